@@ -1,0 +1,80 @@
+# How circline's own targets are made.
+#
+# Sources are globbed: a room of a module is a .h/.cc pair (and a test of the same name), so the
+# folder itself is the list, and CONFIGURE_DEPENDS makes the build notice a new file by itself.
+
+# Warnings and language level of our own sources; PRIVATE, so that users inherit none of it.
+# -Wsign-conversion stays out: with int and Eigen::Index as loop variables over std::vector it
+# asks for a cast in every line and has nothing to say.
+function(circline_own_target target)
+  target_compile_features(${target} PUBLIC cxx_std_17)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE
+    -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Woverloaded-virtual
+    $<$<BOOL:${CIRCLINE_WERROR}>:-Werror>
+    # GCC guesses wrong on code that the sanitizers have rewritten.
+    $<$<BOOL:${CIRCLINE_SANITIZE}>:-Wno-maybe-uninitialized>)
+endfunction()
+
+# circline_module(<module> PUBLIC <targets> PRIVATE <targets> PRIVATE_HEADERS <files>): the library
+# in the folder <module>, circline_<module>, known to users as circline::<module>. Its headers are
+# public and get installed, except for PRIVATE_HEADERS.
+function(circline_module module)
+  cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE;PRIVATE_HEADERS" ${ARGN})
+  set_property(GLOBAL PROPERTY CIRCLINE_${module}_PRIVATE_HEADERS ${ARG_PRIVATE_HEADERS})
+  set(target circline_${module})
+  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cc")
+  # Headers are "circline/<module>/x.h" before and after installation.
+  file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/include/circline")
+  file(CREATE_LINK "${CMAKE_CURRENT_SOURCE_DIR}"
+       "${PROJECT_BINARY_DIR}/include/circline/${module}" SYMBOLIC)
+
+  add_library(${target} ${sources})
+  circline_own_target(${target})
+  target_include_directories(${target} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  add_library(circline::${module} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${module})
+endfunction()
+
+# circline_app(<name> <targets>): the program circline_<name> of the folder <name>, if that has a
+# main.cc. All the rest is an internal library, circline_<name>_lib, for its tests and other programs.
+# Headers are "apps/<name>/x.h".
+function(circline_app name)
+  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cc")
+  set(main "${CMAKE_CURRENT_SOURCE_DIR}/${name}/main.cc")
+  list(REMOVE_ITEM sources "${main}")
+  if(sources)
+    add_library(circline_${name}_lib STATIC ${sources})
+    circline_own_target(circline_${name}_lib)
+    target_include_directories(circline_${name}_lib PUBLIC "${PROJECT_SOURCE_DIR}")
+    target_link_libraries(circline_${name}_lib PUBLIC ${ARGN})
+  endif()
+  if(EXISTS "${main}")
+    add_executable(circline_${name} "${main}")
+    circline_own_target(circline_${name})
+    target_include_directories(circline_${name} PRIVATE "${PROJECT_SOURCE_DIR}")
+    target_link_libraries(circline_${name} PRIVATE ${ARGN})
+    if(sources)
+      target_link_libraries(circline_${name} PRIVATE circline_${name}_lib)
+    endif()
+  endif()
+endfunction()
+
+# circline_test(<folder> <targets>): all *.cc of the folder as circline_<folder>_test, one ctest
+# entry per case. Test helpers are "tests/x.h".
+function(circline_test folder)
+  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cc")
+  if(NOT sources)
+    return()
+  endif()
+  set(target circline_${folder}_test)
+  add_executable(${target} ${sources})
+  circline_own_target(${target})
+  target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
+  target_link_libraries(${target} PRIVATE ${ARGN} GTest::gtest GTest::gtest_main Threads::Threads)
+  gtest_discover_tests(${target} TEST_PREFIX ${folder}. DISCOVERY_MODE PRE_TEST
+                       DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+endfunction()

@@ -1,0 +1,30 @@
+// Poses of one imaged circle (METHOD section 2, proposition 3; section 4 of Wang, Wu and Ji 2007).
+#ifndef CIRCLINE_ESTIMATORS_CIRCLE_POSE_H_
+#define CIRCLINE_ESTIMATORS_CIRCLE_POSE_H_
+
+#include <Eigen/Core>
+#include <array>
+
+namespace circline {
+
+// A circle in space, camera frame, lengths in units of its radius.
+struct CirclePose {
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // Unit; faces the camera: normal . center < 0.
+  Eigen::Vector3d center =
+      Eigen::Vector3d::Zero();  // In front of the camera; |center| = distance / radius.
+};
+
+// The circles whose image is the ellipse `conic` (calibrated, any scale). Returns how many were
+// written: 2; 1 where both coincide to rounding (the plane is parallel to the image of the circle's
+// own cone: tilt 0); 0 where the conic is not a proper ellipse. The order has no meaning.
+// Exact to rounding; the normal of a circle seen at `tilt` radians from frontal is good to 1e-15 /
+// tilt, never worse than 1e-7.
+int CirclePoses(const Eigen::Matrix3d& conic, std::array<CirclePose, 2>* poses);
+
+// The reverse: image of the circle of radius 1 at `pose`, calibrated, unit Frobenius norm, negative
+// inside. Valid for every circle whose plane misses the camera centre.
+Eigen::Matrix3d ProjectCircle(const CirclePose& pose);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_CIRCLE_POSE_H_

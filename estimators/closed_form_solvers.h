@@ -1,0 +1,32 @@
+// The propositions as registered solvers: they choose the evidence, call the free functions of
+// circle_pose.h and line_pose.h, settle the signs, rank, and propagate the covariance.
+#ifndef CIRCLINE_ESTIMATORS_CLOSED_FORM_SOLVERS_H_
+#define CIRCLINE_ESTIMATORS_CLOSED_FORM_SOLVERS_H_
+
+#include "circline/estimators/solver_registry.h"
+
+namespace circline {
+
+struct ClosedFormOptions {
+  // Standard deviation of a point where a feature states none, pixels; > 0.
+  double sigma_px = 1.0;
+  Status Validate() const;
+};
+
+// single_circle (both poses of a circle, nothing else used), circle_center (prop. 3), circle_frame
+// (prop. 4), line_pairs (prop. 5; 1 where both directions are axes). Hypotheses carry a covariance
+// by statistical linearisation: each independent error of the fits, one standard deviation up and
+// down.
+void AddClosedFormSolvers(SolverRegistry* registry, const ClosedFormOptions& options = {});
+
+// Rotation of the world frame whose plane has the unit normal +-`normal`: the in-plane angle from
+// the axes or from lines along them, else X towards the camera's right; the senses of the axes as
+// drawn, else +Z towards the camera, then X to the right. `plane_ray`: any ray that meets the plane
+// in front of the camera. `observations` fitted and resolved (ResolveWorld). False where the
+// evidence is degenerate.
+bool WorldRotation(const Observations& observations, const Eigen::Vector3d& normal,
+                   const Eigen::Vector3d& plane_ray, double sigma_px, Eigen::Matrix3d* rotation);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_CLOSED_FORM_SOLVERS_H_

@@ -1,0 +1,50 @@
+// From contour points to an ellipse in calibrated coordinates, with its covariance.
+#ifndef CIRCLINE_ESTIMATORS_CONIC_FIT_H_
+#define CIRCLINE_ESTIMATORS_CONIC_FIT_H_
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "circline/estimators/camera.h"
+#include "circline/estimators/conic.h"
+#include "circline/estimators/status.h"
+
+namespace circline {
+
+struct ConicFit {
+  Eigen::Matrix3d conic = Eigen::Matrix3d::Zero();  // Calibrated, normalised (NormalizeEllipse).
+  // Of ConicToVector(conic), 6x6 row-major, rank 5: the conic itself is its null vector.
+  std::array<double, 36> covariance{};
+  double rms_px = 0.0;  // Root of the weighted mean squared distance, pixels of the photo.
+
+  Eigen::Map<const Matrix6d> Covariance() const {
+    return Eigen::Map<const Matrix6d>(covariance.data());
+  }
+};
+
+// Maximum-likelihood ellipse: starts from FitConicDirect and minimises the distances to the points
+// in pixels of the photo (each with standard deviation `sigma_px`), damped, never leaving the set
+// of ellipses. `weights` (optional, one per point) multiply the squared residuals. Refuses fewer
+// than 5 points, and points that no ellipse explains (collinear, a hyperbola's branch).
+Status FitConic(const std::vector<CalibratedPoint>& points, double sigma_px, ConicFit* fit,
+                const std::vector<double>* weights = nullptr);
+
+// Closed form: hyper-accurate algebraic least squares (Kanatani and Rangarajan 2011), and where
+// that is not an ellipse, the ellipse-constrained least squares of Halir and Flusser 1998.
+Status FitConicDirect(const std::vector<CalibratedPoint>& points, Eigen::Matrix3d* conic,
+                      const std::vector<double>* weights = nullptr);
+
+// Refines a given ellipse on the points (the second half of FitConic).
+Status RefineConic(const std::vector<CalibratedPoint>& points, double sigma_px,
+                   const Eigen::Matrix3d& initial, ConicFit* fit,
+                   const std::vector<double>* weights = nullptr);
+
+// Conic through five points, calibrated coordinates, as a member of the pencil spanned by two pairs
+// of lines; no test of what kind of conic it is. False where four of the points are collinear.
+// 20 ns.
+bool ConicFromFivePoints(const std::array<Eigen::Vector2d, 5>& x, Eigen::Matrix3d* conic);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_CONIC_FIT_H_

@@ -1,0 +1,94 @@
+#include "circline/estimators/line.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+#include "circline/estimators/geometric_residuals.h"
+
+namespace circline {
+namespace {
+
+double Weight(const std::vector<double>* weights, std::size_t i) {
+  return weights == nullptr ? 1.0 : (*weights)[i];
+}
+
+// Orthogonal regression in calibrated coordinates. False where the points coincide.
+bool RegressLine(const std::vector<CalibratedPoint>& points, const std::vector<double>* weights,
+                 Eigen::Vector3d* line) {
+  double sum = 0.0;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    sum += Weight(weights, i);
+    mean += Weight(weights, i) * points[i].x;
+  }
+  if (!(sum > 0.0)) return false;
+  mean /= sum;
+  double xx = 0.0, xy = 0.0, yy = 0.0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector2d d = points[i].x - mean;
+    xx += Weight(weights, i) * d.x() * d.x();
+    xy += Weight(weights, i) * d.x() * d.y();
+    yy += Weight(weights, i) * d.y() * d.y();
+  }
+  constexpr double kMinSpread =
+      1e-10;  // Calibrated units: points closer than rounding make no line.
+  if (!(xx + yy > kMinSpread * kMinSpread * sum * (1.0 + mean.squaredNorm()))) return false;
+  const double angle = 0.5 * std::atan2(2.0 * xy, xx - yy);  // Of the direction.
+  const Eigen::Vector2d normal(-std::sin(angle), std::cos(angle));
+  *line = Eigen::Vector3d(normal.x(), normal.y(), -normal.dot(mean)).normalized();
+  return true;
+}
+
+Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& unit) {
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = unit.unitOrthogonal();
+  basis.col(1) = unit.cross(basis.col(0));
+  return basis;
+}
+
+}  // namespace
+
+Status FitLine(const std::vector<CalibratedPoint>& points, double sigma_px, LineFit* fit,
+               const std::vector<double>* weights) {
+  if (points.size() < 2) return Status::Refused("a line needs two points");
+  Eigen::Vector3d line;
+  if (!RegressLine(points, weights, &line))
+    return Status::Refused("the points of the line coincide");
+
+  Eigen::Matrix3d information;
+  double cost = 0.0, sum = 0.0;
+  // The distance is measured in the photo, so the metric changes along a distorted line: the
+  // regression is the start, Gauss-Newton on the sphere of lines the answer.
+  constexpr int kPasses = 3;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    information.setZero();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    cost = sum = 0.0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const CalibratedPoint& p = points[i];
+      Eigen::Vector3d jacobian;
+      const double r = LineDistance(p, line, &jacobian);
+      const double w = Weight(weights, i);
+      information += w * jacobian * jacobian.transpose();
+      gradient += w * r * jacobian;
+      cost += w * r * r;
+      sum += w;
+    }
+    if (pass + 1 == kPasses) break;
+    const Eigen::Matrix<double, 3, 2> basis = TangentBasis(line);
+    const Eigen::Vector2d step =
+        (basis.transpose() * information * basis).inverse() * (basis.transpose() * gradient);
+    if (!step.allFinite()) return Status::Refused("the points of the line coincide");
+    line = (line - basis * step).normalized();
+  }
+  const Eigen::Matrix<double, 3, 2> basis = TangentBasis(line);
+  const Eigen::Matrix2d covariance =
+      sigma_px * sigma_px * (basis.transpose() * information * basis).inverse();
+  if (!covariance.allFinite()) return Status::Refused("the points of the line coincide");
+  fit->line = line;
+  fit->covariance = basis * covariance * basis.transpose();
+  fit->rms_px = std::sqrt(cost / sum);
+  return Status::Ok();
+}
+
+}  // namespace circline

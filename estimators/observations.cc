@@ -1,0 +1,269 @@
+#include "circline/estimators/observations.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace circline {
+namespace {
+
+bool Finite(const std::vector<Eigen::Vector2d>& pixels) {
+  return std::all_of(pixels.begin(), pixels.end(),
+                     [](const Eigen::Vector2d& p) { return p.allFinite(); });
+}
+
+bool Finite(const Segment& s) { return s[0].allFinite() && s[1].allFinite(); }
+
+bool NonNegative(double value) { return value >= 0.0 && std::isfinite(value); }
+
+Status ValidateCircle(const CircleObservation& circle) {
+  const std::string name = "circle '" + circle.id + "'";
+  if (!Finite(circle.points)) return Status::Invalid(name + ": a contour point is not finite");
+  if (!circle.inliers.empty() && circle.inliers.size() != circle.points.size()) {
+    return Status::Invalid(name + ": the inlier mask has another length than the contour");
+  }
+  if (!NonNegative(circle.sigma_px)) return Status::Invalid(name + ": sigma_px must be 0 or more");
+  if (!NonNegative(circle.radius)) return Status::Invalid(name + ": radius must be 0 or more");
+  if (circle.center && !circle.center->allFinite())
+    return Status::Invalid(name + ": center is not finite");
+  for (const Segment& s : circle.diameters) {
+    if (!Finite(s)) return Status::Invalid(name + ": a diameter is not finite");
+  }
+  return Status::Ok();
+}
+
+Status ValidatePencil(const PencilObservation& pencil) {
+  const std::string name = "pencil '" + pencil.id + "'";
+  if (!NonNegative(pencil.sigma_px)) return Status::Invalid(name + ": sigma_px must be 0 or more");
+  for (const LineObservation& line : pencil.lines) {
+    if (!Finite(line.points)) return Status::Invalid(name + ": a segment is not finite");
+    if (!line.inliers.empty() && line.inliers.size() != line.points.size()) {
+      return Status::Invalid(name + ": an inlier mask has another length than its line");
+    }
+  }
+  return Status::Ok();
+}
+
+Status ValidateFrame(const Observations& observations) {
+  const FrameObservation& frame = observations.frame;
+  if (frame.origin && !frame.origin->allFinite())
+    return Status::Invalid("frame: origin is not finite");
+  for (const auto* axis : {&frame.x_axis, &frame.y_axis}) {
+    if (*axis && !Finite(**axis)) return Status::Invalid("frame: an axis is not finite");
+    if (*axis && (**axis)[0] == (**axis)[1]) return Status::Invalid("frame: an axis has no length");
+  }
+  if (!frame.origin_is_center.empty() && FindCircle(observations, frame.origin_is_center) < 0) {
+    return Status::Invalid("frame: origin_is_center names no circle: '" + frame.origin_is_center +
+                           "'");
+  }
+  return Status::Ok();
+}
+
+Status ValidateKnown(const Observations& observations) {
+  for (const KnownAngle& angle : observations.known_angles) {
+    for (const std::string& id : angle.pencils) {
+      if (FindPencil(observations, id) < 0) {
+        return Status::Invalid("known angle: there is no pencil '" + id + "'");
+      }
+    }
+    if (!std::isfinite(angle.value) || !NonNegative(angle.sigma)) {
+      return Status::Invalid("known angle between '" + angle.pencils[0] + "' and '" +
+                             angle.pencils[1] + "': value must be finite and sigma 0 or more");
+    }
+  }
+  for (const KnownLength& length : observations.known_lengths) {
+    if (!Finite(length.points) || !(length.value > 0.0) || !std::isfinite(length.value)) {
+      return Status::Invalid("known length: points must be finite and value positive");
+    }
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+const char* PencilDirectionName(PencilDirection direction) {
+  switch (direction) {
+    case PencilDirection::kX:
+      return "x";
+    case PencilDirection::kY:
+      return "y";
+    case PencilDirection::kZ:
+      return "z";
+    case PencilDirection::kFree:
+      return "free";
+  }
+  return "free";
+}
+
+Status Observations::Validate() const {
+  Status status = camera.Validate();
+  std::set<std::string> circle_ids, pencil_ids;
+  for (const CircleObservation& circle : circles) {
+    if (status.ok()) status = ValidateCircle(circle);
+    if (status.ok() && !circle_ids.insert(circle.id).second) {
+      status = Status::Invalid("two circles have the id '" + circle.id + "'");
+    }
+  }
+  for (const PencilObservation& pencil : pencils) {
+    if (status.ok()) status = ValidatePencil(pencil);
+    if (status.ok() && !pencil_ids.insert(pencil.id).second) {
+      status = Status::Invalid("two pencils have the id '" + pencil.id + "'");
+    }
+  }
+  if (status.ok()) status = ValidateFrame(*this);
+  if (status.ok()) status = ValidateKnown(*this);
+  return status;
+}
+
+int FindCircle(const Observations& observations, const std::string& id) {
+  for (std::size_t i = 0; i < observations.circles.size(); ++i) {
+    if (observations.circles[i].id == id) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+int FindPencil(const Observations& observations, const std::string& id) {
+  for (std::size_t i = 0; i < observations.pencils.size(); ++i) {
+    if (observations.pencils[i].id == id) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+namespace {
+
+std::string FirstNamedPlane(const Observations& observations) {
+  if (!observations.frame.plane.empty()) return observations.frame.plane;
+  for (const CircleObservation& circle : observations.circles) {
+    if (!circle.plane.empty()) return circle.plane;
+  }
+  for (const PencilObservation& pencil : observations.pencils) {
+    if (!pencil.plane.empty()) return pencil.plane;
+  }
+  return "";
+}
+
+bool HasRole(const PencilObservation& pencil) { return pencil.direction != PencilDirection::kFree; }
+
+// True if two directions are more than three standard deviations apart (unfitted ones: true).
+bool Differ(const PencilObservation& a, const PencilObservation& b) {
+  if (!a.fit || !b.fit) return true;
+  const double variance = a.fit->covariance.trace() + b.fit->covariance.trace();
+  const double sine2 = a.fit->direction.cross(b.fit->direction).squaredNorm();
+  constexpr double kRounding = 1e-18;
+  return sine2 > 9.0 * variance && sine2 > kRounding;
+}
+
+// Puts the first pair of pencils that span a plane onto `plane`.
+void SpanPlane(const std::string& plane, std::vector<PencilObservation>* pencils) {
+  for (std::size_t i = 0; i < pencils->size(); ++i) {
+    for (std::size_t j = i + 1; j < pencils->size(); ++j) {
+      if (!Differ((*pencils)[i], (*pencils)[j])) continue;
+      (*pencils)[i].plane = (*pencils)[j].plane = plane;
+      return;
+    }
+  }
+}
+
+}  // namespace
+
+Observations ResolveWorld(const Observations& observations) {
+  Observations out = observations;
+  FrameObservation& frame = out.frame;
+  const bool has_role = std::any_of(out.pencils.begin(), out.pencils.end(), HasRole);
+  frame.plane = FirstNamedPlane(out);
+  if (frame.plane.empty()) {
+    frame.plane = "world";
+    const int named = FindCircle(out, frame.origin_is_center);
+    if (!out.circles.empty()) {
+      const CircleObservation reference = out.circles[static_cast<std::size_t>(std::max(0, named))];
+      for (CircleObservation& circle : out.circles) {
+        const bool concentric =
+            !circle.concentric.empty() && circle.concentric == reference.concentric;
+        if (circle.id == reference.id || concentric) circle.plane = frame.plane;
+      }
+    } else if (!has_role) {
+      SpanPlane(frame.plane, &out.pencils);
+    }
+  }
+  const bool x_is_fixed =
+      frame.x_axis || frame.y_axis ||
+      std::any_of(out.pencils.begin(), out.pencils.end(), [](const PencilObservation& p) {
+        return p.direction == PencilDirection::kX || p.direction == PencilDirection::kY;
+      });
+  if (!x_is_fixed) {
+    const auto first = std::find_if(
+        out.pencils.begin(), out.pencils.end(),
+        [&](const PencilObservation& p) { return !HasRole(p) && p.plane == frame.plane; });
+    if (first != out.pencils.end()) first->direction = PencilDirection::kX;
+  }
+  return out;
+}
+
+bool FindAxisLine(const Observations& observations, const Segment& axis, int* pencil, int* line) {
+  const auto contains = [](const LineObservation& l, const Eigen::Vector2d& p) {
+    return std::find(l.points.begin(), l.points.end(), p) != l.points.end();
+  };
+  for (std::size_t i = 0; i < observations.pencils.size(); ++i) {
+    const std::vector<LineObservation>& lines = observations.pencils[i].lines;
+    for (std::size_t j = 0; j < lines.size(); ++j) {
+      if (!contains(lines[j], axis[0]) || !contains(lines[j], axis[1])) continue;
+      *pencil = static_cast<int>(i);
+      *line = static_cast<int>(j);
+      return true;
+    }
+  }
+  return false;
+}
+
+int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
+                     const std::vector<std::uint8_t>& inliers,
+                     std::vector<CalibratedPoint>* points) {
+  if (inliers.empty()) return PixelsToCalibrated(camera, pixels, points);
+  std::vector<Eigen::Vector2d> kept;
+  kept.reserve(pixels.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (inliers[i] != 0) kept.push_back(pixels[i]);
+  }
+  return PixelsToCalibrated(camera, kept, points);
+}
+
+void FitDirect(double default_sigma_px, Observations* observations,
+               std::vector<std::string>* problems) {
+  const auto report = [problems](const std::string& what, const Status& status) {
+    if (problems != nullptr && !status.ok()) problems->push_back(what + ": " + status.message);
+  };
+  const auto sigma = [default_sigma_px](double own) { return own > 0.0 ? own : default_sigma_px; };
+  std::vector<CalibratedPoint> points;
+  for (CircleObservation& circle : observations->circles) {
+    if (circle.fit) continue;
+    observations->num_dropped_points +=
+        CalibrateInliers(observations->camera, circle.points, circle.inliers, &points);
+    ConicFit fit;
+    const Status status = FitConic(points, sigma(circle.sigma_px), &fit);
+    if (status.ok()) circle.fit = fit;
+    report("circle '" + circle.id + "'", status);
+  }
+  for (PencilObservation& pencil : observations->pencils) {
+    std::vector<LineFit> fits;
+    for (std::size_t i = 0; i < pencil.lines.size(); ++i) {
+      LineObservation& line = pencil.lines[i];
+      if (!line.fit) {
+        observations->num_dropped_points +=
+            CalibrateInliers(observations->camera, line.points, line.inliers, &points);
+        LineFit fit;
+        const Status status = FitLine(points, sigma(pencil.sigma_px), &fit);
+        if (status.ok()) line.fit = fit;
+        report("pencil '" + pencil.id + "', line " + std::to_string(i), status);
+      }
+      if (line.fit) fits.push_back(*line.fit);
+    }
+    if (pencil.fit) continue;
+    VanishingPointFit fit;
+    const Status status = FitVanishingPoint(fits, &fit);
+    if (status.ok()) pencil.fit = fit;
+    report("pencil '" + pencil.id + "'", status);
+  }
+}
+
+}  // namespace circline

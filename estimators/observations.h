@@ -1,0 +1,135 @@
+// Everything that one photo tells about one pose: the common language of detection, fitting,
+// solvers and refinement. Detected (DetectObservations), read from a scene file, or filled by hand.
+#ifndef CIRCLINE_ESTIMATORS_OBSERVATIONS_H_
+#define CIRCLINE_ESTIMATORS_OBSERVATIONS_H_
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/camera.h"
+#include "circline/estimators/conic_fit.h"
+#include "circline/estimators/line.h"
+#include "circline/estimators/status.h"
+#include "circline/estimators/vanishing_point.h"
+
+namespace circline {
+
+// Two pixels of the photo. As an axis it is oriented from [0] to [1]; elsewhere it has no sense.
+using Segment = std::array<Eigen::Vector2d, 2>;
+
+// Image of one circle. All pixels are pixels of the photo as taken.
+struct CircleObservation {
+  std::string id;
+  std::vector<Eigen::Vector2d> points;  // Contour, pixels, any order; 5 or more.
+  double sigma_px = 0.0;                // Standard deviation of each coordinate; 0 = not known.
+  std::optional<Eigen::Vector2d>
+      center;              // Image of the circle's centre (NOT the ellipse's), pixels.
+  double radius = 0.0;     // In the world's unit; 0 = not known.
+  std::string plane;       // Circles and pencils with the same id share a plane; empty = with none.
+  std::string concentric;  // Circles with the same id share their centre; empty = with none.
+  std::vector<Segment> diameters;  // Chords through the centre, pixels.
+
+  // Added by a fit.
+  std::optional<ConicFit> fit;
+  std::vector<std::uint8_t> inliers;  // One per point, 1 = inlier; empty = all.
+};
+
+// Image of one straight line: the end points of a segment, or points along it.
+struct LineObservation {
+  std::vector<Eigen::Vector2d> points;  // Pixels; 2 or more.
+
+  std::optional<LineFit> fit;
+  std::vector<std::uint8_t> inliers;
+};
+
+enum class PencilDirection { kX, kY, kZ, kFree };            // Along a world axis, or unknown.
+const char* PencilDirectionName(PencilDirection direction);  // "x", "y", "z", "free".
+
+// Images of lines that are parallel in space.
+struct PencilObservation {
+  std::string id;
+  std::vector<LineObservation> lines;
+  PencilDirection direction = PencilDirection::kFree;
+  std::string plane;      // The plane in which the lines lie; empty = none in particular.
+  double sigma_px = 0.0;  // Of each point's coordinates; 0 = not known.
+
+  std::optional<VanishingPointFit> fit;
+};
+
+// Where the user wants the world frame. All optional; what is not given follows DESIGN conventions:
+// the plane is the first one named, +Z faces the camera, the origin is the first circle's centre.
+struct FrameObservation {
+  std::string plane;                      // The plane Z = 0.
+  std::optional<Eigen::Vector2d> origin;  // Image of the world origin, pixels.
+  std::optional<Segment> x_axis, y_axis;  // Oriented pieces of the axes' images, pixels.
+  std::string origin_is_center;           // Id of the circle whose centre is the origin.
+};
+
+// The angle between the directions of two pencils.
+struct KnownAngle {
+  std::array<std::string, 2> pencils;  // Ids.
+  double value = 0.0;                  // Radians.
+  double sigma = 0.0;                  // Radians; 0 = exact.
+};
+
+// The distance between two points of a plane.
+struct KnownLength {
+  Segment points;     // Pixels.
+  std::string plane;  // Empty = the frame's plane.
+  double value = 0.0;
+};
+
+struct Observations {
+  Camera camera;
+  std::vector<CircleObservation> circles;
+  std::vector<PencilObservation> pencils;
+  FrameObservation frame;
+  std::vector<KnownAngle> known_angles;
+  std::vector<KnownLength> known_lengths;
+  int num_dropped_points = 0;  // Pixels that the camera model cannot undistort, counted by fits.
+  std::string message;  // What a detection wants to say ("one pencil only: ..."); may be empty.
+
+  // Ok, or a sentence naming what is inconsistent: an id used twice, a reference to nothing, a
+  // non-finite number, a negative sigma, radius or length.
+  Status Validate() const;
+};
+
+// Index of a circle or pencil by id, or -1.
+int FindCircle(const Observations& observations, const std::string& id);
+int FindPencil(const Observations& observations, const std::string& id);
+
+// Settles by convention what the user left open, so that every solver speaks of the same world
+// frame; returns the observations with frame.plane and the roles filled in:
+// - The plane Z = 0 is frame.plane, else the first plane named by a circle, then by a pencil. Where
+//   none is named it gets the id "world", and holds the circle whose centre is the origin (else the
+//   first circle) and those concentric with it. Where there is no circle either, and no pencil has
+//   a role, the first two pencils of different direction span it.
+// - Where nothing fixes the X axis (no role x or y, no axis drawn), the first free pencil of that
+// plane
+//   does: it gets role x.
+Observations ResolveWorld(const Observations& observations);
+
+// The line of a pencil of which `axis` is a part: both its end points are points of the line. Such
+// an axis is no evidence of its own (the line is); it adds the sense, and that the line meets the
+// origin.
+bool FindAxisLine(const Observations& observations, const Segment& axis, int* pencil, int* line);
+
+// Points of a line or circle that count (mask applied), calibrated. Returns how many were dropped
+// because the camera cannot undistort them.
+int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
+                     const std::vector<std::uint8_t>& inliers,
+                     std::vector<CalibratedPoint>* points);
+
+// Fills every fit that is absent by the direct (non-robust) maximum-likelihood fits, taking
+// `default_sigma_px` where a feature states no sigma of its own. What cannot be fitted stays
+// without a fit; `problems` (optional) receives one sentence for each.
+void FitDirect(double default_sigma_px, Observations* observations,
+               std::vector<std::string>* problems = nullptr);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_OBSERVATIONS_H_

@@ -1,0 +1,84 @@
+#include "circline/estimators/pose.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace circline {
+
+Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
+Eigen::Matrix3d ExpRotation(const Eigen::Vector3d& delta) {
+  const double angle = delta.norm();
+  const double half = 0.5 * angle;
+  const double sinc = angle > 1e-4 ? std::sin(half) / angle : 0.5 - angle * angle / 48.0;
+  return Eigen::Quaterniond(std::cos(half), sinc * delta.x(), sinc * delta.y(), sinc * delta.z())
+      .normalized()
+      .toRotationMatrix();
+}
+
+Eigen::Vector3d LogRotation(const Eigen::Matrix3d& rotation) {
+  Eigen::Quaterniond q(rotation);
+  if (q.w() < 0.0) q.coeffs() = -q.coeffs();
+  const double sine = q.vec().norm();
+  const double factor = sine > 1e-9 ? 2.0 * std::atan2(sine, q.w()) / sine : 2.0;
+  return factor * q.vec();
+}
+
+double RotationAngle(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+  return LogRotation(a * b.transpose()).norm();
+}
+
+bool PoseHypothesis::RotationIsFree() const {
+  return std::any_of(
+      free_directions.begin(), free_directions.end(),
+      [](const std::array<double, 6>& d) { return std::hypot(d[0], d[1], d[2]) > 1e-6; });
+}
+
+Eigen::Vector3d PoseHypothesis::SigmaRotation() const {
+  Eigen::Vector3d sigma = Covariance().diagonal().head<3>().cwiseMax(0.0).cwiseSqrt();
+  for (const std::array<double, 6>& d : free_directions) {
+    for (int i = 0; i < 3; ++i) {
+      if (std::abs(d[static_cast<std::size_t>(i)]) > 1e-6)
+        sigma[i] = std::numeric_limits<double>::infinity();
+    }
+  }
+  return sigma;
+}
+
+void RankHypotheses(std::vector<PoseHypothesis>* hypotheses) {
+  if (hypotheses->empty()) return;
+  const auto log_posterior = [](const PoseHypothesis& h) { return -h.cost + 0.5 * h.log_det; };
+  std::stable_sort(hypotheses->begin(), hypotheses->end(),
+                   [&](const PoseHypothesis& a, const PoseHypothesis& b) {
+                     return log_posterior(a) > log_posterior(b);
+                   });
+  const double best = log_posterior(hypotheses->front());
+  double sum = 0.0;
+  for (PoseHypothesis& h : *hypotheses) {
+    h.probability = std::exp(log_posterior(h) - best);
+    sum += h.probability;
+  }
+  for (PoseHypothesis& h : *hypotheses) h.probability /= sum;
+}
+
+void MergeHypotheses(double max_angle, std::vector<PoseHypothesis>* hypotheses) {
+  std::vector<PoseHypothesis> kept;
+  for (PoseHypothesis& h : *hypotheses) {
+    const bool duplicate = std::any_of(kept.begin(), kept.end(), [&](const PoseHypothesis& k) {
+      const Eigen::Vector3d a = k.cam_from_world.translation, b = h.cam_from_world.translation;
+      return RotationAngle(k.cam_from_world.rotation, h.cam_from_world.rotation) < max_angle &&
+             a.cross(b).norm() <= max_angle * a.norm() * b.norm();
+    });
+    if (!duplicate) kept.push_back(std::move(h));
+  }
+  *hypotheses = std::move(kept);
+  RankHypotheses(hypotheses);
+}
+
+}  // namespace circline

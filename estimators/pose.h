@@ -1,0 +1,92 @@
+// What a solver returns: every pose that the evidence admits, ranked, each with its uncertainty.
+#ifndef CIRCLINE_ESTIMATORS_POSE_H_
+#define CIRCLINE_ESTIMATORS_POSE_H_
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/conic.h"
+#include "circline/estimators/status.h"
+
+namespace circline {
+
+// X_cam = rotation * X_world + translation.
+struct CameraPose {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::UnitZ();
+};
+
+// A circle as a hypothesis places it, camera frame, in the unit of its pose's translation.
+struct CircleEstimate {
+  std::string id;
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // Unit; faces the camera.
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Vector2d center_px = Eigen::Vector2d::Zero();  // Its image (NOT the ellipse's centre).
+  double radius = 0.0;
+};
+
+// A pencil as a hypothesis sees it.
+struct PencilEstimate {
+  std::string id;
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // Unit, camera frame, without sense.
+  double sigma_deg = 0.0;  // Standard deviation, the larger of the two components; degrees.
+};
+
+struct PoseHypothesis {
+  CameraPose cam_from_world;
+  bool metric = false;       // Else the translation has unit norm.
+  double probability = 1.0;  // Posterior among the hypotheses of the estimate; they sum to 1.
+  double cost = 0.0;         // 1/2 sum rho(r^2), residuals in standard deviations.
+  double log_det = 0.0;  // Log determinant of the covariance of all parameters (Laplace's term).
+  // Of [delta, delta_t], 6x6 row-major; rotation = exp([delta]x) * estimate, delta in the camera
+  // frame, radians. Directions listed in `free_directions` are left out (they carry no variance
+  // here, but are unbounded), and so is the length of t where it is a unit vector.
+  std::array<double, 36> covariance{};
+  int rank = 0;  // Of that covariance.
+  // Orthonormal directions of [delta, delta_t] in which the evidence says nothing.
+  std::vector<std::array<double, 6>> free_directions;
+  double rms_px = 0.0;  // Of the inlier residuals of all evidence, pixels of the photo.
+  int num_inliers = 0, num_observations = 0;  // Scalar residuals.
+  bool origin_observed =
+      false;  // Whether evidence fixes the world origin (else it is a convention).
+  std::vector<CircleEstimate> circles;
+  std::vector<PencilEstimate> pencils;
+
+  Eigen::Map<const Matrix6d> Covariance() const {
+    return Eigen::Map<const Matrix6d>(covariance.data());
+  }
+  // True if some rotation is free; the normal may be known all the same.
+  bool RotationIsFree() const;
+  // Standard deviations of delta's three components, radians; +infinity where unbounded.
+  Eigen::Vector3d SigmaRotation() const;
+};
+
+struct PoseEstimate {
+  Status status;       // Not ok: `hypotheses` is empty and the message says what was missing.
+  std::string solver;  // Who made it.
+  std::vector<PoseHypothesis> hypotheses;  // Best first. Ambiguity is data, not an error.
+  std::string decided_by;  // Which evidence tells the first hypothesis from the others, in words.
+  std::vector<std::string> notes;  // Evidence left out, and why.
+};
+
+// Sorts by posterior, proportional to exp(-cost) sqrt(det covariance), and fills the probabilities.
+void RankHypotheses(std::vector<PoseHypothesis>* hypotheses);
+
+// Removes hypotheses whose rotations agree within `max_angle` radians (and translations within the
+// same angle) with a better one. Call after RankHypotheses; ranks again.
+void MergeHypotheses(double max_angle, std::vector<PoseHypothesis>* hypotheses);
+
+// Rotation vector <-> matrix (Rodrigues), and the angle between two rotations, radians.
+Eigen::Matrix3d ExpRotation(const Eigen::Vector3d& delta);
+Eigen::Vector3d LogRotation(const Eigen::Matrix3d& rotation);
+double RotationAngle(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b);
+
+Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_POSE_H_

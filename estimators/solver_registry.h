@@ -1,0 +1,45 @@
+// Solvers by name. A registry is a value: make one, add what you like, hand it to EstimatePose or
+// to a comparison. There is no global one.
+#ifndef CIRCLINE_ESTIMATORS_SOLVER_REGISTRY_H_
+#define CIRCLINE_ESTIMATORS_SOLVER_REGISTRY_H_
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/observations.h"
+#include "circline/estimators/pose.h"
+
+namespace circline {
+
+enum class SolverStage { kClosedForm, kRefined };
+const char* SolverStageName(SolverStage stage);  // "closed_form", "refined".
+
+// Options are captured when a solver is made; Solve is const and may run in many threads at once.
+class Solver {
+ public:
+  virtual ~Solver() = default;
+  virtual const std::string& name() const = 0;  // "circle_center", ...
+  virtual SolverStage stage() const = 0;
+  virtual std::string needs() const = 0;  // In words: "a circle and the image of its centre".
+  // All hypotheses, best first, or a status that says what was missing or degenerate.
+  virtual PoseEstimate Solve(const Observations& observations) const = 0;
+  // The part of the observations that Solve uses, so that a refinement can be given the same.
+  virtual Observations Evidence(const Observations& observations) const = 0;
+};
+
+class SolverRegistry {
+ public:
+  // Replaces a solver of the same name and stage.
+  void Add(std::shared_ptr<const Solver> solver);
+  // Null if there is none.
+  const Solver* Find(const std::string& name, SolverStage stage) const;
+  const std::vector<std::shared_ptr<const Solver>>& solvers() const { return solvers_; }
+
+ private:
+  std::vector<std::shared_ptr<const Solver>> solvers_;
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_SOLVER_REGISTRY_H_

@@ -1,0 +1,87 @@
+#include "circline/estimators/vanishing_point.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace circline {
+namespace {
+
+double Weight(const std::vector<double>* weights, std::size_t i) {
+  return weights == nullptr ? 1.0 : (*weights)[i];
+}
+
+double Cost(const std::vector<LineFit>& lines, const std::vector<double>* weights,
+            const Eigen::Vector3d& v) {
+  double cost = 0.0;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const double r = VanishingPointResidual(lines[i], v);
+    cost += Weight(weights, i) * r * r;
+  }
+  return cost;
+}
+
+}  // namespace
+
+double VanishingPointResidual(const LineFit& line, const Eigen::Vector3d& direction) {
+  return line.line.dot(direction) / std::sqrt(direction.dot(line.covariance * direction));
+}
+
+Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* fit,
+                         const std::vector<double>* weights) {
+  if (lines.size() < 2) return Status::Refused("a pencil needs two lines");
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    scatter += Weight(weights, i) / lines[i].covariance.trace() * lines[i].line *
+               lines[i].line.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
+  constexpr double kMinRatio = 1e-20;  // Of squared sines: lines within 1e-10 rad are one line.
+  if (!(eigen.eigenvalues()[1] > kMinRatio * eigen.eigenvalues()[2])) {
+    return Status::Refused("the lines of the pencil coincide");
+  }
+  Eigen::Vector3d v = eigen.eigenvectors().col(0);
+  double cost = Cost(lines, weights, v);
+
+  Eigen::Matrix2d information;
+  Eigen::Matrix<double, 3, 2> basis;
+  double damping = 0.0;
+  constexpr int kMaxIterations = 20;
+  for (int iteration = 0;; ++iteration) {
+    basis.col(0) = v.unitOrthogonal();
+    basis.col(1) = v.cross(basis.col(0));
+    information.setZero();
+    Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      const Eigen::Vector3d s_v = lines[i].covariance * v;
+      const double sigma = std::sqrt(v.dot(s_v));
+      const double r = lines[i].line.dot(v) / sigma;
+      const Eigen::Vector2d j = basis.transpose() * (lines[i].line - (r / sigma) * s_v) / sigma;
+      information += Weight(weights, i) * j * j.transpose();
+      gradient += Weight(weights, i) * r * j;
+    }
+    if (iteration == kMaxIterations) break;
+    Eigen::Matrix2d damped = information;
+    damped.diagonal() *= 1.0 + damping;
+    const Eigen::Vector2d step = -(damped.inverse() * gradient);
+    if (!step.allFinite()) return Status::Refused("the lines of the pencil coincide");
+    if (step.norm() < 1e-14) break;
+    const Eigen::Vector3d candidate = (v + basis * step).normalized();
+    const double next = Cost(lines, weights, candidate);
+    if (next <= cost) {
+      const bool converged = cost - next <= 1e-13 * cost;
+      v = candidate;
+      cost = next;
+      damping *= 0.1;
+      if (converged) iteration = kMaxIterations - 1;  // One more linearisation, for the covariance.
+    } else {
+      damping = std::max(1e-3, 10.0 * damping);
+    }
+  }
+  const Eigen::Matrix3d covariance = basis * information.inverse() * basis.transpose();
+  if (!covariance.allFinite()) return Status::Refused("the lines of the pencil coincide");
+  fit->direction = v;
+  fit->covariance = covariance;
+  return Status::Ok();
+}
+
+}  // namespace circline
