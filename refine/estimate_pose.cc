@@ -1,0 +1,41 @@
+#include "circline/refine/estimate_pose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/closed_form_solvers.h"
+#include "circline/refine/joint_problem.h"
+#include "circline/refine/refined_solvers.h"
+#include "circline/refine/seeded_refinement.h"
+
+namespace circline {
+
+Status EstimationOptions::Validate() const {
+  for (const auto& [loss, name] :
+       {std::pair(conic_loss, "conic_loss"), std::pair(line_loss, "line_loss")}) {
+    if (!(loss.scale_px >= 0.0) || !std::isfinite(loss.scale_px)) {
+      return Status::Invalid(std::string(name) + ".scale_px must be positive, or 0 for auto");
+    }
+  }
+  if (max_iterations < 1) return Status::Invalid("max_iterations must be 1 or more");
+  if (!(max_cost_gap > 0.0)) return Status::Invalid("max_cost_gap must be positive");
+  return Status::Ok();
+}
+
+PoseEstimate EstimatePose(const Observations& observations, const EstimationOptions& options,
+                          const SolverRegistry* registry) {
+  SolverRegistry built_in;
+  if (registry == nullptr) {
+    AddClosedFormSolvers(&built_in);
+    registry = &built_in;
+  }
+  std::vector<std::shared_ptr<const Solver>> seeders;
+  for (const std::shared_ptr<const Solver>& solver : registry->solvers()) {
+    if (solver->stage() == SolverStage::kClosedForm) seeders.push_back(solver);
+  }
+  return RefineSeeds("joint", seeders, observations, options);
+}
+
+}  // namespace circline

@@ -1,0 +1,40 @@
+// The front door: from observations to every pose they admit, ranked, with covariances.
+#ifndef CIRCLINE_REFINE_ESTIMATE_POSE_H_
+#define CIRCLINE_REFINE_ESTIMATE_POSE_H_
+
+#include "circline/estimators/observations.h"
+#include "circline/estimators/pose.h"
+#include "circline/estimators/robust_loss.h"
+#include "circline/estimators/solver_registry.h"
+#include "circline/estimators/status.h"
+
+namespace circline {
+
+// How one kind of residual is weighed.
+struct LossOptions {
+  LossType type = LossType::kCauchy;
+  // Standard deviation of a point, pixels of the photo, for features that state no sigma_px of
+  // their own. The loss multiplies it by its own tuning constant. 0 = "auto": estimated from the
+  // residuals of the direct fits (1.4826 x median absolute residual).
+  double scale_px = 0.0;
+};
+
+struct EstimationOptions {
+  LossOptions conic_loss;   // Contour points of circles.
+  LossOptions line_loss;    // Points of lines.
+  int max_iterations = 50;  // Of each refinement; 1 or more.
+  // Seeds whose refined cost exceeds the best by more than this are dropped from the answer, in
+  // units of cost (1/2 chi^2); their probability is below exp(-max_cost_gap).
+  double max_cost_gap = 30.0;
+
+  Status Validate() const;
+};
+
+// Refines every hypothesis of the closed forms on all evidence. `registry` null means the built-in
+// solvers; else its closed forms give the seeds. Never throws, never returns NaN.
+PoseEstimate EstimatePose(const Observations& observations, const EstimationOptions& options = {},
+                          const SolverRegistry* registry = nullptr);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_ESTIMATE_POSE_H_

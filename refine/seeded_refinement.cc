@@ -1,0 +1,244 @@
+#include "circline/refine/seeded_refinement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <utility>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/closed_form_solvers.h"
+#include "circline/refine/joint_problem.h"
+
+namespace circline {
+namespace {
+
+// Seeds closer than this are one; far inside the basin of convergence of each other.
+constexpr double kSameSeed = 0.02;  // Radians.
+// Refined poses closer than this are one.
+constexpr double kSamePose = 1e-6;  // Radians; convergence leaves about 1e-9.
+constexpr std::size_t kMaxSeeds = 8;
+constexpr std::size_t kMaxCircleSeeds = 6;  // Circles that propose both their planes.
+// Where nothing is redundant, so that nothing can be estimated.
+constexpr double kDefaultSigmaPx = 1.0;
+
+// 1.4826 x the median of |values|: the standard deviation of a Gaussian, whatever the outliers.
+double MadSigma(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  for (double& v : values) v = std::abs(v);
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return 1.4826 * *middle;
+}
+
+// Scatter of the points about their own fits, the degrees of freedom of each fit counted in.
+double ConicScale(const Observations& observations) {
+  std::vector<double> residuals;
+  std::vector<CalibratedPoint> points;
+  for (const CircleObservation& circle : observations.circles) {
+    if (!circle.fit || circle.sigma_px > 0.0) continue;
+    CalibrateInliers(observations.camera, circle.points, circle.inliers, &points);
+    if (points.size() <= 5) continue;
+    const double n = static_cast<double>(points.size());
+    const double gain = std::sqrt(n / (n - 5.0));
+    for (const CalibratedPoint& p : points)
+      residuals.push_back(gain * ConicDistancePx(p, circle.fit->conic));
+  }
+  return MadSigma(std::move(residuals));
+}
+
+// The same for lines of more than two points; segments known by their ends alone are judged by how
+// far they miss their pencil's vanishing point, in units of the sigma that their fits assumed.
+double LineScale(const Observations& observations) {
+  std::vector<double> along, across;
+  std::vector<CalibratedPoint> points;
+  for (const PencilObservation& pencil : observations.pencils) {
+    if (pencil.sigma_px > 0.0) continue;
+    const double lines = static_cast<double>(pencil.lines.size());
+    for (const LineObservation& line : pencil.lines) {
+      if (!line.fit) continue;
+      CalibrateInliers(observations.camera, line.points, line.inliers, &points);
+      const double n = static_cast<double>(points.size());
+      if (n > 2.0) {
+        const double gain = std::sqrt(n / (n - 2.0));
+        for (const CalibratedPoint& p : points)
+          along.push_back(gain * LineDistancePx(p, line.fit->line));
+      } else if (pencil.fit && lines > 2.0) {
+        // Sigma of an end point under which this line's miss is one standard deviation: scale the
+        // assumed one. An end-point line's covariance is proportional to its sigma squared.
+        const Eigen::Matrix3d& C = line.fit->covariance;
+        LineFit unit;
+        if (!FitLine(points, 1.0, &unit).ok() || !(C.trace() > 0.0)) continue;
+        across.push_back(std::sqrt(lines / (lines - 2.0)) *
+                         VanishingPointResidual(unit, pencil.fit->direction));
+      }
+    }
+  }
+  constexpr std::size_t kEnough = 8;
+  if (along.size() >= kEnough) return MadSigma(std::move(along));
+  return across.size() >= kEnough ? MadSigma(std::move(across)) : 0.0;
+}
+
+// Settles "auto" scales. Never below a twentieth of a pixel: systematic errors of a camera and of
+// edges do not go away with smooth contours.
+constexpr double kFloorPx = 0.05;
+EstimationOptions SettleScales(const Observations& observations, EstimationOptions options) {
+  const auto settle = [](double measured, double* scale) {
+    if (*scale == 0.0) *scale = measured > 0.0 ? std::max(measured, kFloorPx) : kDefaultSigmaPx;
+  };
+  settle(ConicScale(observations), &options.conic_loss.scale_px);
+  settle(LineScale(observations), &options.line_loss.scale_px);
+  return options;
+}
+
+struct Seed {
+  CameraPose pose;
+  double cost;
+  int source;  // The two poses of one circle, however close, are two seeds.
+};
+
+void AddSeed(const JointProblem& problem, const CameraPose& pose, int source,
+             std::vector<Seed>* seeds) {
+  const double cost = problem.SeedCost(pose);
+  if (!std::isfinite(cost)) return;
+  for (Seed& seed : *seeds) {
+    if (seed.source == source || RotationAngle(seed.pose.rotation, pose.rotation) > kSameSeed)
+      continue;
+    if (cost < seed.cost) seed = {pose, cost, source};
+    return;
+  }
+  seeds->push_back({pose, cost, source});
+}
+
+// Both planes of the largest circles of the world plane, turned in the plane as the other evidence
+// says.
+void AddCircleSeeds(const Observations& observations, double sigma_px, const JointProblem& problem,
+                    std::vector<Seed>* seeds) {
+  std::vector<const CircleObservation*> circles;
+  for (const CircleObservation& circle : observations.circles) {
+    if (circle.fit && circle.plane == observations.frame.plane) circles.push_back(&circle);
+  }
+  std::stable_sort(circles.begin(), circles.end(),
+                   [](const CircleObservation* a, const CircleObservation* b) {
+                     return a->fit->Covariance().trace() < b->fit->Covariance().trace();
+                   });
+  circles.resize(std::min(circles.size(), kMaxCircleSeeds));
+  int source = 0;
+  for (const CircleObservation* circle : circles) {
+    --source;  // Closed forms count upwards.
+    std::array<CirclePose, 2> poses;
+    const int count = CirclePoses(circle->fit->conic, &poses);
+    for (int i = 0; i < count; ++i) {
+      const CirclePose& p = poses[static_cast<std::size_t>(i)];
+      CameraPose pose;
+      if (!WorldRotation(observations, p.normal, p.center, sigma_px, &pose.rotation)) continue;
+      pose.translation = p.center;
+      AddSeed(problem, pose, source, seeds);
+    }
+  }
+}
+
+// Poses that the closed forms propose for the same world plane, and those of its circles. `reason`
+// receives why the last of the closed forms refused.
+std::vector<Seed> CollectSeeds(const Observations& observations,
+                               const std::vector<std::shared_ptr<const Solver>>& seeders,
+                               double sigma_px, const JointProblem& problem,
+                               std::vector<std::string>* reasons) {
+  std::vector<Seed> seeds;
+  int source = 0;
+  for (const std::shared_ptr<const Solver>& seeder : seeders) {
+    const PoseEstimate estimate = seeder->Solve(observations);
+    if (!estimate.status.ok()) {
+      reasons->push_back(seeder->name() + ": " + estimate.status.message);
+      continue;
+    }
+    // Pencils tied to nothing span a plane of their own; a pose of that plane seeds nothing here.
+    if (seeder->Evidence(observations).frame.plane != observations.frame.plane) continue;
+    ++source;
+    for (const PoseHypothesis& h : estimate.hypotheses) {
+      CameraPose pose = h.cam_from_world;
+      // A solver that leaves the spin about the normal open has chosen it by convention; the other
+      // evidence knows better.
+      if (h.RotationIsFree() && !WorldRotation(observations, pose.rotation.col(2), pose.translation,
+                                               sigma_px, &pose.rotation)) {
+        continue;
+      }
+      AddSeed(problem, pose, source, &seeds);
+    }
+  }
+  AddCircleSeeds(observations, sigma_px, problem, &seeds);
+  std::stable_sort(seeds.begin(), seeds.end(),
+                   [](const Seed& a, const Seed& b) { return a.cost < b.cost; });
+  seeds.resize(std::min(seeds.size(), kMaxSeeds));
+  return seeds;
+}
+
+// What tells the best hypothesis from the next, in words.
+std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
+  if (hypotheses.size() < 2) return "only one pose fits the evidence";
+  const double gap = hypotheses[1].cost - hypotheses[0].cost;
+  char text[120];
+  if (std::abs(gap) < 0.5) return "nothing decides: both poses explain the evidence equally well";
+  std::snprintf(text, sizeof(text),
+                "residuals: chi-square lower by %.3g than that of the second pose", 2.0 * gap);
+  return text;
+}
+
+std::string Join(const std::vector<std::string>& parts) {
+  std::string out;
+  for (const std::string& part : parts) out += (out.empty() ? "" : "; ") + part;
+  return out;
+}
+
+}  // namespace
+
+PoseEstimate RefineSeeds(const std::string& name,
+                         const std::vector<std::shared_ptr<const Solver>>& seeders,
+                         const Observations& observations, const EstimationOptions& options) {
+  PoseEstimate estimate;
+  estimate.solver = name;
+  estimate.status = options.Validate();
+  if (estimate.status.ok()) estimate.status = observations.Validate();
+  if (!estimate.status.ok()) return estimate;
+
+  Observations fitted = observations;
+  FitDirect(options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDefaultSigmaPx,
+            &fitted, &estimate.notes);
+  fitted = ResolveWorld(fitted);
+  const EstimationOptions settled = SettleScales(fitted, options);
+  const JointProblem problem(fitted, settled);
+  std::vector<std::string> reasons;
+  const std::vector<Seed> seeds =
+      CollectSeeds(fitted, seeders, settled.line_loss.scale_px, problem, &reasons);
+
+  Status last = Status::Refused(
+      reasons.empty() ? "there is no circle and no pencil of parallel lines" : Join(reasons));
+  for (const Seed& seed : seeds) {
+    PoseHypothesis h;
+    const Status status = problem.Refine(seed.pose, &h);
+    if (status.ok()) {
+      estimate.hypotheses.push_back(std::move(h));
+    } else {
+      last = status;
+    }
+  }
+  RankHypotheses(&estimate.hypotheses);
+  MergeHypotheses(kSamePose, &estimate.hypotheses);
+  if (estimate.hypotheses.empty()) {
+    estimate.status = last;
+    return estimate;
+  }
+  const double best = std::min_element(estimate.hypotheses.begin(), estimate.hypotheses.end(),
+                                       [](const auto& a, const auto& b) { return a.cost < b.cost; })
+                          ->cost;
+  std::vector<PoseHypothesis>& all = estimate.hypotheses;
+  all.erase(
+      std::remove_if(all.begin(), all.end(),
+                     [&](const PoseHypothesis& h) { return h.cost > best + options.max_cost_gap; }),
+      all.end());
+  RankHypotheses(&all);
+  estimate.decided_by = DecidedBy(all);
+  return estimate;
+}
+
+}  // namespace circline
