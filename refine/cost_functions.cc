@@ -17,14 +17,15 @@ struct Robust {
   double residual, factor;  // d residual = factor * d distance.
 };
 
-Robust ApplyLoss(LossType type, double distance, double sigma) {
-  const double r = distance / sigma;
-  if (type == LossType::kTrivial) return {r, 1.0 / sigma};
+Robust ApplyLoss(LossType type, double distance, double sigma, double stretch) {
+  if (type == LossType::kTrivial) return {distance / sigma, 1.0 / sigma};
+  const double width = sigma * stretch;
+  const double r = distance / width;
   const double s = r * r;
+  if (s < 1e-16) return {distance / sigma, 1.0 / sigma};
   const LossValue loss = EvaluateLoss(type, s);
-  if (s < 1e-16) return {r, 1.0 / sigma};
   const double ratio = std::sqrt(loss.rho / s);
-  return {r * ratio, loss.rho_prime / ratio / sigma};
+  return {stretch * r * ratio, loss.rho_prime / (ratio * sigma)};
 }
 
 template <int kRows, int kCols>
@@ -81,9 +82,9 @@ RotationChart::RotationChart(const Eigen::Matrix3d& base, const double* w) {
   right_jacobian = Eigen::Matrix3d::Identity() - b * W + c * W * W;
 }
 
-CircleCost::CircleCost(const PointSet* set, const Eigen::Matrix3d& base, double facing, bool split,
-                       double factor)
-    : set_(set), base_(base), facing_(facing), split_(split), factor_(factor) {
+CircleCost::CircleCost(const PointSet* set, const double* stretch, const Eigen::Matrix3d& base,
+                       double facing, bool split, double factor)
+    : set_(set), stretch_(stretch), base_(base), facing_(facing), split_(split), factor_(factor) {
   set_num_residuals(static_cast<int>(set->points.size()));
   *mutable_parameter_block_sizes() = split ? std::vector<int>{3, 2, 1} : std::vector<int>{3, 3};
 }
@@ -101,7 +102,7 @@ bool CircleCost::Evaluate(double const* const* parameters, double* residuals,
   for (std::size_t i = 0; i < set_->points.size(); ++i) {
     const double d = ConicDistance(set_->points[i], circle.conic, &per_conic);
     if (!std::isfinite(d)) return false;
-    const Robust robust = ApplyLoss(set_->loss, d, set_->sigma_px);
+    const Robust robust = ApplyLoss(set_->loss, d, set_->sigma_px, *stretch_);
     residuals[i] = robust.residual;
     if (jacobians == nullptr) continue;
     const Eigen::Matrix<double, 1, 6> row = robust.factor * per_conic.transpose() * to_parameters;
@@ -129,9 +130,14 @@ void PencilBasis(const Eigen::Vector3d& direction, Eigen::Vector3d* a, Eigen::Ve
   *b = direction.cross(*a);
 }
 
-LineCost::LineCost(Kind kind, const PointSet* set, const Eigen::Matrix3d& base, double facing,
-                   const Eigen::Vector3d& direction)
-    : kind_(kind), set_(set), base_(base), facing_(facing), direction_(direction) {
+LineCost::LineCost(Kind kind, const PointSet* set, const double* stretch,
+                   const Eigen::Matrix3d& base, double facing, const Eigen::Vector3d& direction)
+    : kind_(kind),
+      set_(set),
+      stretch_(stretch),
+      base_(base),
+      facing_(facing),
+      direction_(direction) {
   set_num_residuals(static_cast<int>(set->points.size()));
   std::vector<int>& sizes = *mutable_parameter_block_sizes();
   switch (kind) {
@@ -212,7 +218,7 @@ bool LineCost::Evaluate(double const* const* parameters, double* residuals,
   for (std::size_t i = 0; i < set_->points.size(); ++i) {
     const double d = LineDistance(set_->points[i], line, &per_line);
     if (!std::isfinite(d)) return false;
-    const Robust robust = ApplyLoss(set_->loss, d, set_->sigma_px);
+    const Robust robust = ApplyLoss(set_->loss, d, set_->sigma_px, *stretch_);
     residuals[i] = robust.residual;
     if (jacobians == nullptr) continue;
     const Eigen::Vector3d row = robust.factor * per_line;

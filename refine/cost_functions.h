@@ -16,7 +16,8 @@
 
 namespace circline {
 
-// What the residuals of a circle or line have in common.
+// What the residuals of a circle or line have in common. A robust loss is applied stretched: its
+// tuning constant times `*stretch`, which graduated refinement lowers from large to 1.
 struct PointSet {
   std::vector<CalibratedPoint> points;
   double sigma_px = 1.0;
@@ -34,8 +35,8 @@ struct RotationChart {
 // the last block. Lengths in units of the plane's distance.
 class CircleCost : public ceres::CostFunction {
  public:
-  CircleCost(const PointSet* set, const Eigen::Matrix3d& base, double facing, bool split,
-             double factor);
+  CircleCost(const PointSet* set, const double* stretch, const Eigen::Matrix3d& base, double facing,
+             bool split, double factor);
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
   // The image of the circle, calibrated.
@@ -43,6 +44,7 @@ class CircleCost : public ceres::CostFunction {
 
  private:
   const PointSet* set_;
+  const double* stretch_;
   Eigen::Matrix3d base_;
   double facing_;
   bool split_;
@@ -61,8 +63,8 @@ class LineCost : public ceres::CostFunction {
     kDiameter,        // w[3], center[2], psi[1]: through the centre at angle psi.
   };
   // `direction`: unit, for kFixedDirection only.
-  LineCost(Kind kind, const PointSet* set, const Eigen::Matrix3d& base, double facing,
-           const Eigen::Vector3d& direction = Eigen::Vector3d::Zero());
+  LineCost(Kind kind, const PointSet* set, const double* stretch, const Eigen::Matrix3d& base,
+           double facing, const Eigen::Vector3d& direction = Eigen::Vector3d::Zero());
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
   // The image of the line, calibrated, unit.
@@ -75,6 +77,7 @@ class LineCost : public ceres::CostFunction {
 
   Kind kind_;
   const PointSet* set_;
+  const double* stretch_;
   Eigen::Matrix3d base_;
   double facing_;
   Eigen::Vector3d direction_;

@@ -5,14 +5,6 @@
 #include <utility>
 
 namespace circline {
-namespace {
-
-double SigmaOr(double own_sigma_px, const LossOptions& loss) {
-  return own_sigma_px > 0.0 ? own_sigma_px : loss.scale_px;
-}
-
-}  // namespace
-
 JointEvidence::JointEvidence(const Observations& obs, const EstimationOptions& opts)
     : observations(obs), options(opts) {
   AddParameter(3, false);  // The rotation.
@@ -53,6 +45,12 @@ bool JointEvidence::BothAxes() const {
   return observations.frame.x_axis && observations.frame.y_axis;
 }
 
+// Of points that belong to no pencil: drawn axes, the origin, ends of a known length.
+double JointEvidence::DrawnSigma() const {
+  constexpr double kDrawnSigmaPx = 0.5;
+  return options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDrawnSigmaPx;
+}
+
 void JointEvidence::AddFrame() {
   const FrameObservation& frame = observations.frame;
   origin_observed = BothAxes() || frame.origin || !frame.origin_is_center.empty();
@@ -63,7 +61,7 @@ void JointEvidence::AddFrame() {
     return axis && ((*axis)[0] == *frame.origin || (*axis)[1] == *frame.origin);
   };
   if (BothAxes() && (is_end(frame.x_axis) || is_end(frame.y_axis))) return;
-  AddPoint(*frame.origin, options.line_loss.scale_px, origin);
+  AddPoint(*frame.origin, DrawnSigma(), origin);
 }
 
 // The block of a centre that other residuals share (the world origin, a concentric group), or -1.
@@ -87,7 +85,7 @@ int JointEvidence::CenterBlock(const CircleObservation& circle,
 void JointEvidence::AddCircle(int index, std::map<std::string, int>* concentric) {
   const CircleObservation& circle = observations.circles[static_cast<std::size_t>(index)];
   if (!circle.fit || circle.plane != observations.frame.plane) return;
-  const double sigma = SigmaOr(circle.sigma_px, options.conic_loss);
+  const double sigma = circle.sigma_px;
   const int set = AddSet(circle.points, circle.inliers, sigma, options.conic_loss.type);
   if (set < 0) return;
   CircleTerm term{index, set, CenterBlock(circle, concentric), -1, 1.0};
@@ -150,7 +148,7 @@ void JointEvidence::AddPencil(int index) {
 void JointEvidence::AddLine(const PencilObservation& pencil, int theta, const LineObservation& line,
                             int axis) {
   if (!line.fit) return;
-  const double sigma = SigmaOr(pencil.sigma_px, options.line_loss);
+  const double sigma = pencil.sigma_px;
   const int set = AddSet(line.points, line.inliers, sigma, options.line_loss.type);
   if (set < 0) return;
   LineTerm term{LineCost::Kind::kInPlane, set, theta, -1, Eigen::Vector3d::Zero(), line.fit->line};
@@ -173,7 +171,7 @@ void JointEvidence::AddLine(const PencilObservation& pencil, int theta, const Li
 void JointEvidence::AddAxis(const std::optional<Segment>& axis, bool is_x) {
   int p, l;
   if (!axis || FindAxisLine(observations, *axis, &p, &l)) return;
-  const double sigma = options.line_loss.scale_px;
+  const double sigma = DrawnSigma();
   const int set = AddSet({(*axis)[0], (*axis)[1]}, {}, sigma, options.line_loss.type);
   LineFit fit;
   if (set < 0 || !FitLine(sets[static_cast<std::size_t>(set)].points, sigma, &fit).ok()) return;
@@ -224,8 +222,8 @@ void JointEvidence::AddLength(const KnownLength& known) {
     return;
   }
   const LengthTerm term{AddParameter(2, false), AddParameter(2, false), known.value};
-  points.push_back({a, options.line_loss.scale_px, term.a});
-  points.push_back({b, options.line_loss.scale_px, term.b});
+  points.push_back({a, DrawnSigma(), term.a});
+  points.push_back({b, DrawnSigma(), term.b});
   lengths.push_back(term);
   ScaleBlock();
 }

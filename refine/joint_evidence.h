@@ -88,6 +88,7 @@ struct JointEvidence {
   void AddAngle(const KnownAngle& known);
   void AddLength(const KnownLength& known);
   int ScaleBlock();
+  double DrawnSigma() const;
   bool BothAxes() const;
   int AxisOfLine(int pencil, int line) const;
 };

@@ -32,6 +32,7 @@ struct State {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // Block 0 counts from here.
   double facing = -1.0;
   Values values;
+  double stretch = 1.0;  // Of the robust losses.
 };
 
 // Plane coordinates (X, Y) at which a ray meets the plane; false where it does not, in front.
@@ -44,21 +45,18 @@ bool PlanePoint(const Eigen::Matrix3d& R, double facing, const Eigen::Vector3d& 
   return true;
 }
 
-// Circle of the plane nearest to a fitted conic: exact where the plane's normal is one of the
-// conic's.
+// Circle of the plane like a fitted conic: seen in the plane this is an ellipse, and a circle where
+// the plane's normal is one of the conic's.
 bool PlaneCircle(const Eigen::Matrix3d& R, double facing, const Eigen::Matrix3d& conic,
                  double* cx_cy_radius) {
   const Eigen::Vector3d d(1.0, 1.0, facing);
-  const Eigen::Matrix3d Q = d.asDiagonal() * R.transpose() * conic * R * d.asDiagonal();
-  const double scale = 0.5 * (Q(0, 0) + Q(1, 1));
-  if (!(std::abs(scale) > 0.0)) return false;
-  const double cx = -Q(0, 2) / scale, cy = -Q(1, 2) / scale;
-  const double radius2 = cx * cx + cy * cy - Q(2, 2) / scale;
-  if (!std::isfinite(radius2) || !std::isfinite(cx) || !std::isfinite(cy)) return false;
-  cx_cy_radius[0] = cx;
-  cx_cy_radius[1] = cy;
-  cx_cy_radius[2] = std::sqrt(std::max(radius2, 1e-12));
-  return radius2 > 0.0;
+  const Eigen::Matrix3d in_plane = d.asDiagonal() * R.transpose() * conic * R * d.asDiagonal();
+  Ellipse ellipse;
+  if (!ConicToEllipse(in_plane, &ellipse)) return false;
+  cx_cy_radius[0] = ellipse.center.x();
+  cx_cy_radius[1] = ellipse.center.y();
+  cx_cy_radius[2] = std::sqrt(ellipse.a * ellipse.b);
+  return true;
 }
 
 bool InitializeCircles(const JointEvidence& e, State* state) {
@@ -129,25 +127,29 @@ bool Initialize(const JointEvidence& e, const CameraPose& seed, State* state) {
   return true;
 }
 
-// The residual blocks at a base rotation, on the given point sets (one for each of the evidence's).
+// The residual blocks at a base rotation, on the given point sets (one for each of the evidence's;
+// empty ones make none).
 std::vector<ResidualTerm> MakeTerms(const JointEvidence& e, const std::vector<PointSet>& sets,
                                     const State& state) {
   const Eigen::Matrix3d& R = state.rotation;
   std::vector<ResidualTerm> terms;
   const auto set = [&sets](int index) { return &sets[static_cast<std::size_t>(index)]; };
   for (const CircleTerm& t : e.circles) {
+    if (set(t.set)->points.empty()) continue;
     std::vector<int> blocks = {0, t.center};
     if (t.radius >= 0) blocks.push_back(t.radius);
-    terms.push_back(
-        {std::make_unique<CircleCost>(set(t.set), R, state.facing, t.radius >= 0, t.factor),
-         blocks});
+    terms.push_back({std::make_unique<CircleCost>(set(t.set), &state.stretch, R, state.facing,
+                                                  t.radius >= 0, t.factor),
+                     blocks});
   }
   for (const LineTerm& t : e.lines) {
+    if (set(t.set)->points.empty()) continue;
     std::vector<int> blocks = {0};
     if (t.shared >= 0) blocks.push_back(t.shared);
     if (t.angle >= 0) blocks.push_back(t.angle);
-    terms.push_back(
-        {std::make_unique<LineCost>(t.kind, set(t.set), R, state.facing, t.direction), blocks});
+    terms.push_back({std::make_unique<LineCost>(t.kind, set(t.set), &state.stretch, R, state.facing,
+                                                t.direction),
+                     blocks});
   }
   for (const PointTerm& t : e.points) {
     terms.push_back(
@@ -187,6 +189,24 @@ double RobustCost(const std::vector<ResidualTerm>& terms, Values* values) {
   return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
 }
 
+// Calls visit(set, distance) for each circle, then visit for each line; `terms` as MakeTerms made
+// them on the evidence's own sets. distance(point): signed, pixels.
+template <typename Visit>
+void ForEachCurve(const JointEvidence& e, const std::vector<ResidualTerm>& terms, Values* values,
+                  const Visit& visit) {
+  std::size_t term = 0;  // MakeTerms writes circles first, then lines.
+  for (const CircleTerm& t : e.circles) {
+    const auto* cost = static_cast<const CircleCost*>(terms[term].cost.get());
+    const Eigen::Matrix3d conic = cost->Conic(Pointers(terms[term++].blocks, values).data());
+    visit(t.set, [&](const CalibratedPoint& p) { return ConicDistancePx(p, conic); });
+  }
+  for (const LineTerm& t : e.lines) {
+    const auto* cost = static_cast<const LineCost*>(terms[term].cost.get());
+    const Eigen::Vector3d line = cost->Line(Pointers(terms[term++].blocks, values).data());
+    visit(t.set, [&](const CalibratedPoint& p) { return LineDistancePx(p, line); });
+  }
+}
+
 // Minimises in Ceres; `values` in and out.
 Status Minimize(const std::vector<ResidualTerm>& terms,
                 const std::vector<ParameterInfo>& parameters, bool x_is_fixed, int max_iterations,
@@ -210,8 +230,8 @@ Status Minimize(const std::vector<ResidualTerm>& terms,
   }
   ceres::Solver::Options options;
   options.max_num_iterations = max_iterations;
-  options.function_tolerance = 1e-11;
-  options.parameter_tolerance = 1e-11;
+  options.function_tolerance = 1e-9;
+  options.parameter_tolerance = 1e-10;
   options.gradient_tolerance = 1e-14;
   options.logging_type = ceres::SILENT;
   options.linear_solver_type = any_private ? ceres::DENSE_SCHUR : ceres::DENSE_QR;
@@ -221,6 +241,43 @@ Status Minimize(const std::vector<ResidualTerm>& terms,
   if (!summary.IsSolutionUsable())
     return Status::Failed("the refinement failed: " + summary.message);
   return Status::Ok();
+}
+
+// Largest |residual| / tuning constant but for the worst tenth: above 1, the robust losses are in
+// their tails, where a least-squares solver crawls and a redescending one is lost.
+double RelativeSpread(const JointEvidence& e, const std::vector<ResidualTerm>& terms,
+                      Values* values) {
+  std::vector<double> ratios;
+  const auto add = [&](const PointSet& set, const auto& distance) {
+    for (const CalibratedPoint& p : set.points) {
+      ratios.push_back(std::abs(distance(p)) / (set.sigma_px * LossTuningConstant(set.loss)));
+    }
+  };
+  ForEachCurve(e, terms, values, [&](int set, const auto& distance) {
+    add(e.sets[static_cast<std::size_t>(set)], distance);
+  });
+  if (ratios.empty()) return 0.0;
+  const auto quantile = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() * 9 / 10);
+  std::nth_element(ratios.begin(), quantile, ratios.end());
+  return *quantile;
+}
+
+// Graduated non-convexity: the losses start as wide as the residuals of the seed ask for, and
+// narrow to their own width as these shrink (Black and Rangarajan 1996).
+Status GraduatedMinimize(const JointEvidence& e, const std::vector<ResidualTerm>& terms,
+                         bool x_is_fixed, State* state) {
+  constexpr double kShrink = 0.3;
+  constexpr int kIterationsOnTheWay = 8;
+  state->stretch = std::max(1.0, RelativeSpread(e, terms, &state->values));
+  while (state->stretch > 1.0) {
+    const Status status =
+        Minimize(terms, e.parameters, x_is_fixed,
+                 std::min(kIterationsOnTheWay, e.options.max_iterations), &state->values);
+    if (!status.ok()) return status;
+    state->stretch =
+        std::max(1.0, std::min(kShrink * state->stretch, RelativeSpread(e, terms, &state->values)));
+  }
+  return Minimize(terms, e.parameters, x_is_fixed, e.options.max_iterations, &state->values);
 }
 
 // Moves the rotation found into the base, so that block 0 is zero: the covariance is that of the
@@ -235,37 +292,71 @@ void Recenter(State* state) {
 // --- Results
 // ----------------------------------------------------------------------------------------------
 
-// Keeps the inliers of every set, without loss, and counts them.
-std::vector<PointSet> KeepInliers(const JointEvidence& e, const std::vector<ResidualTerm>& terms,
-                                  Values* values, PoseHypothesis* h) {
-  std::vector<PointSet> kept(e.sets.size());
-  double squares = 0.0;
-  const auto filter = [&](int index, const auto& distance) {
-    const PointSet& set = e.sets[static_cast<std::size_t>(index)];
-    PointSet& out = kept[static_cast<std::size_t>(index)];
+// 1.4826 x the median; `parameters` of the values' degrees of freedom are spent.
+double MadScale(std::vector<double> distances, std::size_t parameters) {
+  constexpr std::size_t kEnough = 8;
+  if (distances.size() < parameters + kEnough) return 0.0;
+  const double n = static_cast<double>(distances.size());
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return 1.4826 * *middle * std::sqrt(n / (n - static_cast<double>(parameters)));
+}
+
+// Splits every set into inliers, kept without loss, and the rest; counts, rms and scales on the
+// way. A set with fewer than `minimum` inliers is an outlier as a whole, and left empty.
+class InlierFilter {
+ public:
+  InlierFilter(const JointEvidence& e, PoseHypothesis* h) : e_(e), h_(h), kept_(e.sets.size()) {}
+
+  // `distance`: of a point, signed, pixels.
+  template <typename Distance>
+  void Add(int index, std::size_t minimum, const Distance& distance,
+           std::vector<double>* distances) {
+    const PointSet& set = e_.sets[static_cast<std::size_t>(index)];
+    PointSet& out = kept_[static_cast<std::size_t>(index)];
     out.sigma_px = set.sigma_px;
+    double squares = 0.0;
     for (const CalibratedPoint& p : set.points) {
-      const double d = distance(p);
-      ++h->num_observations;
-      if (!(std::abs(d) <= kInlierSigmas * set.sigma_px)) continue;
+      const double d = std::abs(distance(p));
+      distances->push_back(d);
+      if (!(d <= kInlierSigmas * set.sigma_px)) continue;
       squares += d * d;
-      ++h->num_inliers;
       out.points.push_back(p);
     }
-  };
-  std::size_t term = 0;  // MakeTerms writes circles first, then lines.
-  for (const CircleTerm& t : e.circles) {
-    const auto* cost = static_cast<const CircleCost*>(terms[term].cost.get());
-    const Eigen::Matrix3d conic = cost->Conic(Pointers(terms[term++].blocks, values).data());
-    filter(t.set, [&](const CalibratedPoint& p) { return ConicDistancePx(p, conic); });
+    h_->num_observations += static_cast<int>(set.points.size());
+    if (out.points.size() < minimum) {
+      out.points.clear();
+      return;
+    }
+    squares_ += squares;
+    h_->num_inliers += static_cast<int>(out.points.size());
   }
-  for (const LineTerm& t : e.lines) {
-    const auto* cost = static_cast<const LineCost*>(terms[term].cost.get());
-    const Eigen::Vector3d line = cost->Line(Pointers(terms[term++].blocks, values).data());
-    filter(t.set, [&](const CalibratedPoint& p) { return LineDistancePx(p, line); });
+
+  std::vector<PointSet> Finish() {
+    h_->rms_px = h_->num_inliers > 0 ? std::sqrt(squares_ / h_->num_inliers) : 0.0;
+    return std::move(kept_);
   }
-  h->rms_px = h->num_inliers > 0 ? std::sqrt(squares / h->num_inliers) : 0.0;
-  return kept;
+
+ private:
+  const JointEvidence& e_;
+  PoseHypothesis* h_;
+  std::vector<PointSet> kept_;
+  double squares_ = 0.0;
+};
+
+std::vector<PointSet> KeepInliers(const JointEvidence& e, const std::vector<ResidualTerm>& terms,
+                                  Values* values, PoseHypothesis* h, ResidualScales* scales) {
+  InlierFilter filter(e, h);
+  std::vector<double> of_circles, of_lines;
+  std::size_t curve = 0;
+  ForEachCurve(e, terms, values, [&](int set, const auto& distance) {
+    const bool is_circle = curve++ < e.circles.size();
+    filter.Add(set, is_circle ? 5 : 2, distance, is_circle ? &of_circles : &of_lines);
+  });
+  constexpr std::size_t kPerCircle = 3, kPerLine = 1, kPose = 3;
+  scales->conic_px = MadScale(of_circles, kPose + kPerCircle * e.circles.size());
+  scales->line_px = MadScale(of_lines, kPose + kPerLine * e.lines.size());
+  return filter.Finish();
 }
 
 // Origin of the world in units of the plane's distance, camera frame.
@@ -409,20 +500,20 @@ double JointProblem::SeedCost(const CameraPose& seed) const {
   return RobustCost(MakeTerms(*evidence_, evidence_->sets, state), &state.values);
 }
 
-Status JointProblem::Refine(const CameraPose& seed, PoseHypothesis* h) const {
+Status JointProblem::Refine(const CameraPose& seed, PoseHypothesis* h,
+                            ResidualScales* scales) const {
   const JointEvidence& e = *evidence_;
   *h = PoseHypothesis();
   State state;
   if (!Initialize(e, seed, &state)) return Status::Failed("a seed pose contradicts the evidence");
   const bool hold_spin = !e.x_is_fixed;
   std::vector<ResidualTerm> terms = MakeTerms(e, e.sets, state);
-  Status status =
-      Minimize(terms, e.parameters, !hold_spin, e.options.max_iterations, &state.values);
+  Status status = GraduatedMinimize(e, terms, !hold_spin, &state);
   if (!status.ok()) return status;
   Recenter(&state);
   terms = MakeTerms(e, e.sets, state);
   h->cost = RobustCost(terms, &state.values);
-  const std::vector<PointSet> inliers = KeepInliers(e, terms, &state.values, h);
+  const std::vector<PointSet> inliers = KeepInliers(e, terms, &state.values, h, scales);
 
   SharedCovariance shared;
   const std::vector<ResidualTerm> inlier_terms = MakeTerms(e, inliers, state);

@@ -26,6 +26,12 @@ namespace circline {
 
 struct JointEvidence;
 
+// Scatter of the points about a refined pose, pixels: 1.4826 x median absolute residual, degrees of
+// freedom counted in; 0 where too few are redundant to tell.
+struct ResidualScales {
+  double conic_px = 0.0, line_px = 0.0;
+};
+
 class JointProblem {
  public:
   // `observations` fitted and resolved (FitObservations or FitDirect, then ResolveWorld). Features
@@ -36,7 +42,7 @@ class JointProblem {
 
   // Refines `seed` (its rotation and, where the origin is known, its translation); fills everything
   // that a hypothesis holds but the probability. Not ok: degenerate evidence, or no convergence.
-  Status Refine(const CameraPose& seed, PoseHypothesis* hypothesis) const;
+  Status Refine(const CameraPose& seed, PoseHypothesis* hypothesis, ResidualScales* scales) const;
 
   // Robust cost at the seed with every other parameter at its closed-form value: ranks seeds
   // cheaply. Infinity where the seed is unusable.

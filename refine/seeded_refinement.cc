@@ -16,11 +16,12 @@ namespace {
 // Seeds closer than this are one; far inside the basin of convergence of each other.
 constexpr double kSameSeed = 0.02;  // Radians.
 // Refined poses closer than this are one.
-constexpr double kSamePose = 1e-6;  // Radians; convergence leaves about 1e-9.
+constexpr double kSamePose = 1e-4;  // Radians; far below any standard deviation.
 constexpr std::size_t kMaxSeeds = 8;
 constexpr std::size_t kMaxCircleSeeds = 6;  // Circles that propose both their planes.
-// Where nothing is redundant, so that nothing can be estimated.
-constexpr double kDefaultSigmaPx = 1.0;
+// Where nothing is redundant, so that nothing can be measured.
+constexpr double kDefaultConicSigmaPx = 0.3;
+constexpr double kDefaultLineSigmaPx = 0.4;
 
 // 1.4826 x the median of |values|: the standard deviation of a Gaussian, whatever the outliers.
 double MadSigma(std::vector<double> values) {
@@ -79,16 +80,43 @@ double LineScale(const Observations& observations) {
   return across.size() >= kEnough ? MadSigma(std::move(across)) : 0.0;
 }
 
-// Settles "auto" scales. Never below a twentieth of a pixel: systematic errors of a camera and of
-// edges do not go away with smooth contours.
-constexpr double kFloorPx = 0.05;
-EstimationOptions SettleScales(const Observations& observations, EstimationOptions options) {
-  const auto settle = [](double measured, double* scale) {
-    if (*scale == 0.0) *scale = measured > 0.0 ? std::max(measured, kFloorPx) : kDefaultSigmaPx;
+// Standard deviations of the points, pixels; 0 = not known.
+struct Scales {
+  double conic = 0.0, line = 0.0;
+};
+
+// "auto": measured, where anything is redundant.
+Scales MeasureScales(const Observations& observations) {
+  return {ConicScale(observations), LineScale(observations)};
+}
+
+// Gives every feature that states no sigma_px the one that options or measurement say. Under "auto"
+// the errors of one feature are not taken as independent: its n points share a smooth error (lens,
+// blur, print, a surface not quite flat) that no number of them averages out, which is what a
+// standard deviation of sqrt(sigma^2 + n bias^2) for each amounts to.
+Observations ApplyScales(const Observations& observations, const EstimationOptions& options,
+                         const Scales& scales) {
+  Observations out = observations;
+  const auto effective = [](const LossOptions& loss, double measured, double fallback, double bias,
+                            std::size_t n) {
+    if (loss.scale_px > 0.0) return loss.scale_px;
+    const double sigma = measured > 0.0 ? measured : fallback;
+    return std::sqrt(sigma * sigma + static_cast<double>(n) * bias * bias);
   };
-  settle(ConicScale(observations), &options.conic_loss.scale_px);
-  settle(LineScale(observations), &options.line_loss.scale_px);
-  return options;
+  for (CircleObservation& circle : out.circles) {
+    if (circle.sigma_px > 0.0) continue;
+    circle.sigma_px = effective(options.conic_loss, scales.conic, kDefaultConicSigmaPx,
+                                options.contour_bias_px, circle.points.size());
+  }
+  for (PencilObservation& pencil : out.pencils) {
+    if (pencil.sigma_px > 0.0) continue;
+    std::size_t longest = 2;
+    for (const LineObservation& line : pencil.lines)
+      longest = std::max(longest, line.points.size());
+    pencil.sigma_px = effective(options.line_loss, scales.line, kDefaultLineSigmaPx,
+                                options.line_bias_px, longest);
+  }
+  return out;
 }
 
 struct Seed {
@@ -112,7 +140,7 @@ void AddSeed(const JointProblem& problem, const CameraPose& pose, int source,
 
 // Both planes of the largest circles of the world plane, turned in the plane as the other evidence
 // says.
-void AddCircleSeeds(const Observations& observations, double sigma_px, const JointProblem& problem,
+void AddCircleSeeds(const Observations& observations, const JointProblem& problem,
                     std::vector<Seed>* seeds) {
   std::vector<const CircleObservation*> circles;
   for (const CircleObservation& circle : observations.circles) {
@@ -131,7 +159,8 @@ void AddCircleSeeds(const Observations& observations, double sigma_px, const Joi
     for (int i = 0; i < count; ++i) {
       const CirclePose& p = poses[static_cast<std::size_t>(i)];
       CameraPose pose;
-      if (!WorldRotation(observations, p.normal, p.center, sigma_px, &pose.rotation)) continue;
+      if (!WorldRotation(observations, p.normal, p.center, kDefaultLineSigmaPx, &pose.rotation))
+        continue;
       pose.translation = p.center;
       AddSeed(problem, pose, source, seeds);
     }
@@ -142,8 +171,7 @@ void AddCircleSeeds(const Observations& observations, double sigma_px, const Joi
 // receives why the last of the closed forms refused.
 std::vector<Seed> CollectSeeds(const Observations& observations,
                                const std::vector<std::shared_ptr<const Solver>>& seeders,
-                               double sigma_px, const JointProblem& problem,
-                               std::vector<std::string>* reasons) {
+                               const JointProblem& problem, std::vector<std::string>* reasons) {
   std::vector<Seed> seeds;
   int source = 0;
   for (const std::shared_ptr<const Solver>& seeder : seeders) {
@@ -160,13 +188,13 @@ std::vector<Seed> CollectSeeds(const Observations& observations,
       // A solver that leaves the spin about the normal open has chosen it by convention; the other
       // evidence knows better.
       if (h.RotationIsFree() && !WorldRotation(observations, pose.rotation.col(2), pose.translation,
-                                               sigma_px, &pose.rotation)) {
+                                               kDefaultLineSigmaPx, &pose.rotation)) {
         continue;
       }
       AddSeed(problem, pose, source, &seeds);
     }
   }
-  AddCircleSeeds(observations, sigma_px, problem, &seeds);
+  AddCircleSeeds(observations, problem, &seeds);
   std::stable_sort(seeds.begin(), seeds.end(),
                    [](const Seed& a, const Seed& b) { return a.cost < b.cost; });
   seeds.resize(std::min(seeds.size(), kMaxSeeds));
@@ -190,6 +218,42 @@ std::string Join(const std::vector<std::string>& parts) {
   return out;
 }
 
+// Every seed refined at the given scales; `measured` receives the scatter about the best pose.
+Status RefineAt(const Observations& scaled,
+                const std::vector<std::shared_ptr<const Solver>>& seeders,
+                const EstimationOptions& options, std::vector<PoseHypothesis>* hypotheses,
+                Scales* measured) {
+  const JointProblem problem(scaled, options);
+  std::vector<std::string> reasons;
+  const std::vector<Seed> seeds = CollectSeeds(scaled, seeders, problem, &reasons);
+  Status last = Status::Refused(
+      reasons.empty() ? "there is no circle and no pencil of parallel lines" : Join(reasons));
+  double best_cost = std::numeric_limits<double>::infinity();
+  hypotheses->clear();
+  for (const Seed& seed : seeds) {
+    PoseHypothesis h;
+    ResidualScales scales;
+    const Status status = problem.Refine(seed.pose, &h, &scales);
+    if (!status.ok()) {
+      last = status;
+      continue;
+    }
+    if (h.cost < best_cost) *measured = {scales.conic_px, scales.line_px};
+    best_cost = std::min(best_cost, h.cost);
+    hypotheses->push_back(std::move(h));
+  }
+  if (hypotheses->empty()) return last;
+  RankHypotheses(hypotheses);
+  MergeHypotheses(kSamePose, hypotheses);
+  hypotheses->erase(std::remove_if(hypotheses->begin(), hypotheses->end(),
+                                   [&](const PoseHypothesis& h) {
+                                     return h.cost > best_cost + options.max_cost_gap;
+                                   }),
+                    hypotheses->end());
+  RankHypotheses(hypotheses);
+  return Status::Ok();
+}
+
 }  // namespace
 
 PoseEstimate RefineSeeds(const std::string& name,
@@ -202,42 +266,26 @@ PoseEstimate RefineSeeds(const std::string& name,
   if (!estimate.status.ok()) return estimate;
 
   Observations fitted = observations;
-  FitDirect(options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDefaultSigmaPx,
+  FitDirect(options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDefaultLineSigmaPx,
             &fitted, &estimate.notes);
   fitted = ResolveWorld(fitted);
-  const EstimationOptions settled = SettleScales(fitted, options);
-  const JointProblem problem(fitted, settled);
-  std::vector<std::string> reasons;
-  const std::vector<Seed> seeds =
-      CollectSeeds(fitted, seeders, settled.line_loss.scale_px, problem, &reasons);
-
-  Status last = Status::Refused(
-      reasons.empty() ? "there is no circle and no pencil of parallel lines" : Join(reasons));
-  for (const Seed& seed : seeds) {
-    PoseHypothesis h;
-    const Status status = problem.Refine(seed.pose, &h);
-    if (status.ok()) {
-      estimate.hypotheses.push_back(std::move(h));
-    } else {
-      last = status;
-    }
+  Scales scales = MeasureScales(fitted), measured;
+  estimate.status = RefineAt(ApplyScales(fitted, options, scales), seeders, options,
+                             &estimate.hypotheses, &measured);
+  // Features that fit well one by one may fit badly together (a plane not quite flat): then the
+  // scatter about the common pose is the noise that counts.
+  constexpr double kTolerated = 1.3;
+  const bool conic_worse =
+      options.conic_loss.scale_px == 0.0 && measured.conic > kTolerated * scales.conic;
+  const bool line_worse =
+      options.line_loss.scale_px == 0.0 && measured.line > kTolerated * scales.line;
+  if (estimate.status.ok() && (conic_worse || line_worse)) {
+    if (conic_worse) scales.conic = measured.conic;
+    if (line_worse) scales.line = measured.line;
+    estimate.status = RefineAt(ApplyScales(fitted, options, scales), seeders, options,
+                               &estimate.hypotheses, &measured);
   }
-  RankHypotheses(&estimate.hypotheses);
-  MergeHypotheses(kSamePose, &estimate.hypotheses);
-  if (estimate.hypotheses.empty()) {
-    estimate.status = last;
-    return estimate;
-  }
-  const double best = std::min_element(estimate.hypotheses.begin(), estimate.hypotheses.end(),
-                                       [](const auto& a, const auto& b) { return a.cost < b.cost; })
-                          ->cost;
-  std::vector<PoseHypothesis>& all = estimate.hypotheses;
-  all.erase(
-      std::remove_if(all.begin(), all.end(),
-                     [&](const PoseHypothesis& h) { return h.cost > best + options.max_cost_gap; }),
-      all.end());
-  RankHypotheses(&all);
-  estimate.decided_by = DecidedBy(all);
+  if (estimate.status.ok()) estimate.decided_by = DecidedBy(estimate.hypotheses);
   return estimate;
 }
 
