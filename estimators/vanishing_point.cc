@@ -35,7 +35,7 @@ Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* f
                lines[i].line.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
-  constexpr double kMinRatio = 1e-20;  // Of squared sines: lines within 1e-10 rad are one line.
+  constexpr double kMinRatio = 1e-15;  // Of squared sines; eigenvalues round at 1e-16.
   if (!(eigen.eigenvalues()[1] > kMinRatio * eigen.eigenvalues()[2])) {
     return Status::Refused("the lines of the pencil coincide");
   }

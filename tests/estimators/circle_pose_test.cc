@@ -1,0 +1,102 @@
+#include "circline/estimators/circle_pose.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "circline/estimators/random.h"
+
+namespace circline {
+namespace {
+
+// A circle of radius 1 tilted from the direction to the camera by `tilt`, in a random direction.
+CirclePose RandomCircle(double tilt, double distance, Random* random) {
+  CirclePose pose;
+  pose.center =
+      distance *
+      Eigen::Vector3d(random->Uniform(-0.5, 0.5), random->Uniform(-0.5, 0.5), 1.0).normalized();
+  const Eigen::Vector3d towards = -pose.center.normalized();
+  const Eigen::Vector3d a = towards.unitOrthogonal(), b = towards.cross(a);
+  const double spin = random->Uniform(0.0, 6.283185307179586);
+  pose.normal =
+      std::cos(tilt) * towards + std::sin(tilt) * (std::cos(spin) * a + std::sin(spin) * b);
+  return pose;
+}
+
+double BestNormalError(const CirclePose& truth) {
+  std::array<CirclePose, 2> poses;
+  const int count = CirclePoses(ProjectCircle(truth), &poses);
+  double best = 4.0;
+  for (int i = 0; i < count; ++i) {
+    const CirclePose& p = poses[static_cast<std::size_t>(i)];
+    best = std::min(
+        best, p.normal.cross(truth.normal).norm() + (p.normal.dot(truth.normal) < 0.0 ? 4.0 : 0.0));
+  }
+  return best;
+}
+
+TEST(CirclePoseTest, TruthIsAmongTheTwo) {
+  Random random(1);
+  std::vector<double> errors;
+  for (int i = 0; i < 100000; ++i) {
+    const CirclePose truth =
+        RandomCircle(random.Uniform(0.02, 1.45), random.Uniform(2.0, 40.0), &random);
+    // Circles that reach behind the camera's plane have no ellipse as image.
+    if (truth.center.z() < 1.5) continue;
+    errors.push_back(BestNormalError(truth));
+  }
+  ASSERT_GT(errors.size(), 90000U);
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2),
+                   errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 1e-12);
+  EXPECT_LT(*std::max_element(errors.begin(), errors.end()), 1e-6);
+}
+
+TEST(CirclePoseTest, CentersAreInUnitsOfTheRadius) {
+  Random random(2);
+  for (int i = 0; i < 1000; ++i) {
+    const CirclePose truth = RandomCircle(0.7, 8.0, &random);
+    std::array<CirclePose, 2> poses;
+    ASSERT_EQ(CirclePoses(ProjectCircle(truth), &poses), 2);
+    const double miss =
+        std::min((poses[0].center - truth.center).norm(), (poses[1].center - truth.center).norm());
+    EXPECT_LT(miss, 1e-10);
+    for (const CirclePose& p : poses) {
+      EXPECT_LT(p.normal.dot(p.center), 0.0);  // Faces the camera.
+      // Both project to the very same conic.
+      EXPECT_LT((ProjectCircle(p) - ProjectCircle(truth)).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(CirclePoseTest, NearlyFrontalCirclesKeepTheirNormal) {
+  Random random(3);
+  for (double tilt = 1e-1; tilt > 0.5e-8; tilt *= 0.1) {
+    const double bar = std::min(1e-7, std::max(1e-12, 1e-15 / tilt));
+    double worst = 0.0;
+    for (int i = 0; i < 200; ++i)
+      worst = std::max(worst, BestNormalError(RandomCircle(tilt, 8.0, &random)));
+    EXPECT_LE(worst, bar) << "tilt " << tilt;
+  }
+  // Exactly frontal and on the axis: one pose.
+  std::array<CirclePose, 2> poses;
+  const Eigen::Matrix3d frontal = Eigen::Vector3d(1.0, 1.0, -0.01).asDiagonal();
+  ASSERT_EQ(CirclePoses(frontal, &poses), 1);
+  EXPECT_LT((poses[0].normal - Eigen::Vector3d(0.0, 0.0, -1.0)).norm(), 1e-12);
+  EXPECT_LT((poses[0].center - Eigen::Vector3d(0.0, 0.0, 10.0)).norm(), 1e-9);
+}
+
+TEST(CirclePoseTest, WhatIsNoEllipseHasNoPose) {
+  std::array<CirclePose, 2> poses;
+  for (const Eigen::Vector3d& d :
+       {Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(1, -1, -1), Eigen::Vector3d(1, 0, -1),
+        Eigen::Vector3d(1, 1, 0), Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(NAN, 1, -1)}) {
+    EXPECT_EQ(CirclePoses(Eigen::Matrix3d(d.asDiagonal()), &poses), 0) << d.transpose();
+  }
+}
+
+}  // namespace
+}  // namespace circline

@@ -1,0 +1,114 @@
+#include "circline/estimators/line.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "circline/estimators/random.h"
+#include "circline/estimators/vanishing_point.h"
+
+namespace circline {
+namespace {
+
+Camera BarrelCamera() {
+  Camera camera;
+  camera.model = CameraModel::kOpenCV;
+  camera.fx = camera.fy = 500.0;
+  camera.cx = 320.0;
+  camera.cy = 240.0;
+  camera.distortion = {-0.28, 0.08, 0.0, 0.0, 0.0};
+  return camera;
+}
+
+// Noisy pixels of the line from a to b (calibrated), seen through the camera.
+std::vector<CalibratedPoint> NoisyLine(const Camera& camera, const Eigen::Vector2d& a,
+                                       const Eigen::Vector2d& b, int n, double sigma_px,
+                                       Random* random) {
+  std::vector<CalibratedPoint> points;
+  for (int i = 0; i < n; ++i) {
+    const Eigen::Vector2d x = a + (b - a) * i / (n - 1);
+    Eigen::Vector2d pixel;
+    CameraToPixel(camera, {x.x(), x.y(), 1.0}, &pixel);
+    const double dx = random->Normal(), dy = random->Normal();
+    CalibratedPoint p;
+    PixelToCalibrated(camera, pixel + sigma_px * Eigen::Vector2d(dx, dy), &p);
+    points.push_back(p);
+  }
+  return points;
+}
+
+// Squared error of a unit vector without sense in units of its rank-2 covariance.
+double Nees(const Eigen::Vector3d& estimate, const Eigen::Matrix3d& covariance,
+            const Eigen::Vector3d& truth) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
+  const Eigen::Vector3d d = estimate - truth * (estimate.dot(truth) < 0.0 ? -1.0 : 1.0);
+  const Eigen::Vector3d z = eigen.eigenvectors().transpose() * d;
+  return (z.tail<2>().array().square() / eigen.eigenvalues().tail<2>().array()).sum();
+}
+
+TEST(LineTest, CovarianceIsHonestUnderDistortion) {
+  const Camera camera = BarrelCamera();
+  Random random(1);
+  for (int n : {2, 30}) {
+    constexpr int kTrials = 2000;
+    double nees = 0.0;
+    for (int i = 0; i < kTrials; ++i) {
+      const Eigen::Vector2d a(random.Uniform(-0.5, 0.0), random.Uniform(-0.4, 0.4));
+      const Eigen::Vector2d b(random.Uniform(0.1, 0.5), random.Uniform(-0.4, 0.4));
+      const Eigen::Vector3d truth = a.homogeneous().cross(b.homogeneous()).normalized();
+      LineFit fit;
+      ASSERT_TRUE(FitLine(NoisyLine(camera, a, b, n, 0.5, &random), 0.5, &fit).ok());
+      nees += Nees(fit.line, fit.covariance, truth) / kTrials;
+    }
+    EXPECT_NEAR(nees, 2.0, 0.2) << n << " points";
+  }
+}
+
+TEST(LineTest, RefusesDegeneratePoints) {
+  LineFit fit;
+  std::vector<CalibratedPoint> points(1);
+  EXPECT_EQ(FitLine(points, 1.0, &fit).code, StatusCode::kRefused);
+  points.resize(5);
+  for (CalibratedPoint& p : points) p.x = {0.3, 0.4};
+  EXPECT_EQ(FitLine(points, 1.0, &fit).code, StatusCode::kRefused);
+}
+
+TEST(VanishingPointTest, SitsOnItsCovarianceForMixedLengths) {
+  const Camera camera = BarrelCamera();
+  Random random(2);
+  // Directions near and far, and one parallel to the image: infinity is nothing special.
+  for (const Eigen::Vector3d& raw :
+       {Eigen::Vector3d(1.0, 0.2, 0.3), Eigen::Vector3d(0.1, 0.9, 0.0)}) {
+    const Eigen::Vector3d direction = raw.normalized();
+    constexpr int kTrials = 1000;
+    double nees = 0.0;
+    for (int i = 0; i < kTrials; ++i) {
+      std::vector<LineFit> lines;
+      while (lines.size() < 8) {
+        const Eigen::Vector3d start(random.Uniform(-0.3, 0.3), random.Uniform(-0.3, 0.3), 1.0);
+        const Eigen::Vector3d end = start + random.Uniform(0.05, 0.4) * direction;
+        LineFit fit;
+        const auto points =
+            NoisyLine(camera, start.hnormalized(), end.hnormalized(), 2, 0.3, &random);
+        if (FitLine(points, 0.3, &fit).ok()) lines.push_back(fit);
+      }
+      VanishingPointFit fit;
+      ASSERT_TRUE(FitVanishingPoint(lines, &fit).ok());
+      nees += Nees(fit.direction, fit.covariance, direction) / kTrials;
+    }
+    EXPECT_NEAR(nees, 2.0, 0.3);
+  }
+}
+
+TEST(VanishingPointTest, RefusesOneLineManyTimes) {
+  LineFit line;
+  line.line = Eigen::Vector3d(0.6, 0.8, 0.0);
+  line.covariance = 1e-6 * (Eigen::Matrix3d::Identity() - line.line * line.line.transpose());
+  VanishingPointFit fit;
+  EXPECT_EQ(FitVanishingPoint({line}, &fit).code, StatusCode::kRefused);
+  EXPECT_EQ(FitVanishingPoint({line, line, line}, &fit).code, StatusCode::kRefused);
+}
+
+}  // namespace
+}  // namespace circline
