@@ -11,9 +11,11 @@ function(circline_own_target target)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Woverloaded-virtual
-    $<$<BOOL:${CIRCLINE_WERROR}>:-Werror>
+    $<$<BOOL:${CIRCLINE_WERROR}>:-Werror>)
+  if(CIRCLINE_SANITIZE)
     # GCC guesses wrong on code that the sanitizers have rewritten.
-    $<$<BOOL:${CIRCLINE_SANITIZE}>:-Wno-maybe-uninitialized>)
+    target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized)
+  endif()
 endfunction()
 
 # circline_module(<module> PUBLIC <targets> PRIVATE <targets> PRIVATE_HEADERS <files>): the library

@@ -1,0 +1,482 @@
+#include "circline/ransac/conic_model.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "circline/estimators/conic.h"
+
+namespace circline {
+namespace {
+
+// Keeps 0 / 0 out of the centre of a conic; far below any squared gradient per pixel that matters.
+constexpr float kTiny = 1e-30f;
+
+constexpr double kPi = 3.14159265358979323846;
+
+// 99.8 % of a Gaussian's points.
+constexpr double kSigmas = 3.03;
+
+// Eccentric anomalies are counted in sectors of 10 degrees.
+constexpr int kSectors = 36;
+
+// Fewest neighbouring sectors that hold four fifths of the counts: the rest may be clutter.
+int SectorsOfMost(const std::array<int, kSectors>& counts) {
+  int total = 0;
+  for (const int c : counts) total += c;
+  for (int width = 1; width < kSectors; ++width) {
+    int sum = 0;
+    for (int i = 0; i < width; ++i) sum += counts[static_cast<std::size_t>(i)];
+    for (int i = 0; i < kSectors; ++i) {
+      if (5 * sum >= 4 * total) return width;
+      sum += counts[static_cast<std::size_t>((i + width) % kSectors)] -
+             counts[static_cast<std::size_t>(i)];
+    }
+  }
+  return kSectors;
+}
+
+// The sector of a point: the affine map that takes the ellipse to a circle (the Cholesky factor of
+// its quadratic part) makes its eccentric anomaly an angle.
+class SectorOf {
+ public:
+  explicit SectorOf(const ConicModel::Value& value) {
+    const auto [a, b, c, d, e, f] = value;
+    const double minor = a * c - b * b;
+    center_ = {(b * e - c * d) / minor, (b * d - a * e) / minor};
+    l00_ = std::sqrt(a);
+    l10_ = b / l00_;
+    l11_ = std::sqrt(std::max(0.0, c - l10_ * l10_));
+  }
+  std::size_t operator()(const Eigen::Vector2d& x) const {
+    const Eigen::Vector2d p = x - center_;
+    const double angle = std::atan2(l11_ * p.y(), l00_ * p.x() + l10_ * p.y());
+    const int sector = static_cast<int>((angle / (2.0 * kPi) + 0.5) * kSectors);
+    return static_cast<std::size_t>(std::clamp(sector, 0, kSectors - 1));
+  }
+
+ private:
+  Eigen::Vector2d center_;
+  double l00_, l10_, l11_;
+};
+
+// What a straight line explains of these points, as a sum of 1 - min(r^2 / T^2, 1): the best of
+// lines through pairs of them. The points are in random order.
+double GainOfLine(const Eigen::Vector2d* points, int n, double threshold) {
+  constexpr int kPairs = 16;  // Three quarters on a line: all miss it once in 10^5.
+  double best = 0.0;
+  for (int k = 0; k < std::min(kPairs, n / 2); ++k) {
+    const Eigen::Vector2d d = points[n - 1 - k] - points[k];
+    const double length = d.norm();
+    if (length < 4.0 * threshold) continue;
+    const Eigen::Vector2d normal = Eigen::Vector2d(-d.y(), d.x()) / (length * threshold);
+    const double offset = normal.dot(points[k]);
+    double gain = 0.0;
+    for (int i = 0; i < n; ++i) {
+      const double r = normal.dot(points[i]) - offset;
+      gain += 1.0 - std::min(1.0, r * r);
+    }
+    best = std::max(best, gain);
+  }
+  return best;
+}
+
+// Gauss-Newton on r = v / (2 |g|), v = q . m and g the gradient per pixel (halved), of the
+// coefficients q of a conic. Points are taken in blocks, so that the compiler can work on several
+// at a time: half the time of point by point.
+class ConicNormalEquations {
+ public:
+  explicit ConicNormalEquations(const ConicModel::Value& q) : q_(q) {}
+
+  void Add(const Eigen::Vector2d& x, const std::array<double, 4>& x_from_pixel, double weight) {
+    x_[size_] = x.x();
+    y_[size_] = x.y();
+    for (std::size_t k = 0; k < 4; ++k) j_[k][size_] = x_from_pixel[k];
+    w_[size_] = weight;
+    if (++size_ == kBlock) Flush();
+    ++count_;
+  }
+
+  int count() const { return count_; }
+
+  // The step of q that minimises the linearised cost, orthogonal to q: r does not change with the
+  // scale of q, so q q^T closes the rank. False if there is none.
+  bool Step(Vector6d* step) {
+    Flush();
+    Matrix6d H;
+    Vector6d gradient;
+    std::size_t k = 0;
+    for (int m = 0; m < 6; ++m) {
+      for (int n = m; n < 6; ++n) H(m, n) = H(n, m) = sums_[k++];
+      gradient[m] = sums_[k++];
+    }
+    const Eigen::Map<const Vector6d> q(q_.data());
+    const double trace = H.trace();
+    H += trace * q * q.transpose();
+    H.diagonal().array() += 1e-12 * trace;
+    *step = -H.ldlt().solve(gradient);
+    return step->allFinite();
+  }
+
+ private:
+  static constexpr int kBlock = 32;
+  using Block = Eigen::Array<double, kBlock, 1>;
+
+  void Flush() {
+    if (size_ == 0) return;
+    for (int i = size_; i < kBlock; ++i) {
+      x_[i] = x_[0];
+      y_[i] = y_[0];
+      for (Block& j : j_) j[i] = j[0];
+      w_[i] = 0.0;
+    }
+    size_ = 0;
+    const auto [a, b, c, d, e, f] = q_;
+    const Block gx = a * x_ + b * y_ + d, gy = b * x_ + c * y_ + e;
+    const Block gu = j_[0] * gx + j_[2] * gy, gv = j_[1] * gx + j_[3] * gy;
+    const Block inverse = 0.5 / (gu * gu + gv * gv + kTinySquare).sqrt();
+    std::array<Block, 7> row;  // Derivatives, and the residual.
+    row[6] = (x_ * gx + y_ * gy + d * x_ + e * y_ + f) * inverse;
+    const Block s = 4.0 * row[6] * inverse * inverse;
+    const Block hx = s * (j_[0] * gu + j_[1] * gv), hy = s * (j_[2] * gu + j_[3] * gv);
+    row[0] = x_ * (x_ * inverse - hx);
+    row[1] = 2.0 * x_ * y_ * inverse - hx * y_ - hy * x_;
+    row[2] = y_ * (y_ * inverse - hy);
+    row[3] = 2.0 * x_ * inverse - hx;
+    row[4] = 2.0 * y_ * inverse - hy;
+    row[5] = inverse;
+    std::size_t k = 0;
+    for (std::size_t m = 0; m < 6; ++m) {
+      const Block weighted = w_ * row[m];
+      for (std::size_t n = m; n < 7; ++n) sums_[k++] += (weighted * row[n]).sum();
+    }
+  }
+
+  // Keeps 0 / 0 out of the centre of a conic.
+  static constexpr double kTinySquare = 1e-100;
+
+  ConicModel::Value q_;
+  Block x_, y_, w_;
+  std::array<Block, 4> j_;
+  std::array<double, 27> sums_{};
+  int size_ = 0, count_ = 0;
+};
+
+}  // namespace
+
+Status ConicLimits::Validate() const {
+  if (!(min_axis_px >= 0.0)) return Status::Invalid("min_axis_px must not be negative");
+  if (!(max_axis_ratio > 0.0)) return Status::Invalid("max_axis_ratio must be positive");
+  if (!(min_arc_deg >= 0.0 && min_arc_deg < 360.0)) {
+    return Status::Invalid("min_arc_deg must be 0 or more and less than 360");
+  }
+  if (!(max_line_share > 0.0)) return Status::Invalid("max_line_share must be positive");
+  return Status::Ok();
+}
+
+ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLimits& limits)
+    : limits_(limits), index_(RandomOrder(static_cast<int>(points.size()), 1)) {
+  const std::size_t n = points.size();
+  if (n == 0) return;
+  Eigen::Vector2d low = points[0].x, high = points[0].x;
+  for (const CalibratedPoint& p : points) {
+    low = low.cwiseMin(p.x);
+    high = high.cwiseMax(p.x);
+  }
+  center_ = 0.5 * (low + high);
+  scale_ = std::max(0.5 * (high - low).norm(), 1e-12);
+  data_.resize(6 * n);
+  x_.resize(n);
+  x_from_pixel_.resize(n);
+  double area = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const CalibratedPoint& p = points[static_cast<std::size_t>(index_[i])];
+    x_[i] = (p.x - center_) / scale_;
+    data_[i] = static_cast<float>(x_[i].x());
+    data_[n + i] = static_cast<float>(x_[i].y());
+    for (std::size_t k = 0; k < 4; ++k) {
+      x_from_pixel_[i][k] = p.x_from_pixel[k] / scale_;
+      data_[(2 + k) * n + i] = static_cast<float>(x_from_pixel_[i][k]);
+    }
+    const std::array<double, 4>& j = x_from_pixel_[i];
+    area += std::abs(j[0] * j[3] - j[1] * j[2]);
+  }
+  pixel_ = std::sqrt(area / static_cast<double>(n));
+}
+
+Eigen::Matrix3d ConicModel::ToConic(const Value& value) const {
+  const auto [a, b, c, d, e, f] = value;
+  Eigen::Matrix3d C, T;
+  C << a, b, d, b, c, e, d, e, f;
+  T << 1.0 / scale_, 0.0, -center_.x() / scale_, 0.0, 1.0 / scale_, -center_.y() / scale_, 0.0, 0.0,
+      1.0;
+  return T.transpose() * C * T;
+}
+
+bool ConicModel::Normalize(Value* value) const {
+  const auto [a, b, c, d, e, f] = *value;
+  const double minor = a * c - b * b;
+  if (!(minor > 0.0)) return false;
+  const double det = f * minor - a * e * e - c * d * d + 2.0 * b * d * e;
+  const double trace = a + c;
+  if (!(det * trace < 0.0)) return false;  // Imaginary.
+  // Squared semi-axes are k / eigenvalue with k = -det / minor; the small one from the product.
+  const double k = std::abs(det) / minor;
+  const double half = 0.5 * std::abs(trace);
+  const double large = half + std::sqrt(std::max(0.0, half * half - minor));
+  const double min_axis = limits_.min_axis_px * pixel_;
+  if (k < min_axis * min_axis * large) return false;
+  if (k * large > limits_.max_axis_ratio * limits_.max_axis_ratio * minor) return false;
+  const double norm = std::sqrt(a * a + c * c + f * f + 2.0 * (b * b + d * d + e * e));
+  const double factor = (trace < 0.0 ? -1.0 : 1.0) / norm;
+  for (double& v : *value) v *= factor;
+  return true;
+}
+
+bool ConicModel::Fit(const int* sample, Value* value) const {
+  std::array<Eigen::Vector2d, 5> x;
+  for (std::size_t i = 0; i < 5; ++i) x[i] = x_[static_cast<std::size_t>(sample[i])];
+  Eigen::Matrix3d conic;
+  if (!ConicFromFivePoints(x, &conic)) return false;
+  *value = {conic(0, 0), conic(0, 1), conic(1, 1), conic(0, 2), conic(1, 2), conic(2, 2)};
+  return Normalize(value);
+}
+
+void ConicModel::SquaredResiduals(const Value& value, int begin, int end, float* r2) const {
+  const std::size_t n = index_.size();
+  const float* x = data_.data() + begin;
+  const float a = static_cast<float>(value[0]), b = static_cast<float>(value[1]),
+              c = static_cast<float>(value[2]), d = static_cast<float>(value[3]),
+              e = static_cast<float>(value[4]), f = static_cast<float>(value[5]);
+  const std::size_t size = static_cast<std::size_t>(end - begin);
+  for (std::size_t i = 0; i < size; ++i) {
+    const float px = x[i], py = x[i + n];
+    const float gx = a * px + b * py + d, gy = b * px + c * py + e;
+    const float value_here = px * gx + py * gy + (d * px + e * py + f);
+    const float gu = x[i + 2 * n] * gx + x[i + 4 * n] * gy;
+    const float gv = x[i + 3 * n] * gx + x[i + 5 * n] * gy;
+    r2[i] = value_here * value_here / (4.0f * (gu * gu + gv * gv) + kTiny);
+  }
+}
+
+bool ConicModel::Refine(const float* weights, Value* value) const {
+  ConicNormalEquations equations(*value);
+  for (std::size_t i = 0; i < x_.size(); ++i) {
+    if (!(weights[i] > 0.0f)) continue;
+    equations.Add(x_[i], x_from_pixel_[i], static_cast<double>(weights[i]));
+  }
+  Vector6d step;
+  if (equations.count() < kMinSamples || !equations.Step(&step)) return false;
+  const Eigen::Map<const Vector6d> q(value->data());
+  constexpr int kMaxHalvings = 4;
+  for (int i = 0; i <= kMaxHalvings; ++i, step *= 0.5) {
+    Value moved;
+    Eigen::Map<Vector6d>(moved.data()) = q + step;
+    if (!Normalize(&moved)) continue;
+    *value = moved;
+    return true;
+  }
+  return false;
+}
+
+bool ConicModel::Accept(const Value& value, double threshold) const {
+  const SectorOf sector_of(value);
+  const float t2 = static_cast<float>(threshold * threshold);
+  std::array<int, kSectors> counts{};
+  std::array<float, kRansacBlock> r2;
+  constexpr int kSome = 64;  // Inliers that stand for all of them.
+  std::array<Eigen::Vector2d, kSome> some;
+  int num_some = 0;
+  double gain = 0.0;
+  for (int begin = 0; begin < NumData(); begin += kRansacBlock) {
+    const int end = std::min(begin + kRansacBlock, NumData());
+    SquaredResiduals(value, begin, end, r2.data());
+    for (int i = begin; i < end; ++i) {
+      const float square = r2[static_cast<std::size_t>(i - begin)];
+      if (!(square < t2)) continue;
+      const Eigen::Vector2d& x = x_[static_cast<std::size_t>(i)];
+      ++counts[sector_of(x)];
+      if (num_some == kSome) continue;
+      some[static_cast<std::size_t>(num_some++)] = x;
+      gain += 1.0 - static_cast<double>(square / t2);
+    }
+  }
+  // Evenly spread inliers leave a fifth of their arc outside.
+  if (SectorsOfMost(counts) * (360.0 / kSectors) < 0.8 * limits_.min_arc_deg) return false;
+  return GainOfLine(some.data(), num_some, threshold * pixel_) <= limits_.max_line_share * gain;
+}
+
+double ConicModel::Distance(const Value& value, int i) const {
+  const auto [a, b, c, d, e, f] = value;
+  const Eigen::Vector2d& x = x_[static_cast<std::size_t>(i)];
+  const std::array<double, 4>& j = x_from_pixel_[static_cast<std::size_t>(i)];
+  const double gx = a * x.x() + b * x.y() + d, gy = b * x.x() + c * x.y() + e;
+  const double gu = j[0] * gx + j[2] * gy, gv = j[1] * gx + j[3] * gy;
+  const double norm = std::sqrt(gu * gu + gv * gv);
+  const double algebraic = x.x() * gx + x.y() * gy + d * x.x() + e * x.y() + f;
+  return norm > 0.0 ? 0.5 * algebraic / norm : std::numeric_limits<double>::infinity();
+}
+
+void ConicModel::Weigh(const Value& value, double threshold, ConicWeights* result) const {
+  const std::size_t n = index_.size();
+  const SectorOf sector_of(value);
+  const double s = result->sigma > 0.0 ? result->sigma : threshold / kSigmas;
+  std::array<double, kSectors> inside{}, beside{};
+  double all_beside = 0.5;  // The half keeps a trace of doubt where none was seen.
+  result->residuals.resize(n);
+  result->sectors.resize(n);
+  result->weights.assign(n, 0.0f);
+  for (std::size_t i = 0; i < n; ++i) {
+    result->residuals[i] = Distance(value, static_cast<int>(i));
+    const double size = std::abs(result->residuals[i]);
+    if (!(size <= 3.0 * threshold)) continue;
+    const std::size_t k = sector_of(x_[i]);
+    result->sectors[i] = static_cast<std::uint8_t>(k);
+    (size <= threshold ? inside : beside)[k] += 1.0;
+    all_beside += size <= threshold ? 0.0 : 1.0;
+  }
+  // In each sector, of the points inside the threshold: those of the background, and those of the
+  // curve as far as they are sure (lower by two and a half standard deviations of the background).
+  std::array<double, kSectors> curve, background;
+  constexpr int kReach = 2;  // Neighbours on each side that vouch for a sector.
+  constexpr double kWindow = (2.0 * kReach + 1.0) / kSectors;
+  for (int k = 0; k < kSectors; ++k) {
+    double in = 0.0, near = 0.0;
+    for (int j = k - kReach; j <= k + kReach; ++j) {
+      const std::size_t sector = static_cast<std::size_t>((j + kSectors) % kSectors);
+      in += inside[sector];
+      near += beside[sector];
+    }
+    // Half local, half global; the sides are twice as wide as the inside.
+    const double expected = 0.5 * (0.5 * near + 0.5 * kWindow * all_beside);
+    background[static_cast<std::size_t>(k)] = expected / (2.0 * threshold);
+    curve[static_cast<std::size_t>(k)] =
+        std::max(0.0, in - expected - 2.5 * std::sqrt(expected)) * 0.3989422804014327 / s;
+  }
+  double sum = 0.0, sum_squares = 0.0;
+  result->log_likelihood = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double r = result->residuals[i];
+    if (!(std::abs(r) <= threshold)) continue;
+    const std::size_t k = result->sectors[i];
+    const double density = curve[k] * std::exp(-0.5 * r * r / (s * s));
+    const double w = density / (density + background[k]);
+    result->weights[i] = static_cast<float>(w);
+    sum += w;
+    sum_squares += w * r * r;
+    result->log_likelihood += std::log1p(density / background[k]);
+  }
+  if (sum > kMinSamples + 1.0) {
+    result->sigma =
+        std::clamp(std::sqrt(sum_squares / (sum - kMinSamples)), 1e-3 * threshold, 0.5 * threshold);
+  }
+}
+
+bool ConicModel::FromConic(const Eigen::Matrix3d& conic, Value* value) const {
+  Eigen::Matrix3d T;
+  T << scale_, 0.0, center_.x(), 0.0, scale_, center_.y(), 0.0, 0.0, 1.0;
+  const Eigen::Matrix3d C = T.transpose() * conic * T;
+  *value = {C(0, 0), C(0, 1), C(1, 1), C(0, 2), C(1, 2), C(2, 2)};
+  return Normalize(value);
+}
+
+namespace {
+
+Status NoEllipse() { return Status::Refused("no ellipse explains the points"); }
+
+struct Start {
+  ConicModel::Value value{};
+  ConicWeights weights;
+};
+
+// Reweighted fit from the engine's ellipse.
+void Polish(const ConicModel& model, double threshold, Start* start) {
+  constexpr int kMaxPasses = 10;
+  constexpr double kConverged = 1e-5;  // Of half the points' box: far below any noise.
+  start->weights.sigma = 0.0;
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    model.Weigh(start->value, threshold, &start->weights);
+    const ConicModel::Value before = start->value;
+    if (!model.Refine(start->weights.weights.data(), &start->value)) break;
+    double change = 0.0;
+    for (std::size_t k = 0; k < before.size(); ++k) {
+      change = std::max(change, std::abs(start->value[k] - before[k]));
+    }
+    if (change < kConverged) break;
+  }
+  model.Weigh(start->value, threshold, &start->weights);
+}
+
+// On short or sparse contours the search may end on an ellipse that takes in clutter where the
+// contour has none. Where less than half of the points are inliers, a few searches from other seeds
+// are compared by likelihood.
+bool Search(const ConicModel& model, RansacOptions options, Start* best) {
+  constexpr int kSearches = 3;
+  // Five noisy points of the contour are often not good enough: a second all-inlier sample.
+  options.confidence = 1.0 - (1.0 - options.confidence) * (1.0 - options.confidence);
+  Start start;
+  for (int k = 0; k < kSearches; ++k) {
+    RansacReport<ConicModel::Value> report;
+    Ransac<ConicModel>(options).Run(model, &report);
+    if (!report.success) return k > 0;
+    start.value = report.model;
+    Polish(model, options.threshold, &start);
+    const bool better = start.weights.log_likelihood > best->weights.log_likelihood;
+    if (k == 0 || better) std::swap(start, *best);
+    if (2 * report.num_inliers >= model.NumData()) break;
+    options.seed = Random(options.seed).Next();
+  }
+  return true;
+}
+
+// Maximum likelihood with the final weights, and its covariance.
+Status FitFinal(const std::vector<CalibratedPoint>& points, const ConicModel& model,
+                const RobustFitOptions& options, const Start& start, ConicFit* fit,
+                std::vector<std::uint8_t>* mask) {
+  std::vector<CalibratedPoint> chosen;
+  std::vector<double> weights;
+  chosen.reserve(points.size());
+  weights.reserve(points.size());
+  for (int i = 0; i < model.NumData(); ++i) {
+    const double w = static_cast<double>(start.weights.weights[static_cast<std::size_t>(i)]);
+    if (w < 1e-3) continue;
+    chosen.push_back(points[static_cast<std::size_t>(model.PointIndex(i))]);
+    weights.push_back(w);
+  }
+  if (chosen.size() < 5) return NoEllipse();
+  const Status status =
+      RefineConic(chosen, options.sigma_px, model.ToConic(start.value), fit, &weights);
+  if (!status.ok()) return status;
+  ConicModel::Value value;
+  const double threshold = options.ransac.threshold;
+  if (!model.FromConic(fit->conic, &value) || !model.Accept(value, threshold)) return NoEllipse();
+  mask->assign(points.size(), 0);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    (*mask)[i] = std::abs(ConicDistancePx(points[i], fit->conic)) <= threshold ? 1 : 0;
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
+                      ConicFit* fit, std::vector<std::uint8_t>* mask, const ConicLimits& limits) {
+  Status status = options.Validate();
+  if (status.ok()) status = limits.Validate();
+  if (!status.ok()) return status;
+  if (points.size() < 5) return Status::Refused("an ellipse needs five points");
+  const ConicModel model(points, limits);
+  Start start;
+  if (!Search(model, options.ransac, &start)) return NoEllipse();
+  ConicFit result;
+  std::vector<std::uint8_t> result_mask;
+  status = FitFinal(points, model, options, start, &result, &result_mask);
+  if (!status.ok()) return status;
+  *fit = result;
+  if (mask != nullptr) *mask = std::move(result_mask);
+  return Status::Ok();
+}
+
+}  // namespace circline

@@ -1,0 +1,151 @@
+#include "circline/ransac/line_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace circline {
+
+LineModel::LineModel(const std::vector<CalibratedPoint>& points)
+    : index_(RandomOrder(static_cast<int>(points.size()), 1)) {
+  const std::size_t n = points.size();
+  if (n == 0) return;
+  Eigen::Vector2d low = points[0].x, high = points[0].x;
+  for (const CalibratedPoint& p : points) {
+    low = low.cwiseMin(p.x);
+    high = high.cwiseMax(p.x);
+  }
+  center_ = 0.5 * (low + high);
+  scale_ = std::max(0.5 * (high - low).norm(), 1e-12);
+  data_.resize(6 * n);
+  x_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const CalibratedPoint& p = points[static_cast<std::size_t>(index_[i])];
+    x_[i] = (p.x - center_) / scale_;
+    data_[i] = static_cast<float>(x_[i].x());
+    data_[n + i] = static_cast<float>(x_[i].y());
+    for (std::size_t k = 0; k < 4; ++k) {
+      data_[(2 + k) * n + i] = static_cast<float>(p.x_from_pixel[k] / scale_);
+    }
+  }
+}
+
+Eigen::Vector3d LineModel::ToLine(const Value& value) const {
+  const auto [a, b, c] = value;
+  return Eigen::Vector3d(a, b, scale_ * c - a * center_.x() - b * center_.y()).normalized();
+}
+
+bool LineModel::Fit(const int* sample, Value* value) const {
+  const Eigen::Vector2d& p = x_[static_cast<std::size_t>(sample[0])];
+  const Eigen::Vector2d d = x_[static_cast<std::size_t>(sample[1])] - p;
+  const double length = d.norm();
+  if (!(length > 1e-9)) return false;
+  const double a = -d.y() / length, b = d.x() / length;
+  *value = {a, b, -(a * p.x() + b * p.y())};
+  return true;
+}
+
+void LineModel::SquaredResiduals(const Value& value, int begin, int end, float* r2) const {
+  const std::size_t n = index_.size();
+  const float* x = data_.data() + begin;
+  const float a = static_cast<float>(value[0]), b = static_cast<float>(value[1]),
+              c = static_cast<float>(value[2]);
+  const std::size_t size = static_cast<std::size_t>(end - begin);
+  for (std::size_t i = 0; i < size; ++i) {
+    const float miss = a * x[i] + b * x[i + n] + c;
+    const float gu = x[i + 2 * n] * a + x[i + 4 * n] * b;
+    const float gv = x[i + 3 * n] * a + x[i + 5 * n] * b;
+    r2[i] = miss * miss / (gu * gu + gv * gv);
+  }
+}
+
+bool LineModel::Refine(const float* weights, Value* value) const {
+  // Total least squares, each point with its pixel's size at the current line.
+  const std::size_t n = index_.size();
+  const double a = (*value)[0], b = (*value)[1];
+  double sum = 0.0;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  double xx = 0.0, xy = 0.0, yy = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(weights[i] > 0.0f)) continue;
+    const float* d = data_.data() + i;
+    const double gu = static_cast<double>(d[2 * n]) * a + static_cast<double>(d[4 * n]) * b;
+    const double gv = static_cast<double>(d[3 * n]) * a + static_cast<double>(d[5 * n]) * b;
+    const double w = static_cast<double>(weights[i]) / (gu * gu + gv * gv);
+    sum += w;
+    mean += w * x_[i];
+    xx += w * x_[i].x() * x_[i].x();
+    xy += w * x_[i].x() * x_[i].y();
+    yy += w * x_[i].y() * x_[i].y();
+  }
+  if (!(sum > 0.0)) return false;
+  mean /= sum;
+  xx = xx / sum - mean.x() * mean.x();
+  xy = xy / sum - mean.x() * mean.y();
+  yy = yy / sum - mean.y() * mean.y();
+  if (!(xx + yy > 1e-18)) return false;
+  const double angle = 0.5 * std::atan2(2.0 * xy, xx - yy);  // Of the line.
+  const double na = -std::sin(angle), nb = std::cos(angle);
+  *value = {na, nb, -(na * mean.x() + nb * mean.y())};
+  return true;
+}
+
+namespace {
+
+// Reweighted maximum likelihood from the engine's line.
+Status FitFinal(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
+                const Eigen::Vector3d& initial, LineFit* fit, std::vector<std::uint8_t>* mask) {
+  const double threshold = options.ransac.threshold;
+  std::vector<double> residuals(points.size()), weights, chosen_weights;
+  std::vector<CalibratedPoint> chosen;
+  fit->line = initial;
+  double sigma = 0.0;
+  constexpr int kPasses = 3;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      residuals[i] = LineDistancePx(points[i], fit->line);
+    }
+    InlierWeights(residuals, threshold, 2, &sigma, &weights);
+    chosen.clear();
+    chosen_weights.clear();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (weights[i] < 1e-3) continue;
+      chosen.push_back(points[i]);
+      chosen_weights.push_back(weights[i]);
+    }
+    const Status status = FitLine(chosen, options.sigma_px, fit, &chosen_weights);
+    if (!status.ok()) return status;
+  }
+  mask->assign(points.size(), 0);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    (*mask)[i] = std::abs(LineDistancePx(points[i], fit->line)) <= threshold ? 1 : 0;
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status FitLineRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
+                     LineFit* fit, std::vector<std::uint8_t>* mask) {
+  Status status = options.Validate();
+  if (!status.ok()) return status;
+  if (points.size() < 2) return Status::Refused("a line needs two points");
+  LineFit result;
+  std::vector<std::uint8_t> result_mask(points.size(), 1);
+  if (points.size() == 2) {
+    status = FitLine(points, options.sigma_px, &result);
+  } else {
+    const LineModel model(points);
+    Ransac<LineModel> engine(options.ransac);
+    RansacReport<LineModel::Value> report;
+    engine.Run(model, &report);
+    if (!report.success) return Status::Refused("the points of the line coincide");
+    status = FitFinal(points, options, model.ToLine(report.model), &result, &result_mask);
+  }
+  if (!status.ok()) return status;
+  *fit = result;
+  if (mask != nullptr) *mask = std::move(result_mask);
+  return Status::Ok();
+}
+
+}  // namespace circline

@@ -1,0 +1,407 @@
+// One robust estimator for every model: random sample consensus with a truncated or marginalised
+// loss, local optimisation, early rejection and an exact stopping rule.
+//
+// In:  a Model (below) that holds the data, RansacOptions, optionally the data ordered by quality.
+// Out: a RansacReport: the best model, its score and inliers - all three computed after the last
+//      refinement, so that they agree - and why the search stopped.
+//
+//     struct Model {
+//       using Value = ...;                     // What is estimated; cheap to copy, no heap.
+//       static constexpr int kMinSamples = 2;  // Data that determine a Value.
+//       int NumData() const;
+//       // Fits the kMinSamples data `sample`; false where they are degenerate.
+//       bool Fit(const int* sample, Value* value) const;
+//       // Squared residuals of the data begin..end-1, to r2[0..]. At most kRansacBlock at a time.
+//       void SquaredResiduals(const Value& value, int begin, int end, float* r2) const;
+//       // One step (Gauss-Newton or a reweighted fit) towards the minimum of the sum of weight
+//       times
+//       // squared residual, one weight per datum; false, with `value` untouched, if there is none.
+//       bool Refine(const float* weights, Value* value) const;
+//       // A last look at a candidate that would become the best: false rejects it.
+//       bool Accept(const Value& value, double threshold) const;
+//     };
+//
+// A Model keeps its data in random order (see RandomOrder), so that a prefix stands for the whole:
+// a candidate whose loss on the first blocks is beyond what chance allows the current best is
+// rejected there (the bail-out test of Capel, BMVC 2005, on the loss).
+//
+// Same input, options and seed: same bits out. Nothing is allocated after the set-up of a run, and
+// nothing at all when an engine is used again on no more data. An engine serves one thread.
+//
+// M. Fischler, R. Bolles, CACM 1981; P. Torr, A. Zisserman, MLESAC, CVIU 2000 (the truncated loss);
+// O. Chum, J. Matas, J. Kittler, Locally optimized RANSAC, DAGM 2003; K. Lebeda, J. Matas, O. Chum,
+// Fixing the locally optimized RANSAC, BMVC 2012; O. Chum, J. Matas, PROSAC, CVPR 2005; D. Barath
+// et al., MAGSAC++, CVPR 2020.
+#ifndef CIRCLINE_RANSAC_RANSAC_H_
+#define CIRCLINE_RANSAC_RANSAC_H_
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/random.h"
+#include "circline/estimators/status.h"
+
+namespace circline {
+
+constexpr int kRansacBlock = 32;
+
+enum class ScoreType {
+  kMsac,    // min(r^2 / T^2, 1): truncated least squares.
+  kMagsac,  // The same truncated at T, averaged over all noise levels that T admits (MAGSAC++).
+};
+
+struct RansacOptions {
+  double threshold = 1.0;      // Largest residual of an inlier, in the model's unit; > 0.
+  double confidence = 0.999;   // That one all-inlier sample was drawn; in (0, 1).
+  int min_iterations = 1;      // Draws that are made whatever the confidence; 0 or more.
+  int max_iterations = 10000;  // Draws; 1 or more.
+  std::uint64_t seed = 1;
+  ScoreType score = ScoreType::kMsac;
+  int local_start = 30;    // Draws before the first local optimisation (Lebeda 2012); 0 or more.
+  int local_samples = 3;   // Inner samples of each local optimisation; 0 = refine the best only.
+  int local_steps = 3;     // Reweighted steps from each inner sample; 0 = no local optimisation.
+  double max_seconds = 0;  // Stops after this time if > 0; the result then depends on the machine.
+
+  // Ok, or a sentence that names the field which is wrong.
+  Status Validate() const;
+};
+
+// What the plain functions of the models (FitConicRobust, ...) take.
+struct RobustFitOptions {
+  RansacOptions ransac;   // Its threshold in the unit that the function states.
+  double sigma_px = 1.0;  // Standard deviation of a point, for the covariance; > 0.
+
+  RobustFitOptions() { ransac.threshold = 3.03; }  // 99.8 % of a Gaussian's points.
+  Status Validate() const;
+};
+
+enum class StopReason { kConfident, kMaxIterations, kMaxSeconds, kTooFewData };
+const char* StopReasonName(StopReason reason);  // "confident", "max_iterations", ...
+
+template <typename Value>
+struct RansacReport {
+  bool success = false;  // A model was found; else the fields below are those of no inliers.
+  Value model{};
+  double score = 0.0;  // Sum of losses, each in [0, 1]: the smaller the better.
+  int num_inliers = 0;
+  std::vector<std::uint8_t> inlier_mask;  // One per datum, in the model's order.
+  int num_iterations = 0;                 // Draws.
+  int num_degenerate = 0;                 // Draws that gave no model.
+  int num_local_optimizations = 0;
+  StopReason stop_reason = StopReason::kTooFewData;
+};
+
+// Draws of `num_samples` of `num_data` without replacement after which, with probability
+// `confidence`, one held inliers only: log(1 - confidence) / log(1 - p), where p is the exact
+// (hypergeometric) probability of an all-inlier sample. At least 1; INT_MAX where it is never.
+int RequiredIterations(int num_data, int num_inliers, int num_samples, double confidence);
+
+// A permutation of 0..n-1, the same on every machine.
+std::vector<int> RandomOrder(int n, std::uint64_t seed);
+
+// The loss of a datum as a function of u = r^2 / T^2, in [0, 1], 1 for u >= 1; and the weight
+// (derivative, scaled to 1 at most, 0 for u >= 1) with which a refit takes it.
+class RansacLoss {
+ public:
+  explicit RansacLoss(ScoreType type);
+  float Value(float u) const;
+  float Weight(float u) const;
+
+ private:
+  ScoreType type_;
+};
+
+// Inlier weights for a final, statistically efficient fit: the posterior probability that a datum
+// belongs to the Gaussian about the model rather than to a uniform background, whose density is
+// measured between one and three thresholds beside the model; 0 beyond the threshold. On clean data
+// that is least squares on the inliers, on contaminated data a redescending M-estimator. `sigma`:
+// in, the current standard deviation of the noise (0: threshold / 3.03), out, its new estimate,
+// with `num_parameters` degrees of freedom spent. Returns the sum of the weights.
+double InlierWeights(const std::vector<double>& residuals, double threshold, int num_parameters,
+                     double* sigma, std::vector<double>* weights);
+
+// Draws samples: uniform, or, given an order of decreasing quality, from a growing set of the best
+// (PROSAC) that ends as the uniform one.
+class Sampler {
+ public:
+  // `order` (optional) must outlive the sampler; after `uniform_after` draws it plays no part (T_N
+  // of the paper).
+  void Reset(int num_data, int num_samples, std::uint64_t seed, const std::vector<int>* order,
+             int uniform_after = 200000);
+  void Draw(int* sample);
+  // `count` distinct numbers of 0..n-1.
+  void DrawFrom(int n, int count, int* sample);
+
+ private:
+  Random random_{0};
+  int num_data_ = 0, num_samples_ = 0;
+  const std::vector<int>* order_ = nullptr;
+  int draw_ = 0, pool_ = 0, pool_until_ = 0;  // Draw number; size of the pool; last draw from it.
+  double pool_draws_ = 0.0;                   // Expected draws from the pool (T_n of the paper).
+};
+
+template <typename Model>
+class Ransac {
+ public:
+  using Value = typename Model::Value;
+  using Report = RansacReport<Value>;
+
+  // `options` must be valid.
+  explicit Ransac(const RansacOptions& options) : options_(options), loss_(options.score) {}
+
+  // `order` (optional): all data, the most promising first.
+  void Run(const Model& model, Report* report, const std::vector<int>* order = nullptr) {
+    constexpr int m = Model::kMinSamples;
+    SetUp(model, order, report);
+    if (num_data_ < m) return;
+    const auto start = std::chrono::steady_clock::now();
+    std::array<int, static_cast<std::size_t>(m)> sample{};
+    int needed = options_.max_iterations;
+    bool optimized = true;  // Whether `best_` has been through local optimisation.
+    report->stop_reason = StopReason::kMaxIterations;
+    while (report->num_iterations < needed) {
+      ++report->num_iterations;
+      sampler_.Draw(sample.data());
+      Candidate candidate;
+      if (!model.Fit(sample.data(), &candidate.value)) {
+        ++report->num_degenerate;
+      } else if (Improves(model, &candidate)) {
+        SetBest(candidate);
+        optimized = false;
+        if (report->num_iterations > options_.local_start) optimized = Optimize(model, report);
+        needed = Needed(model, order);
+      }
+      if (report->num_iterations >= needed && !optimized) {
+        optimized = Optimize(model, report);
+        needed = Needed(model, order);
+      }
+      if (OutOfTime(start, report->num_iterations)) {
+        report->stop_reason = StopReason::kMaxSeconds;
+        break;
+      }
+    }
+    if (!optimized) Optimize(model, report);
+    if (report->stop_reason != StopReason::kMaxSeconds && needed < options_.max_iterations) {
+      report->stop_reason = StopReason::kConfident;
+    }
+    Finish(model, report);
+  }
+
+ private:
+  struct Candidate {
+    Value value{};
+    double score = 0.0;
+    int num_inliers = 0;
+  };
+
+  void SetUp(const Model& model, const std::vector<int>* order, Report* report) {
+    num_data_ = model.NumData();
+    const std::size_t n = static_cast<std::size_t>(num_data_);
+    weights_.assign(n, 0.0f);
+    inliers_.assign(n, 0);
+    limits_.assign(n / kRansacBlock + 1, 0.0);
+    report->inlier_mask.assign(n, 0);
+    report->success = false;
+    report->num_inliers = report->num_iterations = 0;
+    report->num_degenerate = report->num_local_optimizations = 0;
+    report->stop_reason = StopReason::kTooFewData;
+    report->score = num_data_;
+    // A bad order must not use up the draws: halfway through them it is forgotten.
+    sampler_.Reset(num_data_, Model::kMinSamples, options_.seed, order,
+                   options_.max_iterations / 2);
+    inverse_t2_ = static_cast<float>(1.0 / (options_.threshold * options_.threshold));
+    has_best_ = false;
+    best_ = Candidate();
+    best_.score = num_data_;  // What a model without inliers has: a candidate must beat it.
+    SetLimits();
+  }
+
+  // Losses beyond which a candidate is rejected after each block: what a model as good as the best
+  // exceeds in one case of 740 (three standard deviations).
+  void SetLimits() {
+    const double mean = best_.score / num_data_;
+    for (std::size_t block = 0; block < limits_.size(); ++block) {
+      const double seen =
+          std::min<double>(num_data_, static_cast<double>((block + 1) * kRansacBlock));
+      const double variance = seen * mean * (1.0 - mean) * (1.0 - seen / num_data_);
+      limits_[block] = seen * mean + 3.0 * std::sqrt(std::max(0.0, variance));
+    }
+  }
+
+  void SetBest(const Candidate& candidate) {
+    best_ = candidate;
+    has_best_ = true;
+    SetLimits();
+  }
+
+  // Scores the candidate; false as soon as it is clear that it does not beat the best.
+  bool Improves(const Model& model, Candidate* candidate) const {
+    std::array<float, kRansacBlock> r2;
+    double score = 0.0;
+    int inliers = 0;
+    for (int begin = 0, block = 0; begin < num_data_; begin += kRansacBlock, ++block) {
+      const int size = std::min(kRansacBlock, num_data_ - begin);
+      model.SquaredResiduals(candidate->value, begin, begin + size, r2.data());
+      score += ScoreBlock(r2.data(), size, &inliers);
+      if (!(score <= limits_[static_cast<std::size_t>(block)])) return false;
+    }
+    if (!(score < best_.score)) return false;
+    candidate->score = score;
+    candidate->num_inliers = inliers;
+    return inliers >= Model::kMinSamples && model.Accept(candidate->value, options_.threshold);
+  }
+
+  double ScoreBlock(const float* r2, int size, int* inliers) const {
+    float sum = 0.0f;
+    int count = 0;
+    if (options_.score == ScoreType::kMsac) {
+      // Four sums side by side: they vectorise without permission to reorder.
+      std::array<float, 4> sums{};
+      std::array<int, 4> counts{};
+      int i = 0;
+      for (; i + 4 <= size; i += 4) {
+        for (std::size_t k = 0; k < 4; ++k) {
+          const float u = r2[static_cast<std::size_t>(i) + k] * inverse_t2_;
+          sums[k] += u < 1.0f ? u : 1.0f;
+          counts[k] += u < 1.0f ? 1 : 0;
+        }
+      }
+      for (; i < size; ++i) {
+        const float u = r2[i] * inverse_t2_;
+        sums[0] += u < 1.0f ? u : 1.0f;
+        counts[0] += u < 1.0f ? 1 : 0;
+      }
+      sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+      count = counts[0] + counts[1] + counts[2] + counts[3];
+    } else {
+      for (int i = 0; i < size; ++i) {
+        const float u = r2[i] * inverse_t2_;
+        sum += loss_.Value(u);
+        count += u < 1.0f ? 1 : 0;
+      }
+    }
+    *inliers += count;
+    return sum;
+  }
+
+  // Sets weights_ for threshold `scale` T and lists the inliers; returns how many there are.
+  int Weigh(const Model& model, const Value& value, double scale) {
+    std::array<float, kRansacBlock> r2;
+    const float inverse = inverse_t2_ / static_cast<float>(scale * scale);
+    int count = 0;
+    for (int begin = 0; begin < num_data_; begin += kRansacBlock) {
+      const int end = std::min(begin + kRansacBlock, num_data_);
+      model.SquaredResiduals(value, begin, end, r2.data());
+      for (int i = begin; i < end; ++i) {
+        const float u = r2[static_cast<std::size_t>(i - begin)] * inverse;
+        weights_[static_cast<std::size_t>(i)] = loss_.Weight(u);
+        if (u < 1.0f) inliers_[static_cast<std::size_t>(count++)] = i;
+      }
+    }
+    return count;
+  }
+
+  // Replaces the best by the best of: itself after reweighted steps, and the same from inner
+  // samples of its inliers, several times larger than minimal (Chum 2003). Thresholds shrink to T.
+  bool Optimize(const Model& model, Report* report) {
+    if (options_.local_steps == 0) return true;
+    ++report->num_local_optimizations;
+    const Value start = best_.value;
+    for (int k = 0; k <= options_.local_samples; ++k) {
+      Candidate candidate;
+      candidate.value = k % 2 == 1 ? start : best_.value;
+      if (k > 0 && !RefineOnSample(model, &candidate.value)) continue;
+      for (int step = options_.local_steps; step > 0; --step) {
+        const double scale = 1.0 + static_cast<double>(step - 1) / options_.local_steps;
+        Weigh(model, candidate.value, scale);
+        if (!model.Refine(weights_.data(), &candidate.value)) break;
+      }
+      if (Improves(model, &candidate)) SetBest(candidate);
+    }
+    return true;
+  }
+
+  bool RefineOnSample(const Model& model, Value* value) {
+    constexpr int kLargest = 4 * Model::kMinSamples;
+    const int num_inliers = Weigh(model, *value, 1.0);
+    const int size = std::min(num_inliers / 2, kLargest);
+    if (size <= Model::kMinSamples) return false;
+    std::array<int, static_cast<std::size_t>(kLargest)> sample{};
+    sampler_.DrawFrom(num_inliers, size, sample.data());
+    std::fill(weights_.begin(), weights_.end(), 0.0f);
+    for (int i = 0; i < size; ++i) {
+      const int datum = inliers_[static_cast<std::size_t>(sample[static_cast<std::size_t>(i)])];
+      weights_[static_cast<std::size_t>(datum)] = 1.0f;
+    }
+    return model.Refine(weights_.data(), value);
+  }
+
+  // Draws after which the search may stop. With an order of quality, those of the best prefix whose
+  // inliers are not explained by chance (Chum and Matas 2005, sections 2.1 and 2.2).
+  int Needed(const Model& model, const std::vector<int>* order) {
+    constexpr int m = Model::kMinSamples;
+    int needed = RequiredIterations(num_data_, best_.num_inliers, m, options_.confidence);
+    if (order != nullptr) {
+      const int num_inliers = Weigh(model, best_.value, 1.0);
+      std::fill(weights_.begin(), weights_.end(), 0.0f);
+      for (int i = 0; i < num_inliers; ++i) {
+        weights_[static_cast<std::size_t>(inliers_[static_cast<std::size_t>(i)])] = 1.0f;
+      }
+      int inliers = 0;
+      for (int n = 1; n <= num_data_; ++n) {
+        const int datum = (*order)[static_cast<std::size_t>(n - 1)];
+        inliers += weights_[static_cast<std::size_t>(datum)] > 0.0f ? 1 : 0;
+        constexpr double kChance = 0.1;  // Probability that a wrong model holds a datum.
+        const double mean = kChance * (n - m);
+        if (n < 4 * m || inliers < m + mean + 2.33 * std::sqrt(mean * (1.0 - kChance))) continue;
+        needed = std::min(needed, RequiredIterations(n, inliers, m, options_.confidence));
+      }
+    }
+    return std::min(std::max(needed, options_.min_iterations), options_.max_iterations);
+  }
+
+  bool OutOfTime(std::chrono::steady_clock::time_point start, int iteration) const {
+    if (options_.max_seconds <= 0.0 || iteration % 64 != 0) return false;
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    return elapsed.count() >= options_.max_seconds;
+  }
+
+  void Finish(const Model& model, Report* report) {
+    report->success = has_best_;
+    if (!has_best_) return;
+    report->model = best_.value;
+    std::array<float, kRansacBlock> r2;
+    report->score = 0.0;
+    for (int begin = 0; begin < num_data_; begin += kRansacBlock) {
+      const int size = std::min(kRansacBlock, num_data_ - begin);
+      model.SquaredResiduals(best_.value, begin, begin + size, r2.data());
+      report->score += ScoreBlock(r2.data(), size, &report->num_inliers);
+      for (int i = 0; i < size; ++i) {
+        const bool inlier = r2[static_cast<std::size_t>(i)] * inverse_t2_ < 1.0f;
+        report->inlier_mask[static_cast<std::size_t>(begin + i)] = inlier ? 1 : 0;
+      }
+    }
+  }
+
+  RansacOptions options_;
+  RansacLoss loss_;
+  Sampler sampler_;
+  int num_data_ = 0;
+  float inverse_t2_ = 1.0f;
+  Candidate best_;
+  bool has_best_ = false;
+  std::vector<float> weights_;
+  std::vector<int> inliers_;
+  std::vector<double> limits_;
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_RANSAC_H_

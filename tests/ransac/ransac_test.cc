@@ -1,0 +1,461 @@
+#include "circline/ransac/ransac.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <climits>
+#include <cstdlib>
+#include <new>
+#include <set>
+
+namespace {
+// Allocations of the whole program: the engine promises none after its set-up.
+std::atomic<int> allocations{0};
+
+void* Allocate(std::size_t size) {
+  ++allocations;
+  void* p = std::malloc(size > 0 ? size : 1);
+  if (p == nullptr) throw std::bad_alloc();
+  return p;
+}
+}  // namespace
+
+void* operator new(std::size_t size) { return Allocate(size); }
+void* operator new[](std::size_t size) { return Allocate(size); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete[](void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
+
+namespace circline {
+namespace {
+
+// The location of scalars: two equal enough ones make a sample, their mean the model. It keeps a
+// record of how it was called.
+class Location {
+ public:
+  using Value = std::array<double, 1>;
+  static constexpr int kMinSamples = 2;
+
+  explicit Location(std::vector<double> data) : data_(std::move(data)) {}
+
+  int NumData() const { return static_cast<int>(data_.size()); }
+  bool Fit(const int* sample, Value* value) const {
+    if (fits_++ == 0) allocations_at_first_fit_ = allocations;
+    if (always_degenerate_) return false;
+    const double a = Datum(sample[0]), b = Datum(sample[1]);
+    EXPECT_NE(sample[0], sample[1]);
+    if (seconds_per_fit_ > 0.0) Wait();
+    const bool all_inliers = std::abs(a) < 10.0 && std::abs(b) < 10.0;
+    if (all_inliers && first_good_ == 0) first_good_ = fits_;
+    *value = {0.5 * (a + b)};
+    return std::abs(a - b) < 10.0;
+  }
+  void SquaredResiduals(const Value& value, int begin, int end, float* r2) const {
+    for (int i = begin; i < end; ++i) {
+      const double r = Datum(i) - value[0];
+      *r2++ = static_cast<float>(r * r);
+    }
+  }
+  bool Refine(const float* weights, Value* value) const {
+    double sum = 0.0, mean = 0.0;
+    for (int i = 0; i < NumData(); ++i) {
+      const double w = static_cast<double>(weights[i]);
+      sum += w;
+      mean += w * Datum(i);
+    }
+    if (!(sum > 0.0)) return false;
+    *value = {mean / sum};
+    return true;
+  }
+  bool Accept(const Value& value, double /*threshold*/) const { return value[0] < accept_below_; }
+
+  double Datum(int i) const { return data_[static_cast<std::size_t>(i)]; }
+
+  bool always_degenerate_ = false;
+  double seconds_per_fit_ = 0.0;
+  double accept_below_ = std::numeric_limits<double>::infinity();
+  mutable int fits_ = 0, first_good_ = 0, allocations_at_first_fit_ = 0;
+
+ private:
+  void Wait() const {
+    const auto start = std::chrono::steady_clock::now();
+    while (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() <
+           seconds_per_fit_) {
+    }
+  }
+
+  std::vector<double> data_;
+};
+
+// `inliers` values about 0 with standard deviation `sigma`, the rest 100 apart from each other.
+Location MakeData(int n, int inliers, double sigma, std::vector<int>* order = nullptr) {
+  const std::vector<int> position = RandomOrder(n, 7);
+  std::vector<double> data(static_cast<std::size_t>(n));
+  Random random(3);
+  for (int i = 0; i < n; ++i) {
+    data[static_cast<std::size_t>(position[static_cast<std::size_t>(i)])] =
+        i < inliers ? sigma * random.Normal() : 100.0 * (i + 1);
+  }
+  if (order != nullptr) *order = position;
+  return Location(data);
+}
+
+TEST(RequiredIterations, IsHypergeometric) {
+  // p = (5 4) / (10 9) = 2 / 9; log 0.01 / log(7 / 9) = 18.3.
+  EXPECT_EQ(RequiredIterations(10, 5, 2, 0.99), 19);
+  EXPECT_EQ(RequiredIterations(10, 10, 2, 0.99), 1);
+  EXPECT_EQ(RequiredIterations(10, 1, 2, 0.99), INT_MAX);
+  // The usual (5 / 10)^5 would say 146; without replacement one sample of 252 is good.
+  EXPECT_EQ(RequiredIterations(10, 5, 5, 0.99), 1159);
+  EXPECT_EQ(RequiredIterations(1000000, 5, 5, 0.99), INT_MAX);
+}
+
+TEST(RandomOrder, IsAPermutation) {
+  const std::vector<int> order = RandomOrder(100, 5);
+  EXPECT_EQ(std::set<int>(order.begin(), order.end()).size(), 100u);
+  EXPECT_EQ(*std::max_element(order.begin(), order.end()), 99);
+  EXPECT_EQ(order, RandomOrder(100, 5));
+  EXPECT_TRUE(RandomOrder(0, 5).empty());
+}
+
+TEST(Ransac, FindsTheInliers) {
+  for (const ScoreType score : {ScoreType::kMsac, ScoreType::kMagsac}) {
+    const Location model = MakeData(200, 40, 0.1);
+    RansacOptions options;
+    options.score = score;
+    Ransac<Location>::Report report;
+    Ransac<Location>(options).Run(model, &report);
+    ASSERT_TRUE(report.success);
+    EXPECT_EQ(report.num_inliers, 40);
+    EXPECT_NEAR(report.model[0], 0.0, 0.06);
+    EXPECT_EQ(report.stop_reason, StopReason::kConfident);
+    EXPECT_GT(report.num_local_optimizations, 0);
+  }
+}
+
+TEST(Ransac, StopsExactlyWhenConfident) {
+  // Without noise every all-inlier sample gives the final model, so the search ends at the draw
+  // that the formula says, or with the first such sample if that comes later.
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Location model = MakeData(50, 20, 0.0);
+    RansacOptions options;
+    options.seed = seed;
+    Ransac<Location>::Report report;
+    Ransac<Location>(options).Run(model, &report);
+    ASSERT_TRUE(report.success);
+    const int needed = RequiredIterations(50, 20, 2, options.confidence);
+    EXPECT_EQ(report.num_iterations, std::max(needed, model.first_good_)) << seed;
+    EXPECT_EQ(report.num_iterations, model.fits_);
+  }
+}
+
+TEST(Ransac, OneDrawIsEnoughWithoutOutliers) {
+  const Location model = MakeData(50, 50, 0.0);
+  Ransac<Location>::Report report;
+  Ransac<Location>(RansacOptions()).Run(model, &report);
+  EXPECT_EQ(report.num_iterations, 1);
+  EXPECT_EQ(report.num_inliers, 50);
+}
+
+TEST(Ransac, KeepsToItsBounds) {
+  const Location model = MakeData(1000, 20, 0.0);
+  RansacOptions options;
+  options.max_iterations = 17;
+  Ransac<Location>::Report report;
+  Ransac<Location>(options).Run(model, &report);
+  EXPECT_EQ(report.num_iterations, 17);
+  EXPECT_EQ(report.stop_reason, StopReason::kMaxIterations);
+
+  const Location clean = MakeData(50, 50, 0.0);
+  options.max_iterations = 1000;
+  options.min_iterations = 30;
+  Ransac<Location>(options).Run(clean, &report);
+  EXPECT_EQ(report.num_iterations, 30);
+}
+
+TEST(Ransac, StopsInTimeIfAsked) {
+  Location model = MakeData(1000, 10, 0.0);
+  model.seconds_per_fit_ = 1e-4;
+  RansacOptions options;
+  options.max_iterations = 1000000;
+  options.max_seconds = 0.02;
+  Ransac<Location>::Report report;
+  Ransac<Location>(options).Run(model, &report);
+  EXPECT_EQ(report.stop_reason, StopReason::kMaxSeconds);
+  EXPECT_LT(report.num_iterations, 1000);
+}
+
+TEST(Ransac, DegenerateSamplesAreNoModel) {
+  Location model = MakeData(50, 50, 0.0);
+  model.always_degenerate_ = true;
+  RansacOptions options;
+  options.max_iterations = 100;
+  Ransac<Location>::Report report;
+  Ransac<Location>(options).Run(model, &report);
+  EXPECT_FALSE(report.success);
+  EXPECT_EQ(report.num_iterations, 100);
+  EXPECT_EQ(report.num_degenerate, 100);
+  EXPECT_EQ(report.num_inliers, 0);
+  EXPECT_EQ(report.inlier_mask, std::vector<std::uint8_t>(50, 0));
+}
+
+TEST(Ransac, TooFewDataAreRefused) {
+  for (int n : {0, 1}) {
+    const Location model = MakeData(n, n, 0.0);
+    Ransac<Location>::Report report;
+    Ransac<Location>(RansacOptions()).Run(model, &report);
+    EXPECT_FALSE(report.success);
+    EXPECT_EQ(report.stop_reason, StopReason::kTooFewData);
+    EXPECT_EQ(model.fits_, 0);
+  }
+}
+
+TEST(Ransac, TheModelHasTheLastWord) {
+  Location model = MakeData(200, 100, 0.1);
+  model.accept_below_ = -1e9;
+  RansacOptions options;
+  options.max_iterations = 200;
+  Ransac<Location>::Report report;
+  Ransac<Location>(options).Run(model, &report);
+  EXPECT_FALSE(report.success);
+}
+
+TEST(Ransac, MaskAndScoreAreThoseOfTheReturnedModel) {
+  for (const ScoreType score : {ScoreType::kMsac, ScoreType::kMagsac}) {
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      // Noise well beyond the threshold: refinement moves data in and out.
+      const Location model = MakeData(300, 200, 2.0);
+      RansacOptions options;
+      options.score = score;
+      options.seed = seed;
+      Ransac<Location>::Report report;
+      Ransac<Location>(options).Run(model, &report);
+      ASSERT_TRUE(report.success);
+      const RansacLoss loss(score);
+      double expected = 0.0;
+      int inliers = 0;
+      for (int i = 0; i < model.NumData(); ++i) {
+        const double r = model.Datum(i) - report.model[0];
+        expected += static_cast<double>(loss.Value(static_cast<float>(r * r)));
+        EXPECT_EQ(report.inlier_mask[static_cast<std::size_t>(i)], std::abs(r) < 1.0 ? 1 : 0);
+        inliers += std::abs(r) < 1.0 ? 1 : 0;
+      }
+      EXPECT_EQ(report.num_inliers, inliers);
+      EXPECT_NEAR(report.score, expected, 1e-3);
+    }
+  }
+}
+
+TEST(Ransac, LocalOptimizationImprovesTheScore) {
+  const Location model = MakeData(300, 200, 0.4);
+  RansacOptions options;
+  Ransac<Location>::Report with, without;
+  Ransac<Location>(options).Run(model, &with);
+  options.local_steps = 0;
+  Ransac<Location>(options).Run(model, &without);
+  EXPECT_LE(with.score, without.score);
+  EXPECT_EQ(without.num_local_optimizations, 0);
+  EXPECT_NEAR(with.model[0], 0.0, 0.1);
+}
+
+TEST(Ransac, SameSeedSameBits) {
+  const Location model = MakeData(300, 100, 0.4);
+  RansacOptions options;
+  options.seed = 42;
+  Ransac<Location>::Report a, b;
+  Ransac<Location> engine(options);
+  engine.Run(model, &a);
+  engine.Run(model, &b);  // The engine keeps no memory of the first run.
+  EXPECT_EQ(a.model, b.model);
+  EXPECT_EQ(a.score, b.score);
+  EXPECT_EQ(a.num_iterations, b.num_iterations);
+  EXPECT_EQ(a.inlier_mask, b.inlier_mask);
+}
+
+TEST(Ransac, AllocatesNothingAfterSetUp) {
+  for (const ScoreType score : {ScoreType::kMsac, ScoreType::kMagsac}) {
+    std::vector<int> order;
+    const Location model = MakeData(500, 100, 0.4, &order);
+    RansacOptions options;
+    options.score = score;
+    Ransac<Location> engine(options);
+    Ransac<Location>::Report report;
+    engine.Run(model, &report);
+    EXPECT_GT(report.num_local_optimizations, 0);
+    EXPECT_EQ(model.allocations_at_first_fit_, allocations);
+    // Used again, it allocates nothing at all.
+    const int before = allocations;
+    engine.Run(model, &report);
+    engine.Run(model, &report, &order);
+    EXPECT_EQ(before, allocations);
+  }
+}
+
+TEST(Ransac, ProsacFindsGoodDataFirst) {
+  std::vector<int> order;
+  const Location model = MakeData(1000, 30, 0.0, &order);  // The inliers come first.
+  RansacOptions options;
+  options.max_iterations = 100000;
+  Ransac<Location>::Report ordered, uniform;
+  Ransac<Location>(options).Run(model, &ordered, &order);
+  Ransac<Location>(options).Run(model, &uniform);
+  EXPECT_EQ(ordered.num_inliers, 30);
+  EXPECT_EQ(uniform.num_inliers, 30);
+  EXPECT_LT(ordered.num_iterations, 20);
+  EXPECT_GT(uniform.num_iterations, 1000);
+}
+
+TEST(Ransac, ProsacSurvivesABadOrder) {
+  std::vector<int> order;
+  const Location model = MakeData(100, 40, 0.0, &order);
+  std::reverse(order.begin(), order.end());
+  Ransac<Location>::Report report;
+  Ransac<Location>(RansacOptions()).Run(model, &report, &order);
+  ASSERT_TRUE(report.success);
+  EXPECT_EQ(report.num_inliers, 40);
+}
+
+TEST(Sampler, ProsacGrowsFromTheBestToAll) {
+  constexpr int n = 20, m = 3;
+  std::vector<int> order(n);
+  for (int i = 0; i < n; ++i) order[static_cast<std::size_t>(i)] = n - 1 - i;
+  Sampler sampler;
+  sampler.Reset(n, m, 1, &order);
+  std::array<int, m> sample{};
+  sampler.Draw(sample.data());
+  EXPECT_EQ(std::set<int>(sample.begin(), sample.end()), (std::set<int>{19, 18, 17}));
+  std::vector<int> drawn(n, 0);
+  for (int i = 0; i < 300000; ++i) {
+    sampler.Draw(sample.data());
+    if (i < 200000) continue;
+    for (const int s : sample) ++drawn[static_cast<std::size_t>(s)];
+  }
+  for (const int count : drawn) EXPECT_NEAR(count, 100000 * m / n, 700);
+}
+
+TEST(Sampler, UniformDrawsAllAlike) {
+  constexpr int n = 10, m = 4, draws = 100000;
+  Sampler sampler;
+  sampler.Reset(n, m, 1, nullptr);
+  std::array<int, m> sample{};
+  std::vector<int> drawn(n, 0);
+  for (int i = 0; i < draws; ++i) {
+    sampler.Draw(sample.data());
+    EXPECT_EQ(std::set<int>(sample.begin(), sample.end()).size(), static_cast<std::size_t>(m));
+    for (const int s : sample) ++drawn[static_cast<std::size_t>(s)];
+  }
+  for (const int count : drawn) EXPECT_NEAR(count, draws * m / n, 800);
+}
+
+// The loss of MAGSAC++ by its definition: the likelihoods of the residual under Gaussians of every
+// standard deviation up to T / k that holds it, integrated numerically.
+double MarginalWeight(double r) {
+  constexpr double k = 3.03;
+  const double from = r / k, to = 1.0 / k;
+  constexpr int steps = 4000;
+  double sum = 0.0;
+  for (int i = 0; i < steps; ++i) {
+    const double s = from + (to - from) * (i + 0.5) / steps;
+    sum += std::exp(-0.5 * r * r / (s * s)) / s * (to - from) / steps;
+  }
+  return sum;
+}
+
+TEST(RansacLoss, MarginalLossFollowsItsDefinition) {
+  const RansacLoss loss(ScoreType::kMagsac);
+  EXPECT_EQ(loss.Value(0.0f), 0.0f);
+  EXPECT_EQ(loss.Value(1.0f), 1.0f);
+  EXPECT_EQ(loss.Value(7.0f), 1.0f);
+  EXPECT_EQ(loss.Weight(1.0f), 0.0f);
+  const double scale = static_cast<double>(loss.Weight(0.25f)) / MarginalWeight(0.5);
+  for (const double r : {0.2, 0.4, 0.6, 0.8, 0.95}) {
+    const float u = static_cast<float>(r * r);
+    EXPECT_NEAR(static_cast<double>(loss.Weight(u)), scale * MarginalWeight(r), 2e-3) << r;
+  }
+  // The weight is the derivative of the loss.
+  for (const double u : {0.1, 0.3, 0.6, 0.9}) {
+    const double slope = static_cast<double>(loss.Value(static_cast<float>(u + 0.02)) -
+                                             loss.Value(static_cast<float>(u - 0.02))) /
+                         0.04;
+    const double reference = static_cast<double>(loss.Value(0.27f) - loss.Value(0.23f)) / 0.04;
+    EXPECT_NEAR(slope / reference,
+                static_cast<double>(loss.Weight(static_cast<float>(u)) / loss.Weight(0.25f)), 0.03);
+  }
+}
+
+TEST(RansacLoss, OutliersAndNanCostOneAndWeighNothing) {
+  for (const ScoreType type : {ScoreType::kMsac, ScoreType::kMagsac}) {
+    const RansacLoss loss(type);
+    for (const float u :
+         {1.5f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+      EXPECT_EQ(loss.Value(u), 1.0f);
+      EXPECT_EQ(loss.Weight(u), 0.0f);
+    }
+  }
+}
+
+TEST(InlierWeights, CleanDataKeepTheirWeight) {
+  Random random(1);
+  std::vector<double> residuals(1000), weights;
+  for (double& r : residuals) r = 0.5 * random.Normal();
+  double sigma = 0.0;
+  for (int i = 0; i < 5; ++i) InlierWeights(residuals, 2.0, 2, &sigma, &weights);
+  EXPECT_NEAR(sigma, 0.5, 0.03);
+  double sum = 0.0;
+  for (const double w : weights) sum += w;
+  EXPECT_GT(sum, 985.0);
+}
+
+TEST(InlierWeights, BackgroundLosesItsWeight) {
+  Random random(1);
+  std::vector<double> residuals(2000), weights;
+  for (std::size_t i = 0; i < 1000; ++i) residuals[i] = 0.5 * random.Normal();
+  for (std::size_t i = 1000; i < 2000; ++i) residuals[i] = random.Uniform(-20.0, 20.0);
+  double sigma = 0.0;
+  for (int i = 0; i < 10; ++i) InlierWeights(residuals, 2.0, 2, &sigma, &weights);
+  EXPECT_NEAR(sigma, 0.5, 0.05);
+  for (std::size_t i = 0; i < 2000; ++i) {
+    const double size = std::abs(residuals[i]);
+    if (size < 0.3) {
+      EXPECT_GT(weights[i], 0.9);
+    } else if (size > 2.0) {
+      EXPECT_EQ(weights[i], 0.0);
+    } else if (size > 1.7) {
+      EXPECT_LT(weights[i], 0.3);
+    }
+  }
+}
+
+TEST(RansacOptions, NamesTheBadField) {
+  struct Case {
+    const char* field;
+    void (*spoil)(RansacOptions*);
+  };
+  const Case cases[] = {
+      {"threshold", [](RansacOptions* o) { o->threshold = 0.0; }},
+      {"threshold", [](RansacOptions* o) { o->threshold = std::nan(""); }},
+      {"confidence", [](RansacOptions* o) { o->confidence = 1.0; }},
+      {"confidence", [](RansacOptions* o) { o->confidence = 0.0; }},
+      {"min_iterations", [](RansacOptions* o) { o->min_iterations = -1; }},
+      {"max_iterations", [](RansacOptions* o) { o->max_iterations = 0; }},
+      {"local_start", [](RansacOptions* o) { o->local_start = -1; }},
+      {"local_samples", [](RansacOptions* o) { o->local_samples = -1; }},
+      {"local_steps", [](RansacOptions* o) { o->local_steps = -1; }},
+      {"max_seconds", [](RansacOptions* o) { o->max_seconds = -1.0; }},
+  };
+  EXPECT_TRUE(RansacOptions().Validate().ok());
+  for (const Case& c : cases) {
+    RobustFitOptions options;
+    c.spoil(&options.ransac);
+    const Status status = options.Validate();
+    EXPECT_EQ(status.code, StatusCode::kInvalidArgument) << c.field;
+    EXPECT_NE(status.message.find(c.field), std::string::npos) << status.message;
+  }
+  RobustFitOptions options;
+  options.sigma_px = 0.0;
+  EXPECT_NE(options.Validate().message.find("sigma_px"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace circline
