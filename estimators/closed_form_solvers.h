@@ -13,10 +13,18 @@ struct ClosedFormOptions {
   Status Validate() const;
 };
 
-// single_circle (both poses of a circle, nothing else used), circle_center (prop. 3), circle_frame
-// (prop. 4), line_pairs (prop. 5; 1 where both directions are axes). Hypotheses carry a covariance
-// by statistical linearisation: each independent error of the fits, one standard deviation up and
-// down.
+// orthogonal_vanishing_points  prop. 1   two pencils along two of the axes
+// line_pairs                   prop. 5   any two pencils, orthogonal or not, coplanar or not
+// single_circle                          a circle alone: both poses
+// circle_center                prop. 3   a circle and the image of its centre
+// circle_diameters             prop. 3   a circle and two or more chords through its centre
+// concentric_circles           prop. 3   two or more circles about one centre
+// parallel_circles             prop. 3   two or more circles of one plane
+// circle_frame                 prop. 4   a circle and the images of the X and Y axes
+//
+// Hypotheses carry a covariance by statistical linearisation: each independent error of the fits,
+// one standard deviation up and down, through the closed form itself. Senses of axes that nothing
+// decides follow the conventions of WorldRotation.
 void AddClosedFormSolvers(SolverRegistry* registry, const ClosedFormOptions& options = {});
 
 // Rotation of the world frame whose plane has the unit normal +-`normal`: the in-plane angle from

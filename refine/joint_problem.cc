@@ -494,6 +494,8 @@ JointProblem::JointProblem(const Observations& observations, const EstimationOpt
 
 JointProblem::~JointProblem() = default;
 
+bool JointProblem::spin_is_free() const { return !evidence_->x_is_fixed; }
+
 double JointProblem::SeedCost(const CameraPose& seed) const {
   State state;
   if (!Initialize(*evidence_, seed, &state)) return std::numeric_limits<double>::infinity();

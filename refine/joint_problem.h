@@ -48,6 +48,9 @@ class JointProblem {
   // cheaply. Infinity where the seed is unusable.
   double SeedCost(const CameraPose& seed) const;
 
+  // True if nothing fixes the rotation about the plane's normal.
+  bool spin_is_free() const;
+
  private:
   std::unique_ptr<const JointEvidence> evidence_;
 };

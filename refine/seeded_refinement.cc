@@ -238,6 +238,11 @@ Status RefineAt(const Observations& scaled,
       last = status;
       continue;
     }
+    // A spin that nothing fixes is settled by convention, whatever the seed's was.
+    if (problem.spin_is_free()) {
+      WorldRotation(scaled, h.cam_from_world.rotation.col(2), h.cam_from_world.translation,
+                    kDefaultLineSigmaPx, &h.cam_from_world.rotation);
+    }
     if (h.cost < best_cost) *measured = {scales.conic_px, scales.line_px};
     best_cost = std::min(best_cost, h.cost);
     hypotheses->push_back(std::move(h));

@@ -1,0 +1,70 @@
+// The numbers that a closed form works on, read from observations. Internal: not installed.
+#ifndef CIRCLINE_ESTIMATORS_CLOSED_FORM_INPUTS_H_
+#define CIRCLINE_ESTIMATORS_CLOSED_FORM_INPUTS_H_
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "circline/estimators/observations.h"
+
+namespace circline {
+
+// A measured vector and a square root of its covariance: `columns` perturb the value by one
+// standard deviation along independent directions.
+struct Measured {
+  Eigen::VectorXd value;
+  Eigen::MatrixXd columns;
+
+  Measured() = default;
+  Measured(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance);
+  bool present() const { return value.size() > 0; }
+};
+
+using RayPair = std::array<Eigen::Vector3d, 2>;
+
+// All calibrated.
+struct Inputs {
+  Measured conic;                     // ConicToVector, 6.
+  std::vector<Measured> more_conics;  // Further circles of the same plane.
+  std::vector<double>
+      normal_weights;       // Inverse variances of the normals of `conic`, `more_conics`.
+  Measured center;          // Image of the circle's centre, homogeneous, 3.
+  Measured x_line, y_line;  // Images of the axes or of lines parallel to them, 3.
+  std::array<Measured, 2> directions;  // Vanishing points of two pencils, 3.
+  Measured origin;                     // Image of the world origin, homogeneous, 3.
+  std::array<PencilDirection, 2> roles{PencilDirection::kFree, PencilDirection::kFree};
+  std::optional<RayPair> x_sense, y_sense;  // Oriented axes, homogeneous.
+  bool origin_at_center = false;            // The origin is the circle's centre.
+  double radius = 0.0;                      // Metric scale from the circle, or 0.
+  std::optional<RayPair> length_points;     // Metric scale from two points ...
+  double length = 0.0;                      // ... of the plane, or 0.
+
+  // Every perturbable input.
+  std::vector<Measured*> All();
+  bool IsMetric() const { return (conic.present() && radius > 0.0) || length > 0.0; }
+};
+
+// `sigma_px` below: of points that state none. `observations` are fitted and resolved.
+
+// A pixel as a homogeneous calibrated point; absent where the camera cannot undistort it.
+Measured MeasuredPoint(const Camera& camera, const Eigen::Vector2d& pixel, double sigma_px);
+
+// The fitted line of an axis: the pencil's line that it is a part of, or its own two points.
+Measured AxisLine(const Observations& observations, const Segment& axis, double sigma_px);
+
+// Images of the drawn axes, or else of the best-measured lines along them: those need not lie in
+// the plane to have the axis' direction.
+void GatherAxisLines(const Observations& observations, double sigma_px, Inputs* inputs);
+
+// Senses of the axes, the origin, a known length.
+void GatherFrame(const Observations& observations, double sigma_px, Inputs* inputs);
+
+// A circle of the world plane, its centre if known, its radius.
+void GatherCircle(const Observations& observations, const CircleObservation& circle,
+                  double sigma_px, Inputs* inputs);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_CLOSED_FORM_INPUTS_H_

@@ -1,0 +1,273 @@
+#include "circline/estimators/closed_form_poses.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "circline/estimators/line_pose.h"
+
+namespace circline {
+namespace {
+
+// Picks the senses of the axes: as drawn, then +Z towards the camera, then X to the right (or
+// down).
+Eigen::Matrix3d Orient(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& plane_ray,
+                       const Inputs& inputs) {
+  Eigen::Matrix3d best = rotation;
+  int best_score = -1;
+  const Eigen::Vector3d normal = rotation.col(2);
+  for (const Eigen::Matrix3d& R : SignChoices(rotation)) {
+    int score = 0;
+    if (inputs.x_sense && MovesAlong(R.col(0), normal, (*inputs.x_sense)[0], (*inputs.x_sense)[1]))
+      score += 8;
+    if (inputs.y_sense && MovesAlong(R.col(1), normal, (*inputs.y_sense)[0], (*inputs.y_sense)[1]))
+      score += 4;
+    if (R.col(2).dot(plane_ray) < 0.0) score += 2;
+    const bool horizontal = std::abs(R(0, 0)) > 1e-9;
+    if (horizontal ? R(0, 0) > 0.0 : R(1, 0) > 0.0) score += 1;
+    if (score > best_score) {
+      best_score = score;
+      best = R;
+    }
+  }
+  return best;
+}
+
+// Variance of the in-plane angle of the direction n x l, from the covariance of l.
+double InPlaneVariance(const Measured& line, const Eigen::Vector3d& direction) {
+  return (direction.normalized().transpose() * line.columns).squaredNorm();
+}
+
+// Translation: the point where the origin's ray meets the plane n . X = distance. `distance` 0
+// means unknown; then a known length gives it, or the translation is a direction.
+Eigen::Vector3d Translation(const Eigen::Vector3d& n, double distance,
+                            const Eigen::Vector3d& origin_ray, const Inputs& inputs) {
+  const double along = n.dot(origin_ray);
+  Eigen::Vector3d t = origin_ray / (along != 0.0 ? along : 1.0);  // On the plane n . X = 1.
+  if (t.z() < 0.0) t = -t;
+  if (inputs.radius > 0.0 && distance != 0.0) return std::abs(distance) * inputs.radius * t;
+  if (inputs.length > 0.0) {
+    const Eigen::Vector3d a = (*inputs.length_points)[0], b = (*inputs.length_points)[1];
+    const double units = (a / n.dot(a) - b / n.dot(b)).norm();
+    if (units > 0.0) return inputs.length / units * t;
+  }
+  return t.normalized();
+}
+
+// Image of the origin as seen by a circle's hypothesis: the measured origin, the crossing of the
+// axes, or the circle's centre.
+Eigen::Vector3d OriginRay(const Inputs& inputs, const CirclePose& circle) {
+  if (inputs.origin.present() && !inputs.origin_at_center) return inputs.origin.value;
+  if (!inputs.origin_at_center && inputs.x_sense && inputs.y_sense && inputs.x_line.present() &&
+      inputs.y_line.present()) {
+    return Eigen::Vector3d(inputs.x_line.value).cross(Eigen::Vector3d(inputs.y_line.value));
+  }
+  return circle.center;
+}
+// One candidate per circle plane; `contradict` says how far other evidence speaks against it.
+std::vector<Candidate> CircleCandidates(
+    const Inputs& inputs,
+    const std::function<Eigen::VectorXd(const CirclePose&, const Inputs&)>& contradict) {
+  std::vector<Candidate> candidates;
+  std::array<CirclePose, 2> poses;
+  const int count = CirclePoses(VectorToConic(inputs.conic.value), &poses);
+  for (int i = 0; i < count; ++i) {
+    const CirclePose& circle = poses[static_cast<std::size_t>(i)];
+    Candidate c;
+    if (!RotationOfPlane(circle.normal, circle.center, inputs, &c.pose.rotation)) continue;
+    c.pose.translation = Translation(circle.normal, circle.normal.dot(circle.center),
+                                     OriginRay(inputs, circle), inputs);
+    c.contradiction = contradict(circle, inputs);
+    c.circle = circle;
+    candidates.push_back(c);
+  }
+  return candidates;
+}
+
+Eigen::Vector2d CenterMiss(const CirclePose& circle, const Eigen::VectorXd& measured) {
+  return (circle.center / circle.center.z()).head<2>() - measured.head<2>() / measured[2];
+}
+
+// The weighted mean of the circles' normals, each nearest to the candidate's; and how far they miss
+// it.
+Candidate CommonPlane(const Candidate& seed, const Inputs& inputs, bool concentric, bool* valid) {
+  std::vector<CirclePose> nearest = {*seed.circle};
+  for (const Measured& conic : inputs.more_conics) {
+    std::array<CirclePose, 2> poses;
+    const int count = CirclePoses(VectorToConic(conic.value), &poses);
+    if (count == 0) continue;
+    const bool second = count == 2 && poses[1].normal.dot(seed.circle->normal) >
+                                          poses[0].normal.dot(seed.circle->normal);
+    nearest.push_back(poses[second ? 1 : 0]);
+  }
+  *valid = nearest.size() == inputs.more_conics.size() + 1;
+  if (!*valid) return seed;
+  Eigen::Vector3d n = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < nearest.size(); ++i)
+    n += inputs.normal_weights[i] * nearest[i].normal;
+  n.normalize();
+  Candidate c = seed;
+  c.circle->normal = n;
+  *valid = RotationOfPlane(n, c.circle->center, inputs, &c.pose.rotation);
+  c.pose.translation =
+      Translation(n, n.dot(c.circle->center), OriginRay(inputs, *c.circle), inputs);
+  const Eigen::Vector3d a = n.unitOrthogonal(), b = n.cross(a);
+  c.contradiction.resize(static_cast<Eigen::Index>((concentric ? 4 : 2) * (nearest.size() - 1)));
+  Eigen::Index row = 0;
+  for (std::size_t i = 1; i < nearest.size(); ++i) {
+    // Against the first circle's own normal: the mean is no independent witness.
+    const Eigen::Vector3d difference = nearest[i].normal - nearest[0].normal;
+    c.contradiction[row++] = a.dot(difference);
+    c.contradiction[row++] = b.dot(difference);
+    if (!concentric) continue;
+    c.contradiction.segment<2>(row) = CenterMiss(nearest[i], nearest[0].center);
+    row += 2;
+  }
+  return c;
+}
+
+std::vector<Candidate> CommonPlanes(const Inputs& inputs, bool concentric) {
+  std::vector<Candidate> common;
+  for (const Candidate& seed : SingleCirclePoses(inputs)) {
+    bool valid;
+    const Candidate c = CommonPlane(seed, inputs, concentric, &valid);
+    if (valid) common.push_back(c);
+  }
+  return common;
+}
+
+// Proposition 1, where the roles say that the directions are orthogonal: the excess over 90 degrees
+// is split by variance.
+bool RotationOfAxes(const Inputs& inputs, Eigen::Matrix3d* rotation) {
+  const Eigen::Vector3d a = inputs.directions[0].value, b = inputs.directions[1].value;
+  const Eigen::Vector3d normal = a.cross(b).normalized();
+  const auto variance = [&normal](const Measured& m) {
+    const Eigen::Vector3d tangent = normal.cross(Eigen::Vector3d(m.value));
+    return (tangent.transpose() * m.columns).squaredNorm();
+  };
+  Eigen::Matrix3d R;
+  if (!RotationFromOrthogonalDirections(a, variance(inputs.directions[0]), b,
+                                        variance(inputs.directions[1]), &R)) {
+    return false;
+  }
+  // R has the two directions as its first columns; move them to the columns of their axes.
+  const int i = static_cast<int>(inputs.roles[0]), j = static_cast<int>(inputs.roles[1]);
+  rotation->col(i) = R.col(0);
+  rotation->col(j) = R.col(1);
+  rotation->col(3 - i - j) = R.col(2) * ((i + 1) % 3 == j ? 1.0 : -1.0);
+  return true;
+}
+
+// The direction with a role comes first; where both have one, the better-measured does.
+bool RotationOfPair(const Inputs& inputs, const Eigen::Vector3d& plane_ray,
+                    Eigen::Matrix3d* rotation) {
+  const auto [first, second] = inputs.roles;
+  if (first != PencilDirection::kFree && second != PencilDirection::kFree) {
+    Inputs anchored = inputs;
+    const bool first_is_better =
+        inputs.directions[0].columns.norm() <= inputs.directions[1].columns.norm();
+    anchored.directions[first_is_better ? 0 : 1].columns.setZero();
+    return RotationOfAxes(anchored, rotation);
+  }
+  Eigen::Matrix3d R;
+  if (!RotationFromDirections(inputs.directions[0].value, inputs.directions[1].value, &R))
+    return false;
+  *rotation = R;
+  if (first == PencilDirection::kY) {
+    rotation->col(0) = -R.col(1);
+    rotation->col(1) = R.col(0);
+  } else if (first == PencilDirection::kFree) {
+    return RotationOfPlane(R.col(2), plane_ray, inputs, rotation);
+  }
+  return true;
+}
+
+// Completes a rotation from lines alone: senses, translation.
+std::vector<Candidate> LinePose(const Eigen::Matrix3d& rotation, const Inputs& inputs) {
+  Candidate c;
+  const Eigen::Vector3d ray = inputs.origin.value;
+  c.pose.rotation = Orient(rotation, ray, inputs);
+  c.pose.translation = Translation(c.pose.rotation.col(2), 0.0, ray, inputs);
+  if (!c.pose.rotation.allFinite() || !c.pose.translation.allFinite()) return {};
+  return {c};
+}
+
+}  // namespace
+
+bool RotationOfPlane(const Eigen::Vector3d& n, const Eigen::Vector3d& plane_ray,
+                     const Inputs& inputs, Eigen::Matrix3d* rotation) {
+  const auto direction = [&n](const Measured& line) -> Eigen::Vector3d {
+    return n.cross(Eigen::Vector3d(line.value));
+  };
+  bool valid = true;
+  if (inputs.x_line.present() && inputs.y_line.present()) {
+    const Eigen::Vector3d x = direction(inputs.x_line), y = direction(inputs.y_line);
+    valid = RotationFromOrthogonalDirections(x, InPlaneVariance(inputs.x_line, x) / x.squaredNorm(),
+                                             y, InPlaneVariance(inputs.y_line, y) / y.squaredNorm(),
+                                             rotation);
+  } else if (inputs.x_line.present()) {
+    const Eigen::Vector3d x = direction(inputs.x_line);
+    valid = RotationFromDirections(x, n.cross(x), rotation);
+  } else if (inputs.y_line.present()) {
+    const Eigen::Vector3d y = direction(inputs.y_line);
+    valid = RotationFromDirections(y.cross(n), y, rotation);
+  } else {
+    const Eigen::Vector3d reference =
+        std::abs(n.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+    const Eigen::Vector3d x = reference - n.dot(reference) * n;
+    valid = RotationFromDirections(x, n.cross(x), rotation);
+  }
+  if (!valid) return false;
+  *rotation = Orient(*rotation, plane_ray, inputs);
+  return rotation->allFinite();
+}
+
+std::vector<Candidate> SingleCirclePoses(const Inputs& inputs) {
+  return CircleCandidates(inputs, [](const CirclePose&, const Inputs&) -> Eigen::VectorXd {
+    return Eigen::VectorXd(0);
+  });
+}
+
+std::vector<Candidate> CircleCenterPoses(const Inputs& inputs) {
+  return CircleCandidates(inputs,
+                          [](const CirclePose& circle, const Inputs& in) -> Eigen::VectorXd {
+                            return CenterMiss(circle, in.center.value);
+                          });
+}
+
+std::vector<Candidate> CircleFramePoses(const Inputs& inputs) {
+  return CircleCandidates(inputs,
+                          [](const CirclePose& circle, const Inputs& in) -> Eigen::VectorXd {
+                            const Eigen::Vector3d lx = in.x_line.value, ly = in.y_line.value;
+                            const Eigen::Vector3d x = circle.normal.cross(lx).normalized(),
+                                                  y = circle.normal.cross(ly).normalized();
+                            Eigen::VectorXd contradiction(in.origin_at_center ? 3 : 1);
+                            contradiction[0] = x.dot(y);
+                            if (in.origin_at_center)
+                              contradiction.tail<2>() = CenterMiss(circle, lx.cross(ly));
+                            return contradiction;
+                          });
+}
+
+std::vector<Candidate> ParallelCirclePoses(const Inputs& inputs) {
+  return CommonPlanes(inputs, false);
+}
+
+std::vector<Candidate> ConcentricCirclePoses(const Inputs& inputs) {
+  return CommonPlanes(inputs, true);
+}
+
+std::vector<Candidate> LinePairPoses(const Inputs& inputs) {
+  Eigen::Matrix3d R;
+  if (!RotationOfPair(inputs, inputs.origin.value, &R)) return {};
+  return LinePose(R, inputs);
+}
+
+std::vector<Candidate> OrthogonalDirectionPoses(const Inputs& inputs) {
+  Eigen::Matrix3d R;
+  if (!RotationOfAxes(inputs, &R)) return {};
+  return LinePose(R, inputs);
+}
+
+}  // namespace circline

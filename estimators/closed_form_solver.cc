@@ -1,0 +1,175 @@
+#include "circline/estimators/closed_form_solver.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace circline {
+namespace {
+
+const Candidate* Nearest(const std::vector<Candidate>& candidates, const Candidate& reference) {
+  const Candidate* best = nullptr;
+  double best_angle = std::numeric_limits<double>::infinity();
+  for (const Candidate& c : candidates) {
+    const double angle = RotationAngle(c.pose.rotation, reference.pose.rotation);
+    if (angle < best_angle) {
+      best_angle = angle;
+      best = &c;
+    }
+  }
+  return best;
+}
+
+// Statistical linearisation: every independent error of the inputs, one standard deviation up and
+// down, through the closed form itself. Returns columns of [delta, delta_t, contradiction].
+Eigen::MatrixXd Sensitivity(const Evaluate& evaluate, const Inputs& inputs,
+                            const Candidate& candidate) {
+  const Eigen::Index rows = 6 + candidate.contradiction.size();
+  std::vector<Eigen::VectorXd> columns;
+  Inputs perturbed = inputs;
+  for (Measured* m : perturbed.All()) {
+    const Eigen::VectorXd value = m->value;
+    for (Eigen::Index k = 0; k < m->columns.cols(); ++k) {
+      if (m->columns.col(k).isZero(0.0)) continue;
+      m->value = value + m->columns.col(k);
+      const std::vector<Candidate> plus_all = evaluate(perturbed);
+      m->value = value - m->columns.col(k);
+      const std::vector<Candidate> minus_all = evaluate(perturbed);
+      m->value = value;
+      const Candidate* plus = Nearest(plus_all, candidate);
+      const Candidate* minus = Nearest(minus_all, candidate);
+      if (plus == nullptr || minus == nullptr) continue;
+      Eigen::VectorXd column(rows);
+      column.head<3>() = 0.5 * LogRotation(plus->pose.rotation * minus->pose.rotation.transpose());
+      column.segment<3>(3) = 0.5 * (plus->pose.translation - minus->pose.translation);
+      column.tail(rows - 6) = 0.5 * (plus->contradiction - minus->contradiction);
+      columns.push_back(column);
+    }
+  }
+  Eigen::MatrixXd out(rows, static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    out.col(static_cast<Eigen::Index>(k)) = columns[k];
+  return out;
+}
+
+void FillUncertainty(const Evaluate& evaluate, const Inputs& inputs, const Candidate& candidate,
+                     bool rotation_is_free, PoseHypothesis* h) {
+  const Eigen::MatrixXd S = Sensitivity(evaluate, inputs, candidate);
+  Matrix6d covariance = S.topRows<6>() * S.topRows<6>().transpose();
+  if (rotation_is_free) {
+    Vector6d free = Vector6d::Zero();
+    free.head<3>() = candidate.pose.rotation.col(2);
+    const Matrix6d project = Matrix6d::Identity() - free * free.transpose();
+    covariance = project * covariance * project;
+    std::array<double, 6> direction;
+    Eigen::Map<Vector6d>(direction.data()) = free;
+    h->free_directions.push_back(direction);
+  }
+  Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
+  h->rank = static_cast<int>(Eigen::FullPivLU<Matrix6d>(covariance).setThreshold(1e-9).rank());
+  if (candidate.contradiction.size() > 0) {
+    const Eigen::MatrixXd tail = S.bottomRows(candidate.contradiction.size());
+    const Eigen::MatrixXd C = tail * tail.transpose();
+    h->cost = 0.5 * candidate.contradiction.dot(
+                        C.completeOrthogonalDecomposition().solve(candidate.contradiction));
+    if (!std::isfinite(h->cost)) h->cost = 0.5 * std::numeric_limits<double>::max();
+  }
+}
+// Counts and rms of the fits that a hypothesis rests on.
+void FillSupport(const Observations& evidence, PoseHypothesis* h) {
+  double squares = 0.0;
+  const auto add = [&](double rms, const std::vector<Eigen::Vector2d>& points,
+                       const std::vector<std::uint8_t>& mask) {
+    const int inliers = mask.empty() ? static_cast<int>(points.size())
+                                     : static_cast<int>(std::count(mask.begin(), mask.end(), 1));
+    squares += rms * rms * inliers;
+    h->num_inliers += inliers;
+    h->num_observations += static_cast<int>(points.size());
+  };
+  for (const CircleObservation& c : evidence.circles) {
+    if (c.fit) add(c.fit->rms_px, c.points, c.inliers);
+  }
+  for (const PencilObservation& pencil : evidence.pencils) {
+    for (const LineObservation& line : pencil.lines) {
+      if (line.fit) add(line.fit->rms_px, line.points, line.inliers);
+    }
+    if (!pencil.fit) continue;
+    PencilEstimate estimate;
+    estimate.id = pencil.id;
+    estimate.direction = pencil.fit->direction;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(pencil.fit->covariance,
+                                                               Eigen::EigenvaluesOnly);
+    estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) * 57.29577951308232;
+    h->pencils.push_back(estimate);
+  }
+  if (h->num_inliers > 0) h->rms_px = std::sqrt(squares / h->num_inliers);
+}
+
+void FillCircle(const Observations& evidence, const CirclePose& pose, PoseHypothesis* h) {
+  const CircleObservation& circle = evidence.circles.front();
+  // CirclePose counts in radii; the hypothesis' unit is metric, or makes the translation a unit
+  // vector.
+  const Eigen::Vector3d n = h->cam_from_world.rotation.col(2);
+  const double distance = std::abs(n.dot(h->cam_from_world.translation));
+  const double unit = distance / std::abs(pose.normal.dot(pose.center));
+  CircleEstimate estimate;
+  estimate.id = circle.id;
+  estimate.normal = pose.normal;
+  estimate.center = unit * pose.center;
+  estimate.radius = unit;
+  CameraToPixel(evidence.camera, pose.center, &estimate.center_px);
+  h->circles.push_back(estimate);
+}
+
+}  // namespace
+
+Observations ClosedFormSolver::Evidence(const Observations& observations) const {
+  Observations evidence;
+  recipe_.select(Resolved(observations), &evidence);
+  return evidence;
+}
+
+PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
+  PoseEstimate estimate;
+  estimate.solver = recipe_.name;
+  estimate.status = options_.Validate();
+  if (estimate.status.ok()) estimate.status = observations.Validate();
+  Observations evidence;
+  if (estimate.status.ok()) estimate.status = recipe_.select(Resolved(observations), &evidence);
+  Inputs inputs;
+  if (estimate.status.ok()) estimate.status = recipe_.gather(evidence, options_.sigma_px, &inputs);
+  if (!estimate.status.ok()) return estimate;
+
+  const std::vector<Candidate> candidates = recipe_.evaluate(inputs);
+  const bool free =
+      !inputs.x_line.present() && !inputs.y_line.present() && !inputs.directions[0].present();
+  for (const Candidate& candidate : candidates) {
+    PoseHypothesis h;
+    h.cam_from_world = candidate.pose;
+    h.metric = inputs.IsMetric();
+    const FrameObservation& frame = evidence.frame;
+    h.origin_observed =
+        frame.origin || !frame.origin_is_center.empty() || (frame.x_axis && frame.y_axis);
+    FillSupport(evidence, &h);
+    if (candidate.circle) FillCircle(evidence, *candidate.circle, &h);
+    FillUncertainty(recipe_.evaluate, inputs, candidate, free, &h);
+    estimate.hypotheses.push_back(std::move(h));
+  }
+  if (estimate.hypotheses.empty()) {
+    estimate.status = Status::Refused(recipe_.name + ": the evidence is degenerate (" +
+                                      recipe_.needs + " are needed)");
+  }
+  RankHypotheses(&estimate.hypotheses);
+  estimate.decided_by = estimate.hypotheses.size() > 1 ? recipe_.decided_by : "only one pose fits";
+  return estimate;
+}
+
+Observations ClosedFormSolver::Resolved(const Observations& observations) const {
+  Observations fitted = observations;
+  FitDirect(options_.sigma_px, &fitted);
+  return ResolveWorld(fitted);
+}
+
+}  // namespace circline

@@ -1,0 +1,262 @@
+#include "circline/estimators/closed_form_solvers.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "tests/plane_scene.h"
+
+namespace circline {
+namespace {
+
+PoseEstimate Solve(const std::string& name, const Observations& observations) {
+  SolverRegistry registry;
+  AddClosedFormSolvers(&registry);
+  const Solver* solver = registry.Find(name, SolverStage::kClosedForm);
+  EXPECT_NE(solver, nullptr) << name;
+  return solver->Solve(observations);
+}
+
+double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
+  return h.cam_from_world.rotation.col(2).cross(scene.pose.rotation.col(2)).norm();
+}
+
+// Adds the drawn axes, on lines of their own.
+void DrawAxes(PlaneScene* scene, Observations* observations) {
+  observations->frame.x_axis = Segment{scene->Pixel(0, 0), scene->Pixel(2, 0)};
+  observations->frame.y_axis = Segment{scene->Pixel(0, 0), scene->Pixel(0, 2)};
+}
+
+constexpr double kExact = 1e-8;  // Noise-free pixels; the lens is inverted to 1e-10.
+
+TEST(ClosedFormSolversTest, SingleCircleReturnsBothPosesAsEquals) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  const PoseEstimate estimate = Solve("single_circle", observations);
+  ASSERT_TRUE(estimate.status.ok());
+  ASSERT_EQ(estimate.hypotheses.size(), 2U);
+  EXPECT_LT(std::min(NormalError(estimate.hypotheses[0], scene),
+                     NormalError(estimate.hypotheses[1], scene)),
+            kExact);
+  EXPECT_NEAR(estimate.hypotheses[0].probability, 0.5, 1e-9);
+  for (const PoseHypothesis& h : estimate.hypotheses) {
+    EXPECT_TRUE(h.RotationIsFree());
+    EXPECT_TRUE(std::isinf(h.SigmaRotation().maxCoeff()));
+    EXPECT_EQ(h.rank, 4);  // The normal, and the direction of the centre.
+    EXPECT_FALSE(h.metric);
+    EXPECT_NEAR(h.cam_from_world.translation.norm(), 1.0, 1e-12);
+    EXPECT_LT(h.cam_from_world.rotation.col(2).dot(h.cam_from_world.translation), 0.0);
+  }
+}
+
+TEST(ClosedFormSolversTest, CenterDecidesAndRadiusMakesItMetric) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  observations.circles[0].center = scene.Pixel(0.5, 0.2);
+  observations.circles[0].radius = 1.0;
+  const PoseEstimate estimate = Solve("circle_center", observations);
+  ASSERT_EQ(estimate.hypotheses.size(), 2U);
+  const PoseHypothesis& best = estimate.hypotheses[0];
+  EXPECT_LT(NormalError(best, scene), kExact);
+  EXPECT_GT(best.probability, 0.999);
+  EXPECT_TRUE(best.metric);
+  const Eigen::Vector3d center =
+      scene.pose.rotation * Eigen::Vector3d(0.5, 0.2, 0.0) + scene.pose.translation;
+  EXPECT_LT((best.cam_from_world.translation - center).norm(), 1e-6);
+  ASSERT_EQ(best.circles.size(), 1U);
+  EXPECT_NEAR(best.circles[0].radius, 1.0, 1e-6);
+  EXPECT_LT((best.circles[0].center_px - *observations.circles[0].center).norm(), 1e-5);
+}
+
+TEST(ClosedFormSolversTest, DiametersAreAsGoodAsTheCenter) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  observations.circles[0].diameters = {Segment{scene.Pixel(-0.5, 0.2), scene.Pixel(1.5, 0.2)},
+                                       Segment{scene.Pixel(0.5, -0.8), scene.Pixel(0.5, 1.2)}};
+  const PoseEstimate estimate = Solve("circle_diameters", observations);
+  ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
+  EXPECT_GT(estimate.hypotheses[0].probability, 0.99);
+}
+
+TEST(ClosedFormSolversTest, CirclesOfOnePlaneDecideTogether) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 1.0, 0.5, 0.8), scene.Circle("c1", -1.5, -0.5, 0.9)};
+  PoseEstimate estimate = Solve("parallel_circles", observations);
+  ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
+  EXPECT_GT(estimate.hypotheses[0].probability, 0.99);
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.2), scene.Circle("c1", 0.5, 0.2, 0.7)};
+  for (CircleObservation& circle : observations.circles) circle.concentric = "g0";
+  estimate = Solve("concentric_circles", observations);
+  ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
+  EXPECT_GT(estimate.hypotheses[0].probability, 0.99);
+}
+
+TEST(ClosedFormSolversTest, CircleFrameRecoversTheDrawnFrame) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  DrawAxes(&scene, &observations);
+  const PoseEstimate estimate = Solve("circle_frame", observations);
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  const PoseHypothesis& best = estimate.hypotheses[0];
+  EXPECT_LT(RotationAngle(best.cam_from_world.rotation, scene.pose.rotation), 1e-7);
+  EXPECT_TRUE(best.origin_observed);
+  EXPECT_LT((best.cam_from_world.translation - scene.pose.translation.normalized()).norm(), 1e-7);
+}
+
+// Axes drawn the other way round, or so that Z points away from the camera, are taken as drawn.
+TEST(ClosedFormSolversTest, AxesDecideTheSigns) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  observations.frame.x_axis = Segment{scene.Pixel(0, 0), scene.Pixel(-2, 0)};
+  observations.frame.y_axis = Segment{scene.Pixel(0, 0), scene.Pixel(0, 2)};
+  const PoseEstimate estimate = Solve("circle_frame", observations);
+  ASSERT_TRUE(estimate.status.ok());
+  const Eigen::Matrix3d drawn = scene.pose.rotation * Eigen::Vector3d(-1.0, 1.0, -1.0).asDiagonal();
+  EXPECT_LT(RotationAngle(estimate.hypotheses[0].cam_from_world.rotation, drawn), 1e-7);
+}
+
+// METHOD section 5: an axis through the circle's centre along the tilt makes both candidates pass
+// the test of orthogonality. They are both returned as equals, unless the origin is the centre.
+TEST(ClosedFormSolversTest, CircleFrameSaysWhenItCannotDecide) {
+  PlaneScene scene;
+  scene.pose.rotation =
+      ExpRotation({0.7, 0.0, 0.0}) * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+  scene.pose.translation = Eigen::Vector3d(0.0, 0.0, 10.0);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
+  DrawAxes(&scene, &observations);
+  PoseEstimate estimate = Solve("circle_frame", observations);
+  ASSERT_EQ(estimate.hypotheses.size(), 2U);
+  EXPECT_LT(estimate.hypotheses[0].probability, 0.7);
+  observations.frame.origin_is_center = "c0";
+  estimate = Solve("circle_frame", observations);
+  ASSERT_EQ(estimate.hypotheses.size(), 2U);
+  EXPECT_GT(estimate.hypotheses[0].probability, 0.95);
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
+}
+
+TEST(ClosedFormSolversTest, LinePairsForAnyTwoDirections) {
+  PlaneScene scene;
+  // Orthogonal, with roles; then oblique and free; then along X and the normal.
+  Observations observations = scene.Empty();
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+  DrawAxes(&scene, &observations);
+  for (const char* name : {"line_pairs", "orthogonal_vanishing_points"}) {
+    const PoseEstimate estimate = Solve(name, observations);
+    ASSERT_EQ(estimate.hypotheses.size(), 1U) << estimate.status.message;
+    EXPECT_LT(RotationAngle(estimate.hypotheses[0].cam_from_world.rotation, scene.pose.rotation),
+              1e-7);
+  }
+  observations.pencils = {
+      scene.Pencil("L1", PencilDirection::kFree, Eigen::Vector3d::UnitX()),
+      scene.Pencil("L2", PencilDirection::kFree, Eigen::Vector3d(0.6, 0.8, 0.0))};
+  observations.frame = FrameObservation();
+  PoseEstimate estimate = Solve("line_pairs", observations);
+  ASSERT_EQ(estimate.hypotheses.size(), 1U) << estimate.status.message;
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
+  EXPECT_LT(estimate.hypotheses[0]
+                .cam_from_world.rotation.col(0)
+                .cross(scene.pose.rotation.col(0))
+                .norm(),
+            kExact);
+  EXPECT_FALSE(Solve("orthogonal_vanishing_points", observations).status.ok());
+
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                          scene.Pencil("L3", PencilDirection::kZ, Eigen::Vector3d::UnitZ())};
+  estimate = Solve("line_pairs", observations);
+  ASSERT_EQ(estimate.hypotheses.size(), 1U) << estimate.status.message;
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
+}
+
+// Lines that are parallel in the image too: the vanishing point is at infinity.
+TEST(ClosedFormSolversTest, FrontalPlaneIsNothingSpecial) {
+  PlaneScene scene;
+  scene.camera.distortion = {};
+  scene.pose.rotation = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+  Observations observations = scene.Empty();
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+  DrawAxes(&scene, &observations);
+  const PoseEstimate estimate = Solve("line_pairs", observations);
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  EXPECT_LT(RotationAngle(estimate.hypotheses[0].cam_from_world.rotation, scene.pose.rotation),
+            1e-9);
+}
+
+TEST(ClosedFormSolversTest, RefusalsNameWhatIsMissing) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  const auto message = [&](const std::string& name) {
+    const PoseEstimate estimate = Solve(name, observations);
+    EXPECT_EQ(estimate.status.code, StatusCode::kRefused) << name;
+    EXPECT_TRUE(estimate.hypotheses.empty());
+    return estimate.status.message;
+  };
+  EXPECT_NE(message("single_circle").find("circle"), std::string::npos);
+  EXPECT_NE(message("line_pairs").find("pencil"), std::string::npos);
+  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
+  EXPECT_NE(message("circle_center").find("centre"), std::string::npos);
+  EXPECT_NE(message("circle_frame").find("axis"), std::string::npos);
+  EXPECT_NE(message("parallel_circles").find("two"), std::string::npos);
+  EXPECT_NE(message("concentric_circles").find("concentric"), std::string::npos);
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kFree, Eigen::Vector3d::UnitX())};
+  EXPECT_NE(message("line_pairs").find("L1"), std::string::npos);
+  // The same direction twice.
+  observations.pencils.push_back(observations.pencils[0]);
+  observations.pencils[1].id = "L2";
+  EXPECT_NE(message("line_pairs").find("same direction"), std::string::npos);
+}
+
+TEST(ClosedFormSolversTest, BrokenInputIsInvalidNotFatal) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
+  observations.circles[0].points[3].x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(Solve("single_circle", observations).status.code, StatusCode::kInvalidArgument);
+  observations = scene.Empty();
+  observations.camera.fx = 0.0;
+  EXPECT_EQ(Solve("single_circle", observations).status.code, StatusCode::kInvalidArgument);
+}
+
+// The covariance that the closed forms report is that of their errors.
+TEST(ClosedFormSolversTest, CovarianceIsHonest) {
+  constexpr int kTrials = 400;
+  for (const char* name : {"circle_frame", "line_pairs", "orthogonal_vanishing_points"}) {
+    PlaneScene scene(0.7, 0.3, 11);
+    double nees = 0.0;
+    for (int i = 0; i < kTrials; ++i) {
+      Observations observations = scene.Empty();
+      observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.5)};
+      observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                              scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+      for (PencilObservation& pencil : observations.pencils) {
+        const auto& line = pencil.lines[1].points;  // Through the origin.
+        (pencil.id == "L1" ? observations.frame.x_axis : observations.frame.y_axis) =
+            Segment{line[0], line[1]};
+      }
+      const PoseEstimate estimate = Solve(name, observations);
+      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      const PoseHypothesis& h = estimate.hypotheses[0];
+      const Eigen::Vector3d error =
+          LogRotation(scene.pose.rotation * h.cam_from_world.rotation.transpose());
+      nees += error.dot(h.Covariance().topLeftCorner<3, 3>().inverse() * error) / kTrials;
+    }
+    EXPECT_NEAR(nees, 3.0, 0.5) << name;
+  }
+}
+
+}  // namespace
+}  // namespace circline

@@ -1,0 +1,188 @@
+#include "circline/refine/estimate_pose.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <limits>
+
+#include "tests/plane_scene.h"
+
+namespace circline {
+namespace {
+
+double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
+  return h.cam_from_world.rotation.col(2).cross(scene.pose.rotation.col(2)).norm();
+}
+
+TEST(EstimatePoseTest, OneCircleHasTwoPosesOfEqualProbability) {
+  PlaneScene scene(0.7, 0.2);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  const PoseEstimate estimate = EstimatePose(observations);
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  ASSERT_EQ(estimate.hypotheses.size(), 2U);
+  EXPECT_NEAR(estimate.hypotheses[0].probability, 0.5, 0.02);
+  EXPECT_NEAR(estimate.hypotheses[0].probability + estimate.hypotheses[1].probability, 1.0, 1e-12);
+  EXPECT_LT(std::min(NormalError(estimate.hypotheses[0], scene),
+                     NormalError(estimate.hypotheses[1], scene)),
+            0.02);
+  EXPECT_TRUE(estimate.hypotheses[0].RotationIsFree());
+  EXPECT_NE(estimate.decided_by.find("nothing"), std::string::npos);
+}
+
+TEST(EstimatePoseTest, MoreEvidenceDecides) {
+  PlaneScene scene(0.7, 0.2);
+  Observations circle = scene.Empty();
+  circle.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  Observations with_center = circle, with_lines = circle, with_ring = circle,
+               with_diameters = circle;
+  with_center.circles[0].center = scene.Pixel(0.5, 0.2);
+  with_lines.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                        scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+  with_ring.circles.push_back(scene.Circle("c1", 0.5, 0.2, 1.8));
+  for (CircleObservation& c : with_ring.circles) c.concentric = "g0";
+  with_diameters.circles[0].diameters = {Segment{scene.Pixel(-0.5, 0.2), scene.Pixel(1.5, 0.2)},
+                                         Segment{scene.Pixel(0.5, -0.8), scene.Pixel(0.5, 1.2)}};
+  for (const Observations& observations : {with_center, with_lines, with_ring, with_diameters}) {
+    const PoseEstimate estimate = EstimatePose(observations);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.02);
+    EXPECT_GT(estimate.hypotheses[0].probability, 0.95);
+  }
+}
+
+TEST(EstimatePoseTest, KnownSizesMakeItMetric) {
+  PlaneScene scene(0.7, 0.05);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.5)};
+  observations.circles[0].center = scene.Pixel(0, 0);
+  Observations with_length = observations;
+  observations.circles[0].radius = 1.5;
+  with_length.known_lengths = {
+      KnownLength{Segment{scene.Pixel(-1, 0), scene.Pixel(1, 0.5)}, "", std::hypot(2.0, 0.5)}};
+  for (const Observations& o : {observations, with_length}) {
+    const PoseEstimate estimate = EstimatePose(o);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& best = estimate.hypotheses[0];
+    EXPECT_TRUE(best.metric);
+    EXPECT_LT((best.cam_from_world.translation - scene.pose.translation).norm(), 0.03);
+    EXPECT_NEAR(best.circles[0].radius, 1.5, 0.01);
+    EXPECT_EQ(best.rank, 5);  // All but the spin about the normal.
+  }
+}
+
+TEST(EstimatePoseTest, KnownAngleSharpensTheRotation) {
+  PlaneScene scene(0.7, 0.5);
+  Observations observations = scene.Empty();
+  observations.pencils = {
+      scene.Pencil("L1", PencilDirection::kFree, Eigen::Vector3d::UnitX()),
+      scene.Pencil("L2", PencilDirection::kFree, Eigen::Vector3d(0.6, 0.8, 0.0))};
+  EstimationOptions options;
+  options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
+  const PoseEstimate without = EstimatePose(observations, options);
+  observations.known_angles = {KnownAngle{{"L1", "L2"}, std::acos(0.6), 0.0}};
+  const PoseEstimate with = EstimatePose(observations, options);
+  ASSERT_TRUE(without.status.ok() && with.status.ok());
+  const auto variance = [](const PoseEstimate& e) {
+    return e.hypotheses[0].Covariance().topLeftCorner(3, 3).trace();
+  };
+  EXPECT_LT(variance(with), 0.9 * variance(without));
+  ASSERT_EQ(with.hypotheses[0].pencils.size(), 2U);
+  const double cosine = std::abs(
+      with.hypotheses[0].pencils[0].direction.dot(with.hypotheses[0].pencils[1].direction));
+  EXPECT_NEAR(cosine, 0.6, 1e-4);
+}
+
+// Rotation and translation covariance against the errors of many trials, all kinds of evidence at
+// once.
+TEST(EstimatePoseTest, CovarianceIsHonest) {
+  constexpr int kTrials = 200;
+  PlaneScene scene(0.7, 0.3, 5);
+  EstimationOptions options;
+  options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
+  double rotation_nees = 0.0, translation_nees = 0.0;
+  for (int i = 0; i < kTrials; ++i) {
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.5), scene.Circle("c1", 0.0, 0.0, 0.8)};
+    for (CircleObservation& c : observations.circles) c.concentric = "g0";
+    observations.circles[0].radius = 1.5;
+    observations.pencils = {
+        scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+        scene.Pencil("L2", PencilDirection::kFree, Eigen::Vector3d(0.6, 0.8, 0.0)),
+        scene.Pencil("L3", PencilDirection::kZ, Eigen::Vector3d::UnitZ())};
+    const auto& axis = observations.pencils[0].lines[1].points;
+    observations.frame.x_axis = Segment{axis[0], axis[1]};
+    observations.frame.origin_is_center = "c0";
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_EQ(h.rank, 6);
+    const Eigen::Vector3d rotation =
+        LogRotation(scene.pose.rotation * h.cam_from_world.rotation.transpose());
+    const Eigen::Vector3d translation = scene.pose.translation - h.cam_from_world.translation;
+    const Eigen::Matrix<double, 6, 6> C = h.Covariance();
+    rotation_nees += rotation.dot(C.topLeftCorner<3, 3>().inverse() * rotation) / kTrials;
+    translation_nees +=
+        translation.dot(C.bottomRightCorner<3, 3>().inverse() * translation) / kTrials;
+  }
+  EXPECT_NEAR(rotation_nees, 3.0, 0.5);
+  EXPECT_NEAR(translation_nees, 3.0, 0.5);
+}
+
+TEST(EstimatePoseTest, RobustLossSurvivesOutliers) {
+  PlaneScene scene(0.7, 0.3, 9);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.5, 100)};
+  observations.circles[0].center = scene.Pixel(0, 0);
+  const Eigen::Vector2d middle = *observations.circles[0].center;
+  for (std::size_t i = 0; i < 15; ++i) {
+    Eigen::Vector2d& p = observations.circles[0].points[i];
+    p += 4.0 * (p - middle).normalized();
+  }
+  EstimationOptions options;
+  options.conic_loss.type = LossType::kTukey;
+  const PoseEstimate estimate = EstimatePose(observations, options);
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.02);
+  EXPECT_LE(estimate.hypotheses[0].num_inliers, 86);
+  EXPECT_GE(estimate.hypotheses[0].num_inliers, 83);
+  EXPECT_EQ(estimate.hypotheses[0].num_observations, 100);
+}
+
+TEST(EstimatePoseTest, RefusalsAndBadInputHaveASentence) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  PoseEstimate estimate = EstimatePose(observations);
+  EXPECT_EQ(estimate.status.code, StatusCode::kRefused);
+  EXPECT_FALSE(estimate.status.message.empty());
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kFree, Eigen::Vector3d::UnitX())};
+  estimate = EstimatePose(observations);
+  EXPECT_EQ(estimate.status.code, StatusCode::kRefused);
+  EXPECT_NE(estimate.status.message.find("L1"), std::string::npos);
+  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
+  observations.circles.push_back(observations.circles[0]);
+  EXPECT_NE(EstimatePose(observations).status.message.find("c0"), std::string::npos);
+  EstimationOptions options;
+  options.conic_loss.scale_px = -1.0;
+  estimate = EstimatePose(scene.Empty(), options);
+  EXPECT_EQ(estimate.status.code, StatusCode::kInvalidArgument);
+  EXPECT_NE(estimate.status.message.find("conic_loss.scale_px"), std::string::npos);
+}
+
+TEST(EstimatePoseTest, SameInputSameBits) {
+  PlaneScene scene(0.7, 0.3);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0), scene.Circle("c1", -1.5, -0.5, 0.9)};
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX())};
+  const PoseEstimate a = EstimatePose(observations), b = EstimatePose(observations);
+  ASSERT_EQ(a.hypotheses.size(), b.hypotheses.size());
+  for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {
+    EXPECT_EQ(a.hypotheses[i].cam_from_world.rotation, b.hypotheses[i].cam_from_world.rotation);
+    EXPECT_EQ(a.hypotheses[i].covariance, b.hypotheses[i].covariance);
+    EXPECT_EQ(a.hypotheses[i].probability, b.hypotheses[i].probability);
+  }
+}
+
+}  // namespace
+}  // namespace circline
