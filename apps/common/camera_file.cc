@@ -1,0 +1,254 @@
+#include "apps/common/camera_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include "apps/common/text.h"
+
+namespace circline::apps {
+namespace {
+
+// What a COLMAP camera model's parameters mean, in order: fx and fy may be one (f).
+struct ColmapModel {
+  const char* name;
+  CameraModel model;
+  bool one_focal_length;
+  std::vector<int> distortion;  // Position in Camera::distortion of each further parameter.
+};
+
+const std::vector<ColmapModel>& ColmapModels() {
+  static const auto* const models = new std::vector<ColmapModel>{
+      {"SIMPLE_PINHOLE", CameraModel::kPinhole, true, {}},
+      {"PINHOLE", CameraModel::kPinhole, false, {}},
+      {"SIMPLE_RADIAL", CameraModel::kOpenCV, true, {0}},
+      {"RADIAL", CameraModel::kOpenCV, true, {0, 1}},
+      {"OPENCV", CameraModel::kOpenCV, false, {0, 1, 2, 3}},
+      {"FULL_OPENCV", CameraModel::kOpenCV, false, {0, 1, 2, 3, 4, 5, 6, 7}},
+      {"OPENCV_FISHEYE", CameraModel::kFisheye, false, {0, 1, 2, 3}},
+      {"SIMPLE_RADIAL_FISHEYE", CameraModel::kFisheye, true, {0}},
+      {"RADIAL_FISHEYE", CameraModel::kFisheye, true, {0, 1}},
+  };
+  return *models;
+}
+
+Status ColmapModelByName(const std::string& name, const ColmapModel** model) {
+  std::vector<std::string> names;
+  for (const ColmapModel& candidate : ColmapModels()) {
+    names.emplace_back(candidate.name);
+    if (name == candidate.name) {
+      *model = &candidate;
+      return Status::Ok();
+    }
+  }
+  return Status::Invalid("camera model '" + name + "' is not one of " + JoinList(names, ", "));
+}
+
+// One line "ID MODEL WIDTH HEIGHT PARAMS...".
+Status ParseColmapCamera(const std::string& line, Camera* camera) {
+  std::istringstream stream(line);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  if (words.size() < 5) {
+    return Status::Invalid("neither an OpenCV calibration nor a line of a COLMAP cameras.txt");
+  }
+  const ColmapModel* model = nullptr;
+  const Status status = ColmapModelByName(words[1], &model);
+  if (!status.ok()) return status;
+  const std::size_t num_focal = model->one_focal_length ? 1 : 2;
+  const std::size_t num_expected = num_focal + 2 + model->distortion.size();
+  std::vector<double> parameters;
+  for (std::size_t i = 4; i < words.size(); ++i) {
+    double value = 0.0;
+    if (!ParseDouble(words[i], &value)) return Status::Invalid("'" + words[i] + "' is no number");
+    parameters.push_back(value);
+  }
+  if (parameters.size() != num_expected) {
+    return Status::Invalid(words[1] + " has " + std::to_string(num_expected) + " parameters, not " +
+                           std::to_string(parameters.size()));
+  }
+  if (!ParseInt(words[2], &camera->width) || !ParseInt(words[3], &camera->height)) {
+    return Status::Invalid("width and height must be whole numbers");
+  }
+  camera->id = words[0];
+  camera->model = model->model;
+  camera->fx = parameters[0];
+  camera->fy = parameters[num_focal - 1];
+  camera->cx = parameters[num_focal] - 0.5;
+  camera->cy = parameters[num_focal + 1] - 0.5;
+  for (std::size_t k = 0; k < model->distortion.size(); ++k) {
+    camera->distortion[static_cast<std::size_t>(model->distortion[k])] =
+        parameters[num_focal + 2 + k];
+  }
+  return camera->Validate();
+}
+
+Status ParseColmapCameras(const std::string& path, const std::string& text,
+                          std::vector<Camera>* cameras) {
+  std::istringstream lines(text);
+  std::set<std::string> ids;
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    const std::size_t begin = line.find_first_not_of(" \t\r");
+    if (begin == std::string::npos || line[begin] == '#') continue;
+    Camera camera;
+    Status status = ParseColmapCamera(line, &camera);
+    if (status.ok() && !ids.insert(camera.id).second) {
+      status = Status::Invalid("camera " + camera.id + " stands there twice");
+    }
+    if (!status.ok()) {
+      return Status::Invalid(path + ": line " + std::to_string(number) + ": " + status.message);
+    }
+    cameras->push_back(camera);
+  }
+  return cameras->empty() ? Status::Invalid(path + ": has no camera") : Status::Ok();
+}
+
+void SetIntrinsics(const StorageNode& matrix_node, Camera* camera) {
+  const std::vector<double> k = matrix_node.Numbers(9);
+  if (k.empty()) return;
+  camera->fx = k[0];
+  camera->fy = k[4];
+  camera->cx = k[2];
+  camera->cy = k[5];
+  if (!(camera->fx > 0.0) || !(camera->fy > 0.0)) {
+    matrix_node.Fail("focal lengths fx (number 1) and fy (number 5) must be positive");
+  } else if (std::abs(k[1]) > 1e-9 * camera->fx || k[3] != 0.0) {
+    matrix_node.Fail("skew (number 2) is not supported: it must be 0");
+  } else if (k[6] != 0.0 || k[7] != 0.0 || k[8] != 1.0) {
+    matrix_node.Fail("must be fx 0 cx 0 fy cy 0 0 1, row by row");
+  }
+}
+
+// How many coefficients `model` takes: OpenCV writes 4, 5, 8, 12 or 14, of which we use up to 8.
+void SetDistortion(const StorageNode& node, Camera* camera) {
+  if (!node.Exists()) return;
+  const std::vector<double> d = node.Numbers();
+  const bool all_zero = std::all_of(d.begin(), d.end(), [](double v) { return v == 0.0; });
+  if (camera->model == CameraModel::kPinhole) {
+    if (!all_zero) node.Fail("a pinhole camera has no distortion: say model: \"opencv\"");
+    return;
+  }
+  const std::size_t used = camera->model == CameraModel::kFisheye ? 4 : 8;
+  const std::vector<std::size_t> sizes = camera->model == CameraModel::kFisheye
+                                             ? std::vector<std::size_t>{0, 4}
+                                             : std::vector<std::size_t>{0, 4, 5, 8, 12, 14};
+  if (std::find(sizes.begin(), sizes.end(), d.size()) == sizes.end()) {
+    node.Fail(camera->model == CameraModel::kFisheye
+                  ? "the fisheye model has 4 coefficients (k1 k2 k3 k4), not " +
+                        std::to_string(d.size())
+                  : "the opencv model has 4, 5 or 8 coefficients (k1 k2 p1 p2 k3 k4 k5 k6), not " +
+                        std::to_string(d.size()));
+    return;
+  }
+  for (std::size_t i = 0; i < d.size(); ++i) {
+    if (i < used) {
+      camera->distortion[i] = d[i];
+    } else if (d[i] != 0.0) {
+      node.Fail("thin prism and tilt coefficients are not supported: numbers 9 and up must be 0");
+    }
+  }
+}
+
+void CheckCamera(const StorageNode& node, const Camera& camera) {
+  if (!node.ok()) return;
+  const Status status = camera.Validate();
+  if (!status.ok()) node.Fail(status.message);
+}
+
+int ReadSize(const StorageNode& node) {
+  if (!node.Exists()) return 0;
+  const int value = node.Integer();
+  if (value < 0) node.Fail("must be 0 (not known) or more");
+  return value;
+}
+
+// The first of the names that exists, else the first: files of older OpenCV samples spell
+// differently.
+StorageNode GetAny(const StorageNode& node, const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    if (node.Get(name).Exists()) return node.Get(name);
+  }
+  return node.Get(names.front());
+}
+
+Status ReadOpenCvCalibration(const std::string& path, std::vector<Camera>* cameras) {
+  StorageDocument document;
+  Status status = document.Open(path);
+  if (!status.ok()) return status;
+  const StorageNode root(document.root(), path, &status);
+  const StorageNode matrix = GetAny(root, {"camera_matrix", "Camera_Matrix", "cameraMatrix"});
+  if (!matrix.Exists()) {
+    root.Fail("'camera_matrix' is missing: a camera needs its focal length");
+    return status;
+  }
+  Camera camera;
+  camera.id = "camera";
+  const StorageNode fisheye = root.Get("fisheye_model");
+  camera.model =
+      fisheye.Exists() && fisheye.Integer() != 0 ? CameraModel::kFisheye : CameraModel::kOpenCV;
+  camera.width = ReadSize(GetAny(root, {"image_width", "image_Width"}));
+  camera.height = ReadSize(GetAny(root, {"image_height", "image_Height"}));
+  SetIntrinsics(matrix, &camera);
+  SetDistortion(GetAny(root, {"distortion_coefficients", "Distortion_Coefficients", "distCoeffs"}),
+                &camera);
+  CheckCamera(root, camera);
+  if (status.ok()) cameras->push_back(camera);
+  return status;
+}
+
+bool LooksLikeStorage(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r\n");
+  if (begin == std::string::npos) return false;
+  const std::string start = text.substr(begin, 5);
+  return start[0] == '%' || start[0] == '{' || start[0] == '<' || start.compare(0, 3, "---") == 0 ||
+         text.find("camera_matrix") != std::string::npos;
+}
+
+}  // namespace
+
+Status ReadCameraFile(const std::string& path, std::vector<Camera>* cameras) {
+  cameras->clear();
+  std::string text;
+  const Status status = ReadTextFile(path, &text);
+  if (!status.ok()) return status;
+  const Status parsed = LooksLikeStorage(text) ? ReadOpenCvCalibration(path, cameras)
+                                               : ParseColmapCameras(path, text, cameras);
+  if (!parsed.ok()) cameras->clear();
+  return parsed;
+}
+
+Camera ReadSceneCamera(const StorageNode& node) {
+  node.AllowKeys({"id", "model", "width", "height", "camera_matrix", "distortion"});
+  Camera camera;
+  camera.id = node.Require("id").Text();
+  StorageNode named = node;
+  named.set_place(node.place() + " (\"" + camera.id + "\")");
+  const StorageNode model = named.Require("model");
+  const std::string name = model.Text();
+  if (name == "pinhole") {
+    camera.model = CameraModel::kPinhole;
+  } else if (name == "opencv") {
+    camera.model = CameraModel::kOpenCV;
+  } else if (name == "fisheye") {
+    camera.model = CameraModel::kFisheye;
+  } else {
+    model.Fail("'" + name + "' is not one of pinhole, opencv, fisheye");
+  }
+  camera.width = ReadSize(named.Get("width"));
+  camera.height = ReadSize(named.Get("height"));
+  const StorageNode matrix = named.Get("camera_matrix");
+  if (!matrix.Exists()) {
+    named.Fail("'camera_matrix' is missing: a camera needs its focal length");
+    return camera;
+  }
+  SetIntrinsics(matrix, &camera);
+  SetDistortion(named.Get("distortion"), &camera);
+  CheckCamera(named, camera);
+  return camera;
+}
+
+}  // namespace circline::apps

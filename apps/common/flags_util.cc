@@ -1,0 +1,157 @@
+#include "apps/common/flags_util.h"
+
+#include <gflags/gflags.h>
+#include <glog/logging.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/core/utils/logger.hpp>
+#include <sstream>
+#include <vector>
+
+#include "apps/common/storage_node.h"
+#include "apps/common/text.h"
+
+#ifndef CIRCLINE_VERSION
+#define CIRCLINE_VERSION "0.1.0"
+#endif
+
+namespace circline::apps {
+namespace {
+
+constexpr int kMaxFlagFileDepth = 8;
+
+bool IsAppFlag(const gflags::CommandLineFlagInfo& flag) {
+  return flag.filename.find("apps/") != std::string::npos;
+}
+
+std::vector<gflags::CommandLineFlagInfo> AppFlags() {
+  std::vector<gflags::CommandLineFlagInfo> all, flags;
+  gflags::GetAllFlags(&all);
+  std::copy_if(all.begin(), all.end(), std::back_inserter(flags), IsAppFlag);
+  return flags;
+}
+
+Status UnknownFlag(const std::string& name) {
+  std::vector<std::string> names = {"help", "version", "flagfile"};
+  for (const auto& flag : AppFlags()) names.push_back(flag.name);
+  return Status::Invalid("unknown flag --" + name + DidYouMean(name, names));
+}
+
+Status SetFlag(const std::string& name, const std::string& value, const std::string& type) {
+  if (!gflags::SetCommandLineOption(name.c_str(), value.c_str()).empty()) return Status::Ok();
+  const std::string expected = type == "double"   ? "a number"
+                               : type == "bool"   ? "true or false"
+                               : type == "uint64" ? "a whole number, 0 or more"
+                                                  : "a whole number";
+  return Status::Invalid("--" + name + "=" + value + ": must be " + expected);
+}
+
+class Parser {
+ public:
+  explicit Parser(CommandLine* command_line) : command_line_(command_line) {}
+
+  Status Parse(const std::vector<std::string>& arguments, int depth) {
+    for (std::size_t i = 0; i < arguments.size(); ++i) {
+      const Status status = ParseOne(arguments, depth, &i);
+      if (!status.ok()) return status;
+    }
+    return Status::Ok();
+  }
+
+ private:
+  // Handles arguments[*i], and the next one where that is its value.
+  Status ParseOne(const std::vector<std::string>& arguments, int depth, std::size_t* i) {
+    const std::string& argument = arguments[*i];
+    if (argument.size() < 2 || argument[0] != '-' || argument == "--") {
+      return Status::Invalid("unexpected argument '" + argument + "'; flags begin with --");
+    }
+    const std::string text = argument.substr(argument[1] == '-' ? 2 : 1);
+    const std::size_t equals = text.find('=');
+    std::string name = text.substr(0, equals);
+    std::replace(name.begin(), name.end(), '-', '_');
+    if (IsHelp(name)) return Status::Ok();
+    gflags::CommandLineFlagInfo info;
+    const bool known = gflags::GetCommandLineFlagInfo(name.c_str(), &info);
+    if (equals != std::string::npos) {
+      return known ? Set(name, text.substr(equals + 1), info.type, depth) : UnknownFlag(name);
+    }
+    if (known && info.type == "bool") return SetFlag(name, "true", info.type);
+    if (known && *i + 1 < arguments.size()) return Set(name, arguments[++*i], info.type, depth);
+    if (known) return Status::Invalid("--" + name + ": its value is missing");
+    if (name.compare(0, 2, "no") == 0 &&
+        gflags::GetCommandLineFlagInfo(name.substr(2).c_str(), &info) && info.type == "bool") {
+      return SetFlag(name.substr(2), "false", info.type);
+    }
+    return UnknownFlag(name);
+  }
+
+  bool IsHelp(const std::string& name) {
+    if (name == "help" || name == "h" || name == "helpfull" || name == "helpshort") {
+      command_line_->help = true;
+      return true;
+    }
+    if (name == "version") command_line_->version = true;
+    return name == "version";
+  }
+
+  Status Set(const std::string& name, const std::string& value, const std::string& type,
+             int depth) {
+    return name == "flagfile" ? ParseFile(value, depth) : SetFlag(name, value, type);
+  }
+
+  Status ParseFile(const std::string& path, int depth) {
+    if (depth >= kMaxFlagFileDepth) {
+      return Status::Invalid("--flagfile=" + path + ": flag files name one another");
+    }
+    std::string text;
+    Status status = ReadTextFile(path, &text);
+    if (!status.ok()) return Status::Invalid("--flagfile: " + status.message);
+    std::vector<std::string> arguments;
+    for (const std::string& line : SplitList(text, '\n')) {
+      if (!line.empty() && line[0] != '#') arguments.push_back(line);
+    }
+    status = Parse(arguments, depth + 1);
+    return status.ok() ? status : Status::Invalid(path + ": " + status.message);
+  }
+
+  CommandLine* command_line_;
+};
+
+// OpenCV prints each error before it throws; what is thrown reaches the user as one line of ours.
+int IgnoreOpenCvError(int, const char*, const char*, const char*, int, void*) { return 0; }
+
+}  // namespace
+
+Status ParseCommandLine(int argc, const char* const* argv, CommandLine* command_line) {
+  return Parser(command_line).Parse({argv + std::min(argc, 1), argv + argc}, 0);
+}
+
+std::string HelpText(const std::string& usage) {
+  std::ostringstream text;
+  text << usage << "\n\nFlags:\n";
+  for (const auto& flag : AppFlags()) {
+    const bool quoted = flag.type == "string";
+    text << "  --" << flag.name << " (" << (quoted ? "\"" : "") << flag.default_value
+         << (quoted ? "\"" : "") << ")\n      " << flag.description << "\n";
+  }
+  text << "  --flagfile\n      Reads flags from a file, one a line.\n"
+       << "  --help, --version\n      Say this, or the version, and do nothing else.\n";
+  return text.str();
+}
+
+std::string VersionText(const std::string& app) { return app + " " CIRCLINE_VERSION; }
+
+void SayOnStderr(const std::string& line) { std::fputs((line + "\n").c_str(), stderr); }
+
+void InitAppLogging(const char* app) {
+  FLAGS_logtostderr = true;
+  FLAGS_log_prefix = false;
+  FLAGS_minloglevel = google::GLOG_FATAL;  // What goes wrong is in the results.
+  google::InitGoogleLogging(app);
+  cv::redirectError(IgnoreOpenCvError);
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+}
+
+}  // namespace circline::apps

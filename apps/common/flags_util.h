@@ -1,0 +1,42 @@
+// Command lines: gflags' flags, but an unknown flag or a bad value is an answer, not an exit(1).
+#ifndef CIRCLINE_APPS_COMMON_FLAGS_UTIL_H_
+#define CIRCLINE_APPS_COMMON_FLAGS_UTIL_H_
+
+#include <string>
+
+#include "circline/estimators/status.h"
+
+namespace circline::apps {
+
+// Exit codes of every app.
+inline constexpr int kExitOk = 0;  // Every input gave an answer or a stated refusal.
+inline constexpr int kExitUnreadable =
+    1;                                // Some input could not be read (named); the rest was done.
+inline constexpr int kExitUsage = 2;  // Unusable flags or scene file; nothing was written.
+
+struct CommandLine {
+  bool help = false;     // --help was asked for.
+  bool version = false;  // --version was asked for.
+};
+
+// Sets gflags' variables from the arguments: --name=value, --name value, --name and --noname for
+// booleans, one dash or two, --flagfile=FILE with a flag a line (# starts a comment). Not ok: one
+// line that names the argument.
+Status ParseCommandLine(int argc, const char* const* argv, CommandLine* command_line);
+
+// Usage and every flag defined under apps/, with its default.
+std::string HelpText(const std::string& usage);
+
+// "circline_compare 0.1.0".
+std::string VersionText(const std::string& app);
+
+// One whole line on stderr.
+void SayOnStderr(const std::string& line);
+
+// Sets up logging to stderr (--minloglevel=0 shows it; people are told by SayOnStderr) and silences
+// OpenCV's own messages (they become ours).
+void InitAppLogging(const char* app);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMMON_FLAGS_UTIL_H_

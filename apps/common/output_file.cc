@@ -1,0 +1,104 @@
+#include "apps/common/output_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <utility>
+
+namespace circline::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string FoldCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+// The last `num_folders` folders of the path and its stem, joined by "_".
+std::string StemWithFolders(const fs::path& path, int num_folders) {
+  std::string stem = path.stem().string();
+  fs::path folder = path.parent_path();
+  for (int i = 0; i < num_folders && folder.has_filename(); ++i) {
+    const std::string name = folder.filename().string();
+    if (name != "." && name != "..") stem = name + "_" + stem;
+    folder = folder.parent_path();
+  }
+  return stem;
+}
+
+}  // namespace
+
+OutputFile::OutputFile(std::string path)
+    : path_(std::move(path)),
+      temporary_path_(path_ + ".part"),
+      stream_(temporary_path_, std::ios::binary) {}
+
+OutputFile::~OutputFile() {
+  if (committed_) return;
+  stream_.close();
+  std::error_code error;
+  fs::remove(temporary_path_, error);
+}
+
+Status OutputFile::Commit() {
+  stream_.close();
+  std::error_code error;
+  if (stream_) fs::rename(temporary_path_, path_, error);
+  if (!stream_ || error) return Status::Failed(path_ + ": cannot be written");
+  committed_ = true;
+  return Status::Ok();
+}
+
+Status WriteFile(const std::string& path, const std::string& content) {
+  OutputFile file(path);
+  file.Write(content);
+  return file.Commit();
+}
+
+Status CreateFolder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (fs::is_directory(path)) return Status::Ok();
+  return Status::Invalid(path + ": this folder cannot be created" +
+                         (error ? " (" + error.message() + ")" : ""));
+}
+
+std::vector<std::string> UniqueStems(const std::vector<std::string>& paths) {
+  constexpr int kMaxFolders = 8;
+  std::vector<std::string> stems(paths.size());
+  std::vector<std::size_t> open(paths.size());
+  for (std::size_t i = 0; i < open.size(); ++i) open[i] = i;
+  std::set<std::string> taken;
+  for (int num_folders = 0; num_folders <= kMaxFolders && !open.empty(); ++num_folders) {
+    std::map<std::string, int> count;
+    for (const std::size_t i : open) ++count[FoldCase(StemWithFolders(paths[i], num_folders))];
+    std::vector<std::size_t> still_open;
+    for (const std::size_t i : open) {
+      const std::string stem = StemWithFolders(paths[i], num_folders);
+      if (count[FoldCase(stem)] == 1 && taken.count(FoldCase(stem)) == 0) {
+        stems[i] = stem;
+      } else {
+        still_open.push_back(i);
+      }
+    }
+    for (const std::size_t i : open) {
+      if (!stems[i].empty()) taken.insert(FoldCase(stems[i]));
+    }
+    open = still_open;
+  }
+  for (const std::size_t i : open) {  // Same path twice, or names such as a.jpg and a.png.
+    int number = 1;
+    std::string stem = StemWithFolders(paths[i], 0);
+    while (!taken.insert(FoldCase(stem)).second) {
+      stem = StemWithFolders(paths[i], 0) + "_" + std::to_string(++number);
+    }
+    stems[i] = stem;
+  }
+  return stems;
+}
+
+}  // namespace circline::apps

@@ -1,0 +1,43 @@
+// Files that appear whole or not at all, and names that do not overwrite one another.
+#ifndef CIRCLINE_APPS_COMMON_OUTPUT_FILE_H_
+#define CIRCLINE_APPS_COMMON_OUTPUT_FILE_H_
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/status.h"
+
+namespace circline::apps {
+
+// Written under a temporary name (".part" appended); Commit gives it its own. Dropped if not
+// committed.
+class OutputFile {
+ public:
+  explicit OutputFile(std::string path);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  void Write(const std::string& text) { stream_ << text; }
+  // Not ok: names the file that could not be written.
+  Status Commit();
+
+ private:
+  std::string path_, temporary_path_;
+  std::ofstream stream_;
+  bool committed_ = false;
+};
+
+Status WriteFile(const std::string& path, const std::string& content);
+
+// Creates a folder and its parents. Not ok where that cannot be, or where a file has that name.
+Status CreateFolder(const std::string& path);
+
+// One file name stem for each path, all different: the path's own stem where no other path has it,
+// else with as many folders in front as it takes ("left/01.jpg" -> "left_01"), or a number.
+std::vector<std::string> UniqueStems(const std::vector<std::string>& paths);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMMON_OUTPUT_FILE_H_

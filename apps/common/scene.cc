@@ -1,0 +1,394 @@
+#include "apps/common/scene.h"
+
+#include <glob.h>
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "apps/common/camera_file.h"
+#include "apps/common/storage_node.h"
+#include "apps/common/text.h"
+
+namespace circline::apps {
+namespace {
+
+constexpr double kRadiansPerDegree = 0.017453292519943295;
+
+Eigen::Vector2d ReadPoint(const StorageNode& node) {
+  const std::vector<double> v = node.Numbers(2);
+  return v.empty() ? Eigen::Vector2d::Zero() : Eigen::Vector2d(v[0], v[1]);
+}
+
+std::vector<Segment> ReadSegments(const StorageNode& node) {
+  const std::vector<double> v = node.Numbers(0, 4);
+  std::vector<Segment> segments;
+  for (std::size_t i = 0; i + 3 < v.size(); i += 4) {
+    segments.push_back({Eigen::Vector2d(v[i], v[i + 1]), Eigen::Vector2d(v[i + 2], v[i + 3])});
+    if (segments.back()[0] == segments.back()[1]) {
+      node.Fail("segment " + std::to_string(i / 4) + " has no length");
+    }
+  }
+  return segments;
+}
+
+Segment ReadSegment(const StorageNode& node) {
+  const std::vector<double> v = node.Numbers(4);
+  if (v.empty()) return {Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
+  return ReadSegments(node).front();
+}
+
+// A positive number, or 0 where it is not given.
+double ReadPositive(const StorageNode& node) {
+  if (!node.Exists()) return 0.0;
+  const double value = node.Number();
+  if (!(value > 0.0)) node.Fail("must be positive");
+  return value;
+}
+
+std::string ReadOptionalText(const StorageNode& node) {
+  return node.Exists() ? node.Text() : std::string();
+}
+
+std::vector<Eigen::Vector2d> ReadContour(const StorageNode& node) {
+  const std::vector<double> v = node.Numbers(0, 2);
+  std::vector<Eigen::Vector2d> points;
+  for (std::size_t i = 0; i + 1 < v.size(); i += 2) points.emplace_back(v[i], v[i + 1]);
+  if (points.size() < 5) {
+    node.Fail("must have 5 points or more, has " + std::to_string(points.size()));
+  }
+  return points;
+}
+
+std::array<int, 4> ReadRectangle(const StorageNode& node) {
+  const std::vector<double> v = node.Numbers(4);
+  if (v.empty()) return {};
+  if (std::any_of(v.begin(), v.end(), [](double x) { return std::abs(x) > 1e6; })) {
+    node.Fail("is not a rectangle of a photo");
+    return {};
+  }
+  const int x0 = static_cast<int>(std::floor(v[0])), y0 = static_cast<int>(std::floor(v[1]));
+  const int x1 = static_cast<int>(std::ceil(v[0] + v[2]));
+  const int y1 = static_cast<int>(std::ceil(v[1] + v[3]));
+  if (!(v[2] > 0.0) || !(v[3] > 0.0)) node.Fail("width and height must be positive");
+  return {x0, y0, x1 - x0, y1 - y0};
+}
+
+void ReadCircle(const StorageNode& node, SceneImage* image) {
+  node.AllowKeys(
+      {"id", "contour", "roi", "center", "radius", "plane", "concentric", "sigma_px", "diameters"});
+  CircleObservation circle;
+  circle.id = node.Require("id").Text();
+  if (FindCircle(image->observations, circle.id) >= 0) {
+    node.Fail("id '" + circle.id + "' is used twice");
+  }
+  circle.sigma_px = ReadPositive(node.Get("sigma_px"));
+  circle.radius = ReadPositive(node.Get("radius"));
+  circle.plane = ReadOptionalText(node.Get("plane"));
+  circle.concentric = ReadOptionalText(node.Get("concentric"));
+  if (node.Get("center").Exists()) circle.center = ReadPoint(node.Get("center"));
+  if (node.Get("diameters").Exists()) circle.diameters = ReadSegments(node.Get("diameters"));
+  if (node.Get("contour").Exists()) {
+    circle.points = ReadContour(node.Get("contour"));
+  } else if (node.Get("roi").Exists()) {
+    image->rois.push_back({image->observations.circles.size(), ReadRectangle(node.Get("roi"))});
+  } else {
+    node.Fail("give 'contour', or 'roi'");
+  }
+  image->observations.circles.push_back(std::move(circle));
+}
+
+PencilDirection ReadDirection(const StorageNode& node) {
+  if (!node.Exists()) return PencilDirection::kFree;
+  const std::string name = node.Text();
+  for (const PencilDirection direction :
+       {PencilDirection::kX, PencilDirection::kY, PencilDirection::kZ, PencilDirection::kFree}) {
+    if (name == PencilDirectionName(direction)) return direction;
+  }
+  node.Fail("'" + name + "' is not one of x, y, z, free");
+  return PencilDirection::kFree;
+}
+
+void ReadPencil(const StorageNode& node, Observations* observations) {
+  node.AllowKeys({"id", "segments", "direction", "plane", "sigma_px"});
+  PencilObservation pencil;
+  pencil.id = node.Require("id").Text();
+  if (FindPencil(*observations, pencil.id) >= 0) node.Fail("id '" + pencil.id + "' is used twice");
+  pencil.direction = ReadDirection(node.Get("direction"));
+  pencil.plane = ReadOptionalText(node.Get("plane"));
+  pencil.sigma_px = ReadPositive(node.Get("sigma_px"));
+  for (const Segment& segment : ReadSegments(node.Require("segments"))) {
+    LineObservation line;
+    line.points = {segment[0], segment[1]};
+    pencil.lines.push_back(std::move(line));
+  }
+  observations->pencils.push_back(std::move(pencil));
+}
+
+void CheckPlane(const StorageNode& node, const std::string& plane, const Observations& observations,
+                bool detect_everything) {
+  if (plane.empty() || detect_everything) return;
+  for (const CircleObservation& circle : observations.circles) {
+    if (circle.plane == plane) return;
+  }
+  for (const PencilObservation& pencil : observations.pencils) {
+    if (pencil.plane == plane) return;
+  }
+  node.Fail("no circle and no pencil names the plane '" + plane + "'");
+}
+
+void ReadFrame(const StorageNode& node, bool detect_everything, Observations* observations) {
+  if (!node.Exists()) return;
+  node.AllowKeys({"plane", "origin", "x_axis", "y_axis", "origin_is_center"});
+  FrameObservation& frame = observations->frame;
+  frame.plane = ReadOptionalText(node.Get("plane"));
+  CheckPlane(node.Get("plane"), frame.plane, *observations, detect_everything);
+  if (node.Get("origin").Exists()) frame.origin = ReadPoint(node.Get("origin"));
+  if (node.Get("x_axis").Exists()) frame.x_axis = ReadSegment(node.Get("x_axis"));
+  if (node.Get("y_axis").Exists()) frame.y_axis = ReadSegment(node.Get("y_axis"));
+  const StorageNode center = node.Get("origin_is_center");
+  frame.origin_is_center = ReadOptionalText(center);
+  if (center.Exists() && FindCircle(*observations, frame.origin_is_center) < 0) {
+    center.Fail("there is no circle '" + frame.origin_is_center + "'");
+  }
+}
+
+void ReadKnownAngle(const StorageNode& node, Observations* observations) {
+  node.AllowKeys({"pencils", "value", "sigma"});
+  KnownAngle angle;
+  const StorageNode pencils = node.Require("pencils");
+  const std::vector<StorageNode> ids = pencils.Items();
+  if (ids.size() != 2) {
+    pencils.Fail("must name two pencils");
+    return;
+  }
+  for (std::size_t i = 0; i < 2; ++i) {
+    angle.pencils[i] = ids[i].Text();
+    if (FindPencil(*observations, angle.pencils[i]) < 0) {
+      ids[i].Fail("there is no pencil '" + angle.pencils[i] + "'");
+    }
+  }
+  if (angle.pencils[0] == angle.pencils[1]) pencils.Fail("names the same pencil twice");
+  angle.value = node.Require("value").Number() * kRadiansPerDegree;
+  const StorageNode sigma = node.Get("sigma");
+  if (sigma.Exists()) angle.sigma = sigma.Number() * kRadiansPerDegree;
+  if (angle.sigma < 0.0) sigma.Fail("must be 0 or positive");
+  observations->known_angles.push_back(angle);
+}
+
+void ReadKnown(const StorageNode& node, bool detect_everything, Observations* observations) {
+  if (!node.Exists()) return;
+  node.AllowKeys({"angle_deg", "length"});
+  for (const StorageNode& item : node.Get("angle_deg").Items()) ReadKnownAngle(item, observations);
+  for (const StorageNode& item : node.Get("length").Items()) {
+    item.AllowKeys({"points", "plane", "value"});
+    KnownLength length;
+    length.points = ReadSegment(item.Require("points"));
+    length.plane = ReadOptionalText(item.Get("plane"));
+    CheckPlane(item.Get("plane"), length.plane, *observations, detect_everything);
+    length.value = item.Require("value").Number();
+    if (!(length.value > 0.0)) item.Get("value").Fail("must be positive");
+    observations->known_lengths.push_back(length);
+  }
+}
+
+// The nearest rotation, so that nine printed digits do not cost accuracy.
+Eigen::Matrix3d ReadRotation(const StorageNode& node) {
+  const std::vector<double> v = node.Numbers(9);
+  if (v.empty()) return Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d given =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v.data());
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(given, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
+  if ((rotation - given).norm() > 1e-3 || rotation.determinant() < 0.0) {
+    node.Fail("is not a rotation matrix");
+  }
+  return rotation;
+}
+
+Symmetry ReadSymmetry(const StorageNode& node) {
+  if (!node.Exists()) return Symmetry::kNone;
+  const std::string name = node.Text();
+  if (name == "none") return Symmetry::kNone;
+  if (name == "D2") return Symmetry::kD2;
+  if (name == "D4") return Symmetry::kD4;
+  if (name == "axis") return Symmetry::kAxis;
+  node.Fail("'" + name + "' is not one of none, D2, D4, axis");
+  return Symmetry::kNone;
+}
+
+Eigen::Vector3d ReadVector3(const StorageNode& node) {
+  const std::vector<double> v = node.Numbers(3);
+  return v.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(v[0], v[1], v[2]);
+}
+
+void ReadTruth(const StorageNode& node, SceneImage* image) {
+  if (!node.Exists()) return;
+  node.AllowKeys({"rotation", "translation", "symmetry", "directions"});
+  Truth truth;
+  if (node.Get("rotation").Exists()) truth.rotation = ReadRotation(node.Get("rotation"));
+  if (node.Get("translation").Exists()) truth.translation = ReadVector3(node.Get("translation"));
+  truth.symmetry = ReadSymmetry(node.Get("symmetry"));
+  for (const StorageNode& item : node.Get("directions").Items()) {
+    item.AllowKeys({"pencil", "value"});
+    TrueDirection direction{item.Require("pencil").Text(), ReadVector3(item.Require("value"))};
+    const double norm = direction.direction.norm();
+    if (!(norm > 0.0)) item.Get("value").Fail("is not a direction");
+    direction.direction /= norm > 0.0 ? norm : 1.0;
+    if (!image->detect_everything && FindPencil(image->observations, direction.pencil) < 0) {
+      item.Get("pencil").Fail("there is no pencil '" + direction.pencil + "'");
+    }
+    truth.directions.push_back(direction);
+  }
+  image->truth = truth;
+}
+
+const Camera* ChooseCamera(const StorageNode& image_node, const std::vector<Camera>& cameras) {
+  const StorageNode node = image_node.Get("camera");
+  if (!node.Exists()) {
+    if (cameras.size() == 1) return &cameras.front();
+    image_node.Fail(cameras.empty() ? "there is no camera for it"
+                                    : "'camera' is missing, and there are several cameras");
+    return nullptr;
+  }
+  const std::string id = node.Text();
+  std::vector<std::string> ids;
+  for (const Camera& camera : cameras) {
+    if (camera.id == id) return &camera;
+    ids.push_back(camera.id);
+  }
+  node.Fail("there is no camera '" + id + "'" + DidYouMean(id, ids));
+  return nullptr;
+}
+
+SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
+                     const std::vector<Camera>& cameras) {
+  SceneImage image;
+  const std::string place = node.place();
+  if (node.Get("file").Exists()) {
+    image.name = node.Get("file").Text();
+    node.set_place(place + " (\"" + image.name + "\")");
+  }
+  node.AllowKeys({"file", "camera", "circles", "pencils", "frame", "known", "truth"});
+  if (node.Require("file").Exists() && image.name.empty()) node.Get("file").Fail("is empty");
+  image.path = (folder / image.name).lexically_normal().string();
+  const Camera* camera = ChooseCamera(node, cameras);
+  if (camera != nullptr) image.observations.camera = *camera;
+  for (const StorageNode& item : node.Get("circles").Items()) ReadCircle(item, &image);
+  for (const StorageNode& item : node.Get("pencils").Items()) ReadPencil(item, &image.observations);
+  image.detect_everything =
+      image.observations.circles.empty() && image.observations.pencils.empty();
+  ReadFrame(node.Get("frame"), image.detect_everything, &image.observations);
+  ReadKnown(node.Get("known"), image.detect_everything, &image.observations);
+  ReadTruth(node.Get("truth"), &image);
+  if (node.ok() && !image.detect_everything && image.rois.empty()) {
+    const Status status = image.observations.Validate();
+    if (!status.ok()) node.Fail(status.message);
+  }
+  return image;
+}
+
+bool IsPhotoName(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  static const auto* const known = new std::set<std::string>{
+      ".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".webp", ".jp2"};
+  return known->count(extension) > 0;
+}
+
+std::vector<std::string> PhotosInFolder(const std::string& folder) {
+  std::vector<std::string> paths;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    if (!entry.is_directory(error) && IsPhotoName(entry.path())) {
+      paths.push_back(entry.path().string());
+    }
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+std::vector<std::string> MatchWildcard(const std::string& pattern) {
+  std::vector<std::string> paths;
+  glob_t found{};
+  if (glob(pattern.c_str(), GLOB_TILDE, nullptr, &found) == 0) {
+    for (std::size_t i = 0; i < found.gl_pathc; ++i) paths.emplace_back(found.gl_pathv[i]);
+  }
+  globfree(&found);
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+Status ExpandPattern(const std::string& pattern, std::vector<std::string>* paths) {
+  std::error_code error;
+  if (std::filesystem::exists(pattern, error)) {  // Also a file whose name has wildcard letters.
+    const bool is_folder = std::filesystem::is_directory(pattern, error);
+    *paths = is_folder ? PhotosInFolder(pattern) : std::vector<std::string>{pattern};
+    if (paths->empty()) return Status::Invalid("--images: no photo in the folder " + pattern);
+    return Status::Ok();
+  }
+  if (pattern.find_first_of("*?[") == std::string::npos) {
+    *paths = {pattern};
+    return Status::Ok();
+  }
+  *paths = MatchWildcard(pattern);
+  return paths->empty() ? Status::Invalid("--images: nothing matches " + pattern) : Status::Ok();
+}
+
+}  // namespace
+
+Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
+                 std::vector<SceneImage>* images) {
+  images->clear();
+  StorageDocument document;
+  Status status = document.Open(path);
+  if (!status.ok()) return status;
+  const StorageNode root(document.root(), "", &status);
+  root.AllowKeys({"cameras", "images"});
+  std::vector<Camera> all = cameras;
+  for (const StorageNode& item : root.Get("cameras").Items()) {
+    Camera camera = ReadSceneCamera(item);
+    const bool twice = std::any_of(all.begin(), all.end(),
+                                   [&](const Camera& other) { return other.id == camera.id; });
+    if (twice) item.Fail("camera '" + camera.id + "' is there twice");
+    all.push_back(std::move(camera));
+  }
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  for (const StorageNode& item : root.Require("images").Items()) {
+    if (!status.ok()) break;
+    images->push_back(ReadImage(item, folder, all));
+  }
+  if (status.ok() && images->empty()) root.Get("images").Fail("has no image");
+  if (!status.ok()) {
+    images->clear();
+    const std::string separator = status.message.compare(0, 2, ": ") == 0 ? "" : ": ";
+    return Status::Invalid(path + separator + status.message);
+  }
+  return Status::Ok();
+}
+
+Status ListPhotos(const std::string& patterns, const Camera& camera,
+                  std::vector<SceneImage>* images) {
+  images->clear();
+  for (const std::string& pattern : SplitList(patterns)) {
+    if (pattern.empty()) continue;
+    std::vector<std::string> paths;
+    const Status status = ExpandPattern(pattern, &paths);
+    if (!status.ok()) return status;
+    for (const std::string& path : paths) {
+      SceneImage image;
+      image.name = path;
+      image.path = path;
+      image.observations.camera = camera;
+      image.detect_everything = true;
+      images->push_back(std::move(image));
+    }
+  }
+  return images->empty() ? Status::Invalid("--images: names no photo") : Status::Ok();
+}
+
+}  // namespace circline::apps

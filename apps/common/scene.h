@@ -1,0 +1,68 @@
+// Scene files: an image set with what is known of it (docs: scene files). OpenCV FileStorage, YAML
+// or JSON.
+#ifndef CIRCLINE_APPS_COMMON_SCENE_H_
+#define CIRCLINE_APPS_COMMON_SCENE_H_
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/camera.h"
+#include "circline/estimators/observations.h"
+#include "circline/estimators/status.h"
+
+namespace circline::apps {
+
+// What the evidence of a photo cannot tell about the true rotation.
+enum class Symmetry {
+  kNone,
+  kD2,    // The axes' senses: sign changes of determinant 1.
+  kD4,    // Also which axis is which: a square grid found in the photo.
+  kAxis,  // All but the plane's normal, up to sign.
+};
+
+struct TrueDirection {
+  std::string pencil;         // Id.
+  Eigen::Vector3d direction;  // Unit, camera frame, without sense.
+};
+
+// What is known to be true of one photo.
+struct Truth {
+  std::optional<Eigen::Matrix3d> rotation;     // cam_from_world of the frame's plane.
+  std::optional<Eigen::Vector3d> translation;  // Same.
+  Symmetry symmetry = Symmetry::kNone;
+  std::vector<TrueDirection> directions;
+};
+
+// A circle that is to be detected inside a rectangle of the photo.
+struct CircleRoi {
+  std::size_t circle;            // Index in Observations::circles, whose points are empty yet.
+  std::array<int, 4> rectangle;  // x, y, width, height; pixels.
+};
+
+struct SceneImage {
+  std::string name;                // As the scene file writes it.
+  std::string path;                // Where it is.
+  Observations observations;       // Camera, and what is annotated; nothing fitted or detected yet.
+  bool detect_everything = false;  // No circle and no pencil is annotated.
+  std::vector<CircleRoi> rois;
+  std::optional<Truth> truth;
+};
+
+// Reads and checks a scene file. Cameras of the file come beside `cameras` (from a camera file; may
+// be empty); an image that names no camera takes the only one there is. Not ok: one line that names
+// the file, the place in it (images[3] ("a.jpg").circles[0].contour) and what is wrong there.
+Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
+                 std::vector<SceneImage>* images);
+
+// The photos that a comma-separated list of files, folders and wildcards names, sorted within each;
+// to be detected. A plain file name need not exist (reading it will tell); a wildcard that matches
+// nothing, or a folder without photos, is an error.
+Status ListPhotos(const std::string& patterns, const Camera& camera,
+                  std::vector<SceneImage>* images);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMMON_SCENE_H_

@@ -1,0 +1,160 @@
+#include "apps/common/svg_plot.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+
+#include "apps/common/text.h"
+
+namespace circline::apps {
+namespace {
+
+constexpr double kLeft = 58.0, kRight = 14.0, kTop = 30.0, kBottom = 46.0;
+constexpr double kLegendRow = 18.0;
+constexpr int kLegendColumns = 2;
+
+struct Frame {
+  const Plot& plot;
+
+  double right() const { return plot.width - kRight; }
+  double bottom() const { return plot.height - kBottom; }
+  double X(double x) const {
+    const double t = plot.log_x ? std::log(x / plot.x_min) / std::log(plot.x_max / plot.x_min)
+                                : (x - plot.x_min) / (plot.x_max - plot.x_min);
+    return kLeft + std::clamp(t, 0.0, 1.0) * (right() - kLeft);
+  }
+  double Y(double y) const {
+    const double t = (y - plot.y_min) / (plot.y_max - plot.y_min);
+    return bottom() - std::clamp(t, 0.0, 1.0) * (bottom() - kTop);
+  }
+};
+
+std::string Number(double value) { return FormatFixed(value, 1); }
+
+// Round values (1, 2, 5 times a power of ten) that cut the range into about five.
+std::vector<double> LinearTicks(double low, double high) {
+  const double raw = (high - low) / 5.0;
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  const double step = raw / power < 1.5   ? power
+                      : raw / power < 3.5 ? 2 * power
+                      : raw / power < 7.5 ? 5 * power
+                                          : 10 * power;
+  std::vector<double> ticks;
+  for (double i = std::ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i += 1.0) {
+    ticks.push_back(i * step);
+  }
+  return ticks;
+}
+
+std::vector<double> LogTicks(double low, double high) {
+  std::vector<double> ticks;
+  for (int decade = static_cast<int>(std::floor(std::log10(low))); decade < 12; ++decade) {
+    for (const double factor : {1.0, 2.0, 5.0}) {
+      const double value = factor * std::pow(10.0, decade);
+      if (value > high * 1.0001) return ticks;
+      if (value >= low * 0.9999) ticks.push_back(value);
+    }
+  }
+  return ticks;
+}
+
+std::string TickText(double value) {
+  if (value == 0.0) return "0";
+  std::string text = FormatFixed(value, 4);
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+void DrawGrid(const Frame& frame, std::ostringstream* svg) {
+  const Plot& plot = frame.plot;
+  *svg << "<g stroke='currentColor' stroke-opacity='.14'>";
+  const std::vector<double> x_ticks =
+      plot.log_x ? LogTicks(plot.x_min, plot.x_max) : LinearTicks(plot.x_min, plot.x_max);
+  const std::vector<double> y_ticks = LinearTicks(plot.y_min, plot.y_max);
+  for (const double x : x_ticks) {
+    *svg << "<path d='M" << Number(frame.X(x)) << " " << kTop << "V" << Number(frame.bottom())
+         << "'/>";
+  }
+  for (const double y : y_ticks) {
+    *svg << "<path d='M" << kLeft << " " << Number(frame.Y(y)) << "H" << Number(frame.right())
+         << "'/>";
+  }
+  *svg << "</g><g fill='currentColor' fill-opacity='.75' font-size='11'>";
+  for (const double x : x_ticks) {
+    *svg << "<text text-anchor='middle' x='" << Number(frame.X(x)) << "' y='"
+         << Number(frame.bottom() + 15) << "'>" << TickText(x) << "</text>";
+  }
+  for (const double y : y_ticks) {
+    *svg << "<text text-anchor='end' x='" << kLeft - 6 << "' y='" << Number(frame.Y(y) + 4) << "'>"
+         << (plot.percent_y ? TickText(y * 100.0) + " %" : TickText(y)) << "</text>";
+  }
+  *svg << "</g>";
+}
+
+void DrawLabels(const Frame& frame, std::ostringstream* svg) {
+  const Plot& plot = frame.plot;
+  const double middle_x = (kLeft + frame.right()) / 2, middle_y = (kTop + frame.bottom()) / 2;
+  *svg << "<text text-anchor='middle' font-size='14' font-weight='600' fill='currentColor' x='"
+       << Number(middle_x) << "' y='18'>" << EscapeHtml(plot.title) << "</text>"
+       << "<text text-anchor='middle' font-size='12' fill='currentColor' x='" << Number(middle_x)
+       << "' y='" << Number(frame.bottom() + 34) << "'>" << EscapeHtml(plot.x_label) << "</text>"
+       << "<text text-anchor='middle' font-size='12' fill='currentColor' transform='translate(13 "
+       << Number(middle_y) << ") rotate(-90)'>" << EscapeHtml(plot.y_label) << "</text>"
+       << "<rect fill='none' stroke='currentColor' stroke-opacity='.5' x='" << kLeft << "' y='"
+       << kTop << "' width='" << Number(frame.right() - kLeft) << "' height='"
+       << Number(frame.bottom() - kTop) << "'/>";
+}
+
+void DrawSeries(const Frame& frame, const PlotSeries& series, std::ostringstream* svg) {
+  *svg << "<path fill='none' stroke-width='2' stroke-linejoin='round' stroke='" << series.color
+       << "'" << (series.dashed ? " stroke-dasharray='5 3'" : "") << " d='";
+  bool pen_down = false;
+  for (const auto& [x, y] : series.points) {
+    const bool usable = std::isfinite(x) && std::isfinite(y) && (!frame.plot.log_x || x > 0.0);
+    if (usable) *svg << (pen_down ? "L" : "M") << Number(frame.X(x)) << " " << Number(frame.Y(y));
+    pen_down = usable;
+  }
+  *svg << "'><title>" << EscapeHtml(series.name) << "</title></path>";
+}
+
+void DrawLegend(const Frame& frame, std::ostringstream* svg) {
+  const double column_width = (frame.right() - kLeft) / kLegendColumns;
+  for (std::size_t i = 0; i < frame.plot.series.size(); ++i) {
+    const PlotSeries& series = frame.plot.series[i];
+    const std::size_t column = i % kLegendColumns, row = i / kLegendColumns;
+    const double x = kLeft + static_cast<double>(column) * column_width;
+    const double y = frame.plot.height + static_cast<double>(row) * kLegendRow + 8;
+    *svg << "<path stroke-width='2.5' stroke='" << series.color << "'"
+         << (series.dashed ? " stroke-dasharray='5 3'" : "") << " d='M" << Number(x) << " "
+         << Number(y - 4) << "h22'/><text font-size='12' fill='currentColor' x='" << Number(x + 28)
+         << "' y='" << Number(y) << "'>" << EscapeHtml(series.name) << "</text>";
+  }
+}
+
+}  // namespace
+
+std::string RenderSvg(const Plot& plot) {
+  const Frame frame{plot};
+  const std::size_t rows = (plot.series.size() + kLegendColumns - 1) / kLegendColumns;
+  const double height = plot.height + static_cast<double>(rows) * kLegendRow;
+  std::ostringstream svg;
+  svg << "<svg viewBox='0 0 " << plot.width << " " << Number(height)
+      << "' role='img' font-family='system-ui,sans-serif'>";
+  DrawGrid(frame, &svg);
+  for (const PlotSeries& series : plot.series) DrawSeries(frame, series, &svg);
+  DrawLabels(frame, &svg);
+  DrawLegend(frame, &svg);
+  svg << "</svg>";
+  return svg.str();
+}
+
+std::string SeriesColor(std::size_t index) {
+  static constexpr std::array<const char*, 10> kColors = {
+      "#d1495b", "#2e86de", "#2a9d5c", "#e08e0b", "#8e5bd0",
+      "#17a2b8", "#b5651d", "#d63fa6", "#6b7f1f", "#5c6b7a"};
+  return kColors[index % kColors.size()];
+}
+
+}  // namespace circline::apps

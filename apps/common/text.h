@@ -1,0 +1,34 @@
+// Small helpers on text: lists, numbers, names that were meant, HTML.
+#ifndef CIRCLINE_APPS_COMMON_TEXT_H_
+#define CIRCLINE_APPS_COMMON_TEXT_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace circline::apps {
+
+// "a, b,c" -> {"a", "b", "c"}; blanks around the parts are removed, empty parts are kept.
+std::vector<std::string> SplitList(const std::string& text, char separator = ',');
+std::string JoinList(const std::vector<std::string>& parts, const std::string& separator);
+
+// The whole text as a finite number, or false.
+bool ParseDouble(const std::string& text, double* value);
+bool ParseInt(const std::string& text, int* value);
+
+// "; did you mean 'x'?" where one of the candidates is near enough to `name`, else "".
+std::string DidYouMean(const std::string& name, const std::vector<std::string>& candidates);
+
+// Fixed number of decimals; "-" for what is not finite.
+std::string FormatFixed(double value, int decimals);
+// About `digits` significant digits without an exponent where that is readable (0.012, 3.4, 120).
+std::string FormatShort(double value, int digits = 3);
+// "412 us", "3.1 ms", "2.4 s".
+std::string FormatMicroseconds(double microseconds);
+
+std::string EscapeHtml(const std::string& text);
+std::string EncodeBase64(const std::vector<std::uint8_t>& bytes);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMMON_TEXT_H_

@@ -1,0 +1,186 @@
+#include "apps/compare/image_run.h"
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+
+#include "circline/refine/refined_solvers.h"
+
+namespace circline::apps {
+namespace {
+
+class Stopwatch {
+ public:
+  double Microseconds() const {
+    return std::chrono::duration<double, std::micro>(Clock::now() - start_).count();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+std::string ReadPhoto(const std::string& path, cv::Mat* photo) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (!fs::exists(path, error)) return "the file does not exist";
+  if (fs::is_directory(path, error)) return "is a folder, not a photo";
+  if (fs::file_size(path, error) == 0 && !error) return "the file is empty";
+  try {
+    *photo = cv::imread(path, cv::IMREAD_ANYCOLOR);
+  } catch (const std::exception&) {
+    photo->release();
+  }
+  return photo->empty() ? "is not an image that can be read" : "";
+}
+
+std::string SizeError(const cv::Mat& photo, const Camera& camera) {
+  const bool differs = (camera.width > 0 && camera.width != photo.cols) ||
+                       (camera.height > 0 && camera.height != photo.rows);
+  if (!differs) return "";
+  return "the photo has " + std::to_string(photo.cols) + " x " + std::to_string(photo.rows) +
+         " pixels, the camera '" + camera.id + "' " + std::to_string(camera.width) + " x " +
+         std::to_string(camera.height);
+}
+
+// What the scene says of a photo in which everything is detected: the frame and lengths in pixels
+// hold; ids of planes mean nothing unless the detection happens to use them.
+void TakeOverFrame(const Observations& scene, Observations* detected) {
+  const auto has_plane = [&](const std::string& plane) {
+    return std::any_of(detected->circles.begin(), detected->circles.end(),
+                       [&](const CircleObservation& c) { return c.plane == plane; }) ||
+           std::any_of(detected->pencils.begin(), detected->pencils.end(),
+                       [&](const PencilObservation& p) { return p.plane == plane; });
+  };
+  const FrameObservation& frame = scene.frame;
+  if (!frame.plane.empty() && has_plane(frame.plane)) detected->frame.plane = frame.plane;
+  if (frame.origin) detected->frame.origin = frame.origin;
+  if (frame.x_axis) detected->frame.x_axis = frame.x_axis;
+  if (frame.y_axis) detected->frame.y_axis = frame.y_axis;
+  detected->known_lengths = scene.known_lengths;
+  for (KnownLength& length : detected->known_lengths) {
+    if (!has_plane(length.plane)) length.plane.clear();
+  }
+}
+
+void DetectAll(const CompareOptions& options, ImageRun* run) {
+  const Stopwatch watch;
+  const Status status = DetectObservations(run->photo, run->image->observations.camera,
+                                           options.detection, &run->observations);
+  run->stages.emplace_back("detect", watch.Microseconds());
+  if (!status.ok()) run->read_error = status.message;
+  TakeOverFrame(run->image->observations, &run->observations);
+  if (!run->observations.message.empty()) run->problems.push_back(run->observations.message);
+}
+
+void DetectInRois(const CompareOptions& options, ImageRun* run) {
+  if (run->image->rois.empty()) return;
+  const Stopwatch watch;
+  for (const CircleRoi& roi : run->image->rois) {
+    CircleObservation& circle = run->observations.circles[roi.circle];
+    const cv::Rect rectangle(roi.rectangle[0], roi.rectangle[1], roi.rectangle[2],
+                             roi.rectangle[3]);
+    CircleObservation detected = circle;
+    const Status status = DetectCircleInRoi(run->photo, run->observations.camera, rectangle,
+                                            options.detection, &detected);
+    if (status.ok()) {
+      circle.points = std::move(detected.points);
+    } else {
+      run->problems.push_back("circle '" + circle.id + "': " + status.message);
+    }
+  }
+  run->stages.emplace_back("detect", watch.Microseconds());
+}
+
+void Observe(const CompareOptions& options, ImageRun* run) {
+  if (run->image->detect_everything) return DetectAll(options, run);  // Fits included.
+  run->observations = run->image->observations;
+  DetectInRois(options, run);
+  const Stopwatch watch;
+  const Status status = FitObservations(options.fit, &run->observations, &run->problems);
+  run->stages.emplace_back("fit", watch.Microseconds());
+  if (!status.ok()) run->problems.push_back(status.message);
+}
+
+SolverRun RunSolver(const SolverSet::Task& task, const CompareOptions& options,
+                    const ImageRun& image) {
+  SolverRun run;
+  run.solver = task.solver->name();
+  run.stage = task.solver->stage();
+  if (task.loss >= 0) run.loss = &options.losses[static_cast<std::size_t>(task.loss)];
+  const Stopwatch watch;
+  run.estimate = task.solver->Solve(image.observations);
+  run.microseconds = watch.Microseconds();
+  for (const PoseHypothesis& hypothesis : run.estimate.hypotheses) {
+    run.errors.push_back(ComparePose(hypothesis, *image.image));
+  }
+  return run;
+}
+
+void RunAll(const CompareOptions& options, const SolverSet& solvers, ImageRun* run) {
+  const SceneImage& image = *run->image;
+  const bool needs_photo = options.overlays || image.detect_everything || !image.rois.empty();
+  if (needs_photo) {
+    const Stopwatch watch;
+    run->read_error = ReadPhoto(image.path, &run->photo);
+    run->stages.emplace_back("read", watch.Microseconds());
+    if (run->read_error.empty()) run->read_error = SizeError(run->photo, image.observations.camera);
+  }
+  if (run->read_error.empty()) Observe(options, run);
+  if (!run->read_error.empty()) return;
+  for (const SolverSet::Task& task : solvers.tasks()) {
+    run->solvers.push_back(RunSolver(task, options, *run));
+  }
+}
+
+}  // namespace
+
+SolverSet::SolverSet(const CompareOptions& options) {
+  for (const LossSetting& loss : options.losses) {
+    SolverRegistry registry;
+    AddClosedFormSolvers(&registry, options.closed_form);
+    AddRefinedSolvers(&registry, loss.estimation);
+    registries_.push_back(std::move(registry));
+  }
+  const std::vector<std::string> names = options.solvers.empty() ? SolverNames() : options.solvers;
+  for (const std::string& name : names) {
+    const Solver* closed_form = registries_.front().Find(name, SolverStage::kClosedForm);
+    if (closed_form != nullptr) tasks_.push_back({closed_form, -1});
+    for (std::size_t k = 0; k < registries_.size(); ++k) {
+      const Solver* refined = registries_[k].Find(name, SolverStage::kRefined);
+      if (refined != nullptr) tasks_.push_back({refined, static_cast<int>(k)});
+    }
+  }
+}
+
+ImageRun RunImage(const SceneImage& image, const CompareOptions& options,
+                  const SolverSet& solvers) {
+  ImageRun run;
+  run.image = &image;
+  try {
+    RunAll(options, solvers, &run);
+  } catch (const std::exception& error) {  // Such as a photo too large for the memory.
+    run.read_error = std::string("cannot be worked on: ") + error.what();
+    std::replace(run.read_error.begin(), run.read_error.end(), '\n', ' ');
+    run.solvers.clear();
+  }
+  return run;
+}
+
+const SolverRun* RunToShow(const ImageRun& run) {
+  const SolverRun* best = nullptr;
+  const auto rank = [](const SolverRun& r) {
+    const int stage = r.stage == SolverStage::kRefined ? 1 : 0;
+    const bool is_joint = r.solver == "joint";
+    return std::array<int, 3>{is_joint ? 1 : 0, stage,
+                              r.estimate.hypotheses.front().num_observations};
+  };
+  for (const SolverRun& candidate : run.solvers) {
+    if (!candidate.estimate.status.ok() || candidate.estimate.hypotheses.empty()) continue;
+    if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
+  }
+  return best;
+}
+
+}  // namespace circline::apps

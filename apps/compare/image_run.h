@@ -1,0 +1,63 @@
+// One photo through all solvers.
+#ifndef CIRCLINE_APPS_COMPARE_IMAGE_RUN_H_
+#define CIRCLINE_APPS_COMPARE_IMAGE_RUN_H_
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/common/pose_error.h"
+#include "apps/common/scene.h"
+#include "apps/compare/options.h"
+#include "circline/estimators/observations.h"
+#include "circline/estimators/pose.h"
+#include "circline/estimators/solver_registry.h"
+
+namespace circline::apps {
+
+// The solvers to run, in the order in which results are written: by name, the closed form before
+// its refinements with each loss. Immutable once made; many threads may use it.
+class SolverSet {
+ public:
+  struct Task {
+    const Solver* solver;
+    int loss;  // Index in CompareOptions::losses; -1 for closed forms, which have none.
+  };
+  explicit SolverSet(const CompareOptions& options);
+  const std::vector<Task>& tasks() const { return tasks_; }
+
+ private:
+  std::vector<SolverRegistry> registries_;  // One for each loss; they own the solvers.
+  std::vector<Task> tasks_;
+};
+
+struct SolverRun {
+  std::string solver;
+  SolverStage stage = SolverStage::kClosedForm;
+  const LossSetting* loss = nullptr;  // Null for closed forms.
+  PoseEstimate estimate;
+  std::vector<PoseErrors> errors;  // One for each hypothesis.
+  double microseconds = 0.0;
+};
+
+struct ImageRun {
+  const SceneImage* image = nullptr;
+  std::string read_error;  // Not empty: the photo could not be used, and nothing else is filled.
+  cv::Mat photo;           // May be empty where nothing needed it.
+  Observations observations;
+  std::vector<std::string> problems;  // What could not be fitted or detected, a sentence each.
+  std::vector<SolverRun> solvers;
+  std::vector<std::pair<std::string, double>> stages;  // "read", "detect", "fit"; microseconds.
+};
+
+// Never throws. The options and solvers outlive the result.
+ImageRun RunImage(const SceneImage& image, const CompareOptions& options, const SolverSet& solvers);
+
+// The run to show in a picture: joint, else the refined answer with the most evidence, else a
+// closed form; of the first loss. Null if every solver refused.
+const SolverRun* RunToShow(const ImageRun& run);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMPARE_IMAGE_RUN_H_

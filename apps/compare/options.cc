@@ -1,0 +1,305 @@
+#include "apps/compare/options.h"
+
+#include <gflags/gflags.h>
+
+#include <algorithm>
+#include <optional>
+#include <sstream>
+
+#include "apps/common/camera_file.h"
+#include "apps/common/text.h"
+#include "circline/estimators/robust_loss.h"
+#include "circline/estimators/solver_registry.h"
+#include "circline/refine/refined_solvers.h"
+
+DEFINE_string(scene, "", "Scene file (YAML or JSON): photos and what is known of them.");
+DEFINE_string(
+    images, "",
+    "Instead of --scene: photos to detect everything in; files, folders and quoted wildcards, "
+    "separated by commas. Needs --camera.");
+DEFINE_string(
+    camera, "",
+    "Camera: an OpenCV calibration file (camera_matrix, distortion_coefficients, image_width, "
+    "image_height) or a COLMAP cameras.txt.");
+DEFINE_string(output, "", "Folder for the results; created if need be.");
+DEFINE_string(solvers, "all", "Solvers to compare, separated by commas; see --list_solvers.");
+DEFINE_string(
+    robust_loss, circline::LossName(circline::LossOptions().type),
+    "Robust losses of the refinement, a list sweeps: trivial, huber, soft_l_one, cauchy, arctan, "
+    "tukey, geman_mcclure.");
+DEFINE_string(
+    loss_scale_px, "auto",
+    "Standard deviation of a point's noise, pixels, or 'auto' (estimated); a list sweeps.");
+DEFINE_string(conic_loss, "", "Loss of contour points, where it differs from --robust_loss.");
+DEFINE_string(conic_loss_scale_px, "", "Scale of contour points, where it differs.");
+DEFINE_string(line_loss, "", "Loss of points of lines, where it differs from --robust_loss.");
+DEFINE_string(line_loss_scale_px, "", "Scale of points of lines, where it differs.");
+DEFINE_double(inlier_threshold_px, circline::FitOptions().inlier_threshold_px,
+              "A point farther than this from its curve is an outlier, pixels; positive.");
+DEFINE_double(ransac_confidence, circline::FitOptions().confidence,
+              "Probability that the best model was among those drawn; between 0 and 1.");
+DEFINE_int32(ransac_max_iterations, circline::FitOptions().max_iterations,
+             "Draws for each model; 1 or more.");
+DEFINE_double(min_ellipse_axis_px, circline::DetectionOptions().min_ellipse_axis_px,
+              "Detection: smallest semi-minor axis of an ellipse, pixels.");
+DEFINE_double(min_arc_deg, circline::DetectionOptions().min_arc_deg,
+              "Detection: smallest angular coverage of an ellipse, degrees.");
+DEFINE_double(min_segment_length_px, circline::DetectionOptions().min_segment_length_px,
+              "Detection: shortest line segment, pixels.");
+DEFINE_int32(max_circles, circline::DetectionOptions().max_circles,
+             "Detection: at most so many ellipses.");
+DEFINE_int32(max_pencils, circline::DetectionOptions().max_pencils,
+             "Detection: at most so many directions of parallel lines.");
+DEFINE_uint64(seed, circline::FitOptions().seed, "Same input and seed: same bytes out.");
+DEFINE_int32(threads, 0, "Images worked on at a time; 0 = one for each core.");
+DEFINE_string(
+    shard, "0/1",
+    "i/n: only every n-th image, from the i-th on. i counts from 0 or from 1 (n/n is 0/n).");
+DEFINE_bool(overlays, true, "Draw a picture of each photo with what was found in it.");
+DEFINE_bool(list_solvers, false, "List the solvers and what each needs, and do nothing else.");
+
+namespace circline::apps {
+namespace {
+
+// The option is good as far as this flag goes: the sentence, with the flag and its value in front.
+Status CheckFlag(const std::string& flag, const Status& status) {
+  if (status.ok()) return status;
+  std::string value;
+  gflags::GetCommandLineOption(flag.c_str(), &value);
+  return Status::Invalid("--" + flag + "=" + value + ": " + status.message);
+}
+
+Status ParseLoss(const std::string& flag, const std::string& name, LossType* type) {
+  if (LossFromName(name, type)) return Status::Ok();
+  return Status::Invalid("--" + flag + ": '" + name + "' is not one of " +
+                         JoinList(LossNames(), ", ") + DidYouMean(name, LossNames()));
+}
+
+Status ParseScale(const std::string& flag, const std::string& text, double* scale) {
+  if (text == "auto") {
+    *scale = 0.0;
+    return Status::Ok();
+  }
+  if (ParseDouble(text, scale) && *scale > 0.0) return Status::Ok();
+  return Status::Invalid("--" + flag + ": '" + text + "' is neither a positive number nor 'auto'");
+}
+
+// What --conic_loss or --line_loss and their scales say; absent where they are empty.
+struct LossOverride {
+  std::optional<LossType> type;
+  std::optional<double> scale_px;
+
+  Status Read(const std::string& flag, const std::string& loss, const std::string& scale) {
+    if (!loss.empty()) {
+      const Status status = ParseLoss(flag, loss, &type.emplace());
+      if (!status.ok()) return status;
+    }
+    return scale.empty() ? Status::Ok()
+                         : ParseScale(flag + "_scale_px", scale, &scale_px.emplace());
+  }
+  LossOptions Apply(const LossOptions& common) const {
+    return {type.value_or(common.type), scale_px.value_or(common.scale_px)};
+  }
+};
+
+Status ReadLosses(std::vector<LossSetting>* losses) {
+  LossOverride conic, line;
+  Status status = conic.Read("conic_loss", FLAGS_conic_loss, FLAGS_conic_loss_scale_px);
+  if (status.ok()) status = line.Read("line_loss", FLAGS_line_loss, FLAGS_line_loss_scale_px);
+  if (!status.ok()) return status;
+  losses->clear();
+  for (const std::string& loss : SplitList(FLAGS_robust_loss)) {
+    LossOptions common;
+    status = ParseLoss("robust_loss", loss, &common.type);
+    for (const std::string& scale : SplitList(FLAGS_loss_scale_px)) {
+      if (status.ok()) status = ParseScale("loss_scale_px", scale, &common.scale_px);
+      LossSetting setting{loss, common.scale_px, {}};
+      setting.estimation.conic_loss = conic.Apply(common);
+      setting.estimation.line_loss = line.Apply(common);
+      if (status.ok()) status = setting.estimation.Validate();
+      if (!status.ok()) return status;
+      const bool twice = std::any_of(losses->begin(), losses->end(), [&](const LossSetting& other) {
+        return other.loss == setting.loss && other.scale_px == setting.scale_px;
+      });
+      if (!twice) losses->push_back(setting);
+    }
+  }
+  return Status::Ok();
+}
+
+// Sets one field from its flag and checks it apart from the others, so that the flag can be named.
+template <typename Options, typename Field, typename Value>
+Status SetOption(const std::string& flag, Field Options::*field, const Value& value,
+                 Options* options) {
+  Options alone;
+  alone.*field = static_cast<Field>(value);
+  options->*field = static_cast<Field>(value);
+  return CheckFlag(flag, alone.Validate());
+}
+
+Status FirstError(const std::vector<Status>& checks) {
+  for (const Status& status : checks) {
+    if (!status.ok()) return status;
+  }
+  return Status::Ok();
+}
+
+Status ReadFitOptions(FitOptions* fit) {
+  fit->seed = FLAGS_seed;
+  const std::vector<Status> checks = {
+      SetOption("inlier_threshold_px", &FitOptions::inlier_threshold_px, FLAGS_inlier_threshold_px,
+                fit),
+      SetOption("ransac_confidence", &FitOptions::confidence, FLAGS_ransac_confidence, fit),
+      SetOption("ransac_max_iterations", &FitOptions::max_iterations, FLAGS_ransac_max_iterations,
+                fit)};
+  const Status status = FirstError(checks);
+  return status.ok() ? fit->Validate() : status;
+}
+
+Status ReadDetectionOptions(DetectionOptions* detection) {
+  using D = DetectionOptions;
+  detection->seed = FLAGS_seed;
+  const std::vector<Status> checks = {
+      SetOption("min_ellipse_axis_px", &D::min_ellipse_axis_px, FLAGS_min_ellipse_axis_px,
+                detection),
+      SetOption("min_arc_deg", &D::min_arc_deg, FLAGS_min_arc_deg, detection),
+      SetOption("min_segment_length_px", &D::min_segment_length_px, FLAGS_min_segment_length_px,
+                detection),
+      SetOption("max_circles", &D::max_circles, FLAGS_max_circles, detection),
+      SetOption("max_pencils", &D::max_pencils, FLAGS_max_pencils, detection)};
+  const Status status = FirstError(checks);
+  return status.ok() ? detection->Validate() : status;
+}
+
+Status ReadSolvers(std::vector<std::string>* solvers) {
+  solvers->clear();
+  const std::vector<std::string> known = SolverNames();
+  for (const std::string& name : SplitList(FLAGS_solvers)) {
+    if (name == "all") {
+      solvers->clear();
+      return Status::Ok();
+    }
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      return Status::Invalid("--solvers: there is no solver '" + name + "'" +
+                             DidYouMean(name, known) + " (--list_solvers lists them)");
+    }
+    solvers->push_back(name);
+  }
+  return Status::Ok();
+}
+
+Status ReadShard(int* index, int* count) {
+  const std::vector<std::string> parts = SplitList(FLAGS_shard, '/');
+  const bool numbers = parts.size() == 2 && ParseInt(parts[0], index) && ParseInt(parts[1], count);
+  if (!numbers || *count < 1 || *index < 0 || *index > *count) {
+    return Status::Invalid("--shard=" + FLAGS_shard +
+                           ": must be i/n with n at least 1 and i from 0 to n");
+  }
+  *index %= *count;
+  return Status::Ok();
+}
+
+SolverRegistry AllSolvers() {
+  SolverRegistry registry;
+  AddClosedFormSolvers(&registry);
+  AddRefinedSolvers(&registry);
+  return registry;
+}
+
+Status OneCamera(const std::vector<Camera>& cameras, Camera* camera) {
+  if (cameras.size() != 1) {
+    return Status::Invalid("--camera=" + FLAGS_camera + ": has " + std::to_string(cameras.size()) +
+                           " cameras; --images takes one (a scene file can name several)");
+  }
+  *camera = cameras.front();
+  return Status::Ok();
+}
+
+Status ReadImages(std::vector<SceneImage>* images) {
+  std::vector<Camera> cameras;
+  if (!FLAGS_camera.empty()) {
+    const Status status = ReadCameraFile(FLAGS_camera, &cameras);
+    if (!status.ok()) return status;
+  }
+  if (!FLAGS_scene.empty()) return ReadScene(FLAGS_scene, cameras, images);
+  Camera camera;
+  const Status status = OneCamera(cameras, &camera);
+  return status.ok() ? ListPhotos(FLAGS_images, camera, images) : status;
+}
+
+}  // namespace
+
+Status OptionsFromFlags(CompareOptions* options) {
+  Status status = ReadFitOptions(&options->fit);
+  if (status.ok()) status = ReadDetectionOptions(&options->detection);
+  if (status.ok()) status = ReadLosses(&options->losses);
+  if (status.ok()) status = ReadSolvers(&options->solvers);
+  if (status.ok()) status = ReadShard(&options->shard_index, &options->num_shards);
+  if (!status.ok()) return status;
+  if (FLAGS_threads < 0 || FLAGS_threads > 1024) {
+    return CheckFlag("threads", Status::Invalid("must be between 0 and 1024"));
+  }
+  if (FLAGS_scene.empty() == FLAGS_images.empty()) {
+    return Status::Invalid(FLAGS_scene.empty()
+                               ? "give --scene, or --images with --camera (--help says more)"
+                               : "give --scene or --images, not both");
+  }
+  if (!FLAGS_images.empty() && FLAGS_camera.empty())
+    return Status::Invalid("--images needs --camera");
+  if (FLAGS_output.empty())
+    return Status::Invalid("--output is missing: the folder for the results");
+  options->output = FLAGS_output;
+  options->threads = FLAGS_threads;
+  options->overlays = FLAGS_overlays;
+  return Status::Ok();
+}
+
+Status ImagesFromFlags(const CompareOptions& options, std::vector<SceneImage>* images) {
+  const Status status = ReadImages(images);
+  if (!status.ok()) return status;
+  std::vector<SceneImage> shard;
+  for (std::size_t i = 0; i < images->size(); ++i) {
+    if (static_cast<int>(i % static_cast<std::size_t>(options.num_shards)) == options.shard_index) {
+      shard.push_back(std::move((*images)[i]));
+    }
+  }
+  *images = std::move(shard);
+  return Status::Ok();
+}
+
+std::vector<std::string> SolverNames() {
+  const SolverRegistry registry = AllSolvers();
+  std::vector<std::string> names;
+  for (const auto& solver : registry.solvers()) {
+    if (std::find(names.begin(), names.end(), solver->name()) == names.end()) {
+      names.push_back(solver->name());
+    }
+  }
+  return names;
+}
+
+std::string ListSolvers() {
+  const SolverRegistry registry = AllSolvers();
+  std::size_t width = 0;
+  for (const std::string& name : SolverNames()) width = std::max(width, name.size());
+  std::ostringstream text;
+  for (const std::string& name : SolverNames()) {
+    std::vector<std::string> stages;
+    std::string needs;
+    for (const SolverStage stage : {SolverStage::kClosedForm, SolverStage::kRefined}) {
+      const Solver* solver = registry.Find(name, stage);
+      if (solver == nullptr) continue;
+      stages.emplace_back(SolverStageName(stage));
+      if (needs.empty()) needs = solver->needs();
+    }
+    std::string stage_text = JoinList(stages, ", ");
+    stage_text.resize(std::max<std::size_t>(stage_text.size(), 20), ' ');
+    text << name << std::string(width + 2 - name.size(), ' ') << stage_text << "  " << needs
+         << "\n";
+  }
+  return text.str();
+}
+
+bool ListSolversAsked() { return FLAGS_list_solvers; }
+
+}  // namespace circline::apps

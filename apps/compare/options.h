@@ -1,0 +1,52 @@
+// What circline_compare was asked to do: the library's options, and where from and where to.
+#ifndef CIRCLINE_APPS_COMPARE_OPTIONS_H_
+#define CIRCLINE_APPS_COMPARE_OPTIONS_H_
+
+#include <string>
+#include <vector>
+
+#include "apps/common/scene.h"
+#include "circline/estimators/closed_form_solvers.h"
+#include "circline/estimators/status.h"
+#include "circline/ransac/detect_observations.h"
+#include "circline/ransac/fit_observations.h"
+#include "circline/refine/estimate_pose.h"
+
+namespace circline::apps {
+
+// One point of the sweep over losses and scales.
+struct LossSetting {
+  std::string loss;              // As given to --robust_loss.
+  double scale_px = 0.0;         // As given to --loss_scale_px; 0 = auto.
+  EstimationOptions estimation;  // With the overrides for conics and lines.
+};
+
+struct CompareOptions {
+  std::string output;
+  std::vector<std::string> solvers;  // Names; empty = all.
+  std::vector<LossSetting> losses;   // One or more.
+  FitOptions fit;
+  DetectionOptions detection;
+  ClosedFormOptions closed_form;
+  int threads = 0;  // 0 = as many as the machine has.
+  int shard_index = 0, num_shards = 1;
+  bool overlays = true;
+};
+
+// From the flags (flags.cc); not ok: one line that names the flag. Nothing is read from disk.
+Status OptionsFromFlags(CompareOptions* options);
+
+// The images of --scene or --images with --camera, those of this shard only. Not ok: one line that
+// names the flag or file.
+Status ImagesFromFlags(const CompareOptions& options, std::vector<SceneImage>* images);
+
+// Names of all solvers, closed form and refined, in the order of the registry.
+std::vector<std::string> SolverNames();
+
+// For --list_solvers: a line for each solver: name, stages, what it needs.
+std::string ListSolvers();
+bool ListSolversAsked();
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMPARE_OPTIONS_H_

@@ -1,0 +1,359 @@
+#include "apps/compare/overlay.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "apps/common/text.h"
+#include "apps/compare/canvas.h"
+#include "apps/compare/pixel_ellipse.h"
+
+namespace circline::apps {
+namespace {
+
+constexpr double kFullTurn = 6.283185307179586;
+constexpr double kDegreesPerRadian = 57.295779513082323;
+
+const cv::Scalar kWhite(255, 255, 255), kEllipse(0, 215, 255), kUnusedEllipse(90, 150, 170),
+    kOutlier(60, 60, 255);
+const cv::Scalar kHorizon(255, 230, 120), kGrid(255, 255, 255), kGridRim(90, 60, 30);
+const std::array<cv::Scalar, 3> kAxes = {cv::Scalar(70, 70, 255), cv::Scalar(80, 220, 60),
+                                         cv::Scalar(255, 140, 50)};  // X red, Y green, Z blue.
+const std::array<cv::Scalar, 4> kFreePencils = {cv::Scalar(220, 80, 230), cv::Scalar(40, 160, 255),
+                                                cv::Scalar(230, 220, 60),
+                                                cv::Scalar(120, 255, 200)};
+
+// A curve of the camera frame as pixels of the photo; not finite where it cannot be seen.
+std::vector<Eigen::Vector2d> ProjectCurve(const Camera& camera, int samples, double t0, double t1,
+                                          const std::function<Eigen::Vector3d(double)>& curve) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (int i = 0; i <= samples; ++i) {
+    const Eigen::Vector3d point = curve(t0 + (t1 - t0) * i / samples);
+    Eigen::Vector2d pixel;
+    const bool seen = point.allFinite() && CameraToPixel(camera, point, &pixel);
+    pixels.push_back(seen ? pixel : Eigen::Vector2d::Constant(NAN));
+  }
+  return pixels;
+}
+
+// ---- Evidence ----
+
+void DrawContourPoints(const CircleObservation& circle, Canvas* canvas) {
+  for (std::size_t i = 0; i < circle.points.size(); ++i) {
+    const bool inlier = circle.inliers.empty() || circle.inliers[i] != 0;
+    canvas->Dot(circle.points[i], inlier ? 1.6 : 2.2, inlier ? kWhite : kOutlier);
+  }
+}
+
+void DrawEllipse(const Camera& camera, const CircleObservation& circle, bool used, Canvas* canvas) {
+  Ellipse ellipse;
+  if (!circle.fit || !ConicToEllipse(circle.fit->conic, &ellipse)) return;
+  const auto pixels = ProjectCurve(camera, 180, 0.0, kFullTurn, [&ellipse](double t) {
+    return EllipsePoint(ellipse, t).homogeneous().eval();
+  });
+  canvas->Polyline(pixels, used ? kEllipse : kUnusedEllipse, used ? 2 : 1);
+}
+
+cv::Scalar PencilColor(const PencilObservation& pencil, std::size_t index) {
+  return pencil.direction == PencilDirection::kFree
+             ? kFreePencils[index % kFreePencils.size()]
+             : kAxes[static_cast<std::size_t>(pencil.direction)];
+}
+
+// A straight line of the scene between two pixels is a curve of the photo: drawn by its plane.
+void DrawSegment(const Camera& camera, const Segment& segment, const cv::Scalar& color,
+                 Canvas* canvas) {
+  CalibratedPoint a, b;
+  if (!PixelToCalibrated(camera, segment[0], &a) || !PixelToCalibrated(camera, segment[1], &b))
+    return;
+  const Eigen::Vector3d from = a.Homogeneous(), to = b.Homogeneous();
+  canvas->Polyline(ProjectCurve(camera, 24, 0.0, 1.0,
+                                [&](double t) { return ((1.0 - t) * from + t * to).eval(); }),
+                   color, 2);
+}
+
+void DrawPencils(const Observations& observations, Canvas* canvas) {
+  std::size_t num_free = 0;
+  for (const PencilObservation& pencil : observations.pencils) {
+    const cv::Scalar color = PencilColor(pencil, num_free);
+    if (pencil.direction == PencilDirection::kFree) ++num_free;
+    for (const LineObservation& line : pencil.lines) {
+      const Segment ends = EndPoints(line);
+      DrawSegment(observations.camera, ends, color, canvas);
+      canvas->Dot(ends[0], 3.0, color);
+      canvas->Dot(ends[1], 3.0, color);
+    }
+  }
+}
+
+// ---- The pose ----
+
+// A pixel's point on the plane Z = 0.
+struct PlanePoint {
+  Eigen::Vector2d world;
+  double depth;  // Camera frame, along the optical axis.
+};
+
+// Where the ray of a pixel meets the plane in front of the camera; false if it does not.
+bool PixelOnPlane(const Camera& camera, const CameraPose& pose, const Eigen::Vector2d& pixel,
+                  PlanePoint* result) {
+  CalibratedPoint point;
+  if (!PixelToCalibrated(camera, pixel, &point)) return false;
+  const Eigen::Vector3d ray = point.Homogeneous();
+  const Eigen::Vector3d normal = pose.rotation.col(2);
+  const double along = normal.dot(ray);
+  if (std::abs(along) < 1e-3 * ray.norm()) return false;  // Next to the vanishing line.
+  result->depth = normal.dot(pose.translation) / along;
+  result->world = (pose.rotation.transpose() * (result->depth * ray - pose.translation)).head<2>();
+  return result->depth > 0.0 && result->world.allFinite();
+}
+
+// Pixels of everything that lies on the world's plane.
+std::vector<Eigen::Vector2d> PixelsOfPlane(const Observations& observations) {
+  const Observations resolved = ResolveWorld(observations);
+  const std::string& plane = resolved.frame.plane;
+  std::vector<Eigen::Vector2d> pixels;
+  for (const CircleObservation& circle : resolved.circles) {
+    if (circle.plane != plane) continue;
+    pixels.insert(pixels.end(), circle.points.begin(), circle.points.end());
+  }
+  for (const PencilObservation& pencil : resolved.pencils) {
+    if (pencil.direction == PencilDirection::kZ || pencil.plane != plane) continue;
+    for (const LineObservation& line : pencil.lines) {
+      const Segment ends = EndPoints(line);
+      pixels.insert(pixels.end(), ends.begin(), ends.end());
+    }
+  }
+  return pixels;
+}
+
+// The part of the plane Z = 0 that carries evidence, world coordinates; without what lies much
+// farther away than the nearest, towards the vanishing line.
+Eigen::AlignedBox2d EvidenceOnPlane(const Observations& observations, const CameraPose& pose) {
+  constexpr double kDepthRange = 4.0;
+  std::vector<PlanePoint> points;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector2d& pixel : PixelsOfPlane(observations)) {
+    PlanePoint point;
+    if (!PixelOnPlane(observations.camera, pose, pixel, &point)) continue;
+    points.push_back(point);
+    nearest = std::min(nearest, point.depth);
+  }
+  Eigen::AlignedBox2d box;
+  for (const PlanePoint& point : points) {
+    if (point.depth <= kDepthRange * nearest) box.extend(point.world);
+  }
+  return box;
+}
+
+struct WorldDrawing {
+  const Camera& camera;
+  const CameraPose& pose;
+
+  std::vector<Eigen::Vector2d> Line(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+    return ProjectCurve(camera, 32, 0.0, 1.0, [&](double t) {
+      return (pose.rotation * ((1.0 - t) * from + t * to) + pose.translation).eval();
+    });
+  }
+  bool Pixel(const Eigen::Vector3d& point, Eigen::Vector2d* pixel) const {
+    return CameraToPixel(camera, pose.rotation * point + pose.translation, pixel);
+  }
+};
+
+void DrawGrid(const WorldDrawing& world, Eigen::AlignedBox2d box, const cv::Scalar& color,
+              int thickness, Canvas* canvas) {
+  constexpr int kCells = 8;
+  const double longest = box.sizes().maxCoeff();
+  if (!(longest > 0.0) || !std::isfinite(longest)) return;
+  box.min().array() -= 0.06 * longest;
+  box.max().array() += 0.06 * longest;
+  const double step = box.sizes().maxCoeff() / kCells;
+  for (const int axis : {0, 1}) {
+    const int other = 1 - axis;
+    const int count = std::max(1, static_cast<int>(std::lround(box.sizes()[axis] / step)));
+    for (int i = 0; i <= count; ++i) {
+      Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = Eigen::Vector3d::Zero();
+      from[axis] = to[axis] = box.min()[axis] + box.sizes()[axis] * i / count;
+      from[other] = box.min()[other];
+      to[other] = box.max()[other];
+      canvas->Polyline(world.Line(from, to), color, thickness);
+    }
+  }
+}
+
+void DrawVanishingLine(const Camera& camera, const Eigen::Vector3d& normal, Canvas* canvas) {
+  const Eigen::Vector3d sideways =
+      (std::abs(normal.z()) > 0.999 ? Eigen::Vector3d::UnitX()
+                                    : Eigen::Vector3d::UnitZ().cross(normal))
+          .normalized();
+  const Eigen::Vector3d forward = sideways.cross(normal).normalized();
+  const double sign = forward.z() < 0.0 ? -1.0 : 1.0;
+  const auto pixels = ProjectCurve(camera, 400, -1.55, 1.55, [&](double t) {
+    return (std::sin(t) * sideways + sign * std::cos(t) * forward).eval();
+  });
+  canvas->Dashes(pixels, kHorizon, 2);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (!canvas->IsInside(pixels[i], 24.0)) continue;
+    canvas->Label(pixels[i] + Eigen::Vector2d(0.0, canvas->PhotoPixels(-8.0)), "vanishing line",
+                  kHorizon, 0.5);
+    return;
+  }
+}
+
+// World length at which the longest visible axis takes up a sixth of the photo's height.
+double AxisLength(const WorldDrawing& world, const Eigen::Vector3d& origin, const Canvas& canvas) {
+  const double wanted = canvas.PhotoPixels(canvas.height() * 0.17);
+  Eigen::Vector2d start;
+  if (!world.Pixel(origin, &start)) return 0.0;
+  double length = 0.1 * (world.pose.rotation * origin + world.pose.translation).norm();
+  for (int pass = 0; pass < 6; ++pass) {
+    double longest = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      Eigen::Vector2d end;
+      if (world.Pixel(origin + length * Eigen::Vector3d::Unit(axis), &end)) {
+        longest = std::max(longest, (end - start).norm());
+      }
+    }
+    if (!(longest > 0.0)) return 0.0;
+    length *= std::clamp(wanted / longest, 0.25, 4.0);
+  }
+  return length;
+}
+
+void DrawAxes(const WorldDrawing& world, const Eigen::Vector3d& origin, bool rotation_is_free,
+              Canvas* canvas) {
+  const double length = AxisLength(world, origin, *canvas);
+  Eigen::Vector2d start;
+  if (!(length > 0.0) || !world.Pixel(origin, &start)) return;
+  // The farthest first, so that nearer ones lie on top.
+  std::array<int, 3> order = {0, 1, 2};
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return world.pose.rotation(2, a) > world.pose.rotation(2, b); });
+  static constexpr std::array<const char*, 3> kNames = {"X", "Y", "Z"};
+  for (const int axis : order) {
+    if (rotation_is_free && axis != 2) continue;  // A convention, nothing that was seen.
+    const auto pixels = world.Line(origin, origin + length * Eigen::Vector3d::Unit(axis));
+    const auto index = static_cast<std::size_t>(axis);
+    canvas->Arrow(pixels, kAxes[index], 3);
+    if (!pixels.back().allFinite()) continue;
+    const Eigen::Vector2d ahead =
+        (pixels.back() - start).stableNormalized() * canvas->PhotoPixels(15.0);
+    canvas->Label(pixels.back() + ahead, rotation_is_free ? "normal" : kNames[index], kAxes[index],
+                  0.75, true);
+  }
+  canvas->Dot(start, 4.5, kWhite);
+}
+
+void DrawCenters(const PoseEstimate& estimate, Canvas* canvas) {
+  for (std::size_t i = estimate.hypotheses.size(); i-- > 0;) {
+    for (const CircleEstimate& circle : estimate.hypotheses[i].circles) {
+      if (!circle.center_px.allFinite() || circle.center_px.isZero()) continue;
+      if (i == 0) {
+        canvas->Cross(circle.center_px, 7.0, kEllipse);
+      } else if (i == 1) {
+        canvas->Ring(circle.center_px, 5.0, kEllipse);
+      }
+    }
+  }
+}
+
+// World axes at the origin, or where the evidence is if the origin is not in the picture.
+Eigen::Vector3d AxesOrigin(const WorldDrawing& world, const Eigen::AlignedBox2d& box,
+                           const Canvas& canvas) {
+  Eigen::Vector2d pixel;
+  const bool visible = world.Pixel(Eigen::Vector3d::Zero(), &pixel) && canvas.IsInside(pixel, 0.0);
+  if (visible || box.isEmpty()) return Eigen::Vector3d::Zero();
+  return {box.center().x(), box.center().y(), 0.0};
+}
+
+void DrawPose(const Observations& observations, const PoseEstimate& estimate, Canvas* canvas) {
+  const PoseHypothesis& best = estimate.hypotheses.front();
+  const WorldDrawing world{observations.camera, best.cam_from_world};
+  const Eigen::AlignedBox2d box = EvidenceOnPlane(observations, best.cam_from_world);
+  if (!box.isEmpty()) {
+    canvas->Blend(0.35, [&] { DrawGrid(world, box, kGridRim, 3, canvas); });
+    canvas->Blend(0.7, [&] { DrawGrid(world, box, kGrid, 1, canvas); });
+  }
+  DrawVanishingLine(observations.camera, best.cam_from_world.rotation.col(2), canvas);
+  DrawCenters(estimate, canvas);
+  DrawAxes(world, AxesOrigin(world, box, *canvas), best.RotationIsFree(), canvas);
+}
+
+// ---- The caption ----
+
+std::string SigmaText(const PoseHypothesis& hypothesis) {
+  const Eigen::Vector3d sigma = hypothesis.SigmaRotation() * kDegreesPerRadian;
+  if (!sigma.allFinite()) {
+    const std::optional<double> normal = SigmaNormalDeg(hypothesis);
+    return normal ? "sigma of the normal " + FormatShort(*normal, 2) + " deg"
+                  : "a rotation is free";
+  }
+  return "sigma " + FormatShort(sigma.norm(), 2) + " deg";
+}
+
+std::vector<std::string> Caption(const ImageRun& run, const SolverRun* shown) {
+  if (shown == nullptr) {
+    std::string reason = run.solvers.empty() ? "" : run.solvers.back().estimate.status.message;
+    return {"no pose", reason};
+  }
+  const PoseHypothesis& best = shown->estimate.hypotheses.front();
+  std::string title =
+      shown->solver + (shown->stage == SolverStage::kRefined ? ", refined" : ", closed form");
+  const auto error = shown->errors.front().Headline();
+  if (error) title += "    error " + FormatShort(*error, 2) + " deg";
+  const std::size_t count = shown->estimate.hypotheses.size();
+  std::string details = "rms " + FormatShort(best.rms_px, 2) + " px    " + SigmaText(best) +
+                        "    probability " + FormatFixed(best.probability, 2) + " (" +
+                        std::to_string(count) + (count == 1 ? " hypothesis)" : " hypotheses)");
+  return {title, details};
+}
+
+// Whether the shown pose rests on this circle; where there is no pose, all are drawn alike.
+bool IsUsed(const CircleObservation& circle, const SolverRun* shown) {
+  if (shown == nullptr) return true;
+  const std::vector<CircleEstimate>& used = shown->estimate.hypotheses.front().circles;
+  return std::any_of(used.begin(), used.end(),
+                     [&](const CircleEstimate& estimate) { return estimate.id == circle.id; });
+}
+
+}  // namespace
+
+cv::Mat DrawOverlay(const ImageRun& run) {
+  Canvas canvas(run.photo);
+  const Observations& observations = run.observations;
+  canvas.Blend(0.55, [&] {
+    for (const CircleObservation& circle : observations.circles) DrawContourPoints(circle, &canvas);
+  });
+  const SolverRun* shown = RunToShow(run);
+  for (const CircleObservation& circle : observations.circles) {
+    DrawEllipse(observations.camera, circle, IsUsed(circle, shown), &canvas);
+  }
+  DrawPencils(observations, &canvas);
+  if (shown != nullptr) DrawPose(observations, shown->estimate, &canvas);
+  return canvas.WithCaption(Caption(run, shown));
+}
+
+std::vector<std::uint8_t> EncodePng(const cv::Mat& picture) {
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", picture, bytes, {cv::IMWRITE_PNG_COMPRESSION, 3});
+  return bytes;
+}
+
+std::vector<std::uint8_t> EncodeJpeg(const cv::Mat& picture, int max_width) {
+  cv::Mat small = picture;
+  if (picture.cols > max_width) {
+    const double scale = static_cast<double>(max_width) / picture.cols;
+    cv::resize(picture, small,
+               cv::Size(max_width, static_cast<int>(std::lround(picture.rows * scale))), 0.0, 0.0,
+               cv::INTER_AREA);
+  }
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, 82});
+  return bytes;
+}
+
+}  // namespace circline::apps

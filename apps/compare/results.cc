@@ -1,0 +1,211 @@
+#include "apps/compare/results.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "apps/common/text.h"
+#include "apps/compare/pixel_ellipse.h"
+
+namespace circline::apps {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDegreesPerRadian = 57.295779513082323;
+
+// A text that is not UTF-8 (a file name) must not stop the run.
+std::string Line(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+Json Number(const std::optional<double>& value) { return value ? Number(*value) : Json(); }
+Json TextOrNull(const std::string& text) { return text.empty() ? Json() : Json(text); }
+
+template <typename Derived>
+Json Array(const Eigen::MatrixBase<Derived>& m) {  // Row by row.
+  Json array = Json::array();
+  for (Eigen::Index i = 0; i < m.rows(); ++i) {
+    for (Eigen::Index j = 0; j < m.cols(); ++j) array.push_back(Number(m(i, j)));
+  }
+  return array;
+}
+
+Json ScaleJson(double scale_px) { return scale_px > 0.0 ? Json(scale_px) : Json("auto"); }
+
+Json ResultHead(const ImageRun& image, const SolverRun& run) {
+  Json line;
+  line["image"] = image.image->name;
+  line["solver"] = run.solver;
+  line["stage"] = SolverStageName(run.stage);
+  line["loss"] = run.loss == nullptr ? Json() : Json(run.loss->loss);
+  line["loss_scale_px"] = run.loss == nullptr ? Json() : ScaleJson(run.loss->scale_px);
+  line["status"] = StatusText(run.estimate.status);
+  line["message"] = run.estimate.status.message;
+  return line;
+}
+
+// Errors that cannot be had are left out.
+void AddErrors(const PoseErrors& errors, const Truth& truth, Json* line) {
+  const auto add = [line](const char* key, const std::optional<double>& error) {
+    if (error) (*line)[key] = *error;
+  };
+  add("rotation_error_deg", errors.rotation_deg);
+  add("normal_error_deg", errors.normal_deg);
+  add("translation_error_deg", errors.translation_deg);
+  if (truth.directions.empty()) return;
+  Json directions = Json::object();
+  for (const auto& [id, error] : errors.directions_deg) directions[id] = error;
+  (*line)["direction_error_deg"] = directions;
+}
+
+Json HypothesisLine(const ImageRun& image, const SolverRun& run, std::size_t index) {
+  const PoseHypothesis& h = run.estimate.hypotheses[index];
+  Json line = ResultHead(image, run);
+  line["hypothesis"] = index;
+  line["num_hypotheses"] = run.estimate.hypotheses.size();
+  line["probability"] = Number(h.probability);
+  line["rotation"] = Array(h.cam_from_world.rotation);
+  line["translation"] = Array(h.cam_from_world.translation);
+  line["metric"] = h.metric;
+  line["rms_px"] = Number(h.rms_px);
+  line["num_inliers"] = h.num_inliers;
+  line["num_observations"] = h.num_observations;
+  line["sigma_rotation_deg"] = Array((h.SigmaRotation() * kDegreesPerRadian).eval());
+  line["sigma_normal_deg"] = Number(SigmaNormalDeg(h));
+  line["free_directions"] = Json::array();
+  for (const std::array<double, 6>& direction : h.free_directions) {
+    line["free_directions"].push_back(direction);
+  }
+  line["origin_observed"] = h.origin_observed;
+  line["decided_by"] = run.estimate.decided_by;
+  line["notes"] = run.estimate.notes;
+  if (image.image->truth) AddErrors(run.errors[index], *image.image->truth, &line);
+  return line;
+}
+
+Json RefusalLine(const ImageRun& image, const SolverRun& run) {
+  Json line = ResultHead(image, run);
+  line["hypothesis"] = nullptr;
+  line["num_hypotheses"] = 0;
+  for (const char* key :
+       {"probability", "rotation", "translation", "metric", "rms_px", "num_inliers",
+        "num_observations", "sigma_rotation_deg", "sigma_normal_deg", "free_directions"}) {
+    line[key] = nullptr;
+  }
+  line["notes"] = run.estimate.notes;
+  return line;
+}
+
+Json EllipseJson(const CircleObservation& circle) {
+  Json json;
+  json["id"] = circle.id;
+  PixelEllipse pixel;
+  if (FitPixelEllipse(circle, &pixel)) {
+    json["center"] = Array(pixel.ellipse.center);
+    json["axes"] = {pixel.ellipse.a, pixel.ellipse.b};
+    json["angle_rad"] = pixel.ellipse.angle;
+  } else {
+    json["center"] = json["axes"] = json["angle_rad"] = nullptr;
+  }
+  if (circle.fit) {
+    const Eigen::Matrix3d& c = circle.fit->conic;
+    json["conic"] = {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};
+  } else {
+    json["conic"] = nullptr;
+  }
+  json["coverage"] = pixel.coverage;
+  json["concentric"] = TextOrNull(circle.concentric);
+  json["plane"] = TextOrNull(circle.plane);
+  json["num_points"] = pixel.num_points;
+  return json;
+}
+
+Json PencilJson(const PencilObservation& pencil) {
+  Json json;
+  json["id"] = pencil.id;
+  json["direction"] = pencil.fit ? Array(pencil.fit->direction) : Json();
+  json["num_segments"] = pencil.lines.size();
+  if (pencil.fit) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(pencil.fit->covariance,
+                                                               Eigen::EigenvaluesOnly);
+    json["sigma_deg"] =
+        Number(std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) * kDegreesPerRadian);
+  } else {
+    json["sigma_deg"] = nullptr;
+  }
+  json["along"] = PencilDirectionName(pencil.direction);
+  json["plane"] = TextOrNull(pencil.plane);
+  return json;
+}
+
+}  // namespace
+
+const char* StatusText(const Status& status) {
+  if (status.ok()) return "ok";
+  return status.code == StatusCode::kRefused ? "refused" : "failed";
+}
+
+std::string ScaleText(const LossSetting& loss) {
+  return loss.scale_px > 0.0 ? FormatShort(loss.scale_px) : "auto";
+}
+
+std::string ResultLines(const ImageRun& image) {
+  std::string lines;
+  for (const SolverRun& run : image.solvers) {
+    if (!run.estimate.status.ok() || run.estimate.hypotheses.empty()) {
+      lines += Line(RefusalLine(image, run));
+      continue;
+    }
+    for (std::size_t i = 0; i < run.estimate.hypotheses.size(); ++i) {
+      lines += Line(HypothesisLine(image, run, i));
+    }
+  }
+  return lines;
+}
+
+std::string ObservationLine(const ImageRun& run) {
+  Json line;
+  line["image"] = run.image->name;
+  for (const char* key : {"ellipses", "segments", "pencils"}) line[key] = Json::array();
+  for (const CircleObservation& circle : run.observations.circles) {
+    line["ellipses"].push_back(EllipseJson(circle));
+  }
+  for (const PencilObservation& pencil : run.observations.pencils) {
+    for (const LineObservation& observed : pencil.lines) {
+      const Segment s = EndPoints(observed);
+      line["segments"].push_back({s[0].x(), s[0].y(), s[1].x(), s[1].y(), pencil.id});
+    }
+    line["pencils"].push_back(PencilJson(pencil));
+  }
+  line["problems"] = run.problems;
+  if (!run.read_error.empty()) line["error"] = run.read_error;
+  return Line(line);
+}
+
+std::string TimingLines(const ImageRun& run) {
+  std::string lines;
+  const auto whole = [](double microseconds) { return static_cast<long long>(microseconds + 0.5); };
+  for (const auto& [stage, microseconds] : run.stages) {
+    Json line;
+    line["image"] = run.image->name;
+    line["stage"] = stage;
+    line["microseconds"] = whole(microseconds);
+    lines += Line(line);
+  }
+  for (const SolverRun& solver : run.solvers) {
+    Json line;
+    line["image"] = run.image->name;
+    line["solver"] = solver.solver;
+    line["stage"] = SolverStageName(solver.stage);
+    line["loss"] = solver.loss == nullptr ? Json() : Json(solver.loss->loss);
+    line["loss_scale_px"] = solver.loss == nullptr ? Json() : ScaleJson(solver.loss->scale_px);
+    line["microseconds"] = whole(solver.microseconds);
+    lines += Line(line);
+  }
+  return lines;
+}
+
+}  // namespace circline::apps

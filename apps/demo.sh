@@ -1,0 +1,65 @@
+#!/usr/bin/env bash
+# Shows circline on real photographs, on Debian 12: installs the packages that are missing, builds in
+# build/release, fetches the photographs (they come with two Debian packages) and runs
+# circline_compare on the three sets described in apps/demo/*.yaml. The results are in build/demo.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. cmake/setup.sh
+
+# find_folder <package> <folder>: sets `found` to where the package's folder is: in the system if the
+# package is installed with all of its files (minimal systems leave out documentation), else unpacked
+# below build/, so that half a gigabyte of documentation does not become part of the user's system.
+find_folder() {
+  local package=$1 folder=$2 unpacked=build/demo/packages/$1
+  found=$folder
+  [ ! -d "$found" ] || return 0
+  found=$unpacked$folder
+  [ ! -d "$found" ] || return 0
+  say "fetching the photographs of the Debian package $package"
+  rm -rf "$unpacked"
+  mkdir -p "$unpacked"
+  quietly "$unpacked.log" download "$package" "$unpacked"
+  dpkg-deb --fsys-tarfile "$unpacked"/*.deb | tar -x -C "$unpacked" ".$folder"
+  rm "$unpacked"/*.deb
+  [ -d "$found" ] || fail "the package $package has no folder $folder"
+}
+
+# download <package> <folder>; a fresh system has no package lists yet.
+download() {
+  (cd "$2" && apt-get -q download "$1") || { apt update && (cd "$2" && apt-get -q download "$1"); }
+}
+
+# compare <set> <folder>: copies the photographs that the scene file names next to a copy of it, so
+# that build/demo/<set> can be opened, changed and run again by hand.
+compare() {
+  local set=$1 folder=$2 dir=build/demo/$1 file
+  mkdir -p "$dir"
+  cp "apps/demo/$set.yaml" "$dir/scene.yaml"
+  sed -nE 's/.*file: "([^"]+)".*/\1/p' "$dir/scene.yaml" | while read -r file; do
+    if [ -f "$folder/$file" ]; then
+      cp "$folder/$file" "$dir/$file"
+    elif [ -f "$folder/$file.gz" ]; then
+      gunzip -c "$folder/$file.gz" > "$dir/$file"
+    else
+      fail "no $file in $folder"
+    fi
+  done
+  echo
+  say "$set: $(sed -n '3s/^# //p' "$dir/scene.yaml")"
+  build/release/bin/circline_compare --scene="$dir/scene.yaml" --output="$dir/out"
+}
+
+install_packages "${BUILD_PACKAGES[@]}"
+build release circline_compare
+
+find_folder opencv-doc /usr/share/doc/opencv-doc/examples/data
+compare chessboard "$found"
+find_folder visp-images-data /usr/share/visp-images-data/ViSP-images
+compare disc "$found/mire-2"
+compare dots "$found/calibration"
+
+echo
+say "the reports, with a picture of every photograph:"
+for set in chessboard disc dots; do
+  echo "  $PWD/build/demo/$set/out/report.html"
+done

@@ -1,0 +1,390 @@
+#include "circline/ransac/assemble_observations.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/conic.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kRadians = 3.14159265358979323846 / 180.0;
+
+// Errors of a direction or a normal that no covariance of edge points knows: calibration, surfaces
+// that are not quite plane, prints that are not quite round. Standard deviation, degrees.
+constexpr double kModelSigmaDeg = 0.5;
+// Agreement is believed up to this many standard deviations.
+constexpr double kMaxSigmas = 3.0;
+// Two directions count as orthogonal within 2.5 standard deviations plus a quarter of a degree, and
+// never beyond 1.25 degrees: real streets and walls are off by more, and a false right angle
+// biases.
+constexpr double kOrthogonalSigmas = 2.5;
+constexpr double kOrthogonalDeg = 0.25;
+constexpr double kMaxOrthogonalDeg = 1.25;
+// Two pencils span a plane if they are this far from parallel.
+constexpr double kMinSpanDeg = 15.0;
+// Lines nearer than this meet in a corner, pixels; those that meet no line of the other pencil
+// count this much of their length for the plane of both.
+constexpr double kJunctionPx = 10.0;
+constexpr double kAloneWeight = 0.2;
+// The rim of a circle that agrees with two pencils counts as much as this many times its length in
+// lines: it is rarer than a line, and fixes both directions.
+constexpr double kCircleWeight = 3.0;
+
+// Angle between two axes (no sense of sign) and its standard deviation.
+struct AngleTest {
+  double angle_deg = 0.0, sigma_deg = 0.0;
+};
+
+AngleTest Compare(const UncertainDirection& a, const UncertainDirection& b) {
+  const double sign = a.vector.dot(b.vector) < 0.0 ? -1.0 : 1.0;
+  const Vector3d difference = a.vector - sign * b.vector;
+  const double norm = difference.norm();
+  AngleTest test;
+  test.angle_deg = 2.0 * std::asin(std::min(1.0, 0.5 * norm)) / kRadians;
+  const Matrix3d covariance = a.covariance + b.covariance;
+  const double variance = norm > 1e-12 ? difference.dot(covariance * difference) / (norm * norm)
+                                       : 0.5 * covariance.trace();
+  test.sigma_deg = std::hypot(std::sqrt(std::max(0.0, variance)) / kRadians, kModelSigmaDeg);
+  return test;
+}
+
+// How far from 90 degrees.
+AngleTest CompareToRightAngle(const UncertainDirection& a, const UncertainDirection& b) {
+  AngleTest test;
+  test.angle_deg = std::asin(std::min(1.0, std::abs(a.vector.dot(b.vector)))) / kRadians;
+  const double variance =
+      a.vector.dot(b.covariance * a.vector) + b.vector.dot(a.covariance * b.vector);
+  test.sigma_deg = std::sqrt(std::max(0.0, variance)) / kRadians;
+  return test;
+}
+
+bool SamePlane(const UncertainDirection& a, const UncertainDirection& b, double max_deg) {
+  const AngleTest test = Compare(a, b);
+  return test.angle_deg <= std::min(max_deg, kMaxSigmas * test.sigma_deg);
+}
+
+bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal,
+             double max_deg) {
+  const AngleTest test = CompareToRightAngle(direction, normal);
+  return test.angle_deg <=
+         std::min(max_deg, kMaxSigmas * std::hypot(test.sigma_deg, kModelSigmaDeg));
+}
+
+bool Orthogonal(const UncertainDirection& a, const UncertainDirection& b) {
+  const AngleTest test = CompareToRightAngle(a, b);
+  return test.angle_deg <=
+         std::min(kMaxOrthogonalDeg, kOrthogonalSigmas * test.sigma_deg + kOrthogonalDeg);
+}
+
+// Normal of the plane that two directions span: first-order propagation through the normalised
+// cross product. False where they are too nearly parallel.
+bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
+                   UncertainDirection* normal) {
+  const Vector3d cross = a.vector.cross(b.vector);
+  const double sine = cross.norm();
+  if (sine < std::sin(kMinSpanDeg * kRadians)) return false;
+  normal->vector = cross / sine;
+  const Matrix3d tangent =
+      (Matrix3d::Identity() - normal->vector * normal->vector.transpose()) / sine;
+  Matrix3d cross_a, cross_b;
+  for (int k = 0; k < 3; ++k) {
+    cross_a.col(k) = a.vector.cross(Vector3d::Unit(k));
+    cross_b.col(k) = Vector3d::Unit(k).cross(b.vector);
+  }
+  const Matrix3d ja = tangent * cross_b, jb = tangent * cross_a;
+  normal->covariance = ja * a.covariance * ja.transpose() + jb * b.covariance * jb.transpose();
+  return true;
+}
+
+double PointSegmentDistance(const Vector2d& p, const Segment& s) {
+  const Vector2d d = s[1] - s[0];
+  const double t = std::clamp((p - s[0]).dot(d) / std::max(d.squaredNorm(), 1e-12), 0.0, 1.0);
+  return (p - s[0] - t * d).norm();
+}
+
+// 0 where they cross.
+double SegmentDistance(const Segment& s, const Segment& t) {
+  const auto side = [](const Segment& line, const Vector2d& p) {
+    const Vector2d d = line[1] - line[0], e = p - line[0];
+    return d.x() * e.y() - d.y() * e.x();
+  };
+  if (side(s, t[0]) * side(s, t[1]) < 0.0 && side(t, s[0]) * side(t, s[1]) < 0.0) return 0.0;
+  return std::min({PointSegmentDistance(s[0], t), PointSegmentDistance(s[1], t),
+                   PointSegmentDistance(t[0], s), PointSegmentDistance(t[1], s)});
+}
+
+// A pencil, and its direction as the tests take it.
+struct PlacedPencil : DetectedPencil {
+  PlacedPencil(DetectedPencil pencil, UncertainDirection d)
+      : DetectedPencil(std::move(pencil)), direction(std::move(d)) {}
+  UncertainDirection direction;
+};
+
+// A plane that some of the evidence agrees on.
+struct Plane {
+  UncertainDirection normal;
+  std::array<int, 2> pencils{-1, -1};  // That span it; -1: circles alone.
+  std::vector<int> circles;
+  double support_px = 0.0;
+};
+
+class Assembler {
+ public:
+  Assembler(const AssemblyOptions& options, std::vector<CircleEvidence>* circles,
+            std::vector<DetectedPencil>* pencils)
+      : options_(options), circles_(*circles) {
+    for (DetectedPencil& pencil : *pencils) {
+      const VanishingPointFit fit = *pencil.observation.fit;
+      const UncertainDirection direction{fit.direction, fit.covariance};
+      pencils_.emplace_back(std::move(pencil), direction);
+    }
+  }
+
+  void Assemble(Observations* observations) {
+    const Plane plane = ChoosePlane();
+    SetPlane(plane);
+    SetRoles(plane);
+    Emit(plane, observations);
+  }
+
+ private:
+  // Length of the lines of `a`, those that meet none of `b` at a reduced rate: two pencils of one
+  // plane cross or form corners, while a wall and a floor far apart do not.
+  static double JointSupport(const PlacedPencil& a, const PlacedPencil& b) {
+    double support = 0.0;
+    for (const Segment& s : a.ends) {
+      const bool meets = std::any_of(b.ends.begin(), b.ends.end(), [&s](const Segment& t) {
+        return SegmentDistance(s, t) < kJunctionPx;
+      });
+      support += (s[1] - s[0]).norm() * (meets ? 1.0 : kAloneWeight);
+    }
+    return support;
+  }
+
+  // The normal of a circle that agrees with the plane's, or null.
+  const UncertainDirection* AgreeingNormal(const CircleEvidence& circle,
+                                           const UncertainDirection& normal) const {
+    const UncertainDirection* nearest = nullptr;
+    double smallest = options_.max_shared_plane_deg;
+    for (int k = 0; k < circle.num_normals; ++k) {
+      const UncertainDirection& candidate = circle.normals[static_cast<std::size_t>(k)];
+      if (!SamePlane(candidate, normal, options_.max_shared_plane_deg)) continue;
+      const double angle = Compare(candidate, normal).angle_deg;
+      if (angle > smallest) continue;
+      smallest = angle;
+      nearest = &candidate;
+    }
+    return nearest;
+  }
+
+  void AddCircles(Plane* plane) const {
+    for (std::size_t i = 0; i < circles_.size(); ++i) {
+      if (AgreeingNormal(circles_[i], plane->normal) == nullptr) continue;
+      plane->circles.push_back(static_cast<int>(i));
+      plane->support_px += kCircleWeight * circles_[i].support_px;
+    }
+  }
+
+  // The plane of circles alone that starts from one circle's normal: the mean of all that agree,
+  // weighted by their accuracy, until no more join.
+  Plane GrowFrom(const UncertainDirection& seed) const {
+    Plane plane;
+    plane.normal = seed;
+    AddCircles(&plane);
+    constexpr int kPasses = 3;
+    for (int pass = 0; pass < kPasses && plane.circles.size() > 1; ++pass) {
+      Plane next;
+      next.normal = MeanNormal(plane);
+      AddCircles(&next);
+      if (next.support_px < plane.support_px) break;
+      plane = next;
+    }
+    return plane;
+  }
+
+  UncertainDirection MeanNormal(const Plane& plane) const {
+    const double model = kModelSigmaDeg * kRadians;
+    Vector3d sum = Vector3d::Zero();
+    Matrix3d information = Matrix3d::Zero();
+    const Matrix3d tangent =
+        Matrix3d::Identity() - plane.normal.vector * plane.normal.vector.transpose();
+    for (const int i : plane.circles) {
+      const UncertainDirection* n =
+          AgreeingNormal(circles_[static_cast<std::size_t>(i)], plane.normal);
+      // Regular across the tangent plane by the model's variance, along the normal by a nominal
+      // one.
+      const Matrix3d weight = (n->covariance + model * model * Matrix3d::Identity()).inverse();
+      const Matrix3d w = tangent * weight * tangent;
+      information += w;
+      sum += w * (n->vector - plane.normal.vector);
+    }
+    // Invertible: what is added acts along the normal only.
+    const Matrix3d normal_part = plane.normal.vector * plane.normal.vector.transpose();
+    const Matrix3d inverse = (information + information.trace() * normal_part).inverse();
+    UncertainDirection mean;
+    mean.vector = (plane.normal.vector + tangent * (inverse * sum)).normalized();
+    mean.covariance = tangent * inverse * tangent;
+    return mean;
+  }
+
+  // The plane with most support: of two pencils and the circles that agree, or of circles alone.
+  Plane ChoosePlane() const {
+    Plane best;
+    const auto consider = [&best](const Plane& plane) {
+      if (plane.support_px > best.support_px) best = plane;
+    };
+    for (std::size_t i = 0; i < pencils_.size(); ++i) {
+      for (std::size_t j = i + 1; j < pencils_.size(); ++j) {
+        Plane plane;
+        if (!SpannedNormal(pencils_[i].direction, pencils_[j].direction, &plane.normal)) continue;
+        plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
+        plane.support_px =
+            JointSupport(pencils_[i], pencils_[j]) + JointSupport(pencils_[j], pencils_[i]);
+        AddCircles(&plane);
+        consider(plane);
+      }
+    }
+    for (const CircleEvidence& circle : circles_) {
+      for (int k = 0; k < circle.num_normals; ++k) {
+        consider(GrowFrom(circle.normals[static_cast<std::size_t>(k)]));
+      }
+    }
+    return best;
+  }
+
+  void SetPlane(const Plane& plane) {
+    for (const int i : plane.circles)
+      circles_[static_cast<std::size_t>(i)].observation.plane = "p0";
+    if (plane.support_px <= 0.0) return;
+    for (PlacedPencil& pencil : pencils_) {
+      if (InPlane(pencil.direction, plane.normal, options_.max_shared_plane_deg)) {
+        pencil.observation.plane = "p0";
+      }
+    }
+    for (const int i : plane.pencils) {
+      if (i >= 0) pencils_[static_cast<std::size_t>(i)].observation.plane = "p0";
+    }
+  }
+
+  // The strongest pencil of the plane is the candidate for x, the strongest one orthogonal to it y.
+  void SetRoles(const Plane& plane) {
+    const std::vector<int> order = InPlaneOrder(plane);
+    for (std::size_t a = 0; a < order.size(); ++a) {
+      for (std::size_t b = a + 1; b < order.size(); ++b) {
+        PlacedPencil& x = pencils_[static_cast<std::size_t>(order[a])];
+        PlacedPencil& y = pencils_[static_cast<std::size_t>(order[b])];
+        if (!Orthogonal(x.direction, y.direction)) continue;
+        x.observation.direction = PencilDirection::kX;
+        y.observation.direction = PencilDirection::kY;
+        SetNormalRole(x.direction, y.direction);
+        return;
+      }
+    }
+  }
+
+  // Pencils of the plane: those that span it, then the others by support.
+  std::vector<int> InPlaneOrder(const Plane& plane) const {
+    std::vector<int> order;
+    for (const int i : plane.pencils) {
+      if (i >= 0) order.push_back(i);
+    }
+    for (std::size_t i = 0; i < pencils_.size(); ++i) {
+      const int k = static_cast<int>(i);
+      if (pencils_[i].observation.plane == "p0" &&
+          std::find(order.begin(), order.end(), k) == order.end()) {
+        order.push_back(k);
+      }
+    }
+    return order;
+  }
+
+  void SetNormalRole(const UncertainDirection& x, const UncertainDirection& y) {
+    for (PlacedPencil& pencil : pencils_) {
+      if (!pencil.observation.plane.empty()) continue;
+      if (!Orthogonal(pencil.direction, x) || !Orthogonal(pencil.direction, y)) continue;
+      pencil.observation.direction = PencilDirection::kZ;
+      return;
+    }
+  }
+
+  // Everything in its final order, with ids; pencils beyond max_pencils are left out.
+  void Emit(const Plane& plane, Observations* observations) {
+    const auto on_plane_first = [](const auto& a, const auto& b) {
+      return !a.observation.plane.empty() && b.observation.plane.empty();
+    };
+    std::stable_sort(circles_.begin(), circles_.end(), on_plane_first);
+    const auto rank = [](const PlacedPencil& p) {
+      const bool has_role = p.observation.direction != PencilDirection::kFree;
+      return std::make_pair(has_role ? 0 : 1, p.observation.plane.empty() ? 1 : 0);
+    };
+    std::stable_sort(
+        pencils_.begin(), pencils_.end(),
+        [&](const PlacedPencil& a, const PlacedPencil& b) { return rank(a) < rank(b); });
+    for (CircleEvidence& circle : circles_) {
+      circle.observation.id = "c" + std::to_string(observations->circles.size());
+      observations->circles.push_back(std::move(circle.observation));
+    }
+    for (PlacedPencil& pencil : pencils_) {
+      if (static_cast<int>(observations->pencils.size()) >= options_.max_pencils) break;
+      pencil.observation.id = "L" + std::to_string(observations->pencils.size());
+      observations->pencils.push_back(std::move(pencil.observation));
+    }
+    if (plane.support_px > 0.0) observations->frame.plane = "p0";
+  }
+
+  const AssemblyOptions& options_;
+  std::vector<CircleEvidence>& circles_;
+  std::vector<PlacedPencil> pencils_;
+};
+
+}  // namespace
+
+int CircleNormals(const ConicFit& fit, double inflation,
+                  std::array<UncertainDirection, 2>* normals) {
+  std::array<CirclePose, 2> poses;
+  const int count = CirclePoses(fit.conic, &poses);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(fit.Covariance());
+  for (int i = 0; i < count; ++i) {
+    UncertainDirection& normal = (*normals)[static_cast<std::size_t>(i)];
+    normal.vector = poses[static_cast<std::size_t>(i)].normal;
+    normal.covariance.setZero();
+    for (int k = 0; k < 6; ++k) {
+      // Steps of a tenth of a standard deviation: small enough to be linear.
+      constexpr double kStep = 0.1;
+      const double sigma = std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
+      const Vector6d moved = ConicToVector(fit.conic) + kStep * sigma * eigen.eigenvectors().col(k);
+      std::array<CirclePose, 2> moved_poses;
+      const int moved_count = CirclePoses(VectorToConic(moved), &moved_poses);
+      Vector3d change = Vector3d::Zero();
+      double nearest = std::numeric_limits<double>::infinity();
+      for (int j = 0; j < moved_count; ++j) {
+        const Vector3d d = moved_poses[static_cast<std::size_t>(j)].normal - normal.vector;
+        if (d.norm() < nearest) {
+          nearest = d.norm();
+          change = d / kStep;
+        }
+      }
+      normal.covariance += inflation * change * change.transpose();
+    }
+  }
+  return count;
+}
+
+void AssembleObservations(const AssemblyOptions& options, std::vector<CircleEvidence>* circles,
+                          std::vector<DetectedPencil>* pencils, Observations* observations) {
+  Assembler(options, circles, pencils).Assemble(observations);
+}
+
+}  // namespace circline

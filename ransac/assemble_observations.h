@@ -1,0 +1,47 @@
+// Which of the detected circles and pencils share a plane, and what the pencils are in its frame.
+#ifndef CIRCLINE_RANSAC_ASSEMBLE_OBSERVATIONS_H_
+#define CIRCLINE_RANSAC_ASSEMBLE_OBSERVATIONS_H_
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "circline/estimators/observations.h"
+#include "circline/ransac/detect_pencils.h"
+
+namespace circline {
+
+// A unit vector (a normal, or a pencil's direction) and its covariance, rank 2, rad^2.
+struct UncertainDirection {
+  Eigen::Vector3d vector = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+struct CircleEvidence {
+  CircleObservation observation;              // Points, sigma_px, fit; no id or plane yet.
+  std::array<UncertainDirection, 2> normals;  // That its plane can have; see CircleNormals.
+  int num_normals = 0;
+  double support_px = 0.0;  // Length of rim that edges support.
+};
+
+// The normals of the planes that a circle can lie in, with covariances: those of the conic's own
+// covariance times `inflation`, by differences. Returns how many: 0, 1 or 2.
+int CircleNormals(const ConicFit& fit, double inflation,
+                  std::array<UncertainDirection, 2>* normals);
+
+struct AssemblyOptions {
+  int max_pencils = 3;                // That are kept, those with a role first.
+  double max_shared_plane_deg = 5.0;  // Normals farther apart are never one plane.
+};
+
+// Chooses the plane with most support, "p0": that of two pencils and the circles that agree with
+// it, or of circles alone. Agreement is a test with the propagated covariances. Two pencils in it
+// that are orthogonal as far as can be told become x and y, a third orthogonal to both z; others
+// stay free. Appends circles ("c0", ...) and pencils ("L0", ...) to `observations`, those of the
+// plane first. `circles` and `pencils` are ordered by support; they are moved from.
+void AssembleObservations(const AssemblyOptions& options, std::vector<CircleEvidence>* circles,
+                          std::vector<DetectedPencil>* pencils, Observations* observations);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_ASSEMBLE_OBSERVATIONS_H_

@@ -1,0 +1,235 @@
+#include "circline/ransac/contour_support.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kPi = 3.14159265358979323846;
+
+// An edge point supports a contour if its gradient is within 25 degrees of the contour's normal.
+constexpr double kMinNormalCosine = 0.906;
+// Support must come in runs of this length, pixels (a tenth of the contour for small ellipses);
+// holes of up to kMaxHolePx do not interrupt a run.
+constexpr double kMinRunPx = 6.0;
+constexpr double kMaxHolePx = 2.5;
+constexpr double kFarPx = 1e6;
+
+// To the nearest integer, for values within 2 kFarPx of 0; a tenth of the time of std::lround.
+int Round(double x) { return static_cast<int>(x + (2e6 + 0.5)) - 2000000; }
+
+double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+}  // namespace
+
+bool Contour::Project(const Matrix3d& conic, double min_axis_px, double max_axis_px) {
+  if (!ConicToEllipse(conic, &ellipse_)) return false;
+  // Axes on the photo, from four points: good enough to bound sizes and to choose a spacing.
+  std::array<Vector2d, 4> ends;
+  for (int k = 0; k < 4; ++k) {
+    if (!PixelAt(0.5 * kPi * k, &ends[static_cast<std::size_t>(k)])) return false;
+  }
+  const double a = 0.5 * (ends[0] - ends[2]).norm(), b = 0.5 * (ends[1] - ends[3]).norm();
+  major_px_ = std::max(a, b);
+  minor_px_ = std::min(a, b);
+  return minor_px_ >= min_axis_px && major_px_ <= max_axis_px;
+}
+
+bool Contour::SampleEvery(double spacing_px, std::vector<ContourSample>* samples) const {
+  const double h = (major_px_ - minor_px_) / (major_px_ + minor_px_);
+  const double perimeter = kPi * (major_px_ + minor_px_) * (1.0 + 0.25 * h * h);  // Ramanujan, cut.
+  return SampleCount(std::clamp(static_cast<int>(perimeter / spacing_px), 16, 20000), samples);
+}
+
+bool Contour::SampleCount(int n, std::vector<ContourSample>* samples) const {
+  samples->resize(static_cast<std::size_t>(n));
+  const double cosine = std::cos(ellipse_.angle), sine = std::sin(ellipse_.angle);
+  const Vector2d major = ellipse_.a * Vector2d(cosine, sine),
+                 minor = ellipse_.b * Vector2d(-sine, cosine);
+  // The anomaly advances by rotation: its rounding error is far below a pixel for any n here.
+  const double step_c = std::cos(2.0 * kPi / n), step_s = std::sin(2.0 * kPi / n);
+  Vector2d anomaly(1.0, 0.0);
+  for (int k = 0; k < n; ++k) {
+    const Vector2d x = ellipse_.center + anomaly.x() * major + anomaly.y() * minor;
+    Vector2d* pixel = &(*samples)[static_cast<std::size_t>(k)].pixel;
+    if (!CameraToPixel(camera_, Vector3d(x.x(), x.y(), 1.0), pixel)) return false;
+    // Beyond what Round() takes: no part of a photo.
+    if (!(pixel->cwiseAbs().maxCoeff() < kFarPx)) *pixel = Vector2d(-kFarPx, -kFarPx);
+    anomaly = Vector2d(step_c * anomaly.x() - step_s * anomaly.y(),
+                       step_s * anomaly.x() + step_c * anomaly.y());
+  }
+  for (int k = 0; k < n; ++k) {
+    const auto before = static_cast<std::size_t>((k + n - 1) % n);
+    const auto after = static_cast<std::size_t>((k + 1) % n);
+    const Vector2d along = (*samples)[after].pixel - (*samples)[before].pixel;
+    ContourSample& s = (*samples)[static_cast<std::size_t>(k)];
+    const double length = along.norm();
+    s.length = 0.5 * length;
+    // The anomaly runs from +x towards +y, so that outward is on its right (y down).
+    s.normal =
+        length > 0.0 ? Vector2d(along.y() / length, -along.x() / length) : Vector2d(1.0, 0.0);
+  }
+  for (int k = 0; k < n; ++k) {
+    const Vector2d& before = (*samples)[static_cast<std::size_t>((k + n - 1) % n)].normal;
+    const Vector2d& after = (*samples)[static_cast<std::size_t>((k + 1) % n)].normal;
+    // Twice the sine is close enough to the angle for steps of a few degrees.
+    (*samples)[static_cast<std::size_t>(k)].turn = 0.5 * std::abs(Cross(before, after));
+  }
+  return true;
+}
+
+bool Contour::PixelAt(double t, Vector2d* pixel) const {
+  const Vector2d x = EllipsePoint(ellipse_, t);
+  return CameraToPixel(camera_, Vector3d(x.x(), x.y(), 1.0), pixel);
+}
+
+void Supporter::Take(const std::vector<int>& points) {
+  for (const int i : points) taken_[static_cast<std::size_t>(i)] = 1;
+}
+
+double Supporter::QuickShare(const std::vector<ContourSample>& samples, bool bright_inside,
+                             double reach) const {
+  int found = 0;
+  for (const ContourSample& s : samples) found += Nearest(s, bright_inside, reach) >= 0 ? 1 : 0;
+  return static_cast<double>(found) / static_cast<double>(samples.size());
+}
+
+void Supporter::Collect(const std::vector<ContourSample>& samples, bool bright_inside, double reach,
+                        Support* support) {
+  const std::size_t n = samples.size();
+  nearest_.resize(n);
+  for (std::size_t k = 0; k < n; ++k) nearest_[k] = Nearest(samples[k], bright_inside, reach);
+  FindRuns(samples);
+  *support = Support();
+  int last = -1;
+  sines_.clear();
+  for (std::size_t k = 0; k < n; ++k) {
+    support->perimeter_px += samples[k].length;
+    if (!in_run_[k]) continue;
+    support->length_px += samples[k].length;
+    support->turn += samples[k].turn;
+    const int i = nearest_[k];
+    if (i < 0 || i == last) continue;
+    const double sine = Cross(samples[k].normal, map_.points[static_cast<std::size_t>(i)].Normal());
+    sines_.push_back(std::abs(sine));
+    support->points.push_back(i);
+    last = i;
+  }
+  support->normal_median = Median(&sines_);
+  Unique(&support->points);
+  AverageStrength(support);
+}
+
+// The free edge point nearest to the contour at a sample, with the right direction, or -1.
+int Supporter::Nearest(const ContourSample& s, bool bright_inside, double reach) const {
+  const double side = bright_inside ? -1.0 : 1.0;  // The gradient points inward or outward.
+  const int steps = static_cast<int>(std::ceil(reach));
+  int best = -1;
+  double best_distance = reach;
+  for (int step = -steps; step <= steps; ++step) {
+    const int x = Round(s.pixel.x() + step * s.normal.x());
+    const int y = Round(s.pixel.y() + step * s.normal.y());
+    const int i = map_.PointAt(x, y);
+    if (i < 0 || taken_[static_cast<std::size_t>(i)]) continue;
+    const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
+    if (side * s.normal.dot(p.Normal()) < kMinNormalCosine) continue;
+    const double d = std::abs(s.normal.dot(p.Position() - s.pixel));
+    if (d < best_distance) {
+      best_distance = d;
+      best = i;
+    }
+  }
+  return best;
+}
+
+void Supporter::AverageStrength(Support* support) const {
+  if (support->points.empty()) return;
+  double variance = 0.0;
+  for (const int i : support->points) {
+    const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
+    support->gradient += static_cast<double>(p.gradient);
+    variance += static_cast<double>(p.sigma_px * p.sigma_px);
+  }
+  const double n = static_cast<double>(support->points.size());
+  support->gradient /= n;
+  support->sigma_px = std::sqrt(variance / n);
+}
+
+// in_run_[k]: sample k lies in a supported run that is long enough, small holes closed.
+void Supporter::FindRuns(const std::vector<ContourSample>& samples) {
+  const std::size_t n = samples.size();
+  in_run_.assign(n, 0);
+  double perimeter = 0.0;
+  for (const ContourSample& s : samples) perimeter += s.length;
+  const double min_run = std::min(kMinRunPx, 0.1 * perimeter);
+  const std::size_t start = BehindHole(samples);
+  if (start == n) {
+    in_run_.assign(n, 1);
+    return;
+  }
+  std::size_t run_begin = 0, run_end = 0;  // Offsets from start; the run found so far.
+  double run = 0.0;
+  double hole = std::numeric_limits<double>::infinity();
+  const auto close = [&] {
+    for (std::size_t j = run_begin; run >= min_run && j < run_end; ++j)
+      in_run_[(start + j) % n] = 1;
+  };
+  for (std::size_t j = 0; j < n; ++j) {
+    const ContourSample& s = samples[(start + j) % n];
+    if (nearest_[(start + j) % n] < 0) {
+      hole += s.length;
+      continue;
+    }
+    if (hole > kMaxHolePx) {
+      close();
+      run_begin = j;
+      run = 0.0;
+    } else {
+      run += hole;
+    }
+    run += s.length;
+    run_end = j + 1;
+    hole = 0.0;
+  }
+  close();
+}
+
+// Where to start, so that no run is cut by the start of the contour; n if there is no hole.
+std::size_t Supporter::BehindHole(const std::vector<ContourSample>& samples) const {
+  const std::size_t n = samples.size();
+  double hole = 0.0;
+  for (std::size_t k = 0; k < 2 * n; ++k) {
+    hole = nearest_[k % n] >= 0 ? 0.0 : hole + samples[k % n].length;
+    if (hole > kMaxHolePx) return k % n;
+  }
+  return n;
+}
+
+// Removes repetitions, keeps the order.
+void Supporter::Unique(std::vector<int>* points) {
+  stamp_.resize(map_.points.size(), 0);
+  ++now_;
+  const auto seen = [this](int i) {
+    std::uint32_t& stamp = stamp_[static_cast<std::size_t>(i)];
+    if (stamp == now_) return true;
+    stamp = now_;
+    return false;
+  };
+  points->erase(std::remove_if(points->begin(), points->end(), seen), points->end());
+}
+
+double Median(std::vector<double>* values) {
+  if (values->empty()) return 0.0;
+  const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
+  std::nth_element(values->begin(), middle, values->end());
+  return *middle;
+}
+
+}  // namespace circline

@@ -1,0 +1,101 @@
+// What edges there are along the image of an ellipse.
+#ifndef CIRCLINE_RANSAC_CONTOUR_SUPPORT_H_
+#define CIRCLINE_RANSAC_CONTOUR_SUPPORT_H_
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "circline/estimators/camera.h"
+#include "circline/estimators/conic.h"
+#include "circline/ransac/edges.h"
+
+namespace circline {
+
+struct ContourSample {
+  Eigen::Vector2d pixel, normal;  // On the photo; outward, unit.
+  double length = 0.0;            // Of the contour that it stands for, pixels.
+  double turn = 0.0;              // Of the normal over that length, radians.
+};
+
+// The image of a calibrated ellipse on the photo, whatever the lens makes of it.
+class Contour {
+ public:
+  // `camera` must outlive the contour.
+  explicit Contour(const Camera& camera) : camera_(camera) {}
+
+  // False where the conic is no ellipse, parts of it cannot be projected, or it is too small
+  // (semi-minor axis) or too large (semi-major axis).
+  bool Project(const Eigen::Matrix3d& conic, double min_axis_px, double max_axis_px);
+
+  // The following require Project. False where parts of the contour cannot be projected. Samples
+  // are evenly spaced in the eccentric anomaly.
+  bool SampleEvery(double spacing_px, std::vector<ContourSample>* samples) const;
+  bool SampleCount(int n, std::vector<ContourSample>* samples) const;
+
+  double major_px() const { return major_px_; }  // Semi-axes on the photo, approximate.
+  double minor_px() const { return minor_px_; }
+
+ private:
+  bool PixelAt(double t, Eigen::Vector2d* pixel) const;
+
+  const Camera& camera_;
+  Ellipse ellipse_;
+  double major_px_ = 0.0, minor_px_ = 0.0;
+};
+
+struct Support {
+  std::vector<int> points;  // Of the edge map, once around.
+  double perimeter_px = 0.0;
+  double length_px = 0.0;      // Of the parts of the contour that edges support.
+  double turn = 0.0;           // Of the contour over those parts, radians.
+  double normal_median = 0.0;  // Angle between the gradients and the contour's normal, radians.
+  double gradient = 0.0;       // Mean over the points, grey levels per pixel.
+  double sigma_px = 0.0;       // Of the points, expected from the noise alone.
+
+  // Share of the contour.
+  double Coverage() const { return perimeter_px > 0.0 ? length_px / perimeter_px : 0.0; }
+};
+
+// Finds the edge points along a sampled contour, and keeps book of which are already taken.
+class Supporter {
+ public:
+  // `map` must outlive the supporter.
+  explicit Supporter(const EdgeMap& map) : map_(map), taken_(map.points.size(), 0) {}
+
+  // Marks points as belonging to an accepted ellipse: they support no other.
+  void Take(const std::vector<int>& points);
+  bool IsTaken(int i) const { return taken_[static_cast<std::size_t>(i)] != 0; }
+
+  // Share of samples with a free edge point within `reach` pixels whose gradient is across the
+  // contour, inward where it is bright inside.
+  double QuickShare(const std::vector<ContourSample>& samples, bool bright_inside,
+                    double reach) const;
+
+  // Those points, as far as they come in runs.
+  void Collect(const std::vector<ContourSample>& samples, bool bright_inside, double reach,
+               Support* support);
+
+ private:
+  int Nearest(const ContourSample& s, bool bright_inside, double reach) const;
+  void FindRuns(const std::vector<ContourSample>& samples);
+  std::size_t BehindHole(const std::vector<ContourSample>& samples) const;
+  void AverageStrength(Support* support) const;
+  void Unique(std::vector<int>* points);
+
+  const EdgeMap& map_;
+  std::vector<std::uint8_t> taken_;
+  // Scratch: for each sample its point or -1, and whether it lies in a run.
+  std::vector<int> nearest_;
+  std::vector<std::uint8_t> in_run_;
+  std::vector<double> sines_;
+  std::vector<std::uint32_t> stamp_;
+  std::uint32_t now_ = 0;
+};
+
+// Reorders; 0 for none.
+double Median(std::vector<double>* values);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_CONTOUR_SUPPORT_H_

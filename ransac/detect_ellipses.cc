@@ -1,0 +1,488 @@
+#include "circline/ransac/detect_ellipses.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/conic.h"
+#include "circline/ransac/arcs.h"
+#include "circline/ransac/contour_support.h"
+
+namespace circline {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// An arc alone determines an ellipse from this turn on.
+constexpr double kMinSingleTurn = 50.0 * kPi / 180.0;
+// Arcs that take part in pairs: the most bent and longest ones. Bounds the quadratic step.
+constexpr std::size_t kMaxPairedArcs = 256;
+constexpr std::size_t kMaxPairCandidates = 1500;
+// Points that a candidate is fitted to, of each arc.
+constexpr int kFitPoints = 24;
+// An arc fits its candidate when the root-mean-square distance stays below this, pixels.
+constexpr double kMaxArcRmsPx = 1.0;
+// ... and on this share of its points the gradient is within 15 degrees of the contour's normal.
+constexpr double kArcNormalCosine = 0.966;
+constexpr double kArcAgreement = 0.85;
+// Edge points support a contour within this distance, pixels: at first, and after refits.
+constexpr std::array<double, 3> kGatherPx = {2.5, 2.0, 1.5};
+// A first look at this many samples drops candidates with less than this share of support.
+constexpr int kQuickSamples = 40;
+constexpr double kQuickShare = 0.2;
+// Before the first refit, this share of the smallest arc must be there.
+constexpr double kEarlyShare = 0.7;
+// Share of random contour samples that find an edge point in place and direction by accident, in a
+// busy photo: edge points on a tenth of the pixels, 3 of them looked at, 50 of 360 degrees.
+constexpr double kChance = 0.08;
+// Neighbouring edge points are not independent: one in this many pixels is.
+constexpr double kIndependentPx = 3.0;
+// Candidates that are tried, as the number of tests of the false-alarm count.
+constexpr double kLog10Tests = 6.0;
+// Blobs and rounded rectangles resemble ellipses; what tells them apart is how closely edge points
+// keep to the contour and gradients to its normal. The two are measured in units of these limits
+// and must not exceed kShapeLimit each, nor 2 together. (Values chosen on renderings and
+// photographs.)
+//
+// Root-mean-square distance, pixels: a constant, plus a share of what the noise explains (up to a
+// limit), plus an allowance for long contours, which no blob follows so closely, but real rims do
+// not follow exactly either; all of it less for a partial contour, more for a full one.
+constexpr double kShapeRmsPx = 0.15;
+constexpr double kShapeRmsPerSigma = 0.3;
+constexpr double kShapeMaxSigmaPx = 0.5;
+constexpr double kShapeRmsPerPx = 5e-4;
+constexpr double kShapeRmsPerCoverage = 0.8;
+constexpr double kShapeUsualCoverage = 0.7;
+// Median angle between gradient and normal, degrees: a constant, plus a share of the noise's, plus
+// an allowance for long contours.
+constexpr double kShapeNormalDeg = 3.0;
+constexpr double kShapeNormalPerNoise = 0.5;
+constexpr double kShapeNormalPerPx = 2e-3;
+constexpr double kShapeLimit = 1.4;
+// While a candidate is still being refined, it may miss the limits by this factor.
+constexpr double kShapeSlack = 1.5;
+// A candidate with this much of its contour is accepted before pairs are looked at.
+constexpr double kSureCoverage = 0.7;
+// Largest ellipse, in diagonals of the photo.
+constexpr double kMaxAxisDiagonals = 2.0;
+// Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
+constexpr double kDuplicatePx = 2.5;
+// Points beyond this many standard deviations take no part in the final fit.
+constexpr double kOutlierSigmas = 3.0;
+// No contour is known better than this, whatever its scatter says.
+constexpr double kMinSigmaPx = 0.05;
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+double ToDegrees(double radians) { return radians * 180.0 / kPi; }
+
+// ------------------------------------------------------------------------------------ calibration
+
+// Edge points in calibrated coordinates, computed once and only where needed.
+class CalibratedEdges {
+ public:
+  CalibratedEdges(const EdgeMap& map, const Camera& camera)
+      : map_(map), camera_(camera), points_(map.points.size()), state_(map.points.size(), 0) {}
+
+  // Null where the camera cannot undistort the point.
+  const CalibratedPoint* Get(int i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (state_[k] == 0) {
+      state_[k] = PixelToCalibrated(camera_, map_.points[k].Position(), &points_[k]) ? 1 : 2;
+    }
+    return state_[k] == 1 ? &points_[k] : nullptr;
+  }
+
+ private:
+  const EdgeMap& map_;
+  const Camera& camera_;
+  std::vector<CalibratedPoint> points_;
+  std::vector<std::uint8_t> state_;
+};
+
+// --------------------------------------------------------------------------------------- detector
+
+// Logarithm (base 10) of the upper tail of the binomial distribution by Hoeffding's bound in its
+// Chernoff form: k of n successes or more at probability p.
+double Log10BinomialTail(double n, double k, double p) {
+  const double q = k / n;
+  if (q <= p) return 0.0;
+  if (q >= 1.0) return n * std::log10(p);
+  return -n * (q * std::log10(q / p) + (1.0 - q) * std::log10((1.0 - q) / (1.0 - p)));
+}
+
+struct Candidate {
+  Matrix3d conic = Matrix3d::Zero();
+  bool bright_inside = false;
+  double score = 0.0;
+};
+
+class EllipseDetector {
+ public:
+  EllipseDetector(const EdgeMap& map, const Camera& camera, const EllipseOptions& options)
+      : map_(map),
+        options_(options),
+        calibrated_(map, camera),
+        contour_(camera),
+        supporter_(map),
+        max_axis_px_(kMaxAxisDiagonals * std::hypot(map.width, map.height)) {}
+
+  std::vector<DetectedEllipse> Detect() {
+    arcs_ = FindArcs(map_);
+    // Whole contours first: they need no partner, and what they explain need not be looked at
+    // again. (By index: arcs are split, and the parts appended, as they are looked at.)
+    for (std::size_t k = 0; k < arcs_.size(); ++k) {
+      const Arc arc = arcs_[k];
+      if (arc.turn >= kMinSingleTurn && !AddCandidate({&arc})) Split(k);
+    }
+    AcceptBest(kSureCoverage);
+    AddPairs();
+    AcceptBest(0.0);
+    Rank();
+    return std::move(accepted_);
+  }
+
+ private:
+  // Fits an ellipse to the arcs and keeps it for later if edges elsewhere support it too. False if
+  // the arcs themselves are not on one ellipse.
+  bool AddCandidate(std::initializer_list<const Arc*> arcs) {
+    fit_points_.clear();
+    fit_indices_.clear();
+    for (const Arc* arc : arcs) AppendPoints(*arc);
+    Candidate candidate;
+    candidate.bright_inside = (*arcs.begin())->bright_inside;
+    if (!FitConicDirect(fit_points_, &candidate.conic).ok()) return false;
+    if (Rms(candidate.conic) > kMaxArcRmsPx || !GradientsAgree(candidate)) return false;
+    if (Improve(&candidate)) candidates_.push_back(candidate);
+    return true;
+  }
+
+  // Replaces an arc that is no ellipse's by its parts on either side of its sharpest point.
+  void Split(std::size_t k) {
+    const std::vector<Arc> parts = SplitArc(map_, arcs_[k]);
+    arcs_[k].turn = 0.0;  // Takes no further part.
+    arcs_.insert(arcs_.end(), parts.begin(), parts.end());
+  }
+
+  void AppendPoints(const Arc& arc) {
+    const int n = std::min(arc.size(), kFitPoints);
+    for (int k = 0; k < n; ++k) {
+      const int i = arc.begin + static_cast<int>((static_cast<long>(k) * (arc.size() - 1)) /
+                                                 std::max(n - 1, 1));
+      const CalibratedPoint* p = calibrated_.Get(i);
+      if (p == nullptr) continue;
+      fit_points_.push_back(*p);
+      fit_indices_.push_back(i);
+    }
+  }
+
+  // Whether the gradients on the arcs are across the contour that was fitted to their places: a
+  // second opinion that costs little and is independent of the first.
+  bool GradientsAgree(const Candidate& candidate) const {
+    const double side = candidate.bright_inside ? -1.0 : 1.0;
+    std::size_t agree = 0;
+    for (std::size_t k = 0; k < fit_points_.size(); ++k) {
+      const CalibratedPoint& p = fit_points_[k];
+      const Vector3d g = candidate.conic * p.Homogeneous();
+      const Vector2d outward = p.GradientPerPixel(g.head<2>());
+      const EdgePoint& edge = map_.points[static_cast<std::size_t>(fit_indices_[k])];
+      agree += side * outward.dot(edge.Normal()) > kArcNormalCosine * outward.norm() ? 1U : 0U;
+    }
+    return static_cast<double>(agree) >= kArcAgreement * static_cast<double>(fit_points_.size());
+  }
+
+  double Rms(const Matrix3d& conic) const {
+    double sum = 0.0;
+    for (const CalibratedPoint& p : fit_points_) {
+      const double d = ConicDistancePx(p, conic);
+      sum += d * d;
+    }
+    return std::sqrt(sum / static_cast<double>(fit_points_.size()));
+  }
+
+  // Refits a candidate to the points along its contour; false if there are too few.
+  bool Improve(Candidate* candidate) {
+    if (!contour_.Project(candidate->conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
+    if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
+    if (supporter_.QuickShare(samples_, candidate->bright_inside, kGatherPx[0]) < kQuickShare) {
+      return false;
+    }
+    for (std::size_t round = 0; round + 1 < kGatherPx.size(); ++round) {
+      if (!Gather(*candidate, 1.5, kGatherPx[round])) return false;
+      if (360.0 * support_.Coverage() < kEarlyShare * options_.min_arc_deg) return false;
+      CalibrateSupport(80);
+      if (!FitConicDirect(fit_points_, &candidate->conic).ok()) return false;
+    }
+    if (!Gather(*candidate, 1.5, kGatherPx.back())) return false;
+    candidate->score = support_.length_px * support_.Coverage();
+    CalibrateSupport(80);
+    return Plausible() && IsShaped(Rms(candidate->conic), kShapeSlack);
+  }
+
+  // Whether the edges follow the contour as those of an ellipse do.
+  bool IsShaped(double rms_px, double slack) const {
+    const double coverage = std::min(support_.Coverage(), support_.turn / (2.0 * kPi));
+    const double rms_unit =
+        (kShapeRmsPx + kShapeRmsPerSigma * std::min(support_.sigma_px, kShapeMaxSigmaPx) +
+         kShapeRmsPerPx * support_.length_px) *
+        (1.0 + kShapeRmsPerCoverage * (coverage - kShapeUsualCoverage));
+    const double noise_deg = ToDegrees(map_.gradient_noise / std::max(support_.gradient, 1e-9));
+    const double normal_unit =
+        kShapeNormalDeg + kShapeNormalPerNoise * noise_deg + kShapeNormalPerPx * support_.length_px;
+    const double rms = rms_px / rms_unit;
+    const double normal = ToDegrees(support_.normal_median) / normal_unit;
+    return rms_px <= slack * options_.max_rms_px && std::max(rms, normal) <= slack * kShapeLimit &&
+           rms + normal <= 2.0 * slack;
+  }
+
+  bool Gather(const Candidate& candidate, double spacing, double reach) {
+    if (!contour_.Project(candidate.conic, 0.7 * options_.min_axis_px, max_axis_px_)) return false;
+    if (!contour_.SampleEvery(spacing, &samples_)) return false;
+    supporter_.Collect(samples_, candidate.bright_inside, reach, &support_);
+    return support_.points.size() >= 6;
+  }
+
+  // The calibrated support, or about `limit` points of it, evenly.
+  void CalibrateSupport(std::size_t limit) {
+    fit_points_.clear();
+    const std::size_t n = support_.points.size(), m = std::min(n, limit);
+    for (std::size_t k = 0; k < m; ++k) {
+      const CalibratedPoint* p = calibrated_.Get(support_.points[k * n / m]);
+      if (p != nullptr) fit_points_.push_back(*p);
+    }
+  }
+
+  // Enough of the contour, and more than chance explains.
+  bool Plausible() const {
+    if (support_.Coverage() * 360.0 < options_.min_arc_deg) return false;
+    if (ToDegrees(support_.turn) < options_.min_arc_deg) return false;
+    const double n = support_.perimeter_px / kIndependentPx;
+    return kLog10Tests + Log10BinomialTail(n, n * support_.Coverage(), kChance) <=
+           options_.max_log10_false_alarms;
+  }
+
+  void AddPairs() {
+    std::vector<const Arc*> arcs;
+    for (const Arc& arc : arcs_) {
+      if (arc.turn > 0.0 && !Explained(arc)) arcs.push_back(&arc);
+    }
+    const auto weight = [](const Arc* a) { return a->turn * a->size(); };
+    std::stable_sort(arcs.begin(), arcs.end(),
+                     [&](const Arc* a, const Arc* b) { return weight(a) > weight(b); });
+    if (arcs.size() > kMaxPairedArcs) arcs.resize(kMaxPairedArcs);
+    std::size_t tried = 0;
+    // In order of the weaker of the two, so that the limit cuts the least promising pairs.
+    for (std::size_t j = 1; j < arcs.size(); ++j) {
+      for (std::size_t i = 0; i < j && tried < kMaxPairCandidates; ++i) {
+        if (!CanShareEllipse(*arcs[i], *arcs[j])) continue;
+        ++tried;
+        AddCandidate({arcs[i], arcs[j]});
+      }
+    }
+  }
+
+  // Whether accepted ellipses took most of the arc.
+  bool Explained(const Arc& arc) const {
+    int taken = 0;
+    for (int i = arc.begin; i < arc.end; ++i) taken += supporter_.IsTaken(i) ? 1 : 0;
+    return 2 * taken > arc.size();
+  }
+
+  // Accepts candidates with at least `min_coverage`, best first; the others wait.
+  void AcceptBest(double min_coverage) {
+    std::stable_sort(candidates_.begin(), candidates_.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+    std::vector<Candidate> waiting;
+    for (Candidate& candidate : candidates_) {
+      // Points taken meanwhile no longer count.
+      if (!Gather(candidate, 1.5, kGatherPx.back()) || !Plausible()) continue;
+      if (support_.Coverage() < min_coverage) {
+        waiting.push_back(candidate);
+      } else {
+        Accept(candidate);
+      }
+    }
+    candidates_ = std::move(waiting);
+  }
+
+  void Accept(Candidate candidate) {
+    DetectedEllipse e;
+    if (!FinalFit(&candidate, &e)) return;
+    e.bright_inside = candidate.bright_inside;
+    if (IsDuplicate(e)) return;
+    supporter_.Take(support_.points);  // What the wider gathering finds belongs to it as well.
+    supporter_.Take(e.points);
+    accepted_.push_back(std::move(e));
+  }
+
+  // Maximum likelihood on all points of the contour, outliers left out, twice.
+  bool FinalFit(Candidate* candidate, DetectedEllipse* e) {
+    double reach = kGatherPx.back();
+    for (int round = 0; round < 3; ++round) {
+      if (!Gather(*candidate, 0.7, reach)) return false;
+      if (!FitSupport(candidate->conic, e)) return false;
+      candidate->conic = e->fit.conic;
+      reach = std::clamp(4.0 * e->sigma_px, 0.8, kGatherPx.back());
+    }
+    if (!Plausible() || !IsShaped(e->fit.rms_px, 1.0)) return false;
+    if (contour_.minor_px() < options_.min_axis_px) return false;
+    e->coverage_deg = 360.0 * support_.Coverage();
+    e->length_px = support_.length_px;
+    e->turn_deg = ToDegrees(support_.turn);
+    e->normal_deg = ToDegrees(support_.normal_median);
+    e->contrast = support_.gradient;
+    Gather(*candidate, 0.7, kGatherPx[1]);
+    return true;
+  }
+
+  bool FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
+    e->points.clear();
+    fit_points_.clear();
+    for (const int i : support_.points) {
+      const CalibratedPoint* p = calibrated_.Get(i);
+      if (p == nullptr) continue;
+      e->points.push_back(i);
+      fit_points_.push_back(*p);
+    }
+    if (fit_points_.size() < 6) return false;
+    if (!RefineConic(fit_points_, 1.0, initial, &e->fit).ok()) return false;
+    DropOutliers(e);
+    if (fit_points_.size() < 6) return false;
+    e->sigma_px = kMinSigmaPx;
+    const Matrix3d conic = e->fit.conic;
+    if (!RefineConic(fit_points_, e->sigma_px, conic, &e->fit).ok()) return false;
+    // Degrees of freedom: five go into the ellipse.
+    const double n = static_cast<double>(fit_points_.size());
+    e->sigma_px = std::max(kMinSigmaPx, e->fit.rms_px * std::sqrt(n / (n - 5.0)));
+    const double scale = e->sigma_px / kMinSigmaPx;
+    for (double& c : e->fit.covariance) c *= scale * scale;
+    return true;
+  }
+
+  void DropOutliers(DetectedEllipse* e) {
+    distances_.clear();
+    for (const CalibratedPoint& p : fit_points_) {
+      distances_.push_back(std::abs(ConicDistancePx(p, e->fit.conic)));
+    }
+    sorted_ = distances_;
+    // 1.4826: median absolute deviation to standard deviation of a Gaussian.
+    const double limit = kOutlierSigmas * std::max(kMinSigmaPx, 1.4826 * Median(&sorted_));
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < distances_.size(); ++k) {
+      if (distances_[k] > limit) continue;
+      fit_points_[kept] = fit_points_[k];
+      e->points[kept++] = e->points[k];
+    }
+    fit_points_.resize(kept);
+    e->points.resize(kept);
+  }
+
+  // The same contour found again from other points.
+  bool IsDuplicate(const DetectedEllipse& e) {
+    for (const DetectedEllipse& other : accepted_) {
+      if (other.bright_inside != e.bright_inside) continue;
+      double worst = 0.0;
+      for (std::size_t k = 0; k < e.points.size(); k += 1 + e.points.size() / 16) {
+        const CalibratedPoint& p = *calibrated_.Get(e.points[k]);
+        worst = std::max(worst, std::abs(ConicDistancePx(p, other.fit.conic)));
+      }
+      if (worst < kDuplicatePx) return true;
+    }
+    return false;
+  }
+
+  void Rank() {
+    std::stable_sort(accepted_.begin(), accepted_.end(),
+                     [](const DetectedEllipse& a, const DetectedEllipse& b) {
+                       return a.length_px * a.coverage_deg > b.length_px * b.coverage_deg;
+                     });
+    if (accepted_.size() > static_cast<std::size_t>(options_.max_ellipses)) {
+      accepted_.resize(static_cast<std::size_t>(options_.max_ellipses));
+    }
+  }
+
+  const EdgeMap& map_;
+  const EllipseOptions& options_;
+  CalibratedEdges calibrated_;
+  Contour contour_;
+  Supporter supporter_;
+  const double max_axis_px_;
+  std::vector<Arc> arcs_;
+  std::vector<Candidate> candidates_;
+  std::vector<DetectedEllipse> accepted_;
+  // Scratch.
+  std::vector<CalibratedPoint> fit_points_;
+  std::vector<int> fit_indices_;
+  std::vector<ContourSample> samples_;
+  Support support_;
+  std::vector<double> distances_, sorted_;
+};
+
+// ------------------------------------------------------------------------------------- concentric
+
+// Images of the centres that the two poses of an ellipse put there, and their normals.
+bool CanBeConcentric(const DetectedEllipse& a, const DetectedEllipse& b, const Camera& camera) {
+  // Both centres within this many pixels. The centre of a well-seen rim is good to a tenth of one.
+  constexpr double kMaxCentrePx = 1.5;
+  constexpr double kMinNormalCosineConcentric = 0.966;  // 15 degrees: normals are less certain.
+  std::array<CirclePose, 2> pa, pb;
+  const int na = CirclePoses(a.fit.conic, &pa), nb = CirclePoses(b.fit.conic, &pb);
+  for (int i = 0; i < na; ++i) {
+    for (int j = 0; j < nb; ++j) {
+      const CirclePose& p = pa[static_cast<std::size_t>(i)];
+      const CirclePose& q = pb[static_cast<std::size_t>(j)];
+      if (p.normal.dot(q.normal) < kMinNormalCosineConcentric) continue;
+      Vector2d u, v;
+      if (!CameraToPixel(camera, p.center, &u) || !CameraToPixel(camera, q.center, &v)) continue;
+      if ((u - v).norm() < kMaxCentrePx) return true;
+    }
+  }
+  return false;
+}
+
+// Numbers the groups in the order of their best members.
+void GroupConcentric(const Camera& camera, std::vector<DetectedEllipse>* ellipses) {
+  int groups = 0;
+  for (std::size_t i = 0; i < ellipses->size(); ++i) {
+    DetectedEllipse& a = (*ellipses)[i];
+    for (std::size_t j = i + 1; j < ellipses->size(); ++j) {
+      DetectedEllipse& b = (*ellipses)[j];
+      if (b.concentric >= 0 || !CanBeConcentric(a, b, camera)) continue;
+      if (a.concentric < 0) a.concentric = groups++;
+      b.concentric = a.concentric;
+    }
+  }
+}
+
+}  // namespace
+
+Status EllipseOptions::Validate() const {
+  if (!(min_axis_px > 0.0)) return Status::Invalid("min_axis_px must be positive");
+  if (!(min_arc_deg > 0.0 && min_arc_deg <= 360.0)) {
+    return Status::Invalid("min_arc_deg must be in (0, 360]");
+  }
+  if (max_ellipses < 0) return Status::Invalid("max_ellipses must not be negative");
+  if (!(max_rms_px > 0.0)) return Status::Invalid("max_rms_px must be positive");
+  return Status::Ok();
+}
+
+Status DetectEllipses(const EdgeMap& edges, const Camera& camera, const EllipseOptions& options,
+                      std::vector<DetectedEllipse>* ellipses) {
+  ellipses->clear();
+  Status status = options.Validate();
+  if (status.ok()) status = camera.Validate();
+  if (!status.ok()) return status;
+  if (options.max_ellipses == 0) return Status::Ok();
+  *ellipses = EllipseDetector(edges, camera, options).Detect();
+  GroupConcentric(camera, ellipses);
+  return Status::Ok();
+}
+
+}  // namespace circline

@@ -1,0 +1,396 @@
+#include "circline/ransac/detect_lines.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace circline {
+namespace {
+
+// A piece starts from this many consecutive points on one line, and has at least this length:
+// below, any smooth curve passes for straight.
+constexpr int kSeedPoints = 9;
+constexpr double kMinPiecePx = 10.0;
+// So many points in a row off the line end a piece; fewer are noise.
+constexpr int kMaxMisses = 2;
+// Pieces are joined if the gap between them is not longer than the shorter of the two, nor than
+// this many pixels; an overlap up to kMaxOverlapPx is what rounded corners and crossings cause.
+constexpr double kMaxGapPx = 100.0;
+constexpr double kMaxOverlapPx = 3.0;
+// A joined piece must lie within max_distance_px plus this many standard deviations of the
+// extrapolated line, but never more than kMaxJoinPx off.
+constexpr double kJoinSigmas = 2.0;
+constexpr double kMaxJoinPx = 1.5;
+// Standard deviation of one edge point in that extrapolation, pixels.
+constexpr double kPointSigmaPx = 0.3;
+// Averaged points are not trusted beyond this: lenses and edges are not straight to better.
+constexpr double kMinSigmaPx = 0.1;
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// Sums of calibrated points, about a shift near them so that nothing cancels.
+class Moments {
+ public:
+  explicit Moments(const Vector2d& shift = Vector2d::Zero()) : shift_(shift) {}
+
+  void Add(const Vector2d& point) {
+    const Vector2d p = point - shift_;
+    ++n_;
+    sum_ += p;
+    xx_ += p.x() * p.x();
+    xy_ += p.x() * p.y();
+    yy_ += p.y() * p.y();
+  }
+
+  int count() const { return n_; }
+  Vector2d Mean() const { return shift_ + sum_ / n_; }
+
+  // Total least squares line, unit normal; its direction to `along`.
+  Vector3d Line(Vector2d* along) const {
+    const Vector2d mean = sum_ / n_;
+    const double a = xx_ / n_ - mean.x() * mean.x();
+    const double b = xy_ / n_ - mean.x() * mean.y();
+    const double c = yy_ / n_ - mean.y() * mean.y();
+    const double angle = 0.5 * std::atan2(2.0 * b, a - c);
+    *along = Vector2d(std::cos(angle), std::sin(angle));
+    const Vector2d normal(-along->y(), along->x());
+    return {normal.x(), normal.y(), -normal.dot(mean + shift_)};
+  }
+
+ private:
+  Vector2d shift_;
+  int n_ = 0;
+  Vector2d sum_ = Vector2d::Zero();
+  double xx_ = 0.0, xy_ = 0.0, yy_ = 0.0;
+};
+
+// A run of edge points on one line.
+struct Piece {
+  int begin = 0, end = 0;       // Points of the map (all usable, in order).
+  Vector3d line;                // Calibrated; unit normal.
+  Vector2d along;               // Its direction.
+  double from = 0.0, to = 0.0;  // Positions of its ends along it, calibrated.
+  double length_px = 0.0;
+  Vector2d first_px, last_px;
+};
+
+// A line being joined from pieces.
+struct Joined {
+  std::vector<int> pieces;
+  Moments moments;
+  Vector3d line;
+  Vector2d along;
+  // The parts that the pieces cover, along the line.
+  std::vector<std::array<double, 2>> covered;
+};
+
+class LineDetector {
+ public:
+  LineDetector(const EdgeMap& map, const Camera& camera, const LineOptions& options,
+               const std::vector<std::uint8_t>* skip)
+      : map_(map), options_(options), points_(map.points.size()), usable_(map.points.size(), 0) {
+    for (std::size_t i = 0; i < map.points.size(); ++i) {
+      if (skip != nullptr && (*skip)[i]) continue;
+      usable_[i] = PixelToCalibrated(camera, map.points[i].Position(), &points_[i]) ? 1 : 0;
+    }
+  }
+
+  std::vector<DetectedLine> Detect() {
+    for (const EdgeChain& chain : map_.chains) CutChain(chain);
+    std::stable_sort(pieces_.begin(), pieces_.end(),
+                     [](const Piece& a, const Piece& b) { return a.length_px > b.length_px; });
+    JoinPieces();
+    std::stable_sort(
+        lines_.begin(), lines_.end(),
+        [](const DetectedLine& a, const DetectedLine& b) { return a.length_px > b.length_px; });
+    if (lines_.size() > static_cast<std::size_t>(options_.max_lines)) {
+      lines_.resize(static_cast<std::size_t>(options_.max_lines));
+    }
+    return std::move(lines_);
+  }
+
+ private:
+  const CalibratedPoint& X(int i) const { return points_[static_cast<std::size_t>(i)]; }
+  Vector2d Pixel(int i) const { return map_.points[static_cast<std::size_t>(i)].Position(); }
+  bool Usable(int i) const { return usable_[static_cast<std::size_t>(i)] != 0; }
+  double Distance(int i, const Vector3d& line) const {
+    return std::abs(LineDistancePx(X(i), line));
+  }
+
+  // Greedily, from the first point on: seed, grow, go on behind.
+  void CutChain(const EdgeChain& chain) {
+    int i = chain.begin;
+    while (i + kSeedPoints <= chain.end) {
+      Piece piece;
+      if (!Seed(i, &piece)) {
+        i += 2;
+        continue;
+      }
+      Grow(chain, &piece);
+      Keep(&piece);
+      i = piece.end;
+    }
+  }
+
+  bool Seed(int begin, Piece* piece) {
+    moments_ = Moments(X(begin).x);
+    for (int i = begin; i < begin + kSeedPoints; ++i) {
+      if (!Usable(i)) return false;
+      moments_.Add(X(i).x);
+    }
+    piece->begin = begin;
+    piece->end = begin + kSeedPoints;
+    piece->line = moments_.Line(&piece->along);
+    for (int i = piece->begin; i < piece->end; ++i) {
+      // Seeds are stricter than growth: they carry no average yet.
+      if (Distance(i, piece->line) > 0.75 * options_.max_distance_px) return false;
+    }
+    return true;
+  }
+
+  void Grow(const EdgeChain& chain, Piece* piece) {
+    int misses = 0, refit_at = kSeedPoints + 2;
+    for (int i = piece->end; i < chain.end && Usable(i) && misses <= kMaxMisses; ++i) {
+      if (Distance(i, piece->line) > options_.max_distance_px) {
+        ++misses;
+        continue;
+      }
+      misses = 0;
+      moments_.Add(X(i).x);
+      piece->end = i + 1;
+      if (moments_.count() < refit_at) continue;
+      piece->line = moments_.Line(&piece->along);
+      refit_at = moments_.count() + std::max(2, moments_.count() / 8);
+    }
+    piece->line = moments_.Line(&piece->along);
+  }
+
+  void Keep(Piece* piece) {
+    piece->first_px = Pixel(piece->begin);
+    piece->last_px = Pixel(piece->end - 1);
+    piece->length_px = (piece->last_px - piece->first_px).norm();
+    if (piece->length_px < kMinPiecePx || !IsStraight(*piece)) return;
+    SetRange(piece->along, *piece, &piece->from, &piece->to);
+    pieces_.push_back(*piece);
+  }
+
+  // Where a piece lies along a line.
+  void SetRange(const Vector2d& along, const Piece& piece, double* from, double* to) const {
+    const double a = along.dot(X(piece.begin).x), b = along.dot(X(piece.end - 1).x);
+    *from = std::min(a, b);
+    *to = std::max(a, b);
+  }
+
+  // The middle half of the points on one side of the line and the ends on the other is a curve.
+  bool IsStraight(const Piece& piece) const {
+    const int n = piece.end - piece.begin;
+    double middle = 0.0, ends = 0.0;
+    int num_middle = 0, num_ends = 0;
+    for (int k = 0; k < n; ++k) {
+      const double d = LineDistancePx(X(piece.begin + k), piece.line);
+      if (std::abs(d) > options_.max_distance_px) continue;
+      if (4 * k >= n && 4 * k < 3 * n) {
+        middle += d;
+        ++num_middle;
+      } else {
+        ends += d;
+        ++num_ends;
+      }
+    }
+    if (num_middle == 0 || num_ends == 0) return false;
+    // For a parabola the two means differ by half its sagitta.
+    return 2.0 * std::abs(middle / num_middle - ends / num_ends) <= options_.max_sagitta_px;
+  }
+
+  void JoinPieces() {
+    std::vector<std::uint8_t> used(pieces_.size(), 0);
+    for (std::size_t k = 0; k < pieces_.size(); ++k) {
+      if (used[k]) continue;
+      used[k] = 1;
+      Joined joined = Start(static_cast<int>(k));
+      // Joining one piece makes the line longer and may bring the next one within reach.
+      bool again = true;
+      while (again) {
+        again = false;
+        for (std::size_t j = k + 1; j < pieces_.size(); ++j) {
+          if (used[j] || !Continues(joined, pieces_[j])) continue;
+          used[j] = 1;
+          again = true;
+          Append(static_cast<int>(j), &joined);
+        }
+      }
+      Finish(joined);
+    }
+  }
+
+  Joined Start(int piece) const {
+    const Piece& p = pieces_[static_cast<std::size_t>(piece)];
+    Joined joined;
+    joined.pieces = {piece};
+    joined.moments = Moments(X(p.begin).x);
+    AddPoints(p, &joined.moments);
+    joined.line = joined.moments.Line(&joined.along);
+    joined.covered = {{p.from, p.to}};
+    return joined;
+  }
+
+  void AddPoints(const Piece& p, Moments* moments) const {
+    for (int i = p.begin; i < p.end; ++i) {
+      if (Distance(i, p.line) <= options_.max_distance_px) moments->Add(X(i).x);
+    }
+  }
+
+  void Append(int piece, Joined* joined) const {
+    joined->pieces.push_back(piece);
+    AddPoints(pieces_[static_cast<std::size_t>(piece)], &joined->moments);
+    joined->line = joined->moments.Line(&joined->along);
+    joined->covered.clear();
+    for (const int i : joined->pieces) {
+      std::array<double, 2> range;
+      SetRange(joined->along, pieces_[static_cast<std::size_t>(i)], &range[0], &range[1]);
+      joined->covered.push_back(range);
+    }
+  }
+
+  bool Continues(const Joined& joined, const Piece& p) const {
+    // Cheap first: the middle of a piece that continues the line lies near it.
+    const CalibratedPoint& first = X(p.begin);
+    const CalibratedPoint& last = X(p.end - 1);
+    if (std::abs(LineDistancePx(first, joined.line)) > kMaxJoinPx) return false;
+    if (std::abs(LineDistancePx(last, joined.line)) > kMaxJoinPx) return false;
+    double from, to;
+    SetRange(joined.along, p, &from, &to);
+    double gap = std::numeric_limits<double>::infinity(), length = 0.0;
+    for (const std::array<double, 2>& c : joined.covered) {
+      gap = std::min(gap, std::max(from - c[1], c[0] - to));
+      length = std::max(length, c[1] - c[0]);
+    }
+    // Calibrated lengths to pixels by the piece's own scale.
+    const double px = p.length_px / std::max(to - from, 1e-12);
+    length *= px;
+    gap *= px;
+    if (gap < -kMaxOverlapPx) return false;
+    if (gap > std::min({p.length_px, length, kMaxGapPx})) return false;
+    return NearExtrapolation(joined, p, length, gap + p.length_px);
+  }
+
+  // Both ends within the uncertainty of the line extrapolated from `length` over `beyond` pixels.
+  bool NearExtrapolation(const Joined& joined, const Piece& p, double length, double beyond) const {
+    const double n = std::max(2, joined.moments.count());
+    const double u = (0.5 * length + beyond) / std::max(length, 1.0);
+    const double sigma = kPointSigmaPx * std::sqrt((1.0 + 12.0 * u * u) / n);
+    const double limit = std::min(kMaxJoinPx, 0.5 * options_.max_distance_px + kJoinSigmas * sigma);
+    return std::abs(LineDistancePx(X(p.begin), joined.line)) <= limit &&
+           std::abs(LineDistancePx(X(p.end - 1), joined.line)) <= limit;
+  }
+
+  void Finish(const Joined& joined) {
+    DetectedLine line;
+    averages_.clear();
+    for (const int k : joined.pieces) {
+      const Piece& p = pieces_[static_cast<std::size_t>(k)];
+      line.length_px += p.length_px;
+      AppendAverages(p, joined.line, &line.points);
+    }
+    if (line.length_px < options_.min_length_px || line.points.size() < 2) return;
+    SortAlong(joined, &line);
+    calibrated_.clear();
+    for (const auto& [position, i] : order_)
+      calibrated_.push_back(averages_[static_cast<std::size_t>(i)]);
+    if (!FitLine(calibrated_, 1.0, &line.fit).ok()) return;
+    const double n = static_cast<double>(calibrated_.size());
+    const double spread = n > 2.0 ? line.fit.rms_px * std::sqrt(n / (n - 2.0)) : 0.0;
+    line.sigma_px = std::max(kMinSigmaPx, spread);
+    line.fit.covariance *= line.sigma_px * line.sigma_px;
+    SetEnds(joined, &line);
+    lines_.push_back(std::move(line));
+  }
+
+  // Means of the points of a piece over point_spacing_px, in pixels and calibrated (averages_).
+  void AppendAverages(const Piece& p, const Vector3d& line, std::vector<Vector2d>* points) {
+    const int bins = std::max(2, static_cast<int>(p.length_px / options_.point_spacing_px));
+    const int n = p.end - p.begin;
+    for (int k = 0; k < bins; ++k) {
+      Vector2d pixel = Vector2d::Zero(), x = Vector2d::Zero();
+      int count = 0;
+      const int begin = p.begin + k * n / bins, end = p.begin + (k + 1) * n / bins;
+      for (int i = begin; i < end; ++i) {
+        if (Distance(i, line) > kMaxJoinPx) continue;
+        pixel += Pixel(i);
+        x += X(i).x;
+        ++count;
+      }
+      if (count == 0) continue;
+      points->push_back(pixel / count);
+      CalibratedPoint average = X((begin + end) / 2);
+      average.x = x / count;
+      averages_.push_back(average);
+    }
+  }
+
+  void SortAlong(const Joined& joined, DetectedLine* line) {
+    order_.clear();
+    for (std::size_t i = 0; i < averages_.size(); ++i) {
+      order_.push_back({joined.along.dot(averages_[i].x), static_cast<int>(i)});
+    }
+    std::sort(order_.begin(), order_.end());
+    std::vector<Vector2d> sorted;
+    for (const auto& [position, i] : order_)
+      sorted.push_back(line->points[static_cast<std::size_t>(i)]);
+    line->points = std::move(sorted);
+  }
+
+  void SetEnds(const Joined& joined, DetectedLine* line) const {
+    double from = std::numeric_limits<double>::infinity(), to = -from;
+    for (const int k : joined.pieces) {
+      const Piece& p = pieces_[static_cast<std::size_t>(k)];
+      for (const int i : {p.begin, p.end - 1}) {
+        const double s = joined.along.dot(X(i).x);
+        if (s < from) {
+          from = s;
+          line->ends[0] = Pixel(i);
+        }
+        if (s > to) {
+          to = s;
+          line->ends[1] = Pixel(i);
+        }
+      }
+    }
+  }
+
+  const EdgeMap& map_;
+  const LineOptions& options_;
+  std::vector<CalibratedPoint> points_;
+  std::vector<std::uint8_t> usable_;
+  std::vector<Piece> pieces_;
+  std::vector<DetectedLine> lines_;
+  // Scratch.
+  Moments moments_;
+  std::vector<CalibratedPoint> averages_, calibrated_;
+  std::vector<std::pair<double, int>> order_;
+};
+
+}  // namespace
+
+Status LineOptions::Validate() const {
+  if (!(min_length_px > 0.0)) return Status::Invalid("min_length_px must be positive");
+  if (max_lines < 0) return Status::Invalid("max_lines must not be negative");
+  if (!(max_distance_px > 0.0)) return Status::Invalid("max_distance_px must be positive");
+  if (!(max_sagitta_px > 0.0)) return Status::Invalid("max_sagitta_px must be positive");
+  if (!(point_spacing_px > 0.0)) return Status::Invalid("point_spacing_px must be positive");
+  return Status::Ok();
+}
+
+Status DetectLines(const EdgeMap& edges, const Camera& camera, const LineOptions& options,
+                   std::vector<DetectedLine>* lines, const std::vector<std::uint8_t>* skip) {
+  lines->clear();
+  Status status = options.Validate();
+  if (status.ok()) status = camera.Validate();
+  if (!status.ok()) return status;
+  *lines = LineDetector(edges, camera, options, skip).Detect();
+  return Status::Ok();
+}
+
+}  // namespace circline

@@ -1,0 +1,116 @@
+#include "apps/common/camera_file.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "tests/apps/test_files.h"
+
+namespace circline::apps {
+namespace {
+
+std::vector<Camera> Read(const std::string& content) {
+  const TestFolder folder;
+  std::vector<Camera> cameras;
+  const Status status = ReadCameraFile(folder.Write("camera", content), &cameras);
+  EXPECT_TRUE(status.ok()) << status.message;
+  return cameras;
+}
+
+std::string ErrorOf(const std::string& content) {
+  const TestFolder folder;
+  std::vector<Camera> cameras;
+  const Status status = ReadCameraFile(folder.Write("camera", content), &cameras);
+  EXPECT_FALSE(status.ok());
+  EXPECT_TRUE(cameras.empty());
+  EXPECT_CONTAINS(status.message, folder / "camera");
+  return status.message;
+}
+
+const char kCalibration[] = R"(%YAML:1.0
+---
+calibration_time: "Mon"
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 500.5, 0., 320., 0., 501., 240., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 5
+   cols: 1
+   dt: d
+   data: [ -0.2, 0.1, 1e-3, -2e-3, 0.05 ]
+)";
+
+TEST(CameraFile, ReadsAnOpenCvCalibration) {
+  const std::vector<Camera> cameras = Read(kCalibration);
+  ASSERT_EQ(cameras.size(), 1U);
+  EXPECT_EQ(cameras[0].model, CameraModel::kOpenCV);
+  EXPECT_EQ(cameras[0].width, 640);
+  EXPECT_EQ(cameras[0].height, 480);
+  EXPECT_EQ(cameras[0].fx, 500.5);
+  EXPECT_EQ(cameras[0].cy, 240.0);
+  EXPECT_EQ(cameras[0].distortion, (std::array<double, 8>{-0.2, 0.1, 1e-3, -2e-3, 0.05, 0, 0, 0}));
+}
+
+TEST(CameraFile, ReadsAFisheyeCalibration) {
+  const std::vector<Camera> cameras = Read(
+      "fisheye_model: 1\ncamera_matrix: [300, 0, 320, 0, 300, 240, 0, 0, 1]\n"
+      "distortion_coefficients: [0.1, 0.2, 0.3, 0.4]\n");
+  ASSERT_EQ(cameras.size(), 1U);
+  EXPECT_EQ(cameras[0].model, CameraModel::kFisheye);
+  EXPECT_EQ(cameras[0].distortion[3], 0.4);
+}
+
+TEST(CameraFile, ReadsColmapCamerasWithTheirPixelCentres) {
+  const std::vector<Camera> cameras = Read(
+      "# Camera list with one line of data per camera:\n"
+      "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
+      "1 SIMPLE_PINHOLE 640 480 500 320.5 240.5\n"
+      "2 PINHOLE 640 480 500 501 320.5 240.5\n"
+      "3 SIMPLE_RADIAL 640 480 500 320.5 240.5 0.1\n"
+      "4 RADIAL 640 480 500 320.5 240.5 0.1 0.2\n"
+      "5 OPENCV 640 480 500 501 320.5 240.5 0.1 0.2 0.3 0.4\n"
+      "6 FULL_OPENCV 640 480 500 501 320.5 240.5 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8\n"
+      "7 OPENCV_FISHEYE 640 480 500 501 320.5 240.5 0.1 0.2 0.3 0.4\n");
+  ASSERT_EQ(cameras.size(), 7U);
+  const std::vector<CameraModel> models = {
+      CameraModel::kPinhole, CameraModel::kPinhole, CameraModel::kOpenCV, CameraModel::kOpenCV,
+      CameraModel::kOpenCV,  CameraModel::kOpenCV,  CameraModel::kFisheye};
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    EXPECT_EQ(cameras[i].id, std::to_string(i + 1));
+    EXPECT_EQ(cameras[i].model, models[i]);
+    EXPECT_EQ(cameras[i].fx, 500.0);
+    EXPECT_EQ(cameras[i].fy, i == 1 || i > 3 ? 501.0 : 500.0);
+    EXPECT_EQ(cameras[i].cx, 320.0);
+    EXPECT_EQ(cameras[i].cy, 240.0);
+  }
+  EXPECT_EQ(cameras[2].distortion[0], 0.1);
+  EXPECT_EQ(cameras[3].distortion[1], 0.2);
+  EXPECT_EQ(cameras[4].distortion[3], 0.4);
+  EXPECT_EQ(cameras[5].distortion[7], 0.8);
+  EXPECT_EQ(cameras[6].distortion[2], 0.3);
+}
+
+TEST(CameraFile, NamesWhatIsWrong) {
+  EXPECT_CONTAINS(ErrorOf("image_width: 640\ncamera_matrx: [1]\n"), "neither");
+  EXPECT_CONTAINS(ErrorOf("%YAML:1.0\n---\nimage_width: 640\n"),
+                  "'camera_matrix' is missing: a camera needs its focal length");
+  EXPECT_CONTAINS(ErrorOf("%YAML:1.0\n---\ncamera_matrix: [0, 0, 320, 0, 0, 240, 0, 0, 1]\n"),
+                  "camera_matrix: focal lengths");
+  EXPECT_CONTAINS(ErrorOf("1 SIMPLE_PINHOLE 640 480 500 320\n"),
+                  "line 1: SIMPLE_PINHOLE has 3 parameters");
+  EXPECT_CONTAINS(ErrorOf("\n1 FOV 640 480 500 500 320 240 0.1\n"), "line 2: camera model 'FOV'");
+  EXPECT_CONTAINS(ErrorOf("1 SIMPLE_PINHOLE 640 480 -500 320 240\n"), "line 1: ");
+  EXPECT_CONTAINS(ErrorOf("1 SIMPLE_PINHOLE 640 480 x 320 240\n"), "'x' is no number");
+  EXPECT_CONTAINS(ErrorOf("1 SIMPLE_PINHOLE 640 480 5 3 2\n1 SIMPLE_PINHOLE 640 480 5 3 2\n"),
+                  "twice");
+  EXPECT_CONTAINS(ErrorOf("# nothing\n"), "has no camera");
+  std::vector<Camera> cameras;
+  EXPECT_CONTAINS(ReadCameraFile("/nonexistent", &cameras).message, "cannot be opened");
+}
+
+}  // namespace
+}  // namespace circline::apps

@@ -1,0 +1,469 @@
+#include "circline/ransac/detect_observations.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/line_pose.h"
+#include "tests/ransac/detection_test_util.h"
+
+namespace circline {
+namespace {
+
+using detection_test::AxisDeg;
+using detection_test::DataFolder;
+using detection_test::Develop;
+using detection_test::DistortedCamera;
+using detection_test::FisheyeCamera;
+using detection_test::HasSet;
+using detection_test::kDegrees;
+using detection_test::kPi;
+using detection_test::LookAt;
+using detection_test::Noise;
+using detection_test::Render;
+using detection_test::RenderPlane;
+using detection_test::TestCamera;
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+Observations Detect(const cv::Mat& image, const Camera& camera,
+                    const DetectionOptions& options = {}) {
+  Observations found;
+  const Status status = DetectObservations(image, camera, options, &found);
+  EXPECT_TRUE(status.ok()) << status.message;
+  const Status valid = found.Validate();
+  EXPECT_TRUE(valid.ok()) << valid.message;
+  return found;
+}
+
+double Checker(double x, double y, double half_width, double half_height) {
+  if (std::abs(x) > half_width || std::abs(y) > half_height) return 220.0;
+  const int i = static_cast<int>(std::floor(x)), j = static_cast<int>(std::floor(y));
+  return (i + j) % 2 == 0 ? 30.0 : 220.0;
+}
+
+// The x and y directions of the pencils with these roles; false where they are not both there.
+bool Axes(const Observations& found, Vector3d* x, Vector3d* y) {
+  bool has_x = false, has_y = false;
+  for (const PencilObservation& pencil : found.pencils) {
+    if (!pencil.fit) continue;
+    if (pencil.direction == PencilDirection::kX) {
+      *x = pencil.fit->direction;
+      has_x = true;
+    }
+    if (pencil.direction == PencilDirection::kY) {
+      *y = pencil.fit->direction;
+      has_y = true;
+    }
+  }
+  return has_x && has_y;
+}
+
+// Largest angle of the two directions to the nearest board axis (each to its own).
+double AxesErrorDeg(const Vector3d& x, const Vector3d& y, const Matrix3d& rotation) {
+  const Vector3d r1 = rotation.col(0), r2 = rotation.col(1);
+  return std::min(std::max(AxisDeg(x, r1), AxisDeg(y, r2)),
+                  std::max(AxisDeg(x, r2), AxisDeg(y, r1)));
+}
+
+double BetterNormalDeg(const CircleObservation& circle, const Vector3d& normal) {
+  std::array<CirclePose, 2> poses;
+  const int n = CirclePoses(circle.fit->conic, &poses);
+  double best = 180.0;
+  for (int k = 0; k < n; ++k) {
+    best = std::min(best, AxisDeg(poses[static_cast<std::size_t>(k)].normal, normal));
+  }
+  return best;
+}
+
+TEST(DetectObservations, ABoardGivesItsAxesThroughEveryLens) {
+  for (const Camera& camera : {TestCamera(), DistortedCamera(), FisheyeCamera()}) {
+    const CameraPose pose = LookAt(30.0, -15.0, 12.0, camera.fx > 300.0 ? 12.0 : 5.5);
+    const cv::Mat image =
+        Develop(RenderPlane(camera, pose, 220.0,
+                            [](double x, double y) { return Checker(x, y, 4.0, 3.0); }),
+                0.7, 2.0);
+    const Observations found = Detect(image, camera);
+    Vector3d x, y;
+    ASSERT_TRUE(Axes(found, &x, &y)) << camera.fx;
+    EXPECT_LT(AxesErrorDeg(x, y, pose.rotation), 0.15) << camera.fx;
+    EXPECT_EQ(found.frame.plane, "p0");
+    ASSERT_GE(found.pencils.size(), 2U);
+    EXPECT_EQ(found.pencils[0].id, "L0");
+    EXPECT_EQ(found.pencils[0].plane, "p0");
+    EXPECT_EQ(found.pencils[1].plane, "p0");
+    EXPECT_GT(found.pencils[0].sigma_px, 0.0);
+    for (const LineObservation& line : found.pencils[0].lines) {
+      EXPECT_GE(line.points.size(), 2U);
+      EXPECT_TRUE(line.fit.has_value());
+    }
+    EXPECT_TRUE(found.circles.empty());
+    EXPECT_TRUE(found.message.empty()) << found.message;
+  }
+}
+
+TEST(DetectObservations, DirectionsThatAreNotOrthogonalStayFree) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(30.0, -15.0, 12.0, 12.0);
+  for (const double degrees : {88.0, 80.0, 60.0}) {
+    const double s = std::cos(degrees / kDegrees), c = std::sin(degrees / kDegrees);
+    const cv::Mat image = Develop(RenderPlane(camera, pose, 220.0, [=](double x, double y) {
+      return Checker(x - y * s / c, y / c, 4.0, 3.0);  // Rows along x, columns along (s, c).
+    }));
+    const Observations found = Detect(image, camera);
+    ASSERT_GE(found.pencils.size(), 2U);
+    const Vector3d skew = s * pose.rotation.col(0) + c * pose.rotation.col(1);
+    for (int k = 0; k < 2; ++k) {
+      const PencilObservation& pencil = found.pencils[static_cast<std::size_t>(k)];
+      EXPECT_EQ(pencil.direction, PencilDirection::kFree) << degrees;
+      EXPECT_EQ(pencil.plane, "p0");
+      const double error = std::min(AxisDeg(pencil.fit->direction, pose.rotation.col(0)),
+                                    AxisDeg(pencil.fit->direction, skew));
+      EXPECT_LT(error, 0.2) << degrees;
+    }
+  }
+}
+
+TEST(DetectObservations, CirclesJoinThePlaneTheyLieIn) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(40.0, -10.0, 8.0, 12.0);
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 220.0,
+                                            [](double x, double y) {
+                                              if (x > 0.6)
+                                                return std::hypot(x - 2.5, y) < 1.5 ? 40.0 : 220.0;
+                                              return Checker(x + 2.0, y, 2.0, 2.0);
+                                            }),
+                                0.7, 1.0);
+  const Observations found = Detect(image, camera);
+  Vector3d x, y;
+  ASSERT_TRUE(Axes(found, &x, &y));
+  EXPECT_LT(AxesErrorDeg(x, y, pose.rotation), 0.3);
+  ASSERT_EQ(found.circles.size(), 1U);
+  EXPECT_EQ(found.circles[0].id, "c0");
+  EXPECT_EQ(found.circles[0].plane, "p0");
+  EXPECT_GT(found.circles[0].sigma_px, 0.0);
+  EXPECT_LT(BetterNormalDeg(found.circles[0], pose.rotation.col(2)), 0.5);
+}
+
+TEST(DetectObservations, ACircleOfAnotherPlaneStaysOut) {
+  // The board in the left half of the photo, a disc on a plane 50 degrees to it in the right half.
+  const Camera camera = TestCamera();
+  CameraPose board = LookAt(40.0, 0.0, 5.0, 12.0), disc = LookAt(-10.0, 40.0, 0.0, 12.0);
+  board.translation.x() = -2.6;
+  disc.translation.x() = 3.4;
+  const cv::Mat left =
+      RenderPlane(camera, board, 220.0, [](double x, double y) { return Checker(x, y, 2.0, 3.0); });
+  const cv::Mat right = RenderPlane(camera, disc, 220.0, [](double x, double y) {
+    return std::hypot(x, y) < 1.2 ? 40.0 : 220.0;
+  });
+  cv::Mat both;
+  cv::min(left, right, both);
+  const Observations found = Detect(Develop(both), camera);
+  Vector3d x, y;
+  ASSERT_TRUE(Axes(found, &x, &y));
+  EXPECT_LT(AxesErrorDeg(x, y, board.rotation), 0.3);
+  ASSERT_EQ(found.circles.size(), 1U);
+  EXPECT_TRUE(found.circles[0].plane.empty());
+  EXPECT_LT(BetterNormalDeg(found.circles[0], disc.rotation.col(2)), 0.5);
+}
+
+TEST(DetectObservations, AGridOfDotsIsOnePlane) {
+  const Camera camera = DistortedCamera();
+  const CameraPose pose = LookAt(35.0, 12.0, 10.0, 14.0);
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0,
+                                            [](double x, double y) {
+                                              if (std::abs(x) > 4.4 || std::abs(y) > 3.3)
+                                                return 200.0;
+                                              const double u = x - 1.6 * std::round(x / 1.6),
+                                                           v = y - 1.6 * std::round(y / 1.6);
+                                              return std::hypot(u, v) < 0.55 ? 30.0 : 200.0;
+                                            }),
+                                0.7, 2.0);
+  const Observations found = Detect(image, camera);
+  ASSERT_EQ(found.circles.size(), 25U);
+  int on_plane = 0;
+  for (const CircleObservation& circle : found.circles) on_plane += circle.plane == "p0" ? 1 : 0;
+  EXPECT_GE(on_plane, 23);
+  EXPECT_EQ(found.circles[0].plane, "p0");
+  EXPECT_EQ(found.frame.plane, "p0");
+  EXPECT_TRUE(found.pencils.empty());
+}
+
+TEST(DetectObservations, NothingIsInvented) {
+  const Camera camera = TestCamera(320, 240);
+  const Observations blank = Detect(cv::Mat(240, 320, CV_8UC1, cv::Scalar(77)), camera);
+  EXPECT_TRUE(blank.circles.empty());
+  EXPECT_TRUE(blank.pencils.empty());
+  EXPECT_TRUE(blank.frame.plane.empty());
+  EXPECT_FALSE(blank.message.empty());
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const Observations noise = Detect(Noise(320, 240, 25.0, seed), camera);
+    EXPECT_TRUE(noise.circles.empty());
+    EXPECT_TRUE(noise.pencils.empty());
+    EXPECT_FALSE(noise.message.empty());
+  }
+}
+
+TEST(DetectObservations, OnePencilIsSaidToBeTooLittle) {
+  const Camera camera = TestCamera();
+  const cv::Mat image =
+      Develop(RenderPlane(camera, LookAt(30.0, 20.0, 15.0, 8.0), 60.0, [](double x, double) {
+        return static_cast<int>(std::floor(x)) % 2 == 0 ? 60.0 : 190.0;
+      }));
+  const Observations found = Detect(image, camera);
+  ASSERT_EQ(found.pencils.size(), 1U);
+  EXPECT_EQ(found.pencils[0].direction, PencilDirection::kFree);
+  EXPECT_NE(found.message.find("one pencil"), std::string::npos);
+}
+
+TEST(DetectObservations, LimitsAreKept) {
+  const Camera camera = TestCamera();
+  const cv::Mat image =
+      Develop(RenderPlane(camera, LookAt(30.0, -15.0, 12.0, 12.0), 220.0,
+                          [](double x, double y) { return Checker(x, y, 4.0, 3.0); }));
+  DetectionOptions options;
+  options.max_pencils = 0;
+  EXPECT_TRUE(Detect(image, camera, options).pencils.empty());
+  options.max_pencils = 1;
+  EXPECT_EQ(Detect(image, camera, options).pencils.size(), 1U);
+  options.max_circles = 0;
+  EXPECT_TRUE(Detect(image, camera, options).circles.empty());
+}
+
+TEST(DetectObservations, TakesColourAndIsRepeatableWithAnyNumberOfThreads) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(40.0, -10.0, 8.0, 12.0);
+  const cv::Mat gray = Develop(RenderPlane(camera, pose, 220.0,
+                                           [](double x, double y) {
+                                             if (x > 0.6)
+                                               return std::hypot(x - 2.5, y) < 1.5 ? 40.0 : 220.0;
+                                             return Checker(x + 2.0, y, 2.0, 2.0);
+                                           }),
+                               0.7, 5.0);
+  cv::Mat color;
+  cv::cvtColor(gray, color, cv::COLOR_GRAY2BGR);
+  const int threads = cv::getNumThreads();
+  cv::setNumThreads(1);
+  const Observations a = Detect(gray, camera);
+  cv::setNumThreads(4);
+  const Observations b = Detect(color, camera);
+  cv::setNumThreads(threads);
+  ASSERT_EQ(a.circles.size(), b.circles.size());
+  for (std::size_t k = 0; k < a.circles.size(); ++k) {
+    EXPECT_EQ(a.circles[k].points, b.circles[k].points);
+    EXPECT_TRUE(a.circles[k].fit->conic == b.circles[k].fit->conic);
+  }
+  ASSERT_EQ(a.pencils.size(), b.pencils.size());
+  for (std::size_t k = 0; k < a.pencils.size(); ++k) {
+    EXPECT_TRUE(a.pencils[k].fit->direction == b.pencils[k].fit->direction);
+    EXPECT_EQ(a.pencils[k].lines.size(), b.pencils[k].lines.size());
+  }
+}
+
+TEST(DetectObservations, SaysWhatIsWrongWithTheInput) {
+  const Camera camera = TestCamera(64, 48);
+  const cv::Mat image(48, 64, CV_8UC1, cv::Scalar(9));
+  Observations found;
+  const auto message = [&](const cv::Mat& photo, const Camera& c, const DetectionOptions& options) {
+    const Status status = DetectObservations(photo, c, options, &found);
+    EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
+    EXPECT_TRUE(found.circles.empty() && found.pencils.empty());
+    return status.message;
+  };
+  EXPECT_NE(message(cv::Mat(), camera, {}).find("empty"), std::string::npos);
+  EXPECT_NE(message(cv::Mat(48, 64, CV_16UC1), camera, {}).find("8 bits"), std::string::npos);
+  EXPECT_NE(message(cv::Mat(48, 64, CV_8UC2), camera, {}).find("channels"), std::string::npos);
+  EXPECT_NE(message(cv::Mat(64, 48, CV_8UC1), camera, {}).find("48 x 64"), std::string::npos);
+  Camera no_focal = camera;
+  no_focal.fx = 0.0;
+  EXPECT_FALSE(message(image, no_focal, {}).empty());
+  DetectionOptions options;
+  options.min_ellipse_axis_px = -1.0;
+  EXPECT_NE(message(image, camera, options).find("min_ellipse_axis_px"), std::string::npos);
+  options = DetectionOptions();
+  options.min_arc_deg = 0.0;
+  EXPECT_NE(message(image, camera, options).find("min_arc_deg"), std::string::npos);
+  options = DetectionOptions();
+  options.min_segment_length_px = std::nan("");
+  EXPECT_NE(message(image, camera, options).find("min_segment_length_px"), std::string::npos);
+  options = DetectionOptions();
+  options.max_circles = -1;
+  EXPECT_NE(message(image, camera, options).find("max_circles"), std::string::npos);
+  options = DetectionOptions();
+  options.max_pencils = -1;
+  EXPECT_NE(message(image, camera, options).find("max_pencils"), std::string::npos);
+  options = DetectionOptions();
+  options.max_shared_plane_deg = 0.0;
+  EXPECT_NE(message(image, camera, options).find("max_shared_plane_deg"), std::string::npos);
+}
+
+TEST(DetectCircleInRoi, FindsTheCircleOfTheRectangle) {
+  const Camera camera = DistortedCamera();
+  CameraPose pose = LookAt(35.0, 10.0, 0.0, 8.0);
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [](double x, double y) {
+    return std::min(std::hypot(x - 2.0, y), std::hypot(x + 2.0, y)) < 0.9 ? 40.0 : 200.0;
+  }));
+  const Observations all = Detect(image, camera);
+  ASSERT_EQ(all.circles.size(), 2U);
+  for (const CircleObservation& truth : all.circles) {
+    Vector2d low = truth.points[0], high = low;
+    for (const Vector2d& p : truth.points) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+    const cv::Rect roi(static_cast<int>(low.x()) - 8, static_cast<int>(low.y()) - 8,
+                       static_cast<int>(high.x() - low.x()) + 17,
+                       static_cast<int>(high.y() - low.y()) + 17);
+    CircleObservation circle;
+    circle.id = "mine";
+    circle.radius = 0.9;
+    const Status status = DetectCircleInRoi(image, camera, roi, DetectionOptions(), &circle);
+    ASSERT_TRUE(status.ok()) << status.message;
+    EXPECT_EQ(circle.id, "mine");
+    EXPECT_EQ(circle.radius, 0.9);
+    EXPECT_GT(circle.points.size(), 30U);
+    EXPECT_LT(BetterNormalDeg(circle, pose.rotation.col(2)), 0.5);
+    for (const Vector2d& p : circle.points) {
+      EXPECT_TRUE(roi.contains(cv::Point(static_cast<int>(p.x()), static_cast<int>(p.y()))));
+      CalibratedPoint x;
+      ASSERT_TRUE(PixelToCalibrated(camera, p, &x));
+      EXPECT_LT(std::abs(ConicDistancePx(x, truth.fit->conic)), 0.5);
+    }
+  }
+}
+
+TEST(DetectCircleInRoi, RefusesWhereThereIsNone) {
+  const Camera camera = TestCamera(100, 80);
+  const cv::Mat image(80, 100, CV_8UC1, cv::Scalar(50));
+  CircleObservation circle;
+  EXPECT_EQ(DetectCircleInRoi(image, camera, cv::Rect(10, 10, 50, 50), {}, &circle).code,
+            StatusCode::kRefused);
+  EXPECT_EQ(DetectCircleInRoi(image, camera, cv::Rect(200, 10, 50, 50), {}, &circle).code,
+            StatusCode::kInvalidArgument);
+  EXPECT_EQ(DetectCircleInRoi(cv::Mat(), camera, cv::Rect(0, 0, 50, 50), {}, &circle).code,
+            StatusCode::kInvalidArgument);
+}
+
+// ------------------------------------------------------------------------------ real photographs
+
+cv::Mat ReadMatrix(const cv::FileNode& node, const char* key) {
+  cv::Mat m;
+  if (!node[key].empty()) node[key] >> m;
+  return m;
+}
+
+Camera ReadCamera(const cv::FileNode& node, const cv::Mat& photo) {
+  const cv::Mat k = ReadMatrix(node, "camera_matrix");
+  const cv::Mat d = ReadMatrix(node, "distortion_coefficients");
+  Camera camera;
+  camera.model = CameraModel::kOpenCV;
+  camera.width = photo.cols;
+  camera.height = photo.rows;
+  camera.fx = k.at<double>(0, 0);
+  camera.fy = k.at<double>(1, 1);
+  camera.cx = k.at<double>(0, 2);
+  camera.cy = k.at<double>(1, 2);
+  for (int i = 0; i < std::min(8, static_cast<int>(d.total())); ++i) {
+    camera.distortion[static_cast<std::size_t>(i)] = d.at<double>(i);
+  }
+  return camera;
+}
+
+// One photo of a set, its observations and its truth.
+struct Photo {
+  std::string file;
+  Observations found;
+  Matrix3d rotation;
+};
+
+std::vector<Photo> DetectSet(const std::string& set, std::size_t every) {
+  std::vector<Photo> photos;
+  const std::string folder = DataFolder() + "/" + set;
+  const cv::FileStorage storage(folder + "/groundtruth.yml", cv::FileStorage::READ);
+  std::size_t k = 0;
+  for (const cv::FileNode& node : storage["images"]) {
+    if (k++ % every != 0) continue;
+    Photo photo;
+    photo.file = static_cast<std::string>(node["file"]);
+    const cv::Mat image = cv::imread(folder + "/" + photo.file, cv::IMREAD_COLOR);
+    if (image.empty()) continue;
+    cv::FileNode camera_node = storage.root();
+    for (const cv::FileNode& c : storage["cameras"]) {
+      if (static_cast<std::string>(c["name"]) == static_cast<std::string>(node["camera"])) {
+        camera_node = c;
+      }
+    }
+    photo.found = Detect(image, ReadCamera(camera_node, image));
+    const cv::Mat r = ReadMatrix(node, "R");
+    for (int i = 0; i < 9 && !r.empty(); ++i)
+      photo.rotation(i / 3, i % 3) = r.at<double>(i / 3, i % 3);
+    photos.push_back(photo);
+  }
+  return photos;
+}
+
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values.empty() ? 1e9 : values[values.size() / 2];
+}
+
+TEST(RealPhotographs, ChessboardsGiveTheirAxes) {
+  if (!HasSet("chessboard-opencv")) GTEST_SKIP() << "no photographs in " << DataFolder();
+  std::vector<double> errors;
+  for (const Photo& photo : DetectSet("chessboard-opencv", 4)) {
+    Vector3d x, y;
+    const bool found = Axes(photo.found, &x, &y);
+    EXPECT_TRUE(found) << photo.file;
+    if (found) errors.push_back(AxesErrorDeg(x, y, photo.rotation));
+  }
+  EXPECT_GE(errors.size(), 6U);
+  EXPECT_LT(Median(errors), 0.5);
+}
+
+TEST(RealPhotographs, TheDiscOfTheTurntableIsFound) {
+  if (!HasSet("turntable-teabox")) GTEST_SKIP() << "no photographs in " << DataFolder();
+  std::vector<double> errors;
+  for (const Photo& photo : DetectSet("turntable-teabox", 2)) {
+    double best = 180.0;
+    for (const CircleObservation& circle : photo.found.circles) {
+      if (circle.points.size() < 150) continue;  // The rim, not a print on the box.
+      best = std::min(best, BetterNormalDeg(circle, photo.rotation.col(2)));
+    }
+    errors.push_back(best);
+  }
+  EXPECT_LT(Median(errors), 2.0);
+}
+
+TEST(RealPhotographs, LargeDiscsInStrongDistortionAreFoundAndShareAPlane) {
+  if (!HasSet("circles-discocal-tir")) GTEST_SKIP() << "no photographs in " << DataFolder();
+  for (const Photo& photo : DetectSet("circles-discocal-tir", 3)) {
+    int good = 0, on_plane = 0;
+    for (const CircleObservation& circle : photo.found.circles) {
+      good += BetterNormalDeg(circle, photo.rotation.col(2)) < 3.0 ? 1 : 0;
+      on_plane += circle.plane == "p0" ? 1 : 0;
+    }
+    EXPECT_GE(good, 11) << photo.file;
+    EXPECT_GE(on_plane, 9) << photo.file;
+  }
+}
+
+TEST(RealPhotographs, AStreetIsNotTakenForARightAngle) {
+  if (!HasSet("scene-lund")) GTEST_SKIP() << "no photographs in " << DataFolder();
+  for (const Photo& photo : DetectSet("scene-lund", 3)) {
+    EXPECT_GE(photo.found.pencils.size(), 2U) << photo.file;
+    for (const PencilObservation& pencil : photo.found.pencils) {
+      EXPECT_EQ(pencil.direction, PencilDirection::kFree) << photo.file;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace circline

@@ -1,0 +1,194 @@
+#include "circline/ransac/edges.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "tests/ransac/detection_test_util.h"
+
+namespace circline {
+namespace {
+
+using detection_test::Develop;
+using detection_test::kDegrees;
+using detection_test::kPi;
+using detection_test::Noise;
+using detection_test::Render;
+
+// 60 | 180 across a line through (40.3, 31.7) whose normal, to the brighter side, is at `angle`.
+cv::Mat StepEdge(double angle, double noise = 0.0) {
+  const double c = std::cos(angle), s = std::sin(angle);
+  return Develop(Render(81, 65,
+                        [=](double u, double v) {
+                          return c * (u - 40.3) + s * (v - 31.7) > 0.0 ? 180.0 : 60.0;
+                        }),
+                 0.7, noise);
+}
+
+// Signed distances to that line of all points away from the border, where the blur reflects.
+std::vector<double> StepErrors(const EdgeMap& map, double angle) {
+  std::vector<double> errors;
+  for (const EdgePoint& p : map.points) {
+    if (p.x < 6 || p.y < 6 || p.x > 74 || p.y > 58) continue;
+    errors.push_back(std::cos(angle) * (static_cast<double>(p.x) - 40.3) +
+                     std::sin(angle) * (static_cast<double>(p.y) - 31.7));
+  }
+  return errors;
+}
+
+double Rms(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double v : values) sum += v * v;
+  return std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+TEST(DetectEdges, LocatesAStraightStepInAnyDirection) {
+  for (int k = 0; k < 24; ++k) {
+    const double angle = 2.0 * kPi * k / 24 + 0.03;
+    EdgeMap map;
+    ASSERT_TRUE(DetectEdges(StepEdge(angle), EdgeOptions(), &map).ok());
+    ASSERT_EQ(map.chains.size(), 1U) << k;
+    const std::vector<double> errors = StepErrors(map, angle);
+    ASSERT_GT(errors.size(), 45U);
+    EXPECT_LT(Rms(errors), 0.03) << "angle " << angle;
+    for (const EdgePoint& p : map.points) {
+      if (p.x < 6 || p.y < 6 || p.x > 74 || p.y > 58) continue;
+      const double off = std::remainder(std::atan2(p.ny, p.nx) - angle, 2.0 * kPi);
+      EXPECT_LT(std::abs(off), 0.05);  // The rendering's own stairs turn it by 0.04.
+      // Pixel (0.29), blur 0.7 and smoothing 1.0, in squares.
+      EXPECT_NEAR(p.blur_px, std::sqrt(0.083 + 0.49 + 1.0), 0.1);
+    }
+  }
+}
+
+TEST(DetectEdges, WalksWithTheBrighterSideOnTheLeft) {
+  EdgeMap map;
+  ASSERT_TRUE(DetectEdges(StepEdge(0.0), EdgeOptions(), &map).ok());  // Brighter on the right:
+  ASSERT_EQ(map.chains.size(), 1U);                                   // the walk goes down.
+  const EdgeChain& chain = map.chains[0];
+  EXPECT_FALSE(chain.closed);
+  for (int i = chain.begin + 1; i < chain.end; ++i) {
+    const float step =
+        map.points[static_cast<std::size_t>(i)].y - map.points[static_cast<std::size_t>(i - 1)].y;
+    EXPECT_GT(step, 0.0f);
+    EXPECT_LT(step, 1.6f);
+  }
+}
+
+TEST(DetectEdges, ClosesTheContourOfADiscAndIndexesIt) {
+  const cv::Mat image = Develop(Render(80, 80, [](double u, double v) {
+    return std::hypot(u - 39.6, v - 40.2) < 25.0 ? 200.0 : 50.0;
+  }));
+  EdgeMap map;
+  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+  ASSERT_EQ(map.chains.size(), 1U);
+  EXPECT_TRUE(map.chains[0].closed);
+  EXPECT_NEAR(map.chains[0].size(), 2.0 * kPi * 25.0, 30.0);
+  double mean = 0.0;
+  for (std::size_t i = 0; i < map.points.size(); ++i) {
+    const EdgePoint& p = map.points[i];
+    const double r = std::hypot(static_cast<double>(p.x) - 39.6, static_cast<double>(p.y) - 40.2);
+    EXPECT_NEAR(r, 25.0, 0.12);
+    mean += r / static_cast<double>(map.points.size());
+    const int x = static_cast<int>(std::lround(p.x)), y = static_cast<int>(std::lround(p.y));
+    int found = 0;
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) found += map.PointAt(x + dx, y + dy) == static_cast<int>(i);
+    }
+    EXPECT_EQ(found, 1);
+  }
+  EXPECT_NEAR(mean, 25.0, 0.06);  // Blur draws a curved edge inward, by blur^2 / (2 r) = 0.03 here.
+  EXPECT_EQ(map.PointAt(-1, 0), -1);
+  EXPECT_EQ(map.PointAt(0, 80), -1);
+}
+
+TEST(DetectEdges, StatesTheNoiseAndWhatItDoesToLocations) {
+  constexpr double kNoise = 6.0;
+  double predicted = 0.0, actual = 0.0, count = 0.0;
+  for (int k = 0; k < 12; ++k) {
+    const double angle = 0.26 + 2.0 * kPi * k / 12;
+    EdgeMap map;
+    const cv::Mat image = Develop(
+        Render(81, 65,
+               [=](double u, double v) {
+                 return std::cos(angle) * (u - 40.3) + std::sin(angle) * (v - 31.7) > 0.0 ? 180.0
+                                                                                          : 60.0;
+               }),
+        0.7, kNoise, static_cast<std::uint64_t>(k + 1));
+    ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+    // White noise through the derivative of a Gaussian of 1 px.
+    EXPECT_NEAR(map.gradient_noise, kNoise / std::sqrt(8.0 * kPi), 0.15 * kNoise / 5.0);
+    for (const EdgePoint& p : map.points) {
+      const double d = std::cos(angle) * (static_cast<double>(p.x) - 40.3) +
+                       std::sin(angle) * (static_cast<double>(p.y) - 31.7);
+      if (std::abs(d) > 2.0 || p.x < 6 || p.y < 6 || p.x > 74 || p.y > 58) continue;
+      actual += d * d;
+      predicted += static_cast<double>(p.sigma_px * p.sigma_px);
+      count += 1.0;
+    }
+  }
+  EXPECT_GT(count, 500.0);
+  const double ratio = std::sqrt(actual / predicted);
+  EXPECT_GT(ratio, 0.75);
+  EXPECT_LT(ratio, 1.35);
+}
+
+TEST(DetectEdges, FindsNothingOnABlankImageAndLittleInNoise) {
+  EdgeMap map;
+  ASSERT_TRUE(DetectEdges(cv::Mat(50, 60, CV_8UC1, cv::Scalar(90)), EdgeOptions(), &map).ok());
+  EXPECT_TRUE(map.points.empty());
+  EXPECT_TRUE(map.chains.empty());
+  ASSERT_TRUE(DetectEdges(Noise(200, 200, 8.0), EdgeOptions(), &map).ok());
+  EXPECT_LT(map.points.size(), 200U);
+}
+
+TEST(DetectEdges, TakesTheSmallestImages) {
+  for (const cv::Size size : {cv::Size(1, 1), cv::Size(2, 5), cv::Size(3, 3), cv::Size(200, 1)}) {
+    EdgeMap map;
+    EXPECT_TRUE(DetectEdges(cv::Mat(size, CV_8UC1, cv::Scalar(0)), EdgeOptions(), &map).ok());
+    EXPECT_TRUE(map.points.empty());
+  }
+}
+
+TEST(DetectEdges, RefusesWhatIsNotAGreyImage) {
+  EdgeMap map;
+  EXPECT_EQ(DetectEdges(cv::Mat(), EdgeOptions(), &map).code, StatusCode::kInvalidArgument);
+  EXPECT_EQ(DetectEdges(cv::Mat(9, 9, CV_8UC3), EdgeOptions(), &map).code,
+            StatusCode::kInvalidArgument);
+  EXPECT_EQ(DetectEdges(cv::Mat(9, 9, CV_32F), EdgeOptions(), &map).code,
+            StatusCode::kInvalidArgument);
+}
+
+TEST(DetectEdges, NamesTheOptionThatIsWrong) {
+  EdgeMap map;
+  const cv::Mat image(9, 9, CV_8UC1, cv::Scalar(0));
+  EdgeOptions options;
+  options.smoothing_px = 0.0;
+  EXPECT_NE(DetectEdges(image, options, &map).message.find("smoothing_px"), std::string::npos);
+  options = EdgeOptions();
+  options.low_gradient = std::nan("");
+  EXPECT_NE(DetectEdges(image, options, &map).message.find("low_gradient"), std::string::npos);
+  options = EdgeOptions();
+  options.high_gradient = 1.0;
+  EXPECT_NE(DetectEdges(image, options, &map).message.find("high_gradient"), std::string::npos);
+  options = EdgeOptions();
+  options.min_chain_points = 1;
+  EXPECT_NE(DetectEdges(image, options, &map).message.find("min_chain_points"), std::string::npos);
+}
+
+TEST(ToGray, TakesOneThreeAndFourChannels) {
+  cv::Mat gray;
+  EXPECT_TRUE(ToGray(cv::Mat(4, 5, CV_8UC1, cv::Scalar(7)), &gray).ok());
+  EXPECT_EQ(gray.at<std::uint8_t>(2, 2), 7);
+  EXPECT_TRUE(ToGray(cv::Mat(4, 5, CV_8UC3, cv::Scalar(9, 9, 9)), &gray).ok());
+  EXPECT_EQ(gray.at<std::uint8_t>(2, 2), 9);
+  EXPECT_TRUE(ToGray(cv::Mat(4, 5, CV_8UC4, cv::Scalar(9, 9, 9, 0)), &gray).ok());
+  EXPECT_EQ(gray.type(), CV_8UC1);
+  EXPECT_FALSE(ToGray(cv::Mat(), &gray).ok());
+  EXPECT_FALSE(ToGray(cv::Mat(4, 5, CV_8UC2), &gray).ok());
+  EXPECT_FALSE(ToGray(cv::Mat(4, 5, CV_16UC1), &gray).ok());
+}
+
+}  // namespace
+}  // namespace circline

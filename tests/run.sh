@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Runs all tests of circline on Debian 12: installs the packages that are missing, builds in
+# build/release, runs the tests, installs into a temporary prefix and builds a user of the installed
+# package. The last line is `N passed, N failed`; the exit code is 0 if none failed.
+#
+#   tests/run.sh              the tests
+#   tests/run.sh --sanitize   the same under AddressSanitizer and UBSan, in build/sanitize
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. cmake/setup.sh
+
+preset=release
+case "$*" in
+  "") ;;
+  --sanitize) preset=sanitize ;;
+  *) fail "usage: tests/run.sh [--sanitize]" ;;
+esac
+
+install_packages "${BUILD_PACKAGES[@]}"
+build "$preset"
+
+log=build/$preset-tests.log
+say "running the tests (log: $log)"
+ctest --test-dir "build/$preset" -j "$(nproc)" --output-on-failure > "$log" 2>&1 || true
+
+# Whatever is neither a start nor a success: the failures with their output.
+if ! grep -q '^100% tests passed' "$log"; then
+  grep -vE '^ *(Start +[0-9]+:|[0-9]+/[0-9]+ Test .*(Passed|Skipped))' "$log" || true
+fi
+skipped=$(grep -cE '^ *[0-9]+/[0-9]+ Test .*Skipped' "$log" || true)
+[ "$skipped" -eq 0 ] || say "$skipped tests skipped: what they need is not on this machine"
+
+# "97% tests passed, 3 tests failed out of 100"
+read -r failed total < <(sed -nE 's/^[0-9]+% tests passed, ([0-9]+) tests failed out of ([0-9]+)$/\1 \2/p' "$log") || true
+[ -n "${total:-}" ] || { cat "$log" >&2; fail "no tests were run"; }
+echo "$((total - skipped - failed)) passed, $failed failed"
+[ "$failed" -eq 0 ]
