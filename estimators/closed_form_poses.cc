@@ -237,17 +237,18 @@ std::vector<Candidate> CircleCenterPoses(const Inputs& inputs) {
 }
 
 std::vector<Candidate> CircleFramePoses(const Inputs& inputs) {
-  return CircleCandidates(inputs,
-                          [](const CirclePose& circle, const Inputs& in) -> Eigen::VectorXd {
-                            const Eigen::Vector3d lx = in.x_line.value, ly = in.y_line.value;
-                            const Eigen::Vector3d x = circle.normal.cross(lx).normalized(),
-                                                  y = circle.normal.cross(ly).normalized();
-                            Eigen::VectorXd contradiction(in.origin_at_center ? 3 : 1);
-                            contradiction[0] = x.dot(y);
-                            if (in.origin_at_center)
-                              contradiction.tail<2>() = CenterMiss(circle, lx.cross(ly));
-                            return contradiction;
-                          });
+  return CircleCandidates(
+      inputs, [](const CirclePose& circle, const Inputs& in) -> Eigen::VectorXd {
+        const Eigen::Vector3d lx = in.x_line.value, ly = in.y_line.value;
+        const Eigen::Vector3d x = circle.normal.cross(lx).normalized(),
+                              y = circle.normal.cross(ly).normalized();
+        // Lines along the axes cross anywhere; the axes themselves, at the origin.
+        const bool at_crossing = in.origin_at_center && in.x_sense && in.y_sense;
+        Eigen::VectorXd contradiction(at_crossing ? 3 : 1);
+        contradiction[0] = x.dot(y);
+        if (at_crossing) contradiction.tail<2>() = CenterMiss(circle, lx.cross(ly));
+        return contradiction;
+      });
 }
 
 std::vector<Candidate> ParallelCirclePoses(const Inputs& inputs) {

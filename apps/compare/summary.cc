@@ -225,12 +225,23 @@ std::string Summary::Table() const {
   const std::vector<SummaryColumn> columns = Columns();
   std::vector<std::vector<std::string>> lines(1);
   for (const SummaryColumn& column : columns) lines[0].push_back(column.title);
+  // Solvers that refused every image need no row, only their names.
+  std::vector<std::string> refused;
   for (const SummaryRow* row : Ranked()) {
+    if (row->refused == row->images) {
+      if (std::find(refused.begin(), refused.end(), row->solver) == refused.end())
+        refused.push_back(row->solver);
+      continue;
+    }
     std::vector<std::string> line;
     for (const SummaryColumn& column : columns) line.push_back(column.text(*row));
     lines.push_back(std::move(line));
   }
-  return Align(columns, lines);
+  std::string table = lines.size() > 1 ? Align(columns, lines) : "";
+  for (std::size_t i = 0; i < refused.size(); ++i) {
+    table += (i == 0 ? "refused every image (the report says why): " : ", ") + refused[i];
+  }
+  return refused.empty() ? table : table + "\n";
 }
 
 }  // namespace circline::apps

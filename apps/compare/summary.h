@@ -48,7 +48,7 @@ class Summary {
   // Without columns that have nothing to say in any row.
   std::vector<SummaryColumn> Columns() const;
   std::string Csv() const;    // In the order of rows().
-  std::string Table() const;  // Ranked, aligned, for people.
+  std::string Table() const;  // Ranked, aligned, for people; who refused every image is only named.
 
  private:
   std::vector<SummaryRow> rows_;

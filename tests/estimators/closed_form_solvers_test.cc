@@ -147,6 +147,20 @@ TEST(ClosedFormSolversTest, CircleFrameSaysWhenItCannotDecide) {
   EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
 }
 
+// Lines that run along the axes serve as well as the axes; where they cross says nothing of the
+// origin.
+TEST(ClosedFormSolversTest, CircleFrameTakesLinesAlongTheAxes) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX(), 2),
+                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY(), 2)};
+  observations.frame.origin_is_center = "c0";
+  const PoseEstimate estimate = Solve("circle_frame", observations);
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
+}
+
 TEST(ClosedFormSolversTest, LinePairsForAnyTwoDirections) {
   PlaneScene scene;
   // Orthogonal, with roles; then oblique and free; then along X and the normal.
