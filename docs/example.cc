@@ -29,8 +29,9 @@ bool PoseOverRoad(const Camera& camera, const std::vector<Eigen::Vector2d>& rim,
   for (const Segment& kerb : kerbs) along.lines.push_back({{kerb[0], kerb[1]}, {}, {}});
   observations.pencils.push_back(std::move(along));
 
-  const Status fitted = FitObservations(FitOptions(), &observations);  // RANSAC: masks, conics, lines.
-  const PoseEstimate estimate = EstimatePose(observations);            // Closed forms, then Ceres.
+  const Status fitted =
+      FitObservations(FitOptions(), &observations);          // RANSAC: masks, conics, lines.
+  const PoseEstimate estimate = EstimatePose(observations);  // Closed forms, then Ceres.
   if (!fitted.ok() || !estimate.status.ok()) {
     std::fprintf(stderr, "%s %s\n", fitted.message.c_str(), estimate.status.message.c_str());
     return false;

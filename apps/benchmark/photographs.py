@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""How good are the poses on photographs with truth? Prints a line for each claim; the last line is `N passed, N failed`.
+
+  photographs.py DATA [--converter=to_scene.py] [--compare=build/release/bin/circline_compare]
+
+DATA holds one folder a set, each with a groundtruth.yml. The converter turns a set into a scene file (docs/scene_files.md):
+`to_scene.py SET OUT.yaml [--evidence=auto] [--lines=all] [--circles=all] [--centre]`; it needs python3-opencv.
+"""
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+
+# set, converter's arguments, solver, stage, field, "best" or "better" of the hypotheses, bar in degrees (median)
+CLAIMS = [
+    ('chessboard-opencv', [], 'line_pairs', 'closed_form', 'rotation_error_deg', 'best', 1.0),
+    ('chessboard-opencv', [], 'joint', 'refined', 'rotation_error_deg', 'best', 0.25),
+    ('chessboard-opencv', ['--lines=all'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.15),
+    ('chessboard-opencv', ['--evidence=auto'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.3),
+    ('circles-discocal-rgb', ['--centre'], 'circle_center', 'refined', 'normal_error_deg', 'best', 0.5),
+    ('circles-discocal-rgb', ['--circles=all'], 'joint', 'refined', 'normal_error_deg', 'best', 0.2),
+    ('circles-discocal-tir', ['--centre'], 'circle_center', 'refined', 'normal_error_deg', 'best', 0.7),
+    ('circles-discocal-tir', ['--circles=all'], 'joint', 'refined', 'normal_error_deg', 'best', 0.2),
+    ('circles-discocal-rgb', ['--evidence=auto'], 'joint', 'refined', 'normal_error_deg', 'best', 0.3),
+    ('circles-discocal-tir', ['--evidence=auto'], 'joint', 'refined', 'normal_error_deg', 'best', 0.3),
+    ('circle-mire2', [], 'single_circle', 'refined', 'normal_error_deg', 'better', 0.2),
+    ('turntable-teabox', ['--evidence=auto'], 'single_circle', 'refined', 'normal_error_deg', 'better', 2.0),
+    ('scene-lund', [], 'joint', 'refined', 'direction_error_deg', 'best', 0.5),
+    ('box-camprodon', [], 'joint', 'refined', 'rotation_error_deg', 'best', 1.0),
+]
+
+
+def run(args, data_set, options, scratch, cache={}):
+    """Result lines by image, solver and stage; one run for each set and evidence."""
+    key = (data_set, *options)
+    if key not in cache:
+        scene = os.path.join(scratch, '_'.join(key).replace('=', '') + '.yaml')
+        out = scene[:-5]
+        subprocess.run(['/usr/bin/python3', args.converter, os.path.join(args.data, data_set), scene, *options],
+                       check=True)
+        subprocess.run([args.compare, f'--scene={scene}', f'--output={out}', '--overlays=false'], check=True,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        with open(os.path.join(out, 'results.jsonl')) as lines:
+            cache[key] = [json.loads(line) for line in lines]
+    return cache[key]
+
+
+def answers(lines, solver, stage):
+    """For each image the hypotheses of one solver, best first; empty where it refused."""
+    by_image = {}
+    for line in lines:
+        hypotheses = by_image.setdefault(line['image'], [])
+        if (line['solver'], line['stage'], line['status']) == (solver, stage, 'ok'):
+            hypotheses.append(line)
+    return list(by_image.values())
+
+
+def error(line, field):
+    """Of directions the worst one."""
+    value = line.get(field, float('inf'))
+    return max(value.values()) if isinstance(value, dict) else value
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('data')
+    parser.add_argument('--converter', default=None)
+    parser.add_argument('--compare', default='build/release/bin/circline_compare')
+    args = parser.parse_args()
+    args.converter = args.converter or os.path.join(args.data, '..', 'tools', 'to_scene.py')
+    passed = failed = 0
+
+    def claim(text, holds):
+        nonlocal passed, failed
+        passed, failed = passed + holds, failed + (not holds)
+        print(f'{"ok    " if holds else "FAILED"} {text}')
+
+    with tempfile.TemporaryDirectory() as scratch:
+        for data_set, options, solver, stage, field, which, bar in CLAIMS:
+            images = answers(run(args, data_set, options, scratch), solver, stage)
+            errors = [min(error(line, field) for line in (h if which == 'better' else h[:1])) if h else float('inf')
+                      for h in images]
+            median = statistics.median(errors)
+            claim(f'{data_set} {" ".join(options)}: {solver} ({stage}), {field} of the {which} hypothesis, median of '
+                  f'{len(images)} photos: {median:.3f} <= {bar}', median <= bar)
+        for data_set in ('circles-discocal-rgb', 'circles-discocal-tir'):
+            images = answers(run(args, data_set, ['--centre'], scratch), 'circle_center', 'refined')
+            right = sum(bool(h) and error(h[0], 'normal_error_deg') <= min(error(l, 'normal_error_deg') for l in h)
+                        for h in images)
+            claim(f'{data_set} --centre: right hypothesis first in {right} of {len(images)}', right >= 0.95 * len(images))
+        # One dot: which of the two it is can often not be told, and then no answer may claim to know.
+        images = answers(run(args, 'circles-visp36', ['--centre'], scratch), 'circle_center', 'refined')
+        wrong = [h[0]['probability'] for h in images
+                 if error(h[0], 'normal_error_deg') > min(error(l, 'normal_error_deg') for l in h)]
+        claim('circles-visp36 --centre: probability of the first hypothesis where it is the wrong one: '
+              + ', '.join(f'{p:.2f}' for p in wrong) + ' < 0.9', all(p < 0.9 for p in wrong))
+    print(f'{passed} passed, {failed} failed')
+    return failed > 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
