@@ -264,22 +264,23 @@ double RelativeSpread(const JointEvidence& e, const std::vector<ResidualTerm>& t
   return kConvex * *quantile;
 }
 
-// Graduated non-convexity: the losses start as wide as the residuals of the seed ask for, and
-// narrow to their own width as these shrink (Black and Rangarajan 1996).
+// Graduated non-convexity: where residuals lie far in the tails, the losses start as wide as these
+// ask for, and narrow to their own width as they shrink (Black and Rangarajan 1996).
 Status GraduatedMinimize(const JointEvidence& e, const std::vector<ResidualTerm>& terms,
-                         bool x_is_fixed, State* state) {
+                         int max_iterations, State* state) {
+  constexpr double kFarOut = 3.0;  // Gaussian noise alone has a spread of 2.2.
   constexpr double kShrink = 0.5;
   constexpr int kIterationsOnTheWay = 5;
-  state->stretch = std::max(1.0, RelativeSpread(e, terms, &state->values));
+  const double spread = RelativeSpread(e, terms, &state->values);
+  state->stretch = spread > kFarOut ? spread : 1.0;
   while (state->stretch > 1.0) {
-    const Status status =
-        Minimize(terms, e.parameters, x_is_fixed,
-                 std::min(kIterationsOnTheWay, e.options.max_iterations), &state->values);
+    const Status status = Minimize(terms, e.parameters, e.x_is_fixed,
+                                   std::min(kIterationsOnTheWay, max_iterations), &state->values);
     if (!status.ok()) return status;
     state->stretch =
         std::max(1.0, std::min(kShrink * state->stretch, RelativeSpread(e, terms, &state->values)));
   }
-  return Minimize(terms, e.parameters, x_is_fixed, e.options.max_iterations, &state->values);
+  return Minimize(terms, e.parameters, e.x_is_fixed, max_iterations, &state->values);
 }
 
 // Moves the rotation found into the base, so that block 0 is zero: the covariance is that of the
@@ -291,8 +292,16 @@ void Recenter(State* state) {
   state->rotation = q.normalized().toRotationMatrix();
 }
 
-// --- Results
-// ----------------------------------------------------------------------------------------------
+// From a seed to (near) a minimum, with the rotation in the state's base.
+Status Converge(const JointEvidence& e, const CameraPose& seed, int max_iterations, State* state) {
+  if (!Initialize(e, seed, state)) return Status::Failed("a seed pose contradicts the evidence");
+  const std::vector<ResidualTerm> terms = MakeTerms(e, e.sets, *state);
+  const Status status = GraduatedMinimize(e, terms, max_iterations, state);
+  if (status.ok()) Recenter(state);
+  return status;
+}
+
+// --- Results ---
 
 // 1.4826 x the median; `parameters` of the values' degrees of freedom are spent.
 double MadScale(std::vector<double> distances, std::size_t parameters) {
@@ -504,20 +513,35 @@ double JointProblem::SeedCost(const CameraPose& seed) const {
   return RobustCost(MakeTerms(*evidence_, evidence_->sets, state), &state.values);
 }
 
-Status JointProblem::Refine(const CameraPose& seed, PoseHypothesis* h,
-                            ResidualScales* scales) const {
+Status JointProblem::ApproachFrom(const CameraPose& seed, Approach* approach) const {
+  const JointEvidence& e = *evidence_;
+  State state;
+  PoseHypothesis h;
+  constexpr int kFirstIterations = 8;
+  const Status status =
+      Converge(e, seed, std::min(kFirstIterations, e.options.max_iterations), &state);
+  if (!status.ok()) return status;
+  const std::vector<ResidualTerm> terms = MakeTerms(e, e.sets, state);
+  approach->cost = RobustCost(terms, &state.values);
+  KeepInliers(e, terms, &state.values, &h, &approach->scales);
+  FillPose(e, state, OriginInPlane(e, state, seed), &h);
+  approach->pose = h.cam_from_world;
+  const bool finite = std::isfinite(approach->cost) && approach->pose.rotation.allFinite() &&
+                      approach->pose.translation.allFinite();
+  return finite ? Status::Ok() : Status::Failed("the refinement left the range of numbers");
+}
+
+Status JointProblem::Refine(const CameraPose& seed, PoseHypothesis* h) const {
   const JointEvidence& e = *evidence_;
   *h = PoseHypothesis();
   State state;
-  if (!Initialize(e, seed, &state)) return Status::Failed("a seed pose contradicts the evidence");
-  const bool hold_spin = !e.x_is_fixed;
-  std::vector<ResidualTerm> terms = MakeTerms(e, e.sets, state);
-  Status status = GraduatedMinimize(e, terms, !hold_spin, &state);
+  const Status status = Converge(e, seed, e.options.max_iterations, &state);
   if (!status.ok()) return status;
-  Recenter(&state);
-  terms = MakeTerms(e, e.sets, state);
+  const bool hold_spin = !e.x_is_fixed;
+  const std::vector<ResidualTerm> terms = MakeTerms(e, e.sets, state);
   h->cost = RobustCost(terms, &state.values);
-  const std::vector<PointSet> inliers = KeepInliers(e, terms, &state.values, h, scales);
+  ResidualScales unused;
+  const std::vector<PointSet> inliers = KeepInliers(e, terms, &state.values, h, &unused);
 
   SharedCovariance shared;
   const std::vector<ResidualTerm> inlier_terms = MakeTerms(e, inliers, state);

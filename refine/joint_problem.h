@@ -32,17 +32,27 @@ struct ResidualScales {
   double conic_px = 0.0, line_px = 0.0;
 };
 
+// Where a few iterations lead from a seed.
+struct Approach {
+  CameraPose pose;
+  double cost = 0.0;  // Robust, as PoseHypothesis::cost.
+  ResidualScales scales;
+};
+
 class JointProblem {
  public:
   // `observations` fitted and resolved (FitObservations or FitDirect, then ResolveWorld). Features
-  // without a fit, of other planes, or without any tie to the world frame take no part. The
-  // options' scales must be positive ("auto" is settled before).
+  // without a fit, of other planes, or without any tie to the world frame take no part. Every
+  // circle and pencil must state its sigma_px ("auto" is settled before).
   JointProblem(const Observations& observations, const EstimationOptions& options);
   ~JointProblem();
 
   // Refines `seed` (its rotation and, where the origin is known, its translation); fills everything
   // that a hypothesis holds but the probability. Not ok: degenerate evidence, or no convergence.
-  Status Refine(const CameraPose& seed, PoseHypothesis* hypothesis, ResidualScales* scales) const;
+  Status Refine(const CameraPose& seed, PoseHypothesis* hypothesis) const;
+
+  // The first iterations of Refine, without covariance: enough to see which basin a seed lies in.
+  Status ApproachFrom(const CameraPose& seed, Approach* approach) const;
 
   // Robust cost at the seed with every other parameter at its closed-form value: ranks seeds
   // cheaply. Infinity where the seed is unusable.

@@ -15,6 +15,8 @@ namespace {
 
 // Seeds closer than this are one; far inside the basin of convergence of each other.
 constexpr double kSameSeed = 0.02;  // Radians.
+// Seeds that arrive this close to each other in a few iterations go to one minimum.
+constexpr double kSameApproach = 1e-3;  // Radians.
 // Refined poses closer than this are one.
 constexpr double kSamePose = 1e-4;  // Radians; far below any standard deviation.
 constexpr std::size_t kMaxSeeds = 8;
@@ -169,9 +171,10 @@ void AddCircleSeeds(const Observations& observations, const JointProblem& proble
 
 // Poses that the closed forms propose for the same world plane, and those of its circles. `reason`
 // receives why the last of the closed forms refused.
-std::vector<Seed> CollectSeeds(const Observations& observations,
-                               const std::vector<std::shared_ptr<const Solver>>& seeders,
-                               const JointProblem& problem, std::vector<std::string>* reasons) {
+std::vector<CameraPose> CollectSeeds(const Observations& observations,
+                                     const std::vector<std::shared_ptr<const Solver>>& seeders,
+                                     const JointProblem& problem,
+                                     std::vector<std::string>* reasons) {
   std::vector<Seed> seeds;
   int source = 0;
   for (const std::shared_ptr<const Solver>& seeder : seeders) {
@@ -198,7 +201,9 @@ std::vector<Seed> CollectSeeds(const Observations& observations,
   std::stable_sort(seeds.begin(), seeds.end(),
                    [](const Seed& a, const Seed& b) { return a.cost < b.cost; });
   seeds.resize(std::min(seeds.size(), kMaxSeeds));
-  return seeds;
+  std::vector<CameraPose> poses;
+  for (const Seed& seed : seeds) poses.push_back(seed.pose);
+  return poses;
 }
 
 // What tells the best hypothesis from the next, in words.
@@ -218,22 +223,65 @@ std::string Join(const std::vector<std::string>& parts) {
   return out;
 }
 
-// Every seed refined at the given scales; `measured` receives the scatter about the best pose.
-Status RefineAt(const Observations& scaled,
-                const std::vector<std::shared_ptr<const Solver>>& seeders,
-                const EstimationOptions& options, std::vector<PoseHypothesis>* hypotheses,
-                Scales* measured) {
-  const JointProblem problem(scaled, options);
-  std::vector<std::string> reasons;
-  const std::vector<Seed> seeds = CollectSeeds(scaled, seeders, problem, &reasons);
-  Status last = Status::Refused(
-      reasons.empty() ? "there is no circle and no pencil of parallel lines" : Join(reasons));
+// A few iterations from every pose, the lowest cost first, those that arrive at one place counted
+// once. `last` receives why the last one that failed did.
+std::vector<Approach> ApproachAll(const JointProblem& problem, const std::vector<CameraPose>& poses,
+                                  Status* last) {
+  std::vector<Approach> approaches;
+  for (const CameraPose& pose : poses) {
+    Approach approach;
+    const Status status = problem.ApproachFrom(pose, &approach);
+    if (status.ok()) {
+      approaches.push_back(approach);
+    } else {
+      *last = status;
+    }
+  }
+  std::stable_sort(approaches.begin(), approaches.end(),
+                   [](const Approach& a, const Approach& b) { return a.cost < b.cost; });
+  std::vector<Approach> distinct;
+  for (const Approach& a : approaches) {
+    const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Approach& b) {
+      return RotationAngle(a.pose.rotation, b.pose.rotation) < kSameApproach;
+    });
+    if (!known) distinct.push_back(a);
+  }
+  return distinct;
+}
+
+std::vector<CameraPose> Poses(const std::vector<Approach>& approaches) {
+  std::vector<CameraPose> poses;
+  for (const Approach& a : approaches) poses.push_back(a.pose);
+  return poses;
+}
+
+// Features that fit well one by one may fit badly together (a plane not quite flat): then the
+// scatter about the common pose is the noise that counts. True if that raised an automatic scale.
+bool RaiseScales(const EstimationOptions& options, const ResidualScales& measured, Scales* scales) {
+  constexpr double kTolerated = 1.3;
+  const bool conic =
+      options.conic_loss.scale_px == 0.0 && measured.conic_px > kTolerated * scales->conic;
+  const bool line =
+      options.line_loss.scale_px == 0.0 && measured.line_px > kTolerated * scales->line;
+  if (conic) scales->conic = measured.conic_px;
+  if (line) scales->line = measured.line_px;
+  return conic || line;
+}
+
+// Runs the approaches to their end, ranked, without duplicates and without those that cannot
+// compete.
+Status RefineApproaches(const JointProblem& problem, const Observations& scaled,
+                        const EstimationOptions& options, const std::vector<Approach>& approaches,
+                        std::vector<PoseHypothesis>* hypotheses) {
+  // An approach has not converged, so that its cost still falls.
+  constexpr double kMargin = 3.0;
+  Status last = Status::Failed("no seed pose could be refined");
   double best_cost = std::numeric_limits<double>::infinity();
-  hypotheses->clear();
-  for (const Seed& seed : seeds) {
+  for (const Approach& approach : approaches) {
+    if (approach.cost > approaches.front().cost * kMargin + kMargin * options.max_cost_gap)
+      continue;
     PoseHypothesis h;
-    ResidualScales scales;
-    const Status status = problem.Refine(seed.pose, &h, &scales);
+    const Status status = problem.Refine(approach.pose, &h);
     if (!status.ok()) {
       last = status;
       continue;
@@ -243,7 +291,6 @@ Status RefineAt(const Observations& scaled,
       WorldRotation(scaled, h.cam_from_world.rotation.col(2), h.cam_from_world.translation,
                     kDefaultLineSigmaPx, &h.cam_from_world.rotation);
     }
-    if (h.cost < best_cost) *measured = {scales.conic_px, scales.line_px};
     best_cost = std::min(best_cost, h.cost);
     hypotheses->push_back(std::move(h));
   }
@@ -257,6 +304,26 @@ Status RefineAt(const Observations& scaled,
                     hypotheses->end());
   RankHypotheses(hypotheses);
   return Status::Ok();
+}
+
+Status RefineFitted(const Observations& fitted,
+                    const std::vector<std::shared_ptr<const Solver>>& seeders,
+                    const EstimationOptions& options, std::vector<PoseHypothesis>* hypotheses) {
+  Scales scales = MeasureScales(fitted);
+  Observations scaled = ApplyScales(fitted, options, scales);
+  auto problem = std::make_unique<JointProblem>(scaled, options);
+  std::vector<std::string> reasons;
+  const std::vector<CameraPose> seeds = CollectSeeds(scaled, seeders, *problem, &reasons);
+  Status last = Status::Refused(
+      reasons.empty() ? "there is no circle and no pencil of parallel lines" : Join(reasons));
+  std::vector<Approach> approaches = ApproachAll(*problem, seeds, &last);
+  if (!approaches.empty() && RaiseScales(options, approaches.front().scales, &scales)) {
+    scaled = ApplyScales(fitted, options, scales);
+    problem = std::make_unique<JointProblem>(scaled, options);
+    approaches = ApproachAll(*problem, Poses(approaches), &last);
+  }
+  if (approaches.empty()) return last;
+  return RefineApproaches(*problem, scaled, options, approaches, hypotheses);
 }
 
 }  // namespace
@@ -274,22 +341,7 @@ PoseEstimate RefineSeeds(const std::string& name,
   FitDirect(options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDefaultLineSigmaPx,
             &fitted, &estimate.notes);
   fitted = ResolveWorld(fitted);
-  Scales scales = MeasureScales(fitted), measured;
-  estimate.status = RefineAt(ApplyScales(fitted, options, scales), seeders, options,
-                             &estimate.hypotheses, &measured);
-  // Features that fit well one by one may fit badly together (a plane not quite flat): then the
-  // scatter about the common pose is the noise that counts.
-  constexpr double kTolerated = 1.3;
-  const bool conic_worse =
-      options.conic_loss.scale_px == 0.0 && measured.conic > kTolerated * scales.conic;
-  const bool line_worse =
-      options.line_loss.scale_px == 0.0 && measured.line > kTolerated * scales.line;
-  if (estimate.status.ok() && (conic_worse || line_worse)) {
-    if (conic_worse) scales.conic = measured.conic;
-    if (line_worse) scales.line = measured.line;
-    estimate.status = RefineAt(ApplyScales(fitted, options, scales), seeders, options,
-                               &estimate.hypotheses, &measured);
-  }
+  estimate.status = RefineFitted(fitted, seeders, options, &estimate.hypotheses);
   if (estimate.status.ok()) estimate.decided_by = DecidedBy(estimate.hypotheses);
   return estimate;
 }
