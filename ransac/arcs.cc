@@ -20,6 +20,9 @@ constexpr float kPolygonTolerancePx = 0.7f;
 // tolerance at most (chord and sagitta); far beyond that, the vertex is a corner.
 constexpr double kCornerFactor = 2.0;
 constexpr double kMaxTurn = 75.0 * kPi / 180.0;
+// Largest length of the edge between the two halves of a rounded corner, in lengths of its
+// neighbours: edges of a smooth curve change more slowly.
+constexpr double kRoundedShare = 0.3;
 // What an arc needs to take part.
 constexpr int kMinArcPoints = 6;
 constexpr double kMinArcTurn = 12.0 * kPi / 180.0;
@@ -146,9 +149,10 @@ class ArcFinder {
     for (std::size_t k = 1; k + 1 < v.size(); ++k) {
       const Vector2d a = P(v[k]) - P(v[k - 1]), b = P(v[k + 1]) - P(v[k]);
       const double theta = std::atan2(Cross(a, b), a.dot(b));
-      const double sagitta = std::min(a.norm(), b.norm()) * std::abs(theta) / 8.0;
-      if (std::abs(theta) > kMaxTurn || sagitta > kCornerFactor * kPolygonTolerancePx) {
+      const bool rounded = IsRoundedCorner(v, k);
+      if (rounded || std::abs(theta) > kMaxTurn || IsCorner(a, b)) {
         Emit(begin, v[k] + 1, turn);
+        if (rounded) ++k;  // The other half of the corner.
         begin = v[k];
         sign = turn = 0.0;
         continue;
@@ -163,6 +167,20 @@ class ArcFinder {
       turn += theta;
     }
     Emit(begin, v.back() + 1, turn);
+  }
+
+  // Whether the polygon bends more from edge `a` to edge `b` than a smooth curve of their lengths.
+  static bool IsCorner(const Vector2d& a, const Vector2d& b) {
+    const double theta = std::abs(std::atan2(Cross(a, b), a.dot(b)));
+    return std::min(a.norm(), b.norm()) * theta / 8.0 > kCornerFactor * kPolygonTolerancePx;
+  }
+
+  // The smoothing rounds a corner into two bends with a short edge between: v[k] is the first.
+  bool IsRoundedCorner(const std::vector<int>& v, std::size_t k) const {
+    if (k + 2 >= v.size()) return false;
+    const Vector2d a = P(v[k]) - P(v[k - 1]), b = P(v[k + 2]) - P(v[k + 1]);
+    const double between = (P(v[k + 1]) - P(v[k])).norm();
+    return kRoundedShare * std::min(a.norm(), b.norm()) > between && IsCorner(a, b);
   }
 
   void Emit(int begin, int end, double turn) {

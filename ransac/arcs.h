@@ -21,7 +21,8 @@ struct Arc {
   int size() const { return end - begin; }
 };
 
-// Cuts all chains at corners, and where the bend changes sides. What is left straight is no arc.
+// Cuts all chains at sharp corners, and where the bend changes sides. What is left straight is no
+// arc. Blunt corners, which the smoothing rounds, may stay inside an arc: see SplitArc.
 std::vector<Arc> FindArcs(const EdgeMap& map);
 
 // The two parts of an arc on either side of its sharpest point, where a corner may have been

@@ -19,10 +19,9 @@ using Eigen::Vector2d;
 
 // Neighbouring edge points share the noise of the pixels under the smoothing Gaussian (sigma 1 px):
 // the correlation at a distance d is exp(-d^2 / 4). Every second point carries nearly all that
-// there is to know, and the remaining correlation (0.37 at 2 px) makes a sum of them 1.33 times as
-// uncertain as if they were independent; for every point (1 px) it is 1.9.
+// there is to know; taking every point (1 px) for independent makes a sum of them 1.9 times too
+// sure.
 constexpr std::size_t kThinFrom = 60;  // Points from which every second one is dropped.
-constexpr double kCorrelationThinned = 1.33;
 constexpr double kCorrelationDense = 1.9;
 // What the shape of a whole contour may be off by, whatever its points scatter, pixels: prints,
 // lenses and sensors bend edges by about that.
@@ -35,16 +34,17 @@ struct Evidence {
   std::vector<DetectedPencil> pencils;
 };
 
-// Points of an ellipse as an observation: thinned, with a standard deviation that accounts for what
-// correlation is left, and the fit's covariance with it.
+// Points of an ellipse as an observation: thinned, and the fit's covariance widened by the
+// correlation of dense points.
 void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, CircleObservation* circle) {
   const bool thin = ellipse.points.size() >= kThinFrom;
   circle->points.clear();
   for (std::size_t k = 0; k < ellipse.points.size(); k += thin ? 2 : 1) {
     circle->points.push_back(edges.points[static_cast<std::size_t>(ellipse.points[k])].Position());
   }
-  const double correlation = thin ? kCorrelationThinned : kCorrelationDense;
-  circle->sigma_px = ellipse.sigma_px * correlation;
+  // The scatter of a smooth contour says little of its error: the estimate measures that, on all
+  // circles.
+  circle->sigma_px = 0.0;
   circle->fit = ellipse.fit;
   // The fit used every point: their correlation is that of dense points.
   for (double& c : circle->fit->covariance) c *= kCorrelationDense * kCorrelationDense;

@@ -59,9 +59,20 @@ inline cv::Mat Render(int width, int height, const PixelPattern& pattern) {
   constexpr int kSamples = 49;
   // Roberts' R2 sequence: powers of the inverse plastic number.
   constexpr double kStepU = 0.7548776662466927, kStepV = 0.5698402909980532;
+  // A pixel whose four corners agree is not crossed by a contour, but for a sliver.
+  cv::Mat corners(height + 1, width + 1, CV_64F);
+  for (int y = 0; y <= height; ++y) {
+    for (int x = 0; x <= width; ++x) corners.at<double>(y, x) = pattern(x - 0.5, y - 0.5);
+  }
   cv::Mat image(height, width, CV_32F);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
+      const double corner = corners.at<double>(y, x);
+      if (corner == corners.at<double>(y, x + 1) && corner == corners.at<double>(y + 1, x) &&
+          corner == corners.at<double>(y + 1, x + 1)) {
+        image.at<float>(y, x) = static_cast<float>(corner);
+        continue;
+      }
       double sum = 0.0;
       for (int k = 0; k < kSamples; ++k) {
         // In pairs on opposite sides of the centre, which is the last: the mean is the centre.

@@ -1,0 +1,104 @@
+#include "circline/ransac/detect_pencils.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/ransac/detection_test_util.h"
+
+namespace circline {
+namespace {
+
+using detection_test::AxisDeg;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// An image line of `length` pixels through (u, v), towards the vanishing point of `direction`
+// turned by `turn` radians, its points moved by noise of `sigma` pixels.
+DetectedLine MakeLine(const Camera& camera, double u, double v, const Vector3d& direction,
+                      double length, double turn, double sigma, Random* random) {
+  CalibratedPoint middle;
+  EXPECT_TRUE(PixelToCalibrated(camera, Vector2d(u, v), &middle));
+  const Vector2d to_vp = direction.head<2>() - direction.z() * middle.x;
+  const double angle = std::atan2(to_vp.y(), to_vp.x()) + turn;
+  const Vector2d along(std::cos(angle), std::sin(angle)), across(-along.y(), along.x());
+  DetectedLine line;
+  std::vector<CalibratedPoint> points;
+  for (double s = -0.5 * length; s <= 0.5 * length; s += 5.0) {
+    line.points.push_back(Vector2d(u, v) + s * along + sigma * random->Normal() * across);
+    CalibratedPoint p;
+    EXPECT_TRUE(PixelToCalibrated(camera, line.points.back(), &p));
+    points.push_back(p);
+  }
+  line.ends = {line.points.front(), line.points.back()};
+  line.length_px = length;
+  line.sigma_px = sigma;
+  EXPECT_TRUE(FitLine(points, sigma, &line.fit).ok());
+  return line;
+}
+
+std::vector<DetectedLine> MakePencil(const Vector3d& direction, int count, double scatter,
+                                     std::uint64_t seed) {
+  const Camera camera = detection_test::TestCamera();
+  Random random(seed);
+  std::vector<DetectedLine> lines;
+  for (int k = 0; k < count; ++k) {
+    const double u = random.Uniform(40.0, 440.0), v = random.Uniform(40.0, 320.0);
+    const double length = random.Uniform(25.0, 120.0);
+    lines.push_back(
+        MakeLine(camera, u, v, direction, length, scatter * random.Normal(), 0.15, &random));
+  }
+  return lines;
+}
+
+const Vector3d kFirst = Vector3d(0.9, 0.1, 0.4).normalized();
+const Vector3d kSecond = Vector3d(0.1, 1.0, -0.2).normalized();
+
+TEST(DetectPencils, FindsTheDirectionsLongestFirst) {
+  std::vector<DetectedLine> lines = MakePencil(kFirst, 30, 0.0, 1);
+  const std::vector<DetectedLine> more = MakePencil(kSecond, 12, 0.0, 2);
+  lines.insert(lines.end(), more.begin(), more.end());
+  std::vector<DetectedPencil> pencils;
+  ASSERT_TRUE(DetectPencils(lines, 3, 1, &pencils).ok());
+  ASSERT_EQ(pencils.size(), 2U);
+  EXPECT_LT(AxisDeg(pencils[0].observation.fit->direction, kFirst), 0.1);
+  EXPECT_LT(AxisDeg(pencils[1].observation.fit->direction, kSecond), 0.1);
+  EXPECT_GT(pencils[0].support_px, pencils[1].support_px);
+  EXPECT_EQ(pencils[0].ends.size(), pencils[0].observation.lines.size());
+  EXPECT_NEAR(pencils[0].observation.sigma_px, 0.15, 0.06);
+}
+
+TEST(DetectPencils, KnowsTheScatterOfLinesThatAreNotQuiteParallel) {
+  // A quarter of a degree each: the covariance must cover it, though every line is known far
+  // better.
+  double chi2 = 0.0;
+  constexpr int kTrials = 30;
+  for (std::uint64_t seed = 1; seed <= kTrials; ++seed) {
+    std::vector<DetectedPencil> pencils;
+    ASSERT_TRUE(DetectPencils(MakePencil(kFirst, 40, 0.0044, seed), 1, 1, &pencils).ok());
+    ASSERT_EQ(pencils.size(), 1U);
+    const VanishingPointFit& fit = *pencils[0].observation.fit;
+    const Vector3d e1 = fit.direction.unitOrthogonal(), e2 = fit.direction.cross(e1);
+    Eigen::Matrix2d c;
+    c << e1.dot(fit.covariance * e1), e1.dot(fit.covariance * e2), e2.dot(fit.covariance * e1),
+        e2.dot(fit.covariance * e2);
+    const Vector3d truth = kFirst * (kFirst.dot(fit.direction) < 0.0 ? -1.0 : 1.0);
+    const Vector2d error(e1.dot(truth), e2.dot(truth));
+    chi2 += error.dot(c.inverse() * error) / (2.0 * kTrials);
+    EXPECT_GT(pencils[0].observation.sigma_px, 0.16);
+  }
+  EXPECT_GT(chi2, 0.3);
+  EXPECT_LT(chi2, 3.0);
+}
+
+TEST(DetectPencils, NothingFromNothing) {
+  std::vector<DetectedPencil> pencils;
+  EXPECT_TRUE(DetectPencils({}, 3, 1, &pencils).ok());
+  EXPECT_TRUE(pencils.empty());
+  EXPECT_TRUE(DetectPencils(MakePencil(kFirst, 20, 0.0, 1), 0, 1, &pencils).ok());
+  EXPECT_TRUE(pencils.empty());
+  EXPECT_FALSE(DetectPencils({}, -1, 1, &pencils).ok());
+}
+
+}  // namespace
+}  // namespace circline
