@@ -54,6 +54,25 @@ Observations KeepCircles(const Observations& observations, std::vector<CircleObs
   return evidence;
 }
 
+// Without what would place their centres.
+std::vector<CircleObservation> Bare(std::vector<CircleObservation> circles) {
+  for (CircleObservation& circle : circles) {
+    circle.center.reset();
+    circle.diameters.clear();
+  }
+  return circles;
+}
+
+// Keeps the largest circle, its contour alone.
+Status SelectBareCircle(const Observations& observations, Observations* evidence) {
+  std::vector<CircleObservation> circles =
+      Bare(WorldCircles(observations, [](const auto&) { return true; }));
+  if (circles.empty()) return Status::Refused("no circle of the world's plane could be fitted");
+  circles.resize(1);
+  *evidence = KeepCircles(observations, std::move(circles));
+  return Status::Ok();
+}
+
 // Keeps the single line of a pencil that an axis is drawn on, as a pencil of its own.
 void KeepAxisLine(const Observations& observations, const std::optional<Segment>& axis,
                   PencilDirection direction, Observations* evidence) {
@@ -83,17 +102,11 @@ Recipe SingleCircleRecipe() {
   r.needs = "a circle";
   r.decided_by = "nothing: a circle alone has two poses";
   r.select = [](const Observations& observations, Observations* evidence) {
-    std::vector<CircleObservation> circles =
-        WorldCircles(observations, [](const auto&) { return true; });
-    if (circles.empty()) return Status::Refused("no circle of the world's plane could be fitted");
-    circles.resize(1);
-    circles[0].center.reset();
-    circles[0].diameters.clear();
-    *evidence = KeepCircles(observations, std::move(circles));
+    const Status status = SelectBareCircle(observations, evidence);
     evidence->frame = FrameObservation();
     evidence->frame.plane = observations.frame.plane;
     evidence->known_lengths.clear();
-    return Status::Ok();
+    return status;
   };
   r.gather = [](const Observations& evidence, double sigma_px, Inputs* inputs) {
     GatherCircle(evidence, evidence.circles.front(), sigma_px, inputs);
@@ -227,15 +240,12 @@ Recipe ParallelCirclesRecipe() {
   r.decided_by = "the plane that the circles have in common";
   r.select = [](const Observations& observations, Observations* evidence) {
     std::vector<CircleObservation> circles =
-        WorldCircles(observations, [](const auto&) { return true; });
-    if (circles.size() < 2)
+        Bare(WorldCircles(observations, [](const auto&) { return true; }));
+    if (circles.size() < 2) {
       return Status::Refused("the world's plane holds fewer than two fitted circles");
-    circles.resize(std::min(circles.size(), kMaxCircles));
-    for (CircleObservation& circle : circles) {
-      circle.center.reset();
-      circle.diameters.clear();
-      circle.concentric.clear();
     }
+    circles.resize(std::min(circles.size(), kMaxCircles));
+    for (CircleObservation& circle : circles) circle.concentric.clear();
     *evidence = KeepCircles(observations, std::move(circles));
     KeepAxisLines(observations, evidence);
     return Status::Ok();
@@ -253,13 +263,9 @@ Recipe ConcentricCirclesRecipe() {
   r.select = [](const Observations& observations, Observations* evidence) {
     for (const CircleObservation& first :
          WorldCircles(observations, [](const auto& c) { return !c.concentric.empty(); })) {
-      std::vector<CircleObservation> circles = WorldCircles(
-          observations, [&](const auto& c) { return c.concentric == first.concentric; });
+      std::vector<CircleObservation> circles = Bare(WorldCircles(
+          observations, [&](const auto& c) { return c.concentric == first.concentric; }));
       if (circles.size() < 2) continue;
-      for (CircleObservation& circle : circles) {
-        circle.center.reset();
-        circle.diameters.clear();
-      }
       *evidence = KeepCircles(observations, std::move(circles));
       KeepAxisLines(observations, evidence);
       return Status::Ok();
@@ -287,13 +293,8 @@ Recipe CircleFrameRecipe() {
   r.needs = "a circle and the images of the X and Y axes of its plane";
   r.decided_by = "the right angle between the axes";
   r.select = [](const Observations& observations, Observations* evidence) {
-    std::vector<CircleObservation> circles =
-        WorldCircles(observations, [](const auto&) { return true; });
-    if (circles.empty()) return Status::Refused("no circle of the world's plane could be fitted");
-    circles.resize(1);
-    circles[0].center.reset();
-    circles[0].diameters.clear();
-    *evidence = KeepCircles(observations, std::move(circles));
+    const Status status = SelectBareCircle(observations, evidence);
+    if (!status.ok()) return status;
     if (observations.frame.x_axis && observations.frame.y_axis) {
       KeepAxisLines(observations, evidence);
       return Status::Ok();

@@ -337,7 +337,9 @@ TEST(ConicModel, RefineFindsTheMaximumLikelihood) {
   value[3] += 0.02;
   const std::vector<float> weights(scene.points.size(), 1.0f);
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(model.Refine(weights.data(), &value));
-  for (std::size_t k = 0; k < 6; ++k) EXPECT_NEAR(value[k], best[k], 1e-6);
+  // The engine's first-order distance and FitConic's orthogonal one differ by (sigma / radius)^2: 1
+  // px on 60 px.
+  for (std::size_t k = 0; k < 6; ++k) EXPECT_NEAR(value[k], best[k], 3e-4);
 }
 
 TEST(ConicModel, RefineNeedsFivePoints) {
