@@ -34,6 +34,26 @@ RadialFactor KannalaBrandtRadial(const std::array<double, 8>& k, double s) {
   return {f, df};
 }
 
+// Angle off the axis whose distorted radius is theta_d; false where that is 89 degrees or more.
+bool FisheyeAngle(const std::array<double, 8>& k, double theta_d, double* theta) {
+  constexpr double kMaxAngle = 89.0 / 57.29577951308232;
+  const auto distort = [&k](double t) {
+    const double q = t * t;
+    return t * (1.0 + q * (k[0] + q * (k[1] + q * (k[2] + q * k[3]))));
+  };
+  // Bisection: a fisheye's radius grows with the angle, or the camera is refused later
+  // (IsOneToOne).
+  double low = 0.0, high = kMaxAngle;
+  if (!(theta_d < distort(high))) return false;
+  constexpr int kSteps = 40;
+  for (int i = 0; i < kSteps; ++i) {
+    const double middle = 0.5 * (low + high);
+    (distort(middle) < theta_d ? low : high) = middle;
+  }
+  *theta = 0.5 * (low + high);
+  return true;
+}
+
 RadialFactor Radial(const Camera& camera, double s) {
   return camera.model == CameraModel::kFisheye ? KannalaBrandtRadial(camera.distortion, s)
                                                : BrownConradyRadial(camera.distortion, s);
@@ -101,10 +121,11 @@ bool PixelToCalibrated(const Camera& camera, const Eigen::Vector2d& pixel, Calib
   Eigen::Vector2d x = target;
   Distorted d = Distort(camera, x);
   if (camera.model == CameraModel::kFisheye) {
-    // tan is steep: start from the radius that an undistorted fisheye would have.
-    const double theta = target.norm();
-    if (theta > 1.6) return false;
-    if (theta > 1e-8) x = target * (std::tan(std::min(theta, 1.5)) / theta);
+    // tan is steep: solve for the angle first, then polish with the others.
+    const double distorted = target.norm();
+    double theta;
+    if (!FisheyeAngle(camera.distortion, distorted, &theta)) return false;
+    if (distorted > 1e-8) x = target * (std::tan(theta) / distorted);
     d = Distort(camera, x);
   }
   if (camera.model != CameraModel::kPinhole) {

@@ -98,12 +98,13 @@ void GatherCircle(const Observations& observations, const CircleObservation& cir
   inputs->conic = Measured(ConicToVector(circle.fit->conic), circle.fit->Covariance());
   inputs->radius = circle.radius;
   const FrameObservation& frame = observations.frame;
+  const bool is_origin = !frame.origin_is_center.empty() && frame.origin_is_center == circle.id;
   const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : sigma_px;
   if (circle.center) {
     inputs->center = MeasuredPoint(observations.camera, *circle.center, sigma);
-  } else if (frame.origin && frame.origin_is_center == circle.id) {
+  } else if (frame.origin && is_origin) {
     inputs->center = MeasuredPoint(observations.camera, *frame.origin, sigma);
   }
-  inputs->origin_at_center = frame.origin_is_center == circle.id;
+  inputs->origin_at_center = is_origin;
 }
 }  // namespace circline

@@ -24,7 +24,8 @@ Eigen::Matrix3d Orient(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& p
     if (inputs.y_sense && MovesAlong(R.col(1), normal, (*inputs.y_sense)[0], (*inputs.y_sense)[1]))
       score += 4;
     if (R.col(2).dot(plane_ray) < 0.0) score += 2;
-    const bool horizontal = std::abs(R(0, 0)) > 1e-9;
+    constexpr double kVertical = 0.05;  // Nearer to vertical than 3 degrees: then downwards.
+    const bool horizontal = std::abs(R(0, 0)) > kVertical;
     if (horizontal ? R(0, 0) > 0.0 : R(1, 0) > 0.0) score += 1;
     if (score > best_score) {
       best_score = score;
@@ -170,9 +171,18 @@ bool RotationOfPair(const Inputs& inputs, const Eigen::Vector3d& plane_ray,
     anchored.directions[first_is_better ? 0 : 1].columns.setZero();
     return RotationOfAxes(anchored, rotation);
   }
+  const Eigen::Vector3d a = inputs.directions[0].value, b = inputs.directions[1].value;
+  if (first == PencilDirection::kZ) {
+    // The normal itself; the turn about it from the axes, else X is the other direction's
+    // projection.
+    if (inputs.x_line.present() || inputs.y_line.present()) {
+      return RotationOfPlane(a, plane_ray, inputs, rotation);
+    }
+    const Eigen::Vector3d x = b - a * a.dot(b);
+    return RotationFromDirections(x, a.cross(x), rotation);
+  }
   Eigen::Matrix3d R;
-  if (!RotationFromDirections(inputs.directions[0].value, inputs.directions[1].value, &R))
-    return false;
+  if (!RotationFromDirections(a, b, &R)) return false;
   *rotation = R;
   if (first == PencilDirection::kY) {
     rotation->col(0) = -R.col(1);

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "circline/estimators/line_pose.h"
+
 namespace circline {
 namespace {
 
@@ -18,6 +20,16 @@ const Candidate* Nearest(const std::vector<Candidate>& candidates, const Candida
       best_angle = angle;
       best = &c;
     }
+  }
+  return best;
+}
+
+// A perturbation may tip the convention that settles the senses of the axes; that is no error.
+Eigen::Matrix3d SameSenses(const Candidate& perturbed, const Candidate& reference) {
+  Eigen::Matrix3d best = perturbed.pose.rotation;
+  for (const Eigen::Matrix3d& R : SignChoices(perturbed.pose.rotation)) {
+    if (RotationAngle(R, reference.pose.rotation) < RotationAngle(best, reference.pose.rotation))
+      best = R;
   }
   return best;
 }
@@ -42,7 +54,8 @@ Eigen::MatrixXd Sensitivity(const Evaluate& evaluate, const Inputs& inputs,
       const Candidate* minus = Nearest(minus_all, candidate);
       if (plus == nullptr || minus == nullptr) continue;
       Eigen::VectorXd column(rows);
-      column.head<3>() = 0.5 * LogRotation(plus->pose.rotation * minus->pose.rotation.transpose());
+      column.head<3>() = 0.5 * LogRotation(SameSenses(*plus, candidate) *
+                                           SameSenses(*minus, candidate).transpose());
       column.segment<3>(3) = 0.5 * (plus->pose.translation - minus->pose.translation);
       column.tail(rows - 6) = 0.5 * (plus->contradiction - minus->contradiction);
       columns.push_back(column);
@@ -68,7 +81,7 @@ void FillUncertainty(const Evaluate& evaluate, const Inputs& inputs, const Candi
     h->free_directions.push_back(direction);
   }
   Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
-  h->rank = static_cast<int>(Eigen::FullPivLU<Matrix6d>(covariance).setThreshold(1e-9).rank());
+  h->rank = CovarianceRank(covariance);
   if (candidate.contradiction.size() > 0) {
     const Eigen::MatrixXd tail = S.bottomRows(candidate.contradiction.size());
     const Eigen::MatrixXd C = tail * tail.transpose();

@@ -149,8 +149,8 @@ Recipe CircleCenterRecipe() {
   return CenterRecipe(
       "circle_center", "a circle and the image of its centre", "the image of the circle's centre",
       [](const Observations& observations, const CircleObservation& circle) {
-        return circle.center ||
-               (observations.frame.origin && observations.frame.origin_is_center == circle.id);
+        return circle.center || (observations.frame.origin && !circle.id.empty() &&
+                                 observations.frame.origin_is_center == circle.id);
       },
       [](const Observations& evidence, double, Inputs* inputs) {
         return inputs->center.present()
@@ -390,7 +390,10 @@ Status GatherPencils(const Observations& evidence, double sigma_px, Inputs* inpu
     }
     return Eigen::Vector3d::Zero();
   };
-  Eigen::Vector3d crossing = line(inputs->x_line, 0).cross(line(inputs->y_line, 1));
+  const bool y_first =
+      inputs->roles[0] == PencilDirection::kY || inputs->roles[1] == PencilDirection::kX;
+  const std::size_t x = y_first ? 1 : 0;
+  Eigen::Vector3d crossing = line(inputs->x_line, x).cross(line(inputs->y_line, 1 - x));
   if (!(std::abs(crossing.z()) > 1e-9 * crossing.norm())) crossing = Eigen::Vector3d::UnitZ();
   inputs->origin.value = crossing / crossing.z();
   inputs->origin.columns = Eigen::MatrixXd::Zero(3, 0);

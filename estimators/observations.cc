@@ -67,12 +67,18 @@ Status ValidateKnown(const Observations& observations) {
         return Status::Invalid("known angle: there is no pencil '" + id + "'");
       }
     }
+    if (angle.pencils[0] == angle.pencils[1]) {
+      return Status::Invalid("known angle: pencil '" + angle.pencils[0] + "' is named twice");
+    }
     if (!std::isfinite(angle.value) || !NonNegative(angle.sigma)) {
       return Status::Invalid("known angle between '" + angle.pencils[0] + "' and '" +
                              angle.pencils[1] + "': value must be finite and sigma 0 or more");
     }
   }
   for (const KnownLength& length : observations.known_lengths) {
+    if (length.points[0] == length.points[1]) {
+      return Status::Invalid("known length: its two points are the same");
+    }
     if (!Finite(length.points) || !(length.value > 0.0) || !std::isfinite(length.value)) {
       return Status::Invalid("known length: points must be finite and value positive");
     }
@@ -186,6 +192,15 @@ Observations ResolveWorld(const Observations& observations) {
       SpanPlane(frame.plane, &out.pencils);
     }
   }
+  // A pencil on one of whose lines an axis is drawn runs along that axis.
+  const auto follow = [&out](const std::optional<Segment>& axis, PencilDirection role) {
+    int pencil, line;
+    if (!axis || !FindAxisLine(out, *axis, &pencil, &line)) return;
+    PencilDirection& direction = out.pencils[static_cast<std::size_t>(pencil)].direction;
+    if (direction == PencilDirection::kFree) direction = role;
+  };
+  follow(frame.x_axis, PencilDirection::kX);
+  follow(frame.y_axis, PencilDirection::kY);
   const bool x_is_fixed =
       frame.x_axis || frame.y_axis ||
       std::any_of(out.pencils.begin(), out.pencils.end(), [](const PencilObservation& p) {

@@ -108,6 +108,7 @@ int FindPencil(const Observations& observations, const std::string& id);
 //   none is named it gets the id "world", and holds the circle whose centre is the origin (else the
 //   first circle) and those concentric with it. Where there is no circle either, and no pencil has
 //   a role, the first two pencils of different direction span it.
+// - A free pencil on one of whose lines an axis is drawn gets that axis' role.
 // - Where nothing fixes the X axis (no role x or y, no axis drawn), the first free pencil of that
 // plane
 //   does: it gets role x.

@@ -51,6 +51,13 @@ Eigen::Vector3d PoseHypothesis::SigmaRotation() const {
   return sigma;
 }
 
+int CovarianceRank(const Matrix6d& covariance) {
+  const Vector6d scale =
+      covariance.diagonal().unaryExpr([](double v) { return v > 0.0 ? 1.0 / std::sqrt(v) : 0.0; });
+  const Matrix6d correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
+  return static_cast<int>(Eigen::FullPivLU<Matrix6d>(correlation).setThreshold(1e-9).rank());
+}
+
 void RankHypotheses(std::vector<PoseHypothesis>* hypotheses) {
   if (hypotheses->empty()) return;
   const auto log_posterior = [](const PoseHypothesis& h) { return -h.cost + 0.5 * h.log_det; };

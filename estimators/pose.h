@@ -80,6 +80,9 @@ void RankHypotheses(std::vector<PoseHypothesis>* hypotheses);
 // same angle) with a better one. Call after RankHypotheses; ranks again.
 void MergeHypotheses(double max_angle, std::vector<PoseHypothesis>* hypotheses);
 
+// Rank of a covariance of [delta, delta_t] whatever the units of the two.
+int CovarianceRank(const Matrix6d& covariance);
+
 // Rotation vector <-> matrix (Rodrigues), and the angle between two rotations, radians.
 Eigen::Matrix3d ExpRotation(const Eigen::Vector3d& delta);
 Eigen::Vector3d LogRotation(const Eigen::Matrix3d& rotation);

@@ -238,9 +238,9 @@ bool LineCost::Evaluate(double const* const* parameters, double* residuals,
   return true;
 }
 
-PointCost::PointCost(const CalibratedPoint& measured, double sigma_px, const Eigen::Matrix3d& base,
-                     double facing)
-    : x_(measured.x), base_(base), facing_(facing) {
+PointCost::PointCost(const CalibratedPoint& measured, double sigma_px, LossType loss,
+                     const double* stretch, const Eigen::Matrix3d& base, double facing)
+    : x_(measured.x), loss_(loss), stretch_(stretch), base_(base), facing_(facing) {
   Eigen::Matrix2d x_from_pixel;
   x_from_pixel << measured.x_from_pixel[0], measured.x_from_pixel[1], measured.x_from_pixel[2],
       measured.x_from_pixel[3];
@@ -255,11 +255,18 @@ bool PointCost::Evaluate(double const* const* parameters, double* residuals,
   const Eigen::Vector3d p(parameters[1][0], parameters[1][1], facing_);
   const Eigen::Vector3d X = chart.rotation * p;
   if (!(X.z() > 0.0)) return false;  // Behind the camera.
-  Eigen::Map<Eigen::Vector2d>{residuals} = whitener_ * (X.head<2>() / X.z() - x_);
+  const Eigen::Vector2d miss = whitener_ * (X.head<2>() / X.z() - x_);
+  // sqrt(rho(|miss|^2)) along miss, as ApplyLoss does for a scalar.
+  const double norm = miss.norm();
+  const Robust robust = ApplyLoss(loss_, norm, 1.0, *stretch_);
+  const double ratio = norm > 1e-8 ? robust.residual / norm : 1.0;
+  Eigen::Map<Eigen::Vector2d>{residuals} = ratio * miss;
   if (jacobians == nullptr) return true;
+  Eigen::Matrix2d by_miss = ratio * Eigen::Matrix2d::Identity();
+  if (norm > 1e-8) by_miss += (robust.factor - ratio) / (norm * norm) * miss * miss.transpose();
   Eigen::Matrix<double, 2, 3> project;
   project << 1.0, 0.0, -X.x() / X.z(), 0.0, 1.0, -X.y() / X.z();
-  const Eigen::Matrix<double, 2, 3> by_point = whitener_ * project / X.z();
+  const Eigen::Matrix<double, 2, 3> by_point = by_miss * whitener_ * project / X.z();
   if (jacobians[0] != nullptr) {
     Eigen::Map<RowMajor<2, 3>>{jacobians[0]} =
         -by_point * chart.rotation * CrossMatrix(p) * chart.right_jacobian;
@@ -306,7 +313,7 @@ LengthCost::LengthCost(double length) : length_(length) {
 
 bool LengthCost::Evaluate(double const* const* parameters, double* residuals,
                           double** jacobians) const {
-  constexpr double kRelativeSigma = 1e-6;
+  constexpr double kRelativeSigma = 1e-4;
   const Eigen::Vector2d difference(parameters[1][0] - parameters[0][0],
                                    parameters[1][1] - parameters[0][1]);
   const double distance = difference.norm();

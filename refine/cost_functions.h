@@ -87,17 +87,19 @@ class LineCost : public ceres::CostFunction {
 // sin(phi) b.
 void PencilBasis(const Eigen::Vector3d& direction, Eigen::Vector3d* a, Eigen::Vector3d* b);
 
-// Image of a plane point. Blocks: w[3], point[2].
+// Image of a plane point, its distance under a robust loss. Blocks: w[3], point[2].
 class PointCost : public ceres::CostFunction {
  public:
-  PointCost(const CalibratedPoint& measured, double sigma_px, const Eigen::Matrix3d& base,
-            double facing);
+  PointCost(const CalibratedPoint& measured, double sigma_px, LossType loss, const double* stretch,
+            const Eigen::Matrix3d& base, double facing);
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
  private:
   Eigen::Vector2d x_;
   Eigen::Matrix2d whitener_;  // Pixels per calibrated unit over sigma.
+  LossType loss_;
+  const double* stretch_;
   Eigen::Matrix3d base_;
   double facing_;
 };

@@ -19,8 +19,10 @@ Status EstimationOptions::Validate() const {
       return Status::Invalid(std::string(name) + ".scale_px must be positive, or 0 for auto");
     }
   }
-  if (!(contour_bias_px >= 0.0)) return Status::Invalid("contour_bias_px must be 0 or more");
-  if (!(line_bias_px >= 0.0)) return Status::Invalid("line_bias_px must be 0 or more");
+  if (!(contour_bias_px >= 0.0) || !std::isfinite(contour_bias_px))
+    return Status::Invalid("contour_bias_px must be 0 or more");
+  if (!(line_bias_px >= 0.0) || !std::isfinite(line_bias_px))
+    return Status::Invalid("line_bias_px must be 0 or more");
   if (max_iterations < 1) return Status::Invalid("max_iterations must be 1 or more");
   if (!(max_cost_gap > 0.0)) return Status::Invalid("max_cost_gap must be positive");
   return Status::Ok();

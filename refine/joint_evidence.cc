@@ -53,7 +53,7 @@ double JointEvidence::DrawnSigma() const {
 
 void JointEvidence::AddFrame() {
   const FrameObservation& frame = observations.frame;
-  origin_observed = BothAxes() || frame.origin || !frame.origin_is_center.empty();
+  origin_observed = BothAxes() || frame.origin;
   if (BothAxes() || frame.origin) origin = AddParameter(2, false);
   if (!frame.origin) return;
   // An origin that is an end point of a drawn axis is no measurement of its own.
@@ -71,12 +71,14 @@ int JointEvidence::CenterBlock(const CircleObservation& circle,
   // By convention the first circle's centre is the origin where nothing else is.
   const bool is_origin =
       named_origin.empty() ? origin < 0 && circles.empty() : named_origin == circle.id;
-  int center = -1;
-  if (is_origin && origin < 0) origin = AddParameter(2, false);
-  if (is_origin) center = origin;
+  const auto group = concentric->find(circle.concentric);
+  int center = !circle.concentric.empty() && group != concentric->end() ? group->second : -1;
+  if (is_origin) {
+    origin_observed = origin_observed || !named_origin.empty();
+    if (origin < 0) origin = center >= 0 ? center : AddParameter(2, false);
+    if (center < 0) center = origin;
+  }
   if (circle.concentric.empty()) return center;
-  const auto found = concentric->find(circle.concentric);
-  if (found != concentric->end()) return found->second;
   if (center < 0) center = AddParameter(2, false);
   (*concentric)[circle.concentric] = center;
   return center;
@@ -118,15 +120,15 @@ void JointEvidence::AddDiameter(const Segment& diameter, double sigma_px, int ce
   lines.push_back({LineCost::Kind::kDiameter, set, center, psi, Eigen::Vector3d::Zero(), fit.line});
 }
 
-// The drawn axis that a pencil's line carries, where both are drawn: 0 = x, 1 = y, -1 = none.
+// The drawn axis that a pencil's line carries, where the origin is observed: 0 = x, 1 = y, -1 =
+// none.
 int JointEvidence::AxisOfLine(int pencil, int line) const {
-  if (!BothAxes()) return -1;
-  int p, l;
-  if (FindAxisLine(observations, *observations.frame.x_axis, &p, &l) && p == pencil && l == line)
-    return 0;
-  if (FindAxisLine(observations, *observations.frame.y_axis, &p, &l) && p == pencil && l == line)
-    return 1;
-  return -1;
+  if (!origin_observed || origin < 0) return -1;
+  const auto carries = [&](const std::optional<Segment>& axis) {
+    int p, l;
+    return axis && FindAxisLine(observations, *axis, &p, &l) && p == pencil && l == line;
+  };
+  return carries(observations.frame.x_axis) ? 0 : carries(observations.frame.y_axis) ? 1 : -1;
 }
 
 void JointEvidence::AddPencil(int index) {
@@ -166,8 +168,8 @@ void JointEvidence::AddLine(const PencilObservation& pencil, int theta, const Li
   lines.push_back(term);
 }
 
-// An axis drawn apart from the pencils is a line of its own: through the origin where both axes are
-// drawn, else just along X or Y.
+// An axis drawn apart from the pencils is a line of its own: through the origin where that is
+// observed, else just along X or Y.
 void JointEvidence::AddAxis(const std::optional<Segment>& axis, bool is_x) {
   int p, l;
   if (!axis || FindAxisLine(observations, *axis, &p, &l)) return;
@@ -182,7 +184,7 @@ void JointEvidence::AddAxis(const std::optional<Segment>& axis, bool is_x) {
                 -1,
                 Eigen::Vector3d::Zero(),
                 fit.line};
-  if (!BothAxes()) {
+  if (!origin_observed || origin < 0) {
     term.kind = LineCost::Kind::kFixedDirection;
     term.direction = is_x ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
     term.shared = -1;

@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -33,6 +34,9 @@ struct State {
   double facing = -1.0;
   Values values;
   double stretch = 1.0;  // Of the robust losses.
+  // Circles that cannot lie on this plane in front of the camera, and points that are outliers; by
+  // term, 1 = left out.
+  std::vector<std::uint8_t> circle_left_out, point_left_out;
 };
 
 // Plane coordinates (X, Y) at which a ray meets the plane; false where it does not, in front.
@@ -59,16 +63,25 @@ bool PlaneCircle(const Eigen::Matrix3d& R, double facing, const Eigen::Matrix3d&
   return true;
 }
 
+// An ellipse that the plane cannot explain (across or beyond the horizon) is an outlier of this
+// seed; the seed is refused only where that leaves no circle.
 bool InitializeCircles(const JointEvidence& e, State* state) {
-  for (const CircleTerm& t : e.circles) {
+  std::size_t left_out = 0;
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    const CircleTerm& t = e.circles[i];
     double circle[3];
     const ConicFit& fit = *e.observations.circles[static_cast<std::size_t>(t.observation)].fit;
-    if (!PlaneCircle(state->rotation, state->facing, fit.conic, circle)) return false;
+    if (!PlaneCircle(state->rotation, state->facing, fit.conic, circle) ||
+        !((state->rotation * Eigen::Vector3d(circle[0], circle[1], state->facing)).z() > 0.0)) {
+      state->circle_left_out[i] = 1;
+      ++left_out;
+      continue;
+    }
     double* center = At(&state->values, t.center);
     std::copy(circle, circle + 2, center);
     (t.radius < 0 ? center[2] : At(&state->values, t.radius)[0]) = circle[2] / t.factor;
   }
-  return true;
+  return e.circles.empty() || left_out < e.circles.size();
 }
 
 void InitializeLine(const LineTerm& t, State* state) {
@@ -103,6 +116,8 @@ bool Initialize(const JointEvidence& e, const CameraPose& seed, State* state) {
   state->rotation = seed.rotation;
   state->facing = seed.rotation.col(2).dot(seed.translation) > 0.0 ? 1.0 : -1.0;
   state->values.assign(e.parameters.size(), {0.0, 0.0, 0.0});
+  state->circle_left_out.assign(e.circles.size(), 0);
+  state->point_left_out.assign(e.points.size(), 0);
   const auto place = [&](const Eigen::Vector3d& ray, int block) {
     return PlanePoint(state->rotation, state->facing, ray, At(&state->values, block));
   };
@@ -134,8 +149,9 @@ std::vector<ResidualTerm> MakeTerms(const JointEvidence& e, const std::vector<Po
   const Eigen::Matrix3d& R = state.rotation;
   std::vector<ResidualTerm> terms;
   const auto set = [&sets](int index) { return &sets[static_cast<std::size_t>(index)]; };
-  for (const CircleTerm& t : e.circles) {
-    if (set(t.set)->points.empty()) continue;
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    const CircleTerm& t = e.circles[i];
+    if (set(t.set)->points.empty() || state.circle_left_out[i] != 0) continue;
     std::vector<int> blocks = {0, t.center};
     if (t.radius >= 0) blocks.push_back(t.radius);
     terms.push_back({std::make_unique<CircleCost>(set(t.set), &state.stretch, R, state.facing,
@@ -151,9 +167,12 @@ std::vector<ResidualTerm> MakeTerms(const JointEvidence& e, const std::vector<Po
                                                 t.direction),
                      blocks});
   }
-  for (const PointTerm& t : e.points) {
-    terms.push_back(
-        {std::make_unique<PointCost>(t.measured, t.sigma_px, R, state.facing), {0, t.point}});
+  for (std::size_t i = 0; i < e.points.size(); ++i) {
+    const PointTerm& t = e.points[i];
+    if (state.point_left_out[i] != 0) continue;
+    terms.push_back({std::make_unique<PointCost>(t.measured, t.sigma_px, e.options.line_loss.type,
+                                                 &state.stretch, R, state.facing),
+                     {0, t.point}});
   }
   for (const AngleTerm& t : e.angles) {
     std::vector<int> blocks;
@@ -189,22 +208,39 @@ double RobustCost(const std::vector<ResidualTerm>& terms, Values* values) {
   return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
 }
 
-// Calls visit(set, distance) for each circle, then visit for each line; `terms` as MakeTerms made
-// them on the evidence's own sets. distance(point): signed, pixels.
+// Calls visit(set, is_circle, distance) for each circle that takes part, then for each line;
+// `terms` as MakeTerms made them on the evidence's own sets. distance(point): signed, pixels.
 template <typename Visit>
-void ForEachCurve(const JointEvidence& e, const std::vector<ResidualTerm>& terms, Values* values,
+void ForEachCurve(const JointEvidence& e, const std::vector<ResidualTerm>& terms, State* state,
                   const Visit& visit) {
   std::size_t term = 0;  // MakeTerms writes circles first, then lines.
-  for (const CircleTerm& t : e.circles) {
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    if (state->circle_left_out[i] != 0) continue;
     const auto* cost = static_cast<const CircleCost*>(terms[term].cost.get());
-    const Eigen::Matrix3d conic = cost->Conic(Pointers(terms[term++].blocks, values).data());
-    visit(t.set, [&](const CalibratedPoint& p) { return ConicDistancePx(p, conic); });
+    const Eigen::Matrix3d conic =
+        cost->Conic(Pointers(terms[term++].blocks, &state->values).data());
+    visit(e.circles[i].set, true,
+          [&](const CalibratedPoint& p) { return ConicDistancePx(p, conic); });
   }
   for (const LineTerm& t : e.lines) {
     const auto* cost = static_cast<const LineCost*>(terms[term].cost.get());
-    const Eigen::Vector3d line = cost->Line(Pointers(terms[term++].blocks, values).data());
-    visit(t.set, [&](const CalibratedPoint& p) { return LineDistancePx(p, line); });
+    const Eigen::Vector3d line = cost->Line(Pointers(terms[term++].blocks, &state->values).data());
+    visit(t.set, false, [&](const CalibratedPoint& p) { return LineDistancePx(p, line); });
   }
+}
+
+// What the circles left out cost: as much as points far off, so that no pose gains by explaining
+// less.
+double LeftOutCost(const JointEvidence& e, const State& state) {
+  constexpr double kFarOffSigmas = 30.0;
+  double cost = 0.0;
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    if (state.circle_left_out[i] == 0) continue;
+    const PointSet& set = e.sets[static_cast<std::size_t>(e.circles[i].set)];
+    cost += 0.5 * static_cast<double>(set.points.size()) *
+            EvaluateLoss(set.loss, kFarOffSigmas * kFarOffSigmas).rho;
+  }
+  return cost;
 }
 
 // Minimises in Ceres; `values` in and out.
@@ -247,14 +283,14 @@ Status Minimize(const std::vector<ResidualTerm>& terms,
 // largest |residual| / tuning constant but for the worst hundredth. Tukey's and Geman-McClure's are
 // convex up to 0.45 and 0.58 of theirs. 1 or less: nothing lies in the tails.
 double RelativeSpread(const JointEvidence& e, const std::vector<ResidualTerm>& terms,
-                      Values* values) {
+                      State* state) {
   std::vector<double> ratios;
   const auto add = [&](const PointSet& set, const auto& distance) {
     for (const CalibratedPoint& p : set.points) {
       ratios.push_back(std::abs(distance(p)) / (set.sigma_px * LossTuningConstant(set.loss)));
     }
   };
-  ForEachCurve(e, terms, values, [&](int set, const auto& distance) {
+  ForEachCurve(e, terms, state, [&](int set, bool, const auto& distance) {
     add(e.sets[static_cast<std::size_t>(set)], distance);
   });
   if (ratios.empty()) return 0.0;
@@ -271,14 +307,14 @@ Status GraduatedMinimize(const JointEvidence& e, const std::vector<ResidualTerm>
   constexpr double kFarOut = 3.0;  // Gaussian noise alone has a spread of 2.2.
   constexpr double kShrink = 0.5;
   constexpr int kIterationsOnTheWay = 5;
-  const double spread = RelativeSpread(e, terms, &state->values);
+  const double spread = RelativeSpread(e, terms, state);
   state->stretch = spread > kFarOut ? spread : 1.0;
   while (state->stretch > 1.0) {
     const Status status = Minimize(terms, e.parameters, e.x_is_fixed,
                                    std::min(kIterationsOnTheWay, max_iterations), &state->values);
     if (!status.ok()) return status;
     state->stretch =
-        std::max(1.0, std::min(kShrink * state->stretch, RelativeSpread(e, terms, &state->values)));
+        std::max(1.0, std::min(kShrink * state->stretch, RelativeSpread(e, terms, state)));
   }
   return Minimize(terms, e.parameters, e.x_is_fixed, max_iterations, &state->values);
 }
@@ -302,6 +338,15 @@ Status Converge(const JointEvidence& e, const CameraPose& seed, int max_iteratio
 }
 
 // --- Results ---
+
+// How far the image of a point in the camera frame misses its measurement, pixels (first order).
+double PointMissPx(const CalibratedPoint& measured, const Eigen::Vector3d& X) {
+  if (!(X.z() > 0.0)) return std::numeric_limits<double>::infinity();
+  Eigen::Matrix2d x_from_pixel;
+  x_from_pixel << measured.x_from_pixel[0], measured.x_from_pixel[1], measured.x_from_pixel[2],
+      measured.x_from_pixel[3];
+  return (x_from_pixel.inverse() * (X.head<2>() / X.z() - measured.x)).norm();
+}
 
 // 1.4826 x the median; `parameters` of the values' degrees of freedom are spent.
 double MadScale(std::vector<double> distances, std::size_t parameters) {
@@ -343,6 +388,13 @@ class InlierFilter {
     h_->num_inliers += static_cast<int>(out.points.size());
   }
 
+  void AddPoint(double miss_px, bool is_inlier) {
+    ++h_->num_observations;
+    if (!is_inlier) return;
+    ++h_->num_inliers;
+    squares_ += miss_px * miss_px;
+  }
+
   std::vector<PointSet> Finish() {
     h_->rms_px = h_->num_inliers > 0 ? std::sqrt(squares_ / h_->num_inliers) : 0.0;
     return std::move(kept_);
@@ -356,14 +408,26 @@ class InlierFilter {
 };
 
 std::vector<PointSet> KeepInliers(const JointEvidence& e, const std::vector<ResidualTerm>& terms,
-                                  Values* values, PoseHypothesis* h, ResidualScales* scales) {
+                                  State* state, PoseHypothesis* h, ResidualScales* scales) {
   InlierFilter filter(e, h);
   std::vector<double> of_circles, of_lines;
-  std::size_t curve = 0;
-  ForEachCurve(e, terms, values, [&](int set, const auto& distance) {
-    const bool is_circle = curve++ < e.circles.size();
+  ForEachCurve(e, terms, state, [&](int set, bool is_circle, const auto& distance) {
     filter.Add(set, is_circle ? 5 : 2, distance, is_circle ? &of_circles : &of_lines);
   });
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    if (state->circle_left_out[i] != 0) {
+      h->num_observations +=
+          static_cast<int>(e.sets[static_cast<std::size_t>(e.circles[i].set)].points.size());
+    }
+  }
+  for (std::size_t i = 0; i < e.points.size(); ++i) {
+    const PointTerm& t = e.points[i];
+    const double* xy = At(state->values, t.point);
+    const double miss_px =
+        PointMissPx(t.measured, state->rotation * Eigen::Vector3d(xy[0], xy[1], state->facing));
+    state->point_left_out[i] = miss_px <= kInlierSigmas * t.sigma_px ? 0 : 1;
+    filter.AddPoint(miss_px, state->point_left_out[i] == 0);
+  }
   constexpr std::size_t kPerCircle = 3, kPerLine = 1, kPose = 3;
   scales->conic_px = MadScale(of_circles, kPose + kPerCircle * e.circles.size());
   scales->line_px = MadScale(of_lines, kPose + kPerLine * e.lines.size());
@@ -438,9 +502,12 @@ void FillFreeDirections(const Eigen::MatrixXd& T, const Eigen::MatrixXd& null_sp
 // invariant measure, the first circle's centre uniform in space in units of its radius, the others
 // in the plane in the same unit, radii by their logarithm. Log of (that measure / the parameters'
 // own).
-double LogMeasure(const JointEvidence& e, const Values& values) {
+double LogMeasure(const JointEvidence& e, const State& state) {
+  const Values& values = state.values;
   double first_radius = 0.0, log_measure = 0.0;
-  for (const CircleTerm& t : e.circles) {
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    const CircleTerm& t = e.circles[i];
+    if (state.circle_left_out[i] != 0) continue;
     const double radius =
         std::abs(t.radius < 0 ? At(values, t.center)[2] : t.factor * At(values, t.radius)[0]);
     if (first_radius == 0.0) {
@@ -455,7 +522,9 @@ double LogMeasure(const JointEvidence& e, const Values& values) {
 
 void FillFeatures(const JointEvidence& e, const State& state, double unit, PoseHypothesis* h) {
   const Eigen::Matrix3d& R = state.rotation;
-  for (const CircleTerm& t : e.circles) {
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    const CircleTerm& t = e.circles[i];
+    if (state.circle_left_out[i] != 0) continue;
     const double* c = At(state.values, t.center);
     CircleEstimate estimate;
     estimate.id = e.observations.circles[static_cast<std::size_t>(t.observation)].id;
@@ -510,7 +579,8 @@ bool JointProblem::spin_is_free() const { return !evidence_->x_is_fixed; }
 double JointProblem::SeedCost(const CameraPose& seed) const {
   State state;
   if (!Initialize(*evidence_, seed, &state)) return std::numeric_limits<double>::infinity();
-  return RobustCost(MakeTerms(*evidence_, evidence_->sets, state), &state.values);
+  return RobustCost(MakeTerms(*evidence_, evidence_->sets, state), &state.values) +
+         LeftOutCost(*evidence_, state);
 }
 
 Status JointProblem::ApproachFrom(const CameraPose& seed, Approach* approach) const {
@@ -522,8 +592,8 @@ Status JointProblem::ApproachFrom(const CameraPose& seed, Approach* approach) co
       Converge(e, seed, std::min(kFirstIterations, e.options.max_iterations), &state);
   if (!status.ok()) return status;
   const std::vector<ResidualTerm> terms = MakeTerms(e, e.sets, state);
-  approach->cost = RobustCost(terms, &state.values);
-  KeepInliers(e, terms, &state.values, &h, &approach->scales);
+  approach->cost = RobustCost(terms, &state.values) + LeftOutCost(e, state);
+  KeepInliers(e, terms, &state, &h, &approach->scales);
   FillPose(e, state, OriginInPlane(e, state, seed), &h);
   approach->pose = h.cam_from_world;
   const bool finite = std::isfinite(approach->cost) && approach->pose.rotation.allFinite() &&
@@ -539,9 +609,9 @@ Status JointProblem::Refine(const CameraPose& seed, PoseHypothesis* h) const {
   if (!status.ok()) return status;
   const bool hold_spin = !e.x_is_fixed;
   const std::vector<ResidualTerm> terms = MakeTerms(e, e.sets, state);
-  h->cost = RobustCost(terms, &state.values);
+  h->cost = RobustCost(terms, &state.values) + LeftOutCost(e, state);
   ResidualScales unused;
-  const std::vector<PointSet> inliers = KeepInliers(e, terms, &state.values, h, &unused);
+  const std::vector<PointSet> inliers = KeepInliers(e, terms, &state, h, &unused);
 
   SharedCovariance shared;
   const std::vector<ResidualTerm> inlier_terms = MakeTerms(e, inliers, state);
@@ -557,8 +627,8 @@ Status JointProblem::Refine(const CameraPose& seed, PoseHypothesis* h) const {
   const Matrix6d covariance = inflation * T * shared.covariance * T.transpose();
   Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
   FillFreeDirections(T, shared.null_space, hold_spin, state.rotation, h);
-  h->rank = static_cast<int>(Eigen::FullPivLU<Matrix6d>(covariance).setThreshold(1e-9).rank());
-  h->log_det = shared.log_det + 2.0 * LogMeasure(e, state.values);
+  h->rank = CovarianceRank(covariance);
+  h->log_det = shared.log_det + 2.0 * LogMeasure(e, state);
   FillFeatures(e, state, h->cam_from_world.translation.norm() / origin.norm(), h);
   const bool finite = covariance.allFinite() && h->cam_from_world.rotation.allFinite() &&
                       h->cam_from_world.translation.allFinite() && std::isfinite(h->log_det);

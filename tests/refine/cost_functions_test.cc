@@ -113,8 +113,11 @@ TEST(PointCostTest, JacobianMatchesDifferences) {
   p.x = {0.1, 0.2};
   p.x_from_pixel = {2e-3, 1e-4, -1e-4, 2.2e-3};
   // facing 1 and a rotation near the identity: the plane Z = 1 is in front of the camera.
-  const PointCost cost(p, 0.5, ExpRotation({0.1, 0.2, 0.3}), 1.0);
-  EXPECT_LT(JacobianError(cost, {{0.1, -0.2, 0.1}, {0.3, -0.2}}), 1e-6);
+  const double stretch = 20.0;
+  for (LossType loss : {LossType::kTrivial, LossType::kCauchy, LossType::kTukey}) {
+    const PointCost cost(p, 5.0, loss, &stretch, ExpRotation({0.1, 0.2, 0.3}), 1.0);
+    EXPECT_LT(JacobianError(cost, {{0.1, -0.2, 0.1}, {0.3, -0.2}}), 1e-6);
+  }
 }
 
 TEST(AngleCostTest, JacobianMatchesDifferencesAndSenseDoesNotMatter) {

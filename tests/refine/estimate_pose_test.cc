@@ -146,9 +146,10 @@ TEST(EstimatePoseTest, RobustLossSurvivesOutliers) {
   const PoseEstimate estimate = EstimatePose(observations, options);
   ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
   EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.02);
+  // 85 points and the centre, but for a few beyond the gate by chance.
   EXPECT_LE(estimate.hypotheses[0].num_inliers, 86);
   EXPECT_GE(estimate.hypotheses[0].num_inliers, 83);
-  EXPECT_EQ(estimate.hypotheses[0].num_observations, 100);
+  EXPECT_EQ(estimate.hypotheses[0].num_observations, 101);
 }
 
 TEST(EstimatePoseTest, RefusalsAndBadInputHaveASentence) {
