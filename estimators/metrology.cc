@@ -1,0 +1,263 @@
+#include "circline/estimators/metrology.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kPi = 3.14159265358979323846;
+
+Vector3d CameraCenter(const CameraPose& pose) {
+  return -(pose.rotation.transpose() * pose.translation);
+}
+
+// Columns of the homography that takes (X, Y, 1) to the image.
+Matrix3d ImageFromPlane(const CameraPose& pose) {
+  Matrix3d H = pose.rotation;
+  H.col(2) = pose.translation;
+  return H;
+}
+
+double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+// Both segments as vectors on the plane.
+bool VectorsOnPlane(const CameraPose& pose, const SegmentPair& segments, Vector2d* first,
+                    Vector2d* second) {
+  std::array<Vector2d, 4> p;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!PointOnPlane(pose, segments[i], &p[i])) return false;
+  }
+  *first = p[1] - p[0];
+  *second = p[3] - p[2];
+  return true;
+}
+
+// Differences of angles are small.
+double Wrapped(double angle) { return std::remainder(angle, 2.0 * kPi); }
+double Plain(double difference) { return difference; }
+
+// The measurement and its variance, by central differences along every pixel coordinate and every
+// parameter of the pose. `subtract` tells how values are compared.
+bool Propagate(bool (*measure)(const CameraPose&, const SegmentPair&, double*),
+               double (*subtract)(double), const CameraPose& pose,
+               const std::array<double, 36>& pose_covariance, const MeasuredSegmentPair& points,
+               double sigma_px, Measurement* result) {
+  SegmentPair x;
+  for (std::size_t i = 0; i < 4; ++i) x[i] = points[i].Homogeneous();
+  Measurement m;
+  if (!measure(pose, x, &m.value)) return false;
+
+  constexpr double kStepPx = 1e-3;
+  double variance = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Vector3d step(kStepPx * points[i].x_from_pixel[k],
+                          kStepPx * points[i].x_from_pixel[2 + k], 0.0);
+      SegmentPair up = x, down = x;
+      up[i] += step;
+      down[i] -= step;
+      double high, low;
+      if (!measure(pose, up, &high) || !measure(pose, down, &low)) return false;
+      const double gradient = subtract(high - low) / (2.0 * kStepPx);
+      variance += gradient * gradient * sigma_px * sigma_px;
+    }
+  }
+  constexpr double kStep = 1e-6;  // Radians, and in units of the translation's length.
+  const double length = pose.translation.norm();
+  Vector6d gradient;
+  for (int k = 0; k < 6; ++k) {
+    const double h = k < 3 ? kStep : kStep * length;
+    double values[2];
+    for (int side = 0; side < 2; ++side) {
+      CameraPose moved = pose;
+      Vector3d step = Vector3d::Zero();
+      step[k % 3] = side == 0 ? h : -h;
+      if (k < 3) {
+        moved.rotation = ExpRotation(step) * pose.rotation;
+      } else {
+        moved.translation += step;
+      }
+      if (!measure(moved, x, &values[side])) return false;
+    }
+    gradient[k] = subtract(values[0] - values[1]) / (2.0 * h);
+  }
+  variance += gradient.dot(Eigen::Map<const Matrix6d>(pose_covariance.data()) * gradient);
+  m.sigma = std::sqrt(std::fmax(0.0, variance));
+  if (!std::isfinite(variance)) return false;
+  *result = m;
+  return true;
+}
+
+}  // namespace
+
+bool RayOfPoint(const CameraPose& pose, const Vector3d& x, WorldRay* ray) {
+  const WorldRay result = {CameraCenter(pose), pose.rotation.transpose() * x.stableNormalized()};
+  if (!result.origin.allFinite() || !result.direction.allFinite() ||
+      !(result.direction.squaredNorm() > 0.0)) {
+    return false;
+  }
+  *ray = result;
+  return true;
+}
+
+bool PlaneOfLine(const CameraPose& pose, const Vector3d& line, WorldPlane* plane) {
+  const Vector3d unit = line.stableNormalized();
+  const WorldPlane result = {pose.rotation.transpose() * unit, unit.dot(pose.translation)};
+  if (!result.normal.allFinite() || !std::isfinite(result.offset) ||
+      !(result.normal.squaredNorm() > 0.0)) {
+    return false;
+  }
+  *plane = result;
+  return true;
+}
+
+bool ConeOfConic(const CameraPose& pose, const Matrix3d& conic, WorldCone* cone) {
+  const WorldCone result = {CameraCenter(pose), pose.rotation.transpose() * conic * pose.rotation};
+  if (!result.apex.allFinite() || !result.form.allFinite() || result.form.isZero(0.0)) return false;
+  *cone = result;
+  return true;
+}
+
+bool PointOnPlane(const CameraPose& pose, const Vector3d& x, Vector2d* point) {
+  // The ray meets r3 . (X - t) = 0 at depth X = s x; s > 0 is this side of the horizon.
+  const Vector3d r3 = pose.rotation.col(2);
+  const double s = r3.dot(pose.translation) / r3.dot(x);
+  if (!(s > 0.0)) return false;
+  const Vector3d offset = s * x - pose.translation;
+  const Vector2d result(pose.rotation.col(0).dot(offset), pose.rotation.col(1).dot(offset));
+  if (!result.allFinite()) return false;
+  *point = result;
+  return true;
+}
+
+bool LineOnPlane(const CameraPose& pose, const Vector3d& line, Vector3d* plane_line) {
+  const Vector3d l = ImageFromPlane(pose).transpose() * line.stableNormalized();
+  const double norm = l.head<2>().norm();
+  constexpr double kMinSine = 1e-15;  // Of the angle to the horizon; below, all is rounding.
+  if (!(norm > kMinSine)) return false;
+  const Vector3d result = l / norm;
+  if (!result.allFinite()) return false;
+  *plane_line = result;
+  return true;
+}
+
+bool ConicOnPlane(const CameraPose& pose, const Matrix3d& conic, Ellipse* ellipse) {
+  // A length of order 1 on the plane, whatever the unit of the translation.
+  const double unit = pose.translation.norm();
+  if (!(unit > 0.0) || !std::isfinite(unit)) return false;
+  const CameraPose scaled = {pose.rotation, pose.translation / unit};
+  Matrix3d image;
+  Ellipse result;
+  const Matrix3d H = ImageFromPlane(scaled);
+  if (!NormalizeEllipse(conic, &image) || !ConicToEllipse(TransformConic(image, H), &result)) {
+    return false;
+  }
+  // An ellipse all of which lies beyond the horizon is one of the plane behind the camera.
+  const Vector3d center = H * result.center.homogeneous();
+  if (!(center.z() > 0.0)) return false;
+  result.center *= unit;
+  result.a *= unit;
+  result.b *= unit;
+  if (!std::isfinite(result.a) || !result.center.allFinite() || !(result.b > 0.0)) return false;
+  *ellipse = result;
+  return true;
+}
+
+bool RectifyingHomography(const CameraPose& pose, Matrix3d* plane_from_image) {
+  // The inverse of [r1 r2 t] up to the factor r3 . t.
+  const Vector3d r1 = pose.rotation.col(0), r2 = pose.rotation.col(1), r3 = pose.rotation.col(2);
+  const Vector3d& t = pose.translation;
+  const double distance = r3.dot(t);
+  Matrix3d H;
+  H.row(0) = r2.cross(t);
+  H.row(1) = t.cross(r1);
+  H.row(2) = r3;
+  if (distance < 0.0) H = -H;
+  const double norm = H.norm();
+  constexpr double kMinSine = 1e-15;  // Of the angle at which the plane's origin is seen.
+  if (!(std::abs(distance) > kMinSine * t.norm()) || !std::isfinite(norm)) return false;
+  *plane_from_image = H / norm;
+  return true;
+}
+
+bool LengthOnPlane(const CameraPose& pose, const Vector3d& a, const Vector3d& b, double* length) {
+  Vector2d p, q;
+  if (!PointOnPlane(pose, a, &p) || !PointOnPlane(pose, b, &q)) return false;
+  const double result = (q - p).stableNorm();
+  if (!std::isfinite(result)) return false;
+  *length = result;
+  return true;
+}
+
+bool LengthRatio(const CameraPose& pose, const SegmentPair& segments, double* ratio) {
+  Vector2d first, second;
+  if (!VectorsOnPlane(pose, segments, &first, &second)) return false;
+  const double result = first.stableNorm() / second.stableNorm();
+  if (!std::isfinite(result)) return false;
+  *ratio = result;
+  return true;
+}
+
+bool AngleOnPlane(const CameraPose& pose, const SegmentPair& segments, double* angle) {
+  Vector2d first, second;
+  if (!VectorsOnPlane(pose, segments, &first, &second)) return false;
+  first = first.stableNormalized();
+  second = second.stableNormalized();
+  if (!(first.squaredNorm() > 0.0) || !(second.squaredNorm() > 0.0)) return false;
+  const double result = std::atan2(Cross(first, second), first.dot(second));
+  if (!std::isfinite(result)) return false;
+  *angle = result;
+  return true;
+}
+
+bool AreaOnPlane(const CameraPose& pose, const std::vector<Vector3d>& corners, double* area) {
+  if (corners.size() < 3) return false;
+  // A fan of triangles about the first corner: no large coordinates cancel.
+  Vector2d first, previous, next;
+  if (!PointOnPlane(pose, corners[0], &first) || !PointOnPlane(pose, corners[1], &previous)) {
+    return false;
+  }
+  double sum = 0.0;
+  for (std::size_t i = 2; i < corners.size(); ++i) {
+    if (!PointOnPlane(pose, corners[i], &next)) return false;
+    sum += Cross(previous - first, next - first);
+    previous = next;
+  }
+  if (!std::isfinite(sum)) return false;
+  *area = 0.5 * std::abs(sum);
+  return true;
+}
+
+bool HeightOverPlane(const CameraPose& pose, const Vector3d& foot, const Vector3d& top,
+                     double* height) {
+  Vector2d on_plane;
+  if (!PointOnPlane(pose, foot, &on_plane)) return false;
+  const Vector3d base = ImageFromPlane(pose) * on_plane.homogeneous();
+  const Vector3d r3 = pose.rotation.col(2), ray = top.stableNormalized();
+  // base + h r3 is along the ray, as far as noise allows: least squares over h.
+  const Vector3d moment = r3.cross(ray);
+  const double square = moment.squaredNorm();
+  constexpr double kMinSine = 1e-12;
+  if (!(square > kMinSine * kMinSine)) return false;
+  const double h = -base.cross(ray).dot(moment) / square;
+  if (!std::isfinite(h) || !(ray.dot(base + h * r3) > 0.0)) return false;
+  *height = h;
+  return true;
+}
+
+bool LengthRatio(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
+                 const MeasuredSegmentPair& segments, double sigma_px, Measurement* ratio) {
+  return Propagate(&LengthRatio, &Plain, pose, pose_covariance, segments, sigma_px, ratio);
+}
+
+bool AngleOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
+                  const MeasuredSegmentPair& segments, double sigma_px, Measurement* angle) {
+  return Propagate(&AngleOnPlane, &Wrapped, pose, pose_covariance, segments, sigma_px, angle);
+}
+
+}  // namespace circline

@@ -1,0 +1,251 @@
+#include "circline/estimators/metrology.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/random.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kPi = 3.14159265358979323846;
+
+// The plane seen from above at a slant, +Z towards the camera or away from it.
+CameraPose SlantedPose(bool towards = true) {
+  CameraPose pose;
+  const double side = towards ? -1.0 : 1.0;
+  pose.rotation = ExpRotation({0.9, 0.1, 0.0}) * ExpRotation({0.0, 0.0, 0.4}) *
+                  Vector3d(1.0, side, side).asDiagonal();
+  pose.translation = {0.2, -0.3, 6.0};
+  return pose;
+}
+
+Vector3d Image(const CameraPose& pose, double x, double y, double z = 0.0) {
+  return pose.rotation * Vector3d(x, y, z) + pose.translation;
+}
+
+Vector3d ImageLine(const CameraPose& pose, const Vector2d& a, const Vector2d& b) {
+  return Image(pose, a.x(), a.y()).cross(Image(pose, b.x(), b.y()));
+}
+
+class MetrologyTest : public ::testing::TestWithParam<bool> {
+ protected:
+  const CameraPose pose_ = SlantedPose(GetParam());
+  Random random_{1};
+};
+
+INSTANTIATE_TEST_SUITE_P(BothSides, MetrologyTest, ::testing::Bool());
+
+TEST_P(MetrologyTest, PointsComeBack) {
+  for (int i = 0; i < 1000; ++i) {
+    const Vector2d truth(random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0));
+    const Vector3d x = Image(pose_, truth.x(), truth.y());
+    Vector2d point;
+    ASSERT_TRUE(PointOnPlane(pose_, x / x.z(), &point));
+    EXPECT_LT((point - truth).norm(), 1e-12);
+    // What lies on the same line of sight, behind the camera, is not seen.
+    EXPECT_FALSE(PointOnPlane(pose_, -x, &point));
+    WorldRay ray;
+    ASSERT_TRUE(RayOfPoint(pose_, x, &ray));
+    const Vector3d to_point = Vector3d(truth.x(), truth.y(), 0.0) - ray.origin;
+    EXPECT_LT(to_point.cross(ray.direction).norm(), 1e-12);
+    EXPECT_GT(to_point.dot(ray.direction), 0.0);
+  }
+}
+
+TEST_P(MetrologyTest, NothingIsSeenAtTheHorizonAndBeyond) {
+  // The direction (1, 0, 0) of the plane, and what lies a little over and under it.
+  const Vector3d horizon = pose_.rotation.col(0), up = pose_.rotation.col(2);
+  const double side = up.dot(pose_.translation) < 0.0 ? 1.0 : -1.0;  // Towards the camera.
+  Vector2d point(7.0, 7.0);
+  EXPECT_FALSE(PointOnPlane(pose_, horizon + 0.01 * side * up, &point));
+  EXPECT_EQ(point, Vector2d(7.0, 7.0));
+  EXPECT_TRUE(PointOnPlane(pose_, horizon - 0.01 * side * up, &point));
+  Vector3d line;
+  EXPECT_FALSE(LineOnPlane(pose_, up, &line));
+  double value = 7.0;
+  const Vector3d seen = Image(pose_, 0.0, 0.0), unseen = horizon + 0.01 * side * up;
+  EXPECT_FALSE(LengthOnPlane(pose_, seen, unseen, &value));
+  EXPECT_FALSE(LengthRatio(pose_, {seen, Image(pose_, 1, 0), seen, unseen}, &value));
+  EXPECT_FALSE(LengthRatio(pose_, {seen, Image(pose_, 1, 0), seen, seen}, &value));
+  EXPECT_FALSE(AngleOnPlane(pose_, {seen, Image(pose_, 1, 0), seen, seen}, &value));
+  EXPECT_FALSE(AreaOnPlane(pose_, {seen, Image(pose_, 1, 0), unseen}, &value));
+  EXPECT_FALSE(AreaOnPlane(pose_, {seen, Image(pose_, 1, 0)}, &value));
+  EXPECT_FALSE(HeightOverPlane(pose_, unseen, seen, &value));
+  EXPECT_FALSE(HeightOverPlane(pose_, seen, up, &value));  // End-on.
+  EXPECT_EQ(value, 7.0);
+}
+
+TEST_P(MetrologyTest, LinesComeBack) {
+  for (int i = 0; i < 1000; ++i) {
+    const Vector2d a(random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0));
+    const Vector2d b(random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0));
+    if ((a - b).norm() < 0.1) continue;
+    const Vector3d image = 5.0 * ImageLine(pose_, a, b);
+    Vector3d line;
+    ASSERT_TRUE(LineOnPlane(pose_, image, &line));
+    EXPECT_NEAR(line.head<2>().norm(), 1.0, 1e-14);
+    EXPECT_NEAR(line.dot(a.homogeneous()), 0.0, 1e-11);
+    EXPECT_NEAR(line.dot(b.homogeneous()), 0.0, 1e-11);
+    WorldPlane plane;
+    ASSERT_TRUE(PlaneOfLine(pose_, image, &plane));
+    EXPECT_NEAR(plane.normal.dot(Vector3d(a.x(), a.y(), 0.0)) + plane.offset, 0.0, 1e-12);
+    EXPECT_NEAR(plane.normal.dot(-pose_.rotation.transpose() * pose_.translation) + plane.offset,
+                0.0, 1e-12);
+  }
+}
+
+TEST_P(MetrologyTest, CirclesComeBackAsCircles) {
+  for (int i = 0; i < 1000; ++i) {
+    const Vector2d center(random_.Uniform(-2.0, 2.0), random_.Uniform(-2.0, 2.0));
+    const double radius = random_.Uniform(0.1, 2.0);
+    CirclePose circle;
+    circle.center = Image(pose_, center.x(), center.y()) / radius;
+    circle.normal = pose_.rotation.col(2);
+    const Matrix3d conic = -7.0 * ProjectCircle(circle);
+    Ellipse ellipse;
+    ASSERT_TRUE(ConicOnPlane(pose_, conic, &ellipse));
+    EXPECT_LT((ellipse.center - center).norm(), 1e-11);
+    EXPECT_NEAR(ellipse.a, radius, 1e-11);
+    EXPECT_NEAR(ellipse.b, radius, 1e-11);
+    WorldCone cone;
+    ASSERT_TRUE(ConeOfConic(pose_, conic, &cone));
+    const Vector3d rim = Vector3d(center.x() + radius, center.y(), 0.0) - cone.apex;
+    EXPECT_NEAR(rim.dot(cone.form * rim), 0.0, 1e-11);
+  }
+}
+
+TEST_P(MetrologyTest, ConicsOnOrBeyondTheHorizonHaveNoEllipse) {
+  // Small circles of the image about a point of the horizon, and on either side of it.
+  const Vector3d up = pose_.rotation.col(2);
+  const double side = up.dot(pose_.translation) < 0.0 ? 1.0 : -1.0;
+  Vector3d ahead = Vector3d::UnitZ() - up.z() * up;
+  ahead.normalize();
+  const auto circle = [&](double elevation) {
+    const Vector3d x = ahead + elevation * side * up;
+    return EllipseToConic({Vector2d(x.x() / x.z(), x.y() / x.z()), 0.02, 0.02, 0.0});
+  };
+  Ellipse ellipse;
+  EXPECT_TRUE(ConicOnPlane(pose_, circle(-0.2), &ellipse));
+  EXPECT_FALSE(ConicOnPlane(pose_, circle(0.0), &ellipse));
+  EXPECT_FALSE(ConicOnPlane(pose_, circle(0.2), &ellipse));
+}
+
+TEST_P(MetrologyTest, HomographyRectifies) {
+  Matrix3d H;
+  ASSERT_TRUE(RectifyingHomography(pose_, &H));
+  for (int i = 0; i < 1000; ++i) {
+    const Vector2d truth(random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0));
+    const Vector3d p = H * Image(pose_, truth.x(), truth.y());
+    EXPECT_GT(p.z(), 0.0);
+    EXPECT_LT((p.hnormalized() - truth).norm(), 1e-12);
+  }
+}
+
+TEST_P(MetrologyTest, RatiosAnglesAreasAndHeights) {
+  const auto at = [this](double x, double y, double z = 0.0) { return Image(pose_, x, y, z); };
+  double value;
+  ASSERT_TRUE(LengthOnPlane(pose_, at(1, 1), at(4, 5), &value));
+  EXPECT_NEAR(value, 5.0, 1e-12);
+  ASSERT_TRUE(LengthRatio(pose_, {at(0, 0), at(1, 1), at(-1, 0), at(-1, 2)}, &value));
+  EXPECT_NEAR(value, std::sqrt(0.5), 1e-13);
+  ASSERT_TRUE(AngleOnPlane(pose_, {at(0, 0), at(1, 0), at(2, 1), at(2, 2)}, &value));
+  EXPECT_NEAR(value, 0.5 * kPi, 1e-13);
+  ASSERT_TRUE(AngleOnPlane(pose_, {at(0, 0), at(1, 0), at(2, 2), at(1, 1)}, &value));
+  EXPECT_NEAR(value, -0.75 * kPi, 1e-13);
+  ASSERT_TRUE(
+      AreaOnPlane(pose_, {at(0, 0), at(2, 0), at(2, 1), at(1, 1), at(1, 2), at(0, 2)}, &value));
+  EXPECT_NEAR(value, 3.0, 1e-12);
+  for (const double z : {0.7, -0.4}) {
+    ASSERT_TRUE(HeightOverPlane(pose_, at(1, -1), at(1, -1, z), &value));
+    EXPECT_NEAR(value, z, 1e-12);
+  }
+  // A top that misses the perpendicular by a little: the nearest point of it.
+  ASSERT_TRUE(HeightOverPlane(pose_, at(1, -1), at(1.001, -1, 0.7), &value));
+  EXPECT_NEAR(value, 0.7, 2e-3);
+}
+
+TEST_P(MetrologyTest, RatiosDoNotDependOnTheUnit) {
+  CameraPose small = pose_;
+  small.translation *= 1e-150;
+  const SegmentPair segments = {Image(pose_, 0, 0), Image(pose_, 1, 1), Image(pose_, -1, 0),
+                                Image(pose_, -1, 2)};
+  double ratio, same;
+  ASSERT_TRUE(LengthRatio(pose_, segments, &ratio));
+  ASSERT_TRUE(LengthRatio(small, segments, &same));
+  EXPECT_NEAR(ratio, same, 1e-13);
+}
+
+TEST(MetrologyPoseTest, ACameraInThePlaneSeesNothingOfIt) {
+  CameraPose pose;
+  pose.rotation = ExpRotation({0.5 * kPi, 0.0, 0.0});
+  pose.translation = {0.0, 0.0, 5.0};
+  pose.rotation.col(2) = Vector3d(0.0, 1.0, 0.0);  // Exactly across the optical axis.
+  Vector2d point;
+  Matrix3d H;
+  EXPECT_FALSE(PointOnPlane(pose, {0.1, 0.2, 1.0}, &point));
+  EXPECT_FALSE(RectifyingHomography(pose, &H));
+  pose.translation.y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(PointOnPlane(pose, {0.1, 0.2, 1.0}, &point));
+  EXPECT_FALSE(RectifyingHomography(pose, &H));
+}
+
+// Propagated standard deviations against the spread of simulated measurements.
+TEST(MetrologyUncertaintyTest, SigmaIsTheSpread) {
+  const CameraPose pose = SlantedPose();
+  constexpr double kFocal = 800.0, kSigmaPx = 0.3;
+  Random random(2);
+  // Some full covariance, of 2 mrad and 1 % of the distance or so.
+  Matrix6d root;
+  for (int i = 0; i < 36; ++i) root(i / 6, i % 6) = 1e-3 * random.Normal();
+  root.bottomRows<3>() *= 6.0;
+  std::array<double, 36> covariance;
+  Eigen::Map<Matrix6d>(covariance.data()) = root * root.transpose();
+
+  const std::array<Vector2d, 4> corners = {Vector2d(0, 0), Vector2d(1, 0.2), Vector2d(-1, 1),
+                                           Vector2d(-0.5, 2)};
+  MeasuredSegmentPair segments;
+  for (std::size_t i = 0; i < 4; ++i) {
+    segments[i].x = Image(pose, corners[i].x(), corners[i].y()).hnormalized();
+    segments[i].x_from_pixel = {1.0 / kFocal, 0.0, 0.0, 1.0 / kFocal};
+  }
+  Measurement ratio, angle;
+  ASSERT_TRUE(LengthRatio(pose, covariance, segments, kSigmaPx, &ratio));
+  ASSERT_TRUE(AngleOnPlane(pose, covariance, segments, kSigmaPx, &angle));
+
+  double ratio_sum = 0.0, angle_sum = 0.0;
+  constexpr int kTrials = 20000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Vector6d z;
+    for (int k = 0; k < 6; ++k) z[k] = random.Normal();
+    const Vector6d delta = root * z;
+    CameraPose noisy = pose;
+    noisy.rotation = ExpRotation(delta.head<3>()) * pose.rotation;
+    noisy.translation += delta.tail<3>();
+    SegmentPair x;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const double dx = random.Normal(), dy = random.Normal();
+      x[i] = (segments[i].x + kSigmaPx / kFocal * Vector2d(dx, dy)).homogeneous();
+    }
+    double r, a;
+    ASSERT_TRUE(LengthRatio(noisy, x, &r));
+    ASSERT_TRUE(AngleOnPlane(noisy, x, &a));
+    ratio_sum += (r - ratio.value) * (r - ratio.value);
+    angle_sum += (a - angle.value) * (a - angle.value);
+  }
+  EXPECT_NEAR(ratio.sigma / std::sqrt(ratio_sum / kTrials), 1.0, 0.03);
+  EXPECT_NEAR(angle.sigma / std::sqrt(angle_sum / kTrials), 1.0, 0.03);
+}
+
+}  // namespace
+}  // namespace circline
