@@ -22,9 +22,11 @@ foreach(module estimators ransac refine)
   install(FILES ${headers} DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/circline/${module}")
 endforeach()
 
-if(TARGET circline_compare)
-  install(TARGETS circline_compare RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
-endif()
+foreach(app compare simulate)
+  if(TARGET circline_${app})
+    install(TARGETS circline_${app} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
+  endif()
+endforeach()
 
 configure_package_config_file(
   "${PROJECT_SOURCE_DIR}/cmake/circline-config.cmake.in"

@@ -1,0 +1,94 @@
+#include "apps/simulate/options.h"
+
+#include <gflags/gflags.h>
+
+#include "apps/common/text.h"
+
+DEFINE_int32(trials, 200, "Images for each noise level and outlier ratio; 1 or more.");
+DEFINE_string(noise_px, "0,0.5,1,1.5,2,2.5,3",
+              "Standard deviations of the Gaussian noise on both coordinates of every point, "
+              "pixels, separated by commas.");
+DEFINE_string(outlier_ratio, "0",
+              "Shares of the points of every feature that are replaced by outliers, 0 to 0.8, "
+              "separated by commas.");
+DEFINE_string(outlier_kind, "band",
+              "band: uniform within 40 px of the feature; cluster: all in one disc of 15 px radius "
+              "whose centre lies 40 px off the feature.");
+DEFINE_double(focal, 1800.0, "Focal length, pixels.");
+DEFINE_string(translation, "2,2,100", "Of the camera: the world's origin in its frame.");
+DEFINE_uint64(seed, 1, "Same flags and seed: same bytes out, whatever the threads.");
+DEFINE_int32(threads, 0, "Images worked on at a time; 0 = one for each core.");
+DEFINE_double(inlier_sigmas, circline::apps::SimulationOptions().inlier_sigmas,
+              "With outliers: a point farther than this from its curve is one, in standard "
+              "deviations of the noise; at most 3.03 is taken.");
+DEFINE_string(robust_loss, "auto",
+              "Loss of the refined methods: trivial, huber, soft_l_one, cauchy, arctan, tukey, "
+              "geman_mcclure; auto: trivial without outliers, tukey with them.");
+DEFINE_string(output, "", "Folder for the results; created if need be.");
+
+namespace circline::apps {
+namespace {
+
+Status ReadNumbers(const std::string& flag, const std::string& text, std::vector<double>* values) {
+  values->clear();
+  for (const std::string& part : SplitList(text)) {
+    double value;
+    if (!ParseDouble(part, &value))
+      return Status::Invalid("--" + flag + ": '" + part + "' is not a number");
+    values->push_back(value);
+  }
+  return Status::Ok();
+}
+
+Status ReadTranslation(Eigen::Vector3d* translation) {
+  std::vector<double> values;
+  const Status status = ReadNumbers("translation", FLAGS_translation, &values);
+  if (!status.ok()) return status;
+  if (values.size() != 3) return Status::Invalid("--translation: must be three numbers: x,y,z");
+  *translation = Eigen::Vector3d(values[0], values[1], values[2]);
+  return Status::Ok();
+}
+
+Status ReadOutlierKind(OutlierKind* kind) {
+  if (FLAGS_outlier_kind != "band" && FLAGS_outlier_kind != "cluster") {
+    return Status::Invalid("--outlier_kind: '" + FLAGS_outlier_kind + "' is not band or cluster" +
+                           DidYouMean(FLAGS_outlier_kind, {"band", "cluster"}));
+  }
+  *kind = FLAGS_outlier_kind == "band" ? OutlierKind::kBand : OutlierKind::kCluster;
+  return Status::Ok();
+}
+
+Status ReadLoss(SimulationOptions* options) {
+  if (FLAGS_robust_loss == "auto") return Status::Ok();
+  if (!LossFromName(FLAGS_robust_loss, &options->loss)) {
+    return Status::Invalid("--robust_loss: '" + FLAGS_robust_loss + "' is not one of auto, " +
+                           JoinList(LossNames(), ", ") +
+                           DidYouMean(FLAGS_robust_loss, LossNames()));
+  }
+  options->outlier_loss = options->loss;
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status SimulationFromFlags(SimulationOptions* options, std::string* output) {
+  options->trials = FLAGS_trials;
+  options->focal_px = FLAGS_focal;
+  options->seed = FLAGS_seed;
+  options->threads = FLAGS_threads;
+  options->inlier_sigmas = FLAGS_inlier_sigmas;
+  *output = FLAGS_output;
+  Status status = ReadNumbers("noise_px", FLAGS_noise_px, &options->noise_px);
+  if (status.ok())
+    status = ReadNumbers("outlier_ratio", FLAGS_outlier_ratio, &options->outlier_ratios);
+  if (status.ok()) status = ReadTranslation(&options->translation);
+  if (status.ok()) status = ReadOutlierKind(&options->outlier_kind);
+  if (status.ok()) status = ReadLoss(options);
+  if (!status.ok()) return status;
+  status = options->Validate();  // Its sentences begin with the flag's name.
+  if (!status.ok()) return Status::Invalid("--" + status.message);
+  if (output->empty()) return Status::Invalid("--output is missing: the folder for the results");
+  return Status::Ok();
+}
+
+}  // namespace circline::apps

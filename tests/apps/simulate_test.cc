@@ -1,0 +1,146 @@
+// circline_simulate as its users run it.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/apps/test_files.h"
+
+namespace circline::apps {
+namespace {
+
+constexpr char kHeader[] =
+    "noise_px,outlier_ratio,method,trials,failures,axis_mean_rad,axis_std_rad,angle_mean_rad,"
+    "angle_std_rad,rotation_rms_rad,bound_rms_rad,nees_mean";
+
+// Exit code; what it says on stderr goes to `err`.
+int RunSimulate(const std::string& arguments, std::string* err = nullptr) {
+  const TestFolder folder;
+  const std::string command = std::string("'") + CIRCLINE_SIMULATE + "' " + arguments +
+                              " >/dev/null 2>'" + folder / "err" + "' </dev/null";
+  const int status = std::system(command.c_str());
+  if (err != nullptr) *err = ReadAll(folder / "err");
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+using Row = std::map<std::string, std::string>;
+
+std::vector<std::string> Cells(const std::string& line) {
+  std::vector<std::string> cells(1);
+  for (const char c : line) {
+    if (c == ',') {
+      cells.emplace_back();
+    } else {
+      cells.back() += c;
+    }
+  }
+  return cells;
+}
+
+std::vector<Row> ReadCsv(const std::string& path) {
+  std::istringstream text(ReadAll(path));
+  std::string line;
+  std::getline(text, line);
+  EXPECT_EQ(line, kHeader);
+  const std::vector<std::string> names = Cells(line);
+  std::vector<Row> rows;
+  while (std::getline(text, line)) {
+    const std::vector<std::string> cells = Cells(line);
+    EXPECT_EQ(cells.size(), names.size()) << line;
+    Row row;
+    for (std::size_t i = 0; i < std::min(cells.size(), names.size()); ++i) row[names[i]] = cells[i];
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+TEST(Simulate, WritesARowForEachMethodNoiseAndRatio) {
+  const TestFolder folder;
+  ASSERT_EQ(RunSimulate("--trials=20 --noise_px=0,1 --outlier_ratio=0,0.3 --output='" +
+                        folder / "out" + "'"),
+            0);
+  const std::vector<Row> rows = ReadCsv(folder / "out/simulation.csv");
+  ASSERT_EQ(rows.size(), 2U * 2U * 5U);
+  // Bounds at 1 px without outliers, from a simulation of its own (rad).
+  const std::map<std::string, double> bounds = {{"circle_frame", 0.00389},
+                                                {"line_pairs", 0.00800},
+                                                {"circle_frame_refined", 0.00389},
+                                                {"line_pairs_refined", 0.00800},
+                                                {"joint", 0.00336}};
+  std::map<std::string, double> clean_bounds;
+  for (Row row : rows) {
+    const std::string& method = row["method"];
+    ASSERT_EQ(bounds.count(method), 1U) << method;
+    EXPECT_EQ(row["trials"], "20");
+    const double bound = std::stod(row["bound_rms_rad"]), rms = std::stod(row["rotation_rms_rad"]);
+    if (row["noise_px"] == "0") {
+      EXPECT_EQ(row["nees_mean"], "");
+      EXPECT_EQ(row["failures"], "0") << method << ", outliers " << row["outlier_ratio"];
+      EXPECT_EQ(bound, 0.0);
+      EXPECT_LT(rms, 1e-6);
+    } else if (row["outlier_ratio"] == "0") {
+      EXPECT_EQ(row["failures"], "0") << method;
+      EXPECT_NEAR(bound, bounds.at(method), 0.005 * bounds.at(method)) << method;
+      EXPECT_GT(rms, 0.6 * bound) << method;
+      EXPECT_LT(rms, 3.0 * bound) << method;
+      EXPECT_GT(std::stod(row["nees_mean"]), 1.0) << method;
+      EXPECT_LT(std::stod(row["nees_mean"]), 6.0) << method;
+      clean_bounds[method] = bound;
+    } else {
+      EXPECT_GT(bound, 1.1 * clean_bounds[method]) << method;  // Fewer points tell less.
+      EXPECT_LT(bound, 1.4 * clean_bounds[method]) << method;
+    }
+  }
+  const std::string svg = ReadAll(folder / "out/simulation.svg");
+  EXPECT_EQ(svg.compare(0, 5, "<svg "), 0);
+  EXPECT_CONTAINS(svg, "line_pairs_refined");
+  EXPECT_CONTAINS(svg, "bound of joint");
+}
+
+TEST(Simulate, SameBytesWhateverTheThreads) {
+  const TestFolder folder;
+  const std::string arguments =
+      "--trials=12 --noise_px=1,2 --outlier_ratio=0,0.5 --outlier_kind=cluster --seed=5 ";
+  ASSERT_EQ(RunSimulate(arguments + "--threads=1 --output='" + folder / "one" + "'"), 0);
+  ASSERT_EQ(RunSimulate(arguments + "--threads=2 --output='" + folder / "two" + "'"), 0);
+  for (const char* file : {"/simulation.csv", "/simulation.svg"}) {
+    EXPECT_EQ(ReadAll(folder / "one" + file), ReadAll(folder / "two" + file)) << file;
+  }
+  ASSERT_EQ(RunSimulate(arguments + "--seed=6 --output='" + folder / "other" + "'"), 0);
+  EXPECT_NE(ReadAll(folder / "one/simulation.csv"), ReadAll(folder / "other/simulation.csv"));
+}
+
+TEST(Simulate, BadFlagsAreNamedAndNothingIsWritten) {
+  const TestFolder folder;
+  const std::map<std::string, std::string> cases = {
+      {"--trails=3", "unknown flag --trails; did you mean 'trials'?"},
+      {"--trials=0", "--trials"},
+      {"--trials=many", "--trials"},
+      {"--noise_px=1,-1", "--noise_px"},
+      {"--noise_px=1,x", "--noise_px: 'x'"},
+      {"--noise_px=", "--noise_px"},
+      {"--outlier_ratio=1", "--outlier_ratio"},
+      {"--outlier_kind=clusters", "did you mean 'cluster'?"},
+      {"--focal=0", "--focal"},
+      {"--translation=1,2", "--translation"},
+      {"--translation=0,0,-100", "--translation"},
+      {"--robust_loss=tuckey", "did you mean 'tukey'?"},
+      {"--inlier_sigmas=0", "--inlier_sigmas"},
+      {"--threads=-1", "--threads"},
+      {"more", "unexpected argument 'more'"}};
+  for (const auto& [flag, message] : cases) {
+    std::string err;
+    EXPECT_EQ(RunSimulate("--output='" + folder / "out" + "' " + flag, &err), 2) << flag;
+    EXPECT_CONTAINS(err.c_str(), message.c_str()) << flag;
+  }
+  EXPECT_EQ(RunSimulate("--trials=1"), 2);  // No output.
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+}  // namespace
+}  // namespace circline::apps
