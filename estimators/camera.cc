@@ -100,8 +100,12 @@ Distorted Distort(const Camera& camera, const Eigen::Vector2d& x) {
 
 Status Camera::Validate() const {
   const std::string name = id.empty() ? "camera" : "camera '" + id + "'";
-  if (!(fx > 0.0) || !(fy > 0.0) || !std::isfinite(fx) || !std::isfinite(fy)) {
-    return Status::Invalid(name + ": the focal lengths fx, fy must be positive (camera_matrix)");
+  constexpr double kMinFocal = 1e-3, kMaxFocal = 1e9;  // Pixels; squares stay far from overflow.
+  for (double f : {fx, fy}) {
+    if (!(f >= kMinFocal) || !(f <= kMaxFocal)) {
+      return Status::Invalid(
+          name + ": the focal lengths fx, fy must be positive pixels, 1e-3 to 1e9 (camera_matrix)");
+    }
   }
   if (!std::isfinite(cx) || !std::isfinite(cy)) {
     return Status::Invalid(name + ": the principal point cx, cy must be finite (camera_matrix)");
@@ -129,13 +133,21 @@ bool PixelToCalibrated(const Camera& camera, const Eigen::Vector2d& pixel, Calib
     d = Distort(camera, x);
   }
   if (camera.model != CameraModel::kPinhole) {
-    // Newton; monotone on a barrel from the inside and on a pincushion from the outside.
+    // Newton, damped: rational and high-order polynomials bend where a full step overshoots.
     constexpr int kMaxIterations = 50;
     for (int i = 0; i < kMaxIterations; ++i) {
-      const Eigen::Vector2d step = d.jacobian.inverse() * (target - d.x);
+      const Eigen::Vector2d miss = target - d.x;
+      Eigen::Vector2d step = d.jacobian.inverse() * miss;
       if (!step.allFinite()) return false;
+      constexpr double kSmallestStep = 1e-3;
+      Distorted next = Distort(camera, x + step);
+      for (double size = 0.5; size > kSmallestStep; size *= 0.5) {
+        if ((target - next.x).squaredNorm() <= miss.squaredNorm()) break;
+        step *= 0.5;
+        next = Distort(camera, x + step);
+      }
       x += step;
-      d = Distort(camera, x);
+      d = next;
       if (step.squaredNorm() <= 1e-30 * (1.0 + x.squaredNorm())) break;
     }
     constexpr double kTolerance = 1e-10;  // Calibrated units: 1e-7 px at a focal length of 1000 px.

@@ -90,13 +90,27 @@ void FillUncertainty(const Evaluate& evaluate, const Inputs& inputs, const Candi
     if (!std::isfinite(h->cost)) h->cost = 0.5 * std::numeric_limits<double>::max();
   }
 }
+
+// The first few problems, to be added to a sentence.
+std::string Because(const std::vector<std::string>& problems) {
+  constexpr std::size_t kMost = 3;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(problems.size(), kMost); ++i) {
+    text += (i == 0 ? " (" : "; ") + problems[i];
+  }
+  if (problems.size() > kMost) text += "; " + std::to_string(problems.size() - kMost) + " more";
+  return text.empty() ? text : text + ")";
+}
+
 // Counts and rms of the fits that a hypothesis rests on.
 void FillSupport(const Observations& evidence, PoseHypothesis* h) {
   double squares = 0.0;
   const auto add = [&](double rms, const std::vector<Eigen::Vector2d>& points,
                        const std::vector<std::uint8_t>& mask) {
-    const int inliers = mask.empty() ? static_cast<int>(points.size())
-                                     : static_cast<int>(std::count(mask.begin(), mask.end(), 1));
+    const int inliers = mask.empty()
+                            ? static_cast<int>(points.size())
+                            : static_cast<int>(mask.size()) -
+                                  static_cast<int>(std::count(mask.begin(), mask.end(), 0));
     squares += rms * rms * inliers;
     h->num_inliers += inliers;
     h->num_observations += static_cast<int>(points.size());
@@ -149,8 +163,11 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   estimate.solver = recipe_.name;
   estimate.status = options_.Validate();
   if (estimate.status.ok()) estimate.status = observations.Validate();
+  if (!estimate.status.ok()) return estimate;
   Observations evidence;
-  if (estimate.status.ok()) estimate.status = recipe_.select(Resolved(observations), &evidence);
+  estimate.status = recipe_.select(Resolved(observations, &estimate.notes), &evidence);
+  // What could not be fitted may be what is missing.
+  if (!estimate.status.ok()) estimate.status.message += Because(estimate.notes);
   Inputs inputs;
   if (estimate.status.ok()) estimate.status = recipe_.gather(evidence, options_.sigma_px, &inputs);
   if (!estimate.status.ok()) return estimate;
@@ -179,9 +196,10 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   return estimate;
 }
 
-Observations ClosedFormSolver::Resolved(const Observations& observations) const {
+Observations ClosedFormSolver::Resolved(const Observations& observations,
+                                        std::vector<std::string>* problems) const {
   Observations fitted = observations;
-  FitDirect(options_.sigma_px, &fitted);
+  FitDirect(options_.sigma_px, &fitted, problems);
   return ResolveWorld(fitted);
 }
 

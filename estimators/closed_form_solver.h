@@ -37,7 +37,9 @@ class ClosedFormSolver : public Solver {
   PoseEstimate Solve(const Observations& observations) const override;
 
  private:
-  Observations Resolved(const Observations& observations) const;
+  // Fitted and with a world frame; `problems`: see FitDirect.
+  Observations Resolved(const Observations& observations,
+                        std::vector<std::string>* problems = nullptr) const;
 
   Recipe recipe_;
   ClosedFormOptions options_;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "circline/estimators/cholesky6.h"
+#include "circline/estimators/weights.h"
 
 namespace circline {
 namespace {
@@ -27,7 +28,7 @@ Contour::Contour(const std::vector<CalibratedPoint>& points, const std::vector<d
     data_(size_++, kWeight) = weight;
   };
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (PointWeight(weights, i) != 0.0) append(points[i], PointWeight(weights, i));
+    if (WeightAt(weights, i) != 0.0) append(points[i], WeightAt(weights, i));
   }
   while (size_ % kLanes != 0) append(points.front(), 0.0);
 }

@@ -1,11 +1,13 @@
 #include "circline/estimators/conic_fit.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "circline/estimators/cholesky6.h"
 #include "circline/estimators/conic_distance.h"
 #include "circline/estimators/conic_moments.h"
+#include "circline/estimators/weights.h"
 
 namespace circline {
 namespace {
@@ -48,11 +50,39 @@ Status NoEllipse() {
   return Status::Refused("the points lie on no ellipse (collinear, or a hyperbola)");
 }
 
+// What is to be fitted.
+struct Problem {
+  const std::vector<CalibratedPoint>& points;
+  const std::vector<double>* weights;
+  double sigma_px;
+  Normalization normalization;
+  Moments means;
+
+  bool Normalize() { return NormalizePoints(points, weights, &normalization, &means); }
+};
+
+// Whether the points lie on a branch of a hyperbola: the best ellipse has run off towards a
+// parabola, and a conic that may be anything explains them better by five standard deviations.
+bool IsHyperbola(const Problem& problem, const Minimum& best) {
+  const Eigen::Matrix2d H = best.conic.topLeftCorner<2, 2>();
+  constexpr double kParabola = 1e-2;  // Squared ratio of the axes, about.
+  if (H.determinant() > kParabola * H.trace() * H.trace()) return false;
+  const Eigen::Matrix3d any =
+      TransformConic(FitAnyConic(problem.means), problem.normalization.Matrix());
+  double cost = 0.0;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const double r = ConicDistancePx(problem.points[i], any);
+    cost += WeightAt(problem.weights, i) * r * r;
+  }
+  constexpr double kGate = 25.0;
+  const double freedom = std::max(1.0, static_cast<double>(problem.points.size()) - 5.0);
+  return best.equations.cost > (1.0 + kGate / freedom) * cost;
+}
+
 // `other` (optional): where to look for a second minimum if the first was hard to reach.
-Status Refine(const std::vector<CalibratedPoint>& points, const Normalization& normalization,
-              const std::vector<double>* weights, double sigma_px, const Eigen::Matrix3d& initial,
-              const Eigen::Matrix3d* other, ConicFit* fit) {
-  Contour contour(points, weights, normalization);
+Status Refine(const Problem& problem, const Eigen::Matrix3d& initial, const Eigen::Matrix3d* other,
+              ConicFit* fit) {
+  Contour contour(problem.points, problem.weights, problem.normalization);
   Minimum best;
   bool found = MinimizeDistances(initial, &contour, &best);
   constexpr int kHard = 7;  // Three steps are usual; more say that the cost is far from quadratic.
@@ -65,7 +95,9 @@ Status Refine(const std::vector<CalibratedPoint>& points, const Normalization& n
     }
   }
   ConicFit result;
-  if (!found || !ConicCovariance(best.equations, best.conic, normalization, sigma_px, &result)) {
+  if (!found || IsHyperbola(problem, best) ||
+      !ConicCovariance(best.equations, best.conic, problem.normalization, problem.sigma_px,
+                       &result)) {
     return NoEllipse();
   }
   result.rms_px = std::sqrt(best.equations.cost / best.equations.weight);
@@ -93,30 +125,24 @@ Status FitConicDirect(const std::vector<CalibratedPoint>& points, Eigen::Matrix3
 Status FitConic(const std::vector<CalibratedPoint>& points, double sigma_px, ConicFit* fit,
                 const std::vector<double>* weights) {
   if (points.size() < 5) return Status::Refused("an ellipse needs five points");
-  Normalization normalization;
-  Moments means;
-  Eigen::Matrix3d initial;
-  if (!NormalizePoints(points, weights, &normalization, &means) || !FitEllipse(means, &initial)) {
-    return NoEllipse();
-  }
-  Eigen::Matrix3d circle;
-  const bool has_circle = FitCircle(means, &circle);
-  return Refine(points, normalization, weights, sigma_px, initial, has_circle ? &circle : nullptr,
-                fit);
+  Problem problem{points, weights, sigma_px, {}, {}};
+  Eigen::Matrix3d initial, circle;
+  if (!problem.Normalize() || !FitEllipse(problem.means, &initial)) return NoEllipse();
+  const bool has_circle = FitCircle(problem.means, &circle);
+  return Refine(problem, initial, has_circle ? &circle : nullptr, fit);
 }
 
 Status RefineConic(const std::vector<CalibratedPoint>& points, double sigma_px,
                    const Eigen::Matrix3d& initial, ConicFit* fit,
                    const std::vector<double>* weights) {
   if (points.size() < 5) return Status::Refused("an ellipse needs five points");
-  Normalization normalization;
-  Moments means;
-  if (!NormalizePoints(points, weights, &normalization, &means)) return NoEllipse();
+  Problem problem{points, weights, sigma_px, {}, {}};
+  if (!problem.Normalize()) return NoEllipse();
   Eigen::Matrix3d normalized;
-  if (!NormalizeEllipse(TransformConic(initial, normalization.Inverse()), &normalized)) {
+  if (!NormalizeEllipse(TransformConic(initial, problem.normalization.Inverse()), &normalized)) {
     return Status::Refused("the initial conic is not an ellipse");
   }
-  return Refine(points, normalization, weights, sigma_px, normalized, nullptr, fit);
+  return Refine(problem, normalized, nullptr, fit);
 }
 
 bool ConicFromFivePoints(const std::array<Eigen::Vector2d, 5>& x, Eigen::Matrix3d* conic) {

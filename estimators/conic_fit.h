@@ -31,10 +31,11 @@ struct ConicFit {
 // residuals. Refuses fewer than 5 points, and points that no ellipse explains (collinear, a
 // hyperbola's branch).
 //
-// The covariance is the linearised one. It is calibrated (NEES 5) where the noise is small against
-// the shape: whole ellipses up to a noise of a twentieth of the shorter semi-axis, arcs of 90
-// degrees up to 0.2 % of the longer one; beyond, the true spread is wider. 12 us for 100 points of
-// a whole ellipse, 17 us for an arc of 90 degrees.
+// The covariance is the linearised one. The curve it describes is calibrated along the contour
+// (NEES 5 +- 0.3) for whole ellipses up to a noise of a twentieth of the shorter semi-axis and for
+// arcs of 90 degrees up to 2 % of the longer one. What a short arc says of the far side bends: the
+// entries of the conic of a 90 degrees' arc are calibrated up to 0.5 %, and spread wider beyond.
+// 12 us for 100 points of a whole ellipse, 17 us for an arc of 90 degrees.
 Status FitConic(const std::vector<CalibratedPoint>& points, double sigma_px, ConicFit* fit,
                 const std::vector<double>* weights = nullptr);
 

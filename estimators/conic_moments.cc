@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "circline/estimators/cholesky6.h"
+#include "circline/estimators/weights.h"
 
 namespace circline {
 namespace {
@@ -40,6 +41,7 @@ Eigen::Matrix3d SolveHyper(const Matrix6d& M, const Matrix6d& N) {
   SolveUpper(L, d, &v);
   return VectorToConic(v.normalized());
 }
+
 // Halir and Flusser's numerically stable form of Fitzgibbon's ellipse-constrained fit; M is the
 // scatter of the monomials, any order of which splits into quadratic and linear parts.
 bool SolveHalirFlusser(const Matrix6d& M, Eigen::Matrix3d* conic) {
@@ -85,7 +87,7 @@ bool NormalizePoints(const std::vector<CalibratedPoint>& points, const std::vect
                      Normalization* normalization, Moments* means) {
   double sum = 0.0, x = 0.0, y = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const double w = PointWeight(weights, i);
+    const double w = WeightAt(weights, i);
     sum += w;
     x += w * points[i].x.x();
     y += w * points[i].x.y();
@@ -96,7 +98,7 @@ bool NormalizePoints(const std::vector<CalibratedPoint>& points, const std::vect
   Moments moments;
   for (std::size_t i = 0; i < points.size(); ++i) {
     moments.Add(points[i].x.x() - normalization->center_x,
-                points[i].x.y() - normalization->center_y, PointWeight(weights, i));
+                points[i].x.y() - normalization->center_y, WeightAt(weights, i));
   }
   const double square = 0.5 * (moments.xx + moments.yy) / moments.one;
   if (!(square > 0.0) || !std::isfinite(square)) return false;
@@ -105,11 +107,14 @@ bool NormalizePoints(const std::vector<CalibratedPoint>& points, const std::vect
   return std::isfinite(means->xxxx + means->xxyy + means->yyyy);
 }
 
+Eigen::Matrix3d FitAnyConic(const Moments& means) {
+  return SolveHyper(means.Scatter(), means.HyperConstraint());
+}
+
 bool FitEllipse(const Moments& means, Eigen::Matrix3d* conic) {
-  const Matrix6d M = means.Scatter();
-  Eigen::Matrix3d candidate = SolveHyper(M, means.HyperConstraint());
+  Eigen::Matrix3d candidate = FitAnyConic(means);
   if (candidate.allFinite() && NormalizeEllipse(candidate, conic)) return true;
-  return SolveHalirFlusser(M, &candidate) && NormalizeEllipse(candidate, conic);
+  return SolveHalirFlusser(means.Scatter(), &candidate) && NormalizeEllipse(candidate, conic);
 }
 
 bool FitCircle(const Moments& m, Eigen::Matrix3d* conic) {

@@ -11,10 +11,6 @@
 
 namespace circline {
 
-inline double PointWeight(const std::vector<double>* weights, std::size_t i) {
-  return weights == nullptr ? 1.0 : (*weights)[i];
-}
-
 // Similarity x = scale x' + center under which the points have mean 0 and mean square radius 2: the
 // normal matrices of conics need it.
 struct Normalization {
@@ -104,7 +100,9 @@ bool NormalizePoints(const std::vector<CalibratedPoint>& points, const std::vect
                      Normalization* normalization, Moments* means);
 
 // Direct fits from the means of normalised points, all in normalised coordinates. Hyper-accurate
-// least squares, and where that is not an ellipse, the one of Halir and Flusser.
+// least squares: a conic of any kind, of unit norm.
+Eigen::Matrix3d FitAnyConic(const Moments& means);
+// The same, and where that is not an ellipse, the one of Halir and Flusser.
 bool FitEllipse(const Moments& means, Eigen::Matrix3d* conic);
 // The circle of least squares of x^2 + y^2 + .. (Kasa 1976).
 bool FitCircle(const Moments& means, Eigen::Matrix3d* conic);

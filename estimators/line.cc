@@ -4,13 +4,10 @@
 #include <cmath>
 
 #include "circline/estimators/geometric_residuals.h"
+#include "circline/estimators/weights.h"
 
 namespace circline {
 namespace {
-
-double Weight(const std::vector<double>* weights, std::size_t i) {
-  return weights == nullptr ? 1.0 : (*weights)[i];
-}
 
 // Orthogonal regression in calibrated coordinates. False where the points coincide.
 bool RegressLine(const std::vector<CalibratedPoint>& points, const std::vector<double>* weights,
@@ -18,17 +15,17 @@ bool RegressLine(const std::vector<CalibratedPoint>& points, const std::vector<d
   double sum = 0.0;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < points.size(); ++i) {
-    sum += Weight(weights, i);
-    mean += Weight(weights, i) * points[i].x;
+    sum += WeightAt(weights, i);
+    mean += WeightAt(weights, i) * points[i].x;
   }
   if (!(sum > 0.0)) return false;
   mean /= sum;
   double xx = 0.0, xy = 0.0, yy = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector2d d = points[i].x - mean;
-    xx += Weight(weights, i) * d.x() * d.x();
-    xy += Weight(weights, i) * d.x() * d.y();
-    yy += Weight(weights, i) * d.y() * d.y();
+    xx += WeightAt(weights, i) * d.x() * d.x();
+    xy += WeightAt(weights, i) * d.x() * d.y();
+    yy += WeightAt(weights, i) * d.y() * d.y();
   }
   constexpr double kMinSpread =
       1e-10;  // Calibrated units: points closer than rounding make no line.
@@ -68,7 +65,7 @@ Status FitLine(const std::vector<CalibratedPoint>& points, double sigma_px, Line
       const CalibratedPoint& p = points[i];
       Eigen::Vector3d jacobian;
       const double r = LineDistance(p, line, &jacobian);
-      const double w = Weight(weights, i);
+      const double w = WeightAt(weights, i);
       information += w * jacobian * jacobian.transpose();
       gradient += w * r * jacobian;
       cost += w * r * r;

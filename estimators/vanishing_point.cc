@@ -3,19 +3,17 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "circline/estimators/weights.h"
+
 namespace circline {
 namespace {
-
-double Weight(const std::vector<double>* weights, std::size_t i) {
-  return weights == nullptr ? 1.0 : (*weights)[i];
-}
 
 double Cost(const std::vector<LineFit>& lines, const std::vector<double>* weights,
             const Eigen::Vector3d& v) {
   double cost = 0.0;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const double r = VanishingPointResidual(lines[i], v);
-    cost += Weight(weights, i) * r * r;
+    cost += WeightAt(weights, i) * r * r;
   }
   return cost;
 }
@@ -31,7 +29,7 @@ Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* f
   if (lines.size() < 2) return Status::Refused("a pencil needs two lines");
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    scatter += Weight(weights, i) / lines[i].covariance.trace() * lines[i].line *
+    scatter += WeightAt(weights, i) / lines[i].covariance.trace() * lines[i].line *
                lines[i].line.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
@@ -56,8 +54,8 @@ Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* f
       const double sigma = std::sqrt(v.dot(s_v));
       const double r = lines[i].line.dot(v) / sigma;
       const Eigen::Vector2d j = basis.transpose() * (lines[i].line - (r / sigma) * s_v) / sigma;
-      information += Weight(weights, i) * j * j.transpose();
-      gradient += Weight(weights, i) * r * j;
+      information += WeightAt(weights, i) * j * j.transpose();
+      gradient += WeightAt(weights, i) * r * j;
     }
     if (iteration == kMaxIterations) break;
     Eigen::Matrix2d damped = information;

@@ -110,6 +110,27 @@ TEST(CameraTest, DropsWhatItCannotUndistort) {
   EXPECT_EQ(indices, (std::vector<int>{0, 2}));
 }
 
+// Wherever the model is one-to-one, the way back is found from the axis.
+TEST(CameraTest, UndistortsRationalLensesToTheirEdge) {
+  // A rational lens as calibrations of wide-angle cameras report it, and a mild one.
+  for (const std::array<double, 8>& k :
+       {std::array<double, 8>{8.2, 4.1, 1e-4, -2e-4, 0.12, 8.6, 6.5, 0.9},
+        std::array<double, 8>{-0.4, 0.2, 0.0, 0.0, -0.03, -0.1, 0.05, 0.0}}) {
+    Camera camera = MakeCamera(CameraModel::kOpenCV, {});
+    camera.distortion = k;
+    int tried = 0;
+    for (double r = 0.0; r < 3.0; r += 0.05) {
+      Eigen::Vector2d pixel;
+      if (!CameraToPixel(camera, {0.8 * r, -0.6 * r, 1.0}, &pixel)) break;
+      CalibratedPoint point;
+      ASSERT_TRUE(PixelToCalibrated(camera, pixel, &point)) << r;
+      EXPECT_LT((point.x - Eigen::Vector2d(0.8 * r, -0.6 * r)).norm(), 1e-7 * (1.0 + r)) << r;
+      ++tried;
+    }
+    EXPECT_GE(tried, 15);
+  }
+}
+
 TEST(CameraTest, ValidateNamesTheField) {
   Camera camera = MakeCamera(CameraModel::kPinhole, {});
   EXPECT_TRUE(camera.Validate().ok());
@@ -117,6 +138,10 @@ TEST(CameraTest, ValidateNamesTheField) {
   camera.fx = 0.0;
   EXPECT_NE(camera.Validate().message.find("fx"), std::string::npos);
   EXPECT_NE(camera.Validate().message.find("cam7"), std::string::npos);
+  for (const double f : {-1.0, 1e-310, 1e300, std::numeric_limits<double>::quiet_NaN()}) {
+    camera.fx = f;
+    EXPECT_FALSE(camera.Validate().ok()) << f;
+  }
   camera.fx = 500.0;
   camera.distortion[3] = std::numeric_limits<double>::infinity();
   EXPECT_NE(camera.Validate().message.find("distortion"), std::string::npos);

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <array>
+#include <cmath>
+#include <cstdio>
 #include <vector>
 
 #include "circline/estimators/random.h"
@@ -98,6 +101,46 @@ TEST(VanishingPointTest, SitsOnItsCovarianceForMixedLengths) {
       nees += Nees(fit.direction, fit.covariance, direction) / kTrials;
     }
     EXPECT_NEAR(nees, 2.0, 0.3);
+  }
+}
+
+// One scene, seen again and again: the spread of the directions against the Cramér-Rao bound, which
+// is that of noise-free lines with the covariance of noisy ones.
+TEST(VanishingPointTest, SitsOnTheBoundForMixedLengths) {
+  const Camera camera = BarrelCamera();
+  Random random(3);
+  for (const std::size_t count : {3U, 10U, 40U}) {
+    const Eigen::Vector3d direction = Eigen::Vector3d(1.0, 0.2, 0.3).normalized();
+    std::vector<std::array<Eigen::Vector2d, 2>> segments;
+    std::vector<LineFit> exact(count);
+    for (LineFit& line : exact) {
+      // Every other segment is ten times as long as the rest.
+      const double length = segments.size() % 2 == 0 ? 0.4 : 0.04;
+      const Eigen::Vector3d start(random.Uniform(-0.3, 0.1), random.Uniform(-0.3, 0.3), 1.0);
+      segments.push_back({start.hnormalized(), (start + length * direction).eval().hnormalized()});
+      ASSERT_TRUE(
+          FitLine(NoisyLine(camera, segments.back()[0], segments.back()[1], 2, 0.0, &random), 0.3,
+                  &line)
+              .ok());
+    }
+    VanishingPointFit bound;
+    ASSERT_TRUE(FitVanishingPoint(exact, &bound).ok());
+    constexpr int kTrials = 2000;
+    double square = 0.0;
+    for (int i = 0; i < kTrials; ++i) {
+      std::vector<LineFit> lines(count);
+      for (std::size_t k = 0; k < count; ++k) {
+        const auto points = NoisyLine(camera, segments[k][0], segments[k][1], 2, 0.3, &random);
+        ASSERT_TRUE(FitLine(points, 0.3, &lines[k]).ok());
+      }
+      VanishingPointFit fit;
+      ASSERT_TRUE(FitVanishingPoint(lines, &fit).ok());
+      square += fit.direction.cross(direction).squaredNorm() / kTrials;
+    }
+    const double ratio = std::sqrt(square / bound.covariance.trace());
+    std::printf("%2zu lines: rms / bound %.3f\n", count, ratio);
+    EXPECT_LE(ratio, 1.05) << count;  // 2000 trials scatter it by 1.6 %.
+    EXPECT_GE(ratio, 0.95) << count;
   }
 }
 
