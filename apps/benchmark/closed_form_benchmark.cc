@@ -3,6 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -14,6 +15,7 @@
 #include "circline/estimators/circular_points.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/line_pose.h"
+#include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
 
 #ifdef CIRCLINE_BENCHMARK_CALIB3D
@@ -33,6 +35,7 @@ constexpr std::size_t kScenes = 64;  // Taken in turn, so that no branch is lear
 
 // A circle, the frame of its plane, and everything seen of them, without noise.
 struct Scene {
+  Matrix3d rotation;  // cam_from_world of that frame.
   Matrix3d conic;
   Vector3d x_line, y_line;                            // Images of the axes.
   std::array<std::array<Vector3d, 2>, 2> first_pair;  // Two parallel segments: homogeneous points.
@@ -40,10 +43,10 @@ struct Scene {
   std::array<Vector2d, 4> square;  // Corners of a square of side 2 about the origin, calibrated.
 };
 
-std::vector<Scene> RandomScenes() {
+std::vector<Scene> RandomScenes(std::size_t count = kScenes) {
   Random random(1);
   std::vector<Scene> scenes;
-  while (scenes.size() < kScenes) {
+  while (scenes.size() < count) {
     CirclePose circle;
     circle.center = {random.Uniform(-3.0, 3.0), random.Uniform(-3.0, 3.0),
                      random.Uniform(5.0, 20.0)};
@@ -54,6 +57,7 @@ std::vector<Scene> RandomScenes() {
     const auto at = [&](double u, double v) -> Vector3d { return circle.center + u * x + v * y; };
     const auto seen = [&](double u, double v) -> Vector3d { return at(u, v) / at(u, v).z(); };
     Scene s;
+    s.rotation << x, y, circle.normal;
     s.conic = ProjectCircle(circle);
     s.x_line = seen(0.3, 0.2).cross(seen(1.3, 0.2));
     s.y_line = seen(0.3, 0.2).cross(seen(0.3, 1.2));
@@ -77,10 +81,55 @@ void RunInTurn(benchmark::State& state, const std::vector<Inputs>& inputs, const
   }
 }
 
+// Columns of the table of solvers, over 10^4 scenes: hypotheses a call; how many of them are proper
+// (finite rotations, unit normals facing the camera) and how often the truth is among them to
+// 1e-6 rad, in per cent. `errors` writes, for each hypothesis, its error in radians (NaN if it is
+// improper) and returns how many there are.
+template <typename Errors>
+void CountHypotheses(benchmark::State& state, const Errors& errors) {
+  constexpr std::size_t kCounted = 10000;
+  constexpr double kExact = 1e-6;
+  double hypotheses = 0, valid = 0, found = 0;
+  for (const Scene& s : RandomScenes(kCounted)) {
+    std::array<double, 4> error;
+    const auto count = static_cast<std::size_t>(errors(s, &error));
+    bool hit = false;
+    for (std::size_t i = 0; i < count; ++i) {
+      valid += std::isfinite(error[i]) ? 1.0 : 0.0;
+      hit = hit || error[i] < kExact;
+    }
+    hypotheses += static_cast<double>(count);
+    found += hit ? 1.0 : 0.0;
+  }
+  state.counters["hypotheses"] = hypotheses / kCounted;
+  state.counters["valid_pct"] = 100.0 * valid / hypotheses;
+  state.counters["truth_found_pct"] = 100.0 * found / kCounted;
+}
+
+// Angle between rotations, the least over the senses of the axes; NaN if it is no rotation.
+double RotationError(const Matrix3d& estimate, const Matrix3d& truth) {
+  const double off = (estimate.transpose() * estimate - Matrix3d::Identity()).norm();
+  if (!(off < 1e-9) || !(estimate.determinant() > 0.0)) return std::nan("");
+  double best = 4.0;
+  for (const Matrix3d& choice : SignChoices(estimate)) {
+    best = std::min(best, (choice - truth).norm() / std::sqrt(2.0));
+  }
+  return best;
+}
+
 // Conic to both normals and centres.
 void BM_CirclePoses(benchmark::State& state) {
   std::array<CirclePose, 2> poses;
   RunInTurn(state, RandomScenes(), [&](const Scene& s) { return CirclePoses(s.conic, &poses); });
+  CountHypotheses(state, [&](const Scene& s, std::array<double, 4>* errors) {
+    const int count = CirclePoses(s.conic, &poses);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      const CirclePose& p = poses[i];
+      const bool proper = std::abs(p.normal.norm() - 1.0) < 1e-9 && p.normal.dot(p.center) < 0.0;
+      (*errors)[i] = proper ? (p.normal - s.rotation.col(2)).norm() : std::nan("");
+    }
+    return count;
+  });
 }
 BENCHMARK(BM_CirclePoses);
 
@@ -89,6 +138,13 @@ void BM_CircleFrameToRotation(benchmark::State& state) {
   std::array<FrameRotation, 2> rotations;
   RunInTurn(state, RandomScenes(), [&](const Scene& s) {
     return RotationsFromCircleAndFrame(s.conic, s.x_line, s.y_line, &rotations);
+  });
+  CountHypotheses(state, [&](const Scene& s, std::array<double, 4>* errors) {
+    const int count = RotationsFromCircleAndFrame(s.conic, s.x_line, s.y_line, &rotations);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      (*errors)[i] = RotationError(rotations[i].rotation, s.rotation);
+    }
+    return count;
   });
 }
 BENCHMARK(BM_CircleFrameToRotation);
@@ -102,6 +158,14 @@ void BM_TwoLinePairsToRotation(benchmark::State& state) {
   RunInTurn(state, RandomScenes(), [&](const Scene& s) {
     return RotationFromDirections(vanishing_point(s.first_pair), vanishing_point(s.second_pair),
                                   &R);
+  });
+  CountHypotheses(state, [&](const Scene& s, std::array<double, 4>* errors) {
+    if (!RotationFromDirections(vanishing_point(s.first_pair), vanishing_point(s.second_pair),
+                                &R)) {
+      return 0;
+    }
+    (*errors)[0] = RotationError(R, s.rotation);
+    return 1;
   });
 }
 BENCHMARK(BM_TwoLinePairsToRotation);
@@ -120,6 +184,18 @@ void BM_OpenCV_SolvePnP_IPPE_FourKnownPoints(benchmark::State& state) {
   RunInTurn(state, images, [&](const std::vector<cv::Point2d>& image) {
     return cv::solvePnPGeneric(object, image, identity, cv::noArray(), rotations, translations,
                                false, cv::SOLVEPNP_IPPE);
+  });
+  CountHypotheses(state, [&](const Scene& s, std::array<double, 4>* errors) {
+    std::vector<cv::Point2d> image;
+    for (const Vector2d& x : s.square) image.emplace_back(x.x(), x.y());
+    const int count = cv::solvePnPGeneric(object, image, identity, cv::noArray(), rotations,
+                                          translations, false, cv::SOLVEPNP_IPPE);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      const cv::Mat& r = rotations[i];
+      const Vector3d delta(r.at<double>(0), r.at<double>(1), r.at<double>(2));
+      (*errors)[i] = RotationError(ExpRotation(delta), s.rotation);
+    }
+    return count;
   });
 }
 BENCHMARK(BM_OpenCV_SolvePnP_IPPE_FourKnownPoints);
