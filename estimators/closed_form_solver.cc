@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <utility>
 
@@ -134,6 +135,22 @@ void FillSupport(const Observations& evidence, PoseHypothesis* h) {
   if (h->num_inliers > 0) h->rms_px = std::sqrt(squares / h->num_inliers);
 }
 
+// What two pencils say beside the pose: the angle between them, with its standard deviation.
+std::string AngleBetween(const PencilObservation& a, const PencilObservation& b) {
+  constexpr double kDegrees = 57.29577951308232;
+  const Eigen::Vector3d u = a.fit->direction;
+  const Eigen::Vector3d v = b.fit->direction * (u.dot(b.fit->direction) < 0.0 ? -1.0 : 1.0);
+  const Eigen::Vector3d n = u.cross(v).normalized();
+  // Each direction counts with what it moves within the common plane.
+  const Eigen::Vector3d du = n.cross(u), dv = n.cross(v);
+  const double variance = du.dot(a.fit->covariance * du) + dv.dot(b.fit->covariance * dv);
+  char text[160];
+  std::snprintf(text, sizeof(text), "' are %.2f +- %.2f degrees apart",
+                kDegrees * std::atan2(u.cross(v).norm(), u.dot(v)),
+                kDegrees * std::sqrt(std::max(0.0, variance)));
+  return "the directions of '" + a.id + "' and '" + b.id + text;
+}
+
 void FillCircle(const Observations& evidence, const CirclePose& pose, PoseHypothesis* h) {
   const CircleObservation& circle = evidence.circles.front();
   // CirclePose counts in radii; the hypothesis' unit is metric, or makes the translation a unit
@@ -190,6 +207,9 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   if (estimate.hypotheses.empty()) {
     estimate.status = Status::Refused(recipe_.name + ": the evidence is degenerate (" +
                                       recipe_.needs + " are needed)");
+  }
+  if (evidence.pencils.size() == 2 && evidence.pencils[0].fit && evidence.pencils[1].fit) {
+    estimate.notes.push_back(AngleBetween(evidence.pencils[0], evidence.pencils[1]));
   }
   RankHypotheses(&estimate.hypotheses);
   estimate.decided_by = estimate.hypotheses.size() > 1 ? recipe_.decided_by : "only one pose fits";

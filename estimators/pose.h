@@ -70,7 +70,7 @@ struct PoseEstimate {
   std::string solver;  // Who made it.
   std::vector<PoseHypothesis> hypotheses;  // Best first. Ambiguity is data, not an error.
   std::string decided_by;  // Which evidence tells the first hypothesis from the others, in words.
-  std::vector<std::string> notes;  // Evidence left out, and why.
+  std::vector<std::string> notes;  // Evidence left out, and why; what was found on the way.
 };
 
 // Sorts by posterior, proportional to exp(-cost) sqrt(det covariance), and fills the probabilities.

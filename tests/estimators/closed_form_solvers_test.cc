@@ -186,6 +186,9 @@ TEST(ClosedFormSolversTest, LinePairsForAnyTwoDirections) {
                 .cross(scene.pose.rotation.col(0))
                 .norm(),
             kExact);
+  ASSERT_FALSE(estimate.notes.empty());
+  EXPECT_NE(estimate.notes.back().find("'L1' and 'L2' are 53.13 +- "), std::string::npos)
+      << estimate.notes.back();
   EXPECT_FALSE(Solve("orthogonal_vanishing_points", observations).status.ok());
 
   observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
