@@ -40,17 +40,19 @@ double InPlaneVariance(const Measured& line, const Eigen::Vector3d& direction) {
   return (direction.normalized().transpose() * line.columns).squaredNorm();
 }
 
-// Translation: the point where the origin's ray meets the plane n . X = distance. `distance` 0
-// means unknown; then a known length gives it, or the translation is a direction.
-Eigen::Vector3d Translation(const Eigen::Vector3d& n, double distance,
+// Translation: where the origin's ray, followed backwards if need be (axes may cross behind the
+// camera), meets the plane through the point `in_plane`, which the camera sees. Its length counts
+// in units of `in_plane`, radii of the circle; a known radius or length makes it metric, else it is
+// a direction.
+Eigen::Vector3d Translation(const Eigen::Vector3d& n, const Eigen::Vector3d& in_plane,
                             const Eigen::Vector3d& origin_ray, const Inputs& inputs) {
-  const double along = n.dot(origin_ray);
-  Eigen::Vector3d t = origin_ray / (along != 0.0 ? along : 1.0);  // On the plane n . X = 1.
-  if (t.z() < 0.0) t = -t;
-  if (inputs.radius > 0.0 && distance != 0.0) return std::abs(distance) * inputs.radius * t;
+  const double distance = n.dot(in_plane), along = n.dot(origin_ray);
+  if (distance == 0.0 || along == 0.0) return origin_ray.normalized();
+  const Eigen::Vector3d t = distance / along * origin_ray;
+  if (inputs.conic.present() && inputs.radius > 0.0) return inputs.radius * t;
   if (inputs.length > 0.0) {
     const Eigen::Vector3d a = (*inputs.length_points)[0], b = (*inputs.length_points)[1];
-    const double units = (a / n.dot(a) - b / n.dot(b)).norm();
+    const double units = std::abs(distance) * (a / n.dot(a) - b / n.dot(b)).norm();
     if (units > 0.0) return inputs.length / units * t;
   }
   return t.normalized();
@@ -66,6 +68,7 @@ Eigen::Vector3d OriginRay(const Inputs& inputs, const CirclePose& circle) {
   }
   return circle.center;
 }
+
 // One candidate per circle plane; `contradict` says how far other evidence speaks against it.
 std::vector<Candidate> CircleCandidates(
     const Inputs& inputs,
@@ -77,8 +80,8 @@ std::vector<Candidate> CircleCandidates(
     const CirclePose& circle = poses[static_cast<std::size_t>(i)];
     Candidate c;
     if (!RotationOfPlane(circle.normal, circle.center, inputs, &c.pose.rotation)) continue;
-    c.pose.translation = Translation(circle.normal, circle.normal.dot(circle.center),
-                                     OriginRay(inputs, circle), inputs);
+    c.pose.translation =
+        Translation(circle.normal, circle.center, OriginRay(inputs, circle), inputs);
     c.contradiction = contradict(circle, inputs);
     c.circle = circle;
     candidates.push_back(c);
@@ -111,8 +114,7 @@ Candidate CommonPlane(const Candidate& seed, const Inputs& inputs, bool concentr
   Candidate c = seed;
   c.circle->normal = n;
   *valid = RotationOfPlane(n, c.circle->center, inputs, &c.pose.rotation);
-  c.pose.translation =
-      Translation(n, n.dot(c.circle->center), OriginRay(inputs, *c.circle), inputs);
+  c.pose.translation = Translation(n, c.circle->center, OriginRay(inputs, *c.circle), inputs);
   const Eigen::Vector3d a = n.unitOrthogonal(), b = n.cross(a);
   c.contradiction.resize(static_cast<Eigen::Index>((concentric ? 4 : 2) * (nearest.size() - 1)));
   Eigen::Index row = 0;
@@ -193,12 +195,19 @@ bool RotationOfPair(const Inputs& inputs, const Eigen::Vector3d& plane_ray,
   return true;
 }
 
+// A point of the plane that the camera sees: of a drawn axis, else the origin.
+Eigen::Vector3d SeenPoint(const Inputs& inputs) {
+  if (inputs.x_sense) return (*inputs.x_sense)[0];
+  if (inputs.y_sense) return (*inputs.y_sense)[0];
+  return inputs.origin.value;
+}
+
 // Completes a rotation from lines alone: senses, translation.
 std::vector<Candidate> LinePose(const Eigen::Matrix3d& rotation, const Inputs& inputs) {
   Candidate c;
-  const Eigen::Vector3d ray = inputs.origin.value;
+  const Eigen::Vector3d ray = SeenPoint(inputs);
   c.pose.rotation = Orient(rotation, ray, inputs);
-  c.pose.translation = Translation(c.pose.rotation.col(2), 0.0, ray, inputs);
+  c.pose.translation = Translation(c.pose.rotation.col(2), ray, inputs.origin.value, inputs);
   if (!c.pose.rotation.allFinite() || !c.pose.translation.allFinite()) return {};
   return {c};
 }
@@ -271,7 +280,7 @@ std::vector<Candidate> ConcentricCirclePoses(const Inputs& inputs) {
 
 std::vector<Candidate> LinePairPoses(const Inputs& inputs) {
   Eigen::Matrix3d R;
-  if (!RotationOfPair(inputs, inputs.origin.value, &R)) return {};
+  if (!RotationOfPair(inputs, SeenPoint(inputs), &R)) return {};
   return LinePose(R, inputs);
 }
 

@@ -25,7 +25,8 @@ struct CircleEstimate {
   std::string id;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // Unit; faces the camera.
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  Eigen::Vector2d center_px = Eigen::Vector2d::Zero();  // Its image (NOT the ellipse's centre).
+  Eigen::Vector2d center_px = Eigen::Vector2d::Zero();  // Its image (NOT the ellipse's centre);
+                                                        // zero where the camera cannot see it.
   double radius = 0.0;
 };
 

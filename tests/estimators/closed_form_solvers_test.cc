@@ -114,6 +114,45 @@ TEST(ClosedFormSolversTest, CircleFrameRecoversTheDrawnFrame) {
   EXPECT_LT((best.cam_from_world.translation - scene.pose.translation.normalized()).norm(), 1e-7);
 }
 
+// The drawn pieces of the axes are seen; where they meet lies behind the camera.
+TEST(ClosedFormSolversTest, TheOriginMayLieBehindTheCamera) {
+  PlaneScene scene(1.2);
+  scene.camera.distortion = {};
+  // Seen at a flat angle; the origin is on the plane, 8 behind the camera's centre.
+  scene.pose.translation = Eigen::Vector3d(0.5, 2.0, -8.0);
+  const auto along = [&](double x, double y) {
+    const Eigen::Vector3d X = scene.pose.rotation * Eigen::Vector3d(x, y, 0.0);
+    return (X + scene.pose.translation).z();
+  };
+  // A step along each axis that moves forwards.
+  const double sx = along(1, 0) > along(0, 0) ? 1.0 : -1.0;
+  const double sy = along(0, 1) > along(0, 0) ? 1.0 : -1.0;
+  const double near = 60.0;
+  ASSERT_GT(along(near * sx, 0.0), 1.0);
+  ASSERT_GT(along(0.0, near * sy), 1.0);
+  Observations observations = scene.Empty();
+  observations.frame.x_axis =
+      Segment{scene.Pixel(near * sx, 0.0), scene.Pixel((near + 9.0 * sx) * sx, 0.0)};
+  observations.frame.y_axis =
+      Segment{scene.Pixel(0.0, near * sy), scene.Pixel(0.0, (near + 9.0 * sy) * sy)};
+  PencilObservation x, y;
+  x.id = "x";
+  x.direction = PencilDirection::kX;
+  y.id = "y";
+  y.direction = PencilDirection::kY;
+  x.plane = y.plane = "p0";
+  for (double offset : {0.0, 1.0, 2.0}) {
+    x.lines.push_back(scene.Line({near * sx, offset, 0.0}, {(near + 9.0) * sx, offset, 0.0}));
+    y.lines.push_back(scene.Line({offset, near * sy, 0.0}, {offset, (near + 9.0) * sy, 0.0}));
+  }
+  observations.pencils = {x, y};
+  const PoseEstimate estimate = Solve("line_pairs", observations);
+  ASSERT_EQ(estimate.hypotheses.size(), 1U) << estimate.status.message;
+  const CameraPose& pose = estimate.hypotheses[0].cam_from_world;
+  EXPECT_LT(RotationAngle(pose.rotation, scene.pose.rotation), 1e-6);
+  EXPECT_LT((pose.translation - scene.pose.translation.normalized()).norm(), 1e-6);
+}
+
 // Axes drawn the other way round, or so that Z points away from the camera, are taken as drawn.
 TEST(ClosedFormSolversTest, AxesDecideTheSigns) {
   PlaneScene scene;
