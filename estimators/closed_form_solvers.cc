@@ -321,22 +321,32 @@ using PencilPair = std::array<PencilObservation, 2>;
 
 bool HasRole(const PencilObservation& pencil) { return pencil.direction != PencilDirection::kFree; }
 
-// The first two pencils whose directions are more than three standard deviations apart. Those of
-// two different axes are tried first, then those with one.
-Status FirstPair(std::vector<PencilObservation> pencils, PencilPair* pair) {
+// Whether two pencils have different directions: they run along different axes, are known to make
+// an angle, or are measured more than three standard deviations apart.
+bool Differ(const PencilObservation& a, const PencilObservation& b,
+            const std::vector<KnownAngle>& known_angles) {
+  constexpr double kGate = 3.0, kRounding = 1e-9;
+  if (!(a.fit->direction.cross(b.fit->direction).norm() > kRounding)) return false;
+  if (HasRole(a) && HasRole(b)) return a.direction != b.direction;
+  for (const KnownAngle& known : known_angles) {
+    const bool between = (known.pencils[0] == a.id && known.pencils[1] == b.id) ||
+                         (known.pencils[0] == b.id && known.pencils[1] == a.id);
+    if (between && std::abs(std::sin(known.value)) > kGate * known.sigma) return true;
+  }
+  return DirectionSeparation(*a.fit, *b.fit) > kGate;
+}
+
+// The first two pencils of different directions. Those of two different axes are tried first, then
+// those with one.
+Status FirstPair(std::vector<PencilObservation> pencils,
+                 const std::vector<KnownAngle>& known_angles, PencilPair* pair) {
   std::stable_sort(pencils.begin(), pencils.end(),
                    [](const PencilObservation& a, const PencilObservation& b) {
                      return HasRole(a) > HasRole(b);
                    });
   for (std::size_t i = 0; i < pencils.size(); ++i) {
     for (std::size_t j = i + 1; j < pencils.size(); ++j) {
-      const VanishingPointFit &a = *pencils[i].fit, &b = *pencils[j].fit;
-      const bool same_role = HasRole(pencils[i]) && pencils[i].direction == pencils[j].direction;
-      const double sine2 = a.direction.cross(b.direction).squaredNorm();
-      constexpr double kGate = 9.0, kRounding = 1e-18;
-      if (same_role || !(sine2 > kGate * (a.covariance + b.covariance).trace()) ||
-          !(sine2 > kRounding))
-        continue;
+      if (!Differ(pencils[i], pencils[j], known_angles)) continue;
       *pair = {pencils[i], pencils[j]};
       return Status::Ok();
     }
@@ -362,8 +372,8 @@ Status SelectPencils(const Observations& observations, PencilPair* pair, FrameOb
   }
   *frame = observations.frame;
   frame->origin_is_center.clear();
-  if (FirstPair(of_world, pair).ok()) return Status::Ok();
-  const Status status = FirstPair(fitted, pair);
+  if (FirstPair(of_world, observations.known_angles, pair).ok()) return Status::Ok();
+  const Status status = FirstPair(fitted, observations.known_angles, pair);
   if (!status.ok()) return status;
   *frame = FrameObservation();
   frame->plane = (*pair)[0].plane = (*pair)[1].plane = "pencils";
@@ -436,7 +446,7 @@ Recipe OrthogonalVanishingPointsRecipe() {
       if (pencil.fit && HasRole(pencil)) along_axes.push_back(pencil);
     }
     PencilPair pair;
-    const Status status = FirstPair(along_axes, &pair);
+    const Status status = FirstPair(along_axes, observations.known_angles, &pair);
     if (!status.ok()) return Status::Refused("of the pencils along an axis: " + status.message);
     FrameObservation frame = observations.frame;
     frame.origin_is_center.clear();

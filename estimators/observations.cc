@@ -151,20 +151,13 @@ std::string FirstNamedPlane(const Observations& observations) {
 
 bool HasRole(const PencilObservation& pencil) { return pencil.direction != PencilDirection::kFree; }
 
-// True if two directions are more than three standard deviations apart (unfitted ones: true).
-bool Differ(const PencilObservation& a, const PencilObservation& b) {
-  if (!a.fit || !b.fit) return true;
-  const double variance = a.fit->covariance.trace() + b.fit->covariance.trace();
-  const double sine2 = a.fit->direction.cross(b.fit->direction).squaredNorm();
-  constexpr double kRounding = 1e-18;
-  return sine2 > 9.0 * variance && sine2 > kRounding;
-}
-
 // Puts the first pair of pencils that span a plane onto `plane`.
 void SpanPlane(const std::string& plane, std::vector<PencilObservation>* pencils) {
   for (std::size_t i = 0; i < pencils->size(); ++i) {
     for (std::size_t j = i + 1; j < pencils->size(); ++j) {
-      if (!Differ((*pencils)[i], (*pencils)[j])) continue;
+      const PencilObservation &a = (*pencils)[i], &b = (*pencils)[j];
+      constexpr double kGate = 3.0;
+      if (a.fit && b.fit && !(DirectionSeparation(*a.fit, *b.fit) > kGate)) continue;
       (*pencils)[i].plane = (*pencils)[j].plane = plane;
       return;
     }

@@ -24,6 +24,16 @@ double VanishingPointResidual(const LineFit& line, const Eigen::Vector3d& direct
   return line.line.dot(direction) / std::sqrt(direction.dot(line.covariance * direction));
 }
 
+double DirectionSeparation(const VanishingPointFit& a, const VanishingPointFit& b) {
+  const double sense = a.direction.dot(b.direction) < 0.0 ? -1.0 : 1.0;
+  const Eigen::Vector3d difference = a.direction - sense * b.direction;
+  // Rounding bounds what can be told apart where nothing else does.
+  constexpr double kRounding = 1e-18;
+  Eigen::Matrix3d covariance = a.covariance + b.covariance;
+  covariance.diagonal().array() += kRounding;
+  return std::sqrt(difference.dot(covariance.inverse() * difference));
+}
+
 Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* fit,
                          const std::vector<double>* weights) {
   if (lines.size() < 2) return Status::Refused("a pencil needs two lines");

@@ -26,6 +26,10 @@ Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* f
 // How far a line misses a direction, in standard deviations of the line: l.v / sqrt(v^T Cov v).
 double VanishingPointResidual(const LineFit& line, const Eigen::Vector3d& direction);
 
+// How far two measured directions, which have no sense, are apart: their difference in standard
+// deviations (Mahalanobis), which for the same direction exceeds 3.7 in one case of a thousand.
+double DirectionSeparation(const VanishingPointFit& a, const VanishingPointFit& b);
+
 }  // namespace circline
 
 #endif  // CIRCLINE_ESTIMATORS_VANISHING_POINT_H_
