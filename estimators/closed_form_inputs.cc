@@ -1,6 +1,8 @@
 #include "circline/estimators/closed_form_inputs.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
 
 namespace circline {
 namespace {
@@ -34,7 +36,110 @@ Measured BestLine(const Observations& observations, PencilDirection role) {
   return best == nullptr ? Measured() : FromLine(*best);
 }
 
+// The angle between the two pencils, radians, if it is known.
+std::optional<double> AngleBetween(const PencilObservation& a, const PencilObservation& b,
+                                   const std::vector<KnownAngle>& known_angles) {
+  const PencilDirection free = PencilDirection::kFree;
+  if (a.direction != free && b.direction != free) return 1.5707963267948966;
+  for (const KnownAngle& known : known_angles) {
+    if ((known.pencils[0] == a.id && known.pencils[1] == b.id) ||
+        (known.pencils[0] == b.id && known.pencils[1] == a.id)) {
+      return known.value;
+    }
+  }
+  return {};
+}
+
+using Directions = std::array<Eigen::Vector3d, 2>;
+
+// Both vanishing points, turned in their plane to be `angle` apart, each by its variance.
+Directions SplitByVariance(const VanishingPointFit& a, const VanishingPointFit& b, double angle) {
+  const Eigen::Vector3d n = a.direction.cross(b.direction).normalized();
+  const Eigen::Vector3d ta = n.cross(a.direction), tb = n.cross(b.direction);
+  const double va = ta.dot(a.covariance * ta), vb = tb.dot(b.covariance * tb);
+  double excess = std::atan2(a.direction.cross(b.direction).norm(), a.direction.dot(b.direction));
+  // Directions have no sense: `angle` or its supplement, whichever is nearer.
+  constexpr double kPi = 3.14159265358979323846;
+  excess -= std::abs(excess - angle) < std::abs(excess - (kPi - angle)) ? angle : kPi - angle;
+  const double ea = excess * va / (va + vb), eb = excess - ea;
+  return {std::cos(ea) * a.direction + std::sin(ea) * ta,
+          std::cos(eb) * b.direction - std::sin(eb) * tb};
+}
+
+// Cost of two directions: of all lines of both pencils, 1/2 chi^2.
+double LineCost(const std::array<PencilObservation, 2>& pencils, const Directions& directions) {
+  double cost = 0.0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (const LineObservation& line : pencils[k].lines) {
+      if (!line.fit) continue;
+      const double r = VanishingPointResidual(*line.fit, directions[k]);
+      cost += 0.5 * r * r;
+    }
+  }
+  return cost;
+}
+
+// The best-measured lines of a pencil, three at most.
+std::vector<LineFit> BestLines(const PencilObservation& pencil) {
+  std::vector<LineFit> lines;
+  for (const LineObservation& line : pencil.lines) {
+    if (line.fit) lines.push_back(*line.fit);
+  }
+  std::sort(lines.begin(), lines.end(), [](const LineFit& a, const LineFit& b) {
+    return a.covariance.trace() < b.covariance.trace();
+  });
+  constexpr std::size_t kMost = 3;
+  if (lines.size() > kMost) lines.resize(kMost);
+  return lines;
+}
+
+// The directions in a line's interpretation plane that make `angle` with `d`: a cone meets a plane.
+std::vector<Eigen::Vector3d> OnConeAndPlane(const Eigen::Vector3d& d, double angle,
+                                            const Eigen::Vector3d& line) {
+  const Eigen::Vector3d p = d - line * line.dot(d);
+  const double norm = p.norm();
+  const double along = std::cos(angle) / norm;
+  if (!(std::abs(along) < 1.0)) return {};
+  const Eigen::Vector3d u = p / norm, q = std::sqrt(1.0 - along * along) * line.cross(u);
+  return {along * u + q, along * u - q};
+}
+
 }  // namespace
+
+void GatherDirections(const Observations& evidence, Inputs* inputs) {
+  const std::array<PencilObservation, 2> pencils = {evidence.pencils[0], evidence.pencils[1]};
+  for (std::size_t k = 0; k < 2; ++k) {
+    inputs->directions[k] = Measured(pencils[k].fit->direction, pencils[k].fit->covariance);
+    inputs->roles[k] = pencils[k].direction;
+  }
+  const auto angle = AngleBetween(pencils[0], pencils[1], evidence.known_angles);
+  constexpr double kWellMeasured = 0.05;  // Radians.
+  const auto variance = [&](std::size_t k) { return pencils[k].fit->covariance.trace(); };
+  if (!angle || std::max(variance(0), variance(1)) < kWellMeasured * kWellMeasured) return;
+
+  double best = LineCost(pencils, SplitByVariance(*pencils[0].fit, *pencils[1].fit, *angle));
+  for (std::size_t k = 0; k < 2; ++k) {
+    // One direction from its vanishing point, the other from a line and the angle. The latter's
+    // error lies in the line's plane, across; what it has along the former is for the former to
+    // give in to.
+    const Eigen::Vector3d d = pencils[k].fit->direction;
+    for (const LineFit& line : BestLines(pencils[1 - k])) {
+      for (const Eigen::Vector3d& other : OnConeAndPlane(d, *angle, line.line)) {
+        Directions directions;
+        directions[k] = d;
+        directions[1 - k] = other;
+        const double cost = LineCost(pencils, directions);
+        if (!(cost < best)) continue;
+        best = cost;
+        inputs->directions[k] = Measured(d, pencils[k].fit->covariance);
+        const Eigen::Vector3d across = d.cross(other).normalized();
+        inputs->directions[1 - k] =
+            Measured(other, other.dot(line.covariance * other) * across * across.transpose() +
+                                variance(1 - k) * d * d.transpose());
+      }
+    }
+  }
+}
 
 Measured::Measured(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) : value(mean) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);

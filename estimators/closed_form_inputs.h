@@ -61,6 +61,12 @@ void GatherAxisLines(const Observations& observations, double sigma_px, Inputs* 
 // Senses of the axes, the origin, a known length.
 void GatherFrame(const Observations& observations, double sigma_px, Inputs* inputs);
 
+// The directions of the evidence's two pencils. Where the angle between them is known - they run
+// along two of the axes, or it is given - and one is poorly measured (a pair of lines that nearly
+// coincide), then of what the pencils' vanishing points and single lines admit the directions that
+// explain all lines best.
+void GatherDirections(const Observations& evidence, Inputs* inputs);
+
 // A circle of the world plane, its centre if known, its radius.
 void GatherCircle(const Observations& observations, const CircleObservation& circle,
                   double sigma_px, Inputs* inputs);

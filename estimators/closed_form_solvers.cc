@@ -384,11 +384,7 @@ Status SelectPencils(const Observations& observations, PencilPair* pair, FrameOb
 
 Status GatherPencils(const Observations& evidence, double sigma_px, Inputs* inputs) {
   GatherFrame(evidence, sigma_px, inputs);
-  for (std::size_t i = 0; i < 2; ++i) {
-    const PencilObservation& pencil = evidence.pencils[i];
-    inputs->directions[i] = Measured(pencil.fit->direction, pencil.fit->covariance);
-    inputs->roles[i] = pencil.direction;
-  }
+  GatherDirections(evidence, inputs);
   if (evidence.frame.x_axis) inputs->x_line = AxisLine(evidence, *evidence.frame.x_axis, sigma_px);
   if (evidence.frame.y_axis) inputs->y_line = AxisLine(evidence, *evidence.frame.y_axis, sigma_px);
   if (inputs->origin.present()) return Status::Ok();
@@ -417,6 +413,7 @@ Observations KeepPencils(const Observations& observations, const PencilPair& pai
   evidence.frame = frame;
   evidence.pencils = {pair[0], pair[1]};
   evidence.known_lengths = observations.known_lengths;
+  evidence.known_angles = observations.known_angles;
   return evidence;
 }
 
