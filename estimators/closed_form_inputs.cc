@@ -113,11 +113,12 @@ void GatherDirections(const Observations& evidence, Inputs* inputs) {
     inputs->roles[k] = pencils[k].direction;
   }
   const auto angle = AngleBetween(pencils[0], pencils[1], evidence.known_angles);
-  constexpr double kWellMeasured = 0.05;  // Radians.
-  const auto variance = [&](std::size_t k) { return pencils[k].fit->covariance.trace(); };
-  if (!angle || std::max(variance(0), variance(1)) < kWellMeasured * kWellMeasured) return;
+  if (!angle) return;
 
-  double best = LineCost(pencils, SplitByVariance(*pencils[0].fit, *pencils[1].fit, *angle));
+  // Both vanishing points together are the better estimate unless lines contradict them.
+  constexpr double kGate = 2.0;  // Two standard deviations.
+  double best =
+      LineCost(pencils, SplitByVariance(*pencils[0].fit, *pencils[1].fit, *angle)) - kGate;
   for (std::size_t k = 0; k < 2; ++k) {
     // One direction from its vanishing point, the other from a line and the angle. The latter's
     // error lies in the line's plane, across; what it has along the former is for the former to
@@ -135,7 +136,7 @@ void GatherDirections(const Observations& evidence, Inputs* inputs) {
         const Eigen::Vector3d across = d.cross(other).normalized();
         inputs->directions[1 - k] =
             Measured(other, other.dot(line.covariance * other) * across * across.transpose() +
-                                variance(1 - k) * d * d.transpose());
+                                pencils[1 - k].fit->covariance.trace() * d * d.transpose());
       }
     }
   }

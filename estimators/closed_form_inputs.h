@@ -62,9 +62,9 @@ void GatherAxisLines(const Observations& observations, double sigma_px, Inputs* 
 void GatherFrame(const Observations& observations, double sigma_px, Inputs* inputs);
 
 // The directions of the evidence's two pencils. Where the angle between them is known - they run
-// along two of the axes, or it is given - and one is poorly measured (a pair of lines that nearly
-// coincide), then of what the pencils' vanishing points and single lines admit the directions that
-// explain all lines best.
+// along two of the axes, or it is given - they are, of what the vanishing points and single lines
+// of the pencils admit, those that explain all lines best: lines that nearly coincide have a
+// vanishing point that may be anywhere along them, whatever its covariance says.
 void GatherDirections(const Observations& evidence, Inputs* inputs);
 
 // A circle of the world plane, its centre if known, its radius.

