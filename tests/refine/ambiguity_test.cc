@@ -1,0 +1,214 @@
+// Circles: rings against their Cramer-Rao bound, and whether the probabilities of the two poses of
+// a circle mean what they say. CIRCLINE_AMBIGUITY_SCENES sets the number of scenes for the latter.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/random.h"
+#include "circline/refine/estimate_pose.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kPi = 3.14159265358979323846;
+
+Camera TestCamera() {
+  Camera camera;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = camera.fy = 800.0;
+  camera.cx = 320.0;
+  camera.cy = 240.0;
+  return camera;
+}
+
+// A circle of radius 1 somewhere in the photo, tilted by `tilt` against the line of sight.
+CirclePose RandomCircle(double distance, double tilt, Random* random) {
+  CirclePose circle;
+  const Vector3d sight =
+      Vector3d(random->Uniform(-0.25, 0.25), random->Uniform(-0.18, 0.18), 1.0).normalized();
+  circle.center = distance * sight;
+  const Vector3d a = sight.unitOrthogonal(), b = sight.cross(a);
+  const double spin = random->Uniform(0.0, 2.0 * kPi);
+  circle.normal =
+      -std::cos(tilt) * sight + std::sin(tilt) * (std::cos(spin) * a + std::sin(spin) * b);
+  return circle;
+}
+
+Vector2d Noisy(const Vector2d& pixel, double sigma_px, Random* random) {
+  const double dx = random->Normal(), dy = random->Normal();
+  return pixel + sigma_px * Vector2d(dx, dy);
+}
+
+CircleObservation Observe(const Camera& camera, const CirclePose& circle, double radius, int points,
+                          double sigma_px, Random* random) {
+  CircleObservation observation;
+  observation.plane = "p0";
+  observation.sigma_px = sigma_px;
+  const Vector3d x = circle.normal.unitOrthogonal(), y = circle.normal.cross(x);
+  for (int i = 0; i < points; ++i) {
+    const double t = 2.0 * kPi * i / points;
+    Vector2d pixel;
+    EXPECT_TRUE(CameraToPixel(camera, circle.center + radius * (std::cos(t) * x + std::sin(t) * y),
+                              &pixel));
+    observation.points.push_back(Noisy(pixel, sigma_px, random));
+  }
+  return observation;
+}
+
+EstimationOptions LeastSquares() {
+  EstimationOptions options;
+  options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
+  return options;
+}
+
+// Covariance of the normal (its two tangent components) from noisy points on rings of the given
+// radii about one centre. Unknown: the normal, the centre in units of the distance, the radii.
+Eigen::Matrix2d NormalBound(const Camera& camera, const CirclePose& truth,
+                            const std::vector<double>& radii, int points, double sigma_px) {
+  const auto parameters = static_cast<Eigen::Index>(4 + radii.size());
+  const Vector3d a = truth.normal.unitOrthogonal(), b = truth.normal.cross(a);
+  // Image of ring k after a step: normal along a and b, centre along x and y, radius.
+  const auto conic = [&](std::size_t k, const Eigen::VectorXd& step) {
+    CirclePose moved;
+    moved.normal = (truth.normal + step[0] * a + step[1] * b).normalized();
+    moved.center = truth.center + Vector3d(step[2], step[3], 0.0);
+    moved.center /= radii[k] + step[4 + static_cast<Eigen::Index>(k)];
+    return ProjectCircle(moved);
+  };
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
+  Random none(1);
+  for (std::size_t k = 0; k < radii.size(); ++k) {
+    std::vector<CalibratedPoint> exact;
+    PixelsToCalibrated(camera, Observe(camera, truth, radii[k], points, 0.0, &none).points, &exact);
+    for (const CalibratedPoint& p : exact) {
+      Eigen::VectorXd j(parameters);
+      for (Eigen::Index i = 0; i < parameters; ++i) {
+        constexpr double kStep = 1e-6;
+        const Eigen::VectorXd step = kStep * Eigen::VectorXd::Unit(parameters, i);
+        j[i] = (ConicDistancePx(p, conic(k, step)) - ConicDistancePx(p, conic(k, -step))) /
+               (2.0 * kStep * sigma_px);
+      }
+      information += j * j.transpose();
+    }
+  }
+  return information.inverse().topLeftCorner<2, 2>();
+}
+
+// Two rings, the inner one 0.6 of the outer: the joint estimate sits on the bound of both together.
+TEST(RingsTest, NormalSitsOnTheBoundOfBothRings) {
+  const Camera camera = TestCamera();
+  const std::vector<double> radii = {1.0, 0.6};
+  constexpr double kSigmaPx = 0.5;
+  constexpr int kTrials = 1000, kPoints = 100;
+  Random random(31);
+  double square = 0.0, bound = 0.0;
+  for (int i = 0; i < kTrials; ++i) {
+    const CirclePose truth =
+        RandomCircle(random.Uniform(5.0, 12.0), random.Uniform(0.5, 1.1), &random);
+    Observations observations;
+    observations.camera = camera;
+    for (const double radius : radii) {
+      CircleObservation ring = Observe(camera, truth, radius, kPoints, kSigmaPx, &random);
+      ring.id = radius == 1.0 ? "outer" : "inner";
+      ring.concentric = "g0";
+      observations.circles.push_back(ring);
+    }
+    const PoseEstimate estimate = EstimatePose(observations, LeastSquares());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    // The better of the two poses: which one it is, is the other test's business.
+    double best = 4.0;
+    for (const PoseHypothesis& h : estimate.hypotheses) {
+      best = std::min(best, (h.cam_from_world.rotation.col(2) - truth.normal).squaredNorm());
+    }
+    square += best / kTrials;
+    bound += NormalBound(camera, truth, radii, kPoints, kSigmaPx).trace() / kTrials;
+  }
+  std::printf("two rings: rms of the normal %.3f degrees, bound %.3f, ratio %.3f\n",
+              std::sqrt(square) * 180.0 / kPi, std::sqrt(bound) * 180.0 / kPi,
+              std::sqrt(square / bound));
+  EXPECT_LE(std::sqrt(square / bound), 1.05);
+}
+
+int NumScenes() {
+  const char* text = std::getenv("CIRCLINE_AMBIGUITY_SCENES");
+  if (text != nullptr && std::atoi(text) > 0) return std::atoi(text);
+  return 1500;
+}
+
+struct Bin {
+  double low, high;
+  int scenes = 0, right = 0;
+  double probability = 0.0;
+};
+
+// A circle, and its centre measured as well as a point of the contour: near and large it decides,
+// far away it does not. The stated probability of the first pose is how often it is the right one.
+TEST(AmbiguityTest, ProbabilitiesAreCalibrated) {
+  const Camera camera = TestCamera();
+  Random random(32);
+  std::array<Bin, 6> bins = {
+      {{0.5, 0.6}, {0.6, 0.75}, {0.75, 0.9}, {0.9, 0.97}, {0.97, 0.997}, {0.997, 1.01}}};
+  const int scenes = NumScenes();
+  int lost = 0;
+  for (int i = 0; i < scenes; ++i) {
+    const double sigma = random.Uniform(0.1, 1.0);
+    const CirclePose truth =
+        RandomCircle(4.0 * std::pow(10.0, random.Uniform()), random.Uniform(0.2, 1.3), &random);
+    CircleObservation circle = Observe(camera, truth, 1.0, 60, sigma, &random);
+    circle.id = "c0";
+    Vector2d center;
+    ASSERT_TRUE(CameraToPixel(camera, truth.center, &center));
+    circle.center = Noisy(center, sigma, &random);
+    Observations observations;
+    observations.camera = camera;
+    observations.circles = {circle};
+    const PoseEstimate estimate = EstimatePose(observations, LeastSquares());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const auto error = [&](const PoseHypothesis& h) {
+      return std::acos(std::min(1.0, h.cam_from_world.rotation.col(2).dot(truth.normal)));
+    };
+    const auto nearest = std::min_element(
+        estimate.hypotheses.begin(), estimate.hypotheses.end(),
+        [&](const PoseHypothesis& a, const PoseHypothesis& b) { return error(a) < error(b); });
+    // Among the two: within five of its own standard deviations (the spin carries none).
+    const double sigma_normal = std::sqrt(nearest->Covariance().topLeftCorner<3, 3>().trace());
+    if (error(*nearest) > 5.0 * sigma_normal) ++lost;
+    const double p = estimate.hypotheses.front().probability;
+    for (Bin& bin : bins) {
+      if (p < bin.low || p >= bin.high) continue;
+      ++bin.scenes;
+      bin.probability += p;
+      bin.right += nearest == estimate.hypotheses.begin() ? 1 : 0;
+    }
+  }
+  std::printf("stated probability of the first pose, scenes, how often it is right\n");
+  for (const Bin& bin : bins) {
+    if (bin.scenes == 0) continue;
+    const double stated = bin.probability / bin.scenes;
+    const double right = static_cast<double>(bin.right) / bin.scenes;
+    std::printf("  %.4f  %6d  %.4f\n", stated, bin.scenes, right);
+    // Four standard deviations of the count.
+    EXPECT_NEAR(right, stated,
+                4.0 * std::sqrt(stated * (1.0 - stated) / bin.scenes) + 1.0 / bin.scenes);
+  }
+  std::printf("  the truth is not among the hypotheses in %d of %d\n", lost, scenes);
+  EXPECT_LE(lost, scenes / 1000);
+  const Bin& sure = bins.back();
+  EXPECT_GE(sure.right, 0.997 * sure.scenes - 1.0);
+}
+
+}  // namespace
+}  // namespace circline
