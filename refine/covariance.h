@@ -1,41 +1,31 @@
-// Information and covariance of a least-squares problem at its minimum, exact and without a sparse
-// solver: parameters that appear in one residual block only are eliminated there. Internal.
+// Information and covariance of the joint problem at its minimum, exact and small: each feature's
+// own unknowns are eliminated where they stand. Internal: not installed.
 #ifndef CIRCLINE_REFINE_COVARIANCE_H_
 #define CIRCLINE_REFINE_COVARIANCE_H_
 
-#include <ceres/cost_function.h>
-
 #include <Eigen/Core>
-#include <array>
-#include <memory>
 #include <vector>
 
 #include "circline/refine/joint_evidence.h"
+#include "circline/refine/reduced_problem.h"
 
 namespace circline {
 
-// A residual block and the parameter blocks it reads.
-struct ResidualTerm {
-  std::unique_ptr<ceres::CostFunction> cost;
-  std::vector<int> blocks;
-};
-
-// Values of all parameter blocks; blocks have at most three numbers.
-using Values = std::vector<std::array<double, 3>>;
-
 struct SharedCovariance {
-  std::vector<int>
-      offsets;  // Of each shared block's first column in `covariance`; -1 for private ones.
-  Eigen::MatrixXd covariance;  // Of the shared parameters, pseudo-inverse on the observed subspace.
+  std::vector<int> offsets;    // Of each shared block's first column; -1 for features' own.
+  Eigen::MatrixXd covariance;  // Of the shared unknowns, pseudo-inverse on the observed subspace.
   Eigen::MatrixXd null_space;  // Orthonormal columns: directions without information.
-  double log_det = 0.0;        // Of the covariance of all parameters, observed subspace.
+  // Log determinants of covariances, observed subspace: of the shared unknowns, and of what each
+  // circle and line has of its own.
+  double log_det = 0.0;
+  std::vector<double> circle_log_det, line_log_det;
 };
 
-// False if some residual cannot be evaluated or a private parameter carries no information. With
-// `hold_spin` the third number of block 0 is no parameter.
-bool ComputeCovariance(const std::vector<ResidualTerm>& terms,
-                       const std::vector<ParameterInfo>& parameters, const Values& values,
-                       bool hold_spin, SharedCovariance* out);
+// From the inliers at `state`, without loss. False if some residual cannot be evaluated or an own
+// unknown carries no information. The spin about the normal is held where nothing fixes it: its row
+// and column (2) are then zero.
+bool ComputeCovariance(const JointEvidence& evidence, const JointState& state,
+                       SharedCovariance* out);
 
 }  // namespace circline
 

@@ -1,11 +1,29 @@
 #include "circline/refine/joint_evidence.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
 namespace circline {
-JointEvidence::JointEvidence(const Observations& obs, const EstimationOptions& opts)
+namespace {
+
+// A redescending loss judges for itself which points are outliers; under the others those that a
+// robust fit has found are left out.
+bool Redescends(LossType type) {
+  return type == LossType::kTukey || type == LossType::kGemanMcClure;
+}
+
+}  // namespace
+
+void LineTerm::SetDirection(const Eigen::Vector3d& direction) {
+  a = direction.unitOrthogonal();
+  b = direction.cross(a);
+}
+
+JointEvidence::JointEvidence(const Observations& obs, const EstimationOptions& opts,
+                             const NoiseScales& scales)
     : observations(obs), options(opts) {
   AddParameter(3, false);  // The rotation.
   AddFrame();
@@ -17,6 +35,28 @@ JointEvidence::JointEvidence(const Observations& obs, const EstimationOptions& o
   AddAxis(observations.frame.y_axis, false);
   for (const KnownAngle& known : observations.known_angles) AddAngle(known);
   for (const KnownLength& known : observations.known_lengths) AddLength(known);
+  SetScales(scales);
+}
+
+// Under "auto" the points of one feature share a smooth error (lens, blur, print, a surface not
+// quite flat) of standard deviation b that no number n of them averages out: sigma^2 / (sigma^2 +
+// n b^2) is what the set then counts. Its sigma stays that of a point, for loss and gate.
+void JointEvidence::SetScales(const NoiseScales& scales) {
+  for (PointSet& set : sets) {
+    if (set.noise == PointSet::Noise::kStated) continue;
+    const bool is_conic = set.noise == PointSet::Noise::kAutoConic;
+    set.sigma_px = is_conic ? scales.conic_px : scales.line_px;
+    const double bias = is_conic ? options.contour_bias_px : options.line_bias_px;
+    const double n = static_cast<double>(set.points.size());
+    const double variance = set.sigma_px * set.sigma_px;
+    set.weight = variance / (variance + n * bias * bias);
+  }
+  for (PointTerm& point : points) {
+    // A mark at a circle's centre is no better than the contour as a whole.
+    if (point.like_set < 0) continue;
+    const PointSet& set = sets[static_cast<std::size_t>(point.like_set)];
+    point.measured.sigma_px = set.sigma_px / std::sqrt(set.weight);
+  }
 }
 
 int JointEvidence::AddParameter(int size, bool is_private) {
@@ -24,21 +64,36 @@ int JointEvidence::AddParameter(int size, bool is_private) {
   return static_cast<int>(parameters.size()) - 1;
 }
 
-// Index of a new point set, or -1 where no point is usable.
+// Index of a new point set, or -1 where no point is usable. `sigma_px` 0: automatic.
 int JointEvidence::AddSet(const std::vector<Eigen::Vector2d>& pixels,
-                          const std::vector<std::uint8_t>& mask, double sigma_px, LossType loss) {
+                          const std::vector<std::uint8_t>& mask, double sigma_px, bool is_conic) {
   PointSet set;
+  set.loss = (is_conic ? options.conic_loss : options.line_loss).type;
   CalibrateInliers(observations.camera, pixels, mask, &set.points);
   if (set.points.empty()) return -1;
-  set.sigma_px = sigma_px;
-  set.loss = loss;
+  set.num_trusted = set.points.size();
+  if (!mask.empty() && Redescends(set.loss)) {
+    std::vector<std::uint8_t> others = mask;
+    for (std::uint8_t& m : others) m = m == 0 ? 1 : 0;
+    std::vector<CalibratedPoint> doubted;
+    CalibrateInliers(observations.camera, pixels, others, &doubted);
+    set.points.insert(set.points.end(), doubted.begin(), doubted.end());
+  }
+  const double chosen = (is_conic ? options.conic_loss : options.line_loss).scale_px;
+  set.sigma_px = sigma_px > 0.0 ? sigma_px : chosen;
+  if (!(set.sigma_px > 0.0))
+    set.noise = is_conic ? PointSet::Noise::kAutoConic : PointSet::Noise::kAutoLine;
+  if (is_conic) set.Normalize();
   sets.push_back(std::move(set));
   return static_cast<int>(sets.size()) - 1;
 }
 
-void JointEvidence::AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block) {
+// With `like_set` its sigma is settled by SetScales.
+void JointEvidence::AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block, int like_set,
+                             const std::string& name) {
   CalibratedPoint p;
-  if (PixelToCalibrated(observations.camera, pixel, &p)) points.push_back({p, sigma_px, block});
+  if (PixelToCalibrated(observations.camera, pixel, &p))
+    points.push_back({{p, sigma_px, options.line_loss.type}, block, like_set, name});
 }
 
 bool JointEvidence::BothAxes() const {
@@ -61,7 +116,7 @@ void JointEvidence::AddFrame() {
     return axis && ((*axis)[0] == *frame.origin || (*axis)[1] == *frame.origin);
   };
   if (BothAxes() && (is_end(frame.x_axis) || is_end(frame.y_axis))) return;
-  AddPoint(*frame.origin, DrawnSigma(), origin);
+  AddPoint(*frame.origin, DrawnSigma(), origin, -1, "the origin of the frame");
 }
 
 // The block of a centre that other residuals share (the world origin, a concentric group), or -1.
@@ -87,8 +142,7 @@ int JointEvidence::CenterBlock(const CircleObservation& circle,
 void JointEvidence::AddCircle(int index, std::map<std::string, int>* concentric) {
   const CircleObservation& circle = observations.circles[static_cast<std::size_t>(index)];
   if (!circle.fit || circle.plane != observations.frame.plane) return;
-  const double sigma = circle.sigma_px;
-  const int set = AddSet(circle.points, circle.inliers, sigma, options.conic_loss.type);
+  const int set = AddSet(circle.points, circle.inliers, circle.sigma_px, true);
   if (set < 0) return;
   CircleTerm term{index, set, CenterBlock(circle, concentric), -1, 1.0};
   const bool has_center_evidence = circle.center || !circle.diameters.empty();
@@ -103,8 +157,9 @@ void JointEvidence::AddCircle(int index, std::map<std::string, int>* concentric)
     term.center = AddParameter(3, true);
   }
   circles.push_back(term);
-  if (circle.center) AddPoint(*circle.center, sigma, term.center);
-  for (const Segment& diameter : circle.diameters) AddDiameter(diameter, sigma, term.center);
+  if (circle.center)
+    AddPoint(*circle.center, 0.0, term.center, set, "the centre of circle '" + circle.id + "'");
+  for (const Segment& diameter : circle.diameters) AddDiameter(circle, diameter, term.center);
 }
 
 int JointEvidence::ScaleBlock() {
@@ -112,12 +167,23 @@ int JointEvidence::ScaleBlock() {
   return scale;
 }
 
-void JointEvidence::AddDiameter(const Segment& diameter, double sigma_px, int center) {
-  const int set = AddSet({diameter[0], diameter[1]}, {}, sigma_px, options.line_loss.type);
+// The set and the fit of a line given by two points; false where these are not usable.
+bool JointEvidence::AddSegment(const Segment& segment, double sigma_px, LineTerm* term) {
+  const int set = AddSet({segment[0], segment[1]}, {}, sigma_px, false);
   LineFit fit;
-  if (set < 0 || !FitLine(sets[static_cast<std::size_t>(set)].points, sigma_px, &fit).ok()) return;
-  const int psi = AddParameter(1, true);
-  lines.push_back({LineCost::Kind::kDiameter, set, center, psi, Eigen::Vector3d::Zero(), fit.line});
+  if (set < 0 || !FitLine(sets[static_cast<std::size_t>(set)].points, 1.0, &fit).ok()) return false;
+  term->set = set;
+  term->line = fit.line;
+  return true;
+}
+
+void JointEvidence::AddDiameter(const CircleObservation& circle, const Segment& diameter,
+                                int center) {
+  LineTerm term{LineKind::kDiameter, -1, center, -1, Eigen::Vector3d::Zero()};
+  if (!AddSegment(diameter, circle.sigma_px, &term)) return;
+  term.name = "a diameter of circle '" + circle.id + "'";
+  term.angle = AddParameter(1, true);
+  lines.push_back(term);
 }
 
 // The drawn axis that a pencil's line carries, where the origin is observed: 0 = x, 1 = y, -1 =
@@ -143,26 +209,26 @@ void JointEvidence::AddPencil(int index) {
   x_is_fixed = x_is_fixed || pencil.direction == PencilDirection::kX ||
                pencil.direction == PencilDirection::kY;
   for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
-    AddLine(pencil, theta, pencil.lines[j], AxisOfLine(index, static_cast<int>(j)));
+    AddLine(pencil, theta, pencil.lines[j], AxisOfLine(index, static_cast<int>(j)),
+            "pencil '" + pencil.id + "', line " + std::to_string(j));
   }
 }
 
 void JointEvidence::AddLine(const PencilObservation& pencil, int theta, const LineObservation& line,
-                            int axis) {
+                            int axis, const std::string& name) {
   if (!line.fit) return;
-  const double sigma = pencil.sigma_px;
-  const int set = AddSet(line.points, line.inliers, sigma, options.line_loss.type);
+  const int set = AddSet(line.points, line.inliers, pencil.sigma_px, false);
   if (set < 0) return;
-  LineTerm term{LineCost::Kind::kInPlane, set, theta, -1, Eigen::Vector3d::Zero(), line.fit->line};
+  LineTerm term{LineKind::kInPlane, set, theta, -1, line.fit->line, name};
   if (axis >= 0) {
-    term.kind = axis == 0 ? LineCost::Kind::kXAxis : LineCost::Kind::kYAxis;
+    term.kind = axis == 0 ? LineKind::kXAxis : LineKind::kYAxis;
     term.shared = origin;
     x_is_fixed = true;
   } else {
     term.angle = AddParameter(1, true);
     if (theta < 0) {
-      term.kind = LineCost::Kind::kFixedDirection;
-      term.direction = Eigen::Vector3d::Unit(static_cast<int>(pencil.direction));
+      term.kind = LineKind::kFixedDirection;
+      term.SetDirection(Eigen::Vector3d::Unit(static_cast<int>(pencil.direction)));
     }
   }
   lines.push_back(term);
@@ -173,20 +239,13 @@ void JointEvidence::AddLine(const PencilObservation& pencil, int theta, const Li
 void JointEvidence::AddAxis(const std::optional<Segment>& axis, bool is_x) {
   int p, l;
   if (!axis || FindAxisLine(observations, *axis, &p, &l)) return;
-  const double sigma = DrawnSigma();
-  const int set = AddSet({(*axis)[0], (*axis)[1]}, {}, sigma, options.line_loss.type);
-  LineFit fit;
-  if (set < 0 || !FitLine(sets[static_cast<std::size_t>(set)].points, sigma, &fit).ok()) return;
+  LineTerm term{is_x ? LineKind::kXAxis : LineKind::kYAxis, -1, origin, -1, Eigen::Vector3d::Zero(),
+                is_x ? "the X axis" : "the Y axis"};
+  if (!AddSegment(*axis, DrawnSigma(), &term)) return;
   x_is_fixed = true;
-  LineTerm term{is_x ? LineCost::Kind::kXAxis : LineCost::Kind::kYAxis,
-                set,
-                origin,
-                -1,
-                Eigen::Vector3d::Zero(),
-                fit.line};
   if (!origin_observed || origin < 0) {
-    term.kind = LineCost::Kind::kFixedDirection;
-    term.direction = is_x ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+    term.kind = LineKind::kFixedDirection;
+    term.SetDirection(is_x ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY());
     term.shared = -1;
     term.angle = AddParameter(1, true);
   }
@@ -224,8 +283,10 @@ void JointEvidence::AddLength(const KnownLength& known) {
     return;
   }
   const LengthTerm term{AddParameter(2, false), AddParameter(2, false), known.value};
-  points.push_back({a, DrawnSigma(), term.a});
-  points.push_back({b, DrawnSigma(), term.b});
+  points.push_back(
+      {{a, DrawnSigma(), options.line_loss.type}, term.a, -1, "an end of a known length"});
+  points.push_back(
+      {{b, DrawnSigma(), options.line_loss.type}, term.b, -1, "an end of a known length"});
   lengths.push_back(term);
   ScaleBlock();
 }

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "circline/estimators/observations.h"
-#include "circline/refine/cost_functions.h"
 #include "circline/refine/estimate_pose.h"
+#include "circline/refine/quadratic_models.h"
 
 namespace circline {
 
@@ -24,19 +24,33 @@ struct CircleTerm {
   double factor;  // Known radius, where `radius` is the scale block; else 1.
 };
 
+// How a line's interpretation plane follows from the unknowns.
+enum class LineKind {
+  kFixedDirection,  // phi: along a world axis.
+  kInPlane,         // theta, phi: direction (cos theta, sin theta, 0).
+  kXAxis,           // origin (2): the line Y = origin.y of the plane.
+  kYAxis,           // origin (2): the line X = origin.x.
+  kDiameter,        // centre (2), psi: through the centre at angle psi.
+};
+
 struct LineTerm {
-  LineCost::Kind kind;
+  LineKind kind;
   int set;
-  int shared;  // theta, origin or centre; -1 for a fixed direction.
-  int angle;   // phi or psi; -1 for an axis.
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  Eigen::Vector3d line;  // Closed-form fit, for the initial angle.
+  int shared;             // theta, origin or centre; -1 for a fixed direction.
+  int angle;              // phi or psi; -1 for an axis.
+  Eigen::Vector3d line;   // Closed-form fit, for the initial angle.
+  std::string name = {};  // For people: "pencil 'L1', line 3".
+  // Of kFixedDirection: unit vectors across the direction; the normal is cos(phi) a + sin(phi) b.
+  Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = Eigen::Vector3d::Zero();
+
+  void SetDirection(const Eigen::Vector3d& direction);
 };
 
 struct PointTerm {
-  CalibratedPoint measured;
-  double sigma_px;
+  MeasuredPoint measured;
   int point;
+  int like_set;      // The set whose noise it shares; -1 = none.
+  std::string name;  // For people: "the centre of circle 'c0'".
 };
 
 struct AngleTerm {
@@ -52,12 +66,18 @@ struct LengthTerm {
 
 struct ParameterInfo {
   int size;
-  bool is_private;  // Appears in one residual block only: eliminated before all others.
+  bool is_private;  // Appears in one term only: eliminated before all others.
+};
+
+// Standard deviations of the points of features that state none, pixels, where the options state
+// none either.
+struct NoiseScales {
+  double conic_px = 0.0, line_px = 0.0;
 };
 
 struct JointEvidence {
-  Observations observations;
-  EstimationOptions options;
+  const Observations& observations;  // Outlive this.
+  const EstimationOptions& options;
   std::vector<ParameterInfo> parameters;
   std::vector<PointSet> sets;
   std::vector<CircleTerm> circles;
@@ -71,19 +91,25 @@ struct JointEvidence {
   bool x_is_fixed = false;            // Whether anything fixes the rotation about the normal.
 
   // See JointProblem for what is expected of both.
-  JointEvidence(const Observations& observations, const EstimationOptions& options);
+  JointEvidence(const Observations& observations, const EstimationOptions& options,
+                const NoiseScales& scales);
+
+  void SetScales(const NoiseScales& scales);
 
  private:
   int AddParameter(int size, bool is_private);
   int AddSet(const std::vector<Eigen::Vector2d>& pixels, const std::vector<std::uint8_t>& mask,
-             double sigma_px, LossType loss);
-  void AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block);
+             double sigma_px, bool is_conic);
+  bool AddSegment(const Segment& segment, double sigma_px, LineTerm* term);
+  void AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block, int like_set,
+                const std::string& name);
   void AddFrame();
   void AddCircle(int index, std::map<std::string, int>* concentric);
   int CenterBlock(const CircleObservation& circle, std::map<std::string, int>* concentric);
-  void AddDiameter(const Segment& diameter, double sigma_px, int center);
+  void AddDiameter(const CircleObservation& circle, const Segment& diameter, int center);
   void AddPencil(int index);
-  void AddLine(const PencilObservation& pencil, int theta, const LineObservation& line, int axis);
+  void AddLine(const PencilObservation& pencil, int theta, const LineObservation& line, int axis,
+               const std::string& name);
   void AddAxis(const std::optional<Segment>& axis, bool is_x);
   void AddAngle(const KnownAngle& known);
   void AddLength(const KnownLength& known);

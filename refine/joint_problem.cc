@@ -1,11 +1,8 @@
 #include "circline/refine/joint_problem.h"
 
-#include <ceres/manifold.h>
-#include <ceres/problem.h>
-#include <ceres/solver.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -13,31 +10,11 @@
 #include <vector>
 
 #include "circline/refine/covariance.h"
-#include "circline/refine/joint_evidence.h"
 
 namespace circline {
 namespace {
 
 constexpr double kRadToDeg = 57.29577951308232;
-// A point farther than this many standard deviations from its curve counts as an outlier in masks,
-// rms and covariance: 99.8 % of a Gaussian's points lie within.
-constexpr double kInlierSigmas = 3.09;
-
-double* At(Values* values, int block) { return (*values)[static_cast<std::size_t>(block)].data(); }
-const double* At(const Values& values, int block) {
-  return values[static_cast<std::size_t>(block)].data();
-}
-
-// Where a refinement stands.
-struct State {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // Block 0 counts from here.
-  double facing = -1.0;
-  Values values;
-  double stretch = 1.0;  // Of the robust losses.
-  // Circles that cannot lie on this plane in front of the camera, and points that are outliers; by
-  // term, 1 = left out.
-  std::vector<std::uint8_t> circle_left_out, point_left_out;
-};
 
 // Plane coordinates (X, Y) at which a ray meets the plane; false where it does not, in front.
 bool PlanePoint(const Eigen::Matrix3d& R, double facing, const Eigen::Vector3d& ray, double* xy) {
@@ -65,7 +42,7 @@ bool PlaneCircle(const Eigen::Matrix3d& R, double facing, const Eigen::Matrix3d&
 
 // An ellipse that the plane cannot explain (across or beyond the horizon) is an outlier of this
 // seed; the seed is refused only where that leaves no circle.
-bool InitializeCircles(const JointEvidence& e, State* state) {
+bool InitializeCircles(const JointEvidence& e, JointState* state) {
   std::size_t left_out = 0;
   for (std::size_t i = 0; i < e.circles.size(); ++i) {
     const CircleTerm& t = e.circles[i];
@@ -77,23 +54,21 @@ bool InitializeCircles(const JointEvidence& e, State* state) {
       ++left_out;
       continue;
     }
-    double* center = At(&state->values, t.center);
+    double* center = state->At(t.center);
     std::copy(circle, circle + 2, center);
-    (t.radius < 0 ? center[2] : At(&state->values, t.radius)[0]) = circle[2] / t.factor;
+    (t.radius < 0 ? center[2] : state->At(t.radius)[0]) = circle[2] / t.factor;
   }
   return e.circles.empty() || left_out < e.circles.size();
 }
 
-void InitializeLine(const LineTerm& t, State* state) {
+void InitializeLine(const LineTerm& t, JointState* state) {
   if (t.angle < 0) return;
   const Eigen::Vector3d m = state->rotation.transpose() * t.line;
-  double* angle = At(&state->values, t.angle);
-  if (t.kind == LineCost::Kind::kFixedDirection) {
-    Eigen::Vector3d a, b;
-    PencilBasis(t.direction, &a, &b);
-    angle[0] = std::atan2(m.dot(b), m.dot(a));
-  } else if (t.kind == LineCost::Kind::kInPlane) {
-    const double theta = At(&state->values, t.shared)[0];
+  double* angle = state->At(t.angle);
+  if (t.kind == LineKind::kFixedDirection) {
+    angle[0] = std::atan2(m.dot(t.b), m.dot(t.a));
+  } else if (t.kind == LineKind::kInPlane) {
+    const double theta = state->At(t.shared)[0];
     angle[0] = std::atan2(m.z(), -std::sin(theta) * m.x() + std::cos(theta) * m.y());
   } else {
     angle[0] = std::atan2(-m.x(), m.y());  // A diameter.
@@ -101,25 +76,26 @@ void InitializeLine(const LineTerm& t, State* state) {
 }
 
 // Plane distances per world unit, where no circle of known radius has set it already.
-void InitializeScale(const JointEvidence& e, State* state) {
+void InitializeScale(const JointEvidence& e, JointState* state) {
   const bool from_circle = std::any_of(e.circles.begin(), e.circles.end(),
                                        [&](const CircleTerm& t) { return t.radius == e.scale; });
   if (e.scale < 0 || from_circle || e.lengths.empty()) return;
   const LengthTerm& t = e.lengths.front();
-  const double* a = At(&state->values, t.a);
-  const double* b = At(&state->values, t.b);
-  At(&state->values, e.scale)[0] = std::hypot(a[0] - b[0], a[1] - b[1]) / t.length;
+  const double* a = state->At(t.a);
+  const double* b = state->At(t.b);
+  state->At(e.scale)[0] = std::hypot(a[0] - b[0], a[1] - b[1]) / t.length;
 }
 
 // Closed-form values of all parameters at a seed; false where the seed contradicts the evidence.
-bool Initialize(const JointEvidence& e, const CameraPose& seed, State* state) {
+bool Initialize(const JointEvidence& e, const CameraPose& seed, JointState* state) {
   state->rotation = seed.rotation;
   state->facing = seed.rotation.col(2).dot(seed.translation) > 0.0 ? 1.0 : -1.0;
   state->values.assign(e.parameters.size(), {0.0, 0.0, 0.0});
   state->circle_left_out.assign(e.circles.size(), 0);
+  state->line_left_out.assign(e.lines.size(), 0);
   state->point_left_out.assign(e.points.size(), 0);
   const auto place = [&](const Eigen::Vector3d& ray, int block) {
-    return PlanePoint(state->rotation, state->facing, ray, At(&state->values, block));
+    return PlanePoint(state->rotation, state->facing, ray, state->At(block));
   };
   if (e.origin >= 0 && !place(seed.translation, e.origin)) return false;
   if (!InitializeCircles(e, state)) return false;
@@ -127,14 +103,14 @@ bool Initialize(const JointEvidence& e, const CameraPose& seed, State* state) {
     const PencilObservation& pencil =
         e.observations.pencils[static_cast<std::size_t>(FindPencil(e.observations, id))];
     const Eigen::Vector3d v = state->rotation.transpose() * pencil.fit->direction;
-    At(&state->values, theta)[0] = std::atan2(v.y(), v.x());
+    state->At(theta)[0] = std::atan2(v.y(), v.x());
   }
   for (const LineTerm& term : e.lines) InitializeLine(term, state);
   for (const LengthTerm& term : e.lengths) {
     const auto ray = [&](int block) {
       return std::find_if(e.points.begin(), e.points.end(),
                           [block](const PointTerm& p) { return p.point == block; })
-          ->measured.Homogeneous();
+          ->measured.x.Homogeneous();
     };
     if (!place(ray(term.a), term.a) || !place(ray(term.b), term.b)) return false;
   }
@@ -142,96 +118,37 @@ bool Initialize(const JointEvidence& e, const CameraPose& seed, State* state) {
   return true;
 }
 
-// The residual blocks at a base rotation, on the given point sets (one for each of the evidence's;
-// empty ones make none).
-std::vector<ResidualTerm> MakeTerms(const JointEvidence& e, const std::vector<PointSet>& sets,
-                                    const State& state) {
-  const Eigen::Matrix3d& R = state.rotation;
-  std::vector<ResidualTerm> terms;
-  const auto set = [&sets](int index) { return &sets[static_cast<std::size_t>(index)]; };
-  for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    const CircleTerm& t = e.circles[i];
-    if (set(t.set)->points.empty() || state.circle_left_out[i] != 0) continue;
-    std::vector<int> blocks = {0, t.center};
-    if (t.radius >= 0) blocks.push_back(t.radius);
-    terms.push_back({std::make_unique<CircleCost>(set(t.set), &state.stretch, R, state.facing,
-                                                  t.radius >= 0, t.factor),
-                     blocks});
-  }
-  for (const LineTerm& t : e.lines) {
-    if (set(t.set)->points.empty()) continue;
-    std::vector<int> blocks = {0};
-    if (t.shared >= 0) blocks.push_back(t.shared);
-    if (t.angle >= 0) blocks.push_back(t.angle);
-    terms.push_back({std::make_unique<LineCost>(t.kind, set(t.set), &state.stretch, R, state.facing,
-                                                t.direction),
-                     blocks});
-  }
-  for (std::size_t i = 0; i < e.points.size(); ++i) {
-    const PointTerm& t = e.points[i];
-    if (state.point_left_out[i] != 0) continue;
-    terms.push_back({std::make_unique<PointCost>(t.measured, t.sigma_px, e.options.line_loss.type,
-                                                 &state.stretch, R, state.facing),
-                     {0, t.point}});
-  }
-  for (const AngleTerm& t : e.angles) {
-    std::vector<int> blocks;
-    for (int theta : t.theta) {
-      if (theta >= 0) blocks.push_back(theta);
-    }
-    terms.push_back({std::make_unique<AngleCost>(t.value, t.sigma, t.fixed), blocks});
-  }
-  for (const LengthTerm& t : e.lengths) {
-    terms.push_back({std::make_unique<LengthCost>(t.length), {t.a, t.b, e.scale}});
-  }
-  return terms;
+Eigen::Matrix3d ImageOf(const CircleTerm& t, const JointState& state) {
+  const double* c = state.At(t.center);
+  const double radius = t.radius < 0 ? c[2] : t.factor * state.At(t.radius)[0];
+  return ImageOfPlaneCircle(state.rotation, state.facing, c[0], c[1], radius);
 }
 
-std::vector<double*> Pointers(const std::vector<int>& blocks, Values* values) {
-  std::vector<double*> pointers;
-  pointers.reserve(blocks.size());
-  for (int block : blocks) pointers.push_back(At(values, block));
-  return pointers;
-}
-
-double RobustCost(const std::vector<ResidualTerm>& terms, Values* values) {
-  double cost = 0.0;
-  std::vector<double> residuals;
-  for (const ResidualTerm& term : terms) {
-    residuals.resize(static_cast<std::size_t>(term.cost->num_residuals()));
-    const std::vector<double*> pointers = Pointers(term.blocks, values);
-    if (!term.cost->Evaluate(pointers.data(), residuals.data(), nullptr)) {
-      return std::numeric_limits<double>::infinity();
-    }
-    for (double r : residuals) cost += 0.5 * r * r;
-  }
-  return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
-}
-
-// Calls visit(set, is_circle, distance) for each circle that takes part, then for each line;
-// `terms` as MakeTerms made them on the evidence's own sets. distance(point): signed, pixels.
+// Calls visit(set, is_circle, term, distances) for each circle that takes part, then for each line;
+// distances of the set's points, signed, pixels.
 template <typename Visit>
-void ForEachCurve(const JointEvidence& e, const std::vector<ResidualTerm>& terms, State* state,
-                  const Visit& visit) {
-  std::size_t term = 0;  // MakeTerms writes circles first, then lines.
+void ForEachCurve(const JointEvidence& e, const JointState& state, const Visit& visit) {
+  std::vector<double> distances;
+  const auto set = [&e](int index) -> const PointSet& {
+    return e.sets[static_cast<std::size_t>(index)];
+  };
   for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    if (state->circle_left_out[i] != 0) continue;
-    const auto* cost = static_cast<const CircleCost*>(terms[term].cost.get());
-    const Eigen::Matrix3d conic =
-        cost->Conic(Pointers(terms[term++].blocks, &state->values).data());
-    visit(e.circles[i].set, true,
-          [&](const CalibratedPoint& p) { return ConicDistancePx(p, conic); });
+    if (state.circle_left_out[i] != 0) continue;
+    ConicDistances(set(e.circles[i].set), ImageOf(e.circles[i], state), &distances);
+    visit(set(e.circles[i].set), true, i, distances);
   }
-  for (const LineTerm& t : e.lines) {
-    const auto* cost = static_cast<const LineCost*>(terms[term].cost.get());
-    const Eigen::Vector3d line = cost->Line(Pointers(terms[term++].blocks, &state->values).data());
-    visit(t.set, false, [&](const CalibratedPoint& p) { return LineDistancePx(p, line); });
+  for (std::size_t i = 0; i < e.lines.size(); ++i) {
+    if (state.line_left_out[i] != 0) continue;
+    Eigen::Matrix3d unused;
+    const Eigen::Vector3d line = state.rotation * LineNormal(e.lines[i], state, &unused);
+    LineDistances(set(e.lines[i].set), line, &distances);
+    visit(set(e.lines[i].set), false, i, distances);
   }
 }
 
 // What the circles left out cost: as much as points far off, so that no pose gains by explaining
 // less.
-double LeftOutCost(const JointEvidence& e, const State& state) {
+double LeftOutCost(const JointEvidence& e, const JointState& state) {
   constexpr double kFarOffSigmas = 30.0;
   double cost = 0.0;
   for (std::size_t i = 0; i < e.circles.size(); ++i) {
@@ -243,56 +160,18 @@ double LeftOutCost(const JointEvidence& e, const State& state) {
   return cost;
 }
 
-// Minimises in Ceres; `values` in and out.
-Status Minimize(const std::vector<ResidualTerm>& terms,
-                const std::vector<ParameterInfo>& parameters, bool x_is_fixed, int max_iterations,
-                Values* values) {
-  ceres::Problem::Options problem_options;
-  problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  problem_options.disable_all_safety_checks = true;
-  ceres::SubsetManifold without_spin(3, {2});  // Outlives the problem.
-  ceres::Problem problem(problem_options);
-  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  bool any_private = false;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    problem.AddParameterBlock((*values)[i].data(), parameters[i].size);
-    ordering->AddElementToGroup((*values)[i].data(), parameters[i].is_private ? 0 : 1);
-    any_private = any_private || parameters[i].is_private;
-  }
-  if (!x_is_fixed) problem.SetManifold((*values)[0].data(), &without_spin);
-  for (const ResidualTerm& term : terms) {
-    problem.AddResidualBlock(term.cost.get(), nullptr, Pointers(term.blocks, values));
-  }
-  ceres::Solver::Options options;
-  options.max_num_iterations = max_iterations;
-  options.function_tolerance = 1e-9;
-  options.parameter_tolerance = 1e-10;
-  options.gradient_tolerance = 1e-14;
-  options.logging_type = ceres::SILENT;
-  options.linear_solver_type = any_private ? ceres::DENSE_SCHUR : ceres::DENSE_QR;
-  if (any_private) options.linear_solver_ordering = ordering;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  if (!summary.IsSolutionUsable())
-    return Status::Failed("the refinement failed: " + summary.message);
-  return Status::Ok();
-}
-
 // How wide the losses must be for (nearly) all residuals to lie where they are convex: twice the
-// largest |residual| / tuning constant but for the worst hundredth. Tukey's and Geman-McClure's are
-// convex up to 0.45 and 0.58 of theirs. 1 or less: nothing lies in the tails.
-double RelativeSpread(const JointEvidence& e, const std::vector<ResidualTerm>& terms,
-                      State* state) {
+// largest |residual| / tuning constant but for the worst hundredth, of the points that a robust fit
+// has not found to be outliers. Tukey's and Geman-McClure's are convex up to 0.45 and 0.58 of
+// theirs. 1 or less: nothing lies in the tails.
+double RelativeSpread(const JointEvidence& e, const JointState& state) {
   std::vector<double> ratios;
-  const auto add = [&](const PointSet& set, const auto& distance) {
-    for (const CalibratedPoint& p : set.points) {
-      ratios.push_back(std::abs(distance(p)) / (set.sigma_px * LossTuningConstant(set.loss)));
-    }
-  };
-  ForEachCurve(e, terms, state, [&](int set, bool, const auto& distance) {
-    add(e.sets[static_cast<std::size_t>(set)], distance);
-  });
+  ForEachCurve(e, state,
+               [&](const PointSet& set, bool, std::size_t, const std::vector<double>& distances) {
+                 const double unit = 1.0 / (set.sigma_px * LossTuningConstant(set.loss));
+                 for (std::size_t i = 0; i < set.num_trusted; ++i)
+                   ratios.push_back(std::abs(distances[i]) * unit);
+               });
   if (ratios.empty()) return 0.0;
   const auto quantile = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() * 99 / 100);
   std::nth_element(ratios.begin(), quantile, ratios.end());
@@ -302,51 +181,22 @@ double RelativeSpread(const JointEvidence& e, const std::vector<ResidualTerm>& t
 
 // Graduated non-convexity: where residuals lie far in the tails, the losses start as wide as these
 // ask for, and narrow to their own width as they shrink (Black and Rangarajan 1996).
-Status GraduatedMinimize(const JointEvidence& e, const std::vector<ResidualTerm>& terms,
-                         int max_iterations, State* state) {
+Status GraduatedMinimize(const JointEvidence& e, int max_iterations, double tolerance,
+                         JointState* state) {
   constexpr double kFarOut = 3.0;  // Gaussian noise alone has a spread of 2.2.
   constexpr double kShrink = 0.5;
-  constexpr int kIterationsOnTheWay = 5;
-  const double spread = RelativeSpread(e, terms, state);
-  state->stretch = spread > kFarOut ? spread : 1.0;
-  while (state->stretch > 1.0) {
-    const Status status = Minimize(terms, e.parameters, e.x_is_fixed,
-                                   std::min(kIterationsOnTheWay, max_iterations), &state->values);
+  constexpr int kIterationsOnTheWay = 2;
+  double stretch = RelativeSpread(e, *state);
+  while (stretch > kFarOut) {
+    const Status status =
+        Minimize(e, stretch, std::min(kIterationsOnTheWay, max_iterations), tolerance, state);
     if (!status.ok()) return status;
-    state->stretch =
-        std::max(1.0, std::min(kShrink * state->stretch, RelativeSpread(e, terms, state)));
+    stretch = std::min(kShrink * stretch, RelativeSpread(e, *state));
   }
-  return Minimize(terms, e.parameters, e.x_is_fixed, max_iterations, &state->values);
-}
-
-// Moves the rotation found into the base, so that block 0 is zero: the covariance is that of the
-// rotation at the estimate.
-void Recenter(State* state) {
-  state->rotation = RotationChart(state->rotation, At(state->values, 0)).rotation;
-  state->values[0] = {0.0, 0.0, 0.0};
-  const Eigen::Quaterniond q(state->rotation);  // Rounding of many products, off.
-  state->rotation = q.normalized().toRotationMatrix();
-}
-
-// From a seed to (near) a minimum, with the rotation in the state's base.
-Status Converge(const JointEvidence& e, const CameraPose& seed, int max_iterations, State* state) {
-  if (!Initialize(e, seed, state)) return Status::Failed("a seed pose contradicts the evidence");
-  const std::vector<ResidualTerm> terms = MakeTerms(e, e.sets, *state);
-  const Status status = GraduatedMinimize(e, terms, max_iterations, state);
-  if (status.ok()) Recenter(state);
-  return status;
+  return Minimize(e, 1.0, max_iterations, tolerance, state);
 }
 
 // --- Results ---
-
-// How far the image of a point in the camera frame misses its measurement, pixels (first order).
-double PointMissPx(const CalibratedPoint& measured, const Eigen::Vector3d& X) {
-  if (!(X.z() > 0.0)) return std::numeric_limits<double>::infinity();
-  Eigen::Matrix2d x_from_pixel;
-  x_from_pixel << measured.x_from_pixel[0], measured.x_from_pixel[1], measured.x_from_pixel[2],
-      measured.x_from_pixel[3];
-  return (x_from_pixel.inverse() * (X.head<2>() / X.z() - measured.x)).norm();
-}
 
 // 1.4826 x the median; `parameters` of the values' degrees of freedom are spent.
 double MadScale(std::vector<double> distances, std::size_t parameters) {
@@ -358,86 +208,65 @@ double MadScale(std::vector<double> distances, std::size_t parameters) {
   return 1.4826 * *middle * std::sqrt(n / (n - static_cast<double>(parameters)));
 }
 
-// Splits every set into inliers, kept without loss, and the rest; counts, rms and scales on the
-// way. A set with fewer than `minimum` inliers is an outlier as a whole, and left empty.
-class InlierFilter {
- public:
-  InlierFilter(const JointEvidence& e, PoseHypothesis* h) : e_(e), h_(h), kept_(e.sets.size()) {}
-
-  // `distance`: of a point, signed, pixels.
-  template <typename Distance>
-  void Add(int index, std::size_t minimum, const Distance& distance,
-           std::vector<double>* distances) {
-    const PointSet& set = e_.sets[static_cast<std::size_t>(index)];
-    PointSet& out = kept_[static_cast<std::size_t>(index)];
-    out.sigma_px = set.sigma_px;
-    double squares = 0.0;
-    for (const CalibratedPoint& p : set.points) {
-      const double d = std::abs(distance(p));
-      distances->push_back(d);
-      if (!(d <= kInlierSigmas * set.sigma_px)) continue;
-      squares += d * d;
-      out.points.push_back(p);
-    }
-    h_->num_observations += static_cast<int>(set.points.size());
-    if (out.points.size() < minimum) {
-      out.points.clear();
-      return;
-    }
-    squares_ += squares;
-    h_->num_inliers += static_cast<int>(out.points.size());
-  }
-
-  void AddPoint(double miss_px, bool is_inlier) {
-    ++h_->num_observations;
-    if (!is_inlier) return;
-    ++h_->num_inliers;
-    squares_ += miss_px * miss_px;
-  }
-
-  std::vector<PointSet> Finish() {
-    h_->rms_px = h_->num_inliers > 0 ? std::sqrt(squares_ / h_->num_inliers) : 0.0;
-    return std::move(kept_);
-  }
-
- private:
-  const JointEvidence& e_;
-  PoseHypothesis* h_;
-  std::vector<PointSet> kept_;
-  double squares_ = 0.0;
-};
-
-std::vector<PointSet> KeepInliers(const JointEvidence& e, const std::vector<ResidualTerm>& terms,
-                                  State* state, PoseHypothesis* h, ResidualScales* scales) {
-  InlierFilter filter(e, h);
-  std::vector<double> of_circles, of_lines;
-  ForEachCurve(e, terms, state, [&](int set, bool is_circle, const auto& distance) {
-    filter.Add(set, is_circle ? 5 : 2, distance, is_circle ? &of_circles : &of_lines);
-  });
-  for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    if (state->circle_left_out[i] != 0) {
-      h->num_observations +=
-          static_cast<int>(e.sets[static_cast<std::size_t>(e.circles[i].set)].points.size());
-    }
-  }
+// Counts and rms of the inliers; features and points that are outliers as a whole are marked in the
+// state as left out.
+void CountInliers(const JointEvidence& e, JointState* state, PoseHypothesis* h) {
+  double squares = 0.0;
+  const JointState before = *state;
+  ForEachCurve(e, before,
+               [&](const PointSet& set, bool is_circle, std::size_t term,
+                   const std::vector<double>& distances) {
+                 const std::size_t minimum = is_circle ? 5 : 2;
+                 std::size_t inliers = 0;
+                 double sum = 0.0;
+                 for (const double d : distances) {
+                   if (!(std::abs(d) <= kInlierSigmas * set.sigma_px)) continue;
+                   ++inliers;
+                   sum += d * d;
+                 }
+                 if (inliers < minimum) {
+                   (is_circle ? state->circle_left_out : state->line_left_out)[term] = 1;
+                   return;
+                 }
+                 h->num_inliers += static_cast<int>(inliers);
+                 squares += sum;
+               });
+  for (const PointSet& set : e.sets) h->num_observations += static_cast<int>(set.points.size());
   for (std::size_t i = 0; i < e.points.size(); ++i) {
     const PointTerm& t = e.points[i];
-    const double* xy = At(state->values, t.point);
-    const double miss_px =
-        PointMissPx(t.measured, state->rotation * Eigen::Vector3d(xy[0], xy[1], state->facing));
-    state->point_left_out[i] = miss_px <= kInlierSigmas * t.sigma_px ? 0 : 1;
-    filter.AddPoint(miss_px, state->point_left_out[i] == 0);
+    const double* xy = state->At(t.point);
+    const double miss = PointMissPx(t.measured, state->rotation, state->facing, xy[0], xy[1]);
+    state->point_left_out[i] = miss <= kInlierSigmas * t.measured.sigma_px ? 0 : 1;
+    ++h->num_observations;
+    if (state->point_left_out[i] != 0) continue;
+    ++h->num_inliers;
+    squares += miss * miss;
   }
+  h->rms_px = h->num_inliers > 0 ? std::sqrt(squares / h->num_inliers) : 0.0;
+}
+
+// Scatter about the common pose of those points whose noise is automatic.
+NoiseScales MeasureScatter(const JointEvidence& e, const JointState& state) {
+  std::vector<double> of_circles, of_lines;
+  std::size_t circles = 0, lines = 0;
+  ForEachCurve(
+      e, state,
+      [&](const PointSet& set, bool is_circle, std::size_t, const std::vector<double>& distances) {
+        if (set.noise == PointSet::Noise::kStated) return;
+        std::vector<double>& all = is_circle ? of_circles : of_lines;
+        ++(is_circle ? circles : lines);
+        for (std::size_t i = 0; i < set.num_trusted; ++i) all.push_back(std::abs(distances[i]));
+      });
   constexpr std::size_t kPerCircle = 3, kPerLine = 1, kPose = 3;
-  scales->conic_px = MadScale(of_circles, kPose + kPerCircle * e.circles.size());
-  scales->line_px = MadScale(of_lines, kPose + kPerLine * e.lines.size());
-  return filter.Finish();
+  return {MadScale(std::move(of_circles), kPose + kPerCircle * circles),
+          MadScale(std::move(of_lines), kPose + kPerLine * lines)};
 }
 
 // Origin of the world in units of the plane's distance, camera frame.
-Eigen::Vector3d OriginInPlane(const JointEvidence& e, const State& state, const CameraPose& seed) {
+Eigen::Vector3d OriginInPlane(const JointEvidence& e, const JointState& state,
+                              const CameraPose& seed) {
   if (e.origin >= 0) {
-    const double* o = At(state.values, e.origin);
+    const double* o = state.At(e.origin);
     return {o[0], o[1], state.facing};
   }
   double o[2] = {0.0, 0.0};
@@ -445,50 +274,45 @@ Eigen::Vector3d OriginInPlane(const JointEvidence& e, const State& state, const 
   return {o[0], o[1], state.facing};
 }
 
-void FillPose(const JointEvidence& e, const State& state, const Eigen::Vector3d& origin,
+void FillPose(const JointEvidence& e, const JointState& state, const Eigen::Vector3d& origin,
               PoseHypothesis* h) {
   h->cam_from_world.rotation = state.rotation;
   const Eigen::Vector3d t = state.rotation * origin;
   h->metric = e.scale >= 0;
   h->origin_observed = e.origin_observed;
   h->cam_from_world.translation =
-      h->metric ? Eigen::Vector3d(t / At(state.values, e.scale)[0]) : t.normalized();
+      h->metric ? Eigen::Vector3d(t / state.At(e.scale)[0]) : t.normalized();
 }
 
-// Columns: how the shared parameters move [delta, delta_t].
-Eigen::MatrixXd PoseFromShared(const JointEvidence& e, const State& state,
-                               const Eigen::Vector3d& origin, bool hold_spin,
-                               const SharedCovariance& shared) {
+// Columns: how the shared unknowns move [delta, delta_t].
+Eigen::MatrixXd PoseFromShared(const JointEvidence& e, const JointState& state,
+                               const Eigen::Vector3d& origin, const SharedCovariance& shared) {
   Eigen::MatrixXd T = Eigen::MatrixXd::Zero(6, shared.covariance.cols());
   const Eigen::Matrix3d& R = state.rotation;
-  const int spin = hold_spin ? 2 : 3;
   const Eigen::Vector3d P = R * origin;
   // d t / d P: a direction's length does not vary.
   Eigen::Matrix3d by_P =
       (Eigen::Matrix3d::Identity() - P * P.transpose() / P.squaredNorm()) / P.norm();
   if (e.scale >= 0) {
-    const double scale = At(state.values, e.scale)[0];
+    const double scale = state.At(e.scale)[0];
     by_P = Eigen::Matrix3d::Identity() / scale;
     T.block<3, 1>(3, shared.offsets[static_cast<std::size_t>(e.scale)]) = -P / (scale * scale);
   }
-  T.topLeftCorner(3, spin) = R.leftCols(spin);
-  T.block(3, 0, 3, spin) = -(by_P * R * CrossMatrix(origin)).leftCols(spin);
+  T.topLeftCorner<3, 3>() = R;
+  T.block<3, 3>(3, 0) = -by_P * R * CrossMatrix(origin);
+  // A spin that nothing fixes is one about the origin, wherever that is.
+  if (!e.x_is_fixed) T.block<3, 1>(3, 2).setZero();
   if (e.origin >= 0) {
     T.block<3, 2>(3, shared.offsets[static_cast<std::size_t>(e.origin)]) = by_P * R.leftCols<2>();
   }
   return T;
 }
 
-// Orthonormal basis of the free directions among [delta, delta_t]; the spin about the normal first.
-void FillFreeDirections(const Eigen::MatrixXd& T, const Eigen::MatrixXd& null_space, bool hold_spin,
-                        const Eigen::Matrix3d& R, PoseHypothesis* h) {
-  Eigen::MatrixXd free = T * null_space;
-  if (hold_spin) {
-    free.conservativeResize(6, free.cols() + 1);
-    free.rightCols<1>() << R.col(2), Eigen::Vector3d::Zero();
-  }
-  if (free.cols() == 0) return;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(free);
+// Orthonormal basis of the free directions among [delta, delta_t].
+void FillFreeDirections(const Eigen::MatrixXd& T, const Eigen::MatrixXd& null_space,
+                        PoseHypothesis* h) {
+  if (null_space.cols() == 0) return;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(T * null_space);
   qr.setThreshold(1e-6);
   const Eigen::MatrixXd Q = Eigen::MatrixXd(qr.householderQ());
   for (Eigen::Index k = 0; k < qr.rank(); ++k) {
@@ -498,41 +322,18 @@ void FillFreeDirections(const Eigen::MatrixXd& T, const Eigen::MatrixXd& null_sp
   }
 }
 
-// Volume element of the parameters in which a scene is as likely anywhere: rotations by their
-// invariant measure, the first circle's centre uniform in space in units of its radius, the others
-// in the plane in the same unit, radii by their logarithm. Log of (that measure / the parameters'
-// own).
-double LogMeasure(const JointEvidence& e, const State& state) {
-  const Values& values = state.values;
-  double first_radius = 0.0, log_measure = 0.0;
-  for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    const CircleTerm& t = e.circles[i];
-    if (state.circle_left_out[i] != 0) continue;
-    const double radius =
-        std::abs(t.radius < 0 ? At(values, t.center)[2] : t.factor * At(values, t.radius)[0]);
-    if (first_radius == 0.0) {
-      first_radius = radius;
-      log_measure -= 4.0 * std::log(radius);
-    } else {
-      log_measure -= 2.0 * std::log(first_radius) + std::log(radius);
-    }
-  }
-  return log_measure;
-}
-
-void FillFeatures(const JointEvidence& e, const State& state, double unit, PoseHypothesis* h) {
+void FillFeatures(const JointEvidence& e, const JointState& state, double unit, PoseHypothesis* h) {
   const Eigen::Matrix3d& R = state.rotation;
   for (std::size_t i = 0; i < e.circles.size(); ++i) {
     const CircleTerm& t = e.circles[i];
     if (state.circle_left_out[i] != 0) continue;
-    const double* c = At(state.values, t.center);
+    const double* c = state.At(t.center);
     CircleEstimate estimate;
     estimate.id = e.observations.circles[static_cast<std::size_t>(t.observation)].id;
     estimate.normal = -state.facing * R.col(2);
     const Eigen::Vector3d center = R * Eigen::Vector3d(c[0], c[1], state.facing);
     estimate.center = unit * center;
-    estimate.radius =
-        unit * std::abs(t.radius < 0 ? c[2] : t.factor * At(state.values, t.radius)[0]);
+    estimate.radius = unit * std::abs(t.radius < 0 ? c[2] : t.factor * state.At(t.radius)[0]);
     CameraToPixel(e.observations.camera, center, &estimate.center_px);
     h->circles.push_back(estimate);
   }
@@ -550,7 +351,7 @@ void FillFeatures(const JointEvidence& e, const State& state, double unit, PoseH
       covariance = pencil.fit->covariance;
       const auto theta = e.thetas.find(pencil.id);
       if (theta != e.thetas.end()) {
-        const double angle = At(state.values, theta->second)[0];
+        const double angle = state.At(theta->second)[0];
         estimate.direction = R * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0);
       }
     } else {
@@ -562,77 +363,143 @@ void FillFeatures(const JointEvidence& e, const State& state, double unit, PoseH
   }
 }
 
-bool IsRobust(const EstimationOptions& options) {
-  return options.conic_loss.type != LossType::kTrivial ||
-         options.line_loss.type != LossType::kTrivial;
+// How much wider the estimate scatters than least squares on the inliers would: the variance of an
+// M-estimate, E[psi^2] / E[psi']^2 over residuals in standard deviations (Huber 1964), where enough
+// of them are redundant to measure it, and never less than what every loss is tuned to.
+double Inflation(const JointEvidence& e, const JointState& state) {
+  constexpr double kTuned = 1.0 / 0.95;
+  const bool is_robust = e.options.conic_loss.type != LossType::kTrivial ||
+                         e.options.line_loss.type != LossType::kTrivial;
+  if (!is_robust) return 1.0;
+  double squares = 0.0, slopes = 0.0, inliers = 0.0, points = 0.0, unknowns = 3.0;
+  ForEachCurve(
+      e, state,
+      [&](const PointSet& set, bool is_circle, std::size_t, const std::vector<double>& distances) {
+        unknowns += is_circle ? 3.0 : 1.0;
+        points += static_cast<double>(distances.size());
+        for (const double d : distances) {
+          const double r = d / set.sigma_px, r2 = r * r;
+          const LossSlopes loss = LossSlopesAt(set.loss, r2);
+          squares += loss.first * loss.first * r2;
+          slopes += loss.first + 2.0 * r2 * loss.second;
+          inliers += std::abs(r) <= kInlierSigmas ? 1.0 : 0.0;
+        }
+      });
+  constexpr double kEnough = 30.0;
+  if (!(points > unknowns + kEnough) || !(slopes > 0.0)) return kTuned;
+  const double redundancy = points / (points - unknowns);
+  return std::max(kTuned, redundancy * squares * inliers / (slopes * slopes));
+}
+
+// In words, what a hypothesis leaves out.
+void FillNotes(const JointEvidence& e, const JointState& state, std::vector<std::string>* notes) {
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    if (state.circle_left_out[i] == 0) continue;
+    const auto index = static_cast<std::size_t>(e.circles[i].observation);
+    notes->push_back("circle '" + e.observations.circles[index].id +
+                     "': left out, it cannot be a circle of the plane found");
+  }
+  for (std::size_t i = 0; i < e.lines.size(); ++i) {
+    if (state.line_left_out[i] == 0) continue;
+    notes->push_back(e.lines[i].name + ": left out, it contradicts the pose found");
+  }
+  for (std::size_t i = 0; i < e.points.size(); ++i) {
+    if (state.point_left_out[i] == 0) continue;
+    notes->push_back(e.points[i].name + ": left out, it contradicts the pose found");
+  }
+}
+
+Status Finite(bool finite) {
+  return finite ? Status::Ok() : Status::Failed("the refinement left the range of numbers");
 }
 
 }  // namespace
 
-JointProblem::JointProblem(const Observations& observations, const EstimationOptions& options)
-    : evidence_(std::make_unique<JointEvidence>(observations, options)) {}
-
-JointProblem::~JointProblem() = default;
-
-bool JointProblem::spin_is_free() const { return !evidence_->x_is_fixed; }
-
 double JointProblem::SeedCost(const CameraPose& seed) const {
-  State state;
-  if (!Initialize(*evidence_, seed, &state)) return std::numeric_limits<double>::infinity();
-  return RobustCost(MakeTerms(*evidence_, evidence_->sets, state), &state.values) +
-         LeftOutCost(*evidence_, state);
+  JointState state;
+  if (!Initialize(evidence_, seed, &state)) return std::numeric_limits<double>::infinity();
+  return JointCost(evidence_, state, Weighing()) + LeftOutCost(evidence_, state);
 }
 
 Status JointProblem::ApproachFrom(const CameraPose& seed, Approach* approach) const {
-  const JointEvidence& e = *evidence_;
-  State state;
-  PoseHypothesis h;
-  constexpr int kFirstIterations = 8;
-  const Status status =
-      Converge(e, seed, std::min(kFirstIterations, e.options.max_iterations), &state);
-  if (!status.ok()) return status;
-  const std::vector<ResidualTerm> terms = MakeTerms(e, e.sets, state);
-  approach->cost = RobustCost(terms, &state.values) + LeftOutCost(e, state);
-  KeepInliers(e, terms, &state, &h, &approach->scales);
-  FillPose(e, state, OriginInPlane(e, state, seed), &h);
-  approach->pose = h.cam_from_world;
-  const bool finite = std::isfinite(approach->cost) && approach->pose.rotation.allFinite() &&
-                      approach->pose.translation.allFinite();
-  return finite ? Status::Ok() : Status::Failed("the refinement left the range of numbers");
+  approach->pose = seed;
+  if (!Initialize(evidence_, seed, &approach->state))
+    return Status::Failed("a seed pose contradicts the evidence");
+  return Continue(approach);
 }
 
-Status JointProblem::Refine(const CameraPose& seed, PoseHypothesis* h) const {
-  const JointEvidence& e = *evidence_;
-  *h = PoseHypothesis();
-  State state;
-  const Status status = Converge(e, seed, e.options.max_iterations, &state);
+Status JointProblem::Continue(Approach* approach) const {
+  const JointEvidence& e = evidence_;
+  constexpr int kFirstIterations = 3;
+  constexpr double kTolerance = 0.01;  // Of cost: a seventh of a standard deviation.
+  JointState* state = &approach->state;
+  const Status status =
+      GraduatedMinimize(e, std::min(kFirstIterations, e.options.max_iterations), kTolerance, state);
   if (!status.ok()) return status;
-  const bool hold_spin = !e.x_is_fixed;
-  const std::vector<ResidualTerm> terms = MakeTerms(e, e.sets, state);
-  h->cost = RobustCost(terms, &state.values) + LeftOutCost(e, state);
-  ResidualScales unused;
-  const std::vector<PointSet> inliers = KeepInliers(e, terms, &state, h, &unused);
+  approach->cost = JointCost(e, *state, Weighing()) + LeftOutCost(e, *state);
+  approach->scales = MeasureScatter(e, *state);
+  PoseHypothesis h;
+  FillPose(e, *state, OriginInPlane(e, *state, approach->pose), &h);
+  approach->pose = h.cam_from_world;
+  return Finite(std::isfinite(approach->cost) && approach->pose.rotation.allFinite() &&
+                approach->pose.translation.allFinite());
+}
+
+Status JointProblem::Refine(const Approach& approach, Refined* refined) const {
+  const JointEvidence& e = evidence_;
+  constexpr double kTolerance = 1e-7;  // Of cost: a two-thousandth of a standard deviation.
+  *refined = Refined();
+  PoseHypothesis* h = &refined->hypothesis;
+  JointState state = approach.state;
+  const Status status = GraduatedMinimize(e, e.options.max_iterations, kTolerance, &state);
+  if (!status.ok()) return status;
+  h->cost = JointCost(e, state, Weighing()) + LeftOutCost(e, state);
+  const double inflation = Inflation(e, state);
+  CountInliers(e, &state, h);
 
   SharedCovariance shared;
-  const std::vector<ResidualTerm> inlier_terms = MakeTerms(e, inliers, state);
-  if (!std::isfinite(h->cost) ||
-      !ComputeCovariance(inlier_terms, e.parameters, state.values, hold_spin, &shared)) {
+  if (!std::isfinite(h->cost) || !ComputeCovariance(e, state, &shared))
     return Status::Failed("the refined pose leaves some circle or line without inliers");
-  }
-  const Eigen::Vector3d origin = OriginInPlane(e, state, seed);
+  const Eigen::Vector3d origin = OriginInPlane(e, state, approach.pose);
   FillPose(e, state, origin, h);
-  const Eigen::MatrixXd T = PoseFromShared(e, state, origin, hold_spin, shared);
-  // Every loss is tuned to 95 % efficiency: that much wider than least squares on the inliers.
-  const double inflation = IsRobust(e.options) ? 1.0 / 0.95 : 1.0;
+  const Eigen::MatrixXd T = PoseFromShared(e, state, origin, shared);
   const Matrix6d covariance = inflation * T * shared.covariance * T.transpose();
   Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
-  FillFreeDirections(T, shared.null_space, hold_spin, state.rotation, h);
+  FillFreeDirections(T, shared.null_space, h);
   h->rank = CovarianceRank(covariance);
-  h->log_det = shared.log_det + 2.0 * LogMeasure(e, state);
   FillFeatures(e, state, h->cam_from_world.translation.norm() / origin.norm(), h);
-  const bool finite = covariance.allFinite() && h->cam_from_world.rotation.allFinite() &&
-                      h->cam_from_world.translation.allFinite() && std::isfinite(h->log_det);
-  return finite ? Status::Ok() : Status::Failed("the refinement left the range of numbers");
+  FillNotes(e, state, &refined->notes);
+
+  refined->shared_log_det = shared.log_det;
+  refined->own_log_det = shared.circle_log_det;
+  refined->own_log_det.insert(refined->own_log_det.end(), shared.line_log_det.begin(),
+                              shared.line_log_det.end());
+  refined->left_out = state.circle_left_out;
+  refined->left_out.insert(refined->left_out.end(), state.line_left_out.begin(),
+                           state.line_left_out.end());
+  for (const CircleTerm& t : e.circles) {
+    refined->radii.push_back(
+        std::abs(t.radius < 0 ? state.At(t.center)[2] : t.factor * state.At(t.radius)[0]));
+  }
+  h->log_det = LogDet(*refined, refined->left_out);
+  return Finite(covariance.allFinite() && h->cam_from_world.rotation.allFinite() &&
+                h->cam_from_world.translation.allFinite() && std::isfinite(h->log_det));
+}
+
+double LogDet(const Refined& refined, const std::vector<std::uint8_t>& left_out) {
+  double log_det = refined.shared_log_det, log_measure = 0.0, first_radius = 0.0;
+  for (std::size_t i = 0; i < left_out.size(); ++i) {
+    if (left_out[i] != 0) continue;
+    log_det += refined.own_log_det[i];
+    if (i >= refined.radii.size()) continue;  // A line.
+    if (first_radius == 0.0) {
+      first_radius = refined.radii[i];
+      log_measure -= 4.0 * std::log(first_radius);
+    } else {
+      log_measure -= 2.0 * std::log(first_radius) + std::log(refined.radii[i]);
+    }
+  }
+  return log_det + 2.0 * log_measure;
 }
 
 }  // namespace circline

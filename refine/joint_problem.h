@@ -10,59 +10,81 @@
 // interpretation plane contains its direction whatever its offset: lines need not lie in the plane,
 // and nothing is special at infinity.
 //
-// Residuals are distances in pixels of the photo over the standard deviation, one Ceres block per
-// circle or line with the robust loss applied to each point inside it.
+// Residuals are distances in pixels of the photo over the standard deviation, each under its robust
+// loss. The solver sees the shared unknowns alone (reduced_problem.h). Internal: not installed.
 #ifndef CIRCLINE_REFINE_JOINT_PROBLEM_H_
 #define CIRCLINE_REFINE_JOINT_PROBLEM_H_
 
-#include <memory>
+#include <cstdint>
+#include <string>
+#include <vector>
 
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
 #include "circline/refine/estimate_pose.h"
+#include "circline/refine/joint_evidence.h"
+#include "circline/refine/reduced_problem.h"
 
 namespace circline {
-
-struct JointEvidence;
-
-// Scatter of the points about a refined pose, pixels: 1.4826 x median absolute residual, degrees of
-// freedom counted in; 0 where too few are redundant to tell.
-struct ResidualScales {
-  double conic_px = 0.0, line_px = 0.0;
-};
 
 // Where a few iterations lead from a seed.
 struct Approach {
   CameraPose pose;
   double cost = 0.0;  // Robust, as PoseHypothesis::cost.
-  ResidualScales scales;
+  // Scatter of the points whose noise is automatic, pixels: 1.4826 x median absolute residual,
+  // degrees of freedom counted in; 0 where too few are redundant to tell.
+  NoiseScales scales;
+  JointState state;
 };
+
+// A hypothesis without probability, and what it takes to compare it with others.
+struct Refined {
+  PoseHypothesis hypothesis;
+  // Log determinants of the covariance of the shared unknowns and of what each circle, then each
+  // line, has of its own; the same features that the hypothesis does not explain; circles' radii.
+  double shared_log_det = 0.0;
+  std::vector<double> own_log_det;
+  std::vector<std::uint8_t> left_out;
+  std::vector<double> radii;
+  std::vector<std::string> notes;  // What was left out, and why.
+};
+
+// Log determinant of the covariance of all unknowns but those of the features left out, in
+// parameters in which a scene is as likely anywhere: rotations by their invariant measure, the
+// first circle's centre uniform in space in units of its radius, the others in the plane in the
+// same unit, radii by their logarithm. Hypotheses compare on the features that all of them explain.
+double LogDet(const Refined& refined, const std::vector<std::uint8_t>& left_out);
 
 class JointProblem {
  public:
-  // `observations` fitted and resolved (FitObservations or FitDirect, then ResolveWorld). Features
-  // without a fit, of other planes, or without any tie to the world frame take no part. Every
-  // circle and pencil must state its sigma_px ("auto" is settled before).
-  JointProblem(const Observations& observations, const EstimationOptions& options);
-  ~JointProblem();
+  // `observations` fitted and resolved (FitObservations or FitDirect, then ResolveWorld); they and
+  // the options outlive this. Features without a fit, of other planes, or without any tie to the
+  // world frame take no part. `scales`: positive.
+  JointProblem(const Observations& observations, const EstimationOptions& options,
+               const NoiseScales& scales)
+      : evidence_(observations, options, scales) {}
 
-  // Refines `seed` (its rotation and, where the origin is known, its translation); fills everything
-  // that a hypothesis holds but the probability. Not ok: degenerate evidence, or no convergence.
-  Status Refine(const CameraPose& seed, PoseHypothesis* hypothesis) const;
-
-  // The first iterations of Refine, without covariance: enough to see which basin a seed lies in.
-  Status ApproachFrom(const CameraPose& seed, Approach* approach) const;
+  void SetScales(const NoiseScales& scales) { evidence_.SetScales(scales); }
 
   // Robust cost at the seed with every other parameter at its closed-form value: ranks seeds
   // cheaply. Infinity where the seed is unusable.
   double SeedCost(const CameraPose& seed) const;
 
+  // The first iterations from a seed (its rotation and, where the origin is known, its
+  // translation), or further ones: enough to see which basin it lies in.
+  Status ApproachFrom(const CameraPose& seed, Approach* approach) const;
+  Status Continue(Approach* approach) const;
+
+  // Runs an approach to its end; fills everything that a hypothesis holds but the probability. Not
+  // ok: degenerate evidence, or no convergence.
+  Status Refine(const Approach& approach, Refined* refined) const;
+
   // True if nothing fixes the rotation about the plane's normal.
-  bool spin_is_free() const;
+  bool spin_is_free() const { return !evidence_.x_is_fixed; }
 
  private:
-  std::unique_ptr<const JointEvidence> evidence_;
+  JointEvidence evidence_;
 };
 
 }  // namespace circline

@@ -1,5 +1,6 @@
 #include "circline/refine/seeded_refinement.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -82,41 +83,36 @@ double LineScale(const Observations& observations) {
   return across.size() >= kEnough ? MadSigma(std::move(across)) : 0.0;
 }
 
-// Standard deviations of the points, pixels; 0 = not known.
-struct Scales {
-  double conic = 0.0, line = 0.0;
-};
-
-// "auto": measured, where anything is redundant.
-Scales MeasureScales(const Observations& observations) {
+// "auto": measured, where anything is redundant; else 0.
+NoiseScales MeasureScales(const Observations& observations) {
   return {ConicScale(observations), LineScale(observations)};
 }
 
-// Gives every feature that states no sigma_px the one that options or measurement say. Under "auto"
-// the errors of one feature are not taken as independent: its n points share a smooth error (lens,
-// blur, print, a surface not quite flat) that no number of them averages out, which is what a
-// standard deviation of sqrt(sigma^2 + n bias^2) for each amounts to.
+NoiseScales OrDefault(const NoiseScales& scales) {
+  return {scales.conic_px > 0.0 ? scales.conic_px : kDefaultConicSigmaPx,
+          scales.line_px > 0.0 ? scales.line_px : kDefaultLineSigmaPx};
+}
+
+// For the closed forms: gives every feature that states no sigma_px the one that options or
+// measurement say, its shared error included (EstimationOptions::contour_bias_px).
 Observations ApplyScales(const Observations& observations, const EstimationOptions& options,
-                         const Scales& scales) {
+                         const NoiseScales& scales) {
   Observations out = observations;
-  const auto effective = [](const LossOptions& loss, double measured, double fallback, double bias,
-                            std::size_t n) {
+  const auto effective = [](const LossOptions& loss, double sigma, double bias, std::size_t n) {
     if (loss.scale_px > 0.0) return loss.scale_px;
-    const double sigma = measured > 0.0 ? measured : fallback;
     return std::sqrt(sigma * sigma + static_cast<double>(n) * bias * bias);
   };
   for (CircleObservation& circle : out.circles) {
     if (circle.sigma_px > 0.0) continue;
-    circle.sigma_px = effective(options.conic_loss, scales.conic, kDefaultConicSigmaPx,
-                                options.contour_bias_px, circle.points.size());
+    circle.sigma_px = effective(options.conic_loss, scales.conic_px, options.contour_bias_px,
+                                circle.points.size());
   }
   for (PencilObservation& pencil : out.pencils) {
     if (pencil.sigma_px > 0.0) continue;
     std::size_t longest = 2;
     for (const LineObservation& line : pencil.lines)
       longest = std::max(longest, line.points.size());
-    pencil.sigma_px = effective(options.line_loss, scales.line, kDefaultLineSigmaPx,
-                                options.line_bias_px, longest);
+    pencil.sigma_px = effective(options.line_loss, scales.line_px, options.line_bias_px, longest);
   }
   return out;
 }
@@ -249,81 +245,99 @@ std::vector<Approach> ApproachAll(const JointProblem& problem, const std::vector
   return distinct;
 }
 
-std::vector<CameraPose> Poses(const std::vector<Approach>& approaches) {
-  std::vector<CameraPose> poses;
-  for (const Approach& a : approaches) poses.push_back(a.pose);
-  return poses;
-}
-
 // Features that fit well one by one may fit badly together (a plane not quite flat): then the
 // scatter about the common pose is the noise that counts. True if that raised an automatic scale.
-bool RaiseScales(const EstimationOptions& options, const ResidualScales& measured, Scales* scales) {
+bool RaiseScales(const NoiseScales& measured, NoiseScales* scales) {
   constexpr double kTolerated = 1.3;
-  const bool conic =
-      options.conic_loss.scale_px == 0.0 && measured.conic_px > kTolerated * scales->conic;
-  const bool line =
-      options.line_loss.scale_px == 0.0 && measured.line_px > kTolerated * scales->line;
-  if (conic) scales->conic = measured.conic_px;
-  if (line) scales->line = measured.line_px;
+  const bool conic = measured.conic_px > kTolerated * scales->conic_px;
+  const bool line = measured.line_px > kTolerated * scales->line_px;
+  if (conic) scales->conic_px = measured.conic_px;
+  if (line) scales->line_px = measured.line_px;
   return conic || line;
 }
 
-// Runs the approaches to their end, ranked, without duplicates and without those that cannot
+// Hypotheses that explain different features compare on those that all of them do.
+void CompareOnCommonEvidence(std::vector<Refined>* refined) {
+  std::vector<std::uint8_t> left_out = refined->front().left_out;
+  for (const Refined& r : *refined) {
+    for (std::size_t i = 0; i < left_out.size(); ++i) left_out[i] |= r.left_out[i];
+  }
+  for (Refined& r : *refined) r.hypothesis.log_det = LogDet(r, left_out);
+}
+
+// One pose, up to what the evidence cannot tell: the spin about the normal where that is free, and
+// the senses of the axes, which are settled by convention and may tip over.
+bool IsSamePose(const PoseHypothesis& a, const PoseHypothesis& b, bool spin_is_free) {
+  const Eigen::Matrix3d &A = a.cam_from_world.rotation, &B = b.cam_from_world.rotation;
+  const Eigen::Vector3d &s = a.cam_from_world.translation, &t = b.cam_from_world.translation;
+  if (s.cross(t).norm() > kSamePose * s.norm() * t.norm()) return false;
+  if (A.col(2).cross(B.col(2)).norm() > kSamePose) return false;
+  return spin_is_free || A.col(0).cross(B.col(0)).norm() < kSamePose;
+}
+
+// Runs the approaches to their end; ranked, without duplicates and without those that cannot
 // compete.
 Status RefineApproaches(const JointProblem& problem, const Observations& scaled,
                         const EstimationOptions& options, const std::vector<Approach>& approaches,
-                        std::vector<PoseHypothesis>* hypotheses) {
+                        PoseEstimate* estimate) {
   // An approach has not converged, so that its cost still falls.
   constexpr double kMargin = 3.0;
   Status last = Status::Failed("no seed pose could be refined");
-  double best_cost = std::numeric_limits<double>::infinity();
+  std::vector<Refined> all;
   for (const Approach& approach : approaches) {
     if (approach.cost > approaches.front().cost * kMargin + kMargin * options.max_cost_gap)
       continue;
-    PoseHypothesis h;
-    const Status status = problem.Refine(approach.pose, &h);
+    Refined refined;
+    const Status status = problem.Refine(approach, &refined);
     if (!status.ok()) {
       last = status;
       continue;
     }
+    const bool known = std::any_of(all.begin(), all.end(), [&](const Refined& r) {
+      return IsSamePose(r.hypothesis, refined.hypothesis, problem.spin_is_free());
+    });
+    if (!known) all.push_back(std::move(refined));
+  }
+  if (all.empty()) return last;
+  const auto cheapest = std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
+    return a.hypothesis.cost < b.hypothesis.cost;
+  });
+  const double most = cheapest->hypothesis.cost + options.max_cost_gap;
+  estimate->notes.insert(estimate->notes.end(), cheapest->notes.begin(), cheapest->notes.end());
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [most](const Refined& r) { return r.hypothesis.cost > most; }),
+            all.end());
+  CompareOnCommonEvidence(&all);
+  for (Refined& refined : all) {
+    CameraPose& pose = refined.hypothesis.cam_from_world;
     // A spin that nothing fixes is settled by convention, whatever the seed's was.
     if (problem.spin_is_free()) {
-      WorldRotation(scaled, h.cam_from_world.rotation.col(2), h.cam_from_world.translation,
-                    kDefaultLineSigmaPx, &h.cam_from_world.rotation);
+      WorldRotation(scaled, pose.rotation.col(2), pose.translation, kDefaultLineSigmaPx,
+                    &pose.rotation);
     }
-    best_cost = std::min(best_cost, h.cost);
-    hypotheses->push_back(std::move(h));
+    estimate->hypotheses.push_back(std::move(refined.hypothesis));
   }
-  if (hypotheses->empty()) return last;
-  RankHypotheses(hypotheses);
-  MergeHypotheses(kSamePose, hypotheses);
-  hypotheses->erase(std::remove_if(hypotheses->begin(), hypotheses->end(),
-                                   [&](const PoseHypothesis& h) {
-                                     return h.cost > best_cost + options.max_cost_gap;
-                                   }),
-                    hypotheses->end());
-  RankHypotheses(hypotheses);
+  RankHypotheses(&estimate->hypotheses);
   return Status::Ok();
 }
 
 Status RefineFitted(const Observations& fitted,
                     const std::vector<std::shared_ptr<const Solver>>& seeders,
-                    const EstimationOptions& options, std::vector<PoseHypothesis>* hypotheses) {
-  Scales scales = MeasureScales(fitted);
-  Observations scaled = ApplyScales(fitted, options, scales);
-  auto problem = std::make_unique<JointProblem>(scaled, options);
+                    const EstimationOptions& options, PoseEstimate* estimate) {
+  NoiseScales scales = MeasureScales(fitted);
+  const Observations scaled = ApplyScales(fitted, options, OrDefault(scales));
+  JointProblem problem(fitted, options, OrDefault(scales));
   std::vector<std::string> reasons;
-  const std::vector<CameraPose> seeds = CollectSeeds(scaled, seeders, *problem, &reasons);
+  const std::vector<CameraPose> seeds = CollectSeeds(scaled, seeders, problem, &reasons);
   Status last = Status::Refused(
       reasons.empty() ? "there is no circle and no pencil of parallel lines" : Join(reasons));
-  std::vector<Approach> approaches = ApproachAll(*problem, seeds, &last);
-  if (!approaches.empty() && RaiseScales(options, approaches.front().scales, &scales)) {
-    scaled = ApplyScales(fitted, options, scales);
-    problem = std::make_unique<JointProblem>(scaled, options);
-    approaches = ApproachAll(*problem, Poses(approaches), &last);
-  }
+  std::vector<Approach> approaches = ApproachAll(problem, seeds, &last);
   if (approaches.empty()) return last;
-  return RefineApproaches(*problem, scaled, options, approaches, hypotheses);
+  if (RaiseScales(approaches.front().scales, &scales)) {
+    problem.SetScales(OrDefault(scales));
+    for (Approach& approach : approaches) problem.Continue(&approach);
+  }
+  return RefineApproaches(problem, scaled, options, approaches, estimate);
 }
 
 }  // namespace
@@ -341,7 +355,7 @@ PoseEstimate RefineSeeds(const std::string& name,
   FitDirect(options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDefaultLineSigmaPx,
             &fitted, &estimate.notes);
   fitted = ResolveWorld(fitted);
-  estimate.status = RefineFitted(fitted, seeders, options, &estimate.hypotheses);
+  estimate.status = RefineFitted(fitted, seeders, options, &estimate);
   if (estimate.status.ok()) estimate.decided_by = DecidedBy(estimate.hypotheses);
   return estimate;
 }

@@ -1,0 +1,462 @@
+#include "circline/refine/reduced_problem.h"
+
+#include <ceres/tiny_solver.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "circline/estimators/pose.h"
+
+namespace circline {
+namespace {
+
+// The unknowns behind a model's local variables: block and position in it; -1 where a variable is
+// none.
+struct LocalVariables {
+  int size = 0;
+  std::array<int, 6> block{}, index{};
+
+  void Add(int of_block, int count) {
+    for (int k = 0; k < count; ++k, ++size) {
+      block[static_cast<std::size_t>(size)] = of_block;
+      index[static_cast<std::size_t>(size)] = k;
+    }
+  }
+};
+
+LocalVariables VariablesOf(const CircleTerm& t) {
+  LocalVariables v;
+  v.Add(0, 3);
+  v.Add(t.center, t.radius < 0 ? 3 : 2);
+  if (t.radius >= 0) v.Add(t.radius, 1);
+  return v;
+}
+
+LocalVariables VariablesOf(const LineTerm& t) {
+  LocalVariables v;
+  v.Add(0, 3);
+  if (t.shared >= 0) v.Add(t.shared, t.kind == LineKind::kInPlane ? 1 : 2);
+  if (t.angle >= 0) v.Add(t.angle, 1);
+  return v;
+}
+
+LocalVariables VariablesOf(const PointTerm& t) {
+  LocalVariables v;
+  v.Add(0, 3);
+  v.Add(t.point, 2);
+  return v;
+}
+
+LocalVariables VariablesOf(const AngleTerm& t) {
+  LocalVariables v;
+  v.Add(t.theta[0], 1);
+  v.Add(t.theta[1], 1);
+  return v;
+}
+
+LocalVariables VariablesOf(const LengthTerm& t, int scale) {
+  LocalVariables v;
+  v.Add(t.a, 2);
+  v.Add(t.b, 2);
+  v.Add(scale, 1);
+  return v;
+}
+
+double Evaluate(const JointEvidence& e, const CircleTerm& t, const JointState& state,
+                const Weighing& weighing, QuadraticModel* model) {
+  const double* c = state.At(t.center);
+  const double radius = t.radius < 0 ? c[2] : t.factor * state.At(t.radius)[0];
+  const double cost = EvaluateCircle(e.sets[static_cast<std::size_t>(t.set)], weighing,
+                                     state.rotation, state.facing, c[0], c[1], radius, model);
+  if (model != nullptr && t.radius >= 0 && t.factor != 1.0) {
+    model->gradient[5] *= t.factor;
+    model->hessian.row(5) *= t.factor;
+    model->hessian.col(5) *= t.factor;
+  }
+  return cost;
+}
+
+double Evaluate(const JointEvidence& e, const LineTerm& t, const JointState& state,
+                const Weighing& weighing, QuadraticModel* model) {
+  Eigen::Matrix3d dm;
+  const Eigen::Vector3d m = LineNormal(t, state, &dm);
+  return EvaluateLine(e.sets[static_cast<std::size_t>(t.set)], weighing, state.rotation, m, dm,
+                      model);
+}
+
+double Evaluate(const PointTerm& t, const JointState& state, const Weighing& weighing,
+                QuadraticModel* model) {
+  const double* xy = state.At(t.point);
+  return EvaluatePoint(t.measured, weighing, state.rotation, state.facing, xy[0], xy[1], model);
+}
+
+double Evaluate(const AngleTerm& t, const JointState& state, QuadraticModel* model) {
+  double theta[2];
+  for (int i = 0; i < 2; ++i) theta[i] = t.theta[i] >= 0 ? state.At(t.theta[i])[0] : t.fixed[i];
+  return EvaluateAngle(t.value, t.sigma, theta, model);
+}
+
+double Evaluate(const LengthTerm& t, int scale, const JointState& state, QuadraticModel* model) {
+  return EvaluateLength(t.length, state.At(t.a), state.At(t.b), state.At(scale)[0], model);
+}
+
+// Adds one term's model to the whole, its own unknowns eliminated.
+class Assembler {
+ public:
+  Assembler(const JointEvidence& e, const SharedColumns& columns, bool must_be_known,
+            ReducedModel* out)
+      : e_(e), columns_(columns), must_be_known_(must_be_known), out_(*out) {}
+
+  // False where a cost is not finite or (if it must be) an own unknown is not known. `log_det`
+  // receives that of the own unknowns' information.
+  bool Add(const LocalVariables& variables, QuadraticModel* model, double* log_det) {
+    if (!std::isfinite(model->cost)) return false;
+    out_.cost += model->cost;
+    OwnUnknowns own;
+    for (int k = 0; k < variables.size; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const int block = variables.block[i];
+      if (block < 0) continue;
+      const auto local = static_cast<std::int8_t>(k);
+      if (e_.parameters[static_cast<std::size_t>(block)].is_private) {
+        const auto n = static_cast<std::size_t>(own.size++);
+        own.own[n] = local;
+        own.own_block[n] = block;
+        own.own_index[n] = variables.index[i];
+      } else {
+        const auto n = static_cast<std::size_t>(own.shared_size++);
+        own.shared[n] = local;
+        own.shared_column[n] =
+            columns_.offsets[static_cast<std::size_t>(block)] + variables.index[i];
+      }
+    }
+    if (own.size > 0 && !Eliminate(&own, model, log_det)) return false;
+    for (std::size_t a = 0; a < static_cast<std::size_t>(own.shared_size); ++a) {
+      out_.gradient[own.shared_column[a]] += model->gradient[own.shared[a]];
+      for (std::size_t b = 0; b < static_cast<std::size_t>(own.shared_size); ++b) {
+        out_.hessian(own.shared_column[a], own.shared_column[b]) +=
+            model->hessian(own.shared[a], own.shared[b]);
+      }
+    }
+    return true;
+  }
+
+ private:
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+
+  // Schur's complement, in place, of the own unknowns; where nothing is known of them (all points
+  // far out under a redescending loss) they stay where they are.
+  bool Eliminate(OwnUnknowns* own, QuadraticModel* model, double* log_det) {
+    const int p = own->size, s = own->shared_size;
+    Small H(p, p), C(p, s + 1);  // C: cross terms, then the gradient.
+    for (int a = 0; a < p; ++a) {
+      const int ia = own->own[static_cast<std::size_t>(a)];
+      for (int b = 0; b < p; ++b)
+        H(a, b) = model->hessian(ia, own->own[static_cast<std::size_t>(b)]);
+      for (int b = 0; b < s; ++b)
+        C(a, b) = model->hessian(ia, own->shared[static_cast<std::size_t>(b)]);
+      C(a, s) = model->gradient[ia];
+    }
+    const Eigen::LLT<Small> factor(H);
+    if (factor.info() != Eigen::Success) return !must_be_known_;
+    const Small solution = factor.solve(C);
+    if (!solution.allFinite()) return !must_be_known_;
+    for (int a = 0; a < s; ++a) {
+      const int ia = own->shared[static_cast<std::size_t>(a)];
+      for (int b = 0; b < s; ++b) {
+        model->hessian(ia, own->shared[static_cast<std::size_t>(b)]) -=
+            C.col(a).dot(solution.col(b));
+      }
+      model->gradient[ia] -= C.col(a).dot(solution.col(s));
+    }
+    for (int a = 0; a < p; ++a) {
+      own->step[static_cast<std::size_t>(a)] = -solution(a, s);
+      for (int b = 0; b < s; ++b) own->gain(a, b) = solution(a, b);
+      *log_det += 2.0 * std::log(factor.matrixLLT()(a, a));
+    }
+    out_.eliminated.push_back(*own);
+    return true;
+  }
+
+  const JointEvidence& e_;
+  const SharedColumns& columns_;
+  bool must_be_known_;
+  ReducedModel& out_;
+};
+
+// The problem in the form that ceres::TinySolver wants: as many residuals as shared unknowns, and
+// one more that makes up the cost. Its unknowns are w in rotation = base exp([w]x), w without the
+// spin where nothing fixes that, then the other shared ones.
+class SolverFunction {
+ public:
+  using Scalar = double;
+  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = Eigen::Dynamic };
+
+  SolverFunction(const JointEvidence& e, double stretch, JointState* state)
+      : e_(e),
+        columns_(e),
+        weighing_{stretch, false},
+        rotation_unknowns_(e.x_is_fixed ? 3 : 2),
+        base_(state->rotation),
+        state_(*state),
+        trial_(Start()) {}
+
+  int NumParameters() const { return columns_.size - 3 + rotation_unknowns_; }
+  int NumResiduals() const { return NumParameters() + 1; }
+
+  Eigen::VectorXd Start() const {
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(NumParameters());
+    VisitShared([&](int column, double* value) { x[column] = *value; });
+    return x;
+  }
+
+  // Without Jacobian: a trial. With: at the place of the last trial, or the start.
+  bool operator()(const double* x, double* residuals, double* jacobian) const {
+    const int n = NumParameters();
+    Eigen::Map<Eigen::VectorXd> f(residuals, n + 1);
+    const Eigen::Map<const Eigen::VectorXd> place(x, n);
+    if (jacobian == nullptr) {
+      MoveTo(place);
+      f.setZero();
+      f[n] = std::sqrt(2.0 * JointCost(e_, state_, weighing_));
+      return true;
+    }
+    linearized_at_ = place;
+    accepted_ = state_;
+    own_damping_ = 1.0;
+    if (!Linearize(e_, state_, columns_, weighing_, &model_)) {
+      f.setConstant(std::numeric_limits<double>::quiet_NaN());
+      return false;
+    }
+    Factor(f, Eigen::Map<Eigen::MatrixXd>(jacobian, n + 1, n));
+    return true;
+  }
+
+  // Leaves the state where the solver ended.
+  void Finish(const Eigen::VectorXd& x) const {
+    if (x != trial_) state_ = accepted_;
+  }
+
+ private:
+  template <typename Visit>
+  void VisitShared(const Visit& visit) const {
+    for (std::size_t i = 1; i < e_.parameters.size(); ++i) {
+      if (columns_.offsets[i] < 0) continue;
+      const int column = columns_.offsets[i] - 3 + rotation_unknowns_;
+      for (int k = 0; k < e_.parameters[i].size; ++k)
+        visit(column + k, &state_.values[i][static_cast<std::size_t>(k)]);
+    }
+  }
+
+  Eigen::Vector3d RotationPart(const Eigen::VectorXd& x) const {
+    Eigen::Vector3d w = Eigen::Vector3d::Zero();
+    w.head(rotation_unknowns_) = x.head(rotation_unknowns_);
+    return w;
+  }
+
+  void MoveTo(const Eigen::VectorXd& x) const {
+    trial_ = x;
+    state_.rotation = base_ * ExpRotation(RotationPart(x));
+    VisitShared([&](int column, double* value) { *value = x[column]; });
+    Eigen::VectorXd change(columns_.size);
+    change.head<3>() = LogRotation(accepted_.rotation.transpose() * state_.rotation);
+    change.tail(columns_.size - 3) =
+        (x - linearized_at_).tail(NumParameters() - rotation_unknowns_);
+    for (const OwnUnknowns& own : model_.eliminated) {
+      for (std::size_t a = 0; a < static_cast<std::size_t>(own.size); ++a) {
+        double step = own_damping_ * own.step[a];
+        for (std::size_t b = 0; b < static_cast<std::size_t>(own.shared_size); ++b) {
+          step -= own.gain(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) *
+                  change[own.shared_column[b]];
+        }
+        const auto block = static_cast<std::size_t>(own.own_block[a]);
+        const auto index = static_cast<std::size_t>(own.own_index[a]);
+        state_.values[block][index] = accepted_.values[block][index] + step;
+      }
+    }
+    own_damping_ *= 0.5;  // Should this trial be refused, the next goes a shorter way.
+  }
+
+  // J with J^T J = the model's Hessian, and f with J^T f = its gradient, |f|^2 = 2 cost.
+  void Factor(Eigen::Map<Eigen::VectorXd> f, Eigen::Map<Eigen::MatrixXd> J) const {
+    const int n = NumParameters(), others = columns_.size - 3;
+    Eigen::MatrixXd by_x = Eigen::MatrixXd::Zero(columns_.size, n);
+    by_x.topLeftCorner(3, rotation_unknowns_) =
+        RightJacobian(RotationPart(linearized_at_)).leftCols(rotation_unknowns_);
+    by_x.bottomRightCorner(others, others).setIdentity();
+    const Eigen::LDLT<Eigen::MatrixXd> ldlt(by_x.transpose() * model_.hessian * by_x);
+    Eigen::VectorXd g = ldlt.transpositionsP() * (by_x.transpose() * model_.gradient);
+    ldlt.matrixL().solveInPlace(g);
+    Eigen::MatrixXd P = Eigen::MatrixXd::Identity(n, n);
+    P = ldlt.transpositionsP() * P;
+    J.topRows(n).noalias() = ldlt.matrixU() * P;
+    const double largest = ldlt.vectorD().cwiseAbs().maxCoeff();
+    for (int i = 0; i < n; ++i) {
+      constexpr double kRounding = 1e-15;
+      const double d = ldlt.vectorD()[i];
+      const double root = d > kRounding * largest ? std::sqrt(d) : 0.0;
+      J.row(i) *= root;
+      f[i] = root > 0.0 ? g[i] / root : 0.0;
+    }
+    // Losses that bend back may promise more than there is: then the model is too flat.
+    const double promised = f.head(n).squaredNorm(), twice_cost = 2.0 * model_.cost;
+    if (promised > twice_cost && promised > 0.0) {
+      const double steepen = std::sqrt(promised / twice_cost);
+      J.topRows(n) *= steepen;
+      f.head(n) /= steepen;
+    }
+    J.row(n).setZero();
+    f[n] = std::sqrt(std::max(0.0, twice_cost - f.head(n).squaredNorm()));
+  }
+
+  // exp([w + dw]x) = exp([w]x) exp([J dw]x) to first order.
+  static Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& w) {
+    const double s = w.squaredNorm(), angle = std::sqrt(s);
+    const Eigen::Matrix3d W = CrossMatrix(w);
+    const double b = angle < 1e-4 ? 0.5 - s / 24.0 : (1.0 - std::cos(angle)) / s;
+    const double c = angle < 1e-4 ? 1.0 / 6.0 - s / 120.0 : (angle - std::sin(angle)) / (s * angle);
+    return Eigen::Matrix3d::Identity() - b * W + c * W * W;
+  }
+
+  const JointEvidence& e_;
+  SharedColumns columns_;
+  Weighing weighing_;
+  int rotation_unknowns_;
+  Eigen::Matrix3d base_;
+  // The solver takes its function as const; what it remembers between calls is not.
+  JointState& state_;
+  mutable JointState accepted_;
+  mutable ReducedModel model_;
+  mutable Eigen::VectorXd linearized_at_, trial_;
+  mutable double own_damping_ = 1.0;
+};
+
+}  // namespace
+
+SharedColumns::SharedColumns(const JointEvidence& evidence) {
+  offsets.reserve(evidence.parameters.size());
+  for (const ParameterInfo& parameter : evidence.parameters) {
+    offsets.push_back(parameter.is_private ? -1 : size);
+    if (!parameter.is_private) size += parameter.size;
+  }
+}
+
+Eigen::Vector3d LineNormal(const LineTerm& term, const JointState& state, Eigen::Matrix3d* by_own) {
+  Eigen::Matrix3d& dm = *by_own;
+  dm.setZero();
+  const double facing = state.facing;
+  const auto angle = [&](double* c, double* s) {
+    const double value = state.At(term.angle)[0];
+    *c = std::cos(value);
+    *s = std::sin(value);
+  };
+  double cp, sp;
+  switch (term.kind) {
+    case LineKind::kFixedDirection: {
+      angle(&cp, &sp);
+      dm.col(0) = -sp * term.a + cp * term.b;
+      return cp * term.a + sp * term.b;
+    }
+    case LineKind::kInPlane: {
+      // Basis across (cos theta, sin theta, 0): the in-plane normal and Z.
+      angle(&cp, &sp);
+      const double theta = state.At(term.shared)[0];
+      const double c = std::cos(theta), s = std::sin(theta);
+      dm.col(0) = Eigen::Vector3d(-c * cp, -s * cp, 0.0);
+      dm.col(1) = Eigen::Vector3d(s * sp, -c * sp, cp);
+      return {-s * cp, c * cp, sp};
+    }
+    case LineKind::kXAxis:
+      dm.col(1) = Eigen::Vector3d(0.0, 0.0, -facing);
+      return {0.0, 1.0, -facing * state.At(term.shared)[1]};
+    case LineKind::kYAxis:
+      dm.col(0) = Eigen::Vector3d(0.0, 0.0, -facing);
+      return {1.0, 0.0, -facing * state.At(term.shared)[0]};
+    case LineKind::kDiameter:
+      break;
+  }
+  angle(&cp, &sp);
+  const double x = state.At(term.shared)[0], y = state.At(term.shared)[1];
+  dm.col(0) = Eigen::Vector3d(0.0, 0.0, facing * sp);
+  dm.col(1) = Eigen::Vector3d(0.0, 0.0, -facing * cp);
+  dm.col(2) = Eigen::Vector3d(-cp, -sp, facing * (cp * x + sp * y));
+  return {-sp, cp, facing * (sp * x - cp * y)};
+}
+
+double JointCost(const JointEvidence& e, const JointState& state, const Weighing& weighing) {
+  double cost = 0.0;
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    if (state.circle_left_out[i] == 0) cost += Evaluate(e, e.circles[i], state, weighing, nullptr);
+  }
+  for (std::size_t i = 0; i < e.lines.size(); ++i) {
+    if (state.line_left_out[i] == 0) cost += Evaluate(e, e.lines[i], state, weighing, nullptr);
+  }
+  for (std::size_t i = 0; i < e.points.size(); ++i) {
+    if (state.point_left_out[i] == 0) cost += Evaluate(e.points[i], state, weighing, nullptr);
+  }
+  for (const AngleTerm& t : e.angles) cost += Evaluate(t, state, nullptr);
+  for (const LengthTerm& t : e.lengths) cost += Evaluate(t, e.scale, state, nullptr);
+  return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
+}
+
+bool Linearize(const JointEvidence& e, const JointState& state, const SharedColumns& columns,
+               const Weighing& weighing, ReducedModel* out) {
+  out->cost = 0.0;
+  out->gradient.setZero(columns.size);
+  out->hessian.setZero(columns.size, columns.size);
+  out->eliminated.clear();
+  out->circle_log_det.assign(e.circles.size(), 0.0);
+  out->line_log_det.assign(e.lines.size(), 0.0);
+  Assembler assembler(e, columns, weighing.inliers_only, out);
+  QuadraticModel model;
+  double unused = 0.0;
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    if (state.circle_left_out[i] != 0) continue;
+    Evaluate(e, e.circles[i], state, weighing, &model);
+    if (!assembler.Add(VariablesOf(e.circles[i]), &model, &out->circle_log_det[i])) return false;
+  }
+  for (std::size_t i = 0; i < e.lines.size(); ++i) {
+    if (state.line_left_out[i] != 0) continue;
+    Evaluate(e, e.lines[i], state, weighing, &model);
+    if (!assembler.Add(VariablesOf(e.lines[i]), &model, &out->line_log_det[i])) return false;
+  }
+  for (std::size_t i = 0; i < e.points.size(); ++i) {
+    if (state.point_left_out[i] != 0) continue;
+    if (!std::isfinite(Evaluate(e.points[i], state, weighing, &model)) ||
+        !assembler.Add(VariablesOf(e.points[i]), &model, &unused))
+      return false;
+  }
+  for (const AngleTerm& t : e.angles) {
+    Evaluate(t, state, &model);
+    if (!assembler.Add(VariablesOf(t), &model, &unused)) return false;
+  }
+  for (const LengthTerm& t : e.lengths) {
+    if (!std::isfinite(Evaluate(t, e.scale, state, &model)) ||
+        !assembler.Add(VariablesOf(t, e.scale), &model, &unused))
+      return false;
+  }
+  return out->gradient.allFinite() && out->hessian.allFinite();
+}
+
+Status Minimize(const JointEvidence& e, double stretch, int max_iterations, double tolerance,
+                JointState* state) {
+  if (!std::isfinite(JointCost(e, *state, Weighing{stretch, false})))
+    return Status::Failed("the evidence cannot be evaluated at the seed");
+  const SolverFunction function(e, stretch, state);
+  ceres::TinySolver<SolverFunction> solver;
+  solver.options.max_num_iterations = max_iterations + 1;  // It counts the start as one.
+  solver.options.function_tolerance = 2.0 * tolerance;     // It compares twice the cost.
+  solver.options.gradient_tolerance = 0.0;
+  solver.options.parameter_tolerance = 1e-14;
+  solver.options.cost_threshold = 0.0;
+  Eigen::VectorXd x = function.Start();
+  solver.Solve(function, &x);
+  function.Finish(x);
+  const Eigen::Quaterniond q(state->rotation);  // Rounding of many products, off.
+  state->rotation = q.normalized().toRotationMatrix();
+  return Status::Ok();
+}
+
+}  // namespace circline
