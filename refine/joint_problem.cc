@@ -10,113 +10,12 @@
 #include <vector>
 
 #include "circline/refine/covariance.h"
+#include "circline/refine/joint_start.h"
 
 namespace circline {
 namespace {
 
 constexpr double kRadToDeg = 57.29577951308232;
-
-// Plane coordinates (X, Y) at which a ray meets the plane; false where it does not, in front.
-bool PlanePoint(const Eigen::Matrix3d& R, double facing, const Eigen::Vector3d& ray, double* xy) {
-  const Eigen::Vector3d y = R.transpose() * ray;
-  const double depth = facing * y.z();
-  if (!(depth > 1e-9 * y.norm())) return false;
-  xy[0] = y.x() / depth;
-  xy[1] = y.y() / depth;
-  return true;
-}
-
-// Circle of the plane like a fitted conic: seen in the plane this is an ellipse, and a circle where
-// the plane's normal is one of the conic's.
-bool PlaneCircle(const Eigen::Matrix3d& R, double facing, const Eigen::Matrix3d& conic,
-                 double* cx_cy_radius) {
-  const Eigen::Vector3d d(1.0, 1.0, facing);
-  const Eigen::Matrix3d in_plane = d.asDiagonal() * R.transpose() * conic * R * d.asDiagonal();
-  Ellipse ellipse;
-  if (!ConicToEllipse(in_plane, &ellipse)) return false;
-  cx_cy_radius[0] = ellipse.center.x();
-  cx_cy_radius[1] = ellipse.center.y();
-  cx_cy_radius[2] = std::sqrt(ellipse.a * ellipse.b);
-  return true;
-}
-
-// An ellipse that the plane cannot explain (across or beyond the horizon) is an outlier of this
-// seed; the seed is refused only where that leaves no circle.
-bool InitializeCircles(const JointEvidence& e, JointState* state) {
-  std::size_t left_out = 0;
-  for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    const CircleTerm& t = e.circles[i];
-    double circle[3];
-    const ConicFit& fit = *e.observations.circles[static_cast<std::size_t>(t.observation)].fit;
-    if (!PlaneCircle(state->rotation, state->facing, fit.conic, circle) ||
-        !((state->rotation * Eigen::Vector3d(circle[0], circle[1], state->facing)).z() > 0.0)) {
-      state->circle_left_out[i] = 1;
-      ++left_out;
-      continue;
-    }
-    double* center = state->At(t.center);
-    std::copy(circle, circle + 2, center);
-    (t.radius < 0 ? center[2] : state->At(t.radius)[0]) = circle[2] / t.factor;
-  }
-  return e.circles.empty() || left_out < e.circles.size();
-}
-
-void InitializeLine(const LineTerm& t, JointState* state) {
-  if (t.angle < 0) return;
-  const Eigen::Vector3d m = state->rotation.transpose() * t.line;
-  double* angle = state->At(t.angle);
-  if (t.kind == LineKind::kFixedDirection) {
-    angle[0] = std::atan2(m.dot(t.b), m.dot(t.a));
-  } else if (t.kind == LineKind::kInPlane) {
-    const double theta = state->At(t.shared)[0];
-    angle[0] = std::atan2(m.z(), -std::sin(theta) * m.x() + std::cos(theta) * m.y());
-  } else {
-    angle[0] = std::atan2(-m.x(), m.y());  // A diameter.
-  }
-}
-
-// Plane distances per world unit, where no circle of known radius has set it already.
-void InitializeScale(const JointEvidence& e, JointState* state) {
-  const bool from_circle = std::any_of(e.circles.begin(), e.circles.end(),
-                                       [&](const CircleTerm& t) { return t.radius == e.scale; });
-  if (e.scale < 0 || from_circle || e.lengths.empty()) return;
-  const LengthTerm& t = e.lengths.front();
-  const double* a = state->At(t.a);
-  const double* b = state->At(t.b);
-  state->At(e.scale)[0] = std::hypot(a[0] - b[0], a[1] - b[1]) / t.length;
-}
-
-// Closed-form values of all parameters at a seed; false where the seed contradicts the evidence.
-bool Initialize(const JointEvidence& e, const CameraPose& seed, JointState* state) {
-  state->rotation = seed.rotation;
-  state->facing = seed.rotation.col(2).dot(seed.translation) > 0.0 ? 1.0 : -1.0;
-  state->values.assign(e.parameters.size(), {0.0, 0.0, 0.0});
-  state->circle_left_out.assign(e.circles.size(), 0);
-  state->line_left_out.assign(e.lines.size(), 0);
-  state->point_left_out.assign(e.points.size(), 0);
-  const auto place = [&](const Eigen::Vector3d& ray, int block) {
-    return PlanePoint(state->rotation, state->facing, ray, state->At(block));
-  };
-  if (e.origin >= 0 && !place(seed.translation, e.origin)) return false;
-  if (!InitializeCircles(e, state)) return false;
-  for (const auto& [id, theta] : e.thetas) {
-    const PencilObservation& pencil =
-        e.observations.pencils[static_cast<std::size_t>(FindPencil(e.observations, id))];
-    const Eigen::Vector3d v = state->rotation.transpose() * pencil.fit->direction;
-    state->At(theta)[0] = std::atan2(v.y(), v.x());
-  }
-  for (const LineTerm& term : e.lines) InitializeLine(term, state);
-  for (const LengthTerm& term : e.lengths) {
-    const auto ray = [&](int block) {
-      return std::find_if(e.points.begin(), e.points.end(),
-                          [block](const PointTerm& p) { return p.point == block; })
-          ->measured.x.Homogeneous();
-    };
-    if (!place(ray(term.a), term.a) || !place(ray(term.b), term.b)) return false;
-  }
-  InitializeScale(e, state);
-  return true;
-}
 
 Eigen::Matrix3d ImageOf(const CircleTerm& t, const JointState& state) {
   const double* c = state.At(t.center);
@@ -168,6 +67,7 @@ double RelativeSpread(const JointEvidence& e, const JointState& state) {
   std::vector<double> ratios;
   ForEachCurve(e, state,
                [&](const PointSet& set, bool, std::size_t, const std::vector<double>& distances) {
+                 if (set.IsContaminated()) return;  // Started robustly.
                  const double unit = 1.0 / (set.sigma_px * LossTuningConstant(set.loss));
                  for (std::size_t i = 0; i < set.num_trusted; ++i)
                    ratios.push_back(std::abs(distances[i]) * unit);
@@ -417,13 +317,13 @@ Status Finite(bool finite) {
 
 double JointProblem::SeedCost(const CameraPose& seed) const {
   JointState state;
-  if (!Initialize(evidence_, seed, &state)) return std::numeric_limits<double>::infinity();
+  if (!InitializeState(evidence_, seed, &state)) return std::numeric_limits<double>::infinity();
   return JointCost(evidence_, state, Weighing()) + LeftOutCost(evidence_, state);
 }
 
 Status JointProblem::ApproachFrom(const CameraPose& seed, Approach* approach) const {
   approach->pose = seed;
-  if (!Initialize(evidence_, seed, &approach->state))
+  if (!InitializeState(evidence_, seed, &approach->state))
     return Status::Failed("a seed pose contradicts the evidence");
   return Continue(approach);
 }

@@ -53,6 +53,13 @@ struct PointSet {
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();
   double scale = 1.0;
 
+  // So many points are doubted that the fit itself may have followed outliers.
+  bool IsContaminated() const {
+    constexpr double kShare = 0.15;
+    return static_cast<double>(points.size() - num_trusted) >
+           kShare * static_cast<double>(points.size());
+  }
+
   // Moves the points' middle to the origin and their mean distance to 1.
   void Normalize();
 };
