@@ -19,8 +19,7 @@ constexpr double kPi = 3.14159265358979323846;
 // 99.8 % of a Gaussian's points.
 constexpr double kSigmas = 3.03;
 
-// Eccentric anomalies are counted in sectors of 10 degrees.
-constexpr int kSectors = 36;
+constexpr int kSectors = kConicSectors;
 
 // Fewest neighbouring sectors that hold four fifths of the counts: the rest may be clutter.
 int SectorsOfMost(const std::array<int, kSectors>& counts) {
@@ -176,8 +175,22 @@ Status ConicLimits::Validate() const {
   return Status::Ok();
 }
 
-ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLimits& limits)
-    : limits_(limits), index_(RandomOrder(static_cast<int>(points.size()), 1)) {
+Status EdgeDirections::Validate(std::size_t num_points) const {
+  if (normals.size() != num_points) return Status::Invalid("normals must be one for each point");
+  if (!(sigma_rad > 0.0 && sigma_rad <= 0.5)) {
+    return Status::Invalid("sigma_rad must be positive and 0.5 at most");
+  }
+  for (const Eigen::Vector2d& normal : normals) {
+    if (!normal.allFinite()) return Status::Invalid("normals must be finite");
+  }
+  return Status::Ok();
+}
+
+ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLimits& limits,
+                       const EdgeDirections* directions, double threshold)
+    : limits_(limits),
+      index_(RandomOrder(static_cast<int>(points.size()), 1)),
+      sigma_px_(threshold / kSigmas) {
   const std::size_t n = points.size();
   if (n == 0) return;
   Eigen::Vector2d low = points[0].x, high = points[0].x;
@@ -187,7 +200,7 @@ ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLi
   }
   center_ = 0.5 * (low + high);
   scale_ = std::max(0.5 * (high - low).norm(), 1e-12);
-  data_.resize(6 * n);
+  data_.resize((directions != nullptr ? 8 : 6) * n);
   x_.resize(n);
   x_from_pixel_.resize(n);
   double area = 0.0;
@@ -204,6 +217,20 @@ ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLi
     area += std::abs(j[0] * j[3] - j[1] * j[2]);
   }
   pixel_ = std::sqrt(area / static_cast<double>(n));
+  if (directions != nullptr) TakeDirections(*directions);
+}
+
+void ConicModel::TakeDirections(const EdgeDirections& directions) {
+  const std::size_t n = index_.size();
+  sigma_rad_ = directions.sigma_rad;
+  normals_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    normals_[i] = directions.normals[static_cast<std::size_t>(index_[i])];
+    const double length = normals_[i].norm();
+    if (length > 0.0) normals_[i] /= length;
+    data_[6 * n + i] = static_cast<float>(normals_[i].x() * sigma_px_ / sigma_rad_);
+    data_[7 * n + i] = static_cast<float>(normals_[i].y() * sigma_px_ / sigma_rad_);
+  }
 }
 
 Eigen::Matrix3d ConicModel::ToConic(const Value& value) const {
@@ -245,6 +272,12 @@ bool ConicModel::Fit(const int* sample, Value* value) const {
 }
 
 void ConicModel::SquaredResiduals(const Value& value, int begin, int end, float* r2) const {
+  if (normals_.empty()) return Residuals<false>(value, begin, end, r2);
+  Residuals<true>(value, begin, end, r2);
+}
+
+template <bool kOriented>
+void ConicModel::Residuals(const Value& value, int begin, int end, float* r2) const {
   const std::size_t n = index_.size();
   const float* x = data_.data() + begin;
   const float a = static_cast<float>(value[0]), b = static_cast<float>(value[1]),
@@ -257,7 +290,12 @@ void ConicModel::SquaredResiduals(const Value& value, int begin, int end, float*
     const float value_here = px * gx + py * gy + (d * px + e * py + f);
     const float gu = x[i + 2 * n] * gx + x[i + 4 * n] * gy;
     const float gv = x[i + 3 * n] * gx + x[i + 5 * n] * gy;
-    r2[i] = value_here * value_here / (4.0f * (gu * gu + gv * gv) + kTiny);
+    const float inverse = 1.0f / (gu * gu + gv * gv + kTiny);
+    r2[i] = 0.25f * value_here * value_here * inverse;
+    if (kOriented) {
+      const float sine = gu * x[i + 7 * n] - gv * x[i + 6 * n];
+      r2[i] += sine * sine * inverse;
+    }
   }
 }
 
@@ -319,27 +357,78 @@ double ConicModel::Distance(const Value& value, int i) const {
   return norm > 0.0 ? 0.5 * algebraic / norm : std::numeric_limits<double>::infinity();
 }
 
+double ConicModel::DirectionMiss(const Value& value, int i) const {
+  if (normals_.empty()) return 0.0;
+  const auto [a, b, c, d, e, f] = value;
+  const Eigen::Vector2d& x = x_[static_cast<std::size_t>(i)];
+  const std::array<double, 4>& j = x_from_pixel_[static_cast<std::size_t>(i)];
+  const Eigen::Vector2d& normal = normals_[static_cast<std::size_t>(i)];
+  const double gx = a * x.x() + b * x.y() + d, gy = b * x.x() + c * x.y() + e;
+  const double gu = j[0] * gx + j[2] * gy, gv = j[1] * gx + j[3] * gy;
+  const double sine = gu * normal.y() - gv * normal.x();
+  const double scale = sigma_rad_ * sigma_rad_ * (gu * gu + gv * gv);
+  return scale > 0.0 ? sine * sine / scale : 0.0;
+}
+
 void ConicModel::Weigh(const Value& value, double threshold, ConicWeights* result) const {
   const std::size_t n = index_.size();
-  const SectorOf sector_of(value);
   const double s = result->sigma > 0.0 ? result->sigma : threshold / kSigmas;
+  const bool oriented = !normals_.empty();
+  // A stray point's direction is anything: how many of them look right, and the density of their
+  // sine where it is small, over that of the curve's own points.
+  const double chance = oriented ? std::min(1.0, 2.0 * kSigmas * sigma_rad_ / kPi) : 1.0;
+  const double sharpness = oriented ? std::sqrt(0.5 * kPi) / sigma_rad_ : 1.0;
+  const SectorDensities densities = MeasureSectors(value, threshold, chance, s, result);
+  result->weights.assign(n, 0.0f);
+  result->log_likelihood = 0.0;
+  double sum = 0.0, sum_squares = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double r = result->residuals[i];
+    if (!(std::abs(r) <= threshold)) continue;
+    const std::size_t k = result->sectors[i];
+    double density = densities.curve[k] * std::exp(-0.5 * r * r / (s * s));
+    if (oriented && !normals_[i].isZero(0.0)) {
+      density *= sharpness * std::exp(-0.5 * result->misses[i]);
+    }
+    const double w = density / (density + densities.background[k]);
+    result->weights[i] = static_cast<float>(w);
+    sum += w;
+    sum_squares += w * r * r;
+    result->log_likelihood += std::log1p(density / densities.background[k]);
+  }
+  if (sum > kMinSamples + 1.0) {
+    result->sigma =
+        std::clamp(std::sqrt(sum_squares / (sum - kMinSamples)), 1e-3 * threshold, 0.5 * threshold);
+  }
+}
+
+ConicModel::SectorDensities ConicModel::MeasureSectors(const Value& value, double threshold,
+                                                       double chance, double sigma,
+                                                       ConicWeights* result) const {
+  const std::size_t n = index_.size();
+  const SectorOf sector_of(value);
   std::array<double, kSectors> inside{}, beside{};
   double all_beside = 0.5;  // The half keeps a trace of doubt where none was seen.
   result->residuals.resize(n);
+  result->misses.resize(n);
   result->sectors.resize(n);
-  result->weights.assign(n, 0.0f);
   for (std::size_t i = 0; i < n; ++i) {
     result->residuals[i] = Distance(value, static_cast<int>(i));
     const double size = std::abs(result->residuals[i]);
     if (!(size <= 3.0 * threshold)) continue;
     const std::size_t k = sector_of(x_[i]);
     result->sectors[i] = static_cast<std::uint8_t>(k);
-    (size <= threshold ? inside : beside)[k] += 1.0;
-    all_beside += size <= threshold ? 0.0 : 1.0;
+    if (size > threshold) {
+      beside[k] += 1.0;
+      all_beside += 1.0;
+      continue;
+    }
+    result->misses[i] = DirectionMiss(value, static_cast<int>(i));
+    if (result->misses[i] < kSigmas * kSigmas) inside[k] += 1.0;
   }
   // In each sector, of the points inside the threshold: those of the background, and those of the
   // curve as far as they are sure (lower by two and a half standard deviations of the background).
-  std::array<double, kSectors> curve, background;
+  SectorDensities densities;
   constexpr int kReach = 2;  // Neighbours on each side that vouch for a sector.
   constexpr double kWindow = (2.0 * kReach + 1.0) / kSectors;
   for (int k = 0; k < kSectors; ++k) {
@@ -351,27 +440,12 @@ void ConicModel::Weigh(const Value& value, double threshold, ConicWeights* resul
     }
     // Half local, half global; the sides are twice as wide as the inside.
     const double expected = 0.5 * (0.5 * near + 0.5 * kWindow * all_beside);
-    background[static_cast<std::size_t>(k)] = expected / (2.0 * threshold);
-    curve[static_cast<std::size_t>(k)] =
-        std::max(0.0, in - expected - 2.5 * std::sqrt(expected)) * 0.3989422804014327 / s;
+    const double stray = chance * expected;
+    densities.background[static_cast<std::size_t>(k)] = expected / (2.0 * threshold);
+    densities.curve[static_cast<std::size_t>(k)] =
+        std::max(0.0, in - stray - 2.5 * std::sqrt(stray)) * 0.3989422804014327 / sigma;
   }
-  double sum = 0.0, sum_squares = 0.0;
-  result->log_likelihood = 0.0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const double r = result->residuals[i];
-    if (!(std::abs(r) <= threshold)) continue;
-    const std::size_t k = result->sectors[i];
-    const double density = curve[k] * std::exp(-0.5 * r * r / (s * s));
-    const double w = density / (density + background[k]);
-    result->weights[i] = static_cast<float>(w);
-    sum += w;
-    sum_squares += w * r * r;
-    result->log_likelihood += std::log1p(density / background[k]);
-  }
-  if (sum > kMinSamples + 1.0) {
-    result->sigma =
-        std::clamp(std::sqrt(sum_squares / (sum - kMinSamples)), 1e-3 * threshold, 0.5 * threshold);
-  }
+  return densities;
 }
 
 bool ConicModel::FromConic(const Eigen::Matrix3d& conic, Value* value) const {
@@ -380,103 +454,6 @@ bool ConicModel::FromConic(const Eigen::Matrix3d& conic, Value* value) const {
   const Eigen::Matrix3d C = T.transpose() * conic * T;
   *value = {C(0, 0), C(0, 1), C(1, 1), C(0, 2), C(1, 2), C(2, 2)};
   return Normalize(value);
-}
-
-namespace {
-
-Status NoEllipse() { return Status::Refused("no ellipse explains the points"); }
-
-struct Start {
-  ConicModel::Value value{};
-  ConicWeights weights;
-};
-
-// Reweighted fit from the engine's ellipse.
-void Polish(const ConicModel& model, double threshold, Start* start) {
-  constexpr int kMaxPasses = 10;
-  constexpr double kConverged = 1e-5;  // Of half the points' box: far below any noise.
-  start->weights.sigma = 0.0;
-  for (int pass = 0; pass < kMaxPasses; ++pass) {
-    model.Weigh(start->value, threshold, &start->weights);
-    const ConicModel::Value before = start->value;
-    if (!model.Refine(start->weights.weights.data(), &start->value)) break;
-    double change = 0.0;
-    for (std::size_t k = 0; k < before.size(); ++k) {
-      change = std::max(change, std::abs(start->value[k] - before[k]));
-    }
-    if (change < kConverged) break;
-  }
-  model.Weigh(start->value, threshold, &start->weights);
-}
-
-// On short or sparse contours the search may end on an ellipse that takes in clutter where the
-// contour has none. Where less than half of the points are inliers, a few searches from other seeds
-// are compared by likelihood.
-bool Search(const ConicModel& model, RansacOptions options, Start* best) {
-  constexpr int kSearches = 3;
-  // Five noisy points of the contour are often not good enough: a second all-inlier sample.
-  options.confidence = 1.0 - (1.0 - options.confidence) * (1.0 - options.confidence);
-  Start start;
-  for (int k = 0; k < kSearches; ++k) {
-    RansacReport<ConicModel::Value> report;
-    Ransac<ConicModel>(options).Run(model, &report);
-    if (!report.success) return k > 0;
-    start.value = report.model;
-    Polish(model, options.threshold, &start);
-    const bool better = start.weights.log_likelihood > best->weights.log_likelihood;
-    if (k == 0 || better) std::swap(start, *best);
-    if (2 * report.num_inliers >= model.NumData()) break;
-    options.seed = Random(options.seed).Next();
-  }
-  return true;
-}
-
-// Maximum likelihood with the final weights, and its covariance.
-Status FitFinal(const std::vector<CalibratedPoint>& points, const ConicModel& model,
-                const RobustFitOptions& options, const Start& start, ConicFit* fit,
-                std::vector<std::uint8_t>* mask) {
-  std::vector<CalibratedPoint> chosen;
-  std::vector<double> weights;
-  chosen.reserve(points.size());
-  weights.reserve(points.size());
-  for (int i = 0; i < model.NumData(); ++i) {
-    const double w = static_cast<double>(start.weights.weights[static_cast<std::size_t>(i)]);
-    if (w < 1e-3) continue;
-    chosen.push_back(points[static_cast<std::size_t>(model.PointIndex(i))]);
-    weights.push_back(w);
-  }
-  if (chosen.size() < 5) return NoEllipse();
-  const Status status =
-      RefineConic(chosen, options.sigma_px, model.ToConic(start.value), fit, &weights);
-  if (!status.ok()) return status;
-  ConicModel::Value value;
-  const double threshold = options.ransac.threshold;
-  if (!model.FromConic(fit->conic, &value) || !model.Accept(value, threshold)) return NoEllipse();
-  mask->assign(points.size(), 0);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    (*mask)[i] = std::abs(ConicDistancePx(points[i], fit->conic)) <= threshold ? 1 : 0;
-  }
-  return Status::Ok();
-}
-
-}  // namespace
-
-Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
-                      ConicFit* fit, std::vector<std::uint8_t>* mask, const ConicLimits& limits) {
-  Status status = options.Validate();
-  if (status.ok()) status = limits.Validate();
-  if (!status.ok()) return status;
-  if (points.size() < 5) return Status::Refused("an ellipse needs five points");
-  const ConicModel model(points, limits);
-  Start start;
-  if (!Search(model, options.ransac, &start)) return NoEllipse();
-  ConicFit result;
-  std::vector<std::uint8_t> result_mask;
-  status = FitFinal(points, model, options, start, &result, &result_mask);
-  if (!status.ok()) return status;
-  *fit = result;
-  if (mask != nullptr) *mask = std::move(result_mask);
-  return Status::Ok();
 }
 
 }  // namespace circline

@@ -1,4 +1,5 @@
-// Robust ellipse through contour points: five points a sample, distances in pixels of the photo.
+// The ellipse as a model for RANSAC: five points a sample, or three points with the direction of
+// the edge there; distances in pixels of the photo. robust_conic.h has the fits.
 #ifndef CIRCLINE_RANSAC_CONIC_MODEL_H_
 #define CIRCLINE_RANSAC_CONIC_MODEL_H_
 
@@ -29,41 +30,45 @@ struct ConicLimits {
   Status Validate() const;
 };
 
-// The ellipse that most of the points support, as a maximum-likelihood fit of its inliers with
-// covariance; options.ransac.threshold in pixels of the photo. `mask` (optional) receives one value
-// per point, 1 where the returned ellipse passes within the threshold. Refuses fewer than five
-// points, and points that no ellipse within `limits` explains. `fit` and `mask` are written only if
-// the status is ok.
-//
-// How good: 100 points of a full contour, sigma 1 px, uniform clutter: the root mean square error
-// over trials is 1.00 of the Cramer-Rao bound of the inliers without outliers, 1.08 at 50 %
-// and 1.15 at 70 %, none lost. Among 70 % outliers a quarter of a contour is found in 99 of 100
-// trials; among 90 % a full one, if max_iterations is 100000 or more. 0.1 ms at 30 % outliers, 0.15
-// at 50, 1.3 at 70.
-Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
-                      ConicFit* fit, std::vector<std::uint8_t>* mask = nullptr,
-                      const ConicLimits& limits = {});
+// Directions of the edge at the points, for those who have them (EdgePoint of edges.h has).
+struct EdgeDirections {
+  // One per point: unit gradient, across the contour, on the photo; its sense has no meaning. Zero
+  // where it is not known.
+  std::vector<Eigen::Vector2d> normals;
+  double sigma_rad = 0.1;  // Standard deviation of a normal's angle, radians; in (0, 0.5].
+
+  Status Validate(std::size_t num_points) const;
+};
+
+// Eccentric anomalies are counted in sectors of 10 degrees.
+constexpr int kConicSectors = 36;
 
 // Inlier weights as InlierWeights (ransac.h) has them, but with the densities of curve and
 // background measured sector by sector: where a contour has a gap, a stray point near the ellipse
 // gets no say; it would bend the free part.
 struct ConicWeights {
-  std::vector<float> weights;         // By the model's order.
-  double sigma = 0.0;                 // Of the noise, pixels: in (0 = not known) and out.
-  double log_likelihood = 0.0;        // Ratio of curve with background to background alone.
-  std::vector<double> residuals;      // Workspace.
-  std::vector<std::uint8_t> sectors;  // Workspace.
+  std::vector<float> weights;     // By the model's order.
+  double sigma = 0.0;             // Of the noise, pixels: in (0 = not known) and out.
+  double log_likelihood = 0.0;    // Ratio of curve with background to background alone.
+  std::vector<double> residuals;  // Workspace, as are those below.
+  std::vector<double> misses;
+  std::vector<std::uint8_t> sectors;
 };
 
 // The model for the engine. Coordinates are shifted and scaled so that the points fill [-1, 1];
-// residuals are first-order (Sampson) distances in pixels of the photo.
+// residuals are first-order (Sampson) distances in pixels of the photo. Where directions are given,
+// the sine of the angle between a point's normal and the ellipse's is a second residual, squared
+// and added, such that sigma_rad counts as much as one standard deviation of the distance does
+// (threshold / 3.03). Directions choose the points; they do not pull at the ellipse.
 class ConicModel {
  public:
   // a x^2 + 2 b x y + c y^2 + 2 d x + 2 e y + f, unit norm, an ellipse that is negative inside.
   using Value = std::array<double, 6>;
   static constexpr int kMinSamples = 5;
 
-  ConicModel(const std::vector<CalibratedPoint>& points, const ConicLimits& limits);
+  // `directions` (optional), one for each point, are read here only; `threshold` as the engine's.
+  ConicModel(const std::vector<CalibratedPoint>& points, const ConicLimits& limits,
+             const EdgeDirections* directions = nullptr, double threshold = 3.03);
 
   int NumData() const { return static_cast<int>(index_.size()); }
   // Index into the constructor's points of the datum at position i.
@@ -74,7 +79,7 @@ class ConicModel {
   bool FromConic(const Eigen::Matrix3d& conic, Value* value) const;
 
   bool Fit(const int* sample, Value* value) const;
-  // 0.6 ns a point.
+  // 0.6 ns a point, 0.9 with directions.
   void SquaredResiduals(const Value& value, int begin, int end, float* r2) const;
   bool Refine(const float* weights, Value* value) const;
   // Whether the points within the threshold spread over limits.min_arc_deg and are no straight
@@ -83,18 +88,37 @@ class ConicModel {
 
   // Signed distance of datum i, pixels, in double precision.
   double Distance(const Value& value, int i) const;
+  // Squared sine residual of datum i, in standard deviations; 0 where its direction is not known.
+  double DirectionMiss(const Value& value, int i) const;
   // Inlier weights for a final fit.
   void Weigh(const Value& value, double threshold, ConicWeights* result) const;
 
  private:
+  friend class OrientedConicModel;
+
+  // Points per pixel of distance, by sector.
+  struct SectorDensities {
+    std::array<double, kConicSectors> curve, background;
+  };
+
+  SectorDensities MeasureSectors(const Value& value, double threshold, double chance, double sigma,
+                                 ConicWeights* result) const;
+  template <bool kOriented>
+  void Residuals(const Value& value, int begin, int end, float* r2) const;
+  void TakeDirections(const EdgeDirections& directions);
   // True if the value is a real ellipse within the limits; makes it negative inside, of unit norm.
   bool Normalize(Value* value) const;
 
   ConicLimits limits_;
   std::vector<int> index_;
-  std::vector<float> data_;  // x, y and the four entries of x_from_pixel: six flat arrays.
+  // x, y, the four entries of x_from_pixel and, with directions, the normal scaled to pixels per
+  // unit sine: six or eight flat arrays.
+  std::vector<float> data_;
   std::vector<Eigen::Vector2d> x_;
   std::vector<std::array<double, 4>> x_from_pixel_;
+  std::vector<Eigen::Vector2d> normals_;  // On the photo; empty without directions.
+  double sigma_rad_ = 0.0;
+  double sigma_px_ = 1.0;  // threshold / 3.03.
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
   double scale_ = 1.0;
   double pixel_ = 1.0;  // Size of a pixel in the model's coordinates, on average.

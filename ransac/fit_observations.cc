@@ -7,9 +7,9 @@
 #include "circline/estimators/line.h"
 #include "circline/estimators/random.h"
 #include "circline/estimators/vanishing_point.h"
-#include "circline/ransac/conic_model.h"
 #include "circline/ransac/line_model.h"
 #include "circline/ransac/pencil_model.h"
+#include "circline/ransac/robust_conic.h"
 
 namespace circline {
 namespace {

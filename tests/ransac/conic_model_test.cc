@@ -1,4 +1,4 @@
-#include "circline/ransac/conic_model.h"
+#include "circline/ransac/robust_conic.h"
 
 #include <gtest/gtest.h>
 
