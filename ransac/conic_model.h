@@ -49,10 +49,12 @@ constexpr int kConicSectors = 36;
 struct ConicWeights {
   std::vector<float> weights;     // By the model's order.
   double sigma = 0.0;             // Of the noise, pixels: in (0 = not known) and out.
-  double log_likelihood = 0.0;    // Ratio of curve with background to background alone.
   std::vector<double> residuals;  // Workspace, as are those below.
   std::vector<double> misses;
   std::vector<std::uint8_t> sectors;
+
+  // Logarithm of the ratio of likelihoods: curve with background over background alone.
+  double LogLikelihood() const;
 };
 
 // The model for the engine. Coordinates are shifted and scaled so that the points fill [-1, 1];

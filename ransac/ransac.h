@@ -172,14 +172,23 @@ class Ransac {
       Candidate candidate;
       if (!model.Fit(sample.data(), &candidate.value)) {
         ++report->num_degenerate;
-      } else if (Improves(model, &candidate)) {
-        SetBest(candidate);
-        optimized = false;
-        if (report->num_iterations > options_.local_start) optimized = Optimize(model, report);
+      } else if (Beats(model, drawn_score_, &candidate)) {
+        // The best draw so far, though perhaps not as good as an earlier one after refinement.
+        drawn_score_ = candidate.score;
+        SetLimits();
+        if (candidate.score < best_.score) {
+          best_ = candidate;
+          optimized = false;
+        }
+        if (report->num_iterations > options_.local_start) {
+          Optimize(model, candidate.value, report);
+          optimized = true;
+        }
         needed = Needed(model, order);
       }
       if (report->num_iterations >= needed && !optimized) {
-        optimized = Optimize(model, report);
+        Optimize(model, best_.value, report);
+        optimized = true;
         needed = Needed(model, order);
       }
       if (OutOfTime(start, report->num_iterations)) {
@@ -187,7 +196,7 @@ class Ransac {
         break;
       }
     }
-    if (!optimized) Optimize(model, report);
+    if (!optimized) Optimize(model, best_.value, report);
     if (report->stop_reason != StopReason::kMaxSeconds && needed < options_.max_iterations) {
       report->stop_reason = StopReason::kConfident;
     }
@@ -217,16 +226,15 @@ class Ransac {
     sampler_.Reset(num_data_, Model::kMinSamples, options_.seed, order,
                    options_.max_iterations / 2);
     inverse_t2_ = static_cast<float>(1.0 / (options_.threshold * options_.threshold));
-    has_best_ = false;
     best_ = Candidate();
-    best_.score = num_data_;  // What a model without inliers has: a candidate must beat it.
+    best_.score = drawn_score_ = num_data_;  // What a model without inliers has.
     SetLimits();
   }
 
   // Losses beyond which a candidate is rejected after each block: what a model as good as the best
-  // exceeds in one case of 740 (three standard deviations).
+  // draw exceeds in one case of 740 (three standard deviations).
   void SetLimits() {
-    const double mean = best_.score / num_data_;
+    const double mean = drawn_score_ / num_data_;
     for (std::size_t block = 0; block < limits_.size(); ++block) {
       const double seen =
           std::min<double>(num_data_, static_cast<double>((block + 1) * kRansacBlock));
@@ -235,14 +243,9 @@ class Ransac {
     }
   }
 
-  void SetBest(const Candidate& candidate) {
-    best_ = candidate;
-    has_best_ = true;
-    SetLimits();
-  }
-
-  // Scores the candidate; false as soon as it is clear that it does not beat the best.
-  bool Improves(const Model& model, Candidate* candidate) const {
+  // Scores the candidate; false as soon as it is clear that it beats neither the best draw nor
+  // `score_to_beat`.
+  bool Beats(const Model& model, double score_to_beat, Candidate* candidate) const {
     std::array<float, kRansacBlock> r2;
     double score = 0.0;
     int inliers = 0;
@@ -252,7 +255,7 @@ class Ransac {
       score += ScoreBlock(r2.data(), size, &inliers);
       if (!(score <= limits_[static_cast<std::size_t>(block)])) return false;
     }
-    if (!(score < best_.score)) return false;
+    if (!(score < score_to_beat)) return false;
     candidate->score = score;
     candidate->num_inliers = inliers;
     return inliers >= Model::kMinSamples && model.Accept(candidate->value, options_.threshold);
@@ -308,24 +311,28 @@ class Ransac {
     return count;
   }
 
-  // Replaces the best by the best of: itself after reweighted steps, and the same from inner
-  // samples of its inliers, several times larger than minimal (Chum 2003). Thresholds shrink to T.
-  bool Optimize(const Model& model, Report* report) {
-    if (options_.local_steps == 0) return true;
+  // Local optimisation: reweighted steps from `start`, and from inner samples, several times larger
+  // than minimal, of the inliers of what that gave (Chum 2003). Thresholds shrink to T. Replaces
+  // the best by the best of these, if that beats it.
+  void Optimize(const Model& model, const Value& start, Report* report) {
+    if (options_.local_steps == 0 || best_.num_inliers == 0) return;
     ++report->num_local_optimizations;
-    const Value start = best_.value;
+    Candidate local;
+    local.value = start;
+    local.score = num_data_;
     for (int k = 0; k <= options_.local_samples; ++k) {
       Candidate candidate;
-      candidate.value = k % 2 == 1 ? start : best_.value;
+      candidate.value = k % 2 == 1 ? start : local.value;
       if (k > 0 && !RefineOnSample(model, &candidate.value)) continue;
       for (int step = options_.local_steps; step > 0; --step) {
         const double scale = 1.0 + static_cast<double>(step - 1) / options_.local_steps;
         Weigh(model, candidate.value, scale);
         if (!model.Refine(weights_.data(), &candidate.value)) break;
       }
-      if (Improves(model, &candidate)) SetBest(candidate);
+      if (Beats(model, local.score, &candidate)) local = candidate;
+      if (!(local.score < best_.score)) break;  // Not where the best is, nor better.
     }
-    return true;
+    if (local.score < best_.score) best_ = local;
   }
 
   bool RefineOnSample(const Model& model, Value* value) {
@@ -374,8 +381,8 @@ class Ransac {
   }
 
   void Finish(const Model& model, Report* report) {
-    report->success = has_best_;
-    if (!has_best_) return;
+    report->success = best_.num_inliers > 0;
+    if (!report->success) return;
     report->model = best_.value;
     std::array<float, kRansacBlock> r2;
     report->score = 0.0;
@@ -396,7 +403,7 @@ class Ransac {
   int num_data_ = 0;
   float inverse_t2_ = 1.0f;
   Candidate best_;
-  bool has_best_ = false;
+  double drawn_score_ = 0.0;  // Of the best draw, before refinement.
   std::vector<float> weights_;
   std::vector<int> inliers_;
   std::vector<double> limits_;

@@ -15,12 +15,14 @@ Status NoEllipse() { return Status::Refused("no ellipse explains the points"); }
 struct Start {
   ConicModel::Value value{};
   ConicWeights weights;
+  double log_likelihood = 0.0;
 };
 
 // Reweighted fit from the engine's ellipse.
 void Polish(const ConicModel& model, double threshold, Start* start) {
   constexpr int kMaxPasses = 10;
-  constexpr double kConverged = 1e-5;  // Of half the points' box: far below any noise.
+  constexpr double kConverged =
+      1e-4;  // Of half the points' box: a hundredth of a pixel in a hundred.
   start->weights.sigma = 0.0;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     model.Weigh(start->value, threshold, &start->weights);
@@ -33,6 +35,7 @@ void Polish(const ConicModel& model, double threshold, Start* start) {
     if (change < kConverged) break;
   }
   model.Weigh(start->value, threshold, &start->weights);
+  start->log_likelihood = start->weights.LogLikelihood();
 }
 
 // One run of the engine, by samples with directions where there are any.
@@ -57,7 +60,7 @@ bool Search(const ConicModel& model, const OrientedConicModel* oriented, RansacO
     if (!report.success) return k > 0;
     start.value = report.model;
     Polish(model, options.threshold, &start);
-    const bool better = start.weights.log_likelihood > best->weights.log_likelihood;
+    const bool better = start.log_likelihood > best->log_likelihood;
     if (k == 0 || better) std::swap(start, *best);
     if (2 * report.num_inliers >= model.NumData()) break;
     options.seed = Random(options.seed).Next();
