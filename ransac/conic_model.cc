@@ -390,6 +390,10 @@ double ConicModel::DirectionMiss(const Value& value, int i) const {
   return scale > 0.0 ? sine * sine / scale : 0.0;
 }
 
+bool ConicModel::DirectionFits(const Value& value, int i) const {
+  return DirectionMiss(value, i) < kSigmas * kSigmas;
+}
+
 void ConicModel::Weigh(const Value& value, double threshold, ConicWeights* result) const {
   const std::size_t n = index_.size();
   const double s = result->sigma > 0.0 ? result->sigma : threshold / kSigmas;

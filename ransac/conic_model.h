@@ -92,6 +92,8 @@ class ConicModel {
   double Distance(const Value& value, int i) const;
   // Squared sine residual of datum i, in standard deviations; 0 where its direction is not known.
   double DirectionMiss(const Value& value, int i) const;
+  // Whether it is within 3.03 of them.
+  bool DirectionFits(const Value& value, int i) const;
   // Inlier weights for a final fit.
   void Weigh(const Value& value, double threshold, ConicWeights* result) const;
 

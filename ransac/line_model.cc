@@ -92,30 +92,32 @@ bool LineModel::Refine(const float* weights, Value* value) const {
 
 namespace {
 
-// Reweighted maximum likelihood from the engine's line.
-Status FitFinal(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
-                const Eigen::Vector3d& initial, LineFit* fit, std::vector<std::uint8_t>* mask) {
+// Reweighted steps from the engine's line, then maximum likelihood with the last weights.
+Status FitFinal(const std::vector<CalibratedPoint>& points, const LineModel& model,
+                const RobustFitOptions& options, LineModel::Value value, LineFit* fit,
+                std::vector<std::uint8_t>* mask) {
   const double threshold = options.ransac.threshold;
+  const auto point = [&](std::size_t i) -> const CalibratedPoint& {
+    return points[static_cast<std::size_t>(model.PointIndex(static_cast<int>(i)))];
+  };
   std::vector<double> residuals(points.size()), weights, chosen_weights;
-  std::vector<CalibratedPoint> chosen;
-  fit->line = initial;
   double sigma = 0.0;
   constexpr int kPasses = 3;
   for (int pass = 0; pass < kPasses; ++pass) {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      residuals[i] = LineDistancePx(points[i], fit->line);
-    }
+    const Eigen::Vector3d line = model.ToLine(value);
+    for (std::size_t i = 0; i < points.size(); ++i) residuals[i] = LineDistancePx(point(i), line);
     InlierWeights(residuals, threshold, 2, &sigma, &weights);
-    chosen.clear();
-    chosen_weights.clear();
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (weights[i] < 1e-3) continue;
-      chosen.push_back(points[i]);
-      chosen_weights.push_back(weights[i]);
-    }
-    const Status status = FitLine(chosen, options.sigma_px, fit, &chosen_weights);
-    if (!status.ok()) return status;
+    const std::vector<float> steps(weights.begin(), weights.end());
+    if (pass + 1 < kPasses && !model.Refine(steps.data(), &value)) break;
   }
+  std::vector<CalibratedPoint> chosen;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (weights[i] < 1e-3) continue;
+    chosen.push_back(point(i));
+    chosen_weights.push_back(weights[i]);
+  }
+  const Status status = FitLine(chosen, options.sigma_px, fit, &chosen_weights);
+  if (!status.ok()) return status;
   mask->assign(points.size(), 0);
   for (std::size_t i = 0; i < points.size(); ++i) {
     (*mask)[i] = std::abs(LineDistancePx(points[i], fit->line)) <= threshold ? 1 : 0;
@@ -140,7 +142,7 @@ Status FitLineRobust(const std::vector<CalibratedPoint>& points, const RobustFit
     RansacReport<LineModel::Value> report;
     engine.Run(model, &report);
     if (!report.success) return Status::Refused("the points of the line coincide");
-    status = FitFinal(points, options, model.ToLine(report.model), &result, &result_mask);
+    status = FitFinal(points, model, options, report.model, &result, &result_mask);
   }
   if (!status.ok()) return status;
   *fit = result;

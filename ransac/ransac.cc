@@ -131,18 +131,9 @@ RansacLoss::RansacLoss(ScoreType type) : type_(type) {
   if (type_ == ScoreType::kMagsac) Tables();
 }
 
-float RansacLoss::Value(float u) const {
-  if (!(u < 1.0f)) return 1.0f;
-  return type_ == ScoreType::kMsac ? u : Interpolate(Tables().loss, u);
-}
+float RansacLoss::MarginalValue(float u) { return Interpolate(Tables().loss, u); }
 
-float RansacLoss::Weight(float u) const {
-  if (!(u < 1.0f)) return 0.0f;
-  if (type_ == ScoreType::kMagsac) return Interpolate(Tables().weight, u);
-  // Tukey's, not the loss's own step: a datum that crosses the threshold must not make the
-  // iteration jump.
-  return (1.0f - u) * (1.0f - u);
-}
+float RansacLoss::MarginalWeight(float u) { return Interpolate(Tables().weight, u); }
 
 double InlierWeights(const std::vector<double>& residuals, double threshold, int num_parameters,
                      double* sigma, std::vector<double>* weights) {

@@ -61,7 +61,7 @@ struct RansacOptions {
   double threshold = 1.0;      // Largest residual of an inlier, in the model's unit; > 0.
   double confidence = 0.999;   // That one all-inlier sample was drawn; in (0, 1).
   int min_iterations = 1;      // Draws that are made whatever the confidence; 0 or more.
-  int max_iterations = 10000;  // Draws; 1 or more.
+  int max_iterations = 100000;  // Draws; 1 or more.
   std::uint64_t seed = 1;
   ScoreType score = ScoreType::kMsac;
   int local_start = 30;    // Draws before the first local optimisation (Lebeda 2012); 0 or more.
@@ -111,10 +111,21 @@ std::vector<int> RandomOrder(int n, std::uint64_t seed);
 class RansacLoss {
  public:
   explicit RansacLoss(ScoreType type);
-  float Value(float u) const;
-  float Weight(float u) const;
+  float Value(float u) const {
+    if (!(u < 1.0f)) return 1.0f;
+    return type_ == ScoreType::kMsac ? u : MarginalValue(u);
+  }
+  float Weight(float u) const {
+    if (!(u < 1.0f)) return 0.0f;
+    // Tukey's, not the truncated square's own step: a datum that crosses the threshold must not
+    // make the iteration jump.
+    return type_ == ScoreType::kMsac ? (1.0f - u) * (1.0f - u) : MarginalWeight(u);
+  }
 
  private:
+  static float MarginalValue(float u);
+  static float MarginalWeight(float u);
+
   ScoreType type_;
 };
 
