@@ -103,6 +103,18 @@ double GainOfLine(const SomePoints& points, double threshold) {
   return static_cast<double>(best);
 }
 
+// For each sector the sum over it and `reach` neighbours on either side.
+std::array<double, kSectors> SumsOfWindows(const std::array<double, kSectors>& counts, int reach) {
+  std::array<double, kSectors> sums{};
+  for (int k = 0; k < kSectors; ++k) {
+    for (int j = k - reach; j <= k + reach; ++j) {
+      sums[static_cast<std::size_t>(k)] +=
+          counts[static_cast<std::size_t>((j + kSectors) % kSectors)];
+    }
+  }
+  return sums;
+}
+
 // Gauss-Newton on r = v / (2 |g|), v = q . m and g the gradient per pixel (halved), of the
 // coefficients q of a conic. Points are taken in blocks, so that the compiler can work on several
 // at a time: half the time of point by point.
@@ -459,22 +471,22 @@ ConicModel::SectorDensities ConicModel::MeasureSectors(const Value& value, doubl
   }
   // In each sector, of the points inside the threshold: those of the background, and those of the
   // curve as far as they are sure (lower by two and a half standard deviations of the background).
-  SectorDensities densities;
   constexpr int kReach = 2;  // Neighbours on each side that vouch for a sector.
-  constexpr double kWindow = (2.0 * kReach + 1.0) / kSectors;
-  for (int k = 0; k < kSectors; ++k) {
-    double in = 0.0, near = 0.0;
-    for (int j = k - kReach; j <= k + kReach; ++j) {
-      const std::size_t sector = static_cast<std::size_t>((j + kSectors) % kSectors);
-      in += inside[sector];
-      near += beside[sector];
-    }
+  const std::array<double, kSectors> in = SumsOfWindows(inside, kReach);
+  const std::array<double, kSectors> near = SumsOfWindows(beside, kReach);
+  // What clutter all around leaves in a window; a blob at one place is not all around.
+  std::array<double, kSectors> sorted = near;
+  std::nth_element(sorted.begin(), sorted.begin() + kSectors / 2, sorted.end());
+  const double all_around =
+      std::min(all_beside * (2.0 * kReach + 1.0) / kSectors, 2.0 * sorted[kSectors / 2] + 1.0);
+  SectorDensities densities;
+  for (std::size_t k = 0; k < kSectors; ++k) {
     // Half local, half global; the sides are twice as wide as the inside.
-    const double expected = 0.5 * (0.5 * near + 0.5 * kWindow * all_beside);
+    const double expected = 0.5 * (0.5 * near[k] + 0.5 * all_around);
     const double stray = chance * expected;
-    densities.background[static_cast<std::size_t>(k)] = expected / (2.0 * threshold);
-    densities.curve[static_cast<std::size_t>(k)] =
-        std::max(0.0, in - stray - 2.5 * std::sqrt(stray)) * 0.3989422804014327 / sigma;
+    densities.background[k] = expected / (2.0 * threshold);
+    densities.curve[k] =
+        std::max(0.0, in[k] - stray - 2.5 * std::sqrt(stray)) * 0.3989422804014327 / sigma;
   }
   return densities;
 }

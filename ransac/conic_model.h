@@ -90,6 +90,10 @@ class ConicModel {
 
   // Signed distance of datum i, pixels, in double precision.
   double Distance(const Value& value, int i) const;
+  // Distance of two data, pixels, roughly (a pixel of average size).
+  double PixelsBetween(int i, int j) const {
+    return (x_[static_cast<std::size_t>(i)] - x_[static_cast<std::size_t>(j)]).norm() / pixel_;
+  }
   // Squared sine residual of datum i, in standard deviations; 0 where its direction is not known.
   double DirectionMiss(const Value& value, int i) const;
   // Whether it is within 3.03 of them.

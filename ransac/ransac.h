@@ -341,7 +341,6 @@ class Ransac {
         if (!model.Refine(weights_.data(), &candidate.value)) break;
       }
       if (Beats(model, local.score, &candidate)) local = candidate;
-      if (!(local.score < best_.score)) break;  // Not where the best is, nor better.
     }
     if (local.score < best_.score) best_ = local;
   }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <utility>
 
@@ -17,7 +16,7 @@ Status NoEllipse() { return Status::Refused("no ellipse explains the points"); }
 struct Candidate {
   ConicModel::Value value{};
   ConicWeights weights;
-  double log_likelihood = -std::numeric_limits<double>::infinity();
+  double log_likelihood = 0.0;
 };
 
 // Points with their directions, if there are any.
@@ -54,10 +53,8 @@ class ConicSearch {
 
   const ConicModel& model() const { return model_; }
 
-  // The likeliest ellipse of a few searches; false if there is none.
-  bool Run(Candidate* best) const;
-  // Reweighted steps from an ellipse.
-  void Polish(Candidate* candidate) const;
+  // What a few searches found, the likeliest first.
+  std::vector<Candidate> Run() const;
   // Maximum likelihood with the candidate's weights, its covariance, and the mask of the result.
   Status Finish(const Candidate& candidate, ConicFit* fit, std::vector<std::uint8_t>* mask) const;
 
@@ -69,8 +66,12 @@ class ConicSearch {
     if (oriented_) return Ransac<OrientedConicModel>(options).Run(*oriented_, report);
     Ransac<ConicModel>(options).Run(model_, report);
   }
-  bool SearchBeside(const Candidate& first, const RansacOptions& options, int num_inliers,
-                    Candidate* second) const;
+  // The ellipse after reweighted steps.
+  Candidate Polished(const ConicModel::Value& value) const;
+  std::vector<int> FarFrom(const Candidate& candidate) const;
+  std::vector<int> Uncrowded() const;
+  void SearchAmong(const std::vector<int>& indices, const RansacOptions& options, int num_inliers,
+                   std::vector<Candidate>* candidates) const;
 
   const std::vector<CalibratedPoint>& points_;
   const EdgeDirections* directions_;
@@ -80,51 +81,52 @@ class ConicSearch {
   std::optional<OrientedConicModel> oriented_;
 };
 
-void ConicSearch::Polish(Candidate* candidate) const {
+Candidate ConicSearch::Polished(const ConicModel::Value& value) const {
   constexpr int kMaxPasses = 10;
   // Of half the points' box: a hundredth of a pixel in a hundred.
   constexpr double kConverged = 1e-4;
-  ConicWeights* weights = &candidate->weights;
-  weights->sigma = 0.0;
+  Candidate result;
+  result.value = value;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
-    model_.Weigh(candidate->value, options_.ransac.threshold, weights);
-    const ConicModel::Value before = candidate->value;
-    if (!model_.Refine(weights->weights.data(), &candidate->value)) break;
+    model_.Weigh(result.value, options_.ransac.threshold, &result.weights);
+    const ConicModel::Value before = result.value;
+    if (!model_.Refine(result.weights.weights.data(), &result.value)) break;
     double change = 0.0;
     for (std::size_t k = 0; k < before.size(); ++k) {
-      change = std::max(change, std::abs(candidate->value[k] - before[k]));
+      change = std::max(change, std::abs(result.value[k] - before[k]));
     }
     if (change < kConverged) break;
   }
-  model_.Weigh(candidate->value, options_.ransac.threshold, weights);
-  candidate->log_likelihood = weights->LogLikelihood();
+  model_.Weigh(result.value, options_.ransac.threshold, &result.weights);
+  result.log_likelihood = result.weights.LogLikelihood();
+  return result;
 }
 
 // The engine counts inliers, and that misleads it in two ways: on short or sparse contours it may
 // end on an ellipse that takes in clutter where the contour has none, and a dense blob of clutter
 // holds an ellipse with more inliers than the contour has. Both have far less likelihood than the
 // contour, whose inliers lie close to it and have nothing beside them. So where less than half of
-// the points are inliers, a search from another seed and, where the ellipse explains its inliers
-// badly, one among the points that are not near it, are compared by likelihood.
-bool ConicSearch::Run(Candidate* best) const {
+// the points are inliers, searches from other seeds and, where the ellipse explains its inliers
+// badly, among the points that are not near it and among those that do not crowd, are compared by
+// likelihood.
+std::vector<Candidate> ConicSearch::Run() const {
   RansacOptions options = options_.ransac;
   // One sample is often not good enough: a second all-inlier sample.
   options.confidence = 1.0 - (1.0 - options.confidence) * (1.0 - options.confidence);
+  std::vector<Candidate> candidates;
   Report report;
   Draw(options, &report);
-  if (!report.success) return false;
-  best->value = report.model;
-  Polish(best);
-  const int num_inliers = report.num_inliers;
-  if (2 * num_inliers >= model_.NumData()) return true;
-  const Candidate first = *best;
-  // Log-likelihood for each inlier: about 3 in sparse clutter, 1 in a blob.
-  constexpr double kBad = 1.7;
-  Candidate other;
-  if (first.log_likelihood < kBad * num_inliers &&
-      SearchBeside(first, options, num_inliers, &other) &&
-      other.log_likelihood > best->log_likelihood) {
-    *best = other;
+  if (!report.success) return candidates;
+  candidates.push_back(Polished(report.model));
+  // Log-likelihood for each inlier: 4 in sparse clutter, 3 among twice as many, 1 to 2.5 in a blob.
+  constexpr double kGood = 3.0;
+  const bool good = candidates[0].log_likelihood >= kGood * report.num_inliers &&
+                    model_.Accept(candidates[0].value, options.threshold);
+  if (good && 2 * report.num_inliers >= model_.NumData()) return candidates;
+  if (!good) SearchAmong(Uncrowded(), options, report.num_inliers, &candidates);
+  constexpr double kBad = 2.0;
+  if (candidates[0].log_likelihood < kBad * report.num_inliers) {
+    SearchAmong(FarFrom(candidates[0]), options, report.num_inliers, &candidates);
   }
   constexpr int kSeeds = 3;
   for (int k = 1; k < kSeeds; ++k) {
@@ -132,42 +134,69 @@ bool ConicSearch::Run(Candidate* best) const {
     options.max_iterations -= report.num_iterations;  // They are for all seeds.
     if (options.max_iterations <= 0) break;
     Draw(options, &report);
-    if (!report.success) continue;
-    other.value = report.model;
-    Polish(&other);
-    if (other.log_likelihood > best->log_likelihood) *best = other;
+    if (report.success) candidates.push_back(Polished(report.model));
   }
-  return true;
+  std::stable_sort(
+      candidates.begin(), candidates.end(),
+      [](const Candidate& a, const Candidate& b) { return a.log_likelihood > b.log_likelihood; });
+  return candidates;
 }
 
-// Among the points that do not lie near the first ellipse.
-bool ConicSearch::SearchBeside(const Candidate& first, const RansacOptions& options,
-                               int num_inliers, Candidate* second) const {
-  std::vector<int> far;
+// Points that do not lie near the candidate.
+std::vector<int> ConicSearch::FarFrom(const Candidate& candidate) const {
+  std::vector<int> indices;
   for (int i = 0; i < model_.NumData(); ++i) {
-    if (std::abs(first.weights.residuals[static_cast<std::size_t>(i)]) <= 3.0 * options.threshold) {
-      continue;
-    }
-    far.push_back(model_.PointIndex(i));
+    const double distance = std::abs(candidate.weights.residuals[static_cast<std::size_t>(i)]);
+    if (distance > 3.0 * options_.ransac.threshold) indices.push_back(model_.PointIndex(i));
   }
-  if (far.size() < 5) return false;
+  return indices;
+}
+
+// Points without far more neighbours, in three thresholds around, than the loneliest fifth has.
+std::vector<int> ConicSearch::Uncrowded() const {
+  constexpr int kSome = 300;  // Points, in random order, that stand for all.
+  const int n = model_.NumData();
+  std::vector<int> neighbors(static_cast<std::size_t>(n), 0);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < std::min(n, kSome); ++j) {
+      const bool near = model_.PixelsBetween(i, j) < 3.0 * options_.ransac.threshold;
+      neighbors[static_cast<std::size_t>(i)] += near ? 1 : 0;
+    }
+  }
+  std::vector<int> sorted = neighbors;
+  std::nth_element(sorted.begin(), sorted.begin() + n / 5, sorted.end());
+  const int limit = 4 * (sorted[static_cast<std::size_t>(n / 5)] + 1);
+  std::vector<int> indices;
+  for (int i = 0; i < n; ++i) {
+    if (neighbors[static_cast<std::size_t>(i)] <= limit) indices.push_back(model_.PointIndex(i));
+  }
+  return indices;
+}
+
+// Adds the best ellipse among some of the points, if these are not nearly all.
+void ConicSearch::SearchAmong(const std::vector<int>& indices, const RansacOptions& options,
+                              int num_inliers, std::vector<Candidate>* candidates) const {
+  const int num_points = static_cast<int>(indices.size());
+  if (10 * num_points > 9 * model_.NumData()) return;
   Contour all{points_, std::nullopt};
   if (directions_ != nullptr) all.directions = *directions_;
-  const Contour rest = all.Subset(far);
+  const Contour rest = all.Subset(indices);
   const ConicSearch search(rest.points, rest.directions ? &*rest.directions : nullptr, options_,
                            limits_);
-  // What could win has half as many inliers at least; a tenth of the draws may go into that.
+  // What could win has more than half as many inliers; a tenth of the draws may go into that.
+  constexpr int kFewest = 500;
+  const int needed = RequiredIterations(num_points, std::min(num_points, num_inliers * 3 / 5),
+                                        ConicModel::kMinSamples, options.confidence);
   RansacOptions limited = options;
-  limited.max_iterations = std::min(
-      std::max(1, options.max_iterations / 10),
-      RequiredIterations(static_cast<int>(far.size()), num_inliers / 2, 5, options.confidence));
+  limited.min_iterations = kFewest;
+  limited.max_iterations =
+      std::clamp(needed, kFewest, std::max(kFewest, options.max_iterations / 10));
   Report report;
   search.Draw(limited, &report);
-  if (!report.success || !model_.FromConic(search.model().ToConic(report.model), &second->value)) {
-    return false;
+  ConicModel::Value value;
+  if (report.success && model_.FromConic(search.model().ToConic(report.model), &value)) {
+    candidates->push_back(Polished(value));
   }
-  Polish(second);
-  return true;
 }
 
 Status ConicSearch::Finish(const Candidate& candidate, ConicFit* fit,
@@ -217,11 +246,13 @@ Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFi
   if (!status.ok()) return status;
   if (points.size() < 5) return Status::Refused("an ellipse needs five points");
   const ConicSearch search(points, directions, options, limits);
-  Candidate best;
-  if (!search.Run(&best)) return NoEllipse();
   ConicFit result;
   std::vector<std::uint8_t> result_mask;
-  status = search.Finish(best, &result, &result_mask);
+  status = NoEllipse();
+  for (const Candidate& candidate : search.Run()) {
+    status = search.Finish(candidate, &result, &result_mask);
+    if (status.ok()) break;
+  }
   if (!status.ok()) return status;
   *fit = result;
   if (mask != nullptr) *mask = std::move(result_mask);

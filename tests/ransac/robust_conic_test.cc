@@ -1,0 +1,280 @@
+#include "circline/ransac/robust_conic.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "circline/estimators/conic.h"
+#include "circline/estimators/random.h"
+#include "tests/ransac/conic_scene.h"
+
+namespace circline {
+namespace {
+
+using conic_scene::Clutter;
+using conic_scene::kPi;
+using conic_scene::MakeScene;
+using conic_scene::Scene;
+using conic_scene::TestCamera;
+
+struct Statistics {
+  int ok = 0;  // Errors of at most three times the bound.
+  double median = 0.0;
+};
+
+// Default options throughout.
+Statistics RunTrials(int trials, double outlier_ratio, double arc_deg = 360.0,
+                     Clutter clutter = Clutter::kUniform, bool with_directions = false,
+                     ScoreType score = ScoreType::kMsac) {
+  Statistics statistics;
+  std::vector<double> errors;
+  for (int trial = 0; trial < trials; ++trial) {
+    const Scene scene =
+        MakeScene(static_cast<std::uint64_t>(1000 + trial), outlier_ratio, arc_deg, clutter);
+    RobustFitOptions options;
+    options.ransac.score = score;
+    ConicFit fit;
+    const Status status = FitConicRobust(scene.points, options, &fit, nullptr, ConicLimits(),
+                                         with_directions ? &scene.directions : nullptr);
+    errors.push_back(status.ok() ? scene.Error(fit.conic) : 1e9);
+    if (errors.back() <= 3.0) ++statistics.ok;
+  }
+  std::sort(errors.begin(), errors.end());
+  statistics.median = errors[errors.size() / 2];
+  return statistics;
+}
+
+TEST(FitConicRobust, IsEfficientUpToSeventyPercentOutliers) {
+  struct Case {
+    double outlier_ratio, median;
+  };
+  for (const bool with_directions : {false, true}) {
+    for (const Case& c : {Case{0.0, 1.05}, Case{0.3, 1.05}, Case{0.5, 1.05}, Case{0.7, 1.1}}) {
+      const Statistics s =
+          RunTrials(100, c.outlier_ratio, 360.0, Clutter::kUniform, with_directions);
+      EXPECT_EQ(s.ok, 100) << c.outlier_ratio;
+      EXPECT_LE(s.median, c.median) << c.outlier_ratio;
+    }
+  }
+}
+
+TEST(FitConicRobust, TheMarginalScoreServesToo) {
+  const Statistics s = RunTrials(50, 0.5, 360.0, Clutter::kUniform, false, ScoreType::kMagsac);
+  EXPECT_EQ(s.ok, 50);
+  EXPECT_LE(s.median, 1.1);
+}
+
+TEST(FitConicRobust, FindsArcsAmongSeventyPercentOutliers) {
+  for (const bool with_directions : {false, true}) {
+    for (const double arc_deg : {180.0, 90.0}) {
+      const Statistics s = RunTrials(100, 0.7, arc_deg, Clutter::kUniform, with_directions);
+      EXPECT_GE(s.ok, 99 - (with_directions ? 0 : 1)) << arc_deg;
+      EXPECT_LE(s.median, 1.25) << arc_deg;
+    }
+  }
+}
+
+TEST(FitConicRobust, FindsTheContourAmongNinetyPercentOutliers) {
+  EXPECT_GE(RunTrials(20, 0.9).ok, 19);
+  EXPECT_EQ(RunTrials(50, 0.9, 360.0, Clutter::kUniform, true).ok, 50);
+}
+
+TEST(FitConicRobust, IsNotLedAstrayByStructure) {
+  for (const bool with_directions : {false, true}) {
+    EXPECT_GE(RunTrials(100, 0.4, 360.0, Clutter::kEllipse, with_directions).ok, 99);
+    EXPECT_GE(RunTrials(100, 0.5, 360.0, Clutter::kEdge, with_directions).ok, 99);
+    EXPECT_GE(RunTrials(100, 0.7, 360.0, Clutter::kEdge, with_directions).ok, 99);
+    EXPECT_GE(RunTrials(100, 0.5, 360.0, Clutter::kCluster, with_directions).ok, 99);
+    EXPECT_GE(RunTrials(100, 0.7, 360.0, Clutter::kCluster, with_directions).ok, 99);
+  }
+}
+
+TEST(FitConicRobust, MaskLeavesOutWrongDirections) {
+  Scene scene = MakeScene(1, 0.5);
+  // The contour's first point has the normal of a line that crosses it.
+  Eigen::Vector2d& normal = scene.directions.normals[0];
+  normal = {-normal.y(), normal.x()};
+  ConicFit fit;
+  std::vector<std::uint8_t> near, right;
+  const RobustFitOptions options;
+  ASSERT_TRUE(FitConicRobust(scene.points, options, &fit, &near).ok());
+  ASSERT_TRUE(
+      FitConicRobust(scene.points, options, &fit, &right, ConicLimits(), &scene.directions).ok());
+  EXPECT_EQ(near[0], 1);
+  EXPECT_EQ(right[0], 0);
+  const auto in_clutter = [](const std::vector<std::uint8_t>& mask) {
+    return std::count(mask.begin() + 100, mask.end(), 1);
+  };
+  EXPECT_LT(in_clutter(right), in_clutter(near));
+  EXPECT_GE(std::count(right.begin(), right.begin() + 100, 1), 95);
+}
+
+TEST(FitConicRobust, UnknownDirectionsAreLikeNone) {
+  Scene scene = MakeScene(1, 0.3);
+  for (std::size_t i = 0; i < scene.points.size(); i += 2) scene.directions.normals[i].setZero();
+  ConicFit fit;
+  ASSERT_TRUE(FitConicRobust(scene.points, RobustFitOptions(), &fit, nullptr, ConicLimits(),
+                             &scene.directions)
+                  .ok());
+  EXPECT_LE(scene.Error(fit.conic), 2.0);
+}
+
+TEST(FitConicRobust, NamesBadDirections) {
+  const Scene scene = MakeScene(1, 0.0);
+  ConicFit fit;
+  const auto message = [&](const EdgeDirections& directions) {
+    const Status status =
+        FitConicRobust(scene.points, RobustFitOptions(), &fit, nullptr, ConicLimits(), &directions);
+    EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
+    return status.message;
+  };
+  EdgeDirections directions = scene.directions;
+  directions.sigma_rad = 0.0;
+  EXPECT_NE(message(directions).find("sigma_rad"), std::string::npos);
+  directions = scene.directions;
+  directions.normals.pop_back();
+  EXPECT_NE(message(directions).find("normals"), std::string::npos);
+  directions = scene.directions;
+  directions.normals[3].x() = std::nan("");
+  EXPECT_NE(message(directions).find("normals"), std::string::npos);
+}
+
+TEST(FitConicRobust, MaskIsThatOfTheReturnedEllipse) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const Scene scene = MakeScene(seed, 0.5);
+    RobustFitOptions options;
+    ConicFit fit;
+    std::vector<std::uint8_t> mask;
+    ASSERT_TRUE(FitConicRobust(scene.points, options, &fit, &mask).ok());
+    ASSERT_EQ(mask.size(), scene.points.size());
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+      const double d = std::abs(ConicDistancePx(scene.points[i], fit.conic));
+      EXPECT_EQ(mask[i], d <= options.ransac.threshold ? 1 : 0);
+    }
+  }
+}
+
+TEST(FitConicRobust, SameSeedSameBits) {
+  const Scene scene = MakeScene(3, 0.7);
+  RobustFitOptions options;
+  ConicFit a, b;
+  std::vector<std::uint8_t> mask_a, mask_b;
+  ASSERT_TRUE(FitConicRobust(scene.points, options, &a, &mask_a).ok());
+  ASSERT_TRUE(FitConicRobust(scene.points, options, &b, &mask_b).ok());
+  EXPECT_EQ(a.conic, b.conic);
+  EXPECT_EQ(a.covariance, b.covariance);
+  EXPECT_EQ(mask_a, mask_b);
+}
+
+TEST(FitConicRobust, CovarianceIsHonest) {
+  // Mean of e^T Cov^+ e over trials, chi-square with 5 degrees of freedom each.
+  const Camera camera = TestCamera();
+  Eigen::Matrix3d x_from_pixel;
+  x_from_pixel << 1.0 / camera.fx, 0.0, -camera.cx / camera.fx, 0.0, 1.0 / camera.fy,
+      -camera.cy / camera.fy, 0.0, 0.0, 1.0;
+  constexpr int kTrials = 100;
+  double sum = 0.0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Scene scene = MakeScene(static_cast<std::uint64_t>(trial), 0.3);
+    ConicFit fit, truth;
+    ASSERT_TRUE(FitConicRobust(scene.points, RobustFitOptions(), &fit).ok());
+    ASSERT_TRUE(FitConic(scene.truth, 1.0, &truth).ok());
+    const Vector6d e = ConicToVector(fit.conic) - ConicToVector(truth.conic);
+    const Vector6d v = ConicToVector(fit.conic);
+    const Matrix6d covariance = fit.Covariance();
+    const double scale = covariance.trace();
+    sum += e.dot((covariance + scale * v * v.transpose()).inverse() * e);
+  }
+  EXPECT_GT(sum / kTrials, 3.5);
+  EXPECT_LT(sum / kTrials, 7.0);
+}
+
+TEST(FitConicRobust, ExactPointsGiveTheExactEllipse) {
+  Scene scene = MakeScene(5, 0.5, 360.0, Clutter::kUniform, 0.0);
+  ConicFit fit;
+  ASSERT_TRUE(FitConicRobust(scene.points, RobustFitOptions(), &fit).ok());
+  EXPECT_LT(scene.Error(fit.conic), 0.05);
+}
+
+TEST(FitConicRobust, MeasuresInPixelsOfADistortedPhoto) {
+  Camera camera = TestCamera();
+  camera.model = CameraModel::kOpenCV;
+  camera.distortion = {-0.3, 0.1, 1e-3, -1e-3, 0.0, 0.0, 0.0, 0.0};
+  Random random(9);
+  std::vector<Eigen::Vector2d> pixels;
+  for (int i = 0; i < 80; ++i) {
+    const double t = 2.0 * kPi * i / 80.0;
+    Eigen::Vector2d pixel;
+    ASSERT_TRUE(
+        CameraToPixel(camera, {0.2 + 0.1 * std::cos(t), 0.1 + 0.08 * std::sin(t), 1.0}, &pixel));
+    const double nx = random.Normal(), ny = random.Normal();
+    pixels.push_back(pixel + 0.3 * Eigen::Vector2d(nx, ny));
+  }
+  for (int i = 0; i < 80; ++i) {
+    const double x = random.Uniform(350.0, 600.0), y = random.Uniform(200.0, 420.0);
+    pixels.emplace_back(x, y);
+  }
+  std::vector<CalibratedPoint> points;
+  PixelsToCalibrated(camera, pixels, &points);
+  RobustFitOptions options;
+  options.sigma_px = 0.3;
+  options.ransac.threshold = 0.91;
+  ConicFit fit;
+  ASSERT_TRUE(FitConicRobust(points, options, &fit).ok());
+  EXPECT_NEAR(fit.rms_px, 0.3, 0.08);
+  Ellipse ellipse;
+  ASSERT_TRUE(ConicToEllipse(fit.conic, &ellipse));
+  EXPECT_NEAR(ellipse.center.x(), 0.2, 3e-4);
+  EXPECT_NEAR(ellipse.center.y(), 0.1, 3e-4);
+  EXPECT_NEAR(ellipse.a, 0.1, 4e-4);
+  EXPECT_NEAR(ellipse.b, 0.08, 4e-4);
+}
+
+TEST(FitConicRobust, RefusesWhatHoldsNoEllipse) {
+  const RobustFitOptions options;
+  ConicFit fit;
+  fit.rms_px = -7.0;
+  std::vector<std::uint8_t> mask(3, 9);
+  const auto refused = [&](const std::vector<Eigen::Vector2d>& pixels) {
+    std::vector<CalibratedPoint> points;
+    PixelsToCalibrated(TestCamera(), pixels, &points);
+    const Status status = FitConicRobust(points, options, &fit, &mask);
+    return status.code == StatusCode::kRefused && !status.message.empty();
+  };
+  std::vector<Eigen::Vector2d> collinear, repeated, edge, tiny;
+  Random random(1);
+  for (int i = 0; i < 60; ++i) {
+    collinear.emplace_back(100.0 + 3.0 * i, 50.0 + 2.0 * i);
+    repeated.emplace_back(100.0, 50.0);
+    const double nx = random.Normal(), ny = random.Normal();
+    edge.emplace_back(100.0 + 5.0 * i + nx, 200.0 + ny);
+    tiny.emplace_back(300.0 + std::cos(i * 0.1), 200.0 + std::sin(i * 0.1));
+  }
+  EXPECT_TRUE(refused({}));
+  EXPECT_TRUE(refused({{0.0, 0.0}, {1.0, 5.0}, {20.0, 3.0}, {4.0, 9.0}}));
+  EXPECT_TRUE(refused(collinear));
+  EXPECT_TRUE(refused(repeated));
+  EXPECT_TRUE(refused(edge));
+  EXPECT_TRUE(refused(tiny));  // Smaller than the threshold tells a circle from a blob.
+  // What is refused leaves the outputs alone.
+  EXPECT_EQ(fit.rms_px, -7.0);
+  EXPECT_EQ(mask, std::vector<std::uint8_t>(3, 9));
+}
+
+TEST(FitConicRobust, NamesBadOptions) {
+  const Scene scene = MakeScene(1, 0.0);
+  ConicFit fit;
+  RobustFitOptions options;
+  options.ransac.threshold = -1.0;
+  EXPECT_EQ(FitConicRobust(scene.points, options, &fit).code, StatusCode::kInvalidArgument);
+  ConicLimits limits;
+  limits.min_arc_deg = 400.0;
+  const Status status = FitConicRobust(scene.points, RobustFitOptions(), &fit, nullptr, limits);
+  EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
+  EXPECT_NE(status.message.find("min_arc_deg"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace circline
