@@ -82,7 +82,7 @@ class ConicSearch {
 };
 
 Candidate ConicSearch::Polished(const ConicModel::Value& value) const {
-  constexpr int kMaxPasses = 10;
+  constexpr int kMaxPasses = 30;
   // Of half the points' box: a hundredth of a pixel in a hundred.
   constexpr double kConverged = 1e-4;
   Candidate result;

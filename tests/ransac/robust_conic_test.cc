@@ -69,15 +69,15 @@ TEST(FitConicRobust, TheMarginalScoreServesToo) {
 TEST(FitConicRobust, FindsArcsAmongSeventyPercentOutliers) {
   for (const bool with_directions : {false, true}) {
     for (const double arc_deg : {180.0, 90.0}) {
-      const Statistics s = RunTrials(100, 0.7, arc_deg, Clutter::kUniform, with_directions);
-      EXPECT_GE(s.ok, 99 - (with_directions ? 0 : 1)) << arc_deg;
+      const Statistics s = RunTrials(200, 0.7, arc_deg, Clutter::kUniform, with_directions);
+      EXPECT_GE(s.ok, 198) << arc_deg;
       EXPECT_LE(s.median, 1.25) << arc_deg;
     }
   }
 }
 
 TEST(FitConicRobust, FindsTheContourAmongNinetyPercentOutliers) {
-  EXPECT_GE(RunTrials(20, 0.9).ok, 19);
+  EXPECT_GE(RunTrials(60, 0.9).ok, 57);
   EXPECT_EQ(RunTrials(50, 0.9, 360.0, Clutter::kUniform, true).ok, 50);
 }
 
