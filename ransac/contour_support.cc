@@ -117,14 +117,23 @@ void Supporter::Collect(const std::vector<ContourSample>& samples, bool bright_i
     support->turn += samples[k].turn;
     const int i = nearest_[k];
     if (i < 0 || i == last) continue;
-    const double sine = Cross(samples[k].normal, map_.points[static_cast<std::size_t>(i)].Normal());
-    sines_.push_back(std::abs(sine));
+    sines_.push_back(NormalMiss(samples[k], map_.points[static_cast<std::size_t>(i)]));
     support->points.push_back(i);
     last = i;
   }
   support->normal_median = Median(&sines_);
   Unique(&support->points);
   AverageStrength(support);
+}
+
+// Angle between the gradient at an edge point and the contour's normal beside it, which has turned
+// since the sample by curvature times distance.
+double Supporter::NormalMiss(const ContourSample& s, const EdgePoint& p) {
+  const Vector2d tangent(-s.normal.y(), s.normal.x());
+  const double curvature = s.turn / std::max(s.length, 1e-9);
+  const double side = s.normal.dot(p.Normal()) < 0.0 ? -1.0 : 1.0;
+  const double turned = curvature * tangent.dot(p.Position() - s.pixel);
+  return std::abs(side * Cross(s.normal, p.Normal()) - turned);
 }
 
 // The free edge point nearest to the contour at a sample, with the right direction, or -1.

@@ -77,6 +77,7 @@ class Supporter {
                Support* support);
 
  private:
+  static double NormalMiss(const ContourSample& s, const EdgePoint& p);
   int Nearest(const ContourSample& s, bool bright_inside, double reach) const;
   void FindRuns(const std::vector<ContourSample>& samples);
   std::size_t BehindHole(const std::vector<ContourSample>& samples) const;

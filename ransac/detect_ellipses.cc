@@ -107,6 +107,25 @@ class CalibratedEdges {
   std::vector<std::uint8_t> state_;
 };
 
+Vector2d FromPixels(const CalibratedPoint& p, const Vector2d& shift) {
+  return {p.x_from_pixel[0] * shift.x() + p.x_from_pixel[1] * shift.y(),
+          p.x_from_pixel[2] * shift.x() + p.x_from_pixel[3] * shift.y()};
+}
+
+// Curvature, 1 / pixels of the photo, of the level line of a conic through a point, and the unit
+// normal that points outward: t^T H t / |g| with gradient g, Hessian H, unit tangent t.
+double CurvatureAt(const Matrix3d& conic, const CalibratedPoint& p, Vector2d* outward) {
+  const Vector2d g = p.GradientPerPixel((conic * p.Homogeneous()).head<2>());
+  const double length = g.norm();
+  if (!(length > 0.0)) {
+    outward->setZero();
+    return 0.0;
+  }
+  *outward = g / length;
+  const Vector2d along = FromPixels(p, Vector2d(-outward->y(), outward->x()));
+  return along.dot(conic.topLeftCorner<2, 2>() * along) / length;
+}
+
 // --------------------------------------------------------------------------------------- detector
 
 // Logarithm (base 10) of the upper tail of the binomial distribution by Hoeffding's bound in its
@@ -342,15 +361,37 @@ class EllipseDetector {
     return true;
   }
 
-  bool FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
+  // The edge points of the support where they would lie if the contour, `conic`, were straight.
+  void Straighten(const Matrix3d& conic, DetectedEllipse* e) {
     e->points.clear();
+    e->contour.clear();
     fit_points_.clear();
+    const double blur = MedianBlur();
     for (const int i : support_.points) {
       const CalibratedPoint* p = calibrated_.Get(i);
       if (p == nullptr) continue;
+      const EdgePoint& edge = map_.points[static_cast<std::size_t>(i)];
+      Vector2d outward;
+      const double curvature = CurvatureAt(conic, *p, &outward);
+      const Vector2d shift = CurvatureBias(edge, blur, curvature) * outward;
+      CalibratedPoint moved = *p;
+      moved.x += FromPixels(*p, shift);
       e->points.push_back(i);
-      fit_points_.push_back(*p);
+      e->contour.push_back(edge.Position() + shift);
+      fit_points_.push_back(moved);
     }
+  }
+
+  double MedianBlur() {
+    sorted_.clear();
+    for (const int i : support_.points) {
+      sorted_.push_back(static_cast<double>(map_.points[static_cast<std::size_t>(i)].blur_px));
+    }
+    return Median(&sorted_);
+  }
+
+  bool FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
+    Straighten(initial, e);
     if (fit_points_.size() < 6) return false;
     if (!RefineConic(fit_points_, 1.0, initial, &e->fit).ok()) return false;
     DropOutliers(e);
@@ -378,9 +419,11 @@ class EllipseDetector {
     for (std::size_t k = 0; k < distances_.size(); ++k) {
       if (distances_[k] > limit) continue;
       fit_points_[kept] = fit_points_[k];
+      e->contour[kept] = e->contour[k];
       e->points[kept++] = e->points[k];
     }
     fit_points_.resize(kept);
+    e->contour.resize(kept);
     e->points.resize(kept);
   }
 

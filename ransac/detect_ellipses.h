@@ -8,6 +8,7 @@
 #ifndef CIRCLINE_RANSAC_DETECT_ELLIPSES_H_
 #define CIRCLINE_RANSAC_DETECT_ELLIPSES_H_
 
+#include <Eigen/Core>
 #include <vector>
 
 #include "circline/estimators/camera.h"
@@ -35,6 +36,9 @@ struct EllipseOptions {
 struct DetectedEllipse {
   ConicFit fit;               // Calibrated; residuals in pixels of the photo.
   std::vector<int> points;    // Its edge points, indices into EdgeMap::points, once around.
+  // Where these lie once what the contour's bend did to them is undone (CurvatureBias): what the
+  // fit was made to, pixels.
+  std::vector<Eigen::Vector2d> contour;
   double sigma_px = 0.0;      // Standard deviation of a point about the ellipse.
   double coverage_deg = 0.0;  // Share of the contour that has edge points, times 360.
   double turn_deg = 0.0;      // Angle through which the contour turns over that share.

@@ -149,8 +149,7 @@ class PointFinder {
     const float length = std::sqrt(s[0]);
     point->x = static_cast<float>(x) + (horizontal ? static_cast<float>(offset) : 0.0f);
     point->y = static_cast<float>(y) + (horizontal ? 0.0f : static_cast<float>(offset));
-    point->nx = gx / length;
-    point->ny = gy / length;
+    SetNormal(x, y, horizontal, static_cast<float>(offset), point);
     point->gradient = length;
     // Across the edge rather than along the axis.
     const double cosine = static_cast<double>(std::max(std::abs(gx), std::abs(gy)) / length);
@@ -159,6 +158,19 @@ class PointFinder {
     point->sigma_px = static_cast<float>(
         std::max(kMinSigmaPx, slope_noise_ * variance / static_cast<double>(length)));
     return true;
+  }
+
+  // The direction of the gradient at the point, between the pixel and its neighbour.
+  void SetNormal(int x, int y, bool horizontal, float offset, EdgePoint* point) const {
+    const int side = offset < 0.0f ? -1 : 1;
+    const int x1 = horizontal ? x + side : x, y1 = horizontal ? y : y + side;
+    const float t = std::abs(offset);
+    const float gx = (1.0f - t) * gradient_.x.at<float>(y, x) + t * gradient_.x.at<float>(y1, x1);
+    const float gy = (1.0f - t) * gradient_.y.at<float>(y, x) + t * gradient_.y.at<float>(y1, x1);
+    const float length = std::sqrt(gx * gx + gy * gy);
+    if (!(length > 0.0f)) return;
+    point->nx = gx / length;
+    point->ny = gy / length;
   }
 
   const Gradient& gradient_;
@@ -309,6 +321,14 @@ Status ToGray(const cv::Mat& image, cv::Mat* gray) {
       return Status::Invalid("the image must have 1, 3 or 4 channels, not " +
                              std::to_string(image.channels()));
   }
+}
+
+double CurvatureBias(const EdgePoint& point, double blur_px, double curvature) {
+  const double cosine = static_cast<double>(std::max(std::abs(point.nx), std::abs(point.ny)));
+  const double along = static_cast<double>(std::abs(point.nx) >= std::abs(point.ny) ? point.x : point.y);
+  const double offset = along - std::round(along);
+  return 0.5 * curvature *
+         (blur_px * blur_px + (1.0 - cosine * cosine) * (1.0 - 3.0 * offset * offset));
 }
 
 Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edges) {
