@@ -206,7 +206,6 @@ bool InnerSide(const Arc& arc, const Vector2d& p, double slack) {
 }
 
 bool OnInnerSides(const Arc& a, const Arc& b) {
-  if (a.bright_inside != b.bright_inside) return false;
   constexpr double kSlackPx = 2.0;
   return InnerSide(a, b.first, kSlackPx) && InnerSide(a, b.middle, kSlackPx) &&
          InnerSide(a, b.last, kSlackPx) && InnerSide(b, a.first, kSlackPx) &&

@@ -59,7 +59,7 @@ bool Contour::SampleCount(int n, std::vector<ContourSample>* samples) const {
   for (int k = 0; k < n; ++k) {
     const Vector2d x = ellipse_.center + anomaly.x() * major + anomaly.y() * minor;
     Vector2d* pixel = &(*samples)[static_cast<std::size_t>(k)].pixel;
-    if (!CameraToPixel(camera_, Vector3d(x.x(), x.y(), 1.0), pixel)) return false;
+    if (!ToPixel(x, pixel)) return false;
     // Beyond what Round() takes: no part of a photo.
     if (!(pixel->cwiseAbs().maxCoeff() < kFarPx)) *pixel = Vector2d(-kFarPx, -kFarPx);
     anomaly = Vector2d(step_c * anomaly.x() - step_s * anomaly.y(),
@@ -85,27 +85,43 @@ bool Contour::SampleCount(int n, std::vector<ContourSample>* samples) const {
   return true;
 }
 
+// A pinhole's projection is spelt out: sampling contours is what the detection of ellipses does
+// most.
+bool Contour::ToPixel(const Vector2d& x, Vector2d* pixel) const {
+  if (camera_.model != CameraModel::kPinhole) {
+    return CameraToPixel(camera_, Vector3d(x.x(), x.y(), 1.0), pixel);
+  }
+  *pixel = Vector2d(camera_.fx * x.x() + camera_.cx, camera_.fy * x.y() + camera_.cy);
+  return true;
+}
+
 bool Contour::PixelAt(double t, Vector2d* pixel) const {
   const Vector2d x = EllipsePoint(ellipse_, t);
-  return CameraToPixel(camera_, Vector3d(x.x(), x.y(), 1.0), pixel);
+  return ToPixel(x, pixel);
 }
 
 void Supporter::Take(const std::vector<int>& points) {
   for (const int i : points) taken_[static_cast<std::size_t>(i)] = 1;
 }
 
-double Supporter::QuickShare(const std::vector<ContourSample>& samples, bool bright_inside,
-                             double reach) const {
-  int found = 0;
-  for (const ContourSample& s : samples) found += Nearest(s, bright_inside, reach) >= 0 ? 1 : 0;
-  return static_cast<double>(found) / static_cast<double>(samples.size());
+std::array<double, 3> Supporter::QuickShares(const std::vector<ContourSample>& samples,
+                                             double reach) const {
+  std::array<int, 3> found{};
+  for (const ContourSample& s : samples) {
+    const auto [outside, inside] = SidesAt(s, reach);
+    found[0] += outside ? 1 : 0;
+    found[1] += inside ? 1 : 0;
+    found[2] += outside || inside ? 1 : 0;
+  }
+  const double n = static_cast<double>(samples.size());
+  return {found[0] / n, found[1] / n, found[2] / n};
 }
 
-void Supporter::Collect(const std::vector<ContourSample>& samples, bool bright_inside, double reach,
+void Supporter::Collect(const std::vector<ContourSample>& samples, BrightSide bright, double reach,
                         Support* support) {
   const std::size_t n = samples.size();
   nearest_.resize(n);
-  for (std::size_t k = 0; k < n; ++k) nearest_[k] = Nearest(samples[k], bright_inside, reach);
+  for (std::size_t k = 0; k < n; ++k) nearest_[k] = Nearest(samples[k], bright, reach);
   FindRuns(samples);
   *support = Support();
   int last = -1;
@@ -126,6 +142,21 @@ void Supporter::Collect(const std::vector<ContourSample>& samples, bool bright_i
   AverageStrength(support);
 }
 
+// Whether there are free edge points near a sample with the bright side outside, and inside.
+std::pair<bool, bool> Supporter::SidesAt(const ContourSample& s, double reach) const {
+  const int steps = static_cast<int>(reach + 0.5);
+  std::pair<bool, bool> found(false, false);
+  for (int step = -steps; step <= steps; ++step) {
+    const int i = map_.PointAt(Round(s.pixel.x() + step * s.normal.x()),
+                               Round(s.pixel.y() + step * s.normal.y()));
+    if (i < 0 || taken_[static_cast<std::size_t>(i)]) continue;
+    const double cosine = s.normal.dot(map_.points[static_cast<std::size_t>(i)].Normal());
+    found.first = found.first || cosine > kMinNormalCosine;
+    found.second = found.second || cosine < -kMinNormalCosine;
+  }
+  return found;
+}
+
 // Angle between the gradient at an edge point and the contour's normal beside it, which has turned
 // since the sample by curvature times distance.
 double Supporter::NormalMiss(const ContourSample& s, const EdgePoint& p) {
@@ -137,8 +168,7 @@ double Supporter::NormalMiss(const ContourSample& s, const EdgePoint& p) {
 }
 
 // The free edge point nearest to the contour at a sample, with the right direction, or -1.
-int Supporter::Nearest(const ContourSample& s, bool bright_inside, double reach) const {
-  const double side = bright_inside ? -1.0 : 1.0;  // The gradient points inward or outward.
+int Supporter::Nearest(const ContourSample& s, BrightSide bright, double reach) const {
   const int steps = static_cast<int>(std::ceil(reach));
   int best = -1;
   double best_distance = reach;
@@ -148,7 +178,9 @@ int Supporter::Nearest(const ContourSample& s, bool bright_inside, double reach)
     const int i = map_.PointAt(x, y);
     if (i < 0 || taken_[static_cast<std::size_t>(i)]) continue;
     const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
-    if (side * s.normal.dot(p.Normal()) < kMinNormalCosine) continue;
+    const double cosine = s.normal.dot(p.Normal());  // 1: bright outside, -1: inside.
+    if (std::abs(cosine) < kMinNormalCosine) continue;
+    if (bright != BrightSide::kEither && (cosine < 0.0) != (bright == BrightSide::kInside)) continue;
     const double d = std::abs(s.normal.dot(p.Position() - s.pixel));
     if (d < best_distance) {
       best_distance = d;

@@ -3,7 +3,9 @@
 #define CIRCLINE_RANSAC_CONTOUR_SUPPORT_H_
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "circline/estimators/camera.h"
@@ -38,11 +40,16 @@ class Contour {
 
  private:
   bool PixelAt(double t, Eigen::Vector2d* pixel) const;
+  bool ToPixel(const Eigen::Vector2d& x, Eigen::Vector2d* pixel) const;
 
   const Camera& camera_;
   Ellipse ellipse_;
   double major_px_ = 0.0, minor_px_ = 0.0;
 };
+
+// Where a contour borders on what is brighter: a disc on a plain ground has one side all around, one
+// before a busy ground has either.
+enum class BrightSide { kOutside, kInside, kEither };
 
 struct Support {
   std::vector<int> points;  // Of the edge map, once around.
@@ -67,18 +74,18 @@ class Supporter {
   void Take(const std::vector<int>& points);
   bool IsTaken(int i) const { return taken_[static_cast<std::size_t>(i)] != 0; }
 
-  // Share of samples with a free edge point within `reach` pixels whose gradient is across the
-  // contour, inward where it is bright inside.
-  double QuickShare(const std::vector<ContourSample>& samples, bool bright_inside,
-                    double reach) const;
+  // Shares of samples with a free edge point within `reach` pixels whose gradient is across the
+  // contour, by the bright side (index: BrightSide).
+  std::array<double, 3> QuickShares(const std::vector<ContourSample>& samples, double reach) const;
 
-  // Those points, as far as they come in runs.
-  void Collect(const std::vector<ContourSample>& samples, bool bright_inside, double reach,
+  // The points nearest to the contour with the right bright side, as far as they come in runs.
+  void Collect(const std::vector<ContourSample>& samples, BrightSide bright, double reach,
                Support* support);
 
  private:
   static double NormalMiss(const ContourSample& s, const EdgePoint& p);
-  int Nearest(const ContourSample& s, bool bright_inside, double reach) const;
+  std::pair<bool, bool> SidesAt(const ContourSample& s, double reach) const;
+  int Nearest(const ContourSample& s, BrightSide bright, double reach) const;
   void FindRuns(const std::vector<ContourSample>& samples);
   std::size_t BehindHole(const std::vector<ContourSample>& samples) const;
   void AverageStrength(Support* support) const;

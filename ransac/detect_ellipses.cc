@@ -27,16 +27,29 @@ constexpr std::size_t kMaxPairCandidates = 1500;
 constexpr int kFitPoints = 24;
 // An arc fits its candidate when the root-mean-square distance stays below this, pixels.
 constexpr double kMaxArcRmsPx = 1.0;
-// ... and on this share of its points the gradient is within 15 degrees of the contour's normal.
-constexpr double kArcNormalCosine = 0.966;
+// ... and on this share of its points the gradient is within 15 degrees, plus two standard
+// deviations of its noise, of the contour's normal. (A sine.)
+constexpr double kArcNormalSine = 0.26;
+constexpr double kArcNormalSigmas = 2.0;
 constexpr double kArcAgreement = 0.85;
+// Parts of an arc that are tried where the whole is no ellipse, in sixths.
+constexpr std::array<std::array<int, 2>, 5> kArcParts = {{{0, 5}, {1, 6}, {0, 3}, {3, 6}, {1, 5}}};
 // Edge points support a contour within this distance, pixels: at first, and after refits.
 constexpr std::array<double, 3> kGatherPx = {2.5, 2.0, 1.5};
+// Points farther off than this many standard deviations (at least so many pixels each) are left out
+// of a candidate's refit.
+constexpr double kTrimSigmas = 2.5;
+constexpr double kTrimMinSigmaPx = 0.1;
 // A first look at this many samples drops candidates with less than this share of support.
 constexpr int kQuickSamples = 40;
 constexpr double kQuickShare = 0.2;
+// The other bright side is looked at too if it adds this share.
+constexpr double kOtherSideShare = 0.15;
 // Before the first refit, this share of the smallest arc must be there.
 constexpr double kEarlyShare = 0.7;
+// ... and gradients this near to the contour's normals, degrees: of accidental ones within the 25
+// that count as support the median is 12.
+constexpr double kEarlyNormalDeg = 10.0;
 // Share of random contour samples that find an edge point in place and direction by accident, in a
 // busy photo: edge points on a tenth of the pixels, 3 of them looked at, 50 of 360 degrees.
 constexpr double kChance = 0.08;
@@ -45,23 +58,23 @@ constexpr double kIndependentPx = 3.0;
 // Candidates that are tried, as the number of tests of the false-alarm count.
 constexpr double kLog10Tests = 6.0;
 // Blobs and rounded rectangles resemble ellipses; what tells them apart is how closely edge points
-// keep to the contour and gradients to its normal. The two are measured in units of these limits
-// and must not exceed kShapeLimit each, nor 2 together. (Values chosen on renderings and
-// photographs.)
+// keep to the contour and gradients to its normal. Each is measured in units of what a true rim
+// shows: its own imperfection, and in quadrature what the noise explains. Neither may exceed
+// kShapeLimit, nor both together 2.
 //
-// Root-mean-square distance, pixels: a constant, plus a share of what the noise explains (up to a
-// limit), plus an allowance for long contours, which no blob follows so closely, but real rims do
-// not follow exactly either; all of it less for a partial contour, more for a full one.
-constexpr double kShapeRmsPx = 0.15;
-constexpr double kShapeRmsPerSigma = 0.3;
+// Root-mean-square distance, pixels. Prints, lenses and JPEG leave 0.05 to 0.15 px on photographed
+// rims; long rims follow an ellipse less exactly (no blob follows one so far); and a short arc has
+// less to keep to than a full contour.
+constexpr double kShapeRmsPx = 0.17;
 constexpr double kShapeMaxSigmaPx = 0.5;
 constexpr double kShapeRmsPerPx = 5e-4;
 constexpr double kShapeRmsPerCoverage = 0.8;
 constexpr double kShapeUsualCoverage = 0.7;
-// Median angle between gradient and normal, degrees: a constant, plus a share of the noise's, plus
-// an allowance for long contours.
+// Median angle between gradient and normal, degrees. Photographed rims leave 0.5 to 3 (the latter
+// at 4 px radius). Of Gaussian noise the median is 0.67 sigma; what is added accounts for the
+// points whose gradient is weaker than the average.
 constexpr double kShapeNormalDeg = 3.0;
-constexpr double kShapeNormalPerNoise = 0.5;
+constexpr double kShapeNormalPerNoise = 1.0;
 constexpr double kShapeNormalPerPx = 2e-3;
 constexpr double kShapeLimit = 1.4;
 // While a candidate is still being refined, it may miss the limits by this factor.
@@ -139,7 +152,7 @@ double Log10BinomialTail(double n, double k, double p) {
 
 struct Candidate {
   Matrix3d conic = Matrix3d::Zero();
-  bool bright_inside = false;
+  BrightSide bright = BrightSide::kOutside;
   double score = 0.0;
 };
 
@@ -159,7 +172,9 @@ class EllipseDetector {
     // again. (By index: arcs are split, and the parts appended, as they are looked at.)
     for (std::size_t k = 0; k < arcs_.size(); ++k) {
       const Arc arc = arcs_[k];
-      if (arc.turn >= kMinSingleTurn && !AddCandidate({&arc})) Split(k);
+      if (arc.turn < kMinSingleTurn || AddCandidate({&arc})) continue;
+      AddPart(arc);
+      Split(k);
     }
     AcceptBest(kSureCoverage);
     AddPairs();
@@ -176,11 +191,58 @@ class EllipseDetector {
     fit_indices_.clear();
     for (const Arc* arc : arcs) AppendPoints(*arc);
     Candidate candidate;
-    candidate.bright_inside = (*arcs.begin())->bright_inside;
-    if (!FitConicDirect(fit_points_, &candidate.conic).ok()) return false;
+    candidate.bright = SideOf(arcs);
+    if (!FitTrimmed(&candidate.conic)) return false;
     if (Rms(candidate.conic) > kMaxArcRmsPx || !GradientsAgree(candidate)) return false;
-    if (Improve(&candidate)) candidates_.push_back(candidate);
+    Consider(candidate);
     return true;
+  }
+
+  // Keeps a candidate that edges elsewhere support too.
+  void Consider(const Candidate& rough) {
+    std::array<double, 3> shares;
+    if (!QuickLook(rough.conic, &shares)) return;
+    Candidate candidate = rough;
+    const double own = shares[static_cast<std::size_t>(rough.bright)];
+    if (own >= kQuickShare && Improve(&candidate)) {
+      candidates_.push_back(candidate);
+      return;
+    }
+    // Before a busy ground the bright side changes along the contour.
+    const double either = shares[static_cast<std::size_t>(BrightSide::kEither)];
+    if (either < std::max(2.0 * kQuickShare, own + kOtherSideShare)) return;
+    candidate = rough;
+    candidate.bright = BrightSide::kEither;
+    if (Improve(&candidate)) candidates_.push_back(candidate);
+  }
+
+  bool QuickLook(const Matrix3d& conic, std::array<double, 3>* shares) {
+    if (!contour_.Project(conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
+    if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
+    *shares = supporter_.QuickShares(samples_, kGatherPx[0]);
+    return true;
+  }
+
+  // An arc may be an ellipse's but for a stretch where something else touches the contour: the
+  // first of its parts that is one's makes a candidate.
+  void AddPart(const Arc& arc) {
+    const int n = arc.size();
+    for (const auto& [from, to] : kArcParts) {
+      Arc part = arc;
+      part.begin = arc.begin + n * from / 6;
+      part.end = arc.begin + n * to / 6;
+      part.turn = arc.turn * (to - from) / 6.0;
+      if (part.turn < kMinSingleTurn || part.size() < 6) continue;
+      if (AddCandidate({&part})) return;
+    }
+  }
+
+  static BrightSide SideOf(std::initializer_list<const Arc*> arcs) {
+    const bool inside = (*arcs.begin())->bright_inside;
+    for (const Arc* arc : arcs) {
+      if (arc->bright_inside != inside) return BrightSide::kEither;
+    }
+    return inside ? BrightSide::kInside : BrightSide::kOutside;
   }
 
   // Replaces an arc that is no ellipse's by its parts on either side of its sharpest point.
@@ -202,17 +264,42 @@ class EllipseDetector {
     }
   }
 
+  // Direct fit to the points at hand, and once more without those that stand out: the ends of an
+  // arc often follow a neighbour's edge, and a few such points spoil a least-squares fit.
+  bool FitTrimmed(Matrix3d* conic) {
+    if (!FitConicDirect(fit_points_, conic).ok()) return false;
+    distances_.clear();
+    for (const CalibratedPoint& p : fit_points_) {
+      distances_.push_back(std::abs(ConicDistancePx(p, *conic)));
+    }
+    sorted_ = distances_;
+    const double limit = kTrimSigmas * std::max(kTrimMinSigmaPx, 1.4826 * Median(&sorted_));
+    trimmed_.clear();
+    for (std::size_t k = 0; k < fit_points_.size(); ++k) {
+      if (distances_[k] <= limit) trimmed_.push_back(fit_points_[k]);
+    }
+    if (trimmed_.size() == fit_points_.size() || trimmed_.size() < 6) return true;
+    Matrix3d better;
+    if (FitConicDirect(trimmed_, &better).ok()) *conic = better;
+    return true;
+  }
+
   // Whether the gradients on the arcs are across the contour that was fitted to their places: a
   // second opinion that costs little and is independent of the first.
   bool GradientsAgree(const Candidate& candidate) const {
-    const double side = candidate.bright_inside ? -1.0 : 1.0;
+    const double side = candidate.bright == BrightSide::kInside ? -1.0 : 1.0;
+    const bool either = candidate.bright == BrightSide::kEither;
     std::size_t agree = 0;
     for (std::size_t k = 0; k < fit_points_.size(); ++k) {
       const CalibratedPoint& p = fit_points_[k];
       const Vector3d g = candidate.conic * p.Homogeneous();
       const Vector2d outward = p.GradientPerPixel(g.head<2>());
       const EdgePoint& edge = map_.points[static_cast<std::size_t>(fit_indices_[k])];
-      agree += side * outward.dot(edge.Normal()) > kArcNormalCosine * outward.norm() ? 1U : 0U;
+      const double cosine = outward.normalized().dot(edge.Normal());
+      const double noise = kArcNormalSigmas * map_.gradient_noise / static_cast<double>(edge.gradient);
+      const double sine_squared = kArcNormalSine * kArcNormalSine + noise * noise;
+      if (!either && side * cosine < 0.0) continue;
+      agree += 1.0 - cosine * cosine < sine_squared ? 1U : 0U;
     }
     return static_cast<double>(agree) >= kArcAgreement * static_cast<double>(fit_points_.size());
   }
@@ -228,33 +315,31 @@ class EllipseDetector {
 
   // Refits a candidate to the points along its contour; false if there are too few.
   bool Improve(Candidate* candidate) {
-    if (!contour_.Project(candidate->conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
-    if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
-    if (supporter_.QuickShare(samples_, candidate->bright_inside, kGatherPx[0]) < kQuickShare) {
-      return false;
-    }
     for (std::size_t round = 0; round + 1 < kGatherPx.size(); ++round) {
       if (!Gather(*candidate, 1.5, kGatherPx[round])) return false;
       if (360.0 * support_.Coverage() < kEarlyShare * options_.min_arc_deg) return false;
+      if (ToDegrees(support_.normal_median) > kEarlyNormalDeg) return false;
       CalibrateSupport(80);
-      if (!FitConicDirect(fit_points_, &candidate->conic).ok()) return false;
+      if (!FitTrimmed(&candidate->conic)) return false;
     }
     if (!Gather(*candidate, 1.5, kGatherPx.back())) return false;
     candidate->score = support_.length_px * support_.Coverage();
+    // One side all around explains more than either side does.
+    if (candidate->bright == BrightSide::kEither) candidate->score *= 0.5;
     CalibrateSupport(80);
-    return Plausible() && IsShaped(Rms(candidate->conic), kShapeSlack);
+    return Plausible(candidate->bright) && IsShaped(Rms(candidate->conic), kShapeSlack);
   }
 
   // Whether the edges follow the contour as those of an ellipse do.
   bool IsShaped(double rms_px, double slack) const {
     const double coverage = std::min(support_.Coverage(), support_.turn / (2.0 * kPi));
     const double rms_unit =
-        (kShapeRmsPx + kShapeRmsPerSigma * std::min(support_.sigma_px, kShapeMaxSigmaPx) +
-         kShapeRmsPerPx * support_.length_px) *
+        std::hypot(kShapeRmsPx + kShapeRmsPerPx * support_.length_px,
+                   std::min(support_.sigma_px, kShapeMaxSigmaPx)) *
         (1.0 + kShapeRmsPerCoverage * (coverage - kShapeUsualCoverage));
     const double noise_deg = ToDegrees(map_.gradient_noise / std::max(support_.gradient, 1e-9));
-    const double normal_unit =
-        kShapeNormalDeg + kShapeNormalPerNoise * noise_deg + kShapeNormalPerPx * support_.length_px;
+    const double normal_unit = std::hypot(
+        kShapeNormalDeg + kShapeNormalPerPx * support_.length_px, kShapeNormalPerNoise * noise_deg);
     const double rms = rms_px / rms_unit;
     const double normal = ToDegrees(support_.normal_median) / normal_unit;
     return rms_px <= slack * options_.max_rms_px && std::max(rms, normal) <= slack * kShapeLimit &&
@@ -264,7 +349,7 @@ class EllipseDetector {
   bool Gather(const Candidate& candidate, double spacing, double reach) {
     if (!contour_.Project(candidate.conic, 0.7 * options_.min_axis_px, max_axis_px_)) return false;
     if (!contour_.SampleEvery(spacing, &samples_)) return false;
-    supporter_.Collect(samples_, candidate.bright_inside, reach, &support_);
+    supporter_.Collect(samples_, candidate.bright, reach, &support_);
     return support_.points.size() >= 6;
   }
 
@@ -279,11 +364,12 @@ class EllipseDetector {
   }
 
   // Enough of the contour, and more than chance explains.
-  bool Plausible() const {
+  bool Plausible(BrightSide bright) const {
     if (support_.Coverage() * 360.0 < options_.min_arc_deg) return false;
     if (ToDegrees(support_.turn) < options_.min_arc_deg) return false;
     const double n = support_.perimeter_px / kIndependentPx;
-    return kLog10Tests + Log10BinomialTail(n, n * support_.Coverage(), kChance) <=
+    const double chance = bright == BrightSide::kEither ? 2.0 * kChance : kChance;
+    return kLog10Tests + Log10BinomialTail(n, n * support_.Coverage(), chance) <=
            options_.max_log10_false_alarms;
   }
 
@@ -321,7 +407,7 @@ class EllipseDetector {
     std::vector<Candidate> waiting;
     for (Candidate& candidate : candidates_) {
       // Points taken meanwhile no longer count.
-      if (!Gather(candidate, 1.5, kGatherPx.back()) || !Plausible()) continue;
+      if (!Gather(candidate, 1.5, kGatherPx.back()) || !Plausible(candidate.bright)) continue;
       if (support_.Coverage() < min_coverage) {
         waiting.push_back(candidate);
       } else {
@@ -334,7 +420,7 @@ class EllipseDetector {
   void Accept(Candidate candidate) {
     DetectedEllipse e;
     if (!FinalFit(&candidate, &e)) return;
-    e.bright_inside = candidate.bright_inside;
+    e.bright = candidate.bright;
     if (IsDuplicate(e)) return;
     supporter_.Take(support_.points);  // What the wider gathering finds belongs to it as well.
     supporter_.Take(e.points);
@@ -350,7 +436,7 @@ class EllipseDetector {
       candidate->conic = e->fit.conic;
       reach = std::clamp(4.0 * e->sigma_px, 0.8, kGatherPx.back());
     }
-    if (!Plausible() || !IsShaped(e->fit.rms_px, 1.0)) return false;
+    if (!Plausible(candidate->bright) || !IsShaped(e->fit.rms_px, 1.0)) return false;
     if (contour_.minor_px() < options_.min_axis_px) return false;
     e->coverage_deg = 360.0 * support_.Coverage();
     e->length_px = support_.length_px;
@@ -430,7 +516,10 @@ class EllipseDetector {
   // The same contour found again from other points.
   bool IsDuplicate(const DetectedEllipse& e) {
     for (const DetectedEllipse& other : accepted_) {
-      if (other.bright_inside != e.bright_inside) continue;
+      if (other.bright != e.bright && other.bright != BrightSide::kEither &&
+          e.bright != BrightSide::kEither) {
+        continue;
+      }
       double worst = 0.0;
       for (std::size_t k = 0; k < e.points.size(); k += 1 + e.points.size() / 16) {
         const CalibratedPoint& p = *calibrated_.Get(e.points[k]);
@@ -461,7 +550,7 @@ class EllipseDetector {
   std::vector<Candidate> candidates_;
   std::vector<DetectedEllipse> accepted_;
   // Scratch.
-  std::vector<CalibratedPoint> fit_points_;
+  std::vector<CalibratedPoint> fit_points_, trimmed_;
   std::vector<int> fit_indices_;
   std::vector<ContourSample> samples_;
   Support support_;

@@ -14,6 +14,7 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/status.h"
+#include "circline/ransac/contour_support.h"
 #include "circline/ransac/edges.h"
 
 namespace circline {
@@ -45,7 +46,7 @@ struct DetectedEllipse {
   double length_px = 0.0;     // Length of that share.
   double normal_deg = 0.0;    // Median angle between gradients and the contour's normal.
   double contrast = 0.0;      // Mean gradient there, grey levels per pixel.
-  bool bright_inside = false;
+  BrightSide bright = BrightSide::kOutside;
   int concentric =
       -1;  // Ellipses with the same number can be circles about one centre; -1 = alone.
 };
