@@ -42,10 +42,11 @@ bool Contour::Project(const Matrix3d& conic, double min_axis_px, double max_axis
   return minor_px_ >= min_axis_px && major_px_ <= max_axis_px;
 }
 
-bool Contour::SampleEvery(double spacing_px, std::vector<ContourSample>* samples) const {
+bool Contour::SampleEvery(double spacing_px, std::vector<ContourSample>* samples,
+                          int max_samples) const {
   const double h = (major_px_ - minor_px_) / (major_px_ + minor_px_);
   const double perimeter = kPi * (major_px_ + minor_px_) * (1.0 + 0.25 * h * h);  // Ramanujan, cut.
-  return SampleCount(std::clamp(static_cast<int>(perimeter / spacing_px), 16, 20000), samples);
+  return SampleCount(std::clamp(static_cast<int>(perimeter / spacing_px), 16, max_samples), samples);
 }
 
 bool Contour::SampleCount(int n, std::vector<ContourSample>* samples) const {
@@ -104,17 +105,28 @@ void Supporter::Take(const std::vector<int>& points) {
   for (const int i : points) taken_[static_cast<std::size_t>(i)] = 1;
 }
 
-std::array<double, 3> Supporter::QuickShares(const std::vector<ContourSample>& samples,
-                                             double reach) const {
-  std::array<int, 3> found{};
+QuickSupport Supporter::QuickLook(const std::vector<ContourSample>& samples, double reach) const {
+  const int steps = static_cast<int>(reach + 0.5);
+  std::array<int, 3> across{};
+  int any = 0;
   for (const ContourSample& s : samples) {
-    const auto [outside, inside] = SidesAt(s, reach);
-    found[0] += outside ? 1 : 0;
-    found[1] += inside ? 1 : 0;
-    found[2] += outside || inside ? 1 : 0;
+    bool outside = false, inside = false, found = false;
+    for (int step = -steps; step <= steps; ++step) {
+      const int i = map_.PointAt(Round(s.pixel.x() + step * s.normal.x()),
+                                 Round(s.pixel.y() + step * s.normal.y()));
+      if (i < 0 || taken_[static_cast<std::size_t>(i)]) continue;
+      const double cosine = s.normal.dot(map_.points[static_cast<std::size_t>(i)].Normal());
+      found = true;
+      outside = outside || cosine > kMinNormalCosine;
+      inside = inside || cosine < -kMinNormalCosine;
+    }
+    across[0] += outside ? 1 : 0;
+    across[1] += inside ? 1 : 0;
+    across[2] += outside || inside ? 1 : 0;
+    any += found ? 1 : 0;
   }
   const double n = static_cast<double>(samples.size());
-  return {found[0] / n, found[1] / n, found[2] / n};
+  return {{across[0] / n, across[1] / n, across[2] / n}, any / n};
 }
 
 void Supporter::Collect(const std::vector<ContourSample>& samples, BrightSide bright, double reach,
@@ -140,21 +152,6 @@ void Supporter::Collect(const std::vector<ContourSample>& samples, BrightSide br
   support->normal_median = Median(&sines_);
   Unique(&support->points);
   AverageStrength(support);
-}
-
-// Whether there are free edge points near a sample with the bright side outside, and inside.
-std::pair<bool, bool> Supporter::SidesAt(const ContourSample& s, double reach) const {
-  const int steps = static_cast<int>(reach + 0.5);
-  std::pair<bool, bool> found(false, false);
-  for (int step = -steps; step <= steps; ++step) {
-    const int i = map_.PointAt(Round(s.pixel.x() + step * s.normal.x()),
-                               Round(s.pixel.y() + step * s.normal.y()));
-    if (i < 0 || taken_[static_cast<std::size_t>(i)]) continue;
-    const double cosine = s.normal.dot(map_.points[static_cast<std::size_t>(i)].Normal());
-    found.first = found.first || cosine > kMinNormalCosine;
-    found.second = found.second || cosine < -kMinNormalCosine;
-  }
-  return found;
 }
 
 // Angle between the gradient at an edge point and the contour's normal beside it, which has turned

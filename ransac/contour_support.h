@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "circline/estimators/camera.h"
@@ -32,7 +31,8 @@ class Contour {
 
   // The following require Project. False where parts of the contour cannot be projected. Samples
   // are evenly spaced in the eccentric anomaly.
-  bool SampleEvery(double spacing_px, std::vector<ContourSample>* samples) const;
+  bool SampleEvery(double spacing_px, std::vector<ContourSample>* samples,
+                   int max_samples = 20000) const;
   bool SampleCount(int n, std::vector<ContourSample>* samples) const;
 
   double major_px() const { return major_px_; }  // Semi-axes on the photo, approximate.
@@ -64,6 +64,12 @@ struct Support {
   double Coverage() const { return perimeter_px > 0.0 ? length_px / perimeter_px : 0.0; }
 };
 
+// Shares of a contour's samples near which there are edge points.
+struct QuickSupport {
+  std::array<double, 3> across{};  // With the gradient across the contour, by BrightSide.
+  double any = 0.0;                // Whatever their gradient.
+};
+
 // Finds the edge points along a sampled contour, and keeps book of which are already taken.
 class Supporter {
  public:
@@ -74,9 +80,8 @@ class Supporter {
   void Take(const std::vector<int>& points);
   bool IsTaken(int i) const { return taken_[static_cast<std::size_t>(i)] != 0; }
 
-  // Shares of samples with a free edge point within `reach` pixels whose gradient is across the
-  // contour, by the bright side (index: BrightSide).
-  std::array<double, 3> QuickShares(const std::vector<ContourSample>& samples, double reach) const;
+  // A first look with few samples.
+  QuickSupport QuickLook(const std::vector<ContourSample>& samples, double reach) const;
 
   // The points nearest to the contour with the right bright side, as far as they come in runs.
   void Collect(const std::vector<ContourSample>& samples, BrightSide bright, double reach,
@@ -84,7 +89,6 @@ class Supporter {
 
  private:
   static double NormalMiss(const ContourSample& s, const EdgePoint& p);
-  std::pair<bool, bool> SidesAt(const ContourSample& s, double reach) const;
   int Nearest(const ContourSample& s, BrightSide bright, double reach) const;
   void FindRuns(const std::vector<ContourSample>& samples);
   std::size_t BehindHole(const std::vector<ContourSample>& samples) const;

@@ -33,7 +33,8 @@ constexpr double kArcNormalSine = 0.26;
 constexpr double kArcNormalSigmas = 2.0;
 constexpr double kArcAgreement = 0.85;
 // Parts of an arc that are tried where the whole is no ellipse, in sixths.
-constexpr std::array<std::array<int, 2>, 5> kArcParts = {{{0, 5}, {1, 6}, {0, 3}, {3, 6}, {1, 5}}};
+constexpr std::array<std::array<int, 2>, 4> kArcParts = {{{0, 5}, {1, 6}, {0, 3}, {3, 6}}};
+constexpr int kMinPartPoints = 12;
 // Edge points support a contour within this distance, pixels: at first, and after refits.
 constexpr std::array<double, 3> kGatherPx = {2.5, 2.0, 1.5};
 // Points farther off than this many standard deviations (at least so many pixels each) are left out
@@ -42,7 +43,12 @@ constexpr double kTrimSigmas = 2.5;
 constexpr double kTrimMinSigmaPx = 0.1;
 // A first look at this many samples drops candidates with less than this share of support.
 constexpr int kQuickSamples = 40;
-constexpr double kQuickShare = 0.2;
+constexpr double kQuickShare = 0.25;
+// ... or where so few of the samples near edges have them across the contour: on clutter 50 to 100
+// of 360 degrees pass for across.
+constexpr double kQuickAcross = 0.4;
+// Samples of a contour, at most, while a candidate is being improved.
+constexpr int kRoughSamples = 120;
 // The other bright side is looked at too if it adds this share.
 constexpr double kOtherSideShare = 0.15;
 // Before the first refit, this share of the smallest arc must be there.
@@ -192,7 +198,7 @@ class EllipseDetector {
     for (const Arc* arc : arcs) AppendPoints(*arc);
     Candidate candidate;
     candidate.bright = SideOf(arcs);
-    if (!FitTrimmed(&candidate.conic)) return false;
+    if (!FitConicDirect(fit_points_, &candidate.conic).ok()) return false;
     if (Rms(candidate.conic) > kMaxArcRmsPx || !GradientsAgree(candidate)) return false;
     Consider(candidate);
     return true;
@@ -200,27 +206,22 @@ class EllipseDetector {
 
   // Keeps a candidate that edges elsewhere support too.
   void Consider(const Candidate& rough) {
-    std::array<double, 3> shares;
-    if (!QuickLook(rough.conic, &shares)) return;
+    if (!contour_.Project(rough.conic, 0.5 * options_.min_axis_px, max_axis_px_)) return;
+    if (!contour_.SampleCount(kQuickSamples, &samples_)) return;
+    const QuickSupport look = supporter_.QuickLook(samples_, kGatherPx[0]);
+    const double own = look.across[static_cast<std::size_t>(rough.bright)];
     Candidate candidate = rough;
-    const double own = shares[static_cast<std::size_t>(rough.bright)];
-    if (own >= kQuickShare && Improve(&candidate)) {
+    if (own >= std::max(kQuickShare, kQuickAcross * look.any) && Improve(&candidate)) {
       candidates_.push_back(candidate);
       return;
     }
     // Before a busy ground the bright side changes along the contour.
-    const double either = shares[static_cast<std::size_t>(BrightSide::kEither)];
-    if (either < std::max(2.0 * kQuickShare, own + kOtherSideShare)) return;
+    const double either = look.across[static_cast<std::size_t>(BrightSide::kEither)];
+    if (either < std::max(kQuickShare, own) + kOtherSideShare) return;
+    if (either < 2.0 * kQuickAcross * look.any) return;
     candidate = rough;
     candidate.bright = BrightSide::kEither;
     if (Improve(&candidate)) candidates_.push_back(candidate);
-  }
-
-  bool QuickLook(const Matrix3d& conic, std::array<double, 3>* shares) {
-    if (!contour_.Project(conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
-    if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
-    *shares = supporter_.QuickShares(samples_, kGatherPx[0]);
-    return true;
   }
 
   // An arc may be an ellipse's but for a stretch where something else touches the contour: the
@@ -232,7 +233,7 @@ class EllipseDetector {
       part.begin = arc.begin + n * from / 6;
       part.end = arc.begin + n * to / 6;
       part.turn = arc.turn * (to - from) / 6.0;
-      if (part.turn < kMinSingleTurn || part.size() < 6) continue;
+      if (part.turn < kMinSingleTurn || part.size() < kMinPartPoints) continue;
       if (AddCandidate({&part})) return;
     }
   }
@@ -304,29 +305,30 @@ class EllipseDetector {
     return static_cast<double>(agree) >= kArcAgreement * static_cast<double>(fit_points_.size());
   }
 
-  double Rms(const Matrix3d& conic) const {
+  double Rms(const Matrix3d& conic) const { return Rms(fit_points_, conic); }
+  static double Rms(const std::vector<CalibratedPoint>& points, const Matrix3d& conic) {
     double sum = 0.0;
-    for (const CalibratedPoint& p : fit_points_) {
+    for (const CalibratedPoint& p : points) {
       const double d = ConicDistancePx(p, conic);
       sum += d * d;
     }
-    return std::sqrt(sum / static_cast<double>(fit_points_.size()));
+    return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(points.size(), 1)));
   }
 
   // Refits a candidate to the points along its contour; false if there are too few.
   bool Improve(Candidate* candidate) {
     for (std::size_t round = 0; round + 1 < kGatherPx.size(); ++round) {
-      if (!Gather(*candidate, 1.5, kGatherPx[round])) return false;
+      if (!Gather(*candidate, 1.5, kGatherPx[round], kRoughSamples)) return false;
       if (360.0 * support_.Coverage() < kEarlyShare * options_.min_arc_deg) return false;
       if (ToDegrees(support_.normal_median) > kEarlyNormalDeg) return false;
-      CalibrateSupport(80);
+      CalibrateSupport(kRoughSamples);
       if (!FitTrimmed(&candidate->conic)) return false;
     }
-    if (!Gather(*candidate, 1.5, kGatherPx.back())) return false;
+    if (!Gather(*candidate, 1.5, kGatherPx.back(), 2 * kRoughSamples)) return false;
     candidate->score = support_.length_px * support_.Coverage();
     // One side all around explains more than either side does.
     if (candidate->bright == BrightSide::kEither) candidate->score *= 0.5;
-    CalibrateSupport(80);
+    CalibrateSupport(kRoughSamples);
     return Plausible(candidate->bright) && IsShaped(Rms(candidate->conic), kShapeSlack);
   }
 
@@ -346,9 +348,9 @@ class EllipseDetector {
            rms + normal <= 2.0 * slack;
   }
 
-  bool Gather(const Candidate& candidate, double spacing, double reach) {
+  bool Gather(const Candidate& candidate, double spacing, double reach, int max_samples = 20000) {
     if (!contour_.Project(candidate.conic, 0.7 * options_.min_axis_px, max_axis_px_)) return false;
-    if (!contour_.SampleEvery(spacing, &samples_)) return false;
+    if (!contour_.SampleEvery(spacing, &samples_, max_samples)) return false;
     supporter_.Collect(samples_, candidate.bright, reach, &support_);
     return support_.points.size() >= 6;
   }
@@ -427,15 +429,16 @@ class EllipseDetector {
     accepted_.push_back(std::move(e));
   }
 
-  // Maximum likelihood on all points of the contour, outliers left out, twice.
+  // Maximum likelihood on all points of the contour, outliers left out; from a direct fit to all
+  // points, which brings the contour near enough for the nearest points to be its own.
   bool FinalFit(Candidate* candidate, DetectedEllipse* e) {
-    double reach = kGatherPx.back();
-    for (int round = 0; round < 3; ++round) {
-      if (!Gather(*candidate, 0.7, reach)) return false;
-      if (!FitSupport(candidate->conic, e)) return false;
-      candidate->conic = e->fit.conic;
-      reach = std::clamp(4.0 * e->sigma_px, 0.8, kGatherPx.back());
-    }
+    if (!Gather(*candidate, 0.7, kGatherPx.back())) return false;
+    Straighten(candidate->conic, e);
+    if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic)) return false;
+    const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
+    if (!Gather(*candidate, 0.7, reach)) return false;
+    if (!FitSupport(candidate->conic, e)) return false;
+    candidate->conic = e->fit.conic;
     if (!Plausible(candidate->bright) || !IsShaped(e->fit.rms_px, 1.0)) return false;
     if (contour_.minor_px() < options_.min_axis_px) return false;
     e->coverage_deg = 360.0 * support_.Coverage();

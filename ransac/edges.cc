@@ -13,7 +13,7 @@ namespace {
 constexpr float kMinNeighbourCosine = 0.64f;
 // A neighbour lies along the edge rather than beside it: its offset across the edge, pixels.
 constexpr float kMaxNeighbourOffset = 1.0f;
-// Neighbours are looked for in a window of this radius: 2 bridges one missing pixel.
+// Neighbours are looked for in a window of radius 1, then of this: 2 bridges one missing pixel.
 constexpr int kLinkRadius = 2;
 // Rounding to grey levels is noise too: 1 / sqrt(12) of a level.
 constexpr double kRoundingNoise = 0.29;
@@ -183,18 +183,17 @@ struct Links {
   std::vector<std::int32_t> next, previous;
 };
 
-// The nearest point ahead of `i`, walking with the brighter side on the left, or -1.
-std::int32_t NearestAhead(const EdgeMap& map, std::int32_t i, float* distance) {
+// The nearest point ahead of `i` in the window of `radius`, walking with the brighter side on the
+// left, or -1.
+std::int32_t NearestAhead(const EdgeMap& map, std::int32_t i, int radius, float* distance) {
   const EdgePoint& p = map.points[static_cast<std::size_t>(i)];
   const float tx = -p.ny, ty = p.nx;
-  const int px = static_cast<int>(std::lround(p.x)), py = static_cast<int>(std::lround(p.y));
+  const int px = static_cast<int>(p.x + 0.5f), py = static_cast<int>(p.y + 0.5f);
   std::int32_t best = -1;
   float best_distance = 1e9f;
-  for (int y = std::max(py - kLinkRadius, 0); y <= std::min(py + kLinkRadius, map.height - 1);
-       ++y) {
+  for (int y = std::max(py - radius, 0); y <= std::min(py + radius, map.height - 1); ++y) {
     const std::int32_t* row = map.index.data() + static_cast<std::ptrdiff_t>(y) * map.width;
-    for (int x = std::max(px - kLinkRadius, 0); x <= std::min(px + kLinkRadius, map.width - 1);
-         ++x) {
+    for (int x = std::max(px - radius, 0); x <= std::min(px + radius, map.width - 1); ++x) {
       const std::int32_t j = row[x];
       if (j < 0 || j == i) continue;
       const EdgePoint& q = map.points[static_cast<std::size_t>(j)];
@@ -212,6 +211,11 @@ std::int32_t NearestAhead(const EdgeMap& map, std::int32_t i, float* distance) {
   }
   *distance = best_distance;
   return best;
+}
+
+std::int32_t NearestAhead(const EdgeMap& map, std::int32_t i, float* distance) {
+  const std::int32_t adjacent = NearestAhead(map, i, 1, distance);
+  return adjacent >= 0 ? adjacent : NearestAhead(map, i, kLinkRadius, distance);
 }
 
 // Every point points to the nearest ahead; of several that point to the same, the nearest keeps it.
