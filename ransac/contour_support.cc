@@ -46,7 +46,8 @@ bool Contour::SampleEvery(double spacing_px, std::vector<ContourSample>* samples
                           int max_samples) const {
   const double h = (major_px_ - minor_px_) / (major_px_ + minor_px_);
   const double perimeter = kPi * (major_px_ + minor_px_) * (1.0 + 0.25 * h * h);  // Ramanujan, cut.
-  return SampleCount(std::clamp(static_cast<int>(perimeter / spacing_px), 16, max_samples), samples);
+  return SampleCount(std::clamp(static_cast<int>(perimeter / spacing_px), 16, max_samples),
+                     samples);
 }
 
 bool Contour::SampleCount(int n, std::vector<ContourSample>* samples) const {
@@ -177,7 +178,8 @@ int Supporter::Nearest(const ContourSample& s, BrightSide bright, double reach) 
     const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
     const double cosine = s.normal.dot(p.Normal());  // 1: bright outside, -1: inside.
     if (std::abs(cosine) < kMinNormalCosine) continue;
-    if (bright != BrightSide::kEither && (cosine < 0.0) != (bright == BrightSide::kInside)) continue;
+    if (bright != BrightSide::kEither && (cosine < 0.0) != (bright == BrightSide::kInside))
+      continue;
     const double d = std::abs(s.normal.dot(p.Position() - s.pixel));
     if (d < best_distance) {
       best_distance = d;
@@ -187,17 +189,16 @@ int Supporter::Nearest(const ContourSample& s, BrightSide bright, double reach) 
   return best;
 }
 
-void Supporter::AverageStrength(Support* support) const {
+void Supporter::AverageStrength(Support* support) {
   if (support->points.empty()) return;
-  double variance = 0.0;
+  sigmas_.clear();
   for (const int i : support->points) {
     const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
     support->gradient += static_cast<double>(p.gradient);
-    variance += static_cast<double>(p.sigma_px * p.sigma_px);
+    sigmas_.push_back(static_cast<double>(p.sigma_px));
   }
-  const double n = static_cast<double>(support->points.size());
-  support->gradient /= n;
-  support->sigma_px = std::sqrt(variance / n);
+  support->gradient /= static_cast<double>(support->points.size());
+  support->sigma_px = Median(&sigmas_);
 }
 
 // in_run_[k]: sample k lies in a supported run that is long enough, small holes closed.

@@ -47,8 +47,8 @@ class Contour {
   double major_px_ = 0.0, minor_px_ = 0.0;
 };
 
-// Where a contour borders on what is brighter: a disc on a plain ground has one side all around, one
-// before a busy ground has either.
+// Where a contour borders on what is brighter: a disc on a plain ground has one side all around,
+// one before a busy ground has either.
 enum class BrightSide { kOutside, kInside, kEither };
 
 struct Support {
@@ -58,7 +58,7 @@ struct Support {
   double turn = 0.0;           // Of the contour over those parts, radians.
   double normal_median = 0.0;  // Angle between the gradients and the contour's normal, radians.
   double gradient = 0.0;       // Mean over the points, grey levels per pixel.
-  double sigma_px = 0.0;       // Of the points, expected from the noise alone.
+  double sigma_px = 0.0;       // Of the points, expected from the noise alone; median.
 
   // Share of the contour.
   double Coverage() const { return perimeter_px > 0.0 ? length_px / perimeter_px : 0.0; }
@@ -92,7 +92,7 @@ class Supporter {
   int Nearest(const ContourSample& s, BrightSide bright, double reach) const;
   void FindRuns(const std::vector<ContourSample>& samples);
   std::size_t BehindHole(const std::vector<ContourSample>& samples) const;
-  void AverageStrength(Support* support) const;
+  void AverageStrength(Support* support);
   void Unique(std::vector<int>* points);
 
   const EdgeMap& map_;
@@ -100,7 +100,7 @@ class Supporter {
   // Scratch: for each sample its point or -1, and whether it lies in a run.
   std::vector<int> nearest_;
   std::vector<std::uint8_t> in_run_;
-  std::vector<double> sines_;
+  std::vector<double> sines_, sigmas_;
   std::vector<std::uint32_t> stamp_;
   std::uint32_t now_ = 0;
 };

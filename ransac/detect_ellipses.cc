@@ -69,9 +69,11 @@ constexpr double kLog10Tests = 6.0;
 // kShapeLimit, nor both together 2.
 //
 // Root-mean-square distance, pixels. Prints, lenses and JPEG leave 0.05 to 0.15 px on photographed
-// rims; long rims follow an ellipse less exactly (no blob follows one so far); and a short arc has
+// rims, at most 2 % of the radius on small ones, while a blob's shape is off in proportion to its
+// size; long rims follow an ellipse less exactly (no blob follows one so far); and a short arc has
 // less to keep to than a full contour.
 constexpr double kShapeRmsPx = 0.17;
+constexpr double kShapeRmsPerSize = 0.022;
 constexpr double kShapeMaxSigmaPx = 0.5;
 constexpr double kShapeRmsPerPx = 5e-4;
 constexpr double kShapeRmsPerCoverage = 0.8;
@@ -297,7 +299,8 @@ class EllipseDetector {
       const Vector2d outward = p.GradientPerPixel(g.head<2>());
       const EdgePoint& edge = map_.points[static_cast<std::size_t>(fit_indices_[k])];
       const double cosine = outward.normalized().dot(edge.Normal());
-      const double noise = kArcNormalSigmas * map_.gradient_noise / static_cast<double>(edge.gradient);
+      const double noise =
+          kArcNormalSigmas * map_.gradient_noise / static_cast<double>(edge.gradient);
       const double sine_squared = kArcNormalSine * kArcNormalSine + noise * noise;
       if (!either && side * cosine < 0.0) continue;
       agree += 1.0 - cosine * cosine < sine_squared ? 1U : 0U;
@@ -335,13 +338,14 @@ class EllipseDetector {
   // Whether the edges follow the contour as those of an ellipse do.
   bool IsShaped(double rms_px, double slack) const {
     const double coverage = std::min(support_.Coverage(), support_.turn / (2.0 * kPi));
-    const double rms_unit =
-        std::hypot(kShapeRmsPx + kShapeRmsPerPx * support_.length_px,
-                   std::min(support_.sigma_px, kShapeMaxSigmaPx)) *
-        (1.0 + kShapeRmsPerCoverage * (coverage - kShapeUsualCoverage));
+    const double size = std::sqrt(contour_.major_px() * contour_.minor_px());
+    const double rms_unit = std::hypot(std::min(kShapeRmsPx, kShapeRmsPerSize * size) +
+                                           kShapeRmsPerPx * support_.length_px,
+                                       std::min(support_.sigma_px, kShapeMaxSigmaPx)) *
+                            (1.0 + kShapeRmsPerCoverage * (coverage - kShapeUsualCoverage));
     const double noise_deg = ToDegrees(map_.gradient_noise / std::max(support_.gradient, 1e-9));
-    const double normal_unit = std::hypot(
-        kShapeNormalDeg + kShapeNormalPerPx * support_.length_px, kShapeNormalPerNoise * noise_deg);
+    const double normal_unit = std::hypot(kShapeNormalDeg + kShapeNormalPerPx * support_.length_px,
+                                          kShapeNormalPerNoise * noise_deg);
     const double rms = rms_px / rms_unit;
     const double normal = ToDegrees(support_.normal_median) / normal_unit;
     return rms_px <= slack * options_.max_rms_px && std::max(rms, normal) <= slack * kShapeLimit &&

@@ -35,8 +35,8 @@ struct EllipseOptions {
 };
 
 struct DetectedEllipse {
-  ConicFit fit;               // Calibrated; residuals in pixels of the photo.
-  std::vector<int> points;    // Its edge points, indices into EdgeMap::points, once around.
+  ConicFit fit;             // Calibrated; residuals in pixels of the photo.
+  std::vector<int> points;  // Its edge points, indices into EdgeMap::points, once around.
   // Where these lie once what the contour's bend did to them is undone (CurvatureBias): what the
   // fit was made to, pixels.
   std::vector<Eigen::Vector2d> contour;

@@ -36,11 +36,11 @@ struct Evidence {
 
 // Points of an ellipse as an observation: thinned, and the fit's covariance widened by the
 // correlation of dense points.
-void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, CircleObservation* circle) {
-  const bool thin = ellipse.points.size() >= kThinFrom;
+void FillCircle(const DetectedEllipse& ellipse, CircleObservation* circle) {
+  const bool thin = ellipse.contour.size() >= kThinFrom;
   circle->points.clear();
-  for (std::size_t k = 0; k < ellipse.points.size(); k += thin ? 2 : 1) {
-    circle->points.push_back(edges.points[static_cast<std::size_t>(ellipse.points[k])].Position());
+  for (std::size_t k = 0; k < ellipse.contour.size(); k += thin ? 2 : 1) {
+    circle->points.push_back(ellipse.contour[k]);
   }
   // The scatter of a smooth contour says little of its error: the estimate measures that, on all
   // circles.
@@ -60,12 +60,11 @@ double ShapeInflation(const DetectedEllipse& ellipse) {
   return 1.0 + kShapeErrorPx * kShapeErrorPx * n / (5.0 * sigma * sigma);
 }
 
-std::vector<CircleEvidence> MakeCircles(const EdgeMap& edges,
-                                        const std::vector<DetectedEllipse>& ellipses) {
+std::vector<CircleEvidence> MakeCircles(const std::vector<DetectedEllipse>& ellipses) {
   std::vector<CircleEvidence> circles;
   for (const DetectedEllipse& ellipse : ellipses) {
     CircleEvidence circle;
-    FillCircle(edges, ellipse, &circle.observation);
+    FillCircle(ellipse, &circle.observation);
     if (ellipse.concentric >= 0) {
       circle.observation.concentric = "g" + std::to_string(ellipse.concentric);
     }
@@ -106,7 +105,7 @@ Status CollectEvidence(const cv::Mat& image, const Camera& camera, const Detecti
   std::vector<DetectedEllipse> ellipses;
   status = DetectEllipses(edges, camera, ToEllipseOptions(options), &ellipses);
   if (!status.ok()) return status;
-  evidence->circles = MakeCircles(edges, ellipses);
+  evidence->circles = MakeCircles(ellipses);
   if (options.max_pencils == 0) return Status::Ok();
   LineOptions line_options;
   line_options.min_length_px = options.min_segment_length_px;
@@ -203,7 +202,7 @@ Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::R
   status = DetectEllipses(edges, shifted, ToEllipseOptions(options), &ellipses);
   if (!status.ok()) return status;
   if (ellipses.empty()) return Status::Refused("no ellipse found inside the rectangle");
-  FillCircle(edges, ellipses.front(), circle);
+  FillCircle(ellipses.front(), circle);
   for (Vector2d& p : circle->points) p += Vector2d(inside.x, inside.y);
   return Status::Ok();
 }

@@ -329,7 +329,8 @@ Status ToGray(const cv::Mat& image, cv::Mat* gray) {
 
 double CurvatureBias(const EdgePoint& point, double blur_px, double curvature) {
   const double cosine = static_cast<double>(std::max(std::abs(point.nx), std::abs(point.ny)));
-  const double along = static_cast<double>(std::abs(point.nx) >= std::abs(point.ny) ? point.x : point.y);
+  const double along =
+      static_cast<double>(std::abs(point.nx) >= std::abs(point.ny) ? point.x : point.y);
   const double offset = along - std::round(along);
   return 0.5 * curvature *
          (blur_px * blur_px + (1.0 - cosine * cosine) * (1.0 - 3.0 * offset * offset));

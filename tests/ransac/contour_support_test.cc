@@ -88,10 +88,13 @@ TEST(Supporter, MeasuresCoverageAndRemembersWhatIsTaken) {
   std::vector<ContourSample> samples;
   ASSERT_TRUE(contour.SampleEvery(1.0, &samples));
   Supporter supporter(map);
-  EXPECT_NEAR(supporter.QuickShare(samples, false, 2.0), 2.0 / 3.0, 0.08);
-  EXPECT_LT(supporter.QuickShare(samples, true, 2.0), 0.05);  // The wrong side bright.
+  const QuickSupport look = supporter.QuickLook(samples, 2.0);
+  EXPECT_NEAR(look.across[0], 2.0 / 3.0, 0.08);
+  EXPECT_LT(look.across[1], 0.05);  // The wrong side bright.
+  EXPECT_NEAR(look.across[2], look.across[0], 0.05);
+  EXPECT_NEAR(look.any, 2.0 / 3.0, 0.1);
   Support support;
-  supporter.Collect(samples, false, 2.0, &support);
+  supporter.Collect(samples, BrightSide::kOutside, 2.0, &support);
   EXPECT_NEAR(support.Coverage(), 2.0 / 3.0, 0.04);
   EXPECT_NEAR(support.turn, 4.0 * kPi / 3.0, 0.25);
   EXPECT_LT(support.normal_median, 0.03);
@@ -99,8 +102,49 @@ TEST(Supporter, MeasuresCoverageAndRemembersWhatIsTaken) {
   EXPECT_GT(support.gradient, 20.0);
   supporter.Take(support.points);
   EXPECT_TRUE(supporter.IsTaken(support.points[0]));
-  supporter.Collect(samples, false, 2.0, &support);
+  supporter.Collect(samples, BrightSide::kOutside, 2.0, &support);
   EXPECT_LT(support.Coverage(), 0.05);
+}
+
+TEST(Supporter, MeasuresNormalsAtThePointsThemselves) {
+  // The rim of a small disc turns by 12 degrees from one pixel to the next.
+  const Camera camera = TestCamera(60, 60);
+  const cv::Mat image = Develop(Render(60, 60, [](double u, double v) {
+    return std::hypot(u - 30.2, v - 29.7) < 5.0 ? 40.0 : 200.0;
+  }));
+  EdgeMap map;
+  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+  Contour contour(camera);
+  ASSERT_TRUE(contour.Project(PixelCircle(camera, 30.2, 29.7, 5.0), 4.0, 1000.0));
+  std::vector<ContourSample> samples;
+  ASSERT_TRUE(contour.SampleCount(40, &samples));
+  Supporter supporter(map);
+  Support support;
+  supporter.Collect(samples, BrightSide::kOutside, 1.5, &support);
+  EXPECT_GT(support.Coverage(), 0.99);
+  EXPECT_LT(support.normal_median, 1.0 * kPi / 180.0);
+}
+
+TEST(Supporter, TakesEitherBrightSideIfAsked) {
+  // A grey disc, half before black and half before white.
+  const Camera camera = TestCamera(120, 120);
+  const cv::Mat image = Develop(Render(120, 120, [](double u, double v) {
+    return std::hypot(u - 60.0, v - 60.0) < 30.0 ? 120.0 : u < 60.0 ? 20.0 : 220.0;
+  }));
+  EdgeMap map;
+  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+  Contour contour(camera);
+  ASSERT_TRUE(contour.Project(PixelCircle(camera, 60.0, 60.0, 30.0), 4.0, 1000.0));
+  std::vector<ContourSample> samples;
+  ASSERT_TRUE(contour.SampleEvery(1.0, &samples));
+  Supporter supporter(map);
+  Support support;
+  for (const BrightSide side : {BrightSide::kOutside, BrightSide::kInside}) {
+    supporter.Collect(samples, side, 1.5, &support);
+    EXPECT_NEAR(support.Coverage(), 0.5, 0.08);
+  }
+  supporter.Collect(samples, BrightSide::kEither, 1.5, &support);
+  EXPECT_GT(support.Coverage(), 0.9);
 }
 
 TEST(Median, OfOddEvenAndNone) {

@@ -70,7 +70,7 @@ TEST(DetectEllipses, FindsATiltedDiscThroughEveryLens) {
       const std::vector<DetectedEllipse> found = Detect(Disc(camera, pose), camera);
       ASSERT_EQ(found.size(), 1U) << "tilt " << tilt << " focal " << camera.fx;
       EXPECT_GT(found[0].coverage_deg, 350.0);
-      EXPECT_FALSE(found[0].bright_inside);
+      EXPECT_EQ(found[0].bright, BrightSide::kOutside);
       EXPECT_LT(found[0].fit.rms_px, 0.1);
       EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3) << "tilt " << tilt;
     }
@@ -107,8 +107,8 @@ TEST(DetectEllipses, GroupsTheRimsOfARing) {
   EXPECT_EQ(found[0].concentric, found[1].concentric);
   // The outer one is longer, and brighter inside; the inner one holds the dark disc.
   EXPECT_GT(found[0].length_px, found[1].length_px);
-  EXPECT_TRUE(found[0].bright_inside);
-  EXPECT_FALSE(found[1].bright_inside);
+  EXPECT_EQ(found[0].bright, BrightSide::kInside);
+  EXPECT_EQ(found[1].bright, BrightSide::kOutside);
 }
 
 TEST(DetectEllipses, KeepsNeighboursApart) {
@@ -140,6 +140,58 @@ TEST(DetectEllipses, FindsAnOccludedDisc) {
   EXPECT_GT(found[0].coverage_deg, 150.0);
   EXPECT_LT(found[0].coverage_deg, 290.0);
   EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 1.0);
+}
+
+TEST(DetectEllipses, FindsAGreyDiscBeforeBlackAndWhite) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(40.0, 10.0, 0.0, 6.0);
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 20.0, [](double x, double y) {
+    return std::hypot(x, y) < 1.0 ? 120.0 : x + 0.3 * y < 0.1 ? 20.0 : 220.0;
+  }));
+  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].bright, BrightSide::kEither);
+  EXPECT_GT(found[0].coverage_deg, 300.0);
+  EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3);
+}
+
+TEST(DetectEllipses, FindsADiscAmongWhatTouchesIt) {
+  // A small disc of the same colour grows out of the rim: one chain, the ellipse a part of it.
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(35.0, 10.0, 0.0, 5.0);
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [](double x, double y) {
+    return std::hypot(x, y) < 1.0 || std::hypot(x - 1.05, y - 0.2) < 0.25 ? 40.0 : 200.0;
+  }));
+  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  ASSERT_GE(found.size(), 1U);
+  EXPECT_GT(found[0].coverage_deg, 290.0);
+  EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3);
+}
+
+TEST(DetectEllipses, UndoesWhatTheBendDoesToTheRim) {
+  // The smoothing alone draws the rim inward by 0.06 px at a radius of 8 px, its ends by more.
+  for (const double blur : {0.7, 1.2}) {
+    Ellipse truth;
+    truth.center = {60.4, 50.7};
+    truth.a = 14.0;
+    truth.b = 8.0;
+    truth.angle = 0.6;
+    const Eigen::Matrix3d conic = EllipseToConic(truth);
+    const cv::Mat image = Develop(Render(120, 100,
+                                         [&conic](double u, double v) {
+                                           const Vector3d x(u, v, 1.0);
+                                           return x.dot(conic * x) < 0.0 ? 30.0 : 190.0;
+                                         }),
+                                  blur);
+    const Camera camera = TestCamera(120, 100, 300.0);
+    const std::vector<DetectedEllipse> found = Detect(image, camera);
+    ASSERT_EQ(found.size(), 1U);
+    Ellipse e;
+    ASSERT_TRUE(ConicToEllipse(found[0].fit.conic, &e));
+    EXPECT_NEAR(camera.fx * e.a, truth.a, 0.03) << blur;
+    EXPECT_NEAR(camera.fx * e.b, truth.b, 0.03) << blur;
+    ASSERT_EQ(found[0].contour.size(), found[0].points.size());
+  }
 }
 
 TEST(DetectEllipses, RespectsItsLimits) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
 
@@ -98,9 +100,56 @@ TEST(DetectEdges, ClosesTheContourOfADiscAndIndexesIt) {
     }
     EXPECT_EQ(found, 1);
   }
-  EXPECT_NEAR(mean, 25.0, 0.06);  // Blur draws a curved edge inward, by blur^2 / (2 r) = 0.03 here.
+  EXPECT_NEAR(mean, 25.0, 0.06);  // See CurvatureBias.
   EXPECT_EQ(map.PointAt(-1, 0), -1);
   EXPECT_EQ(map.PointAt(0, 80), -1);
+}
+
+// Mean distance of edge points to the rim of a disc, over discs at many sub-pixel positions, by the
+// direction of the gradient: near the axes of the image, between, near the diagonals.
+struct RimErrors {
+  std::array<double, 3> found{}, corrected{}, count{};
+};
+
+RimErrors MeasureRim(double radius, double blur) {
+  RimErrors errors;
+  for (int k = 0; k < 25; ++k) {
+    const double u0 = 34.0 + std::fmod(0.137 * k, 1.0), v0 = 33.0 + std::fmod(0.713 * k, 1.0);
+    const cv::Mat image = Develop(
+        Render(
+            70, 70,
+            [=](double u, double v) { return std::hypot(u - u0, v - v0) < radius ? 40.0 : 200.0; }),
+        blur);
+    EdgeMap map;
+    EXPECT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+    for (const EdgePoint& p : map.points) {
+      const double dx = static_cast<double>(p.x) - u0, dy = static_cast<double>(p.y) - v0;
+      const double off = std::hypot(dx, dy) - radius;
+      const double from_axis =
+          std::asin(static_cast<double>(std::min(std::abs(p.nx), std::abs(p.ny))));
+      const auto bin = static_cast<std::size_t>(std::min(2.0, from_axis / (kPi / 12.0)));
+      errors.found[bin] += off;
+      errors.corrected[bin] += off + CurvatureBias(p, static_cast<double>(p.blur_px), 1.0 / radius);
+      errors.count[bin] += 1.0;
+    }
+  }
+  return errors;
+}
+
+TEST(CurvatureBias, IsWhatTheEdgesOfDiscsAreOffBy) {
+  for (const double blur : {0.6, 1.2}) {
+    for (const double radius : {6.0, 10.0, 20.0}) {
+      const RimErrors errors = MeasureRim(radius, blur);
+      for (std::size_t bin = 0; bin < 3; ++bin) {
+        const double found = errors.found[bin] / errors.count[bin];
+        const double corrected = errors.corrected[bin] / errors.count[bin];
+        // Smoothing 1, blur, and the pixel's own 0.29.
+        EXPECT_LT(found, -0.45 * (1.08 + blur * blur) / radius) << radius << " " << blur;
+        EXPECT_LT(std::abs(corrected), 0.08 * std::abs(found))
+            << radius << " " << blur << " " << bin;
+      }
+    }
+  }
 }
 
 TEST(DetectEdges, StatesTheNoiseAndWhatItDoesToLocations) {
