@@ -1,5 +1,6 @@
 #include "circline/ransac/detect_ellipses.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -89,6 +90,9 @@ constexpr double kShapeLimit = 1.4;
 constexpr double kShapeSlack = 1.5;
 // A candidate with this much of its contour is accepted before pairs are looked at.
 constexpr double kSureCoverage = 0.7;
+// The second look at a ragged contour: smoothing, and the largest part of the photo, pixels.
+constexpr double kSecondSmoothingPx = 1.6;
+constexpr int kMaxSecondLookPx = 200;
 // Largest ellipse, in diagonals of the photo.
 constexpr double kMaxAxisDiagonals = 2.0;
 // Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
@@ -168,6 +172,7 @@ class EllipseDetector {
  public:
   EllipseDetector(const EdgeMap& map, const Camera& camera, const EllipseOptions& options)
       : map_(map),
+        camera_(camera),
         options_(options),
         calibrated_(map, camera),
         contour_(camera),
@@ -425,12 +430,51 @@ class EllipseDetector {
 
   void Accept(Candidate candidate) {
     DetectedEllipse e;
-    if (!FinalFit(&candidate, &e)) return;
+    const Candidate rough = candidate;
+    if (!FinalFit(&candidate, &e)) {
+      candidate = rough;
+      if (!SecondLook(&candidate, &e)) return;
+    }
     e.bright = candidate.bright;
     if (IsDuplicate(e)) return;
     supporter_.Take(support_.points);  // What the wider gathering finds belongs to it as well.
     supporter_.Take(e.points);
     accepted_.push_back(std::move(e));
+  }
+
+  // What surrounds a contour but is too ragged for an ellipse at the first scale - a penumbra, a
+  // blur by motion, the steps of a bad print - is looked at once more, through a wider Gaussian,
+  // which averages over it.
+  bool SecondLook(Candidate* candidate, DetectedEllipse* e) {
+    if (!Gather(*candidate, 1.5, kGatherPx.back()) || support_.Coverage() < kSureCoverage) {
+      return false;
+    }
+    const cv::Rect box = Surroundings();
+    if (box.empty() || box.width > kMaxSecondLookPx || box.height > kMaxSecondLookPx) return false;
+    EdgeOptions edge_options;
+    edge_options.smoothing_px = kSecondSmoothingPx;
+    EdgeMap map;
+    if (!DetectEdges(map_.gray(box), edge_options, &map).ok()) return false;
+    Camera camera = camera_;  // Seen from the corner of the box; fits stay valid.
+    camera.cx -= box.x;
+    camera.cy -= box.y;
+    if (!EllipseDetector(map, camera, options_).FinalFit(candidate, e)) return false;
+    for (Vector2d& p : e->contour) p += Vector2d(box.x, box.y);
+    // The points of the first scale that it explains.
+    if (!Gather(*candidate, 0.7, kGatherPx[0])) return false;
+    e->points = support_.points;
+    return true;
+  }
+
+  // The samples at hand with a margin for the smoothing, within the photo.
+  cv::Rect Surroundings() const {
+    Eigen::AlignedBox2d box;
+    for (const ContourSample& s : samples_) box.extend(s.pixel);
+    constexpr int kMargin = 8;
+    const cv::Point low(static_cast<int>(box.min().x()), static_cast<int>(box.min().y()));
+    const cv::Point high(static_cast<int>(box.max().x()), static_cast<int>(box.max().y()));
+    const cv::Point margin(kMargin, kMargin);
+    return cv::Rect(low - margin, high + margin) & cv::Rect({}, map_.gray.size());
   }
 
   // Maximum likelihood on all points of the contour, outliers left out; from a direct fit to all
@@ -548,6 +592,7 @@ class EllipseDetector {
   }
 
   const EdgeMap& map_;
+  const Camera& camera_;
   const EllipseOptions& options_;
   CalibratedEdges calibrated_;
   Contour contour_;

@@ -344,6 +344,7 @@ Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edg
   if (gray.type() != CV_8UC1) return Status::Invalid("edges need an 8-bit grey image");
   edges->width = gray.cols;
   edges->height = gray.rows;
+  edges->gray = gray;
   const Gradient gradient = ComputeGradient(gray, options.smoothing_px);
   const double noise = GradientNoise(EstimateNoise(gray), options.smoothing_px);
   edges->gradient_noise = noise;

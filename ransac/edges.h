@@ -65,6 +65,7 @@ struct EdgeMap {
   // the point lies within half a pixel of it.
   std::vector<std::int32_t> index;
   double gradient_noise = 0.0;  // Estimated standard deviation of one gradient component.
+  cv::Mat gray;                 // The photo, shared, for whoever wants a second look.
 
   int PointAt(int x, int y) const {
     if (x < 0 || y < 0 || x >= width || y >= height) return -1;
