@@ -134,7 +134,7 @@ void Supporter::Collect(const std::vector<ContourSample>& samples, BrightSide br
                         Support* support) {
   const std::size_t n = samples.size();
   nearest_.resize(n);
-  for (std::size_t k = 0; k < n; ++k) nearest_[k] = Nearest(samples[k], bright, reach);
+  for (std::size_t k = 0; k < n; ++k) nearest_[k] = Strongest(samples[k], bright, reach);
   FindRuns(samples);
   *support = Support();
   int last = -1;
@@ -165,11 +165,12 @@ double Supporter::NormalMiss(const ContourSample& s, const EdgePoint& p) {
   return std::abs(side * Cross(s.normal, p.Normal()) - turned);
 }
 
-// The free edge point nearest to the contour at a sample, with the right direction, or -1.
-int Supporter::Nearest(const ContourSample& s, BrightSide bright, double reach) const {
+// The free edge point near the contour at a sample with the right direction: of several the
+// strongest, with allowance for distance, as shadows and fringes run beside rims; or -1.
+int Supporter::Strongest(const ContourSample& s, BrightSide bright, double reach) const {
   const int steps = static_cast<int>(std::ceil(reach));
   int best = -1;
-  double best_distance = reach;
+  double best_weight = 0.0;
   for (int step = -steps; step <= steps; ++step) {
     const int x = Round(s.pixel.x() + step * s.normal.x());
     const int y = Round(s.pixel.y() + step * s.normal.y());
@@ -180,9 +181,10 @@ int Supporter::Nearest(const ContourSample& s, BrightSide bright, double reach) 
     if (std::abs(cosine) < kMinNormalCosine) continue;
     if (bright != BrightSide::kEither && (cosine < 0.0) != (bright == BrightSide::kInside))
       continue;
-    const double d = std::abs(s.normal.dot(p.Position() - s.pixel));
-    if (d < best_distance) {
-      best_distance = d;
+    const double d = s.normal.dot(p.Position() - s.pixel) / reach;
+    const double weight = static_cast<double>(p.gradient) * (1.0 - d * d);
+    if (weight > best_weight) {
+      best_weight = weight;
       best = i;
     }
   }

@@ -83,13 +83,13 @@ class Supporter {
   // A first look with few samples.
   QuickSupport QuickLook(const std::vector<ContourSample>& samples, double reach) const;
 
-  // The points nearest to the contour with the right bright side, as far as they come in runs.
+  // The strongest points along the contour with the right bright side, as far as they come in runs.
   void Collect(const std::vector<ContourSample>& samples, BrightSide bright, double reach,
                Support* support);
 
  private:
   static double NormalMiss(const ContourSample& s, const EdgePoint& p);
-  int Nearest(const ContourSample& s, BrightSide bright, double reach) const;
+  int Strongest(const ContourSample& s, BrightSide bright, double reach) const;
   void FindRuns(const std::vector<ContourSample>& samples);
   std::size_t BehindHole(const std::vector<ContourSample>& samples) const;
   void AverageStrength(Support* support);

@@ -37,8 +37,8 @@ struct EllipseOptions {
 struct DetectedEllipse {
   ConicFit fit;             // Calibrated; residuals in pixels of the photo.
   std::vector<int> points;  // Its edge points, indices into EdgeMap::points, once around.
-  // Where these (or those of a second look, more smoothed) lie once what the contour's bend did to them is undone (CurvatureBias): what the
-  // fit was made to, pixels.
+  // Where these (or those of a second look, more smoothed) lie once what the contour's bend did to
+  // them is undone (CurvatureBias): what the fit was made to, pixels.
   std::vector<Eigen::Vector2d> contour;
   double sigma_px = 0.0;      // Standard deviation of a point about the ellipse.
   double coverage_deg = 0.0;  // Share of the contour that has edge points, times 360.

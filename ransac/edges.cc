@@ -332,8 +332,10 @@ double CurvatureBias(const EdgePoint& point, double blur_px, double curvature) {
   const double along =
       static_cast<double>(std::abs(point.nx) >= std::abs(point.ny) ? point.x : point.y);
   const double offset = along - std::round(along);
-  return 0.5 * curvature *
-         (blur_px * blur_px + (1.0 - cosine * cosine) * (1.0 - 3.0 * offset * offset));
+  // The profile across a bent edge is wider than the Gaussian by 1 + k^2 s^2 / 2.
+  const double width = blur_px * blur_px;
+  const double variance = width / (1.0 + 0.5 * curvature * curvature * width);
+  return 0.5 * curvature * (variance + (1.0 - cosine * cosine) * (1.0 - 3.0 * offset * offset));
 }
 
 Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edges) {
