@@ -1,7 +1,11 @@
 #include "apps/common/output_file.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -51,6 +55,30 @@ Status OutputFile::Commit() {
   if (!stream_ || error) return Status::Failed(path_ + ": cannot be written");
   committed_ = true;
   return Status::Ok();
+}
+
+AppendFile::AppendFile(std::string path, std::uint64_t keep_bytes)
+    : path_(std::move(path)),
+      descriptor_(open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666)) {
+  if (descriptor_ >= 0 && ftruncate(descriptor_, static_cast<off_t>(keep_bytes)) != 0) {
+    close(descriptor_);
+    descriptor_ = -1;
+  }
+}
+
+AppendFile::~AppendFile() {
+  if (descriptor_ >= 0) close(descriptor_);
+}
+
+Status AppendFile::Append(const std::string& text) {
+  std::size_t done = 0;
+  while (descriptor_ >= 0 && done < text.size()) {
+    const ssize_t written = write(descriptor_, text.data() + done, text.size() - done);
+    if (written < 0 && errno != EINTR) break;
+    if (written > 0) done += static_cast<std::size_t>(written);
+  }
+  const bool all = descriptor_ >= 0 && done == text.size();
+  return all ? Status::Ok() : Status::Failed(path_ + ": cannot be written");
 }
 
 Status WriteFile(const std::string& path, const std::string& content) {

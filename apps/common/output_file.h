@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_COMMON_OUTPUT_FILE_H_
 #define CIRCLINE_APPS_COMMON_OUTPUT_FILE_H_
 
+#include <cstdint>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -27,6 +28,24 @@ class OutputFile {
   std::string path_, temporary_path_;
   std::ofstream stream_;
   bool committed_ = false;
+};
+
+// Grows under its own name; each Append is handed to the system at once, so that what was appended
+// outlives this process however it ends.
+class AppendFile {
+ public:
+  // Keeps the first `keep_bytes` of what is there.
+  AppendFile(std::string path, std::uint64_t keep_bytes);
+  ~AppendFile();
+  AppendFile(const AppendFile&) = delete;
+  AppendFile& operator=(const AppendFile&) = delete;
+
+  // Not ok: names the file that could not be written.
+  Status Append(const std::string& text);
+
+ private:
+  std::string path_;
+  int descriptor_;
 };
 
 Status WriteFile(const std::string& path, const std::string& content);

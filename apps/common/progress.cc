@@ -23,9 +23,11 @@ std::string FormatDuration(double seconds) {
 
 }  // namespace
 
-Progress::Progress(std::string what, int total)
+Progress::Progress(std::string what, int total, int done)
     : what_(std::move(what)),
       total_(total),
+      done_(done),
+      before_(done),
       terminal_(isatty(STDERR_FILENO) != 0),
       start_(Clock::now()),
       last_print_(start_) {}
@@ -51,7 +53,7 @@ void Progress::Advance() {
 }
 
 void Progress::Print(double seconds, bool last) {
-  const double rate = done_ / seconds;
+  const double rate = (done_ - before_) / seconds;
   std::string line = std::to_string(done_) + " of " + std::to_string(total_) + " " + what_ + ", " +
                      FormatShort(rate, 2) + "/s, ";
   line += last ? FormatDuration(seconds) : FormatDuration((total_ - done_) / rate) + " left";

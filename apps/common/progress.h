@@ -11,7 +11,8 @@ namespace circline::apps {
 // every ten seconds. Not thread-safe: call it under the lock that counts.
 class Progress {
  public:
-  Progress(std::string what, int total);
+  // Of `total`, `done` were there before; the rate does not count them.
+  Progress(std::string what, int total, int done = 0);
   ~Progress();
   void Advance();
   void Clear() const;  // Makes room for another line on a terminal.
@@ -21,7 +22,7 @@ class Progress {
   void Print(double seconds, bool last);
 
   std::string what_;
-  int total_, done_ = 0;
+  int total_, done_, before_;
   bool terminal_;
   bool printed_ = false;
   Clock::time_point start_, last_print_;

@@ -25,7 +25,8 @@ struct Frame {
     return kLeft + std::clamp(t, 0.0, 1.0) * (right() - kLeft);
   }
   double Y(double y) const {
-    const double t = (y - plot.y_min) / (plot.y_max - plot.y_min);
+    const double t = plot.log_y ? std::log(y / plot.y_min) / std::log(plot.y_max / plot.y_min)
+                                : (y - plot.y_min) / (plot.y_max - plot.y_min);
     return bottom() - std::clamp(t, 0.0, 1.0) * (bottom() - kTop);
   }
 };
@@ -59,20 +60,11 @@ std::vector<double> LogTicks(double low, double high) {
   return ticks;
 }
 
-std::string TickText(double value) {
-  if (value == 0.0) return "0";
-  std::string text = FormatFixed(value, 4);
-  text.erase(text.find_last_not_of('0') + 1);
-  if (text.back() == '.') text.pop_back();
-  return text;
-}
-
 void DrawGrid(const Frame& frame, std::ostringstream* svg) {
   const Plot& plot = frame.plot;
   *svg << "<g stroke='currentColor' stroke-opacity='.14'>";
-  const std::vector<double> x_ticks =
-      plot.log_x ? LogTicks(plot.x_min, plot.x_max) : LinearTicks(plot.x_min, plot.x_max);
-  const std::vector<double> y_ticks = LinearTicks(plot.y_min, plot.y_max);
+  const std::vector<double> x_ticks = PlotTicks(plot.log_x, plot.x_min, plot.x_max);
+  const std::vector<double> y_ticks = PlotTicks(plot.log_y, plot.y_min, plot.y_max);
   for (const double x : x_ticks) {
     *svg << "<path d='M" << Number(frame.X(x)) << " " << kTop << "V" << Number(frame.bottom())
          << "'/>";
@@ -111,12 +103,21 @@ void DrawSeries(const Frame& frame, const PlotSeries& series, std::ostringstream
   *svg << "<path fill='none' stroke-width='2' stroke-linejoin='round' stroke='" << series.color
        << "'" << (series.dashed ? " stroke-dasharray='5 3'" : "") << " d='";
   bool pen_down = false;
+  const auto is_usable = [&frame](double x, double y) {
+    return std::isfinite(x) && std::isfinite(y) && (!frame.plot.log_x || x > 0.0) &&
+           (!frame.plot.log_y || y > 0.0);
+  };
   for (const auto& [x, y] : series.points) {
-    const bool usable = std::isfinite(x) && std::isfinite(y) && (!frame.plot.log_x || x > 0.0);
+    const bool usable = is_usable(x, y);
     if (usable) *svg << (pen_down ? "L" : "M") << Number(frame.X(x)) << " " << Number(frame.Y(y));
     pen_down = usable;
   }
   *svg << "'><title>" << EscapeHtml(series.name) << "</title></path>";
+  for (const auto& [x, y] : series.points) {
+    if (!series.dots || !is_usable(x, y)) continue;
+    *svg << "<circle r='3' fill='" << series.color << "' cx='" << Number(frame.X(x)) << "' cy='"
+         << Number(frame.Y(y)) << "'/>";
+  }
 }
 
 void DrawLegend(const Frame& frame, std::ostringstream* svg) {
@@ -134,6 +135,25 @@ void DrawLegend(const Frame& frame, std::ostringstream* svg) {
 }
 
 }  // namespace
+
+std::string TickText(double value) {
+  if (value == 0.0) return "0";
+  if (value < 1e-4) return FormatShort(value, 1);
+  std::string text = FormatFixed(value, 4);
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+std::vector<double> PlotTicks(bool log, double low, double high) {
+  return log ? LogTicks(low, high) : LinearTicks(low, high);
+}
+
+std::vector<double> DecadeTicks(double low, double high) {
+  std::vector<double> ticks;
+  for (double tick = low; tick <= high * 1.0001; tick *= 10.0) ticks.push_back(tick);
+  return ticks;
+}
 
 std::string RenderSvg(const Plot& plot) {
   const Frame frame{plot};

@@ -10,15 +10,15 @@ namespace circline::apps {
 
 struct PlotSeries {
   std::string name;
-  std::string color;  // CSS.
-  bool dashed = false;
+  std::string color;                              // CSS.
+  bool dashed = false, dots = false;              // Dots mark the points.
   std::vector<std::pair<double, double>> points;  // In drawing order; not finite = a gap.
 };
 
 struct Plot {
   std::string title, x_label, y_label;
   double x_min = 0.0, x_max = 1.0, y_min = 0.0, y_max = 1.0;
-  bool log_x = false;  // Then x_min > 0.
+  bool log_x = false, log_y = false;  // Then x_min > 0, y_min > 0.
   bool percent_y = false;
   int width = 560, height = 360;  // Of the plotting area with its labels; the legend stands below.
   std::vector<PlotSeries> series;
@@ -26,6 +26,11 @@ struct Plot {
 
 // An <svg> element. Lines and letters take the page's text colour (currentColor).
 std::string RenderSvg(const Plot& plot);
+
+// Round values of an axis; on a logarithmic one 1, 2 and 5 times powers of ten.
+std::vector<double> PlotTicks(bool log, double low, double high);
+std::vector<double> DecadeTicks(double low, double high);  // Powers of ten.
+std::string TickText(double value);
 
 // Colours that stay apart for most eyes, repeated after ten.
 std::string SeriesColor(std::size_t index);

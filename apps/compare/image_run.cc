@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
+#include "apps/compare/record.h"
 #include "circline/refine/refined_solvers.h"
 
 namespace circline::apps {
@@ -168,13 +169,25 @@ ImageRun RunImage(const SceneImage& image, const CompareOptions& options,
   return run;
 }
 
+std::vector<SolverKey> SolverSet::Keys(const CompareOptions& options) const {
+  std::vector<SolverKey> keys;
+  for (const Task& task : tasks_) {
+    SolverKey key{task.solver->name(), SolverStageName(task.solver->stage()), "", 0.0};
+    if (task.loss >= 0) {
+      const LossSetting& loss = options.losses[static_cast<std::size_t>(task.loss)];
+      key.loss = loss.loss;
+      key.scale_px = loss.scale_px;
+    }
+    keys.push_back(std::move(key));
+  }
+  return keys;
+}
+
 const SolverRun* RunToShow(const ImageRun& run) {
   const SolverRun* best = nullptr;
   const auto rank = [](const SolverRun& r) {
-    const int stage = r.stage == SolverStage::kRefined ? 1 : 0;
-    const bool is_joint = r.solver == "joint";
-    return std::array<int, 3>{is_joint ? 1 : 0, stage,
-                              r.estimate.hypotheses.front().num_observations};
+    return ShowRank(r.solver, r.stage == SolverStage::kRefined,
+                    r.estimate.hypotheses.front().num_observations);
   };
   for (const SolverRun& candidate : run.solvers) {
     if (!candidate.estimate.status.ok() || candidate.estimate.hypotheses.empty()) continue;

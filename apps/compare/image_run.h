@@ -10,6 +10,7 @@
 #include "apps/common/pose_error.h"
 #include "apps/common/scene.h"
 #include "apps/compare/options.h"
+#include "apps/compare/record.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/solver_registry.h"
@@ -26,6 +27,7 @@ class SolverSet {
   };
   explicit SolverSet(const CompareOptions& options);
   const std::vector<Task>& tasks() const { return tasks_; }
+  std::vector<SolverKey> Keys(const CompareOptions& options) const;  // Of tasks().
 
  private:
   std::vector<SolverRegistry> registries_;  // One for each loss; they own the solvers.
@@ -54,8 +56,7 @@ struct ImageRun {
 // Never throws. The options and solvers outlive the result.
 ImageRun RunImage(const SceneImage& image, const CompareOptions& options, const SolverSet& solvers);
 
-// The run to show in a picture: joint, else the refined answer with the most evidence, else a
-// closed form; of the first loss. Null if every solver refused.
+// The run to show in a picture (see ShowRank). Null if every solver refused.
 const SolverRun* RunToShow(const ImageRun& run);
 
 }  // namespace circline::apps

@@ -31,7 +31,7 @@ int Refuse(const Status& status) {
 int Compare() {
   CompareOptions options;
   Status status = circline::apps::OptionsFromFlags(&options);
-  std::vector<circline::apps::SceneImage> images;
+  circline::apps::ImageSet images;
   if (status.ok()) status = circline::apps::ImagesFromFlags(options, &images);
   if (!status.ok()) return Refuse(status);
   circline::apps::ComparisonResult result;

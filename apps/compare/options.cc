@@ -51,11 +51,14 @@ DEFINE_int32(max_circles, circline::DetectionOptions().max_circles,
 DEFINE_int32(max_pencils, circline::DetectionOptions().max_pencils,
              "Detection: at most so many directions of parallel lines.");
 DEFINE_uint64(seed, circline::FitOptions().seed, "Same input and seed: same bytes out.");
-DEFINE_int32(threads, 0, "Images worked on at a time; 0 = one for each core.");
+DEFINE_int32(threads, 0,
+             "Images worked on at a time, at most one for each core; 0 = one for each core.");
 DEFINE_string(
     shard, "0/1",
     "i/n: only every n-th image, from the i-th on. i counts from 0 or from 1 (n/n is 0/n).");
 DEFINE_bool(overlays, true, "Draw a picture of each photo with what was found in it.");
+DEFINE_bool(resume, false,
+            "Go on where a run with the same flags was stopped: skip what results.jsonl has.");
 DEFINE_bool(list_solvers, false, "List the solvers and what each needs, and do nothing else.");
 
 namespace circline::apps {
@@ -227,6 +230,21 @@ Status ReadImages(std::vector<SceneImage>* images) {
   return status.ok() ? ListPhotos(FLAGS_images, camera, images) : status;
 }
 
+// Names and values of the flags that shape what is found in a photo.
+std::string ResultFlags() {
+  std::string lines;
+  for (const char* name :
+       {"solvers", "robust_loss", "loss_scale_px", "conic_loss", "conic_loss_scale_px", "line_loss",
+        "line_loss_scale_px", "inlier_threshold_px", "ransac_confidence", "ransac_max_iterations",
+        "min_ellipse_axis_px", "min_arc_deg", "min_segment_length_px", "max_circles", "max_pencils",
+        "seed", "shard", "overlays"}) {
+    std::string value;
+    gflags::GetCommandLineOption(name, &value);
+    lines += std::string("--") + name + "=" + value + "\n";
+  }
+  return lines;
+}
+
 }  // namespace
 
 Status OptionsFromFlags(CompareOptions* options) {
@@ -251,20 +269,16 @@ Status OptionsFromFlags(CompareOptions* options) {
   options->output = FLAGS_output;
   options->threads = FLAGS_threads;
   options->overlays = FLAGS_overlays;
+  options->resume = FLAGS_resume;
+  options->result_flags = ResultFlags();
   return Status::Ok();
 }
 
-Status ImagesFromFlags(const CompareOptions& options, std::vector<SceneImage>* images) {
-  const Status status = ReadImages(images);
-  if (!status.ok()) return status;
-  std::vector<SceneImage> shard;
-  for (std::size_t i = 0; i < images->size(); ++i) {
-    if (static_cast<int>(i % static_cast<std::size_t>(options.num_shards)) == options.shard_index) {
-      shard.push_back(std::move((*images)[i]));
-    }
-  }
-  *images = std::move(shard);
-  return Status::Ok();
+Status ImagesFromFlags(const CompareOptions& options, ImageSet* images) {
+  std::vector<SceneImage> all;
+  const Status status = ReadImages(&all);
+  if (status.ok()) *images = ImageSet(std::move(all), options.shard_index, options.num_shards);
+  return status;
 }
 
 std::vector<std::string> SolverNames() {

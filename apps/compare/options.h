@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/common/scene.h"
+#include "apps/compare/image_set.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/detect_observations.h"
@@ -31,6 +31,8 @@ struct CompareOptions {
   int threads = 0;  // 0 = as many as the machine has.
   int shard_index = 0, num_shards = 1;
   bool overlays = true;
+  bool resume = false;
+  std::string result_flags;  // All flags that shape the results, one a line.
 };
 
 // From the flags (flags.cc); not ok: one line that names the flag. Nothing is read from disk.
@@ -38,7 +40,7 @@ Status OptionsFromFlags(CompareOptions* options);
 
 // The images of --scene or --images with --camera, those of this shard only. Not ok: one line that
 // names the flag or file.
-Status ImagesFromFlags(const CompareOptions& options, std::vector<SceneImage>* images);
+Status ImagesFromFlags(const CompareOptions& options, ImageSet* images);
 
 // Names of all solvers, closed form and refined, in the order of the registry.
 std::vector<std::string> SolverNames();

@@ -3,20 +3,19 @@
 #define CIRCLINE_APPS_COMPARE_REPORT_H_
 
 #include <string>
-#include <vector>
 
-#include "apps/compare/image_run.h"
-#include "apps/compare/summary.h"
+#include "apps/compare/digest.h"
+#include "circline/estimators/status.h"
 
 namespace circline::apps {
 
-// The part of the report on one image. `picture` is the overlay as JPEG (may be empty),
-// `overlay_file` the name of the full picture beside the report (may be empty).
-std::string ReportSection(const ImageRun& run, const std::vector<std::uint8_t>& picture,
-                          const std::string& overlay_file);
+// Photos shown in full, with their pictures; the others are listed by name.
+inline constexpr std::size_t kMaxReportImages = 200;
 
-// The whole page.
-std::string RenderReport(const Summary& summary, const std::vector<std::string>& sections);
+// Writes report.html of a folder whose results.jsonl, its companions and overlays are there. Photos
+// beyond `max_images` are not shown in full.
+Status WriteReport(const std::string& folder, const Digest& digest,
+                   std::size_t max_images = kMaxReportImages);
 
 }  // namespace circline::apps
 

@@ -1,11 +1,11 @@
 #include "apps/compare/results.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "apps/common/text.h"
 #include "apps/compare/pixel_ellipse.h"
 
 namespace circline::apps {
@@ -14,6 +14,11 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kDegreesPerRadian = 57.295779513082323;
+
+const char* StatusText(const Status& status) {
+  if (status.ok()) return "ok";
+  return status.code == StatusCode::kRefused ? "refused" : "failed";
+}
 
 // A text that is not UTF-8 (a file name) must not stop the run.
 std::string Line(const Json& json) {
@@ -141,17 +146,6 @@ Json PencilJson(const PencilObservation& pencil) {
   return json;
 }
 
-}  // namespace
-
-const char* StatusText(const Status& status) {
-  if (status.ok()) return "ok";
-  return status.code == StatusCode::kRefused ? "refused" : "failed";
-}
-
-std::string ScaleText(const LossSetting& loss) {
-  return loss.scale_px > 0.0 ? FormatShort(loss.scale_px) : "auto";
-}
-
 std::string ResultLines(const ImageRun& image) {
   std::string lines;
   for (const SolverRun& run : image.solvers) {
@@ -166,9 +160,12 @@ std::string ResultLines(const ImageRun& image) {
   return lines;
 }
 
-std::string ObservationLine(const ImageRun& run) {
+std::string ObservationLine(const ImageRun& run, const std::string& overlay,
+                            const LineCounts& counts) {
   Json line;
   line["image"] = run.image->name;
+  line["index"] = run.image->index;
+  line["detected"] = run.image->detect_everything;
   for (const char* key : {"ellipses", "segments", "pencils"}) line[key] = Json::array();
   for (const CircleObservation& circle : run.observations.circles) {
     line["ellipses"].push_back(EllipseJson(circle));
@@ -181,6 +178,8 @@ std::string ObservationLine(const ImageRun& run) {
     line["pencils"].push_back(PencilJson(pencil));
   }
   line["problems"] = run.problems;
+  line["overlay"] = TextOrNull(overlay);
+  line["lines"] = {{"results", counts.results}, {"timings", counts.timings}};
   if (!run.read_error.empty()) line["error"] = run.read_error;
   return Line(line);
 }
@@ -205,6 +204,21 @@ std::string TimingLines(const ImageRun& run) {
     line["microseconds"] = whole(solver.microseconds);
     lines += Line(line);
   }
+  return lines;
+}
+
+std::size_t CountLines(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+}  // namespace
+
+ImageLines WriteLines(const ImageRun& run, const std::string& overlay) {
+  ImageLines lines;
+  lines.results = ResultLines(run);
+  lines.timings = TimingLines(run);
+  const LineCounts counts{run.image->index, CountLines(lines.results), CountLines(lines.timings)};
+  lines.observations = ObservationLine(run, overlay, counts);
   return lines;
 }
 

@@ -8,54 +8,61 @@
 #include <sstream>
 
 #include "apps/common/text.h"
-#include "apps/compare/results.h"
 
 namespace circline::apps {
 namespace {
 
 constexpr double kTieDeg = 1e-3;  // Hypotheses this equally far from the truth are equally good.
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 // Index of the hypothesis nearest to the truth, or -1 where there is none to compare with.
-int NearestHypothesis(const std::vector<PoseErrors>& errors) {
+int NearestHypothesis(const std::vector<HypothesisRecord>& hypotheses) {
   int nearest = -1;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    const auto error = errors[i].Headline();
+  double smallest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    const auto error = hypotheses[i].errors.Headline();
     if (!error) return -1;
-    if (nearest < 0 || *error < *errors[static_cast<std::size_t>(nearest)].Headline() - kTieDeg) {
+    if (nearest < 0 || *error < smallest - kTieDeg) {
       nearest = static_cast<int>(i);
+      smallest = *error;
     }
   }
   return nearest;
 }
 
-void AddErrors(const std::vector<PoseErrors>& errors, SummaryRow* row) {
-  const PoseErrors& best = errors.front();
+void AddErrors(const std::vector<HypothesisRecord>& hypotheses, SummaryRow* row) {
+  const PoseErrors& best = hypotheses.front().errors;
   if (best.rotation_deg) row->rotation_errors.push_back(*best.rotation_deg);
   if (best.normal_deg) row->normal_errors.push_back(*best.normal_deg);
   for (const auto& [id, error] : best.directions_deg) row->direction_errors.push_back(error);
   if (best.Headline()) row->headline_errors.push_back(*best.Headline());
-  const int nearest = NearestHypothesis(errors);
+  const int nearest = NearestHypothesis(hypotheses);
   if (nearest < 0) return;
   ++row->with_truth;
-  if (errors.size() > 1) ++row->ambiguous;
+  if (hypotheses.size() > 1) ++row->ambiguous;
   if (nearest == 0) ++row->best_is_better;
   double normal = std::numeric_limits<double>::infinity();
-  for (const PoseErrors& error : errors)
-    normal = std::min(normal, error.normal_deg.value_or(normal));
+  for (const HypothesisRecord& hypothesis : hypotheses) {
+    normal = std::min(normal, hypothesis.errors.normal_deg.value_or(normal));
+  }
   if (std::isfinite(normal)) row->better_normal_errors.push_back(normal);
 }
 
-void AddRun(const SolverRun& run, SummaryRow* row) {
+void AddSolver(const SolverRecord& solver, SummaryRow* row) {
   ++row->images;
-  row->microseconds.push_back(run.microseconds);
-  if (!run.estimate.status.ok() || run.estimate.hypotheses.empty()) {
-    ++(run.estimate.status.code == StatusCode::kRefused ? row->refused : row->failed);
+  if (std::isfinite(solver.microseconds)) {
+    row->microseconds.push_back(static_cast<float>(solver.microseconds));
+  }
+  if (!solver.HasAnswer()) {
+    ++(solver.status == "refused" ? row->refused : row->failed);
     return;
   }
   ++row->ok;
-  row->rms_px.push_back(run.estimate.hypotheses.front().rms_px);
-  AddErrors(run.errors, row);
+  const HypothesisRecord& best = solver.hypotheses.front();
+  row->rms_px.push_back(best.rms_px);
+  if (best.num_observations > 0) {
+    row->inlier_shares.push_back(static_cast<double>(best.num_inliers) / best.num_observations);
+  }
+  AddErrors(solver.hypotheses, row);
 }
 
 double BetterShare(const SummaryRow& row) {
@@ -103,11 +110,11 @@ std::vector<SummaryColumn> AllColumns() {
     return [field](const Row& row) { return std::to_string(row.*field); };
   };
   return {
-      {"solver", "", true, [](const Row& row) { return row.solver; }},
-      {"stage", "", true, [](const Row& row) { return std::string(SolverStageName(row.stage)); }},
-      {"loss", "", true, [](const Row& row) { return row.loss == nullptr ? "-" : row.loss->loss; }},
+      {"solver", "", true, [](const Row& row) { return row.key.solver; }},
+      {"stage", "", true, [](const Row& row) { return row.key.stage; }},
+      {"loss", "", true, [](const Row& row) { return row.key.refined() ? row.key.loss : "-"; }},
       {"scale", "standard deviation of a point, pixels", true,
-       [](const Row& row) { return row.loss == nullptr ? "-" : ScaleText(*row.loss); }},
+       [](const Row& row) { return row.key.ScaleText(); }},
       {"ok", "images with an answer", false, count(&Row::ok)},
       {"refused", "images whose evidence does not suffice", false, count(&Row::refused)},
       {"failed", "images where the numerics did not get there", false, count(&Row::failed)},
@@ -150,23 +157,15 @@ double Mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-std::string SummaryRow::Name() const {
-  return loss == nullptr ? solver : solver + " refined, " + loss->loss + " " + ScaleText(*loss);
-}
-
-void Summary::Add(const ImageRun& run) {
+void Summary::Add(const ImageRecord& record) {
   ++num_images_;
-  if (!run.read_error.empty()) ++num_unreadable_;
-  for (std::size_t i = 0; i < run.solvers.size(); ++i) {
-    const SolverRun& solver = run.solvers[i];
+  if (!record.error.empty()) ++num_unreadable_;
+  for (std::size_t i = 0; i < record.solvers.size(); ++i) {
     if (i >= rows_.size()) {  // Every image runs the same solvers in the same order.
-      SummaryRow row;
-      row.solver = solver.solver;
-      row.stage = solver.stage;
-      row.loss = solver.loss;
-      rows_.push_back(row);
+      rows_.emplace_back();
+      rows_.back().key = record.solvers[i].key;
     }
-    AddRun(solver, &rows_[i]);
+    AddSolver(record.solvers[i], &rows_[i]);
   }
 }
 
@@ -193,11 +192,11 @@ std::string Summary::Csv() const {
          "median_better_normal_error_deg,median_direction_error_deg,best_is_better_share,"
          "ambiguous,median_rms_px\n";
   for (const SummaryRow& row : rows_) {
-    csv << row.solver << "," << SolverStageName(row.stage) << ","
-        << (row.loss == nullptr ? "" : row.loss->loss) << ","
-        << (row.loss == nullptr        ? ""
-            : row.loss->scale_px > 0.0 ? CsvNumber(row.loss->scale_px)
-                                       : "auto")
+    const SolverKey& key = row.key;
+    csv << key.solver << "," << key.stage << "," << key.loss << ","
+        << (!key.refined()       ? ""
+            : key.scale_px > 0.0 ? CsvNumber(key.scale_px)
+                                 : "auto")
         << "," << row.images << "," << row.ok << "," << row.refused << "," << row.failed << ","
         << CsvNumber(Median(row.rotation_errors)) << "," << CsvNumber(Mean(row.rotation_errors))
         << "," << CsvNumber(Quantile(row.rotation_errors, 0.9)) << ","
@@ -229,8 +228,8 @@ std::string Summary::Table() const {
   std::vector<std::string> refused;
   for (const SummaryRow* row : Ranked()) {
     if (row->refused == row->images) {
-      if (std::find(refused.begin(), refused.end(), row->solver) == refused.end())
-        refused.push_back(row->solver);
+      if (std::find(refused.begin(), refused.end(), row->key.solver) == refused.end())
+        refused.push_back(row->key.solver);
       continue;
     }
     std::vector<std::string> line;

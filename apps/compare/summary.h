@@ -6,26 +6,22 @@
 #include <string>
 #include <vector>
 
-#include "apps/compare/image_run.h"
+#include "apps/compare/record.h"
 
 namespace circline::apps {
 
 // One solver with one loss over all images.
 struct SummaryRow {
-  std::string solver;
-  SolverStage stage = SolverStage::kClosedForm;
-  const LossSetting* loss = nullptr;  // Null for closed forms.
+  SolverKey key;
   int images = 0, ok = 0, refused = 0, failed = 0;
   int with_truth = 0;      // Images whose truth an answer could be compared with.
   int ambiguous = 0;       // Images with two or more hypotheses and a truth.
   int best_is_better = 0;  // Images with a truth whose best hypothesis is the nearest to it.
   // Of the best hypothesis, one for each image that has it, in the order of images.
   std::vector<double> rotation_errors, normal_errors, direction_errors, headline_errors, rms_px;
+  std::vector<double> inlier_shares;
   std::vector<double> better_normal_errors;  // Of the hypothesis nearest to the truth.
-  std::vector<double> microseconds;
-
-  std::string Name()
-      const;  // "circle_center", "circle_center refined", with the loss if there are several.
+  std::vector<float> microseconds;
 };
 
 // A column of the table for people.
@@ -38,7 +34,7 @@ struct SummaryColumn {
 class Summary {
  public:
   // Rows stand in the order in which the first image brings them.
-  void Add(const ImageRun& run);
+  void Add(const ImageRecord& record);
   const std::vector<SummaryRow>& rows() const { return rows_; }
   int num_images() const { return num_images_; }
   int num_unreadable() const { return num_unreadable_; }

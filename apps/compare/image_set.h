@@ -1,0 +1,44 @@
+// The photos of a run, of which there may be very many.
+#ifndef CIRCLINE_APPS_COMPARE_IMAGE_SET_H_
+#define CIRCLINE_APPS_COMPARE_IMAGE_SET_H_
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/common/scene.h"
+
+namespace circline::apps {
+
+// Holds of a photo in which everything is detected little more than its name.
+class ImageSet {
+ public:
+  ImageSet() = default;
+  // Takes every num_shards-th image from shard_index on; index and stem are those in the whole
+  // list.
+  ImageSet(std::vector<SceneImage> images, int shard_index, int num_shards);
+
+  std::size_t size() const { return entries_.size(); }
+  SceneImage At(std::size_t i) const;
+  const std::string& name(std::size_t i) const { return entries_[i].name; }
+  const std::string& path(std::size_t i) const {
+    return entries_[i].path.empty() ? entries_[i].name : entries_[i].path;
+  }
+  std::size_t index(std::size_t i) const { return entries_[i].index; }
+
+ private:
+  struct Entry {
+    std::string name, path, stem;  // The path is empty where it is the name.
+    std::size_t index = 0, camera = 0;
+    std::unique_ptr<Truth> truth;
+    std::unique_ptr<SceneImage> annotated;  // Whole, where the scene file says more of the photo.
+  };
+
+  std::vector<Entry> entries_;
+  std::vector<Camera> cameras_;
+};
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMPARE_IMAGE_SET_H_

@@ -1,0 +1,192 @@
+#include "apps/compare/record.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <tuple>
+
+#include "apps/common/text.h"
+
+namespace circline::apps {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kTinyTurn = 1e-6;  // Below it a free direction does not turn.
+
+double NumberOr(const Json& line, const char* key, double otherwise) {
+  const auto found = line.find(key);
+  return found != line.end() && found->is_number() ? found->get<double>() : otherwise;
+}
+
+std::optional<double> OptionalNumber(const Json& line, const char* key) {
+  const double value = NumberOr(line, key, kUnknown);
+  return std::isfinite(value) ? std::optional<double>(value) : std::nullopt;
+}
+
+std::string TextOr(const Json& line, const char* key) {
+  const auto found = line.find(key);
+  return found != line.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+std::vector<std::string> Texts(const Json& line, const char* key) {
+  const auto found = line.find(key);
+  return found != line.end() && found->is_array() ? found->get<std::vector<std::string>>()
+                                                  : std::vector<std::string>();
+}
+
+// Null (unbounded) is infinity.
+Eigen::Vector3d ReadVector(const Json& json) {
+  Eigen::Vector3d v;
+  for (int i = 0; i < 3; ++i) {
+    const Json& value = json.at(static_cast<std::size_t>(i));
+    v[i] = value.is_number() ? value.get<double>() : std::numeric_limits<double>::infinity();
+  }
+  return v;
+}
+
+SolverKey ReadKey(const Json& line) {
+  return {line.at("solver").get<std::string>(), line.at("stage").get<std::string>(),
+          TextOr(line, "loss"), NumberOr(line, "loss_scale_px", 0.0)};
+}
+
+PoseErrors ReadErrors(const Json& line) {
+  PoseErrors errors;
+  errors.rotation_deg = OptionalNumber(line, "rotation_error_deg");
+  errors.normal_deg = OptionalNumber(line, "normal_error_deg");
+  errors.translation_deg = OptionalNumber(line, "translation_error_deg");
+  const auto directions = line.find("direction_error_deg");
+  if (directions == line.end()) return errors;
+  for (const auto& [id, error] : directions->items()) {
+    if (error.is_number()) errors.directions_deg.emplace_back(id, error.get<double>());
+  }
+  return errors;
+}
+
+HypothesisRecord ReadHypothesis(const Json& line) {
+  HypothesisRecord h;
+  h.probability = NumberOr(line, "probability", kUnknown);
+  for (std::size_t i = 0; i < 9; ++i) {
+    h.rotation(static_cast<Eigen::Index>(i / 3), static_cast<Eigen::Index>(i % 3)) =
+        line.at("rotation").at(i).get<double>();
+  }
+  h.translation = ReadVector(line.at("translation"));
+  h.metric = line.at("metric").get<bool>();
+  h.origin_observed = line.at("origin_observed").get<bool>();
+  h.rms_px = NumberOr(line, "rms_px", kUnknown);
+  h.num_inliers = line.at("num_inliers").get<int>();
+  h.num_observations = line.at("num_observations").get<int>();
+  h.sigma_rotation_deg = ReadVector(line.at("sigma_rotation_deg"));
+  h.sigma_normal_deg = NumberOr(line, "sigma_normal_deg", kUnknown);
+  for (const Json& direction : line.at("free_directions")) {
+    if (ReadVector(direction).norm() > kTinyTurn) h.rotation_is_free = true;
+  }
+  h.errors = ReadErrors(line);
+  return h;
+}
+
+void ReadResults(const std::string& text, ImageRecord* record) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const Json json = Json::parse(line);
+    const bool has_hypothesis = json.at("hypothesis").is_number();
+    if (!has_hypothesis || json.at("hypothesis").get<int>() == 0) {
+      SolverRecord solver;
+      solver.key = ReadKey(json);
+      solver.status = json.at("status").get<std::string>();
+      solver.message = TextOr(json, "message");
+      solver.decided_by = TextOr(json, "decided_by");
+      solver.notes = Texts(json, "notes");
+      record->solvers.push_back(std::move(solver));
+    }
+    if (has_hypothesis) record->solvers.back().hypotheses.push_back(ReadHypothesis(json));
+  }
+}
+
+void ReadTimings(const std::string& text, ImageRecord* record) {
+  std::istringstream lines(text);
+  std::size_t next = 0;  // Times stand in the order of the results.
+  for (std::string line; std::getline(lines, line);) {
+    const Json json = Json::parse(line);
+    const double microseconds = json.at("microseconds").get<double>();
+    if (!json.contains("solver")) {
+      record->stages.emplace_back(json.at("stage").get<std::string>(), microseconds);
+    } else if (next < record->solvers.size()) {
+      record->solvers[next++].microseconds = microseconds;
+    }
+  }
+}
+
+void ReadObservations(const std::string& text, ImageRecord* record) {
+  const Json line = Json::parse(text);
+  record->index = line.at("index").get<std::size_t>();
+  record->name = line.at("image").get<std::string>();
+  record->error = TextOr(line, "error");
+  record->overlay = TextOr(line, "overlay");
+  record->detected = line.at("detected").get<bool>();
+  record->num_ellipses = line.at("ellipses").size();
+  record->num_segments = line.at("segments").size();
+  record->num_pencils = line.at("pencils").size();
+  record->problems = Texts(line, "problems");
+}
+
+}  // namespace
+
+std::string SolverKey::ScaleText() const {
+  if (!refined()) return "-";
+  return scale_px > 0.0 ? FormatShort(scale_px) : "auto";
+}
+
+std::string SolverKey::LossText() const { return refined() ? loss + ", " + ScaleText() : "-"; }
+
+std::string SolverKey::Name() const {
+  return refined() ? solver + " refined, " + loss + " " + ScaleText() : solver;
+}
+
+bool SolverKey::operator==(const SolverKey& other) const {
+  return std::tie(solver, stage, loss, scale_px) ==
+         std::tie(other.solver, other.stage, other.loss, other.scale_px);
+}
+
+Status ParseRecord(const ImageLines& lines, ImageRecord* record) {
+  *record = {};
+  try {
+    ReadObservations(lines.observations, record);
+    ReadResults(lines.results, record);
+    ReadTimings(lines.timings, record);
+  } catch (const nlohmann::json::exception& error) {
+    return Status::Invalid(std::string("a line is not as this program writes it: ") + error.what());
+  }
+  return Status::Ok();
+}
+
+bool ReadLineCounts(const std::string& observation_line, LineCounts* counts) {
+  const Json line = Json::parse(observation_line, nullptr, false);
+  if (!line.is_object() || !line.contains("lines") || !line.contains("index")) return false;
+  try {
+    counts->index = line["index"].get<std::size_t>();
+    counts->results = line["lines"].at("results").get<std::size_t>();
+    counts->timings = line["lines"].at("timings").get<std::size_t>();
+  } catch (const nlohmann::json::exception&) {
+    return false;
+  }
+  return true;
+}
+
+std::array<int, 3> ShowRank(const std::string& solver, bool refined, int num_observations) {
+  return {solver == "joint" ? 1 : 0, refined ? 1 : 0, num_observations};
+}
+
+const SolverRecord* SolverToShow(const ImageRecord& record) {
+  const SolverRecord* best = nullptr;
+  const auto rank = [](const SolverRecord& r) {
+    return ShowRank(r.key.solver, r.key.refined(), r.hypotheses.front().num_observations);
+  };
+  for (const SolverRecord& candidate : record.solvers) {
+    if (!candidate.HasAnswer()) continue;
+    if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
+  }
+  return best;
+}
+
+}  // namespace circline::apps

@@ -1,0 +1,206 @@
+#include "apps/compare/report_image.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "apps/common/text.h"
+
+namespace circline::apps {
+namespace {
+
+std::string Cell(const std::string& text, const char* css = nullptr) {
+  return std::string("<td") + (css == nullptr ? "" : std::string(" class='") + css + "'") + ">" +
+         EscapeHtml(text) + "</td>";
+}
+
+std::string StageText(const SolverRecord& run) {
+  return run.key.refined() ? "refined" : "closed form";
+}
+
+std::string SigmaText(const HypothesisRecord& hypothesis) {
+  if (hypothesis.rotation_is_free) {
+    const double normal = hypothesis.sigma_normal_deg;
+    return std::isfinite(normal) ? "normal " + FormatShort(normal, 2) : "free";
+  }
+  std::vector<std::string> parts;
+  for (const double sigma : hypothesis.sigma_rotation_deg)
+    parts.push_back(std::isfinite(sigma) ? FormatShort(sigma, 2) : "free");
+  return JoinList(parts, " / ");
+}
+
+std::string ErrorText(const std::optional<double>& error) {
+  return error ? FormatShort(*error) : "-";
+}
+
+std::string DirectionText(const PoseErrors& errors) {
+  std::vector<std::string> parts;
+  for (const auto& [id, error] : errors.directions_deg)
+    parts.push_back(id + " " + FormatShort(error));
+  return parts.empty() ? "-" : JoinList(parts, ", ");
+}
+
+std::string Sentences(const SolverRecord& solver) {
+  std::vector<std::string> sentences;
+  if (!solver.message.empty()) sentences.push_back(solver.message);
+  if (!solver.decided_by.empty()) sentences.push_back("Decided by: " + solver.decided_by);
+  sentences.insert(sentences.end(), solver.notes.begin(), solver.notes.end());
+  return JoinList(sentences, " | ");
+}
+
+// Which errors some hypothesis of the image has.
+struct TruthColumns {
+  bool rotation = false, normal = false, translation = false, directions = false;
+  explicit TruthColumns(const ImageRecord& record) {
+    for (const SolverRecord& solver : record.solvers) {
+      for (const HypothesisRecord& hypothesis : solver.hypotheses) {
+        const PoseErrors& errors = hypothesis.errors;
+        rotation = rotation || errors.rotation_deg;
+        normal = normal || errors.normal_deg;
+        translation = translation || errors.translation_deg;
+        directions = directions || !errors.directions_deg.empty();
+      }
+    }
+  }
+};
+
+std::string SolverHead(const TruthColumns& truth) {
+  std::string html =
+      "<tr><th class='l'>solver</th><th class='l'>stage</th><th class='l'>loss, scale px</th>"
+      "<th>hypothesis</th><th>probability</th>";
+  if (truth.rotation) html += "<th>rotation<br>error &deg;</th>";
+  if (truth.normal) html += "<th>normal<br>error &deg;</th>";
+  if (truth.translation) html += "<th>translation<br>error &deg;</th>";
+  if (truth.directions) html += "<th class='l'>direction error &deg;</th>";
+  return html +
+         "<th>rms px</th><th>inliers</th><th>sigma of<br>rotation &deg;</th><th>time</th>"
+         "<th class='l'>remarks</th></tr>";
+}
+
+std::string HypothesisRow(const SolverRecord& run, std::size_t i, const TruthColumns& truth,
+                          bool shown) {
+  const HypothesisRecord& h = run.hypotheses[i];
+  const PoseErrors& errors = h.errors;
+  std::string html = i > 0 ? "<tr class='more'>" : shown ? "<tr class='shown'>" : "<tr>";
+  html +=
+      i > 0 ? "<td></td><td></td><td></td>"
+            : Cell(run.key.solver, "l") + Cell(StageText(run), "l") + Cell(run.key.LossText(), "l");
+  html += Cell(std::to_string(i + 1) + " of " + std::to_string(run.hypotheses.size())) +
+          Cell(FormatFixed(h.probability, 3));
+  if (truth.rotation) html += Cell(ErrorText(errors.rotation_deg));
+  if (truth.normal) html += Cell(ErrorText(errors.normal_deg));
+  if (truth.translation) html += Cell(ErrorText(errors.translation_deg));
+  if (truth.directions) html += Cell(DirectionText(errors), "l");
+  html += Cell(FormatShort(h.rms_px)) +
+          Cell(std::to_string(h.num_inliers) + " / " + std::to_string(h.num_observations)) +
+          Cell(SigmaText(h));
+  html += i > 0 ? "<td></td><td></td>"
+                : Cell(FormatMicroseconds(run.microseconds)) + Cell(Sentences(run), "say");
+  return html + "</tr>";
+}
+
+std::string SolverTable(const ImageRecord& record) {
+  const SolverRecord* shown = SolverToShow(record);
+  if (shown == nullptr) return "";
+  const TruthColumns truth(record);
+  std::string html = "<div class='scroll'><table><thead>" + SolverHead(truth) + "</thead><tbody>";
+  for (const SolverRecord& solver : record.solvers) {
+    for (std::size_t i = 0; i < solver.hypotheses.size(); ++i) {
+      html += HypothesisRow(solver, i, truth, &solver == shown);
+    }
+  }
+  return html + "</tbody></table></div>";
+}
+
+// Solvers without an answer, those with the same sentence together.
+std::string Refusals(const ImageRecord& record) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> groups;  // Sentence, solvers.
+  for (const SolverRecord& solver : record.solvers) {
+    if (solver.HasAnswer()) continue;
+    const std::string sentence = solver.status + ": " + Sentences(solver);
+    auto group = std::find_if(groups.begin(), groups.end(),
+                              [&](const auto& g) { return g.first == sentence; });
+    if (group == groups.end()) group = groups.insert(groups.end(), {sentence, {}});
+    if (group->second.empty() || group->second.back() != solver.key.solver) {
+      group->second.push_back(solver.key.solver);
+    }
+  }
+  if (groups.empty()) return "";
+  std::string html = "<ul class='say'>";
+  for (const auto& [sentence, solvers] : groups) {
+    html +=
+        "<li><b>" + EscapeHtml(JoinList(solvers, ", ")) + "</b> " + EscapeHtml(sentence) + "</li>";
+  }
+  return html + "</ul>";
+}
+
+// At most so many sentences, so that a hundred bad points do not hide the rest.
+std::string Problems(const std::vector<std::string>& problems) {
+  constexpr std::size_t kMost = 8;
+  if (problems.empty()) return "";
+  std::string html = "<ul class='say'>";
+  for (std::size_t i = 0; i < std::min(kMost, problems.size()); ++i) {
+    html += "<li>" + EscapeHtml(problems[i]) + "</li>";
+  }
+  if (problems.size() > kMost) {
+    html += "<li>and " + std::to_string(problems.size() - kMost) + " more</li>";
+  }
+  return html + "</ul>";
+}
+
+std::string EvidenceText(const ImageRecord& record) {
+  std::string text = std::to_string(record.num_ellipses) + " ellipses, " +
+                     std::to_string(record.num_segments) + " segments in " +
+                     std::to_string(record.num_pencils) + " pencils, " +
+                     (record.detected ? "all detected in the photo" : "as the scene file says");
+  for (const auto& [stage, microseconds] : record.stages)
+    text += "; " + stage + " " + FormatMicroseconds(microseconds);
+  return text;
+}
+
+std::string Picture(const std::string& name, const std::vector<std::uint8_t>& jpeg) {
+  return "<figure><img alt='" + EscapeHtml(name) +
+         ", with what was found in it' src='data:image/jpeg;base64," + EncodeBase64(jpeg) +
+         "'></figure>";
+}
+
+}  // namespace
+
+std::string ImageSection(const ImageRecord& record, const std::vector<std::uint8_t>& picture,
+                         const std::string& why) {
+  std::string html = "<section class='image' data-why='" + why + "'><h3>" +
+                     EscapeHtml(record.name) + (why.empty() ? "" : "<small>" + why + "</small>") +
+                     "</h3>";
+  if (!record.error.empty()) {
+    return html + "<p class='failed'>Not read: " + EscapeHtml(record.error) + ".</p></section>\n";
+  }
+  html += "<div class='two'>";
+  if (!picture.empty()) html += Picture(record.name, picture);
+  html += "<div><p class='lead'>" + EscapeHtml(EvidenceText(record)) + ".</p>";
+  if (!record.overlay.empty()) {
+    html += "<p class='lead'>Full picture: " + EscapeHtml(record.overlay) + "</p>";
+  }
+  return html + Problems(record.problems) + Refusals(record) + "</div></div>" +
+         SolverTable(record) + "</section>\n";
+}
+
+std::string OverlayLegend() {
+  const std::vector<std::pair<const char*, const char*>> entries = {
+      {"#ffd700",
+       "fitted ellipses, pale where the pose does not use them; cross: image of the circle's "
+       "centre, "
+       "ring: that of the second hypothesis"},
+      {"#ff4646", "X, and lines along it"},
+      {"#3cdc50", "Y"},
+      {"#328cff", "Z, or the plane's normal"},
+      {"#e650dc", "lines along a free direction (a colour each)"},
+      {"#78e6ff", "dashed: vanishing line of the plane"}};
+  std::string html = "<p class='legend'>";
+  for (const auto& [color, text] : entries) {
+    html += std::string("<span><i style='background:") + color + "'></i>" + EscapeHtml(text) +
+            "</span>";
+  }
+  return html + "</p>";
+}
+
+}  // namespace circline::apps

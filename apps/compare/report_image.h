@@ -1,0 +1,23 @@
+// The part of report.html on one photo.
+#ifndef CIRCLINE_APPS_COMPARE_REPORT_IMAGE_H_
+#define CIRCLINE_APPS_COMPARE_REPORT_IMAGE_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "apps/compare/record.h"
+
+namespace circline::apps {
+
+// What was found, every hypothesis of every solver, and why the others refused. `picture` is the
+// overlay as JPEG (may be empty), `why` as SelectImages says.
+std::string ImageSection(const ImageRecord& record, const std::vector<std::uint8_t>& picture,
+                         const std::string& why);
+
+// What the colours of the overlays mean.
+std::string OverlayLegend();
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMPARE_REPORT_IMAGE_H_

@@ -1,0 +1,27 @@
+// The plots of report.html, each as a <div> with inline SVG; empty where there is nothing to show.
+#ifndef CIRCLINE_APPS_COMPARE_REPORT_PLOTS_H_
+#define CIRCLINE_APPS_COMPARE_REPORT_PLOTS_H_
+
+#include <string>
+
+#include "apps/compare/summary.h"
+
+namespace circline::apps {
+
+// Share of images within an error, a curve for each row: rotation, normal, direction.
+std::string CumulativePlots(const Summary& summary);
+
+// Boxes from quartile to quartile with the median, whiskers at 5 and 95 %: errors where there is a
+// truth, and residuals.
+std::string BoxPlots(const Summary& summary);
+
+// Median time of a call of each row.
+std::string RuntimePlot(const Summary& summary);
+
+// For each solver: median error (or residual and share of inliers) against the scale, a curve for
+// each loss; dashed: the estimated scale.
+std::string SweepPlots(const Summary& summary);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMPARE_REPORT_PLOTS_H_

@@ -1,0 +1,109 @@
+#include "apps/compare/report_tables.h"
+
+#include <algorithm>
+
+#include "apps/common/text.h"
+#include "apps/compare/sweep.h"
+
+namespace circline::apps {
+namespace {
+
+std::string Cell(const std::string& text, const char* css = nullptr) {
+  return std::string("<td") + (css == nullptr ? "" : std::string(" class='") + css + "'") + ">" +
+         EscapeHtml(text) + "</td>";
+}
+
+// The cell's number: the median error, or the residual and the share of inliers.
+std::string SweepText(const SummaryRow* row) {
+  if (row == nullptr || row->ok == 0) return "-";
+  if (!row->headline_errors.empty()) return FormatShort(Median(row->headline_errors)) + " \u00b0";
+  return FormatShort(Median(row->rms_px)) + " px, " +
+         FormatFixed(100.0 * Mean(row->inlier_shares), 0) + " %";
+}
+
+}  // namespace
+
+std::string SummaryTable(const Summary& summary) {
+  std::vector<SummaryColumn> columns = summary.Columns();
+  columns.push_back(
+      {"time ms", "median time of a call", false, [](const SummaryRow& row) {
+         return FormatShort(1e-3 * Median({row.microseconds.begin(), row.microseconds.end()}));
+       }});
+  std::string html = "<div class='scroll'><table class='sortable'><thead><tr>";
+  for (const SummaryColumn& column : columns) {
+    html += std::string("<th") + (column.left ? " class='l'" : "") + " title='" +
+            EscapeHtml(column.explanation) + "'>" + EscapeHtml(column.title) + "</th>";
+  }
+  html += "</tr></thead><tbody>";
+  for (const SummaryRow* row : summary.Ranked()) {
+    html += "<tr>";
+    for (const SummaryColumn& column : columns) {
+      html += Cell(column.text(*row), column.left ? "l" : nullptr);
+    }
+    html += "</tr>";
+  }
+  return html + "</tbody></table></div>";
+}
+
+std::string AgreementTable(const Agreement& agreement) {
+  std::vector<std::size_t> used;  // Solvers that answered together with some other.
+  const std::size_t count = agreement.keys().size();
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = 0; j < count; ++j) {
+      if (i == j || !agreement.MedianDeg(i, j)) continue;
+      used.push_back(i);
+      break;
+    }
+  }
+  if (used.empty()) return "";
+  std::string html = "<div class='scroll'><table class='matrix'><thead><tr><th></th>";
+  for (const std::size_t i : used) {
+    const SolverKey& key = agreement.keys()[i];
+    html +=
+        "<th>" + EscapeHtml(key.solver) + "<br>" + (key.refined() ? "refined" : "closed") + "</th>";
+  }
+  html += "</tr></thead><tbody>";
+  for (const std::size_t i : used) {
+    html += "<tr><th class='l'>" + EscapeHtml(agreement.keys()[i].Name()) + "</th>";
+    for (const std::size_t j : used) {
+      const std::optional<double> median = i == j ? std::nullopt : agreement.MedianDeg(i, j);
+      html += "<td" +
+              (median ? " title='" + std::to_string(agreement.Count(i, j)) + " images'"
+                      : std::string()) +
+              ">" +
+              (i == j   ? ""
+               : median ? FormatShort(*median, 2)
+                        : "-") +
+              "</td>";
+    }
+    html += "</tr>";
+  }
+  return html + "</tbody></table></div>";
+}
+
+std::string SweepTable(const Summary& summary) {
+  const std::vector<LossPoint> points = LossPoints(summary);
+  if (points.size() < 2) return "";
+  const std::vector<std::string> solvers = RefinedSolvers(summary);
+  std::string html =
+      "<div class='scroll'><table class='sortable'><thead><tr><th class='l'>loss</th>"
+      "<th>scale px</th>";
+  std::vector<const SummaryRow*> best;
+  for (const std::string& solver : solvers) {
+    html += "<th>" + EscapeHtml(solver) + "</th>";
+    best.push_back(BestRow(summary, solver));
+  }
+  html += "</tr></thead><tbody>";
+  for (const LossPoint& point : points) {
+    html += "<tr>" + Cell(point.loss, "l") +
+            Cell(point.scale_px > 0.0 ? FormatShort(point.scale_px) : "auto");
+    for (std::size_t i = 0; i < solvers.size(); ++i) {
+      const SummaryRow* row = FindRefined(summary, solvers[i], point);
+      html += Cell(SweepText(row), row != nullptr && row == best[i] ? "best" : nullptr);
+    }
+    html += "</tr>";
+  }
+  return html + "</tbody></table></div>";
+}
+
+}  // namespace circline::apps

@@ -1,0 +1,109 @@
+#include "apps/compare/resume.h"
+
+#include <filesystem>
+#include <sstream>
+
+#include "apps/common/flags_util.h"
+#include "apps/common/output_file.h"
+#include "apps/common/storage_node.h"
+#include "apps/compare/record_files.h"
+
+namespace circline::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Lies in the folder while a run is under way, and says with which flags.
+std::string MarkerPath(const std::string& folder) { return folder + "/unfinished.flags"; }
+
+Status OtherRun(const std::string& folder, const std::string& what) {
+  return Status::Invalid("--resume: " + folder + " has the results of another run: " + what +
+                         "; give another --output, or leave --resume out to begin anew");
+}
+
+// The first line in which they differ.
+std::string FirstDifference(const std::string& before, const std::string& now) {
+  std::istringstream a(before), b(now);
+  std::string line_a, line_b;
+  while (std::getline(a, line_a) && std::getline(b, line_b)) {
+    if (line_a != line_b) return line_a + ", now " + line_b;
+  }
+  return "its flags differ";
+}
+
+Status CheckFlags(const std::string& folder, const std::string& flags) {
+  std::string before;
+  if (!IsUnfinished(folder) || !ReadTextFile(MarkerPath(folder), &before).ok()) return Status::Ok();
+  return before == flags ? Status::Ok() : OtherRun(folder, FirstDifference(before, flags));
+}
+
+bool SameSolvers(const ImageRecord& record, const std::vector<SolverKey>& solvers) {
+  if (!record.error.empty()) return true;
+  if (record.solvers.size() != solvers.size()) return false;
+  for (std::size_t i = 0; i < solvers.size(); ++i) {
+    if (!(record.solvers[i].key == solvers[i])) return false;
+  }
+  return true;
+}
+
+Status FindDone(const std::string& folder, const ImageSet& images,
+                const std::vector<SolverKey>& solvers, DonePart* done) {
+  RecordReader reader(folder);
+  ImageRecord record;
+  for (ImageLines lines; reader.Next(&lines);) {
+    if (!ParseRecord(lines, &record).ok()) return Status::Ok();  // Done again from here on.
+    if (done->images >= images.size()) return OtherRun(folder, "it has more images");
+    const std::string& name = images.name(done->images);
+    if (record.name != name || record.index != images.index(done->images)) {
+      return OtherRun(folder, "its image " + std::to_string(done->images + 1) + " is " +
+                                  record.name + ", not " + name);
+    }
+    if (!SameSolvers(record, solvers)) return OtherRun(folder, "its solvers or losses differ");
+    if (!record.error.empty()) SayOnStderr(images.path(done->images) + ": " + record.error);
+    ++done->images;
+    done->bytes = reader.bytes_read();
+  }
+  return Status::Ok();
+}
+
+// Pictures that were being written when the run was stopped.
+void RemoveParts(const std::string& folder) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() == ".part") fs::remove(entry.path(), error);
+  }
+}
+
+}  // namespace
+
+Status PrepareFolder(const std::string& folder, bool resume, const ImageSet& images,
+                     const std::vector<SolverKey>& solvers, const std::string& flags,
+                     DonePart* done) {
+  *done = {};
+  if (resume) {
+    Status status = CheckFlags(folder, flags);
+    if (status.ok()) status = FindDone(folder, images, solvers, done);
+    if (!status.ok()) return status;
+  } else {
+    for (const char* name :
+         {"results.jsonl", "observations.jsonl", "timings.jsonl", "summary.csv", "report.html"}) {
+      std::error_code error;
+      fs::remove(folder + "/" + name, error);
+    }
+  }
+  RemoveParts(folder);
+  RemoveParts(folder + "/overlays");
+  return WriteFile(MarkerPath(folder), flags);
+}
+
+void MarkFinished(const std::string& folder) {
+  std::error_code error;
+  fs::remove(MarkerPath(folder), error);
+}
+
+bool IsUnfinished(const std::string& folder) {
+  std::error_code error;
+  return fs::exists(MarkerPath(folder), error);
+}
+
+}  // namespace circline::apps

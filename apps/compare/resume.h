@@ -1,0 +1,36 @@
+// Going on where a run was stopped.
+#ifndef CIRCLINE_APPS_COMPARE_RESUME_H_
+#define CIRCLINE_APPS_COMPARE_RESUME_H_
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "apps/compare/image_set.h"
+#include "apps/compare/record.h"
+#include "circline/estimators/status.h"
+
+namespace circline::apps {
+
+// The images, from the first on, whose lines are in the files whole, and how many bytes of
+// results.jsonl, observations.jsonl and timings.jsonl these are.
+struct DonePart {
+  std::size_t images = 0;
+  std::array<std::uint64_t, 3> bytes{};
+};
+
+// Clears a folder of the results of an earlier run, or, with `resume`, finds what of them stands.
+// Not ok: they are those of other images, solvers or flags. `flags` are all that shape the results,
+// one a line. Photos that could not be read are named on stderr again.
+Status PrepareFolder(const std::string& folder, bool resume, const ImageSet& images,
+                     const std::vector<SolverKey>& solvers, const std::string& flags,
+                     DonePart* done);
+
+// A folder is unfinished from PrepareFolder until this.
+void MarkFinished(const std::string& folder);
+bool IsUnfinished(const std::string& folder);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMPARE_RESUME_H_

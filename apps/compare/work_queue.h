@@ -1,0 +1,20 @@
+// Images through many threads, the results out in order.
+#ifndef CIRCLINE_APPS_COMPARE_WORK_QUEUE_H_
+#define CIRCLINE_APPS_COMPARE_WORK_QUEUE_H_
+
+#include <cstddef>
+#include <functional>
+
+#include "apps/compare/image_worker.h"
+
+namespace circline::apps {
+
+// Calls `work` for 0 .. count - 1 in OpenCV's thread pool, on as many threads as cv::getNumThreads
+// says, and `deliver` with what came of it: one call at a time, in order. Only so many results wait
+// for their turn that memory does not depend on `count`. A `deliver` that returns false ends it.
+void WorkInOrder(std::size_t count, const std::function<WorkedImage(std::size_t)>& work,
+                 const std::function<bool(std::size_t, const WorkedImage&)>& deliver);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMPARE_WORK_QUEUE_H_

@@ -1,0 +1,210 @@
+// The parts of circline_compare by themselves: queue, records, selection, agreement.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <opencv2/core/utility.hpp>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "apps/compare/agreement.h"
+#include "apps/compare/record_files.h"
+#include "apps/compare/selection.h"
+#include "apps/compare/sweep.h"
+#include "apps/compare/work_queue.h"
+#include "circline/estimators/pose.h"
+#include "tests/apps/test_files.h"
+
+namespace circline::apps {
+namespace {
+
+TEST(WorkQueue, DeliversInOrderAndKeepsNearTheOldest) {
+  cv::setNumThreads(2);
+  constexpr std::size_t kCount = 2000;
+  std::atomic<std::size_t> started{0}, delivered{0};
+  std::atomic<std::size_t> most_ahead{0};
+  std::vector<std::size_t> order;
+  WorkInOrder(
+      kCount,
+      [&](std::size_t i) {
+        const std::size_t ahead = ++started - delivered;
+        std::size_t most = most_ahead;
+        while (ahead > most && !most_ahead.compare_exchange_weak(most, ahead)) {
+        }
+        if (i == 0) std::this_thread::sleep_for(std::chrono::milliseconds(200));  // The slow one.
+        WorkedImage image;
+        image.lines.results = std::to_string(i);
+        return image;
+      },
+      [&](std::size_t i, const WorkedImage& image) {
+        EXPECT_EQ(image.lines.results, std::to_string(i));
+        order.push_back(i);
+        ++delivered;
+        return true;
+      });
+  ASSERT_EQ(order.size(), kCount);
+  EXPECT_TRUE(std::is_sorted(order.begin(), order.end()));
+  EXPECT_LE(most_ahead, 300U);  // Not all the others while the slow one is worked on.
+}
+
+TEST(WorkQueue, EndsWhenDeliveryFails) {
+  for (const int threads : {1, 2}) {
+    cv::setNumThreads(threads);
+    int delivered = 0;
+    WorkInOrder(
+        1000, [](std::size_t) { return WorkedImage(); },
+        [&](std::size_t i, const WorkedImage&) {
+          ++delivered;
+          return i < 5;
+        });
+    EXPECT_EQ(delivered, 6);
+  }
+}
+
+ImageLines OneImage(int index) {
+  const std::string i = std::to_string(index);
+  return {"{\"result\":" + i + "}\n{\"result\":" + i + "}\n",
+          "{\"index\":" + i + ",\"lines\":{\"results\":2,\"timings\":1}}\n",
+          "{\"time\":" + i + "}\n"};
+}
+
+TEST(RecordFiles, GoesOnAfterTheLastWholeImage) {
+  const TestFolder folder;
+  {
+    RecordWriter writer(folder.path(), {});
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE(writer.Append(OneImage(i)).ok());
+  }
+  const std::string whole = ReadAll(folder / "results.jsonl");
+  const std::size_t one = whole.size() / 3;
+  // Cut anywhere in the third image: two are whole.
+  for (const std::size_t keep : {2 * one, 2 * one + 1, 2 * one + one / 2, 3 * one - 1}) {
+    std::filesystem::resize_file(folder / "results.jsonl", keep);
+    RecordReader reader(folder.path());
+    ImageLines lines;
+    int count = 0;
+    while (reader.Next(&lines)) ++count;
+    EXPECT_EQ(count, 2) << keep;
+    RecordWriter writer(folder.path(), reader.bytes_read());
+    ASSERT_TRUE(writer.Append(OneImage(2)).ok());
+    EXPECT_EQ(ReadAll(folder / "results.jsonl"), whole);
+  }
+}
+
+TEST(Record, NamesALineThatIsNotOfThisProgram) {
+  ImageRecord record;
+  EXPECT_FALSE(ParseRecord({"", "not json\n", ""}, &record).ok());
+  EXPECT_FALSE(ParseRecord({"{\"solver\":1}\n", OneImage(0).observations, ""}, &record).ok());
+}
+
+TEST(Selection, TakesWorstMedianAndRefused) {
+  std::vector<ImageScore> scores;
+  for (int i = 0; i < 1000; ++i) {
+    ImageScore score;
+    score.fate = i % 10 == 3 ? Fate::kRefused : Fate::kAnswered;
+    score.has_truth = true;
+    score.value = static_cast<float>((i * 7919) % 1000);  // All different.
+    scores.push_back(score);
+  }
+  const std::vector<ShownImage> shown = SelectImages(scores, 90);
+  ASSERT_EQ(shown.size(), 90U);
+  std::set<std::size_t> positions;
+  std::vector<float> worst, median;
+  int refused = 0;
+  for (const ShownImage& image : shown) {
+    positions.insert(image.position);
+    const std::string why = image.why;
+    if (why == "worst") worst.push_back(scores[image.position].value);
+    if (why == "median") median.push_back(scores[image.position].value);
+    if (why == "refused") {
+      ++refused;
+      EXPECT_EQ(scores[image.position].fate, Fate::kRefused);
+    }
+  }
+  EXPECT_EQ(positions.size(), 90U);  // None twice.
+  EXPECT_EQ(refused, 30);
+  ASSERT_EQ(worst.size(), 30U);
+  ASSERT_EQ(median.size(), 30U);
+  std::vector<float> values;
+  for (const ImageScore& score : scores) {
+    if (score.fate == Fate::kAnswered) values.push_back(score.value);
+  }
+  std::sort(values.rbegin(), values.rend());
+  EXPECT_EQ(worst, std::vector<float>(values.begin(), values.begin() + 30));
+  EXPECT_EQ(median, std::vector<float>(values.begin() + 435, values.begin() + 465));
+}
+
+TEST(Selection, ShowsAllOfAFew) {
+  const std::vector<ImageScore> scores(7);
+  const std::vector<ShownImage> shown = SelectImages(scores, 10);
+  ASSERT_EQ(shown.size(), 7U);
+  for (std::size_t i = 0; i < 7; ++i) {
+    EXPECT_EQ(shown[i].position, i);
+    EXPECT_STREQ(shown[i].why, "");
+  }
+}
+
+SolverRecord Answer(const std::string& solver, double tilt_deg) {
+  SolverRecord record;
+  record.key = {solver, "refined", "huber", 1.0};
+  record.status = "ok";
+  HypothesisRecord hypothesis;
+  hypothesis.rotation = ExpRotation({tilt_deg * 0.017453292519943295, 0.0, 0.0});
+  record.hypotheses = {hypothesis};
+  return record;
+}
+
+TEST(Agreement, MedianAngleOfThePlanes) {
+  Agreement agreement;
+  for (int i = 0; i <= 10000; ++i) {  // More than are kept.
+    ImageRecord record;
+    record.solvers = {Answer("a", 10.0), Answer("b", 10.0 + i * 1e-3), Answer("c", 190.0)};
+    if (i % 2 == 0) record.solvers[2].hypotheses.clear();
+    agreement.Add(record);
+  }
+  ASSERT_EQ(agreement.keys().size(), 3U);
+  EXPECT_NEAR(*agreement.MedianDeg(0, 1), 5.0, 0.02);
+  EXPECT_EQ(*agreement.MedianDeg(0, 1), *agreement.MedianDeg(1, 0));
+  EXPECT_NEAR(*agreement.MedianDeg(0, 2), 0.0, 1e-5);  // The normal's sense does not count.
+  EXPECT_EQ(agreement.Count(0, 2), 5000U);
+}
+
+SolverRecord Refined(const std::string& loss, double scale, double error_deg, int num_inliers) {
+  SolverRecord record = Answer("joint", 0.0);
+  record.key.loss = loss;
+  record.key.scale_px = scale;
+  HypothesisRecord& hypothesis = record.hypotheses.front();
+  if (error_deg > 0.0) hypothesis.errors.rotation_deg = error_deg;
+  hypothesis.rms_px = 0.01 * num_inliers;
+  hypothesis.num_inliers = num_inliers;
+  hypothesis.num_observations = 100;
+  return record;
+}
+
+TEST(Sweep, BestHasTheSmallestErrorOfThoseThatAnswer) {
+  Summary summary;
+  for (int i = 0; i < 10; ++i) {
+    ImageRecord record;
+    record.solvers = {Refined("huber", 0.5, 0.3, 90), Refined("huber", 0.0, 0.2, 90),
+                      Refined("tukey", 0.5, 0.1, 90)};
+    if (i % 2 == 0) record.solvers[2].hypotheses.clear();  // Only the easy half.
+    summary.Add(record);
+  }
+  const SummaryRow* best = BestRow(summary);
+  ASSERT_NE(best, nullptr);
+  EXPECT_EQ(best->key.Name(), "joint refined, huber auto");
+  EXPECT_EQ(LossPoints(summary).size(), 3U);
+}
+
+TEST(Sweep, WithoutTruthTheMostInliersThenTheSmallestResidual) {
+  Summary summary;
+  ImageRecord record;
+  record.solvers = {Refined("huber", 0.1, 0.0, 40), Refined("tukey", 1.0, 0.0, 95),
+                    Refined("huber", 1.0, 0.0, 80)};
+  summary.Add(record);
+  EXPECT_EQ(BestRow(summary)->key.Name(), "joint refined, tukey 1.00");
+}
+
+}  // namespace
+}  // namespace circline::apps

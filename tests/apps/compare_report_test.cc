@@ -1,0 +1,121 @@
+// report.html as its readers get it.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "apps/compare/digest.h"
+#include "apps/compare/report.h"
+#include "tests/apps/board_set.h"
+#include "tests/apps/run_compare.h"
+#include "tests/apps/test_files.h"
+
+namespace circline::apps {
+namespace {
+
+int Count(const std::string& text, const std::string& part) {
+  int found = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) {
+    ++found;
+  }
+  return found;
+}
+
+std::string RunSweep(const TestFolder& folder) {
+  const std::string scene = MakeSet(folder);
+  const std::string text =
+      ReadAll(scene) + "  - { file: \"gone.png\", camera: \"k\" }\n";  // Cannot be read.
+  EXPECT_EQ(RunCompare("--scene='" + folder.Write("more.yaml", text) +
+                       "' --robust_loss=huber,tukey --loss_scale_px=0.5,1,auto --output='" +
+                       folder / "out" + "'")
+                .exit_code,
+            1);
+  return folder / "out";
+}
+
+TEST(CompareReport, ShowsSomeImagesAndNamesTheOthers) {
+  const TestFolder folder;
+  const std::string out = RunSweep(folder);
+  std::string report = ReadAll(out + "/report.html");
+  EXPECT_EQ(Count(report, "<section class='image'"), 7);
+  EXPECT_EQ(Count(report, "data:image/jpeg;base64,"), 6);
+  EXPECT_CONTAINS(report, "Not read: the file does not exist");
+
+  Digest digest;
+  ASSERT_TRUE(ReadDigest(out, &digest).ok());
+  ASSERT_TRUE(WriteReport(out, digest, 4).ok());
+  report = ReadAll(out + "/report.html");
+  EXPECT_EQ(Count(report, "<section class='image'"), 4);
+  EXPECT_EQ(Count(report, "data-why='worst'"), 2);
+  EXPECT_EQ(Count(report, "data-why='median'"), 1);
+  EXPECT_EQ(Count(report, "data-why='refused'"), 1);
+  EXPECT_EQ(Count(report, "data:image/jpeg;base64,"), 3);
+  EXPECT_EQ(Count(report, "<td class='l'>overlays/tilt"), 3);  // Named, not shown.
+}
+
+TEST(CompareReport, HasEveryChapterAndNothingFromElsewhere) {
+  const TestFolder folder;
+  const std::string report = ReadAll(RunSweep(folder) + "/report.html");
+  for (const char* chapter :
+       {"summary", "curves", "boxes", "sweep", "agreement", "times", "images"}) {
+    EXPECT_EQ(Count(report, std::string("<h2 id='") + chapter + "'"), 1) << chapter;
+  }
+  for (const char* reference : {"http:", "https:", "<link", "url(", "@import", "src='/", "src=\"",
+                                "//cdn", "srcset", "<iframe", "fetch(", "XMLHttpRequest"}) {
+    EXPECT_EQ(Count(report, reference), 0) << reference;
+  }
+  EXPECT_CONTAINS(report, "Best: ");
+  for (const char* number : {">nan", ">-nan", ">inf", "'nan", "M nan", " nan"}) {
+    EXPECT_EQ(Count(report, number), 0) << number;
+  }
+}
+
+// The page in a real browser. Errors of scripts show as lines of its log; what it would fetch has
+// no network to come from, so a reference elsewhere shows there as well.
+TEST(CompareReport, RunsInABrowserWithoutAnError) {
+  if (std::system("command -v chromium > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "no chromium here: apt-get install chromium";
+  }
+  const TestFolder folder;
+  const std::string out = RunSweep(folder);
+  // A copy that clicks through what can be clicked, then says what became of it.
+  std::string page = ReadAll(out + "/report.html");
+  const std::string clicks =
+      "<script>"
+      "document.querySelectorAll('th').forEach(function(h){h.click();h.click()});"
+      "document.querySelectorAll('.choose button').forEach(function(b){b.click()});"
+      "document.querySelector('figure img').click();"
+      "var zoom=document.getElementById('zoom');"
+      "zoom.dispatchEvent(new WheelEvent('wheel',{deltaY:-300,clientX:9,clientY:9}));"
+      "document.title='open='+zoom.classList.contains('on');"
+      "document.dispatchEvent(new KeyboardEvent('keydown',{key:'ArrowRight'}));"
+      "document.dispatchEvent(new KeyboardEvent('keydown',{key:'Escape'}));"
+      "document.title+=' closed='+!zoom.classList.contains('on');"
+      "var head=document.querySelector('#summary+div th');"
+      "while(!head.classList.contains('down'))head.click();"
+      "var names=Array.from(document.querySelectorAll('#summary+div tbody tr')).map(function(r){"
+      "return r.cells[0].textContent});"
+      "document.title+=' sorted='+(names.join()==names.slice().sort().reverse().join())"
+      "+' requests='+performance.getEntriesByType('resource').filter(function(e){"
+      "return !e.name.startsWith('data:')}).length"
+      "</script></body>";
+  const std::size_t end = page.rfind("</body>");
+  ASSERT_NE(end, std::string::npos);
+  page.replace(end, 7, clicks);
+  folder.Write("page.html", page);
+  const std::string command =
+      "HOME='" + folder.path() +
+      "' timeout 120 chromium --headless --no-sandbox --disable-gpu --disable-dev-shm-usage "
+      "--enable-logging=stderr --v=0 --virtual-time-budget=3000 --dump-dom 'file://" +
+      folder / "page.html" + "' >'" + folder / "dom" + "' 2>'" + folder / "log" + "'";
+  ASSERT_EQ(std::system(command.c_str()), 0) << ReadAll(folder / "log");
+  const std::string log = ReadAll(folder / "log"), dom = ReadAll(folder / "dom");
+  const std::string title =
+      dom.substr(dom.find("<title>"), dom.find("</title>") - dom.find("<title>"));
+  EXPECT_EQ(Count(log, "CONSOLE"), 0) << log;
+  EXPECT_EQ(title, "<title>open=true closed=true sorted=true requests=0");
+}
+
+}  // namespace
+}  // namespace circline::apps

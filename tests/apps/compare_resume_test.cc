@@ -1,0 +1,179 @@
+// Runs of circline_compare that are stopped, go on, and grow large.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/apps/board_set.h"
+#include "tests/apps/run_compare.h"
+#include "tests/apps/test_files.h"
+
+namespace circline::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The program as a process of ours, silent.
+pid_t Start(const std::vector<std::string>& arguments) {
+  const pid_t pid = fork();
+  if (pid != 0) return pid;
+  const int null = open("/dev/null", O_RDWR);
+  for (const int stream : {0, 1, 2}) dup2(null, stream);
+  std::vector<char*> argv = {const_cast<char*>(CIRCLINE_COMPARE_BINARY)};
+  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+  execv(argv[0], argv.data());
+  _exit(127);
+}
+
+// Every byte up to the last line end, and nothing after it.
+bool HasWholeLinesOnly(const std::string& path) {
+  const std::string text = ReadAll(path);
+  return text.empty() || text.back() == '\n';
+}
+
+// The same board annotated and to be detected, and a photo that is not there.
+std::string MakeLongSet(const TestFolder& folder) {
+  std::string scene = "%YAML:1.0\n---\n" + BoardCamera() + "images:\n";
+  for (int i = 0; i < 3; ++i) {
+    const Board board(20.0 + 15.0 * i);
+    const std::string name = "photo" + std::to_string(i) + ".png";
+    board.Paint(folder / name);
+    scene += AnnotatedImage(board, name) + DetectedImage(board, name);
+  }
+  return folder.Write("scene.yaml", scene + "  - { file: \"gone.png\", camera: \"k\" }\n");
+}
+
+TEST(CompareResume, KilledTwentyTimesGivesTheSameBytes) {
+  const TestFolder folder;
+  const std::string scene = MakeLongSet(folder);
+  const auto begin = std::chrono::steady_clock::now();
+  ASSERT_EQ(RunCompare("--scene='" + scene + "' --threads=2 --output='" + folder / "whole" + "'")
+                .exit_code,
+            1);  // One photo is not there.
+  const double whole_ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+
+  std::mt19937 random(7);
+  int num_killed = 0, num_begun = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    const std::string out = folder / ("killed" + std::to_string(trial));
+    const pid_t pid = Start({"--scene=" + scene, "--threads=2", "--output=" + out});
+    ASSERT_GT(pid, 0);
+    const double share = std::generate_canonical<double, 32>(random);
+    std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(share * whole_ms));
+    kill(pid, SIGKILL);
+    int status = 0;
+    ASSERT_EQ(waitpid(pid, &status, 0), pid);
+    if (WIFSIGNALED(status)) ++num_killed;
+    for (const char* file : {"results.jsonl", "observations.jsonl", "timings.jsonl"}) {
+      EXPECT_TRUE(HasWholeLinesOnly(out + "/" + file)) << file;
+    }
+    if (WIFSIGNALED(status) && !ReadAll(out + "/results.jsonl").empty()) ++num_begun;
+    const Outcome outcome = RunCompare("--scene='" + scene + "' --resume --output='" + out + "'");
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_CONTAINS(outcome.err, "gone.png: the file does not exist");
+    ExpectSameFiles(folder / "whole", out);
+  }
+  EXPECT_GE(num_killed, 10);
+  EXPECT_GE(num_begun, 3);  // Else nothing was there to go on from.
+}
+
+TEST(CompareResume, DropsALineThatWasCutOff) {
+  const TestFolder folder;
+  const std::string scene = MakeSet(folder);
+  const std::string whole = "--scene='" + scene + "' --output='" + folder / "whole" + "'";
+  ASSERT_EQ(RunCompare(whole).exit_code, 0);
+  for (const std::uintmax_t cut : {1U, 700U, 9000U}) {
+    fs::remove_all(folder / "cut");
+    fs::copy(folder / "whole", folder / "cut", fs::copy_options::recursive);
+    const std::string results = folder / "cut/results.jsonl";
+    fs::resize_file(results, fs::file_size(results) - cut);
+    ASSERT_EQ(
+        RunCompare("--resume --scene='" + scene + "' --output='" + folder / "cut" + "'").exit_code,
+        0);
+    ExpectSameFiles(folder / "whole", folder / "cut");
+  }
+}
+
+TEST(CompareResume, SkipsWhatIsDone) {
+  const TestFolder folder;
+  const std::string scene = MakeSet(folder);
+  const std::string arguments =
+      "--resume --scene='" + scene + "' --output='" + folder / "out" + "'";
+  ASSERT_EQ(RunCompare(arguments).exit_code, 0);
+  const std::string times = ReadAll(folder / "out/timings.jsonl");
+  ASSERT_EQ(RunCompare(arguments).exit_code, 0);
+  EXPECT_EQ(ReadAll(folder / "out/timings.jsonl"), times);  // Measured again, they would differ.
+}
+
+TEST(CompareResume, RefusesTheResultsOfAnotherRun) {
+  const TestFolder folder;
+  const std::string scene = MakeSet(folder);
+  const std::string arguments =
+      "--resume --overlays=false --scene='" + scene + "' --output='" + folder / "out" + "' ";
+  ASSERT_EQ(RunCompare(arguments).exit_code, 0);
+  const std::string before = ReadAll(folder / "out/results.jsonl");
+  Outcome outcome = RunCompare(arguments + "--solvers=joint");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_CONTAINS(outcome.err, "its solvers or losses differ");
+  outcome = RunCompare(arguments + "--shard=1/2");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_CONTAINS(outcome.err, "its image 1 is tilt25.png");
+  EXPECT_EQ(ReadAll(folder / "out/results.jsonl"), before);
+}
+
+// ---- Many images ----
+
+// Peak memory of the program over the photos of a folder, kilobytes.
+long PeakKilobytes(const std::string& photos, const std::string& camera,
+                   const std::string& output) {
+  const pid_t pid = Start({"--images=" + photos, "--camera=" + camera, "--output=" + output,
+                           "--threads=2", "--overlays=false"});
+  int status = 0;
+  rusage usage{};
+  EXPECT_EQ(wait4(pid, &status, 0, &usage), pid);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  return usage.ru_maxrss;
+}
+
+TEST(CompareScale, MemoryIsFlatInTheNumberOfImages) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "AddressSanitizer keeps freed memory";
+#endif
+  const TestFolder folder;
+  constexpr int kFew = 100, kMany = 2000;
+  Board(35.0).Paint(folder / "big.png");
+  cv::Mat small;
+  cv::resize(cv::imread(folder / "big.png", cv::IMREAD_GRAYSCALE), small, {80, 60}, 0.0, 0.0,
+             cv::INTER_AREA);
+  fs::create_directory(folder / "few");
+  fs::create_directory(folder / "many");
+  cv::imwrite(folder / "small.png", small);
+  for (int i = 0; i < kMany; ++i) {
+    const std::string name = "/a_photo_of_a_board_" + std::to_string(i) + ".png";
+    fs::create_symlink(folder / "small.png", folder / "many" + name);
+    if (i < kFew) fs::create_symlink(folder / "small.png", folder / "few" + name);
+  }
+  const std::string camera = folder.Write("cameras.txt", "1 SIMPLE_PINHOLE 80 60 75 40 30\n");
+  const long few = PeakKilobytes(folder / "few", camera, folder / "out_few");
+  const long many = PeakKilobytes(folder / "many", camera, folder / "out_many");
+  RecordProperty("few_kb", std::to_string(few));
+  RecordProperty("many_kb", std::to_string(many));
+  EXPECT_LE(10 * many, 12 * few) << few << " kB for " << kFew << ", " << many << " kB for "
+                                 << kMany;
+}
+
+}  // namespace
+}  // namespace circline::apps
