@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kLeft = 58.0, kRight = 14.0, kTop = 30.0, kBottom = 46.0;
 constexpr double kLegendRow = 18.0;
-constexpr int kLegendColumns = 2;
+constexpr std::size_t kLongName = 32;  // Longer ones stand one below the other.
 
 struct Frame {
   const Plot& plot;
@@ -120,11 +120,18 @@ void DrawSeries(const Frame& frame, const PlotSeries& series, std::ostringstream
   }
 }
 
+std::size_t LegendColumns(const Plot& plot) {
+  const bool is_long = std::any_of(plot.series.begin(), plot.series.end(),
+                                   [](const PlotSeries& s) { return s.name.size() > kLongName; });
+  return is_long ? 1 : 2;
+}
+
 void DrawLegend(const Frame& frame, std::ostringstream* svg) {
-  const double column_width = (frame.right() - kLeft) / kLegendColumns;
+  const std::size_t columns = LegendColumns(frame.plot);
+  const double column_width = (frame.right() - kLeft) / static_cast<double>(columns);
   for (std::size_t i = 0; i < frame.plot.series.size(); ++i) {
     const PlotSeries& series = frame.plot.series[i];
-    const std::size_t column = i % kLegendColumns, row = i / kLegendColumns;
+    const std::size_t column = i % columns, row = i / columns;
     const double x = kLeft + static_cast<double>(column) * column_width;
     const double y = frame.plot.height + static_cast<double>(row) * kLegendRow + 8;
     *svg << "<path stroke-width='2.5' stroke='" << series.color << "'"
@@ -157,7 +164,8 @@ std::vector<double> DecadeTicks(double low, double high) {
 
 std::string RenderSvg(const Plot& plot) {
   const Frame frame{plot};
-  const std::size_t rows = (plot.series.size() + kLegendColumns - 1) / kLegendColumns;
+  const std::size_t columns = LegendColumns(plot);
+  const std::size_t rows = (plot.series.size() + columns - 1) / columns;
   const double height = plot.height + static_cast<double>(rows) * kLegendRow;
   std::ostringstream svg;
   svg << "<svg viewBox='0 0 " << plot.width << " " << Number(height)

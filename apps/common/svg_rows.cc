@@ -10,7 +10,7 @@
 namespace circline::apps {
 namespace {
 
-constexpr double kWidth = 560.0, kNames = 214.0, kRight = 64.0, kTop = 34.0, kRow = 20.0;
+constexpr double kWidth = 640.0, kNames = 286.0, kRight = 64.0, kTop = 34.0, kRow = 20.0;
 constexpr double kBox = 11.0, kBelow = 42.0;
 
 std::string Number(double value) { return FormatFixed(value, 1); }
@@ -89,8 +89,8 @@ std::string RenderRows(const RowsPlot& plot) {
   double y = kTop + kRow / 2;
   for (const SvgRow& row : plot.rows) {
     svg << "<g><title>" << EscapeHtml(row.name + ": " + row.label) << "</title>"
-        << "<text text-anchor='end' font-size='11.5' fill='currentColor' x='" << kNames - 8
-        << "' y='" << Number(y + 4) << "'>" << EscapeHtml(row.name) << "</text>";
+        << "<text text-anchor='end' font-size='11' fill='currentColor' x='" << kNames - 8 << "' y='"
+        << Number(y + 4) << "'>" << EscapeHtml(row.name) << "</text>";
     (plot.bars ? DrawBar : DrawBox)(row, axis, y, &svg);
     svg << "<text font-size='11' fill='currentColor' fill-opacity='.75' x='" << kWidth - kRight + 6
         << "' y='" << Number(y + 4) << "'>" << EscapeHtml(row.label) << "</text></g>";

@@ -112,6 +112,12 @@ std::string FormatShort(double value, int digits) {
   return FormatFixed(value, std::clamp(digits - whole_digits, 0, 9));
 }
 
+std::string FormatPlain(double value) {
+  char buffer[64];
+  std::snprintf(buffer, sizeof(buffer), "%g", value);
+  return buffer;
+}
+
 std::string FormatMicroseconds(double microseconds) {
   if (!std::isfinite(microseconds)) return "-";
   if (microseconds < 1e3) return FormatFixed(microseconds, 0) + " us";

@@ -23,6 +23,8 @@ std::string DidYouMean(const std::string& name, const std::vector<std::string>& 
 std::string FormatFixed(double value, int decimals);
 // About `digits` significant digits without an exponent where that is readable (0.012, 3.4, 120).
 std::string FormatShort(double value, int digits = 3);
+// As short as six digits can be: "0.1", "2", "1e-06".
+std::string FormatPlain(double value);
 // "412 us", "3.1 ms", "2.4 s".
 std::string FormatMicroseconds(double microseconds);
 

@@ -16,7 +16,7 @@ class Agreement {
  public:
   void Add(const ImageRecord& record);
   const std::vector<SolverKey>& keys() const { return keys_; }  // Of the first loss.
-  // Degrees; absent where no photo has both answers..
+  // Degrees; absent where no photo has both answers.
   std::optional<double> MedianDeg(std::size_t i, std::size_t j) const;
   // Photos that have both.
   std::size_t Count(std::size_t i, std::size_t j) const { return At(i, j).seen; }

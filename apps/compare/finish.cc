@@ -2,17 +2,42 @@
 
 #include "apps/common/output_file.h"
 #include "apps/compare/digest.h"
+#include "apps/compare/export.h"
 #include "apps/compare/report.h"
+#include "apps/compare/sweep.h"
 
 namespace circline::apps {
+namespace {
 
-Status FinishFolder(const std::string& folder, ComparisonResult* result) {
+std::string BestSentence(const Summary& summary) {
+  const SummaryRow* best = BestRow(summary);
+  if (best == nullptr || LossPoints(summary).size() < 2) return "";
+  return "best: " + DescribeRow(*best) + "\n";
+}
+
+Status SaveBest(const Summary& summary, const FinishOptions& options) {
+  const SummaryRow* best = BestRow(summary);
+  if (best == nullptr) {
+    return Status::Failed("--save_options: no refined solver has an answer, so none is the best");
+  }
+  return WriteFile(options.save_options,
+                   "# " + DescribeRow(*best) + "\n--robust_loss=" + best->key.loss +
+                       "\n--loss_scale_px=" + best->key.ScaleText() + "\n" + options.other_flags);
+}
+
+}  // namespace
+
+Status FinishFolder(const std::string& folder, const FinishOptions& options,
+                    ComparisonResult* result) {
   Digest digest;
   Status status = ReadDigest(folder, &digest);
-  if (status.ok()) status = WriteFile(folder + "/summary.csv", digest.summary.Csv());
+  const Summary& summary = digest.summary;
+  if (status.ok()) status = WriteFile(folder + "/summary.csv", summary.Csv());
   if (status.ok()) status = WriteReport(folder, digest);
-  result->num_unreadable = digest.summary.num_unreadable();
-  result->table = digest.summary.Table();
+  if (status.ok()) status = WriteExports(folder, options.exports);
+  if (status.ok() && !options.save_options.empty()) status = SaveBest(summary, options);
+  result->num_unreadable = summary.num_unreadable();
+  result->table = summary.Table() + BestSentence(summary);
   return status;
 }
 

@@ -3,6 +3,7 @@
 #define CIRCLINE_APPS_COMPARE_FINISH_H_
 
 #include <string>
+#include <vector>
 
 #include "circline/estimators/status.h"
 
@@ -13,8 +14,15 @@ struct ComparisonResult {
   std::string table;       // Summary for people, and what else there is to say.
 };
 
-// Writes summary.csv and report.html into the folder.
-Status FinishFolder(const std::string& folder, ComparisonResult* result);
+struct FinishOptions {
+  std::string save_options;          // File for the flags of the best loss and scale; may be empty.
+  std::string other_flags;           // To stand in it as well, one a line.
+  std::vector<std::string> exports;  // See WriteExports.
+};
+
+// Writes summary.csv and report.html into the folder, and what else the options say.
+Status FinishFolder(const std::string& folder, const FinishOptions& options,
+                    ComparisonResult* result);
 
 }  // namespace circline::apps
 

@@ -104,14 +104,36 @@ void Observe(const CompareOptions& options, ImageRun* run) {
   if (!status.ok()) run->problems.push_back(status.message);
 }
 
+// What a refinement with this loss is given: where the user says how noisy points are, that holds,
+// and not what the detection measured.
+class LossEvidence {
+ public:
+  explicit LossEvidence(const ImageRun& image) : image_(image) {}
+  const Observations& For(const LossSetting* loss) {
+    if (loss == nullptr || !image_.image->detect_everything) return image_.observations;
+    const bool conic = loss->estimation.conic_loss.scale_px > 0.0;
+    const bool line = loss->estimation.line_loss.scale_px > 0.0;
+    if (!conic && !line) return image_.observations;
+    stated_ = image_.observations;
+    for (CircleObservation& circle : stated_.circles) circle.sigma_px *= conic ? 0.0 : 1.0;
+    for (PencilObservation& pencil : stated_.pencils) pencil.sigma_px *= line ? 0.0 : 1.0;
+    return stated_;
+  }
+
+ private:
+  const ImageRun& image_;
+  Observations stated_;
+};
+
 SolverRun RunSolver(const SolverSet::Task& task, const CompareOptions& options,
-                    const ImageRun& image) {
+                    const ImageRun& image, LossEvidence* evidence) {
   SolverRun run;
   run.solver = task.solver->name();
   run.stage = task.solver->stage();
   if (task.loss >= 0) run.loss = &options.losses[static_cast<std::size_t>(task.loss)];
+  const Observations& observations = evidence->For(run.loss);
   const Stopwatch watch;
-  run.estimate = task.solver->Solve(image.observations);
+  run.estimate = task.solver->Solve(observations);
   run.microseconds = watch.Microseconds();
   for (const PoseHypothesis& hypothesis : run.estimate.hypotheses) {
     run.errors.push_back(ComparePose(hypothesis, *image.image));
@@ -130,8 +152,9 @@ void RunAll(const CompareOptions& options, const SolverSet& solvers, ImageRun* r
   }
   if (run->read_error.empty()) Observe(options, run);
   if (!run->read_error.empty()) return;
+  LossEvidence evidence(*run);
   for (const SolverSet::Task& task : solvers.tasks()) {
-    run->solvers.push_back(RunSolver(task, options, *run));
+    run->solvers.push_back(RunSolver(task, options, *run, &evidence));
   }
 }
 

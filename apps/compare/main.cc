@@ -16,6 +16,7 @@ constexpr char kUsage[] =
     "\n"
     "  circline_compare --scene=set/scene.yaml --output=out\n"
     "  circline_compare --images='photos/*.jpg' --camera=calib.yml --output=out\n"
+    "  circline_compare --merge=shard0,shard1 --output=out\n"
     "\n"
     "Writes results.jsonl, observations.jsonl, summary.csv, timings.jsonl, report.html and "
     "overlays/*.png.\n"
@@ -31,11 +32,15 @@ int Refuse(const Status& status) {
 int Compare() {
   CompareOptions options;
   Status status = circline::apps::OptionsFromFlags(&options);
-  circline::apps::ImageSet images;
-  if (status.ok()) status = circline::apps::ImagesFromFlags(options, &images);
-  if (!status.ok()) return Refuse(status);
   circline::apps::ComparisonResult result;
-  status = circline::apps::RunComparison(images, options, &result);
+  if (status.ok() && !options.merge.empty()) {
+    status = circline::apps::MergeComparison(options, &result);
+  } else {
+    circline::apps::ImageSet images;
+    if (status.ok()) status = circline::apps::ImagesFromFlags(options, &images);
+    if (!status.ok()) return Refuse(status);
+    status = circline::apps::RunComparison(images, options, &result);
+  }
   if (status.code == circline::StatusCode::kInvalidArgument) return Refuse(status);
   std::cout << result.table;
   if (!status.ok()) {

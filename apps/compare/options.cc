@@ -59,6 +59,14 @@ DEFINE_string(
 DEFINE_bool(overlays, true, "Draw a picture of each photo with what was found in it.");
 DEFINE_bool(resume, false,
             "Go on where a run with the same flags was stopped: skip what results.jsonl has.");
+DEFINE_string(merge, "",
+              "Instead of --scene or --images: folders of all the shards of a set, separated by "
+              "commas, to be joined in --output.");
+DEFINE_string(save_options, "",
+              "A file for the flags with the best loss and scale, to be used as --flagfile.");
+DEFINE_string(export_as, "",
+              "Also write the poses of the answers shown: colmap (images.txt, cameras.txt), gltf "
+              "(cameras.gltf), tum (trajectory.txt); a list. Not metric poses have unit distance.");
 DEFINE_bool(list_solvers, false, "List the solvers and what each needs, and do nothing else.");
 
 namespace circline::apps {
@@ -191,6 +199,18 @@ Status ReadSolvers(std::vector<std::string>* solvers) {
   return Status::Ok();
 }
 
+Status ReadExports(std::vector<std::string>* exports) {
+  if (FLAGS_export_as.empty()) return Status::Ok();
+  const std::vector<std::string> known = {"colmap", "gltf", "tum"};
+  for (const std::string& name : SplitList(FLAGS_export_as)) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      return Status::Invalid("--export_as: '" + name + "' is not one of " + JoinList(known, ", "));
+    }
+    exports->push_back(name);
+  }
+  return Status::Ok();
+}
+
 Status ReadShard(int* index, int* count) {
   const std::vector<std::string> parts = SplitList(FLAGS_shard, '/');
   const bool numbers = parts.size() == 2 && ParseInt(parts[0], index) && ParseInt(parts[1], count);
@@ -230,6 +250,19 @@ Status ReadImages(std::vector<SceneImage>* images) {
   return status.ok() ? ListPhotos(FLAGS_images, camera, images) : status;
 }
 
+Status CheckSources() {
+  const std::vector<std::string> given = {FLAGS_scene, FLAGS_images, FLAGS_merge};
+  const auto count = std::count(given.begin(), given.end(), "");
+  if (count == 3) {
+    return Status::Invalid("give --scene, or --images with --camera (--help says more)");
+  }
+  if (count < 2) return Status::Invalid("give --scene, --images or --merge, not both");
+  if (!FLAGS_images.empty() && FLAGS_camera.empty()) {
+    return Status::Invalid("--images needs --camera");
+  }
+  return Status::Ok();
+}
+
 // Names and values of the flags that shape what is found in a photo.
 std::string ResultFlags() {
   std::string lines;
@@ -241,6 +274,20 @@ std::string ResultFlags() {
     std::string value;
     gflags::GetCommandLineOption(name, &value);
     lines += std::string("--") + name + "=" + value + "\n";
+  }
+  return lines;
+}
+
+// The flags beside the losses that were given another value than their own, for --save_options.
+std::string OtherFlags() {
+  std::string lines;
+  for (const char* name :
+       {"conic_loss", "conic_loss_scale_px", "line_loss", "line_loss_scale_px",
+        "inlier_threshold_px", "ransac_confidence", "ransac_max_iterations", "min_ellipse_axis_px",
+        "min_arc_deg", "min_segment_length_px", "max_circles", "max_pencils", "seed"}) {
+    gflags::CommandLineFlagInfo info;
+    if (!gflags::GetCommandLineFlagInfo(name, &info) || info.is_default) continue;
+    lines += std::string("--") + name + "=" + info.current_value + "\n";
   }
   return lines;
 }
@@ -257,13 +304,9 @@ Status OptionsFromFlags(CompareOptions* options) {
   if (FLAGS_threads < 0 || FLAGS_threads > 1024) {
     return CheckFlag("threads", Status::Invalid("must be between 0 and 1024"));
   }
-  if (FLAGS_scene.empty() == FLAGS_images.empty()) {
-    return Status::Invalid(FLAGS_scene.empty()
-                               ? "give --scene, or --images with --camera (--help says more)"
-                               : "give --scene or --images, not both");
-  }
-  if (!FLAGS_images.empty() && FLAGS_camera.empty())
-    return Status::Invalid("--images needs --camera");
+  status = CheckSources();
+  if (status.ok()) status = ReadExports(&options->finish.exports);
+  if (!status.ok()) return status;
   if (FLAGS_output.empty())
     return Status::Invalid("--output is missing: the folder for the results");
   options->output = FLAGS_output;
@@ -271,6 +314,9 @@ Status OptionsFromFlags(CompareOptions* options) {
   options->overlays = FLAGS_overlays;
   options->resume = FLAGS_resume;
   options->result_flags = ResultFlags();
+  if (!FLAGS_merge.empty()) options->merge = SplitList(FLAGS_merge);
+  options->finish.save_options = FLAGS_save_options;
+  options->finish.other_flags = OtherFlags();
   return Status::Ok();
 }
 

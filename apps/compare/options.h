@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/compare/finish.h"
 #include "apps/compare/image_set.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/status.h"
@@ -32,6 +33,8 @@ struct CompareOptions {
   int shard_index = 0, num_shards = 1;
   bool overlays = true;
   bool resume = false;
+  std::vector<std::string> merge;  // Folders of shards; not empty: nothing else is done.
+  FinishOptions finish;
   std::string result_flags;  // All flags that shape the results, one a line.
 };
 

@@ -117,6 +117,23 @@ void ReadTimings(const std::string& text, ImageRecord* record) {
   }
 }
 
+Camera ReadCamera(const Json& json) {
+  Camera camera;
+  camera.id = json.at("id").get<std::string>();
+  const std::string model = json.at("model").get<std::string>();
+  camera.model = model == "fisheye"  ? CameraModel::kFisheye
+                 : model == "opencv" ? CameraModel::kOpenCV
+                                     : CameraModel::kPinhole;
+  camera.width = json.at("width").get<int>();
+  camera.height = json.at("height").get<int>();
+  camera.fx = json.at("fx").get<double>();
+  camera.fy = json.at("fy").get<double>();
+  camera.cx = json.at("cx").get<double>();
+  camera.cy = json.at("cy").get<double>();
+  camera.distortion = json.at("distortion").get<std::array<double, 8>>();
+  return camera;
+}
+
 void ReadObservations(const std::string& text, ImageRecord* record) {
   const Json line = Json::parse(text);
   record->index = line.at("index").get<std::size_t>();
@@ -127,6 +144,7 @@ void ReadObservations(const std::string& text, ImageRecord* record) {
   record->num_ellipses = line.at("ellipses").size();
   record->num_segments = line.at("segments").size();
   record->num_pencils = line.at("pencils").size();
+  record->camera = ReadCamera(line.at("camera"));
   record->problems = Texts(line, "problems");
 }
 
@@ -134,7 +152,7 @@ void ReadObservations(const std::string& text, ImageRecord* record) {
 
 std::string SolverKey::ScaleText() const {
   if (!refined()) return "-";
-  return scale_px > 0.0 ? FormatShort(scale_px) : "auto";
+  return scale_px > 0.0 ? FormatPlain(scale_px) : "auto";
 }
 
 std::string SolverKey::LossText() const { return refined() ? loss + ", " + ScaleText() : "-"; }

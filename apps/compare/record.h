@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "apps/common/pose_error.h"
+#include "circline/estimators/camera.h"
 #include "circline/estimators/status.h"
 
 namespace circline::apps {
@@ -62,6 +63,7 @@ struct ImageRecord {
   std::string overlay;  // Relative to the output folder; empty if none was drawn.
   bool detected = false;
   std::size_t num_ellipses = 0, num_segments = 0, num_pencils = 0;
+  Camera camera;
   std::vector<std::string> problems;
   std::vector<std::pair<std::string, double>> stages;  // "read", "detect", "fit"; microseconds.
   std::vector<SolverRecord> solvers;

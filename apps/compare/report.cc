@@ -55,6 +55,14 @@ std::string SweepChapter(const Summary& summary) {
          Plots(SweepPlots(summary));
 }
 
+std::string AgreementChapter(const Agreement& agreement) {
+  const std::string table = AgreementTable(agreement);
+  return table.empty() ? ""
+                       : "<p class='lead'>Median angle between the plane normals that two solvers "
+                         "answer, degrees.</p>" +
+                             table;
+}
+
 std::string Chapters(const Digest& digest) {
   const Summary& summary = digest.summary;
   Page page;
@@ -62,8 +70,7 @@ std::string Chapters(const Digest& digest) {
   page.Add("curves", "Share of images within an error", Plots(CumulativePlots(summary)));
   page.Add("boxes", "Spread", Plots(BoxPlots(summary)));
   page.Add("sweep", "Losses and scales", SweepChapter(summary));
-  page.Add("agreement", "Agreement: median angle between the plane normals of two solvers, degrees",
-           AgreementTable(digest.agreement));
+  page.Add("agreement", "Agreement", AgreementChapter(digest.agreement));
   page.Add("times", "Times", Plots(RuntimePlot(summary)));
   page.Add("images", "Images", OverlayLegend());
   return page.Html();

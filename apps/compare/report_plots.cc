@@ -13,25 +13,29 @@
 namespace circline::apps {
 namespace {
 
-constexpr std::size_t kMaxCurves = 18;
 constexpr std::size_t kMaxSteps = 300;  // Of one curve.
 
-// One colour for each solver, or each solver with each loss of a sweep, the same in all plots.
-class RowColors {
- public:
-  explicit RowColors(const Summary& summary) : by_loss_(LossPoints(summary).size() > 1) {
-    for (const SummaryRow* row : summary.Ranked()) Of(row->key);
-  }
-  std::string Of(const SolverKey& key) {
-    const bool by_loss = by_loss_ && key.refined();
-    const std::string name = key.solver + (by_loss ? " " + key.LossText() : "");
-    return SeriesColor(colors_.emplace(name, colors_.size()).first->second);
-  }
-
- private:
-  bool by_loss_;
-  std::map<std::string, std::size_t> colors_;
+// A row of the summary as the plots show it.
+struct PlotRow {
+  const SummaryRow* row;
+  std::string name, color;
 };
+
+// Ranked; only rows with an answer, and of the losses of a sweep only each solver's best.
+std::vector<PlotRow> PlotRows(const Summary& summary) {
+  const bool is_sweep = LossPoints(summary).size() > 1;
+  std::map<std::string, std::size_t> colors;
+  std::vector<PlotRow> rows;
+  for (const SummaryRow* row : summary.Ranked()) {
+    const SolverKey& key = row->key;
+    if (row->ok == 0) continue;
+    if (key.refined() && is_sweep && row != BestRow(summary, key.solver)) continue;
+    const std::string name = is_sweep || !key.refined() ? key.Name() : key.solver + " refined";
+    rows.push_back(
+        {row, name, SeriesColor(colors.emplace(key.solver, colors.size()).first->second)});
+  }
+  return rows;
+}
 
 std::string InDiv(const std::string& svg) { return svg.empty() ? "" : "<div>" + svg + "</div>"; }
 
@@ -39,7 +43,6 @@ std::string InDiv(const std::string& svg) { return svg.empty() ? "" : "<div>" + 
 PlotSeries CumulativeCurve(const SummaryRow& row, std::vector<double> errors, double x_min,
                            double x_max) {
   PlotSeries series;
-  series.name = row.key.Name();
   std::sort(errors.begin(), errors.end());
   double share = 0.0;
   const std::size_t stride = 1 + errors.size() / kMaxSteps;
@@ -62,25 +65,24 @@ std::string ErrorPlot(const Summary& summary, const std::string& title,
   plot.y_label = "share of images";
   plot.log_x = plot.percent_y = true;
   double low = 10.0, high = 1.0;
-  std::vector<const SummaryRow*> rows;
-  for (const SummaryRow* row : summary.Ranked()) {
-    if ((row->*errors).empty()) continue;
-    for (const double error : row->*errors) {
+  const std::vector<PlotRow> rows = PlotRows(summary);
+  for (const PlotRow& row : rows) {
+    for (const double error : row.row->*errors) {
       low = std::min(low, error);
       high = std::max(high, error);
     }
-    if (rows.size() < kMaxCurves) rows.push_back(row);
   }
-  if (rows.empty()) return "";
   plot.x_min = std::clamp(std::pow(10.0, std::floor(std::log10(std::max(low, 1e-6)))), 1e-3, 1.0);
   plot.x_max = std::clamp(high * 1.05, 2.0, 180.0);
-  RowColors colors(summary);
-  for (const SummaryRow* row : rows) {
-    PlotSeries series = CumulativeCurve(*row, row->*errors, plot.x_min, plot.x_max);
-    series.color = colors.Of(row->key);
-    series.dashed = !row->key.refined();
+  for (const PlotRow& row : rows) {
+    if ((row.row->*errors).empty()) continue;
+    PlotSeries series = CumulativeCurve(*row.row, row.row->*errors, plot.x_min, plot.x_max);
+    series.name = row.name;
+    series.color = row.color;
+    series.dashed = !row.row->key.refined();
     plot.series.push_back(std::move(series));
   }
+  if (plot.series.empty()) return "";
   return InDiv(RenderSvg(plot));
 }
 
@@ -89,11 +91,10 @@ std::string BoxPlot(const Summary& summary, const std::string& title, const std:
   RowsPlot plot;
   plot.title = title;
   plot.x_label = label;
-  RowColors colors(summary);
-  for (const SummaryRow* row : summary.Ranked()) {
-    const std::vector<double>& values = row->*list;
+  for (const PlotRow& row : PlotRows(summary)) {
+    const std::vector<double>& values = row.row->*list;
     if (values.empty()) continue;
-    SvgRow box{row->key.Name(), colors.Of(row->key), {}, FormatShort(Median(values))};
+    SvgRow box{row.name, row.color, {}, FormatShort(Median(values))};
     const std::array<double, 5> shares = {0.05, 0.25, 0.5, 0.75, 0.95};
     for (std::size_t i = 0; i < 5; ++i) box.quantiles[i] = Quantile(values, shares[i]);
     plot.rows.push_back(std::move(box));
@@ -177,11 +178,11 @@ std::string RuntimePlot(const Summary& summary) {
   plot.title = "Median time of a call";
   plot.x_label = "milliseconds";
   plot.bars = true;
-  RowColors colors(summary);
-  for (const SummaryRow* row : summary.Ranked()) {
-    if (row->microseconds.empty() || row->ok == 0) continue;
-    const double time = Median({row->microseconds.begin(), row->microseconds.end()});
-    SvgRow bar{row->key.Name(), colors.Of(row->key), {}, FormatMicroseconds(time)};
+  for (const PlotRow& row : PlotRows(summary)) {
+    const std::vector<float>& times = row.row->microseconds;
+    if (times.empty()) continue;
+    const double time = Median({times.begin(), times.end()});
+    SvgRow bar{row.name, row.color, {}, FormatMicroseconds(time)};
     bar.quantiles.fill(1e-3 * time);
     plot.rows.push_back(std::move(bar));
   }

@@ -6,7 +6,7 @@ const char* const kReportStyle = R"css(
 :root{--bg:#fff;--fg:#1c2430;--soft:#5d6978;--line:#dde3ea;--card:#f6f8fa;--accent:#1f6fd1;--good:#1d8348;--bad:#c0392b}
 @media(prefers-color-scheme:dark){:root{--bg:#14181d;--fg:#e4e9ef;--soft:#9aa7b5;--line:#2d353f;--card:#1b2127;--accent:#6cb0ff;--good:#5fcf8d;--bad:#ff8a7a}}
 *{box-sizing:border-box}
-body{margin:0 auto;max-width:1280px;padding:0 24px 80px;background:var(--bg);color:var(--fg);font:15px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif}
+body{margin:0 auto;max-width:1400px;padding:0 24px 80px;background:var(--bg);color:var(--fg);font:15px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif}
 nav{position:sticky;top:0;z-index:2;display:flex;flex-wrap:wrap;gap:4px 18px;padding:10px 0;background:var(--bg);border-bottom:1px solid var(--line);font-size:14px}
 a{color:var(--accent);text-decoration:none}a:hover{text-decoration:underline}
 h1{font-size:26px;margin:24px 0 4px}h2{font-size:19px;margin:40px 0 12px;scroll-margin-top:52px}h3{font-size:16px;margin:0 0 10px;overflow-wrap:anywhere}
@@ -14,17 +14,17 @@ h3 small{font-weight:400;color:var(--soft);margin-left:8px}
 p.lead{margin:0 0 20px;color:var(--soft)}
 .scroll{overflow-x:auto;border:1px solid var(--line);border-radius:8px}
 table{border-collapse:collapse;width:100%;font-size:13px;font-variant-numeric:tabular-nums}
-th,td{padding:6px 10px;text-align:right;white-space:nowrap;border-bottom:1px solid var(--line)}
+th,td{padding:5px 9px;text-align:right;white-space:nowrap;border-bottom:1px solid var(--line)}
 tr:last-child td{border-bottom:0}
 th{background:var(--card);font-weight:600;vertical-align:bottom}
 table.sortable th{cursor:pointer}
 th.up:after{content:" \25B4"}th.down:after{content:" \25BE"}
 table.matrix td{text-align:center}table.matrix th.l{max-width:260px}
 td.best{font-weight:700;color:var(--good)}
-.l{text-align:left}td.say{text-align:left;white-space:normal;min-width:220px;color:var(--soft)}
+table.matrix th{white-space:normal;overflow-wrap:anywhere}.l,th.l{text-align:left}td.say{text-align:left;white-space:normal;min-width:160px;color:var(--soft)}
 tr.more td{color:var(--soft)}tr.shown td{background:var(--card)}
 .failed{color:var(--bad);font-weight:600}
-.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:20px}
+.plots{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,560px),1fr));gap:20px}
 .plots>div,section.image{border:1px solid var(--line);border-radius:8px;padding:16px}
 svg{width:100%;height:auto;display:block}
 section.image{margin:0 0 22px}

@@ -13,6 +13,10 @@ std::string Cell(const std::string& text, const char* css = nullptr) {
          EscapeHtml(text) + "</td>";
 }
 
+void AddOnce(const std::string& name, std::vector<std::string>* names) {
+  if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
+}
+
 // The cell's number: the median error, or the residual and the share of inliers.
 std::string SweepText(const SummaryRow* row) {
   if (row == nullptr || row->ok == 0) return "-";
@@ -35,14 +39,22 @@ std::string SummaryTable(const Summary& summary) {
             EscapeHtml(column.explanation) + "'>" + EscapeHtml(column.title) + "</th>";
   }
   html += "</tr></thead><tbody>";
+  std::vector<std::string> refused;
   for (const SummaryRow* row : summary.Ranked()) {
+    if (row->refused == row->images) {
+      AddOnce(row->key.solver, &refused);
+      continue;
+    }
     html += "<tr>";
     for (const SummaryColumn& column : columns) {
       html += Cell(column.text(*row), column.left ? "l" : nullptr);
     }
     html += "</tr>";
   }
-  return html + "</tbody></table></div>";
+  html += "</tbody></table></div>";
+  if (refused.empty()) return html;
+  return html + "<p class='lead'>Refused every image: " + EscapeHtml(JoinList(refused, ", ")) +
+         ".</p>";
 }
 
 std::string AgreementTable(const Agreement& agreement) {
@@ -96,7 +108,7 @@ std::string SweepTable(const Summary& summary) {
   html += "</tr></thead><tbody>";
   for (const LossPoint& point : points) {
     html += "<tr>" + Cell(point.loss, "l") +
-            Cell(point.scale_px > 0.0 ? FormatShort(point.scale_px) : "auto");
+            Cell(point.scale_px > 0.0 ? FormatPlain(point.scale_px) : "auto");
     for (std::size_t i = 0; i < solvers.size(); ++i) {
       const SummaryRow* row = FindRefined(summary, solvers[i], point);
       html += Cell(SweepText(row), row != nullptr && row == best[i] ? "best" : nullptr);

@@ -160,12 +160,37 @@ std::string ResultLines(const ImageRun& image) {
   return lines;
 }
 
+// Its size that of the photo where the calibration does not say; where nothing read the photo, that
+// which has the principal point in its middle.
+Json CameraJson(const ImageRun& run) {
+  const Camera& camera = run.image->observations.camera;
+  Json json;
+  json["id"] = camera.id;
+  json["model"] = camera.model == CameraModel::kPinhole  ? "pinhole"
+                  : camera.model == CameraModel::kOpenCV ? "opencv"
+                                                         : "fisheye";
+  const auto size = [](int stated, int photo, double center) {
+    return stated > 0  ? stated
+           : photo > 0 ? photo
+                       : static_cast<int>(std::lround(2.0 * center + 1));
+  };
+  json["width"] = size(camera.width, run.photo.cols, camera.cx);
+  json["height"] = size(camera.height, run.photo.rows, camera.cy);
+  json["fx"] = camera.fx;
+  json["fy"] = camera.fy;
+  json["cx"] = camera.cx;
+  json["cy"] = camera.cy;
+  json["distortion"] = camera.distortion;
+  return json;
+}
+
 std::string ObservationLine(const ImageRun& run, const std::string& overlay,
                             const LineCounts& counts) {
   Json line;
   line["image"] = run.image->name;
   line["index"] = run.image->index;
   line["detected"] = run.image->detect_everything;
+  line["camera"] = CameraJson(run);
   for (const char* key : {"ellipses", "segments", "pencils"}) line[key] = Json::array();
   for (const CircleObservation& circle : run.observations.circles) {
     line["ellipses"].push_back(EllipseJson(circle));

@@ -9,6 +9,7 @@
 #include "apps/common/output_file.h"
 #include "apps/common/progress.h"
 #include "apps/compare/image_worker.h"
+#include "apps/compare/merge.h"
 #include "apps/compare/record_files.h"
 #include "apps/compare/resume.h"
 #include "apps/compare/work_queue.h"
@@ -39,6 +40,12 @@ Status WorkOn(const ImageSet& images, const ImageWorker& worker, const std::stri
 
 }  // namespace
 
+Status MergeComparison(const CompareOptions& options, ComparisonResult* result) {
+  Status status = MergeFolders(options.merge, options.output);
+  if (status.ok()) status = FinishFolder(options.output, options.finish, result);
+  return status;
+}
+
 Status RunComparison(const ImageSet& images, const CompareOptions& options,
                      ComparisonResult* result) {
   Status status = CreateFolder(options.overlays ? options.output + "/overlays" : options.output);
@@ -51,7 +58,7 @@ Status RunComparison(const ImageSet& images, const CompareOptions& options,
   status = PrepareFolder(options.output, options.resume, images, worker.solvers().Keys(options),
                          options.result_flags, &done);
   if (status.ok()) status = WorkOn(images, worker, options.output, done);
-  if (status.ok()) status = FinishFolder(options.output, result);
+  if (status.ok()) status = FinishFolder(options.output, options.finish, result);
   if (status.ok()) MarkFinished(options.output);
   return status;
 }

@@ -15,6 +15,9 @@ namespace circline::apps {
 Status RunComparison(const ImageSet& images, const CompareOptions& options,
                      ComparisonResult* result);
 
+// Joins the folders options.merge (see MergeFolders), then as above.
+Status MergeComparison(const CompareOptions& options, ComparisonResult* result);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMPARE_RUN_H_

@@ -203,7 +203,7 @@ TEST(Sweep, WithoutTruthTheMostInliersThenTheSmallestResidual) {
   record.solvers = {Refined("huber", 0.1, 0.0, 40), Refined("tukey", 1.0, 0.0, 95),
                     Refined("huber", 1.0, 0.0, 80)};
   summary.Add(record);
-  EXPECT_EQ(BestRow(summary)->key.Name(), "joint refined, tukey 1.00");
+  EXPECT_EQ(BestRow(summary)->key.Name(), "joint refined, tukey 1");
 }
 
 }  // namespace

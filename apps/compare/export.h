@@ -1,0 +1,44 @@
+// The poses in the formats of other programs.
+#ifndef CIRCLINE_APPS_COMPARE_EXPORT_H_
+#define CIRCLINE_APPS_COMPARE_EXPORT_H_
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/compare/record.h"
+#include "circline/estimators/status.h"
+
+namespace circline::apps {
+
+// A camera in the world frame of its photo: X_cam = rotation X_world + translation.
+struct ExportedPose {
+  std::string name;  // Of the photo.
+  std::size_t index = 0;
+  Camera camera;
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d translation;
+};
+
+class Exporter {
+ public:
+  virtual ~Exporter() = default;
+  virtual void Add(const ExportedPose& pose) = 0;
+  virtual Status Finish() = 0;  // Writes the files.
+};
+
+// images.txt (without points), cameras.txt and an empty points3D.txt.
+std::unique_ptr<Exporter> MakeColmapExporter(const std::string& folder);
+// cameras.gltf: a glTF 2.0 scene with a camera for each photo, upright in programs whose Z is up.
+// It has no place for lens distortion and the principal point.
+std::unique_ptr<Exporter> MakeGltfExporter(const std::string& folder);
+// trajectory.txt: lines "time tx ty tz qx qy qz qw", world from camera. The time is the photo's
+// name where that is a number, else its position in the set.
+std::unique_ptr<Exporter> MakeTumExporter(const std::string& folder);
+
+// Writes the answer to show of every photo that has one; `formats` are colmap, gltf, tum.
+Status WriteExports(const std::string& folder, const std::vector<std::string>& formats);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMPARE_EXPORT_H_

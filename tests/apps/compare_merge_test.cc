@@ -1,0 +1,147 @@
+// Shards joined, losses swept, poses in other programs' formats.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <map>
+#include <sstream>
+#include <string>
+
+#include "tests/apps/board_set.h"
+#include "tests/apps/run_compare.h"
+#include "tests/apps/test_files.h"
+
+namespace circline::apps {
+namespace {
+
+using Json = nlohmann::json;
+
+class CompareMerge : public testing::Test {
+ protected:
+  CompareMerge() {
+    const std::string scene = MakeSet(folder_);
+    scene_ =
+        folder_.Write("more.yaml", ReadAll(scene) + "  - { file: \"gone.png\", camera: \"k\" }\n");
+  }
+  Outcome Run(const std::string& flags, const std::string& output) {
+    return RunCompare("--scene='" + scene_ + "' " + flags + " --output='" + folder_ / output + "'");
+  }
+  Outcome Merge(const std::string& inputs) {
+    std::istringstream names(inputs);
+    std::string list;
+    for (std::string name; names >> name;) list += (list.empty() ? "" : ",") + (folder_ / name);
+    return RunCompare("--merge='" + list + "' --output='" + folder_ / "merged" + "'");
+  }
+  const TestFolder folder_;
+  std::string scene_;
+};
+
+TEST_F(CompareMerge, ShardsGiveTheFilesOfTheWhole) {
+  ASSERT_EQ(Run("", "whole").exit_code, 1);  // One photo is not there.
+  for (const char* i : {"0", "1", "2"}) {
+    EXPECT_NE(Run(std::string("--shard=") + i + "/3", std::string("shard") + i).exit_code, 2);
+  }
+  const Outcome outcome = Merge("shard2 shard0 shard1");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+  EXPECT_CONTAINS(outcome.err, "gone.png: the file does not exist");
+  ExpectSameFiles(folder_ / "whole", folder_ / "merged");
+}
+
+TEST_F(CompareMerge, RefusesWhatIsNotOneSet) {
+  ASSERT_EQ(Run("--shard=0/2 --overlays=false", "a").exit_code, 1);
+  ASSERT_EQ(Run("--shard=1/2 --overlays=false", "b").exit_code, 0);
+  ASSERT_EQ(Run("--shard=1/2 --overlays=false --solvers=joint", "other").exit_code, 0);
+  std::filesystem::copy(folder_ / "b", folder_ / "unfinished");
+  folder_.Write("unfinished/unfinished.flags", "--seed=1\n");
+  const std::map<std::string, std::string> cases = {
+      {"a", "image 1 is missing"},         {"b", "image 0 is missing"},
+      {"a b b", "is there twice"},         {"a other", "ran other solvers or losses"},
+      {"a unfinished", "is not finished"}, {"a nothing", "nothing has no results.jsonl"}};
+  for (const auto& [inputs, words] : cases) {
+    const Outcome outcome = Merge(inputs);
+    EXPECT_EQ(outcome.exit_code, 2) << inputs;
+    EXPECT_CONTAINS(outcome.err, words.c_str());
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "merged")) << inputs;
+  }
+}
+
+TEST_F(CompareMerge, SweepNamesTheBestAndSavesItsFlags) {
+  const std::string best = folder_ / "best.flags";
+  const Outcome outcome =
+      Run("--overlays=false --robust_loss=huber,tukey --loss_scale_px=0.5,auto --max_pencils=3 "
+          "--save_options='" +
+              best + "'",
+          "sweep");
+  EXPECT_CONTAINS(outcome.out, "best: ");
+  const std::string flags = ReadAll(best);
+  EXPECT_CONTAINS(flags, "--robust_loss=");
+  EXPECT_CONTAINS(flags, "--max_pencils=3\n");
+  EXPECT_EQ(Run("--overlays=false --flagfile='" + best + "'", "again").exit_code, 1);
+  // The chosen rows repeat the sweep's.
+  const std::string csv = ReadAll(folder_ / "sweep/summary.csv");
+  std::istringstream lines(ReadAll(folder_ / "again/summary.csv"));
+  for (std::string line; std::getline(lines, line);) EXPECT_CONTAINS(csv, line.c_str());
+}
+
+TEST_F(CompareMerge, ExportsThePosesThatAreShown) {
+  ASSERT_EQ(Run("--overlays=false --export_as=colmap,gltf,tum", "out").exit_code, 1);
+  std::vector<Json> shown;
+  for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
+    if (line["solver"] == "joint" && line["hypothesis"] == 0) shown.push_back(line);
+  }
+  ASSERT_EQ(shown.size(), 6U);
+  std::istringstream colmap(ReadAll(folder_ / "out/images.txt"));
+  std::istringstream tum(ReadAll(folder_ / "out/trajectory.txt"));
+  const Json gltf = Json::parse(ReadAll(folder_ / "out/cameras.gltf"));
+  EXPECT_EQ(gltf["asset"]["version"], "2.0");
+  EXPECT_EQ(gltf["nodes"][0]["children"].size(), 6U);
+  std::string line;
+  std::getline(colmap, line);
+  std::getline(colmap, line);
+  std::getline(tum, line);
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    Eigen::Matrix3d rotation;
+    Eigen::Vector3d translation;
+    for (int k = 0; k < 9; ++k) rotation(k / 3, k % 3) = shown[i]["rotation"][k];
+    for (int k = 0; k < 3; ++k) translation[k] = shown[i]["translation"][k];
+    const Eigen::Vector3d center = -rotation.transpose() * translation;
+
+    int id = 0, camera = 0;
+    double w = 0, x = 0, y = 0, z = 0;
+    Eigen::Vector3d t;
+    std::string name;
+    colmap >> id >> w >> x >> y >> z >> t.x() >> t.y() >> t.z() >> camera >> name;
+    EXPECT_EQ(id, static_cast<int>(i) + 1);
+    EXPECT_EQ(name, shown[i]["image"]);
+    EXPECT_LT((Eigen::Quaterniond(w, x, y, z).toRotationMatrix() - rotation).norm(), 1e-12);
+    EXPECT_LT((t - translation).norm(), 1e-12);
+
+    double time = 0;
+    tum >> time >> t.x() >> t.y() >> t.z() >> x >> y >> z >> w;
+    EXPECT_EQ(time, static_cast<double>(i));
+    EXPECT_LT((t - center).norm(), 1e-12);
+    EXPECT_LT((Eigen::Quaterniond(w, x, y, z).toRotationMatrix() - rotation.transpose()).norm(),
+              1e-12);
+
+    // What the glTF camera sees ahead of it (-Z) is what ours does (+Z); so with up (Y and -Y).
+    const Json& node = gltf["nodes"][i + 1];
+    const Json& q = node["rotation"];
+    const Eigen::Matrix3d turn = Eigen::Quaterniond(q[3].get<double>(), q[0].get<double>(),
+                                                    q[1].get<double>(), q[2].get<double>())
+                                     .toRotationMatrix();
+    EXPECT_LT((-turn.col(2) - rotation.transpose().col(2)).norm(), 1e-12);
+    EXPECT_LT((turn.col(1) + rotation.transpose().col(1)).norm(), 1e-12);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(node["translation"][k], center[k], 1e-12);
+  }
+  EXPECT_NEAR(gltf["cameras"][0]["perspective"]["yfov"], 2.0 * std::atan(0.5 * kHeight / kFocal),
+              1e-12);
+  // The root turns the plane's normal (Z) into glTF's up (Y).
+  const Json& r = gltf["nodes"][0]["rotation"];
+  const Eigen::Quaterniond root(r[3].get<double>(), r[0].get<double>(), r[1].get<double>(),
+                                r[2].get<double>());
+  EXPECT_LT((root * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitY()).norm(), 1e-12);
+  EXPECT_CONTAINS(ReadAll(folder_ / "out/cameras.txt"), "1 PINHOLE 320 240 300 300 160 120\n");
+}
+
+}  // namespace
+}  // namespace circline::apps
