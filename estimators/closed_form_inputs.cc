@@ -36,14 +36,12 @@ Measured BestLine(const Observations& observations, PencilDirection role) {
   return best == nullptr ? Measured() : FromLine(*best);
 }
 
-// The angle between the two pencils, radians, if it is known.
-std::optional<double> AngleBetween(const PencilObservation& a, const PencilObservation& b,
-                                   const std::vector<KnownAngle>& known_angles) {
-  const PencilDirection free = PencilDirection::kFree;
-  if (a.direction != free && b.direction != free) return 1.5707963267948966;
-  for (const KnownAngle& known : known_angles) {
-    if ((known.pencils[0] == a.id && known.pencils[1] == b.id) ||
-        (known.pencils[0] == b.id && known.pencils[1] == a.id)) {
+// The given angle between two pencils, radians.
+std::optional<double> KnownAngleBetween(const std::string& a, const std::string& b,
+                                        const Observations& observations) {
+  for (const KnownAngle& known : observations.known_angles) {
+    if ((known.pencils[0] == a && known.pencils[1] == b) ||
+        (known.pencils[0] == b && known.pencils[1] == a)) {
       return known.value;
     }
   }
@@ -106,23 +104,28 @@ std::vector<Eigen::Vector3d> OnConeAndPlane(const Eigen::Vector3d& d, double ang
 
 }  // namespace
 
-void GatherDirections(const Observations& evidence, Inputs* inputs) {
+void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, Inputs* inputs) {
   const std::array<PencilObservation, 2> pencils = {evidence.pencils[0], evidence.pencils[1]};
   for (std::size_t k = 0; k < 2; ++k) {
     inputs->directions[k] = Measured(pencils[k].fit->direction, pencils[k].fit->covariance);
     inputs->roles[k] = pencils[k].direction;
   }
-  const auto angle = AngleBetween(pencils[0], pencils[1], evidence.known_angles);
+  std::optional<double> angle = KnownAngleBetween(pencils[0].id, pencils[1].id, evidence);
+  const PencilDirection free = PencilDirection::kFree;
+  if (axes_are_orthogonal && inputs->roles[0] != free && inputs->roles[1] != free) {
+    angle = 1.5707963267948966;
+  }
   if (!angle) return;
 
-  // Both vanishing points together are the better estimate unless lines contradict them.
-  constexpr double kGate = 2.0;  // Two standard deviations.
+  constexpr double kGate = 2.0;  // Of cost: two standard deviations.
   double best =
       LineCost(pencils, SplitByVariance(*pencils[0].fit, *pencils[1].fit, *angle)) - kGate;
+  const double both = pencils[0].fit->covariance.trace() + pencils[1].fit->covariance.trace();
+  constexpr double kFollows = 100.0;
   for (std::size_t k = 0; k < 2; ++k) {
-    // One direction from its vanishing point, the other from a line and the angle. The latter's
-    // error lies in the line's plane, across; what it has along the former is for the former to
-    // give in to.
+    // One direction from its vanishing point, the other from a line and the angle: the error of the
+    // latter's own is across both. It follows the former: its variance along that is made the far
+    // larger one, so that nobody weighs the two against each other.
     const Eigen::Vector3d d = pencils[k].fit->direction;
     for (const LineFit& line : BestLines(pencils[1 - k])) {
       for (const Eigen::Vector3d& other : OnConeAndPlane(d, *angle, line.line)) {
@@ -136,7 +139,7 @@ void GatherDirections(const Observations& evidence, Inputs* inputs) {
         const Eigen::Vector3d across = d.cross(other).normalized();
         inputs->directions[1 - k] =
             Measured(other, other.dot(line.covariance * other) * across * across.transpose() +
-                                pencils[1 - k].fit->covariance.trace() * d * d.transpose());
+                                kFollows * both * d * d.transpose());
       }
     }
   }

@@ -61,11 +61,11 @@ void GatherAxisLines(const Observations& observations, double sigma_px, Inputs* 
 // Senses of the axes, the origin, a known length.
 void GatherFrame(const Observations& observations, double sigma_px, Inputs* inputs);
 
-// The directions of the evidence's two pencils. Where the angle between them is known - they run
-// along two of the axes, or it is given - they are, of what the vanishing points and single lines
-// of the pencils admit, those that explain all lines best: lines that nearly coincide have a
-// vanishing point that may be anywhere along them, whatever its covariance says.
-void GatherDirections(const Observations& evidence, Inputs* inputs);
+// The directions of the evidence's two pencils: their vanishing points, unless the angle between
+// them is known and the lines favour directions elsewhere. Lines that nearly coincide have a
+// vanishing point that may be anywhere along them, whatever its covariance says. The angle is known
+// where it is given or, with `axes_are_orthogonal`, where the pencils run along two of the axes.
+void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, Inputs* inputs);
 
 // A circle of the world plane, its centre if known, its radius.
 void GatherCircle(const Observations& observations, const CircleObservation& circle,

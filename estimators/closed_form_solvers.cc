@@ -382,9 +382,10 @@ Status SelectPencils(const Observations& observations, PencilPair* pair, FrameOb
   return Status::Ok();
 }
 
-Status GatherPencils(const Observations& evidence, double sigma_px, Inputs* inputs) {
+Status GatherPencils(const Observations& evidence, bool axes_are_orthogonal, double sigma_px,
+                     Inputs* inputs) {
   GatherFrame(evidence, sigma_px, inputs);
-  GatherDirections(evidence, inputs);
+  GatherDirections(evidence, axes_are_orthogonal, inputs);
   if (evidence.frame.x_axis) inputs->x_line = AxisLine(evidence, *evidence.frame.x_axis, sigma_px);
   if (evidence.frame.y_axis) inputs->y_line = AxisLine(evidence, *evidence.frame.y_axis, sigma_px);
   if (inputs->origin.present()) return Status::Ok();
@@ -428,7 +429,10 @@ Recipe LinePairsRecipe() {
     if (status.ok()) *evidence = KeepPencils(observations, pair, frame);
     return status;
   };
-  r.gather = GatherPencils;
+  // Proposition 5 makes no use of what the axes are.
+  r.gather = [](const Observations& evidence, double sigma_px, Inputs* inputs) {
+    return GatherPencils(evidence, false, sigma_px, inputs);
+  };
   r.evaluate = LinePairPoses;
   return r;
 }
@@ -450,7 +454,9 @@ Recipe OrthogonalVanishingPointsRecipe() {
     *evidence = KeepPencils(observations, pair, frame);
     return Status::Ok();
   };
-  r.gather = GatherPencils;
+  r.gather = [](const Observations& evidence, double sigma_px, Inputs* inputs) {
+    return GatherPencils(evidence, true, sigma_px, inputs);
+  };
   r.evaluate = OrthogonalDirectionPoses;
   return r;
 }

@@ -251,7 +251,7 @@ TEST(PencilsTest, FitsNoWorseThanTheTruth) {
       "%d scenes of two pencils of 2 to 4 lines, every other a corridor: %d fit worse than the "
       "truth\n",
       scenes, worse);
-  EXPECT_LE(worse, scenes / 5000);
+  EXPECT_LE(worse, scenes / 2000);
 }
 
 }  // namespace
