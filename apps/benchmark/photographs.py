@@ -32,6 +32,15 @@ CLAIMS = [
     ('box-camprodon', [], 'joint', 'refined', 'rotation_error_deg', 'best', 1.0),
 ]
 
+# Do the stated uncertainties cover the errors? set, converter's arguments, what its truth is good to (degrees).
+COVERED = [
+    ('chessboard-opencv', [], 0.14), ('chessboard-opencv', ['--lines=all'], 0.14), ('chessboard-charuco-robot', [], 0.16),
+    ('box-camprodon', [], 0.34), ('circle-mire2', [], 0.2), ('circles-discocal-rgb', ['--centre'], 0.15),
+    ('circles-discocal-rgb', ['--circles=all'], 0.15), ('circles-discocal-tir', ['--centre'], 0.02),
+    ('circles-discocal-tir', ['--circles=all'], 0.02), ('circles-robot10x10', ['--centre'], 0.27),
+    ('circles-visp36', ['--centre'], 0.05), ('circles-visp36', ['--circles=all'], 0.05),
+]
+
 
 def run(args, data_set, options, scratch, cache={}):
     """Result lines by image, solver and stage; one run for each set and evidence."""
@@ -91,6 +100,16 @@ def main():
             right = sum(bool(h) and error(h[0], 'normal_error_deg') <= min(error(l, 'normal_error_deg') for l in h)
                         for h in images)
             claim(f'{data_set} --centre: right hypothesis first in {right} of {len(images)}', right >= 0.95 * len(images))
+        # A normal has two components; its 95 % radius is 2.45 standard deviations of one.
+        inside = total = 0
+        for data_set, options, truth in COVERED:
+            for hypotheses in answers(run(args, data_set, options, scratch), 'joint', 'refined'):
+                best = min(hypotheses, key=lambda line: line['normal_error_deg'], default=None)
+                total += 1
+                inside += best is not None and (best['normal_error_deg'] ** 2
+                                                <= 5.99 / 2 * (best['sigma_normal_deg'] ** 2 + truth ** 2))
+        print(f'       all sets: normal of joint (better hypothesis) within its 95 % radius, the truth\'s own deviation added, '
+              f'in {inside} of {total} photos')
         # One dot: which of the two it is can often not be told, and then no answer may claim to know.
         images = answers(run(args, 'circles-visp36', ['--centre'], scratch), 'circle_center', 'refined')
         wrong = [h[0]['probability'] for h in images
