@@ -351,7 +351,7 @@ Status JointProblem::Refine(const Approach& approach, Refined* refined) const {
   *refined = Refined();
   PoseHypothesis* h = &refined->hypothesis;
   JointState state = approach.state;
-  const Status status = GraduatedMinimize(e, e.options.max_iterations, kTolerance, &state);
+  const Status status = Minimize(e, 1.0, e.options.max_iterations, kTolerance, &state);
   if (!status.ok()) return status;
   h->cost = JointCost(e, state, Weighing()) + LeftOutCost(e, state);
   const double inflation = Inflation(e, state);

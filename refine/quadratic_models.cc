@@ -55,6 +55,16 @@ Weights LossWeights(double s) {
   return {loss.first, std::max(loss.first + 2.0 * s * loss.second, kLeastCurvature * loss.first)};
 }
 
+// hessian += weight j j^T, its lower half; unrolled by the compiler.
+template <int kSize>
+void AddOuterProduct(const Eigen::Matrix<double, kSize, 1>& j, double weight,
+                     Eigen::Matrix<double, kSize, kSize>* hessian) {
+  for (int c = 0; c < kSize; ++c) {
+    const double scaled = weight * j[c];
+    for (int r = c; r < kSize; ++r) (*hessian)(r, c) += scaled * j[r];
+  }
+}
+
 // Sums a set's residuals: `distance(point, jacobian)` in pixels, jacobian a vector of kSize, not
 // asked for where `hessian` is null. Adds to gradient and hessian (lower half), returns the cost.
 template <LossType kLoss, int kSize, typename Distance>
@@ -73,7 +83,7 @@ double SumRobust(const PointSet& set, double stretch, const Distance& distance,
     if (hessian == nullptr) continue;
     const Weights w = LossWeights<kLoss>(s);
     *gradient += (weight * w.slope * d) * jacobian;
-    hessian->template selfadjointView<Eigen::Lower>().rankUpdate(jacobian, weight * w.curvature);
+    AddOuterProduct<kSize>(jacobian, weight * w.curvature, hessian);
   }
   return 0.5 * set.weight * stretch * stretch * rho.Total();
 }
@@ -91,7 +101,7 @@ double SumInliers(const PointSet& set, const Distance& distance,
     squares += d * d;
     if (hessian == nullptr) continue;
     *gradient += weight * d * jacobian;
-    hessian->template selfadjointView<Eigen::Lower>().rankUpdate(jacobian, weight);
+    AddOuterProduct<kSize>(jacobian, weight, hessian);
   }
   return 0.5 * weight * squares;
 }
@@ -209,9 +219,10 @@ double EvaluateCircle(const PointSet& set, const Weighing& weighing, const Eigen
   Matrix6d hessian = Matrix6d::Zero();
   model->cost = SumSet<6>(set, weighing, distance, &gradient, &hessian);
   const Matrix6d J = CircleJacobian(A, M, facing, cx, cy, radius);
-  model->gradient.noalias() = J.transpose() * gradient;
-  const Matrix6d HJ = hessian.selfadjointView<Eigen::Lower>() * J;
-  model->hessian.noalias() = J.transpose() * HJ;
+  hessian.triangularView<Eigen::StrictlyUpper>() = hessian.transpose();
+  model->gradient = J.transpose().lazyProduct(gradient);
+  const Matrix6d HJ = hessian.lazyProduct(J);
+  model->hessian = J.transpose().lazyProduct(HJ);
   return model->cost;
 }
 
@@ -227,9 +238,10 @@ double EvaluateLine(const PointSet& set, const Weighing& weighing, const Eigen::
   model->cost = SumSet<3>(set, weighing, distance, &gradient, &hessian);
   Eigen::Matrix<double, 3, 6> J;
   J << -R * CrossMatrix(m), R * dm;
-  model->gradient.noalias() = J.transpose() * gradient;
-  const Eigen::Matrix<double, 3, 6> HJ = hessian.selfadjointView<Eigen::Lower>() * J;
-  model->hessian.noalias() = J.transpose() * HJ;
+  hessian.triangularView<Eigen::StrictlyUpper>() = hessian.transpose();
+  model->gradient = J.transpose().lazyProduct(gradient);
+  const Eigen::Matrix<double, 3, 6> HJ = hessian.lazyProduct(J);
+  model->hessian = J.transpose().lazyProduct(HJ);
   return model->cost;
 }
 

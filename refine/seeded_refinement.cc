@@ -169,7 +169,7 @@ void AddCircleSeeds(const Observations& observations, const JointProblem& proble
 // receives why the last of the closed forms refused.
 std::vector<CameraPose> CollectSeeds(const Observations& observations,
                                      const std::vector<std::shared_ptr<const Solver>>& seeders,
-                                     const JointProblem& problem,
+                                     const EstimationOptions& options, const JointProblem& problem,
                                      std::vector<std::string>* reasons) {
   std::vector<Seed> seeds;
   int source = 0;
@@ -197,8 +197,13 @@ std::vector<CameraPose> CollectSeeds(const Observations& observations,
   std::stable_sort(seeds.begin(), seeds.end(),
                    [](const Seed& a, const Seed& b) { return a.cost < b.cost; });
   seeds.resize(std::min(seeds.size(), kMaxSeeds));
+  // A closed form lies so near its minimum that one that costs far more leads to none that counts.
+  constexpr double kMargin = 4.0;
   std::vector<CameraPose> poses;
-  for (const Seed& seed : seeds) poses.push_back(seed.pose);
+  for (const Seed& seed : seeds) {
+    if (seed.cost <= kMargin * (seeds.front().cost + options.max_cost_gap))
+      poses.push_back(seed.pose);
+  }
   return poses;
 }
 
@@ -328,7 +333,7 @@ Status RefineFitted(const Observations& fitted,
   const Observations scaled = ApplyScales(fitted, options, OrDefault(scales));
   JointProblem problem(fitted, options, OrDefault(scales));
   std::vector<std::string> reasons;
-  const std::vector<CameraPose> seeds = CollectSeeds(scaled, seeders, problem, &reasons);
+  const std::vector<CameraPose> seeds = CollectSeeds(scaled, seeders, options, problem, &reasons);
   Status last = Status::Refused(
       reasons.empty() ? "there is no circle and no pencil of parallel lines" : Join(reasons));
   std::vector<Approach> approaches = ApproachAll(problem, seeds, &last);
