@@ -25,6 +25,14 @@ Status EstimationOptions::Validate() const {
     return Status::Invalid("line_bias_px must be 0 or more");
   if (max_iterations < 1) return Status::Invalid("max_iterations must be 1 or more");
   if (!(max_cost_gap > 0.0)) return Status::Invalid("max_cost_gap must be positive");
+  if (prior) {
+    const Eigen::Matrix3d product = prior->rotation * prior->rotation.transpose();
+    constexpr double kTolerance = 1e-6;
+    if (!product.isIdentity(kTolerance) || !prior->translation.allFinite() ||
+        !(prior->translation.norm() > 0.0)) {
+      return Status::Invalid("prior must be a rotation and a translation that is not zero");
+    }
+  }
   return Status::Ok();
 }
 

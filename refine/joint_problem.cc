@@ -345,6 +345,17 @@ Status JointProblem::Continue(Approach* approach) const {
                 approach->pose.translation.allFinite());
 }
 
+double JointProblem::InlierShare(const Approach& approach) const {
+  std::size_t inliers = 0, points = 0;
+  for (const PointSet& set : evidence_.sets) points += set.num_trusted;
+  ForEachCurve(evidence_, approach.state,
+               [&](const PointSet& set, bool, std::size_t, const std::vector<double>& distances) {
+                 for (std::size_t i = 0; i < set.num_trusted; ++i)
+                   inliers += std::abs(distances[i]) <= kInlierSigmas * set.sigma_px ? 1 : 0;
+               });
+  return points > 0 ? static_cast<double>(inliers) / static_cast<double>(points) : 0.0;
+}
+
 Status JointProblem::Refine(const Approach& approach, Refined* refined) const {
   const JointEvidence& e = evidence_;
   constexpr double kTolerance = 1e-7;  // Of cost: a two-thousandth of a standard deviation.

@@ -76,6 +76,9 @@ class JointProblem {
   Status ApproachFrom(const CameraPose& seed, Approach* approach) const;
   Status Continue(Approach* approach) const;
 
+  // Share of the points of contours and lines that are inliers there.
+  double InlierShare(const Approach& approach) const;
+
   // Runs an approach to its end; fills everything that a hypothesis holds but the probability. Not
   // ok: degenerate evidence, or no convergence.
   Status Refine(const Approach& approach, Refined* refined) const;

@@ -326,17 +326,38 @@ Status RefineApproaches(const JointProblem& problem, const Observations& scaled,
   return Status::Ok();
 }
 
+// True if the prior pose (if any) leads to one that explains the points.
+bool ApproachFromPrior(const JointProblem& problem, const EstimationOptions& options,
+                       std::vector<Approach>* approaches) {
+  constexpr double kExplained = 0.8;
+  Approach approach;
+  if (!options.prior || !problem.ApproachFrom(*options.prior, &approach).ok() ||
+      !(problem.InlierShare(approach) >= kExplained)) {
+    return false;
+  }
+  approaches->push_back(std::move(approach));
+  return true;
+}
+
 Status RefineFitted(const Observations& fitted,
                     const std::vector<std::shared_ptr<const Solver>>& seeders,
                     const EstimationOptions& options, PoseEstimate* estimate) {
   NoiseScales scales = MeasureScales(fitted);
   const Observations scaled = ApplyScales(fitted, options, OrDefault(scales));
   JointProblem problem(fitted, options, OrDefault(scales));
+  std::vector<Approach> approaches;
+  if (ApproachFromPrior(problem, options, &approaches)) {
+    const Status status = RefineApproaches(problem, scaled, options, approaches, estimate);
+    if (status.ok()) {
+      estimate->decided_by = "the prior pose";
+      return status;
+    }
+  }
   std::vector<std::string> reasons;
   const std::vector<CameraPose> seeds = CollectSeeds(scaled, seeders, options, problem, &reasons);
   Status last = Status::Refused(
       reasons.empty() ? "there is no circle and no pencil of parallel lines" : Join(reasons));
-  std::vector<Approach> approaches = ApproachAll(problem, seeds, &last);
+  approaches = ApproachAll(problem, seeds, &last);
   if (approaches.empty()) return last;
   if (RaiseScales(approaches.front().scales, &scales)) {
     problem.SetScales(OrDefault(scales));
@@ -361,7 +382,8 @@ PoseEstimate RefineSeeds(const std::string& name,
             &fitted, &estimate.notes);
   fitted = ResolveWorld(fitted);
   estimate.status = RefineFitted(fitted, seeders, options, &estimate);
-  if (estimate.status.ok()) estimate.decided_by = DecidedBy(estimate.hypotheses);
+  if (estimate.status.ok() && estimate.decided_by.empty())
+    estimate.decided_by = DecidedBy(estimate.hypotheses);
   return estimate;
 }
 

@@ -183,6 +183,19 @@ void BM_EstimatePoseCircleAndLinesUnfitted(benchmark::State& state) {
 }
 BENCHMARK(BM_EstimatePoseCircleAndLinesUnfitted);
 
+// As a front end calls it: with the pose of the frame before.
+void BM_EstimatePoseFromPrior(benchmark::State& state) {
+  std::vector<Scene> scenes = Scenes(AddPaperLike);
+  for (Scene& scene : scenes) FitDirect(kNoisePx, &scene.observations);
+  RunInTurn(state, scenes, [&](std::size_t i) {
+    EstimationOptions options;
+    options.prior = scenes[i].pose;
+    options.prior->rotation = ExpRotation({kWarm, -kWarm, kWarm}) * scenes[i].pose.rotation;
+    return EstimatePose(scenes[i].observations, options).status.ok();
+  });
+}
+BENCHMARK(BM_EstimatePoseFromPrior);
+
 void BM_EstimatePoseOneCircle(benchmark::State& state) { Estimate(state, AddOneCircle, true); }
 BENCHMARK(BM_EstimatePoseOneCircle);
 

@@ -63,7 +63,7 @@ Outcome Judge(const PoseEstimate& estimate, const Eigen::Matrix3d& truth,
   const Eigen::Matrix3d covariance = best.Covariance().topLeftCorner<3, 3>();
   outcome.nees = error.dot(covariance.inverse() * error);
   const double limit = std::max(kFailureBounds * std::sqrt(bound.trace()), kFailureExactRad);
-  outcome.failed = !(outcome.rotation_rad <= limit);
+  outcome.failed = best.RotationIsFree() || !(outcome.rotation_rad <= limit);
   return outcome;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/paper_scene.h"
 #include "tests/plane_scene.h"
 
 namespace circline {
@@ -170,6 +171,119 @@ TEST(EstimatePoseTest, RefusalsAndBadInputHaveASentence) {
   estimate = EstimatePose(scene.Empty(), options);
   EXPECT_EQ(estimate.status.code, StatusCode::kInvalidArgument);
   EXPECT_NE(estimate.status.message.find("conic_loss.scale_px"), std::string::npos);
+}
+
+TEST(EstimatePoseTest, APriorPoseDecidesWhereItExplainsThePoints) {
+  PlaneScene scene(0.7, 0.2);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  observations.frame.origin_is_center = "c0";
+  const PoseEstimate both = EstimatePose(observations);
+  ASSERT_EQ(both.hypotheses.size(), 2U);
+  EstimationOptions options;
+  for (const PoseHypothesis& expected : both.hypotheses) {
+    options.prior = expected.cam_from_world;
+    options.prior->rotation = ExpRotation({0.01, -0.02, 0.01}) * options.prior->rotation;
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_EQ(estimate.hypotheses.size(), 1U) << estimate.status.message;
+    EXPECT_EQ(estimate.decided_by, "the prior pose");
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_LT(
+        h.cam_from_world.rotation.col(2).cross(expected.cam_from_world.rotation.col(2)).norm(),
+        1e-5);
+    EXPECT_LT((h.Covariance() - expected.Covariance()).norm(), 1e-3 * h.Covariance().norm());
+  }
+  // The plane seen from behind its edge: nothing lies where it would.
+  options.prior->rotation = ExpRotation({1.5, 0.0, 0.0}) * scene.pose.rotation;
+  EXPECT_EQ(EstimatePose(observations, options).hypotheses.size(), 2U);
+  options.prior->rotation.setZero();
+  const PoseEstimate invalid = EstimatePose(observations, options);
+  EXPECT_EQ(invalid.status.code, StatusCode::kInvalidArgument);
+  EXPECT_NE(invalid.status.message.find("prior"), std::string::npos);
+}
+
+// The sense of an X axis that points straight down in the photo is a toss-up; that makes no second
+// pose.
+TEST(EstimatePoseTest, AVerticalAxisMakesNoSecondPose) {
+  for (int i = 0; i < 20; ++i) {
+    PlaneScene scene(0.7, 0.3, static_cast<std::uint64_t>(i + 1));
+    scene.pose.rotation = ExpRotation({0.7, 0.0, 0.0}) * ExpRotation({0.0, 0.0, 1.5707963}) *
+                          Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+    scene.pose.translation.x() = 0.0;
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
+    observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                            scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+    const PoseEstimate estimate = EstimatePose(observations);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    for (std::size_t k = 1; k < estimate.hypotheses.size(); ++k) {
+      EXPECT_GT(NormalError(estimate.hypotheses[k], scene), 0.02);
+    }
+    EXPECT_GT(estimate.hypotheses[0].probability, 0.9);
+  }
+}
+
+TEST(EstimatePoseTest, EvidenceLeftOutIsNamed) {
+  PlaneScene scene(0.7, 0.1);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.5)};
+  observations.circles[0].center = scene.Pixel(0.0, 0.0) + Eigen::Vector2d(9.0, -6.0);
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+  EstimationOptions options;
+  options.conic_loss.type = options.line_loss.type = LossType::kTukey;
+  const PoseEstimate estimate = EstimatePose(observations, options);
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.01);
+  ASSERT_FALSE(estimate.notes.empty());
+  EXPECT_NE(estimate.notes.back().find("the centre of circle 'c0'"), std::string::npos);
+}
+
+// Half of the points of every feature spread over a band: the mask finds most, the loss the rest,
+// and the covariance says what those cost that lie among the inliers.
+TEST(EstimatePoseTest, CovarianceKnowsOfOutliersAmongTheInliers) {
+  constexpr int kTrials = 150;
+  EstimationOptions options;
+  options.conic_loss.type = options.line_loss.type = LossType::kTukey;
+  double nees = 0.0;
+  for (int i = 0; i < kTrials; ++i) {
+    Random random(static_cast<std::uint64_t>(i + 1));
+    Observations observations = PaperScene(2.0, &random);
+    const auto spoil = [&](std::vector<Eigen::Vector2d>* points, std::vector<std::uint8_t>* inliers,
+                           const auto& across) {
+      inliers->assign(points->size(), 1);
+      for (std::size_t k = 0; k < points->size(); k += 2) {
+        const double by = random.Uniform(-40.0, 40.0);
+        (*points)[k] += by * across((*points)[k]);
+        (*inliers)[k] = std::abs(by) < 6.0 ? 1 : 0;
+      }
+    };
+    CircleObservation& circle = observations.circles[0];
+    Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& p : circle.points) middle += p / 100.0;
+    spoil(&circle.points, &circle.inliers,
+          [&](const Eigen::Vector2d& p) -> Eigen::Vector2d { return (p - middle).normalized(); });
+    for (PencilObservation& pencil : observations.pencils) {
+      for (LineObservation& line : pencil.lines) {
+        const Eigen::Vector2d along = (line.points.back() - line.points.front()).normalized();
+        spoil(&line.points, &line.inliers,
+              [&](const Eigen::Vector2d&) { return Eigen::Vector2d(-along.y(), along.x()); });
+      }
+    }
+    observations.frame.x_axis = Segment{observations.pencils[0].lines[0].points[1],
+                                        observations.pencils[0].lines[0].points[49]};
+    observations.frame.y_axis = Segment{observations.pencils[1].lines[0].points[1],
+                                        observations.pencils[1].lines[0].points[49]};
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& best = estimate.hypotheses.front();
+    const Eigen::Vector3d error =
+        LogRotation(PaperPose().rotation * best.cam_from_world.rotation.transpose());
+    const Eigen::Matrix3d covariance = best.Covariance().topLeftCorner<3, 3>();
+    nees += error.dot(covariance.inverse() * error) / kTrials;
+  }
+  EXPECT_GT(nees, 2.4);
+  EXPECT_LT(nees, 3.9);
 }
 
 TEST(EstimatePoseTest, SameInputSameBits) {
