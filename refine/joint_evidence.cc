@@ -6,16 +6,9 @@
 #include <limits>
 #include <utility>
 
+#include "circline/refine/crowds.h"
+
 namespace circline {
-namespace {
-
-// A redescending loss judges for itself which points are outliers; under the others those that a
-// robust fit has found are left out.
-bool Redescends(LossType type) {
-  return type == LossType::kTukey || type == LossType::kGemanMcClure;
-}
-
-}  // namespace
 
 void LineTerm::SetDirection(const Eigen::Vector3d& direction) {
   a = direction.unitOrthogonal();
@@ -68,21 +61,32 @@ int JointEvidence::AddParameter(int size, bool is_private) {
 int JointEvidence::AddSet(const std::vector<Eigen::Vector2d>& pixels,
                           const std::vector<std::uint8_t>& mask, double sigma_px, bool is_conic) {
   PointSet set;
-  set.loss = (is_conic ? options.conic_loss : options.line_loss).type;
-  CalibrateInliers(observations.camera, pixels, mask, &set.points);
-  if (set.points.empty()) return -1;
-  set.num_trusted = set.points.size();
-  if (!mask.empty() && Redescends(set.loss)) {
-    std::vector<std::uint8_t> others = mask;
-    for (std::uint8_t& m : others) m = m == 0 ? 1 : 0;
-    std::vector<CalibratedPoint> doubted;
-    CalibrateInliers(observations.camera, pixels, others, &doubted);
-    set.points.insert(set.points.end(), doubted.begin(), doubted.end());
-  }
-  const double chosen = (is_conic ? options.conic_loss : options.line_loss).scale_px;
-  set.sigma_px = sigma_px > 0.0 ? sigma_px : chosen;
+  const LossOptions& loss = is_conic ? options.conic_loss : options.line_loss;
+  set.loss = loss.type;
+  set.sigma_px = sigma_px > 0.0 ? sigma_px : loss.scale_px;
   if (!(set.sigma_px > 0.0))
     set.noise = is_conic ? PointSet::Noise::kAutoConic : PointSet::Noise::kAutoLine;
+
+  std::vector<std::uint8_t> trusted = mask, doubted;
+  if (!mask.empty() && Redescends(set.loss)) {
+    set.is_contaminated = IsContaminated(mask);
+    for (const std::uint8_t m : mask) doubted.push_back(m == 0 ? 1 : 0);
+    if (set.is_contaminated) {
+      const std::vector<std::uint8_t> strung = NotCrowded(pixels, set.sigma_px);
+      for (std::size_t i = 0; i < strung.size(); ++i) {
+        trusted[i] &= strung[i];
+        doubted[i] &= strung[i];
+      }
+    }
+  }
+  CalibrateInliers(observations.camera, pixels, trusted, &set.points);
+  set.num_trusted = set.points.size();
+  if (!doubted.empty()) {
+    std::vector<CalibratedPoint> more;
+    CalibrateInliers(observations.camera, pixels, doubted, &more);
+    set.points.insert(set.points.end(), more.begin(), more.end());
+  }
+  if (set.points.empty()) return -1;
   if (is_conic) set.Normalize();
   sets.push_back(std::move(set));
   return static_cast<int>(sets.size()) - 1;

@@ -67,7 +67,7 @@ double RelativeSpread(const JointEvidence& e, const JointState& state) {
   std::vector<double> ratios;
   ForEachCurve(e, state,
                [&](const PointSet& set, bool, std::size_t, const std::vector<double>& distances) {
-                 if (set.IsContaminated()) return;  // Started robustly.
+                 if (set.is_contaminated) return;  // Started robustly.
                  const double unit = 1.0 / (set.sigma_px * LossTuningConstant(set.loss));
                  for (std::size_t i = 0; i < set.num_trusted; ++i)
                    ratios.push_back(std::abs(distances[i]) * unit);
@@ -314,6 +314,11 @@ Status Finite(bool finite) {
 }
 
 }  // namespace
+
+bool JointProblem::is_contaminated() const {
+  return std::any_of(evidence_.sets.begin(), evidence_.sets.end(),
+                     [](const PointSet& set) { return set.is_contaminated; });
+}
 
 double JointProblem::SeedCost(const CameraPose& seed) const {
   JointState state;

@@ -83,6 +83,9 @@ class JointProblem {
   // ok: degenerate evidence, or no convergence.
   Status Refine(const Approach& approach, Refined* refined) const;
 
+  // True if so many points are doubted that some features' fits may be wrong.
+  bool is_contaminated() const;
+
   // True if nothing fixes the rotation about the plane's normal.
   bool spin_is_free() const { return !evidence_.x_is_fixed; }
 

@@ -12,6 +12,10 @@
 namespace circline {
 namespace {
 
+const PointSet& SetOf(const JointEvidence& e, int index) {
+  return e.sets[static_cast<std::size_t>(index)];
+}
+
 // Circle of the plane like a fitted conic: seen in the plane this is an ellipse, and a circle where
 // the plane's normal is one of the conic's.
 bool PlaneCircle(const Eigen::Matrix3d& R, double facing, const Eigen::Matrix3d& conic,
@@ -37,7 +41,7 @@ bool InitializeCircles(const JointEvidence& e, JointState* state) {
     if (!PlaneCircle(state->rotation, state->facing, fit.conic, circle) ||
         !((state->rotation * Eigen::Vector3d(circle[0], circle[1], state->facing)).z() > 0.0)) {
       state->circle_left_out[i] = 1;
-      ++left_out;
+      left_out += SetOf(e, t.set).is_contaminated ? 0 : 1;  // Else it has another chance.
       continue;
     }
     double* center = state->At(t.center);
@@ -72,10 +76,6 @@ void InitializeScale(const JointEvidence& e, JointState* state) {
 }
 
 // --- Where a fit may have followed outliers ---
-
-const PointSet& SetOf(const JointEvidence& e, int index) {
-  return e.sets[static_cast<std::size_t>(index)];
-}
 
 // The position of a line, tried at points of it one after the other: the one that explains most.
 void ReconsiderLine(const JointEvidence& e, const LineTerm& t, JointState* state) {
@@ -170,10 +170,10 @@ void ReconsiderCircle(const JointEvidence& e, std::size_t index, JointState* sta
 
 void Reconsider(const JointEvidence& e, JointState* state) {
   for (const LineTerm& t : e.lines) {
-    if (SetOf(e, t.set).IsContaminated()) ReconsiderLine(e, t, state);
+    if (SetOf(e, t.set).is_contaminated) ReconsiderLine(e, t, state);
   }
   for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    if (SetOf(e, e.circles[i].set).IsContaminated()) ReconsiderCircle(e, i, state);
+    if (SetOf(e, e.circles[i].set).is_contaminated) ReconsiderCircle(e, i, state);
   }
 }
 

@@ -43,6 +43,8 @@ struct PointSet {
 
   std::vector<CalibratedPoint> points;
   std::size_t num_trusted = 0;  // The first ones: those that a robust fit takes for inliers.
+  // So many others there are that the fit itself may have followed outliers.
+  bool is_contaminated = false;
   double sigma_px = 1.0;
   Noise noise = Noise::kStated;
   LossType loss = LossType::kTrivial;
@@ -52,13 +54,6 @@ struct PointSet {
   // their shape is large against rounding.
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();
   double scale = 1.0;
-
-  // So many points are doubted that the fit itself may have followed outliers.
-  bool IsContaminated() const {
-    constexpr double kShare = 0.15;
-    return static_cast<double>(points.size() - num_trusted) >
-           kShare * static_cast<double>(points.size());
-  }
 
   // Moves the points' middle to the origin and their mean distance to 1.
   void Normalize();

@@ -9,6 +9,7 @@
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/closed_form_solvers.h"
+#include "circline/refine/crowds.h"
 #include "circline/refine/joint_problem.h"
 
 namespace circline {
@@ -136,6 +137,28 @@ void AddSeed(const JointProblem& problem, const CameraPose& pose, int source,
   seeds->push_back({pose, cost, source});
 }
 
+// The rotations about the plane's normal under which one line or another of a pencil along an axis
+// has its direction: some of these lines may be wrong. The senses of the axes are those of
+// `rotation`.
+void AddSpinSeeds(const Observations& observations, const JointProblem& problem,
+                  const CameraPose& pose, int source, std::vector<Seed>* seeds) {
+  constexpr int kMaxLines = 8;
+  int lines = 0;
+  const Eigen::Vector3d n = pose.rotation.col(2);
+  for (const PencilObservation& pencil : observations.pencils) {
+    if (pencil.direction != PencilDirection::kX && pencil.direction != PencilDirection::kY)
+      continue;
+    const Eigen::Vector3d axis = pose.rotation.col(static_cast<int>(pencil.direction));
+    for (const LineObservation& line : pencil.lines) {
+      if (!line.fit || ++lines > kMaxLines) continue;
+      Eigen::Vector3d direction = n.cross(line.fit->line);
+      if (direction.dot(axis) < 0.0) direction = -direction;
+      const double angle = std::atan2(axis.cross(direction).dot(n), axis.dot(direction));
+      AddSeed(problem, {ExpRotation(angle * n) * pose.rotation, pose.translation}, source, seeds);
+    }
+  }
+}
+
 // Both planes of the largest circles of the world plane, turned in the plane as the other evidence
 // says.
 void AddCircleSeeds(const Observations& observations, const JointProblem& problem,
@@ -161,6 +184,7 @@ void AddCircleSeeds(const Observations& observations, const JointProblem& proble
         continue;
       pose.translation = p.center;
       AddSeed(problem, pose, source, seeds);
+      if (problem.is_contaminated()) AddSpinSeeds(observations, problem, pose, source, seeds);
     }
   }
 }
@@ -380,6 +404,7 @@ PoseEstimate RefineSeeds(const std::string& name,
   Observations fitted = observations;
   FitDirect(options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDefaultLineSigmaPx,
             &fitted, &estimate.notes);
+  RefitWithoutCrowds(options, &fitted);
   fitted = ResolveWorld(fitted);
   estimate.status = RefineFitted(fitted, seeders, options, &estimate);
   if (estimate.status.ok() && estimate.decided_by.empty())
