@@ -119,7 +119,7 @@ class Assembler {
       const auto i = static_cast<std::size_t>(k);
       const int block = variables.block[i];
       if (block < 0) continue;
-      const auto local = static_cast<std::int8_t>(k);
+      const auto local = static_cast<std::uint8_t>(k);
       if (e_.parameters[static_cast<std::size_t>(block)].is_private) {
         const auto n = static_cast<std::size_t>(own.size++);
         own.own[n] = local;

@@ -47,7 +47,7 @@ double JointCost(const JointEvidence& evidence, const JointState& state, const W
 // (shared - shared at the linearisation). Column indices are local ones of the feature's model.
 struct OwnUnknowns {
   int size = 0, shared_size = 0;
-  std::array<std::int8_t, 6> own{}, shared{};  // Local columns.
+  std::array<std::uint8_t, 6> own{}, shared{};  // Local columns.
   std::array<int, 6> own_block{}, own_index{};
   std::array<int, 6> shared_column{};
   std::array<double, 3> step{};
