@@ -17,10 +17,10 @@ struct FitOptions {
   // feature states sigma_px, the smaller of this and 3.03 sigma_px (99.8 % of a Gaussian's points)
   // is taken.
   double inlier_threshold_px = 2.0;
-  double confidence = 0.999;   // That the best model was among those drawn; in (0, 1).
+  double confidence = 0.999;    // That the best model was among those drawn; in (0, 1).
   int max_iterations = 100000;  // Draws for each model; 1 or more.
-  std::uint64_t seed = 1;      // Same input and seed, same bits out.
-  double sigma_px = 1.0;       // Of a point where the feature states none; > 0.
+  std::uint64_t seed = 1;       // Same input and seed, same bits out.
+  double sigma_px = 1.0;        // Of a point where the feature states none; > 0.
 
   Status Validate() const;
 };

@@ -20,24 +20,6 @@ bool Usable(const LineFit& line) {
   return line.line.allFinite() && line.covariance.allFinite() && line.line.norm() > 0.5;
 }
 
-std::vector<int> UsableLines(const std::vector<LineFit>& lines) {
-  std::vector<int> indices;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (Usable(lines[i])) indices.push_back(static_cast<int>(i));
-  }
-  return indices;
-}
-
-// A line whose covariance holds the model's error too, so that the fit of estimators/ weighs it as
-// the search did.
-LineFit WithModelError(const LineFit& line, double model_sigma_rad) {
-  LineFit result = line;
-  result.covariance +=
-      model_sigma_rad * model_sigma_rad *
-      (Eigen::Matrix3d::Identity() - line.line * line.line.transpose() / line.line.squaredNorm());
-  return result;
-}
-
 // Chance that an unrelated line is within the threshold of the direction: for a direction uniform
 // on the sphere, l . v is uniform on [-1, 1] (Archimedes), so it is T sigma. `line` has the model's
 // error.
@@ -176,6 +158,22 @@ Status PencilOptions::Validate() const {
   return ransac.Validate();
 }
 
+std::vector<int> UsableLines(const std::vector<LineFit>& lines) {
+  std::vector<int> indices;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (Usable(lines[i])) indices.push_back(static_cast<int>(i));
+  }
+  return indices;
+}
+
+LineFit WithModelError(const LineFit& line, double model_sigma_rad) {
+  LineFit result = line;
+  result.covariance +=
+      model_sigma_rad * model_sigma_rad *
+      (Eigen::Matrix3d::Identity() - line.line * line.line.transpose() / line.line.squaredNorm());
+  return result;
+}
+
 PencilModel::PencilModel(const std::vector<LineFit>& lines, const std::vector<int>& indices,
                          double model_sigma_rad)
     : model_variance_(static_cast<float>(
@@ -228,37 +226,50 @@ void PencilModel::SquaredResiduals(const Value& direction, int begin, int end, f
   }
 }
 
-bool PencilModel::Refine(const float* weights, Value* direction) const {
-  // Gauss-Newton in the tangent plane of the sphere, the variances held at the current direction.
-  const Eigen::Vector3d v(direction->data());
-  const Eigen::Vector3d e1 = v.unitOrthogonal();
-  const Eigen::Vector3d e2 = v.cross(e1);
-  const std::size_t n = index_.size();
-  double a = 0.0, b = 0.0, c = 0.0, g1 = 0.0, g2 = 0.0;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!(weights[i] > 0.0f)) continue;
-    const Eigen::Vector3d p(static_cast<double>(data_[3 * n + i]),
-                            static_cast<double>(data_[4 * n + i]),
-                            static_cast<double>(data_[5 * n + i]));
-    const Eigen::Vector3d q(static_cast<double>(data_[6 * n + i]),
-                            static_cast<double>(data_[7 * n + i]),
-                            static_cast<double>(data_[8 * n + i]));
-    const double pv = p.dot(v), qv = q.dot(v);
-    const double variance = pv * pv + qv * qv + static_cast<double>(model_variance_);
-    const double w = static_cast<double>(weights[i]) / variance;
-    const double miss = lines_[i].dot(v), d1 = lines_[i].dot(e1), d2 = lines_[i].dot(e2);
-    a += w * d1 * d1;
-    b += w * d1 * d2;
-    c += w * d2 * d2;
-    g1 += w * d1 * miss;
-    g2 += w * d2 * miss;
+double PencilModel::Variance(const Eigen::Vector3d& direction, int i) const {
+  const std::size_t n = index_.size(), k = static_cast<std::size_t>(i);
+  double p = 0.0, q = 0.0;
+  for (int c = 0; c < 3; ++c) {
+    const std::size_t row = static_cast<std::size_t>(c) * n + k;
+    p += static_cast<double>(data_[row + 3 * n]) * direction[c];
+    q += static_cast<double>(data_[row + 6 * n]) * direction[c];
   }
-  const double det = a * c - b * b;
-  if (!(det > 1e-12 * (a + c) * (a + c))) return false;
-  const Eigen::Vector3d moved = v - (c * g1 - b * g2) / det * e1 - (a * g2 - b * g1) / det * e2;
+  return p * p + q * q + static_cast<double>(model_variance_);
+}
+
+bool PencilModel::Refine(const float* weights, Value* direction) const {
+  Eigen::Vector3d v(direction->data());
+  DirectionStep step(v);
+  for (int i = 0; i < NumData(); ++i) {
+    if (!(weights[i] > 0.0f)) continue;
+    step.Add(Line(i), Variance(v, i), static_cast<double>(weights[i]));
+  }
+  if (!step.Move(&v)) return false;
+  *direction = {v.x(), v.y(), v.z()};
+  return true;
+}
+
+DirectionStep::DirectionStep(const Eigen::Vector3d& direction)
+    : v_(direction), e1_(direction.unitOrthogonal()), e2_(direction.cross(e1_)) {}
+
+void DirectionStep::Add(const Eigen::Vector3d& line, double variance, double weight) {
+  const double w = weight / variance;
+  const double miss = line.dot(v_), d1 = line.dot(e1_), d2 = line.dot(e2_);
+  a_ += w * d1 * d1;
+  b_ += w * d1 * d2;
+  c_ += w * d2 * d2;
+  g1_ += w * d1 * miss;
+  g2_ += w * d2 * miss;
+}
+
+bool DirectionStep::Move(Eigen::Vector3d* direction) const {
+  const double det = a_ * c_ - b_ * b_;
+  if (!(det > 1e-12 * (a_ + c_) * (a_ + c_))) return false;
+  const Eigen::Vector3d moved =
+      v_ - (c_ * g1_ - b_ * g2_) / det * e1_ - (a_ * g2_ - b_ * g1_) / det * e2_;
   const double norm = moved.norm();
   if (!(norm < 10.0)) return false;  // Not a small step: the start was no good, or is not finite.
-  *direction = {moved.x() / norm, moved.y() / norm, moved.z() / norm};
+  *direction = moved / norm;
   return true;
 }
 

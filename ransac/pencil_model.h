@@ -61,6 +61,27 @@ Status FitVanishingPointRobust(const std::vector<LineFit>& lines, const PencilOp
 Status FindPencils(const std::vector<LineFit>& lines, const PencilOptions& options,
                    std::vector<FoundPencil>* pencils);
 
+// Indices of the lines with a finite, unit normal.
+std::vector<int> UsableLines(const std::vector<LineFit>& lines);
+
+// The line with the model's error in its covariance, so that the fits of estimators/ weigh it as
+// the search does.
+LineFit WithModelError(const LineFit& line, double model_sigma_rad);
+
+// Gauss-Newton for a direction in the tangent plane of the sphere, the variances of the lines held
+// at the current direction.
+class DirectionStep {
+ public:
+  explicit DirectionStep(const Eigen::Vector3d& direction);
+  void Add(const Eigen::Vector3d& line, double variance, double weight);
+  // False, with `direction` untouched, where the lines do not fix it.
+  bool Move(Eigen::Vector3d* direction) const;
+
+ private:
+  Eigen::Vector3d v_, e1_, e2_;
+  double a_ = 0.0, b_ = 0.0, c_ = 0.0, g1_ = 0.0, g2_ = 0.0;
+};
+
 // The model for the engine: directions from two lines.
 class PencilModel {
  public:
@@ -74,6 +95,10 @@ class PencilModel {
   int NumData() const { return static_cast<int>(index_.size()); }
   // Index into `lines` of the datum at position i.
   int LineIndex(int i) const { return index_[static_cast<std::size_t>(i)]; }
+
+  // Unit line at position i, and the variance of its product with a direction (model's error too).
+  const Eigen::Vector3d& Line(int i) const { return lines_[static_cast<std::size_t>(i)]; }
+  double Variance(const Eigen::Vector3d& direction, int i) const;
 
   bool Fit(const int* sample, Value* direction) const;
   void SquaredResiduals(const Value& direction, int begin, int end, float* r2) const;

@@ -104,9 +104,10 @@ const char* StopReasonName(StopReason reason) {
   return "unknown";
 }
 
-int RequiredIterations(int num_data, int num_inliers, int num_samples, double confidence) {
+int RequiredIterations(int num_data, int num_inliers, int num_samples, double confidence,
+                       double good_samples) {
   if (num_inliers < num_samples) return INT_MAX;
-  double p = 1.0;
+  double p = good_samples;
   for (int i = 0; i < num_samples; ++i) {
     p *= static_cast<double>(num_inliers - i) / static_cast<double>(num_data - i);
   }

@@ -19,6 +19,9 @@
 //       bool Refine(const float* weights, Value* value) const;
 //       // A last look at a candidate that would become the best: false rejects it.
 //       bool Accept(const Value& value, double threshold) const;
+//       // Optional: share of all-inlier samples that can give the right value, where one that has
+//       // several parts needs samples of the right pattern. Draws are multiplied accordingly.
+//       static constexpr double kGoodSamples = 1.0;
 //     };
 //
 // A Model keeps its data in random order (see RandomOrder), so that a prefix stands for the whole:
@@ -43,6 +46,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "circline/estimators/random.h"
@@ -58,9 +62,9 @@ enum class ScoreType {
 };
 
 struct RansacOptions {
-  double threshold = 1.0;      // Largest residual of an inlier, in the model's unit; > 0.
-  double confidence = 0.999;   // That one all-inlier sample was drawn; in (0, 1).
-  int min_iterations = 1;      // Draws that are made whatever the confidence; 0 or more.
+  double threshold = 1.0;       // Largest residual of an inlier, in the model's unit; > 0.
+  double confidence = 0.999;    // That one all-inlier sample was drawn; in (0, 1).
+  int min_iterations = 1;       // Draws that are made whatever the confidence; 0 or more.
   int max_iterations = 100000;  // Draws; 1 or more.
   std::uint64_t seed = 1;
   ScoreType score = ScoreType::kMsac;
@@ -100,8 +104,20 @@ struct RansacReport {
 
 // Draws of `num_samples` of `num_data` without replacement after which, with probability
 // `confidence`, one held inliers only: log(1 - confidence) / log(1 - p), where p is the exact
-// (hypergeometric) probability of an all-inlier sample. At least 1; INT_MAX where it is never.
-int RequiredIterations(int num_data, int num_inliers, int num_samples, double confidence);
+// (hypergeometric) probability of an all-inlier sample, times the share `good_samples` of those
+// that serve. At least 1; INT_MAX where it is never.
+int RequiredIterations(int num_data, int num_inliers, int num_samples, double confidence,
+                       double good_samples = 1.0);
+
+// Model::kGoodSamples, or 1 where a model has none.
+template <typename Model, typename = void>
+struct GoodSamples {
+  static constexpr double kShare = 1.0;
+};
+template <typename Model>
+struct GoodSamples<Model, std::void_t<decltype(Model::kGoodSamples)>> {
+  static constexpr double kShare = Model::kGoodSamples;
+};
 
 // A permutation of 0..n-1, the same on every machine.
 std::vector<int> RandomOrder(int n, std::uint64_t seed);
@@ -364,7 +380,8 @@ class Ransac {
   // inliers are not explained by chance (Chum and Matas 2005, sections 2.1 and 2.2).
   int Needed(const Model& model, const std::vector<int>* order) {
     constexpr int m = Model::kMinSamples;
-    int needed = RequiredIterations(num_data_, best_.num_inliers, m, options_.confidence);
+    constexpr double kShare = GoodSamples<Model>::kShare;
+    int needed = RequiredIterations(num_data_, best_.num_inliers, m, options_.confidence, kShare);
     if (order != nullptr) {
       const int num_inliers = Weigh(model, best_.value, 1.0);
       std::fill(weights_.begin(), weights_.end(), 0.0f);
@@ -378,7 +395,7 @@ class Ransac {
         constexpr double kChance = 0.1;  // Probability that a wrong model holds a datum.
         const double mean = kChance * (n - m);
         if (n < 4 * m || inliers < m + mean + 2.33 * std::sqrt(mean * (1.0 - kChance))) continue;
-        needed = std::min(needed, RequiredIterations(n, inliers, m, options_.confidence));
+        needed = std::min(needed, RequiredIterations(n, inliers, m, options_.confidence, kShare));
       }
     }
     return std::min(std::max(needed, options_.min_iterations), options_.max_iterations);

@@ -8,52 +8,14 @@
 #include <set>
 
 #include "circline/estimators/random.h"
+#include "tests/ransac/segment_scene.h"
 
 namespace circline {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kFocal = 800.0;
-
-Camera TestCamera() {
-  Camera camera;
-  camera.fx = camera.fy = kFocal;
-  camera.cx = 320.0;
-  camera.cy = 240.0;
-  return camera;
-}
-
-Eigen::Matrix3d RandomRotation(Random* random) {
-  const double w = random->Normal(), x = random->Normal(), y = random->Normal(),
-               z = random->Normal();
-  return Eigen::Quaterniond(w, x, y, z).normalized().toRotationMatrix();
-}
-
-// Adds a segment of 20 to 120 px anywhere in a photo of 640 x 480, end points with sigma 0.5 px,
-// along the image of `direction` or, where that is null, any way.
-void AddSegment(const Eigen::Vector3d* direction, Random* random, std::vector<LineFit>* lines) {
-  const double u = random->Uniform(0.0, 640.0), v = random->Uniform(0.0, 480.0);
-  const double angle = random->Uniform(0.0, kPi);
-  Eigen::Vector2d along(std::cos(angle), std::sin(angle));
-  if (direction != nullptr) {
-    const Eigen::Vector3d x((u - 320.0) / kFocal, (v - 240.0) / kFocal, 1.0);
-    along = (*direction - direction->z() * x).head<2>().normalized();
-  }
-  const double half = random->Uniform(10.0, 60.0);
-  std::vector<Eigen::Vector2d> ends = {{u, v}, {u, v}};
-  for (std::size_t i = 0; i < 2; ++i) {
-    const double nx = random->Normal(), ny = random->Normal();
-    ends[i] += (i == 0 ? half : -half) * along + 0.5 * Eigen::Vector2d(nx, ny);
-  }
-  std::vector<CalibratedPoint> points;
-  PixelsToCalibrated(TestCamera(), ends, &points);
-  LineFit fit;
-  if (FitLine(points, 0.5, &fit).ok()) lines->push_back(fit);
-}
-
-double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::asin(std::min(1.0, a.cross(b).norm()));
-}
+using segment_scene::AddSegment;
+using segment_scene::AngleBetween;
+using segment_scene::RandomRotation;
 
 TEST(FindPencils, ThreeDirectionsAmongFiftyPercentClutter) {
   constexpr int kTrials = 40;
