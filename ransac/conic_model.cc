@@ -233,6 +233,7 @@ ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLi
   }
   center_ = 0.5 * (low + high);
   scale_ = std::max(0.5 * (high - low).norm(), 1e-12);
+  box_area_ = (high - low).prod() / (scale_ * scale_);
   data_.resize((directions != nullptr ? 8 : 6) * n);
   x_.resize(n);
   x_from_pixel_.resize(n);
@@ -376,6 +377,51 @@ bool ConicModel::Accept(const Value& value, double threshold) const {
   const int too_few = static_cast<int>(std::ceil(0.8 * limits_.min_arc_deg * kSectors / 360.0)) - 1;
   if (too_few > 0 && HoldMost(counts, too_few)) return false;
   return GainOfLine(some, threshold * pixel_) <= limits_.max_line_share * gain;
+}
+
+namespace {
+
+struct Axes {
+  double a, b;
+
+  // Semi-axes of an ellipse: squares are k / eigenvalue with k = -det / minor.
+  explicit Axes(const ConicModel::Value& value) {
+    const auto [p, q, r, d, e, f] = value;
+    const double minor = p * r - q * q;
+    const double k = std::abs(f * minor - p * e * e - r * d * d + 2.0 * q * d * e) / minor;
+    const double half = 0.5 * (p + r);
+    const double root = std::sqrt(std::max(0.0, half * half - minor));
+    a = std::sqrt(k * (half + root) / minor);
+    b = std::sqrt(k / (half + root));
+  }
+  // Ramanujan's first approximation.
+  double Perimeter() const {
+    return kPi * (3.0 * (a + b) - std::sqrt((3.0 * a + b) * (a + 3.0 * b)));
+  }
+};
+
+}  // namespace
+
+double ConicModel::BandShare(const Value& value, double threshold) const {
+  const double area = Axes(value).Perimeter() * 2.0 * threshold * pixel_;
+  return area < box_area_ ? area / box_area_ : 1.0;
+}
+
+bool ConicModel::IsBlob(const Value& value, double threshold) const {
+  int in_band = 0, inside = 0;
+  for (int i = 0; i < NumData(); ++i) {
+    const double distance = Distance(value, i);
+    // The centre has no direction to the ellipse: its distance is infinite.
+    if (std::abs(distance) <= threshold) {
+      ++in_band;
+    } else if (distance < 0.0 || std::isinf(distance)) {
+      ++inside;
+    }
+  }
+  const Axes axes(value);
+  const double t = threshold * pixel_;
+  const double area = kPi * std::max(0.0, axes.a - t) * std::max(0.0, axes.b - t);
+  return inside * axes.Perimeter() * 2.0 * t > 0.5 * in_band * area && inside > 0;
 }
 
 double ConicModel::Distance(const Value& value, int i) const {

@@ -88,6 +88,13 @@ class ConicModel {
   // edge.
   bool Accept(const Value& value, double threshold) const;
 
+  // Area within the threshold of the ellipse over that of the points' box: the chance that a stray
+  // point is an inlier.
+  double BandShare(const Value& value, double threshold) const;
+  // Whether the ellipse lies in a blob of points: its inside is more than half as dense as the band
+  // within the threshold.
+  bool IsBlob(const Value& value, double threshold) const;
+
   // Signed distance of datum i, pixels, in double precision.
   double Distance(const Value& value, int i) const;
   // Distance of two data, pixels, roughly (a pixel of average size).
@@ -129,7 +136,8 @@ class ConicModel {
   double sigma_px_ = 1.0;  // threshold / 3.03.
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
   double scale_ = 1.0;
-  double pixel_ = 1.0;  // Size of a pixel in the model's coordinates, on average.
+  double box_area_ = 0.0;  // Of the points, in the model's coordinates.
+  double pixel_ = 1.0;     // Size of a pixel in the model's coordinates, on average.
 };
 
 }  // namespace circline

@@ -55,6 +55,8 @@ class ConicSearch {
 
   // What a few searches found, the likeliest first.
   std::vector<Candidate> Run() const;
+  // The ellipse after reweighted steps.
+  Candidate Polished(const ConicModel::Value& value) const;
   // Maximum likelihood with the candidate's weights, its covariance, and the mask of the result.
   Status Finish(const Candidate& candidate, ConicFit* fit, std::vector<std::uint8_t>* mask) const;
 
@@ -66,8 +68,6 @@ class ConicSearch {
     if (oriented_) return Ransac<OrientedConicModel>(options).Run(*oriented_, report);
     Ransac<ConicModel>(options).Run(model_, report);
   }
-  // The ellipse after reweighted steps.
-  Candidate Polished(const ConicModel::Value& value) const;
   std::vector<int> FarFrom(const Candidate& candidate) const;
   std::vector<int> Uncrowded() const;
   void SearchAmong(const std::vector<int>& indices, const RansacOptions& options, int num_inliers,
@@ -253,6 +253,25 @@ Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFi
     status = search.Finish(candidate, &result, &result_mask);
     if (status.ok()) break;
   }
+  if (!status.ok()) return status;
+  *fit = result;
+  if (mask != nullptr) *mask = std::move(result_mask);
+  return Status::Ok();
+}
+
+Status RefitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
+                        const Eigen::Matrix3d& initial, ConicFit* fit,
+                        std::vector<std::uint8_t>* mask, const ConicLimits& limits,
+                        const EdgeDirections* directions) {
+  Status status = Check(points, options, limits, directions);
+  if (!status.ok()) return status;
+  if (points.size() < 5) return Status::Refused("an ellipse needs five points");
+  const ConicSearch search(points, directions, options, limits);
+  ConicModel::Value value;
+  if (!search.model().FromConic(initial, &value)) return NoEllipse();
+  ConicFit result;
+  std::vector<std::uint8_t> result_mask;
+  status = search.Finish(search.Polished(value), &result, &result_mask);
   if (!status.ok()) return status;
   *fit = result;
   if (mask != nullptr) *mask = std::move(result_mask);
