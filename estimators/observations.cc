@@ -23,6 +23,10 @@ Status ValidateCircle(const CircleObservation& circle) {
   if (!circle.inliers.empty() && circle.inliers.size() != circle.points.size()) {
     return Status::Invalid(name + ": the inlier mask has another length than the contour");
   }
+  if (!circle.normals.empty() && circle.normals.size() != circle.points.size()) {
+    return Status::Invalid(name + ": normals must be one for each point, or none");
+  }
+  if (!Finite(circle.normals)) return Status::Invalid(name + ": a normal is not finite");
   if (!NonNegative(circle.sigma_px)) return Status::Invalid(name + ": sigma_px must be 0 or more");
   if (!NonNegative(circle.radius)) return Status::Invalid(name + ": radius must be 0 or more");
   if (circle.center && !circle.center->allFinite())

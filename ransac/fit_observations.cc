@@ -64,8 +64,17 @@ class Fitter {
     circle->fit.reset();
     circle->inliers.clear();
     Calibrate(circle->points);
+    EdgeDirections directions;
+    directions.sigma_rad = options_.direction_sigma_rad;
+    if (!circle->normals.empty()) {
+      for (const int i : indices_) {
+        directions.normals.push_back(circle->normals[static_cast<std::size_t>(i)]);
+      }
+    }
     ConicFit fit;
-    const Status status = FitConicRobust(points_, FeatureOptions(circle->sigma_px), &fit, &mask_);
+    const Status status =
+        FitConicRobust(points_, FeatureOptions(circle->sigma_px), &fit, &mask_, ConicLimits(),
+                       circle->normals.empty() ? nullptr : &directions);
     if (!status.ok()) return Report("circle '" + circle->id + "'", status.message);
     circle->fit = fit;
     circle->inliers = PixelMask(circle->points.size());
@@ -134,6 +143,9 @@ Status FitOptions::Validate() const {
   if (max_iterations < 1) return Status::Invalid("max_iterations must be 1 or more");
   if (!(sigma_px > 0.0) || !std::isfinite(sigma_px)) {
     return Status::Invalid("sigma_px must be positive");
+  }
+  if (!(direction_sigma_rad > 0.0 && direction_sigma_rad <= 0.5)) {
+    return Status::Invalid("direction_sigma_rad must be positive and 0.5 at most");
   }
   return Status::Ok();
 }

@@ -21,6 +21,8 @@ struct FitOptions {
   int max_iterations = 100000;  // Draws for each model; 1 or more.
   std::uint64_t seed = 1;       // Same input and seed, same bits out.
   double sigma_px = 1.0;        // Of a point where the feature states none; > 0.
+  // Standard deviation of the angle of a contour's normals, where it has any, radians; in (0, 0.5].
+  double direction_sigma_rad = 0.1;
 
   Status Validate() const;
 };

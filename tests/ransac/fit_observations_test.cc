@@ -113,6 +113,36 @@ TEST(FitObservations, FillsEveryFit) {
   EXPECT_NE(problems[0].find("'L1', line 3"), std::string::npos) << problems[0];
 }
 
+TEST(FitObservations, TakesTheNormalsOfAContour) {
+  Observations observations = MakeObservations();
+  CircleObservation& circle = observations.circles[0];
+  circle.normals.resize(circle.points.size());
+  for (int i = 0; i < 60; ++i) {
+    const double t = 0.1 * i;
+    const Eigen::Vector2d along =
+        Pixel(0.05 + 0.1 * std::cos(t + 1e-4), 0.07 * std::sin(t + 1e-4)) -
+        Pixel(0.05 + 0.1 * std::cos(t), 0.07 * std::sin(t));
+    circle.normals[static_cast<std::size_t>(i)] = {-along.y(), along.x()};
+  }
+  // The pixel that no camera sees comes first: normals must stay with their points.
+  std::rotate(circle.points.rbegin(), circle.points.rbegin() + 1, circle.points.rend());
+  std::rotate(circle.normals.rbegin(), circle.normals.rbegin() + 1, circle.normals.rend());
+  std::swap(circle.normals[1].x(), circle.normals[1].y());
+  circle.normals[1].x() *= -1.0;  // Along the contour, not across.
+  ASSERT_TRUE(FitObservations(FitOptions(), &observations).ok());
+  ASSERT_TRUE(circle.fit.has_value());
+  EXPECT_EQ(circle.inliers[0], 0);
+  EXPECT_EQ(circle.inliers[1], 0);
+  int contour = 0;
+  for (std::size_t i = 1; i < 60; ++i) contour += i % 4 != 3 && circle.inliers[i + 1] == 1 ? 1 : 0;
+  EXPECT_EQ(contour, 44);
+
+  circle.normals.pop_back();
+  const Status status = FitObservations(FitOptions(), &observations);
+  EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
+  EXPECT_NE(status.message.find("normals"), std::string::npos);
+}
+
 TEST(FitObservations, IsRepeatableAndOverwrites) {
   Observations a = MakeObservations(), b = MakeObservations();
   ASSERT_TRUE(FitObservations(FitOptions(), &a).ok());
@@ -164,6 +194,7 @@ TEST(FitObservations, NamesBadOptionsAndBadInput) {
       {"confidence", [](FitOptions* o) { o->confidence = 1.0; }},
       {"max_iterations", [](FitOptions* o) { o->max_iterations = 0; }},
       {"sigma_px", [](FitOptions* o) { o->sigma_px = -1.0; }},
+      {"direction_sigma_rad", [](FitOptions* o) { o->direction_sigma_rad = 0.0; }},
   };
   Observations observations = MakeObservations();
   for (const Case& c : cases) {
