@@ -8,6 +8,14 @@
 #include <new>
 #include <set>
 
+#include "circline/ransac/conic_model.h"
+#include "circline/ransac/direction_models.h"
+#include "circline/ransac/line_model.h"
+#include "circline/ransac/oriented_conic_model.h"
+#include "circline/ransac/pencil_model.h"
+#include "tests/ransac/conic_scene.h"
+#include "tests/ransac/segment_scene.h"
+
 namespace {
 // Allocations of the whole program: the engine promises none after its set-up.
 std::atomic<int> allocations{0};
@@ -117,6 +125,13 @@ TEST(RequiredIterations, IsHypergeometric) {
   EXPECT_EQ(RequiredIterations(1000000, 5, 5, 0.99), INT_MAX);
 }
 
+TEST(RequiredIterations, CountsTheSamplesOfTheRightPattern) {
+  // p = 2 / 9 as above, and a quarter of them serve: log 0.01 / log(1 - 1 / 18) = 80.6.
+  EXPECT_EQ(RequiredIterations(10, 5, 2, 0.99, 0.25), 81);
+  // Confidences that 1 - (1 - c)^k would round to one.
+  EXPECT_LT(RequiredIterations(100, 90, 4, 0.9999999, 0.125), 300);
+}
+
 TEST(RandomOrder, IsAPermutation) {
   const std::vector<int> order = RandomOrder(100, 5);
   EXPECT_EQ(std::set<int>(order.begin(), order.end()).size(), 100u);
@@ -154,6 +169,25 @@ TEST(Ransac, StopsExactlyWhenConfident) {
     EXPECT_EQ(report.num_iterations, std::max(needed, model.first_good_)) << seed;
     EXPECT_EQ(report.num_iterations, model.fits_);
   }
+}
+
+// The same, of which only one sample in four could be right.
+class PatternedLocation : public Location {
+ public:
+  using Location::Location;
+  static constexpr double kGoodSamples = 0.25;
+};
+
+TEST(Ransac, DrawsMoreWhereFewSamplesServe) {
+  const Location plain = MakeData(50, 20, 0.0);
+  std::vector<double> data;
+  for (int i = 0; i < 50; ++i) data.push_back(plain.Datum(i));
+  const PatternedLocation model(data);
+  const RansacOptions options;
+  Ransac<PatternedLocation>::Report report;
+  Ransac<PatternedLocation>(options).Run(model, &report);
+  EXPECT_EQ(report.num_iterations, RequiredIterations(50, 20, 2, options.confidence, 0.25));
+  EXPECT_EQ(GoodSamples<Location>::kShare, 1.0);
 }
 
 TEST(Ransac, OneDrawIsEnoughWithoutOutliers) {
@@ -204,6 +238,23 @@ TEST(Ransac, DegenerateSamplesAreNoModel) {
   EXPECT_EQ(report.num_degenerate, 100);
   EXPECT_EQ(report.num_inliers, 0);
   EXPECT_EQ(report.inlier_mask, std::vector<std::uint8_t>(50, 0));
+}
+
+TEST(Ransac, CountsDegenerateSamplesAndGoesOn) {
+  // Half of the pairs of inliers are 10 or more apart: no sample.
+  std::vector<double> data;
+  for (int i = 0; i < 40; ++i) data.push_back(i % 2 == 0 ? -6.0 : 6.0);
+  const Location model(data);
+  RansacOptions options;
+  options.min_iterations = options.max_iterations = 400;
+  options.local_steps = 0;
+  Ransac<Location>::Report report;
+  Ransac<Location>(options).Run(model, &report);
+  ASSERT_TRUE(report.success);
+  EXPECT_EQ(report.num_inliers, 20);
+  EXPECT_EQ(report.num_iterations, 400);
+  EXPECT_EQ(model.fits_, 400);
+  EXPECT_NEAR(report.num_degenerate, 400.0 * 20 / 39, 40.0);
 }
 
 TEST(Ransac, TooFewDataAreRefused) {
@@ -298,6 +349,43 @@ TEST(Ransac, AllocatesNothingAfterSetUp) {
   }
 }
 
+template <typename Model>
+void ExpectNoAllocations(const Model& model, double threshold) {
+  RansacOptions options;
+  options.threshold = threshold;
+  options.max_iterations = 2000;
+  Ransac<Model> engine(options);
+  typename Ransac<Model>::Report report;
+  engine.Run(model, &report);
+  EXPECT_TRUE(report.success);
+  EXPECT_GT(report.num_local_optimizations, 0);
+  const int before = allocations;
+  engine.Run(model, &report);
+  EXPECT_EQ(before, allocations);
+}
+
+TEST(Ransac, TheModelsAllocateNothingInTheLoop) {
+  const conic_scene::Scene contour = conic_scene::MakeScene(1, 0.5);
+  const ConicModel conic(contour.points, ConicLimits());
+  const ConicModel oriented(contour.points, ConicLimits(), &contour.directions);
+  ExpectNoAllocations(conic, 3.03);
+  ExpectNoAllocations(OrientedConicModel(oriented), 3.03);
+  ExpectNoAllocations(LineModel(contour.points), 3.03);
+  Random random(1);
+  const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
+  std::vector<LineFit> lines;
+  std::vector<int> indices;
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::Vector3d v = R.col(i % 2);
+    segment_scene::AddSegment(i < 40 ? &v : nullptr, &random, &lines);
+    indices.push_back(i);
+  }
+  const PencilModel pencil(lines, indices, 0.0);
+  ExpectNoAllocations(pencil, 3.03);
+  ExpectNoAllocations(OrthogonalTripletModel(pencil), 3.03);
+  ExpectNoAllocations(DirectionPairModel(pencil), 3.03);
+}
+
 TEST(Ransac, ProsacFindsGoodDataFirst) {
   std::vector<int> order;
   const Location model = MakeData(1000, 30, 0.0, &order);  // The inliers come first.
@@ -338,6 +426,29 @@ TEST(Sampler, ProsacGrowsFromTheBestToAll) {
     for (const int s : sample) ++drawn[static_cast<std::size_t>(s)];
   }
   for (const int count : drawn) EXPECT_NEAR(count, 100000 * m / n, 700);
+}
+
+TEST(Sampler, ProsacGrowsByThePaper) {
+  // T_n = T_N C(n, m) / C(N, m); the pool grows from n to n + 1 after ceil(T_(n + 1) - T_n) draws,
+  // and each draw has the newest of the pool (Chum and Matas 2005, section 2.1).
+  constexpr int n_all = 12, m = 2, uniform_after = 600;
+  std::vector<int> order(n_all);
+  for (int i = 0; i < n_all; ++i) order[static_cast<std::size_t>(i)] = i;
+  Sampler sampler;
+  sampler.Reset(n_all, m, 3, &order, uniform_after);
+  const auto expected_draws = [](int n) {
+    return uniform_after * (n * (n - 1.0)) / (n_all * (n_all - 1.0));
+  };
+  int pool = m, until = 1;
+  for (int draw = 1; pool < n_all; ++draw) {
+    if (draw > until) {
+      until += static_cast<int>(std::ceil(expected_draws(pool + 1) - expected_draws(pool) - 1e-9));
+      ++pool;
+    }
+    std::array<int, m> sample{};
+    sampler.Draw(sample.data());
+    EXPECT_EQ(std::max(sample[0], sample[1]), pool - 1) << draw;
+  }
 }
 
 TEST(Sampler, UniformDrawsAllAlike) {
