@@ -165,6 +165,51 @@ ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed) 
   return scene;
 }
 
+int InstancesScene::NumFound(const std::vector<Matrix3d>& conics) const {
+  const auto follows = [&](const Ellipse& ellipse, const Matrix3d& conic) {
+    for (int i = 0; i < 64; ++i) {
+      CalibratedPoint p;
+      const Vector2d pixel = EllipsePoint(ellipse, 2.0 * kPi * i / 64);
+      if (!PixelToCalibrated(SceneCamera(), pixel, &p)) return false;
+      if (!(std::abs(ConicDistancePx(p, conic)) < 2.0 * sigma_px)) return false;
+    }
+    return true;
+  };
+  return static_cast<int>(std::count_if(ellipses.begin(), ellipses.end(), [&](const Ellipse& e) {
+    return std::any_of(conics.begin(), conics.end(),
+                       [&](const Matrix3d& conic) { return follows(e, conic); });
+  }));
+}
+
+InstancesScene MakeInstancesScene(double sigma_px, double direction_sigma_rad, std::uint64_t seed) {
+  Random random(seed);
+  InstancesScene scene;
+  scene.sigma_px = sigma_px;
+  const double angle = random.Uniform(-1.5, 1.5), other = random.Uniform(-1.5, 1.5);
+  scene.ellipses = {{{200.0, 200.0}, 100.0, 60.0, angle},
+                    {{200.0, 200.0}, 70.0, 42.0, angle},
+                    {{290.0, 230.0}, 60.0, 50.0, other},
+                    {{500.0, 350.0}, 50.0, 30.0, -angle}};
+  std::vector<Vector2d> pixels;
+  for (const Ellipse& ellipse : scene.ellipses) {
+    const int num_points = static_cast<int>(ellipse.a / 2.0) + 50;
+    for (int i = 0; i < num_points; ++i) {
+      const double t = 2.0 * kPi * i / num_points;
+      pixels.push_back(EllipsePoint(ellipse, t) + Noise(sigma_px, &random));
+      scene.directions.normals.push_back(
+          Turned(EllipseNormal(ellipse, t), direction_sigma_rad, &random));
+    }
+  }
+  const std::size_t num_inliers = pixels.size();
+  for (std::size_t i = 0; i < num_inliers; ++i) {
+    const double x = random.Uniform(0.0, 640.0), y = random.Uniform(0.0, 480.0);
+    pixels.emplace_back(x, y);
+    scene.directions.normals.push_back(Unit(random.Uniform(0.0, kPi)));
+  }
+  PixelsToCalibrated(SceneCamera(), pixels, &scene.points);
+  return scene;
+}
+
 double LineScene::Error(const Vector3d& line) const {
   double sum = 0.0;
   for (const CalibratedPoint& p : truth) {

@@ -48,6 +48,20 @@ struct ConicSceneOptions {
 
 ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed);
 
+// Four ellipses of 60 to 100 points, two of them concentric and one crossing another, among as many
+// stray points again, all over a photo of 640 x 480.
+struct InstancesScene {
+  std::vector<Ellipse> ellipses;  // Pixels.
+  std::vector<CalibratedPoint> points;
+  EdgeDirections directions;
+
+  // How many of the ellipses have a conic that stays within two standard deviations all along.
+  int NumFound(const std::vector<Eigen::Matrix3d>& conics) const;
+  double sigma_px = 1.0;
+};
+
+InstancesScene MakeInstancesScene(double sigma_px, double direction_sigma_rad, std::uint64_t seed);
+
 // 100 points along 300 px with Gaussian noise, outliers uniform in 400 x 400 px.
 struct LineScene {
   std::vector<Eigen::Vector2d> pixels;
