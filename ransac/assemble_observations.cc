@@ -11,6 +11,7 @@
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
+#include "circline/ransac/circle_grid.h"
 
 namespace circline {
 namespace {
@@ -145,14 +146,11 @@ class Assembler {
   Assembler(const AssemblyOptions& options, std::vector<CircleEvidence>* circles,
             std::vector<DetectedPencil>* pencils)
       : options_(options), circles_(*circles) {
-    for (DetectedPencil& pencil : *pencils) {
-      const VanishingPointFit fit = *pencil.observation.fit;
-      const UncertainDirection direction{fit.direction, fit.covariance};
-      pencils_.emplace_back(std::move(pencil), direction);
-    }
+    Place(pencils);
   }
 
   void Assemble(Observations* observations) {
+    AddGrid(observations->camera);
     const Plane plane = ChoosePlane();
     SetPlane(plane);
     SetRoles(plane);
@@ -160,6 +158,25 @@ class Assembler {
   }
 
  private:
+  void Place(std::vector<DetectedPencil>* pencils) {
+    for (DetectedPencil& pencil : *pencils) {
+      const VanishingPointFit fit = *pencil.observation.fit;
+      const UncertainDirection direction{fit.direction, fit.covariance};
+      pencils_.emplace_back(std::move(pencil), direction);
+    }
+  }
+
+  // Rows and columns of the circles' centres are pencils too.
+  void AddGrid(const Camera& camera) {
+    const Plane plane = CirclesPlane();
+    if (plane.circles.empty()) return;
+    // All circles: on small ones the normal is too uncertain to tell who belongs to the plane.
+    std::vector<Matrix3d> conics;
+    for (const CircleEvidence& circle : circles_) conics.push_back(circle.observation.fit->conic);
+    std::vector<DetectedPencil> rows = FindGridPencils(camera, conics, plane.normal.vector);
+    Place(&rows);
+  }
+
   // Length of the lines of `a`, those that meet none of `b` at a reduced rate: two pencils of one
   // plane cross or form corners, while a wall and a floor far apart do not.
   static double JointSupport(const PlacedPencil& a, const PlacedPencil& b) {
@@ -256,9 +273,17 @@ class Assembler {
         consider(plane);
       }
     }
+    consider(CirclesPlane());
+    return best;
+  }
+
+  // The plane with most support of circles alone.
+  Plane CirclesPlane() const {
+    Plane best;
     for (const CircleEvidence& circle : circles_) {
       for (int k = 0; k < circle.num_normals; ++k) {
-        consider(GrowFrom(circle.normals[static_cast<std::size_t>(k)]));
+        Plane plane = GrowFrom(circle.normals[static_cast<std::size_t>(k)]);
+        if (plane.support_px > best.support_px) best = std::move(plane);
       }
     }
     return best;

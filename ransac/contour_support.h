@@ -47,10 +47,6 @@ class Contour {
   double major_px_ = 0.0, minor_px_ = 0.0;
 };
 
-// Where a contour borders on what is brighter: a disc on a plain ground has one side all around,
-// one before a busy ground has either.
-enum class BrightSide { kOutside, kInside, kEither };
-
 struct Support {
   std::vector<int> points;  // Of the edge map, once around.
   double perimeter_px = 0.0;

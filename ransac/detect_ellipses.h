@@ -14,7 +14,6 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/status.h"
-#include "circline/ransac/contour_support.h"
 #include "circline/ransac/edges.h"
 
 namespace circline {

@@ -21,10 +21,10 @@
 namespace circline {
 
 struct DetectionOptions {
-  double min_ellipse_axis_px = 4.0;     // Smallest semi-minor axis; > 0.
+  double min_ellipse_axis_px = 3.0;     // Smallest semi-minor axis; > 0.
   double min_arc_deg = 100.0;           // Smallest angular coverage of an ellipse; in (0, 360].
   double min_segment_length_px = 20.0;  // Shortest line; > 0.
-  int max_circles = 64;                 // The best ones by coverage and size; 0 or more.
+  int max_circles = 128;                // The best ones by coverage and size; 0 or more.
   int max_pencils = 3;                  // Directions of parallel lines to look for; 0 or more.
   double max_shared_plane_deg =
       5.0;  // Two planes nearer than this may be one (a statistical test decides); > 0.

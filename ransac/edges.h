@@ -57,6 +57,10 @@ struct EdgeChain {
   int size() const { return end - begin; }
 };
 
+// Where a contour borders on what is brighter: a disc on a plain ground has one side all around,
+// one before a busy ground has either.
+enum class BrightSide { kOutside, kInside, kEither };
+
 struct EdgeMap {
   int width = 0, height = 0;
   std::vector<EdgePoint> points;  // Chain by chain.
