@@ -33,12 +33,18 @@ constexpr double kMaxSigmas = 3.0;
 constexpr double kOrthogonalSigmas = 2.5;
 constexpr double kOrthogonalDeg = 0.25;
 constexpr double kMaxOrthogonalDeg = 1.25;
+// Rows and columns of a sheet of circles are made at right angles; paper that bends shows them at
+// others. A lattice this near to a rectangular one is rectangular.
+constexpr double kRectangularDeg = 4.0;
 // Two pencils span a plane if they are this far from parallel.
 constexpr double kMinSpanDeg = 15.0;
 // Lines nearer than this meet in a corner, pixels; those that meet no line of the other pencil
 // count this much of their length for the plane of both.
 constexpr double kJunctionPx = 10.0;
 constexpr double kAloneWeight = 0.2;
+// A line counts fully if it meets this many of the other pencil: rows and columns, window fronts
+// and shelves do, lines that cross in the image by accident meet one or two.
+constexpr double kFullMeetings = 3.0;
 // The rim of a circle that agrees with two pencils counts as much as this many times its length in
 // lines: it is rarer than a line, and fixes both directions.
 constexpr double kCircleWeight = 3.0;
@@ -89,6 +95,10 @@ bool Orthogonal(const UncertainDirection& a, const UncertainDirection& b) {
          std::min(kMaxOrthogonalDeg, kOrthogonalSigmas * test.sigma_deg + kOrthogonalDeg);
 }
 
+bool Rectangular(const UncertainDirection& a, const UncertainDirection& b) {
+  return CompareToRightAngle(a, b).angle_deg <= kRectangularDeg;
+}
+
 // Normal of the plane that two directions span: first-order propagation through the normalised
 // cross product. False where they are too nearly parallel.
 bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
@@ -131,6 +141,7 @@ struct PlacedPencil : DetectedPencil {
   PlacedPencil(DetectedPencil pencil, UncertainDirection d)
       : DetectedPencil(std::move(pencil)), direction(std::move(d)) {}
   UncertainDirection direction;
+  bool of_grid = false;  // A row or column of circles.
 };
 
 // A plane that some of the evidence agrees on.
@@ -174,18 +185,21 @@ class Assembler {
     std::vector<Matrix3d> conics;
     for (const CircleEvidence& circle : circles_) conics.push_back(circle.observation.fit->conic);
     std::vector<DetectedPencil> rows = FindGridPencils(camera, conics, plane.normal.vector);
+    const std::size_t before = pencils_.size();
     Place(&rows);
+    for (std::size_t i = before; i < pencils_.size(); ++i) pencils_[i].of_grid = true;
   }
 
-  // Length of the lines of `a`, those that meet none of `b` at a reduced rate: two pencils of one
+  // Length of the lines of `a`, those that meet few of `b` at a reduced rate: two pencils of one
   // plane cross or form corners, while a wall and a floor far apart do not.
   static double JointSupport(const PlacedPencil& a, const PlacedPencil& b) {
     double support = 0.0;
     for (const Segment& s : a.ends) {
-      const bool meets = std::any_of(b.ends.begin(), b.ends.end(), [&s](const Segment& t) {
+      const auto meetings = std::count_if(b.ends.begin(), b.ends.end(), [&s](const Segment& t) {
         return SegmentDistance(s, t) < kJunctionPx;
       });
-      support += (s[1] - s[0]).norm() * (meets ? 1.0 : kAloneWeight);
+      const double share = std::min(1.0, static_cast<double>(meetings) / kFullMeetings);
+      support += (s[1] - s[0]).norm() * (kAloneWeight + (1.0 - kAloneWeight) * share);
     }
     return support;
   }
@@ -310,7 +324,8 @@ class Assembler {
       for (std::size_t b = a + 1; b < order.size(); ++b) {
         PlacedPencil& x = pencils_[static_cast<std::size_t>(order[a])];
         PlacedPencil& y = pencils_[static_cast<std::size_t>(order[b])];
-        if (!Orthogonal(x.direction, y.direction)) continue;
+        const bool grid = x.of_grid && y.of_grid && Rectangular(x.direction, y.direction);
+        if (!grid && !Orthogonal(x.direction, y.direction)) continue;
         x.observation.direction = PencilDirection::kX;
         y.observation.direction = PencilDirection::kY;
         SetNormalRole(x.direction, y.direction);
