@@ -41,7 +41,7 @@ constexpr double kMinSpanDeg = 15.0;
 // Lines nearer than this meet in a corner, pixels; those that meet no line of the other pencil
 // count this much of their length for the plane of both.
 constexpr double kJunctionPx = 10.0;
-constexpr double kAloneWeight = 0.2;
+constexpr double kAloneWeight = 0.05;
 // A line counts fully if it meets this many of the other pencil: rows and columns, window fronts
 // and shelves do, lines that cross in the image by accident meet one or two.
 constexpr double kFullMeetings = 3.0;
@@ -281,8 +281,9 @@ class Assembler {
         Plane plane;
         if (!SpannedNormal(pencils_[i].direction, pencils_[j].direction, &plane.normal)) continue;
         plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
-        plane.support_px =
-            JointSupport(pencils_[i], pencils_[j]) + JointSupport(pencils_[j], pencils_[i]);
+        // No better than by the weaker of the two: one long pencil makes no plane.
+        plane.support_px = 2.0 * std::min(JointSupport(pencils_[i], pencils_[j]),
+                                          JointSupport(pencils_[j], pencils_[i]));
         AddCircles(&plane);
         consider(plane);
       }
