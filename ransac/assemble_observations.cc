@@ -36,6 +36,8 @@ constexpr double kMaxOrthogonalDeg = 1.25;
 // Rows and columns of a sheet of circles are made at right angles; paper that bends shows them at
 // others. A lattice this near to a rectangular one is rectangular.
 constexpr double kRectangularDeg = 4.0;
+// Directions nearer than this are one.
+constexpr double kDistinctDeg = 3.0;
 // Two pencils span a plane if they are this far from parallel.
 constexpr double kMinSpanDeg = 15.0;
 // Lines nearer than this meet in a corner, pixels; those that meet no line of the other pencil
@@ -45,6 +47,8 @@ constexpr double kAloneWeight = 0.05;
 // A line counts fully if it meets this many of the other pencil: rows and columns, window fronts
 // and shelves do, lines that cross in the image by accident meet one or two.
 constexpr double kFullMeetings = 3.0;
+// A further pencil of the plane meets its lines over this share of its length.
+constexpr double kMinMeetingShare = 0.4;
 // The rim of a circle that agrees with two pencils counts as much as this many times its length in
 // lines: it is rarer than a line, and fixes both directions.
 constexpr double kCircleWeight = 3.0;
@@ -142,6 +146,7 @@ struct PlacedPencil : DetectedPencil {
       : DetectedPencil(std::move(pencil)), direction(std::move(d)) {}
   UncertainDirection direction;
   bool of_grid = false;  // A row or column of circles.
+  bool spans = false;    // One of the two that the plane was chosen by.
 };
 
 // A plane that some of the evidence agrees on.
@@ -309,13 +314,26 @@ class Assembler {
       circles_[static_cast<std::size_t>(i)].observation.plane = "p0";
     if (plane.support_px <= 0.0) return;
     for (PlacedPencil& pencil : pencils_) {
-      if (InPlane(pencil.direction, plane.normal, options_.max_shared_plane_deg)) {
-        pencil.observation.plane = "p0";
-      }
+      if (!InPlane(pencil.direction, plane.normal, options_.max_shared_plane_deg)) continue;
+      if (BelongsTo(plane, pencil)) pencil.observation.plane = "p0";
     }
     for (const int i : plane.pencils) {
-      if (i >= 0) pencils_[static_cast<std::size_t>(i)].observation.plane = "p0";
+      if (i < 0) continue;
+      pencils_[static_cast<std::size_t>(i)].observation.plane = "p0";
+      pencils_[static_cast<std::size_t>(i)].spans = true;
     }
+  }
+
+  // Any direction lies in a plane to within a few degrees once in ten times, by accident. So its
+  // lines must also meet those that span the plane; or, where circles are all there is, two of them
+  // at least must have settled the normal (one leaves two, which doubles the accidents).
+  bool BelongsTo(const Plane& plane, const PlacedPencil& pencil) const {
+    if (plane.pencils[0] < 0) return plane.circles.size() >= 2;
+    double meeting = 0.0;
+    for (const int i : plane.pencils) {
+      meeting += JointSupport(pencil, pencils_[static_cast<std::size_t>(i)]);
+    }
+    return meeting >= kMinMeetingShare * pencil.support_px;
   }
 
   // The strongest pencil of the plane is the candidate for x, the strongest one orthogonal to it y.
@@ -360,7 +378,8 @@ class Assembler {
     }
   }
 
-  // Everything in its final order, with ids; pencils beyond max_pencils are left out.
+  // Everything in its final order, with ids; repetitions and pencils beyond max_pencils are left
+  // out.
   void Emit(const Plane& plane, Observations* observations) {
     const auto on_plane_first = [](const auto& a, const auto& b) {
       return !a.observation.plane.empty() && b.observation.plane.empty();
@@ -368,7 +387,7 @@ class Assembler {
     std::stable_sort(circles_.begin(), circles_.end(), on_plane_first);
     const auto rank = [](const PlacedPencil& p) {
       const bool has_role = p.observation.direction != PencilDirection::kFree;
-      return std::make_pair(has_role ? 0 : 1, p.observation.plane.empty() ? 1 : 0);
+      return std::make_pair(has_role || p.spans ? 0 : 1, p.observation.plane.empty() ? 1 : 0);
     };
     std::stable_sort(
         pencils_.begin(), pencils_.end(),
@@ -379,10 +398,21 @@ class Assembler {
     }
     for (PlacedPencil& pencil : pencils_) {
       if (static_cast<int>(observations->pencils.size()) >= options_.max_pencils) break;
+      if (IsRepetition(pencil, observations->pencils)) continue;
       pencil.observation.id = "L" + std::to_string(observations->pencils.size());
       observations->pencils.push_back(std::move(pencil.observation));
     }
     if (plane.support_px > 0.0) observations->frame.plane = "p0";
+  }
+
+  // Old houses have verticals a degree apart: what is nearly parallel to a better supported pencil
+  // says nothing new, and no plane is spanned by both.
+  static bool IsRepetition(const PlacedPencil& pencil,
+                           const std::vector<PencilObservation>& emitted) {
+    return std::any_of(emitted.begin(), emitted.end(), [&](const PencilObservation& other) {
+      return pencil.direction.vector.cross(other.fit->direction).norm() <
+             std::sin(kDistinctDeg * kRadians);
+    });
   }
 
   const AssemblyOptions& options_;

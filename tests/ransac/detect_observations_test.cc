@@ -193,7 +193,17 @@ TEST(DetectObservations, AGridOfDotsIsOnePlane) {
   EXPECT_GE(on_plane, 23);
   EXPECT_EQ(found.circles[0].plane, "p0");
   EXPECT_EQ(found.frame.plane, "p0");
-  EXPECT_TRUE(found.pencils.empty());
+  // Rows and columns of the centres: two axes, each direction as good as five lines make it.
+  ASSERT_EQ(found.pencils.size(), 2U);
+  EXPECT_EQ(found.pencils[0].direction, PencilDirection::kX);
+  EXPECT_EQ(found.pencils[1].direction, PencilDirection::kY);
+  for (const PencilObservation& pencil : found.pencils) {
+    EXPECT_EQ(pencil.lines.size(), 5U);
+    EXPECT_EQ(pencil.plane, "p0");
+    EXPECT_LT(std::min(AxisDeg(pencil.fit->direction, pose.rotation.col(0)),
+                       AxisDeg(pencil.fit->direction, pose.rotation.col(1))),
+              0.3);
+  }
 }
 
 TEST(DetectObservations, NothingIsInvented) {
