@@ -125,6 +125,12 @@ std::string Describe(const Observations& observations) {
   if (circles == 0 && pencils == 1) {
     return "one pencil of parallel lines only, and no circle: that is a direction, not a pose";
   }
+  if (circles == 0 && observations.frame.plane.empty()) {
+    return "the pencils found span no plane, and there is no circle: that is no pose";
+  }
+  if (circles == 1 && pencils == 0) {
+    return "one circle and nothing else: two poses explain it equally well";
+  }
   return std::string();
 }
 

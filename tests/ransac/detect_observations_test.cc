@@ -221,6 +221,64 @@ TEST(DetectObservations, NothingIsInvented) {
   }
 }
 
+// Noise of every scale from 1 to 16 pixels, of full contrast.
+cv::Mat Texture(int width, int height, std::uint64_t seed) {
+  cv::Mat sum(height, width, CV_32F, cv::Scalar(128.0));
+  for (double scale = 1.0; scale <= 16.0; scale *= 2.0) {
+    cv::Mat layer;
+    Noise(width, height, 30.0, seed++).convertTo(layer, CV_32F);
+    cv::GaussianBlur(layer, layer, cv::Size(), scale);
+    sum += 2.0 * scale * (layer - 128.0);
+  }
+  sum.convertTo(sum, CV_8U);
+  return sum;
+}
+
+TEST(DetectObservations, TextureIsNoPose) {
+  for (const Camera& camera : {TestCamera(), FisheyeCamera()}) {
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+      const Observations found = Detect(Texture(camera.width, camera.height, 100 * seed), camera);
+      EXPECT_TRUE(found.pencils.empty()) << seed;
+      EXPECT_LE(found.circles.size(), 1U) << seed;
+      EXPECT_FALSE(found.message.empty()) << seed;
+    }
+  }
+}
+
+TEST(DetectObservations, ClutterOfLinesIsNoPose) {
+  // Triangles thrown about: straight edges in all directions, and no two sides of one parallel.
+  const Camera camera = TestCamera();
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    Random random(seed);
+    cv::Mat image(camera.height, camera.width, CV_8U, cv::Scalar(110));
+    for (int k = 0; k < 14; ++k) {
+      std::vector<cv::Point> corners;
+      for (int c = 0; c < 3; ++c) {
+        corners.emplace_back(static_cast<int>(random.Uniform() * camera.width),
+                             static_cast<int>(random.Uniform() * camera.height));
+      }
+      cv::fillConvexPoly(image, corners, cv::Scalar(255.0 * random.Uniform()), cv::LINE_AA);
+    }
+    cv::GaussianBlur(image, image, cv::Size(), 0.7);
+    const Observations found = Detect(image, camera);
+    EXPECT_TRUE(found.circles.empty()) << seed;
+    EXPECT_LE(found.pencils.size(), 1U) << seed;
+    EXPECT_FALSE(found.message.empty()) << seed;
+  }
+}
+
+TEST(DetectObservations, OneCircleIsSaidToHaveTwoPoses) {
+  const Camera camera = FisheyeCamera();
+  const cv::Mat image =
+      Develop(RenderPlane(camera, LookAt(40.0, 10.0, 0.0, 2.5), 120.0, [](double x, double y) {
+        return std::hypot(x, y) < 1.0 ? 40.0 : 120.0;
+      }));
+  const Observations found = Detect(image, camera);
+  EXPECT_EQ(found.circles.size(), 1U);
+  EXPECT_TRUE(found.pencils.empty());
+  EXPECT_NE(found.message.find("two poses"), std::string::npos);
+}
+
 TEST(DetectObservations, OnePencilIsSaidToBeTooLittle) {
   const Camera camera = TestCamera();
   const cv::Mat image =
