@@ -20,8 +20,10 @@
 #include <string>
 #include <vector>
 
+#include "apps/benchmark/baseline_detectors.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/line.h"
 #include "circline/estimators/line_pose.h"
 #include "circline/estimators/pose.h"
 #include "circline/ransac/detect_ellipses.h"
@@ -125,6 +127,13 @@ struct Score {
   double F(int hits) const { return truth + found > 0 ? 2.0 * hits / (truth + found) : 0.0; }
 };
 
+// Semi-minor axis of the contour of an ellipse on the photo, pixels.
+double SemiMinorPx(const PolygonPoints& polygon) {
+  if (polygon.size() < 5) return 0.0;
+  const cv::RotatedRect box = cv::fitEllipse(polygon);
+  return 0.5 * static_cast<double>(std::min(box.size.width, box.size.height));
+}
+
 struct Timed {
   std::vector<DetectedEllipse> ellipses;
   std::vector<PolygonPoints> polygons;
@@ -191,6 +200,36 @@ std::map<std::string, RenderedImage> ReadRenderings(const std::string& path) {
   return images;
 }
 
+// The truth of the renderings lists no rim with a shorter semi-minor axis than this, though some
+// are drawn and their photographs of textures hold blobs of that size.
+constexpr double kSmallestListedPx = 8.0;
+
+// OpenCV's detectors on the renderings.
+void MeasureEllipseBaselines(const std::string& folder,
+                             const std::map<std::string, RenderedImage>& images) {
+  for (const benchmark::EllipseBaseline& baseline : benchmark::EllipseBaselines()) {
+    Score score;
+    std::vector<double> ms;
+    for (const auto& [name, truth] : images) {
+      const cv::Mat image = cv::imread(folder + "/" + name, cv::IMREAD_GRAYSCALE);
+      if (image.empty()) continue;
+      const std::clock_t start = std::clock();
+      const std::vector<Ellipse> found = baseline.detect(image);
+      ms.push_back(Milliseconds(start));
+      std::vector<PolygonPoints> polygons;
+      for (const Ellipse& e : found) {
+        if (e.b >= kSmallestListedPx) polygons.push_back(EllipsePolygon(e));
+      }
+      std::vector<double> overlap;
+      Match(truth.polygons, polygons, &overlap);
+      score.Add(overlap, polygons.size());
+    }
+    std::printf("  %-24s %4d %5d   %.3f   %.3f   ms median %.1f worst %.1f\n",
+                baseline.name.c_str(), score.truth, score.found, score.F(score.hit80),
+                score.F(score.hit95), Quantile(ms, 0.5), Quantile(ms, 1.0));
+  }
+}
+
 void MeasureRenderings(const std::string& folder) {
   Camera camera;
   camera.width = 640;
@@ -199,9 +238,11 @@ void MeasureRenderings(const std::string& folder) {
   camera.cx = 320.0;
   camera.cy = 240.0;
   std::array<Score, 5> scores;
+  Score listed;
   std::array<std::vector<double>, 5> errors;
   std::vector<double> edges_ms, ellipses_ms;
-  for (const auto& [name, truth] : ReadRenderings(folder + "/truth.csv")) {
+  const std::map<std::string, RenderedImage> images = ReadRenderings(folder + "/truth.csv");
+  for (const auto& [name, truth] : images) {
     const cv::Mat image = cv::imread(folder + "/" + name, cv::IMREAD_GRAYSCALE);
     if (image.empty()) continue;
     const Timed t = RunEllipses(image, camera);
@@ -209,6 +250,13 @@ void MeasureRenderings(const std::string& folder) {
     ellipses_ms.push_back(t.ellipses_ms);
     std::vector<double> overlap;
     const std::vector<int> partner = Match(truth.polygons, t.polygons, &overlap);
+    std::vector<PolygonPoints> large;
+    for (const PolygonPoints& polygon : t.polygons) {
+      if (SemiMinorPx(polygon) >= kSmallestListedPx) large.push_back(polygon);
+    }
+    std::vector<double> overlap_large;
+    Match(truth.polygons, large, &overlap_large);
+    listed.Add(overlap_large, large.size());
     for (const int group : {truth.group, 4}) {
       const auto g = static_cast<std::size_t>(group);
       scores[g].Add(overlap, t.polygons.size());
@@ -227,6 +275,10 @@ void MeasureRenderings(const std::string& folder) {
     std::printf("  %-9s %4d %5d   %.3f   %.3f   %17.3f %5.3f\n", names[g], s.truth, s.found,
                 s.F(s.hit80), s.F(s.hit95), Quantile(errors[g], 0.5), Quantile(errors[g], 0.9));
   }
+  std::printf("  of %.0f px and more, as the truth lists them:\n", kSmallestListedPx);
+  std::printf("  %-24s %4d %5d   %.3f   %.3f\n", "circline", listed.truth, listed.found,
+              listed.F(listed.hit80), listed.F(listed.hit95));
+  MeasureEllipseBaselines(folder, images);
   std::printf("  ms: edges median %.1f worst %.1f, ellipses median %.1f worst %.1f\n",
               Quantile(edges_ms, 0.5), Quantile(edges_ms, 1.0), Quantile(ellipses_ms, 0.5),
               Quantile(ellipses_ms, 1.0));
@@ -409,12 +461,166 @@ PhotoErrors MeasurePhoto(const cv::FileNode& node, const Camera& camera,
   return errors;
 }
 
+// Root mean square distances of the points of the circles found to the true conics, and what the
+// set records of its own edge points.
+struct ContourRms {
+  std::vector<double> found, recorded;
+};
+
+void MeasureContours(const cv::FileNode& node, const Camera& camera, const Observations& found,
+                     ContourRms* rms) {
+  for (const cv::FileNode& circle : node["circles"]) {
+    const cv::Mat center = ReadMatrix(circle, "centre_cam"),
+                  normal = ReadMatrix(circle, "normal_cam");
+    const cv::FileNode recorded = circle["contour_rms_to_ground_truth_px"];
+    if (center.empty() || normal.empty() || recorded.empty() || circle["radius"].empty()) continue;
+    CirclePose pose;
+    pose.normal = ToVector(normal);
+    pose.center = ToVector(center) / static_cast<double>(circle["radius"]);
+    const Matrix3d conic = ProjectCircle(pose);
+    const PolygonPoints truth = ContourPolygon(camera, conic);
+    for (const CircleObservation& observation : found.circles) {
+      if (!observation.fit ||
+          IntersectionOverUnion(truth, ContourPolygon(camera, observation.fit->conic)) < 0.8) {
+        continue;
+      }
+      double sum = 0.0, n = 0.0;
+      for (const Vector2d& pixel : observation.points) {
+        CalibratedPoint p;
+        if (!PixelToCalibrated(camera, pixel, &p)) continue;
+        const double d = ConicDistancePx(p, conic);
+        sum += d * d;
+        n += 1.0;
+      }
+      rms->found.push_back(std::sqrt(sum / n));
+      rms->recorded.push_back(static_cast<double>(recorded));
+      break;
+    }
+  }
+}
+
+// A row or column of a chessboard's corners: its line, and how far it reaches.
+struct BoardLine {
+  Vector3d line;
+  Segment ends;
+};
+
+// Of a board of 9 x 6 corners, given row by row.
+std::vector<BoardLine> BoardLines(const cv::FileNode& node, const Camera& camera) {
+  constexpr int kColumns = 9, kRows = 6;
+  std::vector<BoardLine> lines;
+  const cv::Mat corners = ReadMatrix(node, "corners");
+  if (corners.rows != kColumns * kRows || !node["corner_ids"].empty()) return lines;
+  const auto add = [&](int first, int step, int count) {
+    std::vector<CalibratedPoint> points;
+    BoardLine line;
+    for (int k = 0; k < count; ++k) {
+      const int i = first + k * step;
+      const Vector2d pixel(corners.at<double>(i, 0), corners.at<double>(i, 1));
+      CalibratedPoint p;
+      if (!PixelToCalibrated(camera, pixel, &p)) continue;
+      points.push_back(p);
+      if (k == 0) line.ends[0] = pixel;
+      line.ends[1] = pixel;
+    }
+    LineFit fit;
+    if (!FitLine(points, 1.0, &fit).ok()) return;
+    line.line = fit.line;
+    lines.push_back(line);
+  };
+  for (int row = 0; row < kRows; ++row) add(row * kColumns, 1, kColumns);
+  for (int column = 0; column < kColumns; ++column) add(column, kColumns, kRows);
+  return lines;
+}
+
+// Adds the squared distances of both ends of every segment that runs along one of the lines.
+void AddEndResiduals(const std::vector<BoardLine>& lines, const Camera& camera,
+                     const std::vector<Segment>& segments, std::vector<double>* squares) {
+  constexpr double kAlongPx = 2.0, kMinLengthPx = 20.0;
+  for (const Segment& segment : segments) {
+    if ((segment[1] - segment[0]).norm() < kMinLengthPx) continue;
+    for (const BoardLine& line : lines) {
+      const Vector2d along = line.ends[1] - line.ends[0];
+      std::array<double, 2> distance;
+      bool belongs = true;
+      for (std::size_t k = 0; k < 2; ++k) {
+        CalibratedPoint p;
+        const double t = along.dot(segment[k] - line.ends[0]) / along.squaredNorm();
+        belongs = belongs && t > -0.2 && t < 1.2 && PixelToCalibrated(camera, segment[k], &p);
+        if (!belongs) break;
+        distance[k] = LineDistancePx(p, line.line);
+        belongs = std::abs(distance[k]) < kAlongPx;
+      }
+      if (!belongs) continue;
+      for (const double d : distance) squares->push_back(d * d);
+      break;
+    }
+  }
+}
+
+// The ends of a detected line as its fit has them: moved across onto it.
+Segment FittedEnds(const DetectedLine& line, const Camera& camera) {
+  Segment ends = line.ends;
+  for (Vector2d& end : ends) {
+    CalibratedPoint p;
+    if (!PixelToCalibrated(camera, end, &p)) continue;
+    const Vector2d across = p.GradientPerPixel(line.fit.line.head<2>()).normalized();
+    end -= LineDistancePx(p, line.fit.line) * across;
+  }
+  return ends;
+}
+
+void PrintResiduals(const std::string& name, const std::vector<double>& squares,
+                    const std::vector<double>& ms) {
+  double sum = 0.0;
+  for (const double s : squares) sum += s;
+  std::printf(
+      "  segments, %-22s %6d ends, rms to the board's lines %.3f px, median %.3f; ms %.1f\n",
+      name.c_str(), static_cast<int>(squares.size()),
+      std::sqrt(sum / static_cast<double>(squares.size())), std::sqrt(Quantile(squares, 0.5)),
+      Quantile(ms, 0.5));
+}
+
+// End points of segments on the edges of chessboards; ours and OpenCV's.
+void MeasureSegments(const std::string& folder, const cv::FileNode& root) {
+  std::vector<benchmark::SegmentBaseline> baselines = benchmark::SegmentBaselines();
+  std::vector<std::vector<double>> squares(baselines.size() + 1), ms(baselines.size() + 1);
+  for (const cv::FileNode& node : root["images"]) {
+    const cv::Mat gray = cv::imread(folder + "/" + ReadText(node, "file"), cv::IMREAD_GRAYSCALE);
+    Camera camera;
+    if (gray.empty() || !CameraOf(root, node, gray.size(), &camera)) continue;
+    const std::vector<BoardLine> lines = BoardLines(node, camera);
+    if (lines.empty()) continue;
+    std::clock_t start = std::clock();
+    EdgeMap edges;
+    std::vector<DetectedLine> found;
+    DetectEdges(gray, EdgeOptions(), &edges);
+    DetectLines(edges, camera, LineOptions(), &found);
+    ms[0].push_back(Milliseconds(start));
+    std::vector<Segment> segments;
+    for (const DetectedLine& line : found) segments.push_back(FittedEnds(line, camera));
+    AddEndResiduals(lines, camera, segments, &squares[0]);
+    for (std::size_t k = 0; k < baselines.size(); ++k) {
+      start = std::clock();
+      segments = baselines[k].detect(gray);
+      ms[k + 1].push_back(Milliseconds(start));
+      AddEndResiduals(lines, camera, segments, &squares[k + 1]);
+    }
+  }
+  if (squares[0].empty()) return;
+  PrintResiduals("circline", squares[0], ms[0]);
+  for (std::size_t k = 0; k < baselines.size(); ++k) {
+    PrintResiduals(baselines[k].name, squares[k + 1], ms[k + 1]);
+  }
+}
+
 void MeasurePhotographs(const std::string& folder, const cv::FileNode& root) {
   std::printf(
       "photographs %s\n  photo                       circles pencils  normal deg  board deg"
       "  directions deg     ms\n",
       folder.c_str());
   std::vector<double> normals, rotations, ms;
+  ContourRms contours;
   int circles = 0, circles_found = 0;
   for (const cv::FileNode& node : root["images"]) {
     const std::string file = ReadText(node, "file");
@@ -430,6 +636,7 @@ void MeasurePhotographs(const std::string& folder, const cv::FileNode& root) {
       continue;
     }
     const PhotoErrors e = MeasurePhoto(node, camera, found);
+    MeasureContours(node, camera, found, &contours);
     circles += e.circles;
     circles_found += e.circles_found;
     if (!std::isnan(e.normal_deg)) normals.push_back(e.normal_deg);
@@ -450,6 +657,12 @@ void MeasurePhotographs(const std::string& folder, const cv::FileNode& root) {
       circles_found, circles, Quantile(normals, 0.5), Quantile(normals, 0.9),
       Quantile(rotations, 0.5), Quantile(rotations, 0.9), static_cast<int>(rotations.size()),
       Quantile(ms, 0.5), Quantile(ms, 1.0));
+  if (!contours.found.empty()) {
+    std::printf("  contour rms to the truth: median %.3f px of %d, the set's own edges %.3f px\n",
+                Quantile(contours.found, 0.5), static_cast<int>(contours.found.size()),
+                Quantile(contours.recorded, 0.5));
+  }
+  MeasureSegments(folder, root);
 }
 
 void MeasureFolder(const std::string& folder) {
