@@ -30,8 +30,8 @@ constexpr double kMinArcTurn = 12.0 * kPi / 180.0;
 constexpr int kCornerReach = 2;
 // How far the ends of two arcs may lie from the conic through their middles, pixels: tangents are
 // good to a few degrees.
-constexpr double kEndSlackPx = 3.0;
-constexpr double kEndSlackShare = 0.05;
+constexpr double kEndSlackPx = 2.0;
+constexpr double kEndSlackShare = 0.03;
 
 double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 

@@ -36,6 +36,8 @@ constexpr double kMaxOrthogonalDeg = 1.25;
 // Rows and columns of a sheet of circles are made at right angles; paper that bends shows them at
 // others. A lattice this near to a rectangular one is rectangular.
 constexpr double kRectangularDeg = 4.0;
+// Planes of circles alone start from this many of the best supported ones.
+constexpr std::size_t kMaxSeeds = 16;
 // Directions nearer than this are one.
 constexpr double kDistinctDeg = 3.0;
 // Two pencils span a plane if they are this far from parallel.
@@ -184,12 +186,12 @@ class Assembler {
 
   // Rows and columns of the circles' centres are pencils too.
   void AddGrid(const Camera& camera) {
-    const Plane plane = CirclesPlane();
-    if (plane.circles.empty()) return;
+    circles_plane_ = FindCirclesPlane();
+    if (circles_plane_.circles.empty()) return;
     // All circles: on small ones the normal is too uncertain to tell who belongs to the plane.
     std::vector<Matrix3d> conics;
     for (const CircleEvidence& circle : circles_) conics.push_back(circle.observation.fit->conic);
-    std::vector<DetectedPencil> rows = FindGridPencils(camera, conics, plane.normal.vector);
+    std::vector<DetectedPencil> rows = FindGridPencils(camera, conics, circles_plane_.normal.vector);
     const std::size_t before = pencils_.size();
     Place(&rows);
     for (std::size_t i = before; i < pencils_.size(); ++i) pencils_[i].of_grid = true;
@@ -293,14 +295,15 @@ class Assembler {
         consider(plane);
       }
     }
-    consider(CirclesPlane());
+    consider(circles_plane_);
     return best;
   }
 
   // The plane with most support of circles alone.
-  Plane CirclesPlane() const {
+  Plane FindCirclesPlane() const {
     Plane best;
-    for (const CircleEvidence& circle : circles_) {
+    for (std::size_t i = 0; i < std::min(circles_.size(), kMaxSeeds); ++i) {
+      const CircleEvidence& circle = circles_[i];
       for (int k = 0; k < circle.num_normals; ++k) {
         Plane plane = GrowFrom(circle.normals[static_cast<std::size_t>(k)]);
         if (plane.support_px > best.support_px) best = std::move(plane);
@@ -418,6 +421,7 @@ class Assembler {
   const AssemblyOptions& options_;
   std::vector<CircleEvidence>& circles_;
   std::vector<PlacedPencil> pencils_;
+  Plane circles_plane_;  // Of circles alone.
 };
 
 }  // namespace

@@ -23,7 +23,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kMinSingleTurn = 50.0 * kPi / 180.0;
 // Arcs that take part in pairs: the most bent and longest ones. Bounds the quadratic step.
 constexpr std::size_t kMaxPairedArcs = 256;
-constexpr std::size_t kMaxPairCandidates = 1500;
+constexpr std::size_t kMaxPairCandidates = 1000;
 // Points that a candidate is fitted to, of each arc.
 constexpr int kFitPoints = 24;
 // An arc fits its candidate when the root-mean-square distance stays below this, pixels.
