@@ -191,7 +191,8 @@ class Assembler {
     // All circles: on small ones the normal is too uncertain to tell who belongs to the plane.
     std::vector<Matrix3d> conics;
     for (const CircleEvidence& circle : circles_) conics.push_back(circle.observation.fit->conic);
-    std::vector<DetectedPencil> rows = FindGridPencils(camera, conics, circles_plane_.normal.vector);
+    std::vector<DetectedPencil> rows =
+        FindGridPencils(camera, conics, circles_plane_.normal.vector);
     const std::size_t before = pencils_.size();
     Place(&rows);
     for (std::size_t i = before; i < pencils_.size(); ++i) pencils_[i].of_grid = true;

@@ -47,13 +47,12 @@ void GaussianKernels(double sigma, cv::Mat* smooth, cv::Mat* derivative) {
 }
 
 Gradient ComputeGradient(const cv::Mat& gray, double sigma) {
-  cv::Mat smooth, derivative, image;
+  cv::Mat smooth, derivative;
   GaussianKernels(sigma, &smooth, &derivative);
-  gray.convertTo(image, CV_32F);
   Gradient g;
-  cv::sepFilter2D(image, g.x, CV_32F, derivative, smooth, cv::Point(-1, -1), 0.0,
+  cv::sepFilter2D(gray, g.x, CV_32F, derivative, smooth, cv::Point(-1, -1), 0.0,
                   cv::BORDER_REPLICATE);
-  cv::sepFilter2D(image, g.y, CV_32F, smooth, derivative, cv::Point(-1, -1), 0.0,
+  cv::sepFilter2D(gray, g.y, CV_32F, smooth, derivative, cv::Point(-1, -1), 0.0,
                   cv::BORDER_REPLICATE);
   g.squared.create(gray.size(), CV_32F);
   for (int y = 0; y < gray.rows; ++y) {
@@ -123,7 +122,9 @@ class PointFinder {
 
   void Find(std::vector<EdgePoint>* points, std::vector<std::int32_t>* index) const {
     const int width = gradient_.squared.cols, height = gradient_.squared.rows;
-    index->assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), -1);
+    const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    index->assign(pixels, -1);
+    points->reserve(pixels / 16);  // A busy photo's.
     for (int y = 1; y + 1 < height; ++y) {
       std::int32_t* out = index->data() + static_cast<std::ptrdiff_t>(y) * width;
       const float* s = gradient_.squared.ptr<float>(y);
