@@ -4,7 +4,9 @@
 // one convex curve, give a candidate; the candidate is confronted with all edge points along its
 // contour and fitted to those that agree in place and direction. All fits happen in calibrated
 // coordinates, so that lens distortion neither bends a candidate away from its contour nor biases
-// it, and what is fitted is always a general ellipse: nothing is ever rounded to a circle.
+// it, and what is fitted is always a general ellipse: nothing is ever rounded to a circle. The
+// final fit is to edge points from which the bias of a bent edge has been taken (CurvatureBias). A
+// contour too ragged for an ellipse gets a second look through a wider Gaussian.
 #ifndef CIRCLINE_RANSAC_DETECT_ELLIPSES_H_
 #define CIRCLINE_RANSAC_DETECT_ELLIPSES_H_
 
@@ -50,7 +52,7 @@ struct DetectedEllipse {
       -1;  // Ellipses with the same number can be circles about one centre; -1 = alone.
 };
 
-// Best supported first. `camera` must be valid. About 4 ms for a 640x480 photo.
+// Best supported first. `camera` must be valid. About 5 ms for a 640x480 photo, 10 for a busy one.
 Status DetectEllipses(const EdgeMap& edges, const Camera& camera, const EllipseOptions& options,
                       std::vector<DetectedEllipse>* ellipses);
 

@@ -76,8 +76,9 @@ inline cv::Mat Render(int width, int height, const PixelPattern& pattern) {
       double sum = 0.0;
       for (int k = 0; k < kSamples; ++k) {
         // In pairs on opposite sides of the centre, which is the last: the mean is the centre.
-        const double u = std::fmod(k / 2 * kStepU, 1.0) - 0.5;
-        const double v = std::fmod(k / 2 * kStepV, 1.0) - 0.5;
+        const int pair = k / 2;
+        const double u = std::fmod(pair * kStepU, 1.0) - 0.5;
+        const double v = std::fmod(pair * kStepV, 1.0) - 0.5;
         const double sign = k == kSamples - 1 ? 0.0 : k % 2 == 0 ? 1.0 : -1.0;
         sum += pattern(x + sign * u, y + sign * v);
       }
