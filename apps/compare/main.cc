@@ -3,6 +3,7 @@
 
 #include "apps/common/flags_util.h"
 #include "apps/compare/options.h"
+#include "apps/compare/ranks.h"
 #include "apps/compare/run.h"
 
 namespace {
@@ -10,6 +11,7 @@ namespace {
 using circline::Status;
 using circline::apps::CommandLine;
 using circline::apps::CompareOptions;
+using circline::apps::Ranks;
 
 constexpr char kUsage[] =
     "circline_compare: camera pose from circles and parallel lines, by every solver, compared.\n"
@@ -24,24 +26,26 @@ constexpr char kUsage[] =
     "(named,\n"
     "the rest is done); 2: unusable flags or scene file (nothing is written).";
 
-int Refuse(const Status& status) {
-  circline::apps::SayOnStderr("circline_compare: " + status.message);
+// Only the first of several ranks speaks.
+int Refuse(const Status& status, const Ranks& ranks) {
+  if (ranks.is_first()) circline::apps::SayOnStderr("circline_compare: " + status.message);
   return circline::apps::kExitUsage;
 }
 
-int Compare() {
+int Compare(const Ranks& ranks) {
   CompareOptions options;
   Status status = circline::apps::OptionsFromFlags(&options);
+  if (!status.ok()) return Refuse(status, ranks);
   circline::apps::ComparisonResult result;
-  if (status.ok() && !options.merge.empty()) {
-    status = circline::apps::MergeComparison(options, &result);
+  if (!options.merge.empty()) {
+    if (ranks.is_first()) status = circline::apps::MergeComparison(options, &result);
   } else {
     circline::apps::ImageSet images;
-    if (status.ok()) status = circline::apps::ImagesFromFlags(options, &images);
-    if (!status.ok()) return Refuse(status);
-    status = circline::apps::RunComparison(images, options, &result);
+    status = circline::apps::ImagesFromFlags(options, &images);
+    if (status.ok()) status = circline::apps::RunComparison(images, options, ranks, &result);
   }
-  if (status.code == circline::StatusCode::kInvalidArgument) return Refuse(status);
+  if (status.code == circline::StatusCode::kInvalidArgument) return Refuse(status, ranks);
+  if (!ranks.is_first()) return circline::apps::kExitOk;
   std::cout << result.table;
   if (!status.ok()) {
     circline::apps::SayOnStderr("circline_compare: " + status.message);
@@ -51,24 +55,27 @@ int Compare() {
   return result.num_unreadable > 0 ? circline::apps::kExitUnreadable : circline::apps::kExitOk;
 }
 
+// What is asked for instead of a comparison; false if nothing is.
+bool Answer(const CommandLine& command_line) {
+  if (command_line.help) {
+    std::cout << circline::apps::HelpText(kUsage);
+  } else if (command_line.version) {
+    std::cout << circline::apps::VersionText("circline_compare") << Ranks::kBuiltWith << "\n";
+  } else if (circline::apps::ListSolversAsked()) {
+    std::cout << circline::apps::ListSolvers();
+  } else {
+    return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   circline::apps::InitAppLogging(argv[0]);
+  const Ranks ranks(&argc, &argv);
   CommandLine command_line;
   const Status status = circline::apps::ParseCommandLine(argc, argv, &command_line);
-  if (!status.ok()) return Refuse(status);
-  if (command_line.help) {
-    std::cout << circline::apps::HelpText(kUsage);
-    return circline::apps::kExitOk;
-  }
-  if (command_line.version) {
-    std::cout << circline::apps::VersionText("circline_compare") << "\n";
-    return circline::apps::kExitOk;
-  }
-  if (circline::apps::ListSolversAsked()) {
-    std::cout << circline::apps::ListSolvers();
-    return circline::apps::kExitOk;
-  }
-  return Compare();
+  if (!status.ok()) return Refuse(status, ranks);
+  return Answer(command_line) ? circline::apps::kExitOk : Compare(ranks);
 }

@@ -5,14 +5,16 @@
 #include "apps/compare/finish.h"
 #include "apps/compare/image_set.h"
 #include "apps/compare/options.h"
+#include "apps/compare/ranks.h"
 #include "circline/estimators/status.h"
 
 namespace circline::apps {
 
-// Works on options.threads images at a time and writes their lines in the order of `images` as they
-// are done, so that the files do not depend on the number of threads. Summary and report are made
-// of these files at the end. Not ok: a folder or file that cannot be written.
-Status RunComparison(const ImageSet& images, const CompareOptions& options,
+// Works on options.threads images at a time, on every rank, and writes their lines in the order of
+// `images` as they are done, so that the files do not depend on the number of threads. Summary and
+// report are made of these files at the end. Not ok: a folder or file that cannot be written. Ranks
+// beside the first return without a result.
+Status RunComparison(const ImageSet& images, const CompareOptions& options, const Ranks& ranks,
                      ComparisonResult* result);
 
 // Joins the folders options.merge (see MergeFolders), then as above.
