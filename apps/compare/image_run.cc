@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
+#include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/record.h"
 #include "circline/refine/refined_solvers.h"
 
@@ -65,6 +66,20 @@ void TakeOverFrame(const Observations& scene, Observations* detected) {
   }
 }
 
+// Of the circle whose image has the longest axis.
+void SetLargestRadius(double radius, Observations* observations) {
+  if (!(radius > 0.0)) return;
+  CircleObservation* largest = nullptr;
+  double longest = 0.0;
+  for (CircleObservation& circle : observations->circles) {
+    PixelEllipse pixel;
+    if (!FitPixelEllipse(circle, &pixel) || pixel.ellipse.a <= longest) continue;
+    longest = pixel.ellipse.a;
+    largest = &circle;
+  }
+  if (largest != nullptr) largest->radius = radius;
+}
+
 void DetectAll(const CompareOptions& options, ImageRun* run) {
   const Stopwatch watch;
   const Status status = DetectObservations(run->photo, run->image->observations.camera,
@@ -72,6 +87,7 @@ void DetectAll(const CompareOptions& options, ImageRun* run) {
   run->stages.emplace_back("detect", watch.Microseconds());
   if (!status.ok()) run->read_error = status.message;
   TakeOverFrame(run->image->observations, &run->observations);
+  SetLargestRadius(options.inputs.circle_radius, &run->observations);
   if (!run->observations.message.empty()) run->problems.push_back(run->observations.message);
 }
 
@@ -141,13 +157,18 @@ SolverRun RunSolver(const SolverSet::Task& task, const CompareOptions& options,
   return run;
 }
 
-void RunAll(const CompareOptions& options, const SolverSet& solvers, ImageRun* run) {
-  const SceneImage& image = *run->image;
+void RunAll(const CompareOptions& options, const SolverSet& solvers, SceneImage* scene_image,
+            ImageRun* run) {
+  const SceneImage& image = *scene_image;
   const bool needs_photo = options.overlays || image.detect_everything || !image.rois.empty();
   if (needs_photo) {
     const Stopwatch watch;
     run->read_error = ReadPhoto(image.path, &run->photo);
     run->stages.emplace_back("read", watch.Microseconds());
+    if (run->read_error.empty() && options.inputs.guess.given()) {
+      scene_image->observations.camera =
+          options.inputs.guess.ForPhoto(run->photo.cols, run->photo.rows);
+    }
     if (run->read_error.empty()) run->read_error = SizeError(run->photo, image.observations.camera);
   }
   if (run->read_error.empty()) Observe(options, run);
@@ -178,12 +199,11 @@ SolverSet::SolverSet(const CompareOptions& options) {
   }
 }
 
-ImageRun RunImage(const SceneImage& image, const CompareOptions& options,
-                  const SolverSet& solvers) {
+ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image) {
   ImageRun run;
-  run.image = &image;
+  run.image = image;
   try {
-    RunAll(options, solvers, &run);
+    RunAll(options, solvers, image, &run);
   } catch (const std::exception& error) {  // Such as a photo too large for the memory.
     run.read_error = std::string("cannot be worked on: ") + error.what();
     std::replace(run.read_error.begin(), run.read_error.end(), '\n', ' ');

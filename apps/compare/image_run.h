@@ -53,8 +53,9 @@ struct ImageRun {
   std::vector<std::pair<std::string, double>> stages;  // "read", "detect", "fit"; microseconds.
 };
 
-// Never throws. The options and solvers outlive the result.
-ImageRun RunImage(const SceneImage& image, const CompareOptions& options, const SolverSet& solvers);
+// Never throws. Image, options and solvers outlive the result. A camera that is only guessed gets
+// its focal length from the size of the photo.
+ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image);
 
 // The run to show in a picture (see ShowRank). Null if every solver refused.
 const SolverRun* RunToShow(const ImageRun& run);

@@ -8,9 +8,9 @@
 
 namespace circline::apps {
 
-WorkedImage ImageWorker::Work(const SceneImage& image) const {
+WorkedImage ImageWorker::Work(SceneImage image) const {
   WorkedImage worked;
-  const ImageRun run = RunImage(image, options_, solvers_);
+  const ImageRun run = RunImage(options_, solvers_, &image);
   std::string overlay;
   if (options_.overlays && run.read_error.empty() && !run.photo.empty()) {
     overlay = "overlays/" + image.stem + ".png";

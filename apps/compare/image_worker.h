@@ -20,7 +20,7 @@ struct WorkedImage {
 class ImageWorker {
  public:
   explicit ImageWorker(const CompareOptions& options) : options_(options), solvers_(options) {}
-  WorkedImage Work(const SceneImage& image) const;
+  WorkedImage Work(SceneImage image) const;
   const SolverSet& solvers() const { return solvers_; }
 
  private:

@@ -37,11 +37,11 @@ int Compare(const Ranks& ranks) {
   Status status = circline::apps::OptionsFromFlags(&options);
   if (!status.ok()) return Refuse(status, ranks);
   circline::apps::ComparisonResult result;
-  if (!options.merge.empty()) {
+  if (!options.inputs.merge.empty()) {
     if (ranks.is_first()) status = circline::apps::MergeComparison(options, &result);
   } else {
     circline::apps::ImageSet images;
-    status = circline::apps::ImagesFromFlags(options, &images);
+    status = circline::apps::ImagesFromFlags(options.inputs, &images);
     if (status.ok()) status = circline::apps::RunComparison(images, options, ranks, &result);
   }
   if (status.code == circline::StatusCode::kInvalidArgument) return Refuse(status, ranks);

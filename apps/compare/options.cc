@@ -6,21 +6,11 @@
 #include <optional>
 #include <sstream>
 
-#include "apps/common/camera_file.h"
 #include "apps/common/text.h"
 #include "circline/estimators/robust_loss.h"
 #include "circline/estimators/solver_registry.h"
 #include "circline/refine/refined_solvers.h"
 
-DEFINE_string(scene, "", "Scene file (YAML or JSON): photos and what is known of them.");
-DEFINE_string(
-    images, "",
-    "Instead of --scene: photos to detect everything in; files, folders and quoted wildcards, "
-    "separated by commas. Needs --camera.");
-DEFINE_string(
-    camera, "",
-    "Camera: an OpenCV calibration file (camera_matrix, distortion_coefficients, image_width, "
-    "image_height) or a COLMAP cameras.txt.");
 DEFINE_string(output, "", "Folder for the results; created if need be.");
 DEFINE_string(solvers, "all", "Solvers to compare, separated by commas; see --list_solvers.");
 DEFINE_string(
@@ -53,15 +43,9 @@ DEFINE_int32(max_pencils, circline::DetectionOptions().max_pencils,
 DEFINE_uint64(seed, circline::FitOptions().seed, "Same input and seed: same bytes out.");
 DEFINE_int32(threads, 0,
              "Images worked on at a time, at most one for each core; 0 = one for each core.");
-DEFINE_string(
-    shard, "0/1",
-    "i/n: only every n-th image, from the i-th on. i counts from 0 or from 1 (n/n is 0/n).");
 DEFINE_bool(overlays, true, "Draw a picture of each photo with what was found in it.");
 DEFINE_bool(resume, false,
             "Go on where a run with the same flags was stopped: skip what results.jsonl has.");
-DEFINE_string(merge, "",
-              "Instead of --scene or --images: folders of all the shards of a set, separated by "
-              "commas, to be joined in --output.");
 DEFINE_string(save_options, "",
               "A file for the flags with the best loss and scale, to be used as --flagfile.");
 DEFINE_string(export_as, "",
@@ -211,17 +195,6 @@ Status ReadExports(std::vector<std::string>* exports) {
   return Status::Ok();
 }
 
-Status ReadShard(int* index, int* count) {
-  const std::vector<std::string> parts = SplitList(FLAGS_shard, '/');
-  const bool numbers = parts.size() == 2 && ParseInt(parts[0], index) && ParseInt(parts[1], count);
-  if (!numbers || *count < 1 || *index < 0 || *index > *count) {
-    return Status::Invalid("--shard=" + FLAGS_shard +
-                           ": must be i/n with n at least 1 and i from 0 to n");
-  }
-  *index %= *count;
-  return Status::Ok();
-}
-
 SolverRegistry AllSolvers() {
   SolverRegistry registry;
   AddClosedFormSolvers(&registry);
@@ -229,48 +202,31 @@ SolverRegistry AllSolvers() {
   return registry;
 }
 
-Status OneCamera(const std::vector<Camera>& cameras, Camera* camera) {
-  if (cameras.size() != 1) {
-    return Status::Invalid("--camera=" + FLAGS_camera + ": has " + std::to_string(cameras.size()) +
-                           " cameras; --images takes one (a scene file can name several)");
-  }
-  *camera = cameras.front();
-  return Status::Ok();
-}
-
-Status ReadImages(std::vector<SceneImage>* images) {
-  std::vector<Camera> cameras;
-  if (!FLAGS_camera.empty()) {
-    const Status status = ReadCameraFile(FLAGS_camera, &cameras);
-    if (!status.ok()) return status;
-  }
-  if (!FLAGS_scene.empty()) return ReadScene(FLAGS_scene, cameras, images);
-  Camera camera;
-  const Status status = OneCamera(cameras, &camera);
-  return status.ok() ? ListPhotos(FLAGS_images, camera, images) : status;
-}
-
-Status CheckSources() {
-  const std::vector<std::string> given = {FLAGS_scene, FLAGS_images, FLAGS_merge};
-  const auto count = std::count(given.begin(), given.end(), "");
-  if (count == 3) {
-    return Status::Invalid("give --scene, or --images with --camera (--help says more)");
-  }
-  if (count < 2) return Status::Invalid("give --scene, --images or --merge, not both");
-  if (!FLAGS_images.empty() && FLAGS_camera.empty()) {
-    return Status::Invalid("--images needs --camera");
-  }
-  return Status::Ok();
-}
-
 // Names and values of the flags that shape what is found in a photo.
 std::string ResultFlags() {
   std::string lines;
-  for (const char* name :
-       {"solvers", "robust_loss", "loss_scale_px", "conic_loss", "conic_loss_scale_px", "line_loss",
-        "line_loss_scale_px", "inlier_threshold_px", "ransac_confidence", "ransac_max_iterations",
-        "min_ellipse_axis_px", "min_arc_deg", "min_segment_length_px", "max_circles", "max_pencils",
-        "seed", "shard", "overlays"}) {
+  for (const char* name : {"solvers",
+                           "robust_loss",
+                           "loss_scale_px",
+                           "conic_loss",
+                           "conic_loss_scale_px",
+                           "line_loss",
+                           "line_loss_scale_px",
+                           "inlier_threshold_px",
+                           "ransac_confidence",
+                           "ransac_max_iterations",
+                           "min_ellipse_axis_px",
+                           "min_arc_deg",
+                           "min_segment_length_px",
+                           "max_circles",
+                           "max_pencils",
+                           "seed",
+                           "shard",
+                           "overlays",
+                           "fov_deg",
+                           "focal_px",
+                           "roi",
+                           "circle_radius"}) {
     std::string value;
     gflags::GetCommandLineOption(name, &value);
     lines += std::string("--") + name + "=" + value + "\n";
@@ -299,12 +255,11 @@ Status OptionsFromFlags(CompareOptions* options) {
   if (status.ok()) status = ReadDetectionOptions(&options->detection);
   if (status.ok()) status = ReadLosses(&options->losses);
   if (status.ok()) status = ReadSolvers(&options->solvers);
-  if (status.ok()) status = ReadShard(&options->shard_index, &options->num_shards);
   if (!status.ok()) return status;
   if (FLAGS_threads < 0 || FLAGS_threads > 1024) {
     return CheckFlag("threads", Status::Invalid("must be between 0 and 1024"));
   }
-  status = CheckSources();
+  status = InputsFromFlags(&options->inputs);
   if (status.ok()) status = ReadExports(&options->finish.exports);
   if (!status.ok()) return status;
   if (FLAGS_output.empty())
@@ -314,17 +269,9 @@ Status OptionsFromFlags(CompareOptions* options) {
   options->overlays = FLAGS_overlays;
   options->resume = FLAGS_resume;
   options->result_flags = ResultFlags();
-  if (!FLAGS_merge.empty()) options->merge = SplitList(FLAGS_merge);
   options->finish.save_options = FLAGS_save_options;
   options->finish.other_flags = OtherFlags();
   return Status::Ok();
-}
-
-Status ImagesFromFlags(const CompareOptions& options, ImageSet* images) {
-  std::vector<SceneImage> all;
-  const Status status = ReadImages(&all);
-  if (status.ok()) *images = ImageSet(std::move(all), options.shard_index, options.num_shards);
-  return status;
 }
 
 std::vector<std::string> SolverNames() {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/compare/finish.h"
-#include "apps/compare/image_set.h"
+#include "apps/compare/inputs.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/detect_observations.h"
@@ -30,20 +30,15 @@ struct CompareOptions {
   DetectionOptions detection;
   ClosedFormOptions closed_form;
   int threads = 0;  // 0 = as many as the machine has.
-  int shard_index = 0, num_shards = 1;
   bool overlays = true;
   bool resume = false;
-  std::vector<std::string> merge;  // Folders of shards; not empty: nothing else is done.
+  InputOptions inputs;
   FinishOptions finish;
   std::string result_flags;  // All flags that shape the results, one a line.
 };
 
 // From the flags (flags.cc); not ok: one line that names the flag. Nothing is read from disk.
 Status OptionsFromFlags(CompareOptions* options);
-
-// The images of --scene or --images with --camera, those of this shard only. Not ok: one line that
-// names the flag or file.
-Status ImagesFromFlags(const CompareOptions& options, ImageSet* images);
 
 // Names of all solvers, closed form and refined, in the order of the registry.
 std::vector<std::string> SolverNames();

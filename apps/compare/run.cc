@@ -109,7 +109,7 @@ Status Prepare(const ImageSet& images, const CompareOptions& options, const Imag
 }  // namespace
 
 Status MergeComparison(const CompareOptions& options, ComparisonResult* result) {
-  Status status = MergeFolders(options.merge, options.output);
+  Status status = MergeFolders(options.inputs.merge, options.output);
   if (status.ok()) status = FinishFolder(options.output, options.finish, result);
   return status;
 }

@@ -17,7 +17,7 @@ namespace circline::apps {
 Status RunComparison(const ImageSet& images, const CompareOptions& options, const Ranks& ranks,
                      ComparisonResult* result);
 
-// Joins the folders options.merge (see MergeFolders), then as above.
+// Joins the folders options.inputs.merge (see MergeFolders), then as above.
 Status MergeComparison(const CompareOptions& options, ComparisonResult* result);
 
 }  // namespace circline::apps

@@ -1,0 +1,172 @@
+#include "apps/compare/inputs.h"
+
+#include <gflags/gflags.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/common/camera_file.h"
+#include "apps/common/text.h"
+
+DEFINE_string(scene, "", "Scene file (YAML or JSON): photos and what is known of them.");
+DEFINE_string(
+    images, "",
+    "Instead of --scene: photos to detect everything in; files, folders and quoted wildcards, "
+    "separated by commas. Needs --camera, --focal_px or --fov_deg.");
+DEFINE_string(
+    camera, "",
+    "Camera: an OpenCV calibration file (camera_matrix, distortion_coefficients, image_width, "
+    "image_height) or a COLMAP cameras.txt.");
+DEFINE_double(focal_px, 0.0,
+              "Where there is no calibration: focal length, pixels; no distortion, principal point "
+              "in the middle.");
+DEFINE_double(fov_deg, 0.0,
+              "The same from the field of view along the longer side of the photo, degrees.");
+DEFINE_string(roi, "",
+              "With --images: x,y,width,height, pixels; detect one circle inside it and nothing "
+              "else.");
+DEFINE_double(circle_radius, 0.0,
+              "With --images: radius of the circle in --roi, or of the one that is largest in the "
+              "photo; makes translations metric.");
+DEFINE_string(
+    shard, "0/1",
+    "i/n: only every n-th image, from the i-th on. i counts from 0 or from 1 (n/n is 0/n).");
+DEFINE_string(merge, "",
+              "Instead of --scene or --images: folders of all the shards of a set, separated by "
+              "commas, to be joined in --output.");
+
+namespace circline::apps {
+namespace {
+
+constexpr double kRadiansPerDegree = 0.017453292519943295;
+
+constexpr char kNoCamera[] =
+    "--images needs --camera: an OpenCV calibration file, which OpenCV's calibration sample makes "
+    "of ten photos of a chessboard, or the cameras.txt that COLMAP makes of the photos themselves. "
+    "Where neither can be had, --fov_deg or --focal_px make do (focal length in millimetres / "
+    "width "
+    "of the sensor in millimetres x width of the photo in pixels)";
+
+Status CheckSources() {
+  const std::vector<std::string> given = {FLAGS_scene, FLAGS_images, FLAGS_merge};
+  const auto missing = std::count(given.begin(), given.end(), "");
+  if (missing == 3) {
+    return Status::Invalid("give --scene, or --images with --camera (--help says more)");
+  }
+  if (missing < 2) return Status::Invalid("give --scene, --images or --merge, not both");
+  if (!FLAGS_images.empty()) return Status::Ok();
+  const bool for_images = FLAGS_focal_px != 0.0 || FLAGS_fov_deg != 0.0 || !FLAGS_roi.empty() ||
+                          FLAGS_circle_radius != 0.0;
+  return for_images ? Status::Invalid(
+                          "--focal_px, --fov_deg, --roi and --circle_radius go with "
+                          "--images; a scene file says these things itself")
+                    : Status::Ok();
+}
+
+Status ReadGuess(CameraGuess* guess) {
+  guess->focal_px = FLAGS_focal_px;
+  guess->fov_deg = FLAGS_fov_deg;
+  if (!(guess->focal_px >= 0.0) || !std::isfinite(guess->focal_px)) {
+    return Status::Invalid("--focal_px must be positive");
+  }
+  if (!(guess->fov_deg >= 0.0) || !(guess->fov_deg < 180.0)) {
+    return Status::Invalid("--fov_deg must be between 0 and 180");
+  }
+  const int given = (FLAGS_camera.empty() ? 0 : 1) + (guess->focal_px > 0.0 ? 1 : 0) +
+                    (guess->fov_deg > 0.0 ? 1 : 0);
+  if (!FLAGS_images.empty() && given == 0) return Status::Invalid(kNoCamera);
+  return given > 1 ? Status::Invalid("give one of --camera, --focal_px, --fov_deg") : Status::Ok();
+}
+
+Status ReadRoi(std::optional<std::array<int, 4>>* roi) {
+  if (FLAGS_roi.empty()) return Status::Ok();
+  const std::vector<std::string> parts = SplitList(FLAGS_roi);
+  std::array<int, 4>& numbers = roi->emplace();
+  bool good = parts.size() == 4;
+  for (std::size_t i = 0; good && i < 4; ++i) good = ParseInt(parts[i], &numbers[i]);
+  if (good && numbers[2] > 0 && numbers[3] > 0) return Status::Ok();
+  return Status::Invalid("--roi=" + FLAGS_roi +
+                         ": must be x,y,width,height, whole pixels, the last two positive");
+}
+
+Status ReadShard(int* index, int* count) {
+  const std::vector<std::string> parts = SplitList(FLAGS_shard, '/');
+  const bool numbers = parts.size() == 2 && ParseInt(parts[0], index) && ParseInt(parts[1], count);
+  if (!numbers || *count < 1 || *index < 0 || *index > *count) {
+    return Status::Invalid("--shard=" + FLAGS_shard +
+                           ": must be i/n with n at least 1 and i from 0 to n");
+  }
+  *index %= *count;
+  return Status::Ok();
+}
+
+Status OneCamera(const std::vector<Camera>& cameras, Camera* camera) {
+  if (cameras.size() != 1) {
+    return Status::Invalid("--camera=" + FLAGS_camera + ": has " + std::to_string(cameras.size()) +
+                           " cameras; --images takes one (a scene file can name several)");
+  }
+  *camera = cameras.front();
+  return Status::Ok();
+}
+
+// Turns photos in which everything is detected into photos with one circle to detect.
+void SetRoi(const std::array<int, 4>& roi, double radius, std::vector<SceneImage>* images) {
+  for (SceneImage& image : *images) {
+    CircleObservation circle;
+    circle.id = "circle";
+    circle.radius = radius;
+    image.observations.circles = {circle};
+    image.rois = {{0, roi}};
+    image.detect_everything = false;
+  }
+}
+
+Status ReadImages(const InputOptions& options, std::vector<SceneImage>* images) {
+  std::vector<Camera> cameras;
+  Status status;
+  if (!FLAGS_camera.empty()) status = ReadCameraFile(FLAGS_camera, &cameras);
+  if (!status.ok()) return status;
+  if (!FLAGS_scene.empty()) return ReadScene(FLAGS_scene, cameras, images);
+  Camera camera;
+  if (!options.guess.given()) status = OneCamera(cameras, &camera);
+  if (status.ok()) status = ListPhotos(FLAGS_images, camera, images);
+  if (status.ok() && options.roi) SetRoi(*options.roi, options.circle_radius, images);
+  return status;
+}
+
+}  // namespace
+
+Camera CameraGuess::ForPhoto(int width, int height) const {
+  Camera camera;
+  camera.id = "guessed";
+  camera.width = width;
+  camera.height = height;
+  camera.cx = 0.5 * (width - 1);
+  camera.cy = 0.5 * (height - 1);
+  const double half = 0.5 * std::max(width, height);
+  camera.fx = focal_px > 0.0 ? focal_px : half / std::tan(0.5 * fov_deg * kRadiansPerDegree);
+  camera.fy = camera.fx;
+  return camera;
+}
+
+Status InputsFromFlags(InputOptions* options) {
+  Status status = ReadShard(&options->shard_index, &options->num_shards);
+  if (status.ok()) status = CheckSources();
+  if (status.ok()) status = ReadGuess(&options->guess);
+  if (status.ok()) status = ReadRoi(&options->roi);
+  options->circle_radius = FLAGS_circle_radius;
+  if (status.ok() && !(FLAGS_circle_radius >= 0.0 && std::isfinite(FLAGS_circle_radius))) {
+    status = Status::Invalid("--circle_radius must be positive");
+  }
+  if (!FLAGS_merge.empty()) options->merge = SplitList(FLAGS_merge);
+  return status;
+}
+
+Status ImagesFromFlags(const InputOptions& options, ImageSet* images) {
+  std::vector<SceneImage> all;
+  const Status status = ReadImages(options, &all);
+  if (status.ok()) *images = ImageSet(std::move(all), options.shard_index, options.num_shards);
+  return status;
+}
+
+}  // namespace circline::apps

@@ -1,0 +1,103 @@
+// Photos without a scene file: what stands in for a calibration, and what is known of one circle.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include "tests/apps/board_set.h"
+#include "tests/apps/run_compare.h"
+#include "tests/apps/test_files.h"
+
+namespace circline::apps {
+namespace {
+
+using Json = nlohmann::json;
+
+class CompareInputs : public testing::Test {
+ protected:
+  CompareInputs() { board_.Paint(folder_ / "photo.png"); }
+  Outcome Run(const std::string& flags) {
+    std::filesystem::remove_all(folder_ / "out");
+    return RunCompare("--images='" + folder_ / "photo.png" + "' --output='" + folder_ / "out" +
+                      "' " + flags);
+  }
+  std::string Results() { return ReadAll(folder_ / "out/results.jsonl"); }
+  // Best answer of a solver.
+  Json Best(const std::string& solver) {
+    for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
+      if (line["solver"] == solver && line["stage"] == "refined" && line["hypothesis"] == 0) {
+        return line;
+      }
+    }
+    return {};
+  }
+  void ExpectUnusable(const std::string& flags, const char* words) {
+    const Outcome outcome = Run(flags);
+    EXPECT_EQ(outcome.exit_code, 2) << flags;
+    EXPECT_CONTAINS(outcome.err, words);
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+  }
+  const Board board_{40.0};
+  const TestFolder folder_;
+};
+
+TEST_F(CompareInputs, FocalLengthOrFieldOfViewStandInForACalibration) {
+  // The board's camera: the principal point in the middle.
+  const std::string calibration = folder_.Write("cameras.txt", "1 PINHOLE 320 240 300 300 160 120");
+  ASSERT_EQ(Run("--camera='" + calibration + "'").exit_code, 0);
+  const std::string calibrated = Results();
+  ASSERT_EQ(Run("--focal_px=300").exit_code, 0);
+  EXPECT_EQ(Results(), calibrated);
+  const double fov = 2.0 * std::atan(0.5 * kWidth / kFocal) * 180.0 / 3.14159265358979323846;
+  ASSERT_EQ(Run("--fov_deg=" + std::to_string(fov)).exit_code, 0);
+  const Json guessed = Best("joint");
+  std::istringstream lines(calibrated);
+  ASSERT_EQ(Run("--camera='" + calibration + "'").exit_code, 0);
+  const Json expected = Best("joint");
+  for (std::size_t i = 0; i < 9; ++i) {
+    EXPECT_NEAR(guessed["rotation"][i], expected["rotation"][i], 1e-6);
+  }
+}
+
+TEST_F(CompareInputs, WithoutACalibrationSaysHowToGetOne) {
+  ExpectUnusable("", "--images needs --camera");
+  const Outcome outcome = Run("");
+  for (const char* way : {"chessboard", "COLMAP", "--fov_deg", "--focal_px"}) {
+    EXPECT_CONTAINS(outcome.err, way);
+  }
+}
+
+TEST_F(CompareInputs, BadValuesAreNamed) {
+  ExpectUnusable("--fov_deg=180", "--fov_deg must be between 0 and 180");
+  ExpectUnusable("--focal_px=-1", "--focal_px must be positive");
+  ExpectUnusable("--focal_px=300 --fov_deg=60", "give one of --camera, --focal_px, --fov_deg");
+  ExpectUnusable("--focal_px=300 --roi=1,2,3", "--roi=1,2,3: must be x,y,width,height");
+  ExpectUnusable("--focal_px=300 --roi=1,2,0,5", "--roi=1,2,0,5");
+  ExpectUnusable("--focal_px=300 --circle_radius=-2", "--circle_radius must be positive");
+}
+
+// Length of the translation to the disc's centre is that of the board, not 1.
+TEST_F(CompareInputs, RadiusMakesTheTranslationMetric) {
+  const double distance = board_.translation.norm();
+  ASSERT_EQ(Run("--focal_px=300 --roi=40,20,230,210 --circle_radius=0.5").exit_code, 0);
+  Json best = Best("single_circle");
+  ASSERT_FALSE(best.is_null());
+  EXPECT_EQ(best["metric"], true);
+  const auto norm = [](const Json& t) {
+    return std::hypot(t[0].get<double>(), t[1].get<double>(), t[2].get<double>());
+  };
+  EXPECT_NEAR(norm(best["translation"]), distance, 0.01 * distance);
+  const std::vector<Json> observations = ReadJsonLines(folder_ / "out/observations.jsonl");
+  EXPECT_EQ(observations.at(0)["ellipses"].size(), 1U);  // Nothing else is detected.
+  EXPECT_EQ(observations.at(0)["pencils"].size(), 0U);
+
+  ASSERT_EQ(Run("--focal_px=300 --circle_radius=0.5").exit_code, 0);  // The largest one.
+  best = Best("single_circle");
+  ASSERT_FALSE(best.is_null());
+  EXPECT_EQ(best["metric"], true);
+  EXPECT_NEAR(norm(best["translation"]), distance, 0.01 * distance);
+}
+
+}  // namespace
+}  // namespace circline::apps
