@@ -246,6 +246,14 @@ void ReadTruth(const StorageNode& node, SceneImage* image) {
   image->truth = truth;
 }
 
+void ReadPoints(const StorageNode& node, SceneImage* image) {
+  if (!node.Exists()) return;
+  const std::vector<double> v = node.Numbers(0, 5);
+  for (std::size_t i = 0; i + 4 < v.size(); i += 5) {
+    image->points.push_back({{v[i], v[i + 1]}, {v[i + 2], v[i + 3], v[i + 4]}});
+  }
+}
+
 const Camera* ChooseCamera(const StorageNode& image_node, const std::vector<Camera>& cameras) {
   const StorageNode node = image_node.Get("camera");
   if (!node.Exists()) {
@@ -272,7 +280,7 @@ SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
     image.name = node.Get("file").Text();
     node.set_place(place + " (\"" + image.name + "\")");
   }
-  node.AllowKeys({"file", "camera", "circles", "pencils", "frame", "known", "truth"});
+  node.AllowKeys({"file", "camera", "circles", "pencils", "frame", "known", "truth", "points"});
   if (node.Require("file").Exists() && image.name.empty()) node.Get("file").Fail("is empty");
   image.path = (folder / image.name).lexically_normal().string();
   const Camera* camera = ChooseCamera(node, cameras);
@@ -284,6 +292,7 @@ SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
   ReadFrame(node.Get("frame"), image.detect_everything, &image.observations);
   ReadKnown(node.Get("known"), image.detect_everything, &image.observations);
   ReadTruth(node.Get("truth"), &image);
+  ReadPoints(node.Get("points"), &image);
   if (node.ok() && !image.detect_everything && image.rois.empty()) {
     const Status status = image.observations.Validate();
     if (!status.ok()) node.Fail(status.message);

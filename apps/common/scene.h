@@ -42,6 +42,13 @@ struct CircleRoi {
   std::array<int, 4> rectangle;  // x, y, width, height; pixels.
 };
 
+// A point of the world and its image: no evidence for our solvers, which do without, but for those
+// that are compared with them.
+struct KnownPoint {
+  Eigen::Vector2d pixel;  // Of the photo as taken.
+  Eigen::Vector3d world;  // In the frame of the truth.
+};
+
 struct SceneImage {
   std::string name;                // As the scene file writes it.
   std::string path;                // Where it is.
@@ -51,6 +58,7 @@ struct SceneImage {
   bool detect_everything = false;  // No circle and no pencil is annotated.
   std::vector<CircleRoi> rois;
   std::optional<Truth> truth;
+  std::vector<KnownPoint> points;
 };
 
 // Reads and checks a scene file. Cameras of the file come beside `cameras` (from a camera file; may

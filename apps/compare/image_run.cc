@@ -144,12 +144,13 @@ class LossEvidence {
 SolverRun RunSolver(const SolverSet::Task& task, const CompareOptions& options,
                     const ImageRun& image, LossEvidence* evidence) {
   SolverRun run;
-  run.solver = task.solver->name();
-  run.stage = task.solver->stage();
+  run.solver = task.peer != nullptr ? task.peer->name : task.solver->name();
+  run.stage = task.peer != nullptr ? task.peer->stage : task.solver->stage();
   if (task.loss >= 0) run.loss = &options.losses[static_cast<std::size_t>(task.loss)];
   const Observations& observations = evidence->For(run.loss);
   const Stopwatch watch;
-  run.estimate = task.solver->Solve(observations);
+  run.estimate =
+      task.peer != nullptr ? task.peer->Solve(*image.image) : task.solver->Solve(observations);
   run.microseconds = watch.Microseconds();
   for (const PoseHypothesis& hypothesis : run.estimate.hypotheses) {
     run.errors.push_back(ComparePose(hypothesis, *image.image));
@@ -191,12 +192,14 @@ SolverSet::SolverSet(const CompareOptions& options) {
   const std::vector<std::string> names = options.solvers.empty() ? SolverNames() : options.solvers;
   for (const std::string& name : names) {
     const Solver* closed_form = registries_.front().Find(name, SolverStage::kClosedForm);
-    if (closed_form != nullptr) tasks_.push_back({closed_form, -1});
+    if (closed_form != nullptr) tasks_.push_back({closed_form, nullptr, -1});
     for (std::size_t k = 0; k < registries_.size(); ++k) {
       const Solver* refined = registries_[k].Find(name, SolverStage::kRefined);
-      if (refined != nullptr) tasks_.push_back({refined, static_cast<int>(k)});
+      if (refined != nullptr) tasks_.push_back({refined, nullptr, static_cast<int>(k)});
     }
   }
+  if (options.peers) peers_ = PeerSolvers();
+  for (const PeerSolver& peer : peers_) tasks_.push_back({nullptr, &peer, -1});
 }
 
 ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image) {
@@ -215,7 +218,9 @@ ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, Scene
 std::vector<SolverKey> SolverSet::Keys(const CompareOptions& options) const {
   std::vector<SolverKey> keys;
   for (const Task& task : tasks_) {
-    SolverKey key{task.solver->name(), SolverStageName(task.solver->stage()), "", 0.0};
+    const bool peer = task.peer != nullptr;
+    SolverKey key{peer ? task.peer->name : task.solver->name(),
+                  SolverStageName(peer ? task.peer->stage : task.solver->stage()), "", 0.0};
     if (task.loss >= 0) {
       const LossSetting& loss = options.losses[static_cast<std::size_t>(task.loss)];
       key.loss = loss.loss;

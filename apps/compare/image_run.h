@@ -10,6 +10,7 @@
 #include "apps/common/pose_error.h"
 #include "apps/common/scene.h"
 #include "apps/compare/options.h"
+#include "apps/compare/peers.h"
 #include "apps/compare/record.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
@@ -22,15 +23,19 @@ namespace circline::apps {
 class SolverSet {
  public:
   struct Task {
-    const Solver* solver;
+    const Solver* solver;    // One of ours, or
+    const PeerSolver* peer;  // one of others.
     int loss;  // Index in CompareOptions::losses; -1 for closed forms, which have none.
   };
   explicit SolverSet(const CompareOptions& options);
+  SolverSet(const SolverSet&) = delete;
+  SolverSet& operator=(const SolverSet&) = delete;
   const std::vector<Task>& tasks() const { return tasks_; }
   std::vector<SolverKey> Keys(const CompareOptions& options) const;  // Of tasks().
 
  private:
   std::vector<SolverRegistry> registries_;  // One for each loss; they own the solvers.
+  std::vector<PeerSolver> peers_;
   std::vector<Task> tasks_;
 };
 

@@ -18,9 +18,10 @@ bool SameCamera(const Camera& a, const Camera& b) {
 // Nothing but the photo, its camera and perhaps a truth.
 bool IsPlain(const SceneImage& image) {
   const FrameObservation& frame = image.observations.frame;
-  return image.detect_everything && image.rois.empty() && image.observations.known_angles.empty() &&
-         image.observations.known_lengths.empty() && frame.plane.empty() && !frame.origin &&
-         !frame.x_axis && !frame.y_axis && frame.origin_is_center.empty();
+  return image.detect_everything && image.rois.empty() && image.points.empty() &&
+         image.observations.known_angles.empty() && image.observations.known_lengths.empty() &&
+         frame.plane.empty() && !frame.origin && !frame.x_axis && !frame.y_axis &&
+         frame.origin_is_center.empty();
 }
 
 }  // namespace

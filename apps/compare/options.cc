@@ -19,7 +19,8 @@ DEFINE_string(
     "tukey, geman_mcclure.");
 DEFINE_string(
     loss_scale_px, "auto",
-    "Standard deviation of a point's noise, pixels, or 'auto' (estimated); a list sweeps.");
+    "Standard deviation of a point's noise, pixels, or 'auto' (estimated); a list sweeps. A number "
+    "also replaces what detection measured.");
 DEFINE_string(conic_loss, "", "Loss of contour points, where it differs from --robust_loss.");
 DEFINE_string(conic_loss_scale_px, "", "Scale of contour points, where it differs.");
 DEFINE_string(line_loss, "", "Loss of points of lines, where it differs from --robust_loss.");
@@ -44,6 +45,9 @@ DEFINE_uint64(seed, circline::FitOptions().seed, "Same input and seed: same byte
 DEFINE_int32(threads, 0,
              "Images worked on at a time, at most one for each core; 0 = one for each core.");
 DEFINE_bool(overlays, true, "Draw a picture of each photo with what was found in it.");
+DEFINE_bool(
+    peers, false,
+    "Also run OpenCV's solvePnP (IPPE, SQPnP, iterative) on the 'points' of the scene file.");
 DEFINE_bool(resume, false,
             "Go on where a run with the same flags was stopped: skip what results.jsonl has.");
 DEFINE_string(save_options, "",
@@ -268,6 +272,7 @@ Status OptionsFromFlags(CompareOptions* options) {
   options->threads = FLAGS_threads;
   options->overlays = FLAGS_overlays;
   options->resume = FLAGS_resume;
+  options->peers = FLAGS_peers;
   options->result_flags = ResultFlags();
   options->finish.save_options = FLAGS_save_options;
   options->finish.other_flags = OtherFlags();

@@ -32,6 +32,7 @@ struct CompareOptions {
   int threads = 0;  // 0 = as many as the machine has.
   bool overlays = true;
   bool resume = false;
+  bool peers = false;  // Also run PeerSolvers().
   InputOptions inputs;
   FinishOptions finish;
   std::string result_flags;  // All flags that shape the results, one a line.
