@@ -339,7 +339,7 @@ cv::Mat DrawOverlay(const ImageRun& run) {
 
 std::vector<std::uint8_t> EncodePng(const cv::Mat& picture) {
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", picture, bytes, {cv::IMWRITE_PNG_COMPRESSION, 3});
+  cv::imencode(".png", picture, bytes);  // OpenCV's default: twice as fast as a third smaller.
   return bytes;
 }
 

@@ -33,11 +33,10 @@ const char* const Ranks::kBuiltWith = " with MPI";
 Ranks::Ranks(int* argc, char*** argv) {
   int provided = 0;
   MPI_Init_thread(argc, argv, MPI_THREAD_SERIALIZED, &provided);
+  session_ = std::shared_ptr<void>(nullptr, [](void*) { MPI_Finalize(); });
   MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
   MPI_Comm_size(MPI_COMM_WORLD, &count_);
 }
-
-Ranks::~Ranks() { MPI_Finalize(); }
 
 std::size_t Ranks::FromFirst(std::size_t value) const {
   unsigned long long shared = value;
@@ -73,7 +72,6 @@ void Ranks::Abort(int exit_code) const {
 const char* const Ranks::kBuiltWith = "";
 
 Ranks::Ranks(int* /*argc*/, char*** /*argv*/) {}
-Ranks::~Ranks() = default;
 std::size_t Ranks::FromFirst(std::size_t value) const { return value; }
 void Ranks::SendToFirst(const WorkedImage& /*image*/) const {}
 WorkedImage Ranks::Receive(int /*from*/) const { return {}; }

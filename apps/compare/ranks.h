@@ -3,6 +3,7 @@
 #define CIRCLINE_APPS_COMPARE_RANKS_H_
 
 #include <cstddef>
+#include <memory>
 
 #include "apps/compare/image_worker.h"
 
@@ -15,9 +16,6 @@ class Ranks {
   static const char* const kBuiltWith;  // " with MPI", or nothing.
 
   Ranks(int* argc, char*** argv);
-  ~Ranks();
-  Ranks(const Ranks&) = delete;
-  Ranks& operator=(const Ranks&) = delete;
 
   int rank() const { return rank_; }
   int count() const { return count_; }
@@ -34,6 +32,7 @@ class Ranks {
 
  private:
   int rank_ = 0, count_ = 1;
+  std::shared_ptr<void> session_;  // Ends MPI with the last copy of this.
 };
 
 }  // namespace circline::apps

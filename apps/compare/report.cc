@@ -1,6 +1,8 @@
 #include "apps/compare/report.h"
 
+#include <algorithm>
 #include <opencv2/core.hpp>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "apps/common/output_file.h"
@@ -101,6 +103,25 @@ std::string OtherImage(const ImageRecord& record, const ImageScore& score) {
          "</td><td class='l'>" + EscapeHtml(record.overlay) + "</td></tr>\n";
 }
 
+// Pictures are made by all threads, a few at a time.
+void WriteSections(const std::string& folder, const std::vector<ShownImage>& shown,
+                   const std::vector<ImageRecord>& records, OutputFile* file) {
+  constexpr std::size_t kAtATime = 16;
+  for (std::size_t begin = 0; begin < shown.size(); begin += kAtATime) {
+    const std::size_t count = std::min(kAtATime, shown.size() - begin);
+    std::vector<std::vector<std::uint8_t>> pictures(count);
+    cv::parallel_for_(cv::Range(0, static_cast<int>(count)), [&](const cv::Range& range) {
+      for (std::size_t i = static_cast<std::size_t>(range.start);
+           i < static_cast<std::size_t>(range.end); ++i) {
+        pictures[i] = ReadPicture(folder, records[begin + i].overlay);
+      }
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      file->Write(ImageSection(records[begin + i], pictures[i], shown[begin + i].why));
+    }
+  }
+}
+
 // Second pass over the files: photos to show are kept for the order of the selection, the others
 // become a row each.
 Status AddImages(const std::string& folder, const Digest& digest, std::size_t max_images,
@@ -124,9 +145,7 @@ Status AddImages(const std::string& folder, const Digest& digest, std::size_t ma
     }
   }
   file->Write(Chooser(shown, slots.size()));
-  for (std::size_t i = 0; i < shown.size(); ++i) {
-    file->Write(ImageSection(records[i], ReadPicture(folder, records[i].overlay), shown[i].why));
-  }
+  WriteSections(folder, shown, records, file);
   if (!others.empty()) {
     file->Write(
         "<details><summary>The other images</summary><div class='scroll'>"

@@ -15,7 +15,7 @@ std::string Cell(const std::string& text, const char* css = nullptr) {
 }
 
 std::string StageText(const SolverRecord& run) {
-  return run.key.refined() ? "refined" : "closed form";
+  return run.key.stage == "refined" ? "refined" : "closed form";
 }
 
 std::string SigmaText(const HypothesisRecord& hypothesis) {

@@ -71,8 +71,8 @@ std::string AgreementTable(const Agreement& agreement) {
   std::string html = "<div class='scroll'><table class='matrix'><thead><tr><th></th>";
   for (const std::size_t i : used) {
     const SolverKey& key = agreement.keys()[i];
-    html +=
-        "<th>" + EscapeHtml(key.solver) + "<br>" + (key.refined() ? "refined" : "closed") + "</th>";
+    html += "<th>" + EscapeHtml(key.solver) + "<br>" +
+            (key.stage == "refined" ? "refined" : "closed") + "</th>";
   }
   html += "</tr></thead><tbody>";
   for (const std::size_t i : used) {

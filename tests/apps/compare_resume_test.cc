@@ -55,7 +55,13 @@ std::string MakeLongSet(const TestFolder& folder) {
   return folder.Write("scene.yaml", scene + "  - { file: \"gone.png\", camera: \"k\" }\n");
 }
 
-TEST(CompareResume, KilledTwentyTimesGivesTheSameBytes) {
+#ifdef __SANITIZE_ADDRESS__
+constexpr int kTrials = 4;  // Each takes seconds.
+#else
+constexpr int kTrials = 20;
+#endif
+
+TEST(CompareResume, KilledAtRandomGivesTheSameBytes) {
   const TestFolder folder;
   const std::string scene = MakeLongSet(folder);
   const auto begin = std::chrono::steady_clock::now();
@@ -67,7 +73,7 @@ TEST(CompareResume, KilledTwentyTimesGivesTheSameBytes) {
 
   std::mt19937 random(7);
   int num_killed = 0, num_begun = 0;
-  for (int trial = 0; trial < 20; ++trial) {
+  for (int trial = 0; trial < kTrials; ++trial) {
     const std::string out = folder / ("killed" + std::to_string(trial));
     const pid_t pid = Start({"--scene=" + scene, "--threads=2", "--output=" + out});
     ASSERT_GT(pid, 0);
@@ -86,8 +92,8 @@ TEST(CompareResume, KilledTwentyTimesGivesTheSameBytes) {
     EXPECT_CONTAINS(outcome.err, "gone.png: the file does not exist");
     ExpectSameFiles(folder / "whole", out);
   }
-  EXPECT_GE(num_killed, 10);
-  EXPECT_GE(num_begun, 3);  // Else nothing was there to go on from.
+  EXPECT_GE(num_killed, kTrials / 2);
+  EXPECT_GE(num_begun, kTrials / 8);  // Else nothing was there to go on from.
 }
 
 TEST(CompareResume, DropsALineThatWasCutOff) {
