@@ -149,9 +149,12 @@ std::string Problems(const std::vector<std::string>& problems) {
 }
 
 std::string EvidenceText(const ImageRecord& record) {
-  std::string text = std::to_string(record.num_ellipses) + " ellipses, " +
-                     std::to_string(record.num_segments) + " segments in " +
-                     std::to_string(record.num_pencils) + " pencils, " +
+  const auto count = [](std::size_t number, const std::string& what) {
+    return std::to_string(number) + " " + what + (number == 1 ? "" : "s");
+  };
+  std::string text = count(record.num_ellipses, "ellipse") + ", " +
+                     count(record.num_segments, "segment") + " in " +
+                     count(record.num_pencils, "pencil") + ", " +
                      (record.detected ? "all detected in the photo" : "as the scene file says");
   for (const auto& [stage, microseconds] : record.stages)
     text += "; " + stage + " " + FormatMicroseconds(microseconds);

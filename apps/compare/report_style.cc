@@ -21,7 +21,7 @@ table.sortable th{cursor:pointer}
 th.up:after{content:" \25B4"}th.down:after{content:" \25BE"}
 table.matrix td{text-align:center}table.matrix th.l{max-width:260px}
 td.best{font-weight:700;color:var(--good)}
-table.matrix th{white-space:normal;overflow-wrap:anywhere}.l,th.l{text-align:left}td.say{text-align:left;white-space:normal;min-width:160px;color:var(--soft)}
+table.matrix th{white-space:normal;overflow-wrap:anywhere;text-align:center}.l,th.l{text-align:left}td.say{text-align:left;white-space:normal;min-width:160px;color:var(--soft)}
 tr.more td{color:var(--soft)}tr.shown td{background:var(--card)}
 .failed{color:var(--bad);font-weight:600}
 .plots{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,560px),1fr));gap:20px}

@@ -54,5 +54,12 @@ TEST(Text, EncodesBase64) {  // RFC 4648, section 10.
   EXPECT_EQ(encode("foobar"), "Zm9vYmFy");
 }
 
+TEST(Text, PlainNumbersHaveNoIdleZeros) {
+  EXPECT_EQ(FormatPlain(0.1), "0.1");
+  EXPECT_EQ(FormatPlain(2.0), "2");
+  EXPECT_EQ(FormatPlain(0.03), "0.03");
+  EXPECT_EQ(FormatPlain(1e-6), "1e-06");
+}
+
 }  // namespace
 }  // namespace circline::apps
