@@ -147,6 +147,10 @@ void CountInliers(const JointEvidence& e, JointState* state, PoseHypothesis* h) 
 
 // Scatter about the common pose of those points whose noise is automatic.
 NoiseScales MeasureScatter(const JointEvidence& e, const JointState& state) {
+  if (std::all_of(e.sets.begin(), e.sets.end(),
+                  [](const PointSet& set) { return set.noise == PointSet::Noise::kStated; })) {
+    return {};
+  }
   std::vector<double> of_circles, of_lines;
   std::size_t circles = 0, lines = 0;
   ForEachCurve(

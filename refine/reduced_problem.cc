@@ -227,6 +227,7 @@ class SolverFunction {
     accepted_ = state_;
     own_damping_ = 1.0;
     if (!Linearize(e_, state_, columns_, weighing_, &model_)) {
+      failed_ = true;
       f.setConstant(std::numeric_limits<double>::quiet_NaN());
       return false;
     }
@@ -234,9 +235,10 @@ class SolverFunction {
     return true;
   }
 
-  // Leaves the state where the solver ended.
-  void Finish(const Eigen::VectorXd& x) const {
+  // Leaves the state where the solver ended. False if it could not be linearised on the way.
+  bool Finish(const Eigen::VectorXd& x) const {
     if (x != trial_) state_ = accepted_;
+    return !failed_;
   }
 
  private:
@@ -331,6 +333,7 @@ class SolverFunction {
   mutable ReducedModel model_;
   mutable Eigen::VectorXd linearized_at_, trial_;
   mutable double own_damping_ = 1.0;
+  mutable bool failed_ = false;
 };
 
 }  // namespace
@@ -442,8 +445,6 @@ bool Linearize(const JointEvidence& e, const JointState& state, const SharedColu
 
 Status Minimize(const JointEvidence& e, double stretch, int max_iterations, double tolerance,
                 JointState* state) {
-  if (!std::isfinite(JointCost(e, *state, Weighing{stretch, false})))
-    return Status::Failed("the evidence cannot be evaluated at the seed");
   const SolverFunction function(e, stretch, state);
   ceres::TinySolver<SolverFunction> solver;
   solver.options.max_num_iterations = max_iterations + 1;  // It counts the start as one.
@@ -453,7 +454,7 @@ Status Minimize(const JointEvidence& e, double stretch, int max_iterations, doub
   solver.options.cost_threshold = 0.0;
   Eigen::VectorXd x = function.Start();
   solver.Solve(function, &x);
-  function.Finish(x);
+  if (!function.Finish(x)) return Status::Failed("the evidence cannot be evaluated at the seed");
   const Eigen::Quaterniond q(state->rotation);  // Rounding of many products, off.
   state->rotation = q.normalized().toRotationMatrix();
   return Status::Ok();
