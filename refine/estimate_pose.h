@@ -14,6 +14,9 @@ namespace circline {
 
 // How one kind of residual is weighed.
 struct LossOptions {
+  // Tukey's and Geman and McClure's losses judge all points of a feature, whatever a robust fit has
+  // marked, and leave out crowds of outliers in one place: take one of them where half of the
+  // points may be wrong. The others see the points marked as inliers.
   LossType type = LossType::kCauchy;
   // Standard deviation of a point, pixels of the photo, for features that state no sigma_px of
   // their own. The loss multiplies it by its own tuning constant. 0 = "auto": estimated from the

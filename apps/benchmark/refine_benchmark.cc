@@ -91,6 +91,13 @@ void AddPaperLike(Scene* scene) {
   scene->AddPencil(PencilDirection::kY, 2, 50);
 }
 
+// The same through a camera without distortion: undistorting 300 points takes a third of the time.
+void AddPaperLikeUndistorted(Scene* scene) {
+  scene->observations.camera.model = CameraModel::kPinhole;
+  scene->observations.camera.distortion = {};
+  AddPaperLike(scene);
+}
+
 // One contour of 100 points.
 void AddOneCircle(Scene* scene) { scene->AddCircle(0.5, 0.3, 2.0, 100); }
 
@@ -154,6 +161,12 @@ BENCHMARK_CAPTURE(BM_RefineCircleAndLines, cold_cauchy, LossType::kCauchy, kCold
 BENCHMARK_CAPTURE(BM_RefineCircleAndLines, cold_tukey, LossType::kTukey, kCold);
 BENCHMARK_CAPTURE(BM_RefineCircleAndLines, cold_trivial, LossType::kTrivial, kCold);
 BENCHMARK_CAPTURE(BM_RefineCircleAndLines, warm_cauchy, LossType::kCauchy, kWarm);
+
+void BM_RefineUndistortedCircleAndLines(benchmark::State& state, LossType loss, double error) {
+  RefineOneSeed(state, AddPaperLikeUndistorted, loss, error);
+}
+BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, cold_cauchy, LossType::kCauchy, kCold);
+BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, warm_cauchy, LossType::kCauchy, kWarm);
 
 void BM_RefineOneCircle(benchmark::State& state, LossType loss, double error) {
   RefineOneSeed(state, AddOneCircle, loss, error);
