@@ -28,7 +28,7 @@ struct CircleObservation {
   // Of the edge at each point: unit gradient across the contour, on the photo, its sense without
   // meaning, zero where not known; or empty. A robust fit is faster and surer with them.
   std::vector<Eigen::Vector2d> normals;
-  double sigma_px = 0.0;                // Standard deviation of each coordinate; 0 = not known.
+  double sigma_px = 0.0;  // Standard deviation of each coordinate; 0 = not known.
   std::optional<Eigen::Vector2d>
       center;              // Image of the circle's centre (NOT the ellipse's), pixels.
   double radius = 0.0;     // In the world's unit; 0 = not known.

@@ -516,7 +516,7 @@ ConicModel::SectorDensities ConicModel::MeasureSectors(const Value& value, doubl
     if (result->misses[i] < kSigmas * kSigmas) inside[k] += 1.0;
   }
   // In each sector, of the points inside the threshold: those of the background, and those of the
-  // curve as far as they are sure (lower by two and a half standard deviations of the background).
+  // curve as far as they are sure (lower by three standard deviations of the background).
   constexpr int kReach = 2;  // Neighbours on each side that vouch for a sector.
   const std::array<double, kSectors> in = SumsOfWindows(inside, kReach);
   const std::array<double, kSectors> near = SumsOfWindows(beside, kReach);
@@ -532,7 +532,7 @@ ConicModel::SectorDensities ConicModel::MeasureSectors(const Value& value, doubl
     const double stray = chance * expected;
     densities.background[k] = expected / (2.0 * threshold);
     densities.curve[k] =
-        std::max(0.0, in[k] - stray - 2.5 * std::sqrt(stray)) * 0.3989422804014327 / sigma;
+        std::max(0.0, in[k] - stray - 3.0 * std::sqrt(stray)) * 0.3989422804014327 / sigma;
   }
   return densities;
 }

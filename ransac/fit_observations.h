@@ -18,7 +18,7 @@ struct FitOptions {
   // is taken.
   double inlier_threshold_px = 2.0;
   double confidence = 0.999;    // That the best model was among those drawn; in (0, 1).
-  int max_iterations = 100000;  // Draws for each model; 1 or more.
+  int max_iterations = 200000;  // Draws for each model; 1 or more.
   std::uint64_t seed = 1;       // Same input and seed, same bits out.
   double sigma_px = 1.0;        // Of a point where the feature states none; > 0.
   // Standard deviation of the angle of a contour's normals, where it has any, radians; in (0, 0.5].

@@ -65,7 +65,7 @@ struct RansacOptions {
   double threshold = 1.0;       // Largest residual of an inlier, in the model's unit; > 0.
   double confidence = 0.999;    // That one all-inlier sample was drawn; in (0, 1).
   int min_iterations = 1;       // Draws that are made whatever the confidence; 0 or more.
-  int max_iterations = 100000;  // Draws; 1 or more.
+  int max_iterations = 200000;  // Draws; 1 or more.
   std::uint64_t seed = 1;
   ScoreType score = ScoreType::kMsac;
   int local_start = 30;    // Draws before the first local optimisation (Lebeda 2012); 0 or more.
