@@ -425,7 +425,7 @@ TEST(Sampler, ProsacGrowsFromTheBestToAll) {
     if (i < 200000) continue;
     for (const int s : sample) ++drawn[static_cast<std::size_t>(s)];
   }
-  for (const int count : drawn) EXPECT_NEAR(count, 100000 * m / n, 700);
+  for (const int count : drawn) EXPECT_NEAR(count, 100000.0 * m / n, 700);
 }
 
 TEST(Sampler, ProsacGrowsByThePaper) {
@@ -462,7 +462,7 @@ TEST(Sampler, UniformDrawsAllAlike) {
     EXPECT_EQ(std::set<int>(sample.begin(), sample.end()).size(), static_cast<std::size_t>(m));
     for (const int s : sample) ++drawn[static_cast<std::size_t>(s)];
   }
-  for (const int count : drawn) EXPECT_NEAR(count, draws * m / n, 800);
+  for (const int count : drawn) EXPECT_NEAR(count, 1.0 * draws * m / n, 800);
 }
 
 // The loss of MAGSAC++ by its definition: the likelihoods of the residual under Gaussians of every
