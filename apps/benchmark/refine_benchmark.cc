@@ -103,8 +103,10 @@ void AddOneCircle(Scene* scene) { scene->AddCircle(0.5, 0.3, 2.0, 100); }
 
 // 20 circles of 60 points, 200 segments by their end points.
 void AddManyFeatures(Scene* scene) {
-  for (int i = 0; i < 20; ++i)
-    scene->AddCircle(-2.4 + 1.2 * (i % 5), -1.8 + 1.2 * (i / 5), 0.5, 60);
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 5; ++column)
+      scene->AddCircle(-2.4 + 1.2 * column, -1.8 + 1.2 * row, 0.5, 60);
+  }
   scene->AddPencil(PencilDirection::kX, 100, 2);
   scene->AddPencil(PencilDirection::kY, 100, 2);
 }
