@@ -102,6 +102,27 @@ TEST(Simulate, WritesARowForEachMethodNoiseAndRatio) {
   EXPECT_CONTAINS(svg, "bound of joint");
 }
 
+// Half of all points in one place beside each feature: fits follow it, the joint estimate does not.
+TEST(Simulate, JointHoldsAgainstClustersAndBands) {
+  const TestFolder folder;
+  for (const std::string kind : {"cluster", "band"}) {
+    ASSERT_EQ(RunSimulate("--trials=100 --noise_px=1,2,3 --outlier_ratio=0.5 --outlier_kind=" +
+                          kind + " --output='" + folder / kind + "'"),
+              0);
+    for (Row row : ReadCsv(folder / (kind + "/simulation.csv"))) {
+      if (row["method"] != "joint") continue;
+      const std::string where = kind + ", " + row["noise_px"] + " px";
+      EXPECT_LE(std::stoi(row["failures"]), 1) << where;
+      // 1.20 of the bound at 1 px and 1.35 above, and two standard deviations of 100 trials.
+      const double most = row["noise_px"] == "1" ? 1.20 : 1.35;
+      EXPECT_LT(std::stod(row["rotation_rms_rad"]), 1.13 * most * std::stod(row["bound_rms_rad"]))
+          << where;
+      EXPECT_GT(std::stod(row["nees_mean"]), 2.4 - 0.5) << where;
+      EXPECT_LT(std::stod(row["nees_mean"]), 3.9 + 0.5) << where;
+    }
+  }
+}
+
 TEST(Simulate, SameBytesWhateverTheThreads) {
   const TestFolder folder;
   const std::string arguments =
