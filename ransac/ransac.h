@@ -51,15 +51,12 @@
 
 #include "circline/estimators/random.h"
 #include "circline/estimators/status.h"
+#include "circline/ransac/ransac_loss.h"
+#include "circline/ransac/sampler.h"
 
 namespace circline {
 
 constexpr int kRansacBlock = 32;
-
-enum class ScoreType {
-  kMsac,    // min(r^2 / T^2, 1): truncated least squares.
-  kMagsac,  // The same truncated at T, averaged over all noise levels that T admits (MAGSAC++).
-};
 
 struct RansacOptions {
   double threshold = 1.0;       // Largest residual of an inlier, in the model's unit; > 0.
@@ -117,61 +114,6 @@ struct GoodSamples {
 template <typename Model>
 struct GoodSamples<Model, std::void_t<decltype(Model::kGoodSamples)>> {
   static constexpr double kShare = Model::kGoodSamples;
-};
-
-// A permutation of 0..n-1, the same on every machine.
-std::vector<int> RandomOrder(int n, std::uint64_t seed);
-
-// The loss of a datum as a function of u = r^2 / T^2, in [0, 1], 1 for u >= 1; and the weight
-// (derivative, scaled to 1 at most, 0 for u >= 1) with which a refit takes it.
-class RansacLoss {
- public:
-  explicit RansacLoss(ScoreType type);
-  float Value(float u) const {
-    if (!(u < 1.0f)) return 1.0f;
-    return type_ == ScoreType::kMsac ? u : MarginalValue(u);
-  }
-  float Weight(float u) const {
-    if (!(u < 1.0f)) return 0.0f;
-    // Tukey's, not the truncated square's own step: a datum that crosses the threshold must not
-    // make the iteration jump.
-    return type_ == ScoreType::kMsac ? (1.0f - u) * (1.0f - u) : MarginalWeight(u);
-  }
-
- private:
-  static float MarginalValue(float u);
-  static float MarginalWeight(float u);
-
-  ScoreType type_;
-};
-
-// Inlier weights for a final, statistically efficient fit: the posterior probability that a datum
-// belongs to the Gaussian about the model rather than to a uniform background, whose density is
-// measured between one and three thresholds beside the model; 0 beyond the threshold. On clean data
-// that is least squares on the inliers, on contaminated data a redescending M-estimator. `sigma`:
-// in, the current standard deviation of the noise (0: threshold / 3.03), out, its new estimate,
-// with `num_parameters` degrees of freedom spent. Returns the sum of the weights.
-double InlierWeights(const std::vector<double>& residuals, double threshold, int num_parameters,
-                     double* sigma, std::vector<double>* weights);
-
-// Draws samples: uniform, or, given an order of decreasing quality, from a growing set of the best
-// (PROSAC) that ends as the uniform one.
-class Sampler {
- public:
-  // `order` (optional) must outlive the sampler; after `uniform_after` draws it plays no part (T_N
-  // of the paper).
-  void Reset(int num_data, int num_samples, std::uint64_t seed, const std::vector<int>* order,
-             int uniform_after = 200000);
-  void Draw(int* sample);
-  // `count` distinct numbers of 0..n-1.
-  void DrawFrom(int n, int count, int* sample);
-
- private:
-  Random random_{0};
-  int num_data_ = 0, num_samples_ = 0;
-  const std::vector<int>* order_ = nullptr;
-  int draw_ = 0, pool_ = 0, pool_until_ = 0;  // Draw number; size of the pool; last draw from it.
-  double pool_draws_ = 0.0;                   // Expected draws from the pool (T_n of the paper).
 };
 
 template <typename Model>
