@@ -1,6 +1,7 @@
 #include "circline/estimators/camera.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 namespace circline {
@@ -59,10 +60,26 @@ RadialFactor Radial(const Camera& camera, double s) {
                                                : BrownConradyRadial(camera.distortion, s);
 }
 
+// Whether the terms of the radial polynomial are too small for its slope 1 + 3 k1 s + 5 k2 s^2 + ..
+// to vanish anywhere from the axis to s; s is theta^2 for the fisheye model.
+bool IsMildlyDistorted(const Camera& camera, double s) {
+  const std::array<double, 8>& k = camera.distortion;
+  if (camera.model == CameraModel::kFisheye) {
+    const double q = std::min(s, 2.5);  // theta^2 < r^2, and theta < pi/2.
+    return q * (3.0 * std::abs(k[0]) +
+                q * (5.0 * std::abs(k[1]) +
+                     q * (7.0 * std::abs(k[2]) + q * 9.0 * std::abs(k[3])))) <
+           1.0;
+  }
+  const bool is_polynomial = k[5] == 0.0 && k[6] == 0.0 && k[7] == 0.0;
+  return is_polynomial &&
+         s * (3.0 * std::abs(k[0]) + s * (5.0 * std::abs(k[1]) + s * 7.0 * std::abs(k[4]))) < 1.0;
+}
+
 // Whether the distorted radius grows with the true one all the way from the axis to r^2 = s: beyond
 // a turning point a pixel would have several rays.
 bool IsOneToOne(const Camera& camera, double s) {
-  if (camera.model == CameraModel::kPinhole) return true;
+  if (camera.model == CameraModel::kPinhole || IsMildlyDistorted(camera, s)) return true;
   constexpr int kSteps = 8;  // The derivative is a polynomial of degree 3 or 4 in s.
   for (int i = 1; i <= kSteps; ++i) {
     const double si = s * i / kSteps;
@@ -148,7 +165,8 @@ bool PixelToCalibrated(const Camera& camera, const Eigen::Vector2d& pixel, Calib
       }
       x += step;
       d = next;
-      if (step.squaredNorm() <= 1e-30 * (1.0 + x.squaredNorm())) break;
+      // Newton converges quadratically: after a step of 1e-8 the error is rounding.
+      if (step.squaredNorm() <= 1e-16 * (1.0 + x.squaredNorm())) break;
     }
     constexpr double kTolerance = 1e-10;  // Calibrated units: 1e-7 px at a focal length of 1000 px.
     if (!((d.x - target).norm() < kTolerance * (1.0 + target.norm()))) return false;

@@ -357,7 +357,7 @@ class Assembler {
     }
   }
 
-  // Pencils of the plane: those that span it, then the others by support.
+  // Pencils of the plane: those that span it, then the others by support, but for repetitions.
   std::vector<int> InPlaneOrder(const Plane& plane) const {
     std::vector<int> order;
     for (const int i : plane.pencils) {
@@ -365,10 +365,10 @@ class Assembler {
     }
     for (std::size_t i = 0; i < pencils_.size(); ++i) {
       const int k = static_cast<int>(i);
-      if (pencils_[i].observation.plane == "p0" &&
-          std::find(order.begin(), order.end(), k) == order.end()) {
-        order.push_back(k);
-      }
+      const bool is_new = std::none_of(order.begin(), order.end(), [&](int other) {
+        return Near(pencils_[i], pencils_[static_cast<std::size_t>(other)].direction.vector);
+      });
+      if (pencils_[i].observation.plane == "p0" && is_new) order.push_back(k);
     }
     return order;
   }
@@ -409,13 +409,16 @@ class Assembler {
     if (plane.support_px > 0.0) observations->frame.plane = "p0";
   }
 
+  static bool Near(const PlacedPencil& pencil, const Vector3d& direction) {
+    return pencil.direction.vector.cross(direction).norm() < std::sin(kDistinctDeg * kRadians);
+  }
+
   // Old houses have verticals a degree apart: what is nearly parallel to a better supported pencil
   // says nothing new, and no plane is spanned by both.
   static bool IsRepetition(const PlacedPencil& pencil,
                            const std::vector<PencilObservation>& emitted) {
     return std::any_of(emitted.begin(), emitted.end(), [&](const PencilObservation& other) {
-      return pencil.direction.vector.cross(other.fit->direction).norm() <
-             std::sin(kDistinctDeg * kRadians);
+      return Near(pencil, other.fit->direction);
     });
   }
 
