@@ -1,5 +1,5 @@
 // Two pencils of parallel lines: the refined rotation against its Cramer-Rao bound, with the angle
-// between them known exactly, roughly, or not at all (PEERS section 6); and that nothing diverges,
+// between them known exactly, roughly, or not at all; and that nothing diverges,
 // corridors included. CIRCLINE_PENCIL_SCENES sets the number of scenes for the latter.
 #include <gtest/gtest.h>
 
