@@ -102,7 +102,7 @@ check_error('chessboard', 'line_pairs', 'refined', 'rotation_error_deg', 0.3)
 check_error('disc', 'joint', 'refined', 'rotation_error_deg', 0.2)
 check_error('disc', 'circle_center', 'refined', 'normal_error_deg', 0.2)
 check_error('disc', 'single_circle', 'closed_form', 'normal_error_deg', 0.2, 'better')
-check_error('dots', 'joint', 'refined', 'normal_error_deg', 0.8)
+check_error('dots', 'joint', 'refined', 'normal_error_deg', 0.3)
 check_choice('disc', 'circle_center', 'refined', 0.95)
 
 print(f'{passed} passed, {failed} failed')
