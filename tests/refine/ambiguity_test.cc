@@ -14,6 +14,7 @@
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/random.h"
 #include "circline/refine/estimate_pose.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline {
 namespace {
@@ -23,16 +24,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
-
-Camera TestCamera() {
-  Camera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 800.0;
-  camera.cx = 320.0;
-  camera.cy = 240.0;
-  return camera;
-}
 
 // A circle of radius 1 somewhere in the photo, tilted by `tilt` against the line of sight.
 CirclePose RandomCircle(double distance, double tilt, Random* random) {
@@ -109,7 +100,7 @@ Eigen::Matrix2d NormalBound(const Camera& camera, const CirclePose& truth,
 
 // Two rings, the inner one 0.6 of the outer: the joint estimate sits on the bound of both together.
 TEST(RingsTest, NormalSitsOnTheBoundOfBothRings) {
-  const Camera camera = TestCamera();
+  const Camera camera = PinholeCamera();
   const std::vector<double> radii = {1.0, 0.6};
   constexpr double kSigmaPx = 0.5;
   constexpr int kTrials = 1000, kPoints = 100;
@@ -157,7 +148,7 @@ struct Bin {
 // A circle, and its centre measured as well as a point of the contour: near and large it decides,
 // far away it does not. The stated probability of the first pose is how often it is the right one.
 TEST(AmbiguityTest, ProbabilitiesAreCalibrated) {
-  const Camera camera = TestCamera();
+  const Camera camera = PinholeCamera();
   Random random(32);
   std::array<Bin, 6> bins = {
       {{0.5, 0.6}, {0.6, 0.75}, {0.75, 0.9}, {0.9, 0.97}, {0.97, 0.997}, {0.997, 1.01}}};

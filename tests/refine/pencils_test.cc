@@ -14,6 +14,7 @@
 
 #include "circline/estimators/random.h"
 #include "circline/refine/estimate_pose.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline {
 namespace {
@@ -34,16 +35,6 @@ struct Scene {
   std::array<Vector3d, 2> directions;            // Camera frame; the first is X.
   std::array<std::vector<Segment>, 2> segments;  // Exact pixels, along X and along Y.
 };
-
-Camera TestCamera() {
-  Camera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 800.0;
-  camera.cx = 320.0;
-  camera.cy = 240.0;
-  return camera;
-}
 
 bool InPhoto(const Camera& camera, const Vector3d& X, Vector2d* pixel) {
   return CameraToPixel(camera, X, pixel) && pixel->x() >= 0.0 && pixel->y() >= 0.0 &&
@@ -68,7 +59,7 @@ Segment RandomSegment(const Camera& camera, const Matrix3d& R, const Vector3d& c
 // A tilted plane, or where `corridor` one that is seen nearly edge-on, along the X axis.
 Scene RandomScene(int lines, double angle, bool corridor, Random* random) {
   Scene scene;
-  scene.camera = TestCamera();
+  scene.camera = PinholeCamera();
   const double tilt =
       (corridor ? random->Uniform(80.0, 87.0) : random->Uniform(20.0, 65.0)) * kDegree;
   const double spin =
