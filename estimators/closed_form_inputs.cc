@@ -102,6 +102,20 @@ std::vector<Eigen::Vector3d> OnConeAndPlane(const Eigen::Vector3d& d, double ang
   return {along * u + q, along * u - q};
 }
 
+// The fitted line of an axis: the pencil's line that it is a part of, or its own two points.
+Measured AxisLine(const Observations& observations, const Segment& axis, double sigma_px) {
+  int pencil, line;
+  if (FindAxisLine(observations, axis, &pencil, &line)) {
+    const LineObservation& found = observations.pencils[static_cast<std::size_t>(pencil)]
+                                       .lines[static_cast<std::size_t>(line)];
+    if (found.fit) return FromLine(*found.fit);
+  }
+  std::vector<CalibratedPoint> points;
+  LineFit fit;
+  PixelsToCalibrated(observations.camera, {axis[0], axis[1]}, &points);
+  return FitLine(points, sigma_px, &fit).ok() ? FromLine(fit) : Measured();
+}
+
 }  // namespace
 
 void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, Inputs* inputs) {
@@ -167,25 +181,17 @@ Measured MeasuredPoint(const Camera& camera, const Eigen::Vector2d& pixel, doubl
   return Measured(p.Homogeneous(), covariance);
 }
 
-Measured AxisLine(const Observations& observations, const Segment& axis, double sigma_px) {
-  int pencil, line;
-  if (FindAxisLine(observations, axis, &pencil, &line)) {
-    const LineObservation& found = observations.pencils[static_cast<std::size_t>(pencil)]
-                                       .lines[static_cast<std::size_t>(line)];
-    if (found.fit) return FromLine(*found.fit);
-  }
-  std::vector<CalibratedPoint> points;
-  LineFit fit;
-  PixelsToCalibrated(observations.camera, {axis[0], axis[1]}, &points);
-  return FitLine(points, sigma_px, &fit).ok() ? FromLine(fit) : Measured();
+void GatherDrawnAxes(const Observations& observations, double sigma_px, Inputs* inputs) {
+  const FrameObservation& frame = observations.frame;
+  if (frame.x_axis) inputs->x_line = AxisLine(observations, *frame.x_axis, sigma_px);
+  if (frame.y_axis) inputs->y_line = AxisLine(observations, *frame.y_axis, sigma_px);
 }
 
 void GatherAxisLines(const Observations& observations, double sigma_px, Inputs* inputs) {
+  GatherDrawnAxes(observations, sigma_px, inputs);
   const FrameObservation& frame = observations.frame;
-  inputs->x_line = frame.x_axis ? AxisLine(observations, *frame.x_axis, sigma_px)
-                                : BestLine(observations, PencilDirection::kX);
-  inputs->y_line = frame.y_axis ? AxisLine(observations, *frame.y_axis, sigma_px)
-                                : BestLine(observations, PencilDirection::kY);
+  if (!frame.x_axis) inputs->x_line = BestLine(observations, PencilDirection::kX);
+  if (!frame.y_axis) inputs->y_line = BestLine(observations, PencilDirection::kY);
 }
 
 void GatherFrame(const Observations& observations, double sigma_px, Inputs* inputs) {

@@ -51,8 +51,9 @@ struct Inputs {
 // A pixel as a homogeneous calibrated point; absent where the camera cannot undistort it.
 Measured MeasuredPoint(const Camera& camera, const Eigen::Vector2d& pixel, double sigma_px);
 
-// The fitted line of an axis: the pencil's line that it is a part of, or its own two points.
-Measured AxisLine(const Observations& observations, const Segment& axis, double sigma_px);
+// Images of the drawn axes, fitted to the pencils' lines that they are parts of, or else to their
+// own two points.
+void GatherDrawnAxes(const Observations& observations, double sigma_px, Inputs* inputs);
 
 // Images of the drawn axes, or else of the best-measured lines along them: those need not lie in
 // the plane to have the axis' direction.

@@ -1,29 +1,16 @@
-// One closed form as a registered solver: a recipe of what evidence it takes and how it is
-// evaluated, completed by ranking and propagated covariance. Internal: not installed.
+// One closed form as a registered solver: a recipe, completed by ranking and propagated covariance.
+// Internal: not installed.
 #ifndef CIRCLINE_ESTIMATORS_CLOSED_FORM_SOLVER_H_
 #define CIRCLINE_ESTIMATORS_CLOSED_FORM_SOLVER_H_
 
-#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "circline/estimators/closed_form_poses.h"
+#include "circline/estimators/closed_form_recipes.h"
 #include "circline/estimators/closed_form_solvers.h"
 
 namespace circline {
-
-using Evaluate = std::function<std::vector<Candidate>(const Inputs&)>;
-
-struct Recipe {
-  std::string name, needs;
-  // Keeps of the (fitted, resolved) observations what is used; a refusal says what was missing.
-  std::function<Status(const Observations&, Observations*)> select;
-  // Reads the kept evidence.
-  std::function<Status(const Observations&, double sigma_px, Inputs*)> gather;
-  Evaluate evaluate;
-  std::string decided_by;  // What tells several hypotheses apart.
-};
 
 class ClosedFormSolver : public Solver {
  public:

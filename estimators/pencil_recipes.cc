@@ -1,0 +1,159 @@
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "circline/estimators/closed_form_recipes.h"
+
+namespace circline {
+namespace {
+
+using PencilPair = std::array<PencilObservation, 2>;
+
+bool HasRole(const PencilObservation& pencil) { return pencil.direction != PencilDirection::kFree; }
+
+// Whether two pencils have different directions: they run along different axes, are known to make
+// an angle, or are measured more than three standard deviations apart.
+bool Differ(const PencilObservation& a, const PencilObservation& b,
+            const std::vector<KnownAngle>& known_angles) {
+  constexpr double kGate = 3.0, kRounding = 1e-9;
+  if (!(a.fit->direction.cross(b.fit->direction).norm() > kRounding)) return false;
+  if (HasRole(a) && HasRole(b)) return a.direction != b.direction;
+  for (const KnownAngle& known : known_angles) {
+    const bool between = (known.pencils[0] == a.id && known.pencils[1] == b.id) ||
+                         (known.pencils[0] == b.id && known.pencils[1] == a.id);
+    if (between && std::abs(std::sin(known.value)) > kGate * known.sigma) return true;
+  }
+  return DirectionSeparation(*a.fit, *b.fit) > kGate;
+}
+
+// The first two pencils of different directions. Those of two different axes are tried first, then
+// those with one.
+Status FirstPair(std::vector<PencilObservation> pencils,
+                 const std::vector<KnownAngle>& known_angles, PencilPair* pair) {
+  std::stable_sort(pencils.begin(), pencils.end(),
+                   [](const PencilObservation& a, const PencilObservation& b) {
+                     return HasRole(a) > HasRole(b);
+                   });
+  for (std::size_t i = 0; i < pencils.size(); ++i) {
+    for (std::size_t j = i + 1; j < pencils.size(); ++j) {
+      if (!Differ(pencils[i], pencils[j], known_angles)) continue;
+      *pair = {pencils[i], pencils[j]};
+      return Status::Ok();
+    }
+  }
+  if (pencils.size() > 1) {
+    return Status::Refused(
+        "the pencils '" + pencils[0].id + "' and '" + pencils[1].id +
+        "' have the same direction within their uncertainty; they span no plane");
+  }
+  return Status::Refused(pencils.empty() ? "there is no pencil of two or more parallel lines"
+                                         : "there is only one pencil of parallel lines ('" +
+                                               pencils[0].id + "'); a second direction is needed");
+}
+
+// Two fitted pencils that fix the world frame: along its axes, or in its plane. Where only pencils
+// that are tied to nothing can be had, they span a plane of their own, "pencils".
+Status SelectPencils(const Observations& observations, PencilPair* pair, FrameObservation* frame) {
+  std::vector<PencilObservation> of_world, fitted;
+  for (const PencilObservation& pencil : observations.pencils) {
+    if (!pencil.fit) continue;
+    fitted.push_back(pencil);
+    if (HasRole(pencil) || pencil.plane == observations.frame.plane) of_world.push_back(pencil);
+  }
+  *frame = observations.frame;
+  frame->origin_is_center.clear();
+  if (FirstPair(of_world, observations.known_angles, pair).ok()) return Status::Ok();
+  const Status status = FirstPair(fitted, observations.known_angles, pair);
+  if (!status.ok()) return status;
+  *frame = FrameObservation();
+  frame->plane = (*pair)[0].plane = (*pair)[1].plane = "pencils";
+  (*pair)[0].direction = PencilDirection::kX;
+  (*pair)[1].direction = PencilDirection::kFree;
+  return Status::Ok();
+}
+
+Status GatherPencils(const Observations& evidence, bool axes_are_orthogonal, double sigma_px,
+                     Inputs* inputs) {
+  GatherFrame(evidence, sigma_px, inputs);
+  GatherDirections(evidence, axes_are_orthogonal, inputs);
+  GatherDrawnAxes(evidence, sigma_px, inputs);
+  if (inputs->origin.present()) return Status::Ok();
+  // The origin: where the axes cross, or by convention where the first lines of the pencils do.
+  const auto line = [&](const Measured& axis, std::size_t i) -> Eigen::Vector3d {
+    if (axis.present()) return axis.value;
+    for (const LineObservation& l : evidence.pencils[i].lines) {
+      if (l.fit) return l.fit->line;
+    }
+    return Eigen::Vector3d::Zero();
+  };
+  const bool y_first =
+      inputs->roles[0] == PencilDirection::kY || inputs->roles[1] == PencilDirection::kX;
+  const std::size_t x = y_first ? 1 : 0;
+  Eigen::Vector3d crossing = line(inputs->x_line, x).cross(line(inputs->y_line, 1 - x));
+  if (!(std::abs(crossing.z()) > 1e-9 * crossing.norm())) crossing = Eigen::Vector3d::UnitZ();
+  inputs->origin.value = crossing / crossing.z();
+  inputs->origin.columns = Eigen::MatrixXd::Zero(3, 0);
+  return Status::Ok();
+}
+
+Observations KeepPencils(const Observations& observations, const PencilPair& pair,
+                         const FrameObservation& frame) {
+  Observations evidence;
+  evidence.camera = observations.camera;
+  evidence.frame = frame;
+  evidence.pencils = {pair[0], pair[1]};
+  evidence.known_lengths = observations.known_lengths;
+  evidence.known_angles = observations.known_angles;
+  return evidence;
+}
+
+Recipe LinePairsRecipe() {
+  Recipe r;
+  r.name = "line_pairs";
+  r.needs = "two pencils of parallel lines, two or more lines each";
+  r.select = [](const Observations& observations, Observations* evidence) {
+    PencilPair pair;
+    FrameObservation frame;
+    const Status status = SelectPencils(observations, &pair, &frame);
+    if (status.ok()) *evidence = KeepPencils(observations, pair, frame);
+    return status;
+  };
+  // Proposition 5 makes no use of what the axes are.
+  r.gather = [](const Observations& evidence, double sigma_px, Inputs* inputs) {
+    return GatherPencils(evidence, false, sigma_px, inputs);
+  };
+  r.evaluate = LinePairPoses;
+  return r;
+}
+
+Recipe OrthogonalVanishingPointsRecipe() {
+  Recipe r;
+  r.name = "orthogonal_vanishing_points";
+  r.needs = "two pencils of parallel lines along two of the axes";
+  r.select = [](const Observations& observations, Observations* evidence) {
+    std::vector<PencilObservation> along_axes;
+    for (const PencilObservation& pencil : observations.pencils) {
+      if (pencil.fit && HasRole(pencil)) along_axes.push_back(pencil);
+    }
+    PencilPair pair;
+    const Status status = FirstPair(along_axes, observations.known_angles, &pair);
+    if (!status.ok()) return Status::Refused("of the pencils along an axis: " + status.message);
+    FrameObservation frame = observations.frame;
+    frame.origin_is_center.clear();
+    *evidence = KeepPencils(observations, pair, frame);
+    return Status::Ok();
+  };
+  r.gather = [](const Observations& evidence, double sigma_px, Inputs* inputs) {
+    return GatherPencils(evidence, true, sigma_px, inputs);
+  };
+  r.evaluate = OrthogonalDirectionPoses;
+  return r;
+}
+
+}  // namespace
+
+std::vector<Recipe> PencilRecipes() {
+  return {OrthogonalVanishingPointsRecipe(), LinePairsRecipe()};
+}
+
+}  // namespace circline
