@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "circline/estimators/conic.h"
+#include "circline/ransac/conic_sectors.h"
 
 namespace circline {
 namespace {
@@ -14,61 +15,20 @@ namespace {
 // Keeps 0 / 0 out of the centre of a conic; far below any squared gradient per pixel that matters.
 constexpr float kTiny = 1e-30f;
 
-constexpr double kPi = 3.14159265358979323846;
-
-// 99.8 % of a Gaussian's points.
-constexpr double kSigmas = 3.03;
-
-constexpr int kSectors = kConicSectors;
-
 // Whether `width` neighbouring sectors hold four fifths of the counts: the rest may be clutter.
-bool HoldMost(const std::array<int, kSectors>& counts, int width) {
+bool HoldMost(const std::array<int, kConicSectors>& counts, int width) {
   int total = 0, sum = 0;
-  for (int i = 0; i < kSectors; ++i) {
+  for (int i = 0; i < kConicSectors; ++i) {
     total += counts[static_cast<std::size_t>(i)];
     sum += i < width ? counts[static_cast<std::size_t>(i)] : 0;
   }
-  for (int i = 0, next = width; i < kSectors; ++i, ++next) {
+  for (int i = 0, next = width; i < kConicSectors; ++i, ++next) {
     if (5 * sum >= 4 * total) return true;
-    if (next == kSectors) next = 0;
+    if (next == kConicSectors) next = 0;
     sum += counts[static_cast<std::size_t>(next)] - counts[static_cast<std::size_t>(i)];
   }
   return false;
 }
-
-// Angle of (x, y) as a share of the full turn, to 0.0006 of one: a twentieth of std::atan2's time.
-double Turns(double y, double x) {
-  const double ax = std::abs(x), ay = std::abs(y);
-  const double z = std::min(ax, ay) / std::max(std::max(ax, ay), 1e-300);
-  double turns = z * (0.125 + 0.0434 * (1.0 - z));  // atan(z) / 2 pi, z in [0, 1].
-  if (ay > ax) turns = 0.25 - turns;
-  if (x < 0.0) turns = 0.5 - turns;
-  return y < 0.0 ? 1.0 - turns : turns;
-}
-
-// The sector of a point: the affine map that takes the ellipse to a circle (the Cholesky factor of
-// its quadratic part) makes its eccentric anomaly an angle.
-class SectorOf {
- public:
-  explicit SectorOf(const ConicModel::Value& value) {
-    const auto [a, b, c, d, e, f] = value;
-    const double minor = a * c - b * b;
-    center_ = {(b * e - c * d) / minor, (b * d - a * e) / minor};
-    l00_ = std::sqrt(a);
-    l10_ = b / l00_;
-    l11_ = std::sqrt(std::max(0.0, c - l10_ * l10_));
-  }
-  std::size_t operator()(const Eigen::Vector2d& x) const {
-    const Eigen::Vector2d p = x - center_;
-    const double turns = Turns(l11_ * p.y(), l00_ * p.x() + l10_ * p.y());
-    return static_cast<std::size_t>(
-        std::clamp(static_cast<int>(turns * kSectors), 0, kSectors - 1));
-  }
-
- private:
-  Eigen::Vector2d center_;
-  double l00_, l10_, l11_;
-};
 
 // Inliers that stand for all of them, in random order, in two flat arrays.
 struct SomePoints {
@@ -101,18 +61,6 @@ double GainOfLine(const SomePoints& points, double threshold) {
     best = std::max(best, (1.0f - r.square()).max(0.0f).sum());
   }
   return static_cast<double>(best);
-}
-
-// For each sector the sum over it and `reach` neighbours on either side.
-std::array<double, kSectors> SumsOfWindows(const std::array<double, kSectors>& counts, int reach) {
-  std::array<double, kSectors> sums{};
-  for (int k = 0; k < kSectors; ++k) {
-    for (int j = k - reach; j <= k + reach; ++j) {
-      sums[static_cast<std::size_t>(k)] +=
-          counts[static_cast<std::size_t>((j + kSectors) % kSectors)];
-    }
-  }
-  return sums;
 }
 
 // Gauss-Newton on r = v / (2 |g|), v = q . m and g the gradient per pixel (halved), of the
@@ -223,7 +171,7 @@ ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLi
                        const EdgeDirections* directions, double threshold)
     : limits_(limits),
       index_(RandomOrder(static_cast<int>(points.size()), 1)),
-      sigma_px_(threshold / kSigmas) {
+      sigma_px_(threshold / kConicSigmas) {
   const std::size_t n = points.size();
   if (n == 0) return;
   Eigen::Vector2d low = points[0].x, high = points[0].x;
@@ -354,9 +302,9 @@ bool ConicModel::Refine(const float* weights, Value* value) const {
 }
 
 bool ConicModel::Accept(const Value& value, double threshold) const {
-  const SectorOf sector_of(value);
+  const ConicSectors sector_of(value);
   const float t2 = static_cast<float>(threshold * threshold);
-  std::array<int, kSectors> counts{};
+  std::array<int, kConicSectors> counts{};
   std::array<float, kRansacBlock> r2;
   SomePoints some;
   double gain = 0.0;
@@ -374,12 +322,15 @@ bool ConicModel::Accept(const Value& value, double threshold) const {
     }
   }
   // Evenly spread inliers leave a fifth of their arc outside.
-  const int too_few = static_cast<int>(std::ceil(0.8 * limits_.min_arc_deg * kSectors / 360.0)) - 1;
+  const int too_few =
+      static_cast<int>(std::ceil(0.8 * limits_.min_arc_deg * kConicSectors / 360.0)) - 1;
   if (too_few > 0 && HoldMost(counts, too_few)) return false;
   return GainOfLine(some, threshold * pixel_) <= limits_.max_line_share * gain;
 }
 
 namespace {
+
+constexpr double kPi = 3.14159265358979323846;
 
 struct Axes {
   double a, b;
@@ -449,92 +400,7 @@ double ConicModel::DirectionMiss(const Value& value, int i) const {
 }
 
 bool ConicModel::DirectionFits(const Value& value, int i) const {
-  return DirectionMiss(value, i) < kSigmas * kSigmas;
-}
-
-void ConicModel::Weigh(const Value& value, double threshold, ConicWeights* result) const {
-  const std::size_t n = index_.size();
-  const double s = result->sigma > 0.0 ? result->sigma : threshold / kSigmas;
-  const bool oriented = !normals_.empty();
-  // A stray point's direction is anything: how many of them look right, and the density of their
-  // sine where it is small, over that of the curve's own points.
-  const double chance = oriented ? std::min(1.0, 2.0 * kSigmas * sigma_rad_ / kPi) : 1.0;
-  const double sharpness = oriented ? std::sqrt(0.5 * kPi) / sigma_rad_ : 1.0;
-  const SectorDensities densities = MeasureSectors(value, threshold, chance, s, result);
-  result->weights.assign(n, 0.0f);
-  double sum = 0.0, sum_squares = 0.0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const double r = result->residuals[i];
-    if (!(std::abs(r) <= threshold)) continue;
-    const std::size_t k = result->sectors[i];
-    double density = densities.curve[k] * std::exp(-0.5 * r * r / (s * s));
-    if (oriented && !normals_[i].isZero(0.0)) {
-      density *= sharpness * std::exp(-0.5 * result->misses[i]);
-    }
-    const double w = density / (density + densities.background[k]);
-    result->weights[i] = static_cast<float>(w);
-    sum += w;
-    sum_squares += w * r * r;
-  }
-  if (sum > kMinSamples + 1.0) {
-    result->sigma =
-        std::clamp(std::sqrt(sum_squares / (sum - kMinSamples)), 1e-3 * threshold, 0.5 * threshold);
-  }
-}
-
-double ConicWeights::LogLikelihood() const {
-  // w = curve / (curve + background).
-  double sum = 0.0;
-  for (const float w : weights) {
-    if (w > 0.0f) sum -= std::log(std::max(1e-7, 1.0 - static_cast<double>(w)));
-  }
-  return sum;
-}
-
-ConicModel::SectorDensities ConicModel::MeasureSectors(const Value& value, double threshold,
-                                                       double chance, double sigma,
-                                                       ConicWeights* result) const {
-  const std::size_t n = index_.size();
-  const SectorOf sector_of(value);
-  std::array<double, kSectors> inside{}, beside{};
-  double all_beside = 0.5;  // The half keeps a trace of doubt where none was seen.
-  result->residuals.resize(n);
-  result->misses.resize(n);
-  result->sectors.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    result->residuals[i] = Distance(value, static_cast<int>(i));
-    const double size = std::abs(result->residuals[i]);
-    if (!(size <= 3.0 * threshold)) continue;
-    const std::size_t k = sector_of(x_[i]);
-    result->sectors[i] = static_cast<std::uint8_t>(k);
-    if (size > threshold) {
-      beside[k] += 1.0;
-      all_beside += 1.0;
-      continue;
-    }
-    result->misses[i] = DirectionMiss(value, static_cast<int>(i));
-    if (result->misses[i] < kSigmas * kSigmas) inside[k] += 1.0;
-  }
-  // In each sector, of the points inside the threshold: those of the background, and those of the
-  // curve as far as they are sure (lower by three standard deviations of the background).
-  constexpr int kReach = 2;  // Neighbours on each side that vouch for a sector.
-  const std::array<double, kSectors> in = SumsOfWindows(inside, kReach);
-  const std::array<double, kSectors> near = SumsOfWindows(beside, kReach);
-  // What clutter all around leaves in a window; a blob at one place is not all around.
-  std::array<double, kSectors> sorted = near;
-  std::nth_element(sorted.begin(), sorted.begin() + kSectors / 2, sorted.end());
-  const double all_around =
-      std::min(all_beside * (2.0 * kReach + 1.0) / kSectors, 2.0 * sorted[kSectors / 2] + 1.0);
-  SectorDensities densities;
-  for (std::size_t k = 0; k < kSectors; ++k) {
-    // Half local, half global; the sides are twice as wide as the inside.
-    const double expected = 0.5 * (0.5 * near[k] + 0.5 * all_around);
-    const double stray = chance * expected;
-    densities.background[k] = expected / (2.0 * threshold);
-    densities.curve[k] =
-        std::max(0.0, in[k] - stray - 3.0 * std::sqrt(stray)) * 0.3989422804014327 / sigma;
-  }
-  return densities;
+  return DirectionMiss(value, i) < kConicSigmas * kConicSigmas;
 }
 
 bool ConicModel::FromConic(const Eigen::Matrix3d& conic, Value* value) const {

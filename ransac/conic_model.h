@@ -5,7 +5,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstdint>
 #include <vector>
 
 #include "circline/estimators/camera.h"
@@ -40,28 +39,14 @@ struct EdgeDirections {
   Status Validate(std::size_t num_points) const;
 };
 
-// Eccentric anomalies are counted in sectors of 10 degrees.
-constexpr int kConicSectors = 36;
-
-// Inlier weights as InlierWeights (ransac.h) has them, but with the densities of curve and
-// background measured sector by sector: where a contour has a gap, a stray point near the ellipse
-// gets no say; it would bend the free part.
-struct ConicWeights {
-  std::vector<float> weights;     // By the model's order.
-  double sigma = 0.0;             // Of the noise, pixels: in (0 = not known) and out.
-  std::vector<double> residuals;  // Workspace, as are those below.
-  std::vector<double> misses;
-  std::vector<std::uint8_t> sectors;
-
-  // Logarithm of the ratio of likelihoods: curve with background over background alone.
-  double LogLikelihood() const;
-};
+// Residuals within so many standard deviations are inliers: 99.8 % of a Gaussian's points.
+constexpr double kConicSigmas = 3.03;
 
 // The model for the engine. Coordinates are shifted and scaled so that the points fill [-1, 1];
 // residuals are first-order (Sampson) distances in pixels of the photo. Where directions are given,
 // the sine of the angle between a point's normal and the ellipse's is a second residual, squared
 // and added, such that sigma_rad counts as much as one standard deviation of the distance does
-// (threshold / 3.03). Directions choose the points; they do not pull at the ellipse.
+// (threshold / kConicSigmas). Directions choose the points; they do not pull at the ellipse.
 class ConicModel {
  public:
   // a x^2 + 2 b x y + c y^2 + 2 d x + 2 e y + f, unit norm, an ellipse that is negative inside.
@@ -70,7 +55,7 @@ class ConicModel {
 
   // `directions` (optional), one for each point, are read here only; `threshold` as the engine's.
   ConicModel(const std::vector<CalibratedPoint>& points, const ConicLimits& limits,
-             const EdgeDirections* directions = nullptr, double threshold = 3.03);
+             const EdgeDirections* directions = nullptr, double threshold = kConicSigmas);
 
   int NumData() const { return static_cast<int>(index_.size()); }
   // Index into the constructor's points of the datum at position i.
@@ -97,27 +82,25 @@ class ConicModel {
 
   // Signed distance of datum i, pixels, in double precision.
   double Distance(const Value& value, int i) const;
+  // Position of datum i in the model's coordinates.
+  const Eigen::Vector2d& Position(int i) const { return x_[static_cast<std::size_t>(i)]; }
+  // Standard deviation of the directions, radians; 0 where none are given.
+  double sigma_rad() const { return sigma_rad_; }
+  bool HasDirection(int i) const {
+    return !normals_.empty() && !normals_[static_cast<std::size_t>(i)].isZero(0.0);
+  }
   // Distance of two data, pixels, roughly (a pixel of average size).
   double PixelsBetween(int i, int j) const {
     return (x_[static_cast<std::size_t>(i)] - x_[static_cast<std::size_t>(j)]).norm() / pixel_;
   }
   // Squared sine residual of datum i, in standard deviations; 0 where its direction is not known.
   double DirectionMiss(const Value& value, int i) const;
-  // Whether it is within 3.03 of them.
+  // Whether it is within kConicSigmas of them.
   bool DirectionFits(const Value& value, int i) const;
-  // Inlier weights for a final fit.
-  void Weigh(const Value& value, double threshold, ConicWeights* result) const;
 
  private:
   friend class OrientedConicModel;
 
-  // Points per pixel of distance, by sector.
-  struct SectorDensities {
-    std::array<double, kConicSectors> curve, background;
-  };
-
-  SectorDensities MeasureSectors(const Value& value, double threshold, double chance, double sigma,
-                                 ConicWeights* result) const;
   template <bool kOriented>
   void Residuals(const Value& value, int begin, int end, float* r2) const;
   void TakeDirections(const EdgeDirections& directions);
@@ -133,7 +116,7 @@ class ConicModel {
   std::vector<std::array<double, 4>> x_from_pixel_;
   std::vector<Eigen::Vector2d> normals_;  // On the photo; empty without directions.
   double sigma_rad_ = 0.0;
-  double sigma_px_ = 1.0;  // threshold / 3.03.
+  double sigma_px_ = 1.0;  // threshold / kConicSigmas.
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
   double scale_ = 1.0;
   double box_area_ = 0.0;  // Of the points, in the model's coordinates.

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "circline/ransac/conic_weights.h"
 #include "circline/ransac/oriented_conic_model.h"
 
 namespace circline {
@@ -88,7 +89,7 @@ Candidate ConicSearch::Polished(const ConicModel::Value& value) const {
   Candidate result;
   result.value = value;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
-    model_.Weigh(result.value, options_.ransac.threshold, &result.weights);
+    WeighConic(model_, result.value, options_.ransac.threshold, &result.weights);
     const ConicModel::Value before = result.value;
     if (!model_.Refine(result.weights.weights.data(), &result.value)) break;
     double change = 0.0;
@@ -97,7 +98,7 @@ Candidate ConicSearch::Polished(const ConicModel::Value& value) const {
     }
     if (change < kConverged) break;
   }
-  model_.Weigh(result.value, options_.ransac.threshold, &result.weights);
+  WeighConic(model_, result.value, options_.ransac.threshold, &result.weights);
   result.log_likelihood = result.weights.LogLikelihood();
   return result;
 }
