@@ -10,6 +10,7 @@
 #include "circline/ransac/detect_ellipses.h"
 #include "circline/ransac/detect_lines.h"
 #include "circline/ransac/detect_pencils.h"
+#include "circline/ransac/edge_shift.h"
 #include "circline/ransac/edges.h"
 
 namespace circline {
@@ -113,6 +114,7 @@ Status CollectEvidence(const cv::Mat& image, const Camera& camera, const Detecti
   const std::vector<std::uint8_t> skip = EllipsePoints(edges, ellipses);
   status = DetectLines(edges, camera, line_options, &lines, &skip);
   if (!status.ok()) return status;
+  UndoEdgeShift(edges, camera, &lines);
   return DetectPencils(lines, options.max_pencils + kExtraPencils, options.seed,
                        &evidence->pencils);
 }
