@@ -45,7 +45,7 @@ class Contour {
   };
 
   auto At(Column column, Eigen::Index i) { return data_.col(column).segment<kLanes>(i); }
-  double FindFootPoints(Eigen::Index i, const Eigen::Matrix3d& conic, double level);
+  double FindFeet(Eigen::Index i, const Eigen::Matrix3d& conic, double level);
 
   Eigen::Array<double, Eigen::Dynamic, kEnd> data_;
   Eigen::Index size_ = 0;

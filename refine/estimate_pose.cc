@@ -12,6 +12,19 @@
 
 namespace circline {
 
+const char* ConicDistanceName(ConicDistanceType type) {
+  return type == ConicDistanceType::kSampson ? "sampson" : "orthogonal";
+}
+
+bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type) {
+  for (const auto known : {ConicDistanceType::kSampson, ConicDistanceType::kOrthogonal}) {
+    if (name != ConicDistanceName(known)) continue;
+    *type = known;
+    return true;
+  }
+  return false;
+}
+
 Status EstimationOptions::Validate() const {
   for (const auto& [loss, name] :
        {std::pair(conic_loss, "conic_loss"), std::pair(line_loss, "line_loss")}) {

@@ -63,6 +63,7 @@ int JointEvidence::AddSet(const std::vector<Eigen::Vector2d>& pixels,
   PointSet set;
   const LossOptions& loss = is_conic ? options.conic_loss : options.line_loss;
   set.loss = loss.type;
+  set.distance = options.conic_distance;
   set.sigma_px = sigma_px > 0.0 ? sigma_px : loss.scale_px;
   if (!(set.sigma_px > 0.0))
     set.noise = is_conic ? PointSet::Noise::kAutoConic : PointSet::Noise::kAutoLine;

@@ -176,6 +176,28 @@ double ConicDistanceOnly(const CalibratedPoint& p, const Eigen::Matrix3d& C) {
   return 0.5 * (x * px + y * py + pz) / p.GradientPerPixel({px, py}).norm();
 }
 
+// True if orthogonal distances to the image of a plane's circle are asked for, and defined.
+bool IsOrthogonal(const PointSet& set, const Eigen::Matrix3d& conic, double* level) {
+  if (set.distance == ConicDistanceType::kSampson) return false;
+  *level = EllipseLevel(conic);
+  return conic.topLeftCorner<2, 2>().determinant() > 0.0 && *level > 0.0;
+}
+
+double SumContour(const PointSet& set, const Weighing& weighing, const Eigen::Matrix3d& conic,
+                  Vector6d* gradient, Matrix6d* hessian) {
+  double level;
+  if (IsOrthogonal(set, conic, &level)) {
+    const auto distance = [&conic, level](const CalibratedPoint& p, Vector6d* jacobian) {
+      return OrthogonalDistance(p, conic, level, jacobian);
+    };
+    return SumSet<6>(set, weighing, distance, gradient, hessian);
+  }
+  const auto distance = [&conic](const CalibratedPoint& p, Vector6d* jacobian) {
+    return jacobian == nullptr ? ConicDistanceOnly(p, conic) : ConicDistance(p, conic, jacobian);
+  };
+  return SumSet<6>(set, weighing, distance, gradient, hessian);
+}
+
 Eigen::Matrix2d PixelFromX(const CalibratedPoint& p) {
   Eigen::Matrix2d x_from_pixel;
   x_from_pixel << p.x_from_pixel[0], p.x_from_pixel[1], p.x_from_pixel[2], p.x_from_pixel[3];
@@ -209,15 +231,10 @@ double EvaluateCircle(const PointSet& set, const Weighing& weighing, const Eigen
   const Eigen::Matrix3d A = FromSet(set).transpose() * R;
   const Eigen::Matrix3d M = PlaneCircle(facing, cx, cy, radius);
   const Eigen::Matrix3d conic = A * M * A.transpose();
-  const auto distance = [&conic](const CalibratedPoint& p, Vector6d* jacobian) {
-    return jacobian == nullptr ? ConicDistanceOnly(p, conic) : ConicDistance(p, conic, jacobian);
-  };
-  if (model == nullptr) {
-    return SumSet<6>(set, weighing, distance, nullptr, nullptr);
-  }
+  if (model == nullptr) return SumContour(set, weighing, conic, nullptr, nullptr);
   Vector6d gradient = Vector6d::Zero();
   Matrix6d hessian = Matrix6d::Zero();
-  model->cost = SumSet<6>(set, weighing, distance, &gradient, &hessian);
+  model->cost = SumContour(set, weighing, conic, &gradient, &hessian);
   const Matrix6d J = CircleJacobian(A, M, facing, cx, cy, radius);
   hessian.triangularView<Eigen::StrictlyUpper>() = hessian.transpose();
   model->gradient = J.transpose().lazyProduct(gradient);
@@ -325,7 +342,12 @@ void ConicDistances(const PointSet& set, const Eigen::Matrix3d& conic, std::vect
   const Eigen::Matrix3d N = FromSet(set);
   const Eigen::Matrix3d own = N.transpose() * conic * N;
   out->clear();
-  for (const CalibratedPoint& p : set.points) out->push_back(ConicDistanceOnly(p, own));
+  double level;
+  const bool orthogonal = IsOrthogonal(set, own, &level);
+  for (const CalibratedPoint& p : set.points) {
+    out->push_back(orthogonal ? OrthogonalDistance(p, own, level, nullptr)
+                              : ConicDistanceOnly(p, own));
+  }
 }
 
 void LineDistances(const PointSet& set, const Eigen::Vector3d& line, std::vector<double>* out) {

@@ -15,6 +15,7 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/robust_loss.h"
+#include "circline/refine/estimate_pose.h"
 
 namespace circline {
 
@@ -48,6 +49,7 @@ struct PointSet {
   double sigma_px = 1.0;
   Noise noise = Noise::kStated;
   LossType loss = LossType::kTrivial;
+  ConicDistanceType distance = ConicDistanceType::kSampson;
   // What the set as a whole counts: below 1 where its points share an error.
   double weight = 1.0;
   // x = scale * (coordinates in `points`) + shift: contours are kept about their middle, where
@@ -63,7 +65,8 @@ struct PointSet {
 Eigen::Matrix3d ImageOfPlaneCircle(const Eigen::Matrix3d& R, double facing, double cx, double cy,
                                    double radius);
 
-// Models of a contour in (delta, cx, cy, radius), and of a line in (delta, up to three more) whose
+// Models of a contour in (delta, cx, cy, radius), at Sampson's distance where its image is no
+// ellipse, and of a line in (delta, up to three more) whose
 // interpretation plane has the normal m(others) in the world frame, `dm` its derivatives. Returns
 // the cost; `model` may be null. Not finite where a residual is not.
 double EvaluateCircle(const PointSet& set, const Weighing& weighing, const Eigen::Matrix3d& R,

@@ -134,9 +134,11 @@ void RunInTurn(benchmark::State& state, const std::vector<Scene>& scenes, const 
 }
 
 // From observations with fits and a seed `error` radians and 1 % off to pose and covariance.
-void RefineOneSeed(benchmark::State& state, void (*add)(Scene*), LossType loss, double error) {
+void RefineOneSeed(benchmark::State& state, void (*add)(Scene*), LossType loss, double error,
+                   ConicDistanceType distance = ConicDistanceType::kSampson) {
   std::vector<Scene> scenes = Scenes(add);
   EstimationOptions options;
+  options.conic_distance = distance;
   options.conic_loss.type = options.line_loss.type = loss;
   for (Scene& scene : scenes) {
     FitDirect(kNoisePx, &scene.observations);
@@ -167,6 +169,10 @@ BENCHMARK_CAPTURE(BM_RefineCircleAndLines, warm_cauchy, LossType::kCauchy, kWarm
 void BM_RefineUndistortedCircleAndLines(benchmark::State& state, LossType loss, double error) {
   RefineOneSeed(state, AddPaperLikeUndistorted, loss, error);
 }
+void BM_RefineOrthogonalDistances(benchmark::State& state, LossType loss, double error) {
+  RefineOneSeed(state, AddPaperLikeUndistorted, loss, error, ConicDistanceType::kOrthogonal);
+}
+BENCHMARK_CAPTURE(BM_RefineOrthogonalDistances, cold_cauchy, LossType::kCauchy, kCold);
 BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, cold_cauchy, LossType::kCauchy, kCold);
 BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, warm_cauchy, LossType::kCauchy, kWarm);
 

@@ -25,6 +25,9 @@ DEFINE_string(conic_loss, "", "Loss of contour points, where it differs from --r
 DEFINE_string(conic_loss_scale_px, "", "Scale of contour points, where it differs.");
 DEFINE_string(line_loss, "", "Loss of points of lines, where it differs from --robust_loss.");
 DEFINE_string(line_loss_scale_px, "", "Scale of points of lines, where it differs.");
+DEFINE_string(conic_distance,
+              circline::ConicDistanceName(circline::EstimationOptions().conic_distance),
+              "Distance of contour points in the refinement: sampson (first order) or orthogonal.");
 DEFINE_double(inlier_threshold_px, circline::FitOptions().inlier_threshold_px,
               "A point farther than this from its curve is an outlier, pixels; positive.");
 DEFINE_double(ransac_confidence, circline::FitOptions().confidence,
@@ -105,6 +108,12 @@ Status ReadLosses(std::vector<LossSetting>* losses) {
   LossOverride conic, line;
   Status status = conic.Read("conic_loss", FLAGS_conic_loss, FLAGS_conic_loss_scale_px);
   if (status.ok()) status = line.Read("line_loss", FLAGS_line_loss, FLAGS_line_loss_scale_px);
+  EstimationOptions common_options;
+  if (status.ok() && !ConicDistanceFromName(FLAGS_conic_distance, &common_options.conic_distance)) {
+    status = Status::Invalid("--conic_distance: '" + FLAGS_conic_distance +
+                             "' is not one of sampson, orthogonal" +
+                             DidYouMean(FLAGS_conic_distance, {"sampson", "orthogonal"}));
+  }
   if (!status.ok()) return status;
   losses->clear();
   for (const std::string& loss : SplitList(FLAGS_robust_loss)) {
@@ -112,7 +121,7 @@ Status ReadLosses(std::vector<LossSetting>* losses) {
     status = ParseLoss("robust_loss", loss, &common.type);
     for (const std::string& scale : SplitList(FLAGS_loss_scale_px)) {
       if (status.ok()) status = ParseScale("loss_scale_px", scale, &common.scale_px);
-      LossSetting setting{loss, common.scale_px, {}};
+      LossSetting setting{loss, common.scale_px, common_options};
       setting.estimation.conic_loss = conic.Apply(common);
       setting.estimation.line_loss = line.Apply(common);
       if (status.ok()) status = setting.estimation.Validate();
@@ -216,6 +225,7 @@ std::string ResultFlags() {
                            "conic_loss_scale_px",
                            "line_loss",
                            "line_loss_scale_px",
+                           "conic_distance",
                            "inlier_threshold_px",
                            "ransac_confidence",
                            "ransac_max_iterations",
@@ -242,7 +252,7 @@ std::string ResultFlags() {
 std::string OtherFlags() {
   std::string lines;
   for (const char* name :
-       {"conic_loss", "conic_loss_scale_px", "line_loss", "line_loss_scale_px",
+       {"conic_loss", "conic_loss_scale_px", "line_loss", "line_loss_scale_px", "conic_distance",
         "inlier_threshold_px", "ransac_confidence", "ransac_max_iterations", "min_ellipse_axis_px",
         "min_arc_deg", "min_segment_length_px", "max_circles", "max_pencils", "seed"}) {
     gflags::CommandLineFlagInfo info;

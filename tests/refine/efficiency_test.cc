@@ -17,8 +17,7 @@ struct Efficiency {
 };
 
 Efficiency Measure(const std::string& name, SolverStage stage, LossType loss, double sigma_px,
-                   int trials) {
-  EstimationOptions options;
+                   int trials, EstimationOptions options = {}) {
   options.conic_loss.type = options.line_loss.type = loss;
   SolverRegistry registry;
   AddClosedFormSolvers(&registry);
@@ -54,6 +53,16 @@ TEST(EfficiencyTest, JointIsWithinTenPercentOfTheBound) {
 TEST(EfficiencyTest, JointWithRobustLossIsWithinTenPercentOfTheBound) {
   const Efficiency e = Measure("joint", SolverStage::kRefined, LossType::kCauchy, 1.0, kTrials);
   EXPECT_LT(e.rms_rad, 1.10 * kBoundJoint);
+  EXPECT_NEAR(e.nees, 3.0, 0.5);
+}
+
+TEST(EfficiencyTest, JointWithOrthogonalDistancesIsWithinTenPercentOfTheBound) {
+  EstimationOptions options;
+  options.conic_distance = ConicDistanceType::kOrthogonal;
+  const Efficiency e =
+      Measure("joint", SolverStage::kRefined, LossType::kTrivial, 1.0, kTrials, options);
+  EXPECT_LT(e.rms_rad, 1.10 * kBoundJoint);
+  EXPECT_GT(e.rms_rad, 0.90 * kBoundJoint);
   EXPECT_NEAR(e.nees, 3.0, 0.5);
 }
 

@@ -96,9 +96,10 @@ class QuadraticModelsTest : public ::testing::TestWithParam<LossType> {
 };
 
 TEST_P(QuadraticModelsTest, CircleGradient) {
-  PointSet normalized = set_;
+  PointSet normalized = set_, orthogonal = set_;
   normalized.Normalize();
-  for (const PointSet& set : {set_, normalized}) {
+  orthogonal.distance = ConicDistanceType::kOrthogonal;
+  for (const PointSet& set : {set_, normalized, orthogonal}) {
     for (const double facing : {-1.0, 1.0}) {
       const Model model = [&](const std::vector<double>& x, QuadraticModel* out) {
         return EvaluateCircle(set, weighing_, Turned(base_, x), facing, x[3], x[4], x[5], out);
@@ -109,14 +110,17 @@ TEST_P(QuadraticModelsTest, CircleGradient) {
 }
 
 TEST_P(QuadraticModelsTest, NormalizedPointsHaveTheSameModel) {
-  PointSet normalized = set_;
-  normalized.Normalize();
-  QuadraticModel a, b;
-  EvaluateCircle(set_, weighing_, base_, -1.0, 0.1, -0.2, 0.4, &a);
-  EvaluateCircle(normalized, weighing_, base_, -1.0, 0.1, -0.2, 0.4, &b);
-  EXPECT_NEAR(a.cost, b.cost, 1e-10 * a.cost);
-  EXPECT_LT((a.gradient - b.gradient).norm(), 1e-9 * a.gradient.norm());
-  EXPECT_LT((a.hessian - b.hessian).norm(), 1e-9 * a.hessian.norm());
+  for (const auto distance : {ConicDistanceType::kSampson, ConicDistanceType::kOrthogonal}) {
+    set_.distance = distance;
+    PointSet normalized = set_;
+    normalized.Normalize();
+    QuadraticModel a, b;
+    EvaluateCircle(set_, weighing_, base_, -1.0, 0.1, -0.2, 0.4, &a);
+    EvaluateCircle(normalized, weighing_, base_, -1.0, 0.1, -0.2, 0.4, &b);
+    EXPECT_NEAR(a.cost, b.cost, 1e-10 * a.cost);
+    EXPECT_LT((a.gradient - b.gradient).norm(), 1e-9 * a.gradient.norm());
+    EXPECT_LT((a.hessian - b.hessian).norm(), 1e-9 * a.hessian.norm());
+  }
 }
 
 TEST_P(QuadraticModelsTest, LineGradient) {
@@ -166,7 +170,10 @@ TEST_P(QuadraticModelsTest, HessianIsExactWhereTheEvidenceFits) {
   const Model circle_model = [&](const std::vector<double>& x, QuadraticModel* out) {
     return EvaluateCircle(circle, {}, Turned(near_identity, x), 1.0, x[3], x[4], x[5], out);
   };
-  EXPECT_LT(HessianError(circle_model, {0, 0, 0, 0.1, -0.1, 0.2}), 1e-4);
+  for (const auto distance : {ConicDistanceType::kSampson, ConicDistanceType::kOrthogonal}) {
+    circle.distance = distance;
+    EXPECT_LT(HessianError(circle_model, {0, 0, 0, 0.1, -0.1, 0.2}), 1e-4);
+  }
   const Model line_model = [&](const std::vector<double>& x, QuadraticModel* out) {
     Eigen::Matrix3d dm = Eigen::Matrix3d::Zero();
     dm(2, 0) = -1.0;
@@ -180,6 +187,92 @@ INSTANTIATE_TEST_SUITE_P(Losses, QuadraticModelsTest,
                                            LossType::kSoftLOne, LossType::kCauchy,
                                            LossType::kArctan, LossType::kTukey,
                                            LossType::kGemanMcClure));
+
+// Points at the same distance all around a circle of 20 px seen from the front, where the distance
+// is known, and around a tilted one, through a distorting lens.
+class ConicDistanceTest : public ::testing::Test {
+ protected:
+  // Around the image of the circle of radius 0.2 about (cx, cy) of the plane Z = 1: inside and
+  // outside of it by `offset` pixels.
+  PointSet Around(const Camera& camera, const Eigen::Matrix3d& R, double offset) const {
+    PointSet set;
+    for (int i = 0; i < 24; ++i) {
+      Eigen::Vector2d at, ahead;
+      CameraToPixel(camera, Place(R, 0.26 * i), &at);
+      CameraToPixel(camera, Place(R, 0.26 * i + 1e-6), &ahead);
+      const Eigen::Vector2d along = (ahead - at).normalized();
+      const Eigen::Vector2d across(along.y(), -along.x());
+      CalibratedPoint p;
+      EXPECT_TRUE(PixelToCalibrated(camera, at + (i % 2 == 0 ? offset : -offset) * across, &p));
+      set.points.push_back(p);
+    }
+    return set;
+  }
+
+  std::vector<double> Distances(PointSet set, const Eigen::Matrix3d& R,
+                                ConicDistanceType type) const {
+    set.distance = type;
+    set.Normalize();
+    std::vector<double> distances;
+    ConicDistances(set, ImageOfPlaneCircle(R, 1.0, kCx, kCy, kRadius), &distances);
+    return distances;
+  }
+
+  static Eigen::Vector3d Place(const Eigen::Matrix3d& R, double angle) {
+    return R *
+           Eigen::Vector3d(kCx + kRadius * std::cos(angle), kCy + kRadius * std::sin(angle), 1.0);
+  }
+
+  static constexpr double kCx = 0.1, kCy = -0.1, kRadius = 0.2;
+};
+
+TEST_F(ConicDistanceTest, OrthogonalDistancesAreThoseThatAre) {
+  Camera camera = DistortedCamera();
+  camera.model = CameraModel::kPinhole;
+  camera.distortion = {};
+  const Eigen::Matrix3d tilted = ExpRotation({0.4, 0.3, 0.1});
+  for (const double offset : {0.01, 1.0, 15.0, -5.0}) {
+    const std::vector<double> found =
+        Distances(Around(camera, tilted, offset), tilted, ConicDistanceType::kOrthogonal);
+    for (std::size_t i = 0; i < found.size(); ++i)
+      EXPECT_NEAR(std::abs(found[i]), std::abs(offset), 1e-6) << i;
+  }
+}
+
+TEST_F(ConicDistanceTest, SampsonAndOrthogonalAgreeToSecondOrder) {
+  const Eigen::Matrix3d tilted = ExpRotation({0.4, 0.3, 0.1});
+  std::vector<double> logs, offsets;
+  for (const double offset : {0.03, 0.1, 0.3, 1.0, 3.0}) {
+    const PointSet set = Around(DistortedCamera(), tilted, offset);
+    const std::vector<double> a = Distances(set, tilted, ConicDistanceType::kSampson),
+                              b = Distances(set, tilted, ConicDistanceType::kOrthogonal);
+    double largest = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_GT(a[i] * b[i], 0.0);
+      largest = std::max(largest, std::abs(a[i] - b[i]));
+    }
+    // 100 px are the image's radius: half the square of the distance over it, and they are apart.
+    EXPECT_LT(largest, 0.02 * offset * offset);
+    EXPECT_GT(largest, 0.002 * offset * offset);
+    offsets.push_back(std::log(offset));
+    logs.push_back(std::log(largest));
+  }
+  for (std::size_t i = 1; i < logs.size(); ++i) {
+    const double slope = (logs[i] - logs[i - 1]) / (offsets[i] - offsets[i - 1]);
+    EXPECT_NEAR(slope, 2.0, 0.1) << "from " << std::exp(offsets[i - 1]) << " px";
+  }
+}
+
+// A circle that reaches behind the camera has no ellipse for an image: Sampson's distance stands
+// in.
+TEST_F(ConicDistanceTest, BeyondEllipsesItIsSampson) {
+  const Eigen::Matrix3d R = ExpRotation({1.3, 0.0, 0.0});
+  Random random(4);
+  PointSet set = RandomPoints(LossType::kTrivial, &random);
+  const double sampson = EvaluateCircle(set, {}, R, 1.0, 0.0, 0.0, 2.0, nullptr);
+  set.distance = ConicDistanceType::kOrthogonal;
+  EXPECT_EQ(EvaluateCircle(set, {}, R, 1.0, 0.0, 0.0, 2.0, nullptr), sampson);
+}
 
 TEST(InliersOnlyTest, PointsBeyondTheGateDoNotCount) {
   Random random(3);
