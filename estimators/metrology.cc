@@ -41,50 +41,54 @@ bool VectorsOnPlane(const CameraPose& pose, const SegmentPair& segments, Vector2
 double Wrapped(double angle) { return std::remainder(angle, 2.0 * kPi); }
 double Plain(double difference) { return difference; }
 
-// The measurement and its variance, by central differences along every pixel coordinate and every
-// parameter of the pose. `subtract` tells how values are compared.
-bool Propagate(bool (*measure)(const CameraPose&, const SegmentPair&, double*),
-               double (*subtract)(double), const CameraPose& pose,
-               const std::array<double, 36>& pose_covariance, const MeasuredSegmentPair& points,
+// `pose` moved along one of the six parameters of its covariance.
+CameraPose Moved(const CameraPose& pose, int parameter, double by) {
+  CameraPose moved = pose;
+  Vector3d step = Vector3d::Zero();
+  step[parameter % 3] = by;
+  if (parameter < 3) {
+    moved.rotation = ExpRotation(step) * pose.rotation;
+  } else {
+    moved.translation += step;
+  }
+  return moved;
+}
+
+// The measurement `measure(pose, image points, &value)` and its variance, by central differences
+// along every pixel coordinate and every parameter of the pose. `subtract` tells how values are
+// compared; `x` are the image points of `points`.
+template <typename Measured, typename Image, typename Measure>
+bool Propagate(const Measure& measure, double (*subtract)(double), const CameraPose& pose,
+               const std::array<double, 36>& pose_covariance, const Measured& points, Image x,
                double sigma_px, Measurement* result) {
-  SegmentPair x;
-  for (std::size_t i = 0; i < 4; ++i) x[i] = points[i].Homogeneous();
+  for (std::size_t i = 0; i < points.size(); ++i) x[i] = points[i].Homogeneous();
   Measurement m;
   if (!measure(pose, x, &m.value)) return false;
 
   constexpr double kStepPx = 1e-3;
-  double variance = 0.0;
-  for (std::size_t i = 0; i < 4; ++i) {
+  double variance = 0.0, high, low;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vector3d at = x[i];
     for (std::size_t k = 0; k < 2; ++k) {
       const Vector3d step(kStepPx * points[i].x_from_pixel[k],
                           kStepPx * points[i].x_from_pixel[2 + k], 0.0);
-      SegmentPair up = x, down = x;
-      up[i] += step;
-      down[i] -= step;
-      double high, low;
-      if (!measure(pose, up, &high) || !measure(pose, down, &low)) return false;
+      x[i] = at + step;
+      if (!measure(pose, x, &high)) return false;
+      x[i] = at - step;
+      if (!measure(pose, x, &low)) return false;
       const double gradient = subtract(high - low) / (2.0 * kStepPx);
       variance += gradient * gradient * sigma_px * sigma_px;
     }
+    x[i] = at;
   }
   constexpr double kStep = 1e-6;  // Radians, and in units of the translation's length.
   const double length = pose.translation.norm();
   Vector6d gradient;
   for (int k = 0; k < 6; ++k) {
     const double h = k < 3 ? kStep : kStep * length;
-    double values[2];
-    for (int side = 0; side < 2; ++side) {
-      CameraPose moved = pose;
-      Vector3d step = Vector3d::Zero();
-      step[k % 3] = side == 0 ? h : -h;
-      if (k < 3) {
-        moved.rotation = ExpRotation(step) * pose.rotation;
-      } else {
-        moved.translation += step;
-      }
-      if (!measure(moved, x, &values[side])) return false;
-    }
-    gradient[k] = subtract(values[0] - values[1]) / (2.0 * h);
+    if (!measure(Moved(pose, k, h), x, &high) || !measure(Moved(pose, k, -h), x, &low))
+      return false;
+    gradient[k] = subtract(high - low) / (2.0 * h);
   }
   variance += gradient.dot(Eigen::Map<const Matrix6d>(pose_covariance.data()) * gradient);
   m.sigma = std::sqrt(std::fmax(0.0, variance));
@@ -250,14 +254,49 @@ bool HeightOverPlane(const CameraPose& pose, const Vector3d& foot, const Vector3
   return true;
 }
 
+bool LengthOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
+                   const MeasuredPair& segment, double sigma_px, Measurement* length) {
+  const auto measure = [](const CameraPose& at, const std::array<Vector3d, 2>& x, double* value) {
+    return LengthOnPlane(at, x[0], x[1], value);
+  };
+  return Propagate(measure, &Plain, pose, pose_covariance, segment, std::array<Vector3d, 2>(),
+                   sigma_px, length);
+}
+
 bool LengthRatio(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
                  const MeasuredSegmentPair& segments, double sigma_px, Measurement* ratio) {
-  return Propagate(&LengthRatio, &Plain, pose, pose_covariance, segments, sigma_px, ratio);
+  const auto measure = [](const CameraPose& at, const SegmentPair& x, double* value) {
+    return LengthRatio(at, x, value);
+  };
+  return Propagate(measure, &Plain, pose, pose_covariance, segments, SegmentPair(), sigma_px,
+                   ratio);
 }
 
 bool AngleOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
                   const MeasuredSegmentPair& segments, double sigma_px, Measurement* angle) {
-  return Propagate(&AngleOnPlane, &Wrapped, pose, pose_covariance, segments, sigma_px, angle);
+  const auto measure = [](const CameraPose& at, const SegmentPair& x, double* value) {
+    return AngleOnPlane(at, x, value);
+  };
+  return Propagate(measure, &Wrapped, pose, pose_covariance, segments, SegmentPair(), sigma_px,
+                   angle);
+}
+
+bool AreaOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
+                 const std::vector<CalibratedPoint>& corners, double sigma_px, Measurement* area) {
+  const auto measure = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
+    return AreaOnPlane(at, x, value);
+  };
+  return Propagate(measure, &Plain, pose, pose_covariance, corners,
+                   std::vector<Vector3d>(corners.size()), sigma_px, area);
+}
+
+bool HeightOverPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
+                     const MeasuredPair& foot_and_top, double sigma_px, Measurement* height) {
+  const auto measure = [](const CameraPose& at, const std::array<Vector3d, 2>& x, double* value) {
+    return HeightOverPlane(at, x[0], x[1], value);
+  };
+  return Propagate(measure, &Plain, pose, pose_covariance, foot_and_top, std::array<Vector3d, 2>(),
+                   sigma_px, height);
 }
 
 }  // namespace circline

@@ -7,7 +7,7 @@
 // translation: metres if that is metric, else multiples of the distance from the camera to the
 // world origin; ratios and angles do not care. Whatever returns bool returns false, with its result
 // untouched, for what cannot be computed: a point on or beyond the horizon, a camera in the plane,
-// a number that is not finite. Nothing allocates.
+// a number that is not finite. Nothing allocates where it does not say so.
 #ifndef CIRCLINE_ESTIMATORS_METROLOGY_H_
 #define CIRCLINE_ESTIMATORS_METROLOGY_H_
 
@@ -75,16 +75,26 @@ bool HeightOverPlane(const CameraPose& pose, const Eigen::Vector3d& foot,
 struct Measurement {
   double value = 0.0, sigma = 0.0;
 };
-// LengthRatio and AngleOnPlane of four points measured with the standard deviation `sigma_px`
-// (pixels of the photo, each coordinate), on a pose with the covariance of PoseHypothesis (of
-// [delta, delta_t], 6x6 row-major), independent of the points: first-order propagation. Free
-// directions of the pose, which that covariance leaves out, must not matter to the result; a free
-// rotation about the normal does not.
+// The same of points measured with the standard deviation `sigma_px` (pixels of the photo, each
+// coordinate), on a pose with the covariance of PoseHypothesis (of [delta, delta_t], 6x6
+// row-major), independent of the points: first-order propagation. Free directions of the pose,
+// which that covariance leaves out, must not matter to the result; a free rotation about the normal
+// does not. Nor does it hold the length of a translation that is not metric: lengths, areas and
+// heights are then exact multiples of that unit. Where the focal length was refined as well, what
+// its correlation with the pose takes or adds is left out.
+using MeasuredPair = std::array<CalibratedPoint, 2>;
 using MeasuredSegmentPair = std::array<CalibratedPoint, 4>;
+bool LengthOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
+                   const MeasuredPair& segment, double sigma_px, Measurement* length);
 bool LengthRatio(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
                  const MeasuredSegmentPair& segments, double sigma_px, Measurement* ratio);
 bool AngleOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
                   const MeasuredSegmentPair& segments, double sigma_px, Measurement* angle);
+// Allocates.
+bool AreaOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
+                 const std::vector<CalibratedPoint>& corners, double sigma_px, Measurement* area);
+bool HeightOverPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
+                     const MeasuredPair& foot_and_top, double sigma_px, Measurement* height);
 
 }  // namespace circline
 
