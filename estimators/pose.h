@@ -50,6 +50,10 @@ struct PoseHypothesis {
   int rank = 0;  // Of that covariance.
   // Orthonormal directions of [delta, delta_t] in which the evidence says nothing.
   std::vector<std::array<double, 6>> free_directions;
+  // Where the focal length was refined too: what fx and fy are to be multiplied by, the standard
+  // deviation of that, and its covariance with [delta, delta_t]. Else 1 and 0.
+  double focal_scale = 1.0, focal_sigma = 0.0;
+  std::array<double, 6> focal_covariance{};
   double rms_px = 0.0;  // Of the inlier residuals of all evidence, pixels of the photo.
   int num_inliers = 0, num_observations = 0;  // Scalar residuals.
   bool origin_observed =

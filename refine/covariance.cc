@@ -6,10 +6,10 @@
 namespace circline {
 
 bool ComputeCovariance(const JointEvidence& evidence, const JointState& state,
-                       SharedCovariance* out) {
+                       SharedCovariance* out, double gate_stretch) {
   const SharedColumns columns(evidence);
   ReducedModel model;
-  if (!Linearize(evidence, state, columns, Weighing{1.0, true}, &model)) return false;
+  if (!Linearize(evidence, state, columns, Weighing{gate_stretch, true}, &model)) return false;
   Eigen::MatrixXd& information = model.hessian;
   constexpr int kSpin = 2;
   if (!evidence.x_is_fixed) {

@@ -21,11 +21,11 @@ struct SharedCovariance {
   std::vector<double> circle_log_det, line_log_det;
 };
 
-// From the inliers at `state`, without loss. False if some residual cannot be evaluated or an own
-// unknown carries no information. The spin about the normal is held where nothing fixes it: its row
-// and column (2) are then zero.
+// From the inliers at `state` (within their gate times `gate_stretch`), without loss. False if some
+// residual cannot be evaluated or an own unknown carries no information. The spin about the normal
+// is held where nothing fixes it: its row and column (2) are then zero.
 bool ComputeCovariance(const JointEvidence& evidence, const JointState& state,
-                       SharedCovariance* out);
+                       SharedCovariance* out, double gate_stretch = 1.0);
 
 }  // namespace circline
 

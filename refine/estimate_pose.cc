@@ -36,6 +36,8 @@ Status EstimationOptions::Validate() const {
     return Status::Invalid("contour_bias_px must be 0 or more");
   if (!(line_bias_px >= 0.0) || !std::isfinite(line_bias_px))
     return Status::Invalid("line_bias_px must be 0 or more");
+  if (!(focal_sigma >= 0.0) || !(focal_sigma <= 0.5))
+    return Status::Invalid("focal_sigma must be between 0 and 0.5");
   if (max_iterations < 1) return Status::Invalid("max_iterations must be 1 or more");
   if (!(max_cost_gap > 0.0)) return Status::Invalid("max_cost_gap must be positive");
   if (prior) {

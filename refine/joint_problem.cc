@@ -5,45 +5,20 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <limits>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "circline/refine/covariance.h"
+#include "circline/refine/graduated.h"
 #include "circline/refine/joint_start.h"
 
 namespace circline {
 namespace {
 
 constexpr double kRadToDeg = 57.29577951308232;
-
-Eigen::Matrix3d ImageOf(const CircleTerm& t, const JointState& state) {
-  const double* c = state.At(t.center);
-  const double radius = t.radius < 0 ? c[2] : t.factor * state.At(t.radius)[0];
-  return ImageOfPlaneCircle(state.rotation, state.facing, c[0], c[1], radius);
-}
-
-// Calls visit(set, is_circle, term, distances) for each circle that takes part, then for each line;
-// distances of the set's points, signed, pixels.
-template <typename Visit>
-void ForEachCurve(const JointEvidence& e, const JointState& state, const Visit& visit) {
-  std::vector<double> distances;
-  const auto set = [&e](int index) -> const PointSet& {
-    return e.sets[static_cast<std::size_t>(index)];
-  };
-  for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    if (state.circle_left_out[i] != 0) continue;
-    ConicDistances(set(e.circles[i].set), ImageOf(e.circles[i], state), &distances);
-    visit(set(e.circles[i].set), true, i, distances);
-  }
-  for (std::size_t i = 0; i < e.lines.size(); ++i) {
-    if (state.line_left_out[i] != 0) continue;
-    Eigen::Matrix3d unused;
-    const Eigen::Vector3d line = state.rotation * LineNormal(e.lines[i], state, &unused);
-    LineDistances(set(e.lines[i].set), line, &distances);
-    visit(set(e.lines[i].set), false, i, distances);
-  }
-}
 
 // What the circles left out cost: as much as points far off, so that no pose gains by explaining
 // less.
@@ -57,43 +32,6 @@ double LeftOutCost(const JointEvidence& e, const JointState& state) {
             EvaluateLoss(set.loss, kFarOffSigmas * kFarOffSigmas).rho;
   }
   return cost;
-}
-
-// How wide the losses must be for (nearly) all residuals to lie where they are convex: twice the
-// largest |residual| / tuning constant but for the worst hundredth, of the points that a robust fit
-// has not found to be outliers. Tukey's and Geman-McClure's are convex up to 0.45 and 0.58 of
-// theirs. 1 or less: nothing lies in the tails.
-double RelativeSpread(const JointEvidence& e, const JointState& state) {
-  std::vector<double> ratios;
-  ForEachCurve(e, state,
-               [&](const PointSet& set, bool, std::size_t, const std::vector<double>& distances) {
-                 if (set.is_contaminated) return;  // Started robustly.
-                 const double unit = 1.0 / (set.sigma_px * LossTuningConstant(set.loss));
-                 for (std::size_t i = 0; i < set.num_trusted; ++i)
-                   ratios.push_back(std::abs(distances[i]) * unit);
-               });
-  if (ratios.empty()) return 0.0;
-  const auto quantile = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() * 99 / 100);
-  std::nth_element(ratios.begin(), quantile, ratios.end());
-  constexpr double kConvex = 2.0;
-  return kConvex * *quantile;
-}
-
-// Graduated non-convexity: where residuals lie far in the tails, the losses start as wide as these
-// ask for, and narrow to their own width as they shrink (Black and Rangarajan 1996).
-Status GraduatedMinimize(const JointEvidence& e, int max_iterations, double tolerance,
-                         JointState* state) {
-  constexpr double kFarOut = 3.0;  // Gaussian noise alone has a spread of 2.2.
-  constexpr double kShrink = 0.5;
-  constexpr int kIterationsOnTheWay = 2;
-  double stretch = RelativeSpread(e, *state);
-  while (stretch > kFarOut) {
-    const Status status =
-        Minimize(e, stretch, std::min(kIterationsOnTheWay, max_iterations), tolerance, state);
-    if (!status.ok()) return status;
-    stretch = std::min(kShrink * stretch, RelativeSpread(e, *state));
-  }
-  return Minimize(e, 1.0, max_iterations, tolerance, state);
 }
 
 // --- Results ---
@@ -313,11 +251,44 @@ void FillNotes(const JointEvidence& e, const JointState& state, std::vector<std:
   }
 }
 
+// The focal length's own variance, and what it adds to that of the pose: the pose follows it.
+void FillFocal(const FocalModel& focal, double log_focal, double inflation, double prior_sigma,
+               const Eigen::MatrixXd& T, PoseHypothesis* h, Matrix6d* covariance) {
+  const double variance = 1.0 / (focal.information / inflation + 1.0 / (prior_sigma * prior_sigma));
+  const Vector6d by_focal = T * focal.by_focal;
+  *covariance += variance * by_focal * by_focal.transpose();
+  h->focal_scale = std::exp(log_focal);
+  h->focal_sigma = h->focal_scale * std::sqrt(variance);
+  Eigen::Map<Vector6d>(h->focal_covariance.data()) = h->focal_scale * variance * by_focal;
+}
+
+std::string FocalNote(const PoseHypothesis& h, double prior_sigma) {
+  // Then the evidence alone tells it no better than three times as badly as the prior does.
+  constexpr double kPriorDecides = 0.95;
+  const bool observed = h.focal_sigma < kPriorDecides * prior_sigma * h.focal_scale;
+  char text[160];
+  std::snprintf(text, sizeof(text), "focal length: %.4f times the camera's, +- %.4f%s",
+                h.focal_scale, h.focal_sigma,
+                observed ? "" : "; the evidence cannot tell, the prior alone decides");
+  return text;
+}
+
 Status Finite(bool finite) {
   return finite ? Status::Ok() : Status::Failed("the refinement left the range of numbers");
 }
 
 }  // namespace
+
+const JointEvidence& JointProblem::At(const Approach& approach,
+                                      std::optional<RefocusedEvidence>* refocused) const {
+  if (approach.log_focal == 0.0) return evidence_;
+  return refocused->emplace(evidence_, scales_, approach.log_focal).evidence();
+}
+
+double JointProblem::Cost(const JointEvidence& e, const Approach& approach) const {
+  return JointCost(e, approach.state, Weighing()) + LeftOutCost(e, approach.state) +
+         FocalPriorCost(evidence_, approach.log_focal);
+}
 
 bool JointProblem::is_contaminated() const {
   return std::any_of(evidence_.sets.begin(), evidence_.sets.end(),
@@ -338,14 +309,19 @@ Status JointProblem::ApproachFrom(const CameraPose& seed, Approach* approach) co
 }
 
 Status JointProblem::Continue(Approach* approach) const {
-  const JointEvidence& e = evidence_;
   constexpr int kFirstIterations = 3;
   constexpr double kTolerance = 0.01;  // Of cost: a seventh of a standard deviation.
+  const EstimationOptions& options = evidence_.options;
+  const int iterations = std::min(kFirstIterations, options.max_iterations);
   JointState* state = &approach->state;
   const Status status =
-      GraduatedMinimize(e, std::min(kFirstIterations, e.options.max_iterations), kTolerance, state);
+      options.focal_sigma > 0.0
+          ? MinimizeWithFocal(evidence_, scales_, kTolerance, state, &approach->log_focal)
+          : GraduatedMinimize(evidence_, iterations, kTolerance, state);
   if (!status.ok()) return status;
-  approach->cost = JointCost(e, *state, Weighing()) + LeftOutCost(e, *state);
+  std::optional<RefocusedEvidence> refocused;
+  const JointEvidence& e = At(*approach, &refocused);
+  approach->cost = Cost(e, *approach);
   approach->scales = MeasureScatter(e, *state);
   PoseHypothesis h;
   FillPose(e, *state, OriginInPlane(e, *state, approach->pose), &h);
@@ -356,8 +332,10 @@ Status JointProblem::Continue(Approach* approach) const {
 
 double JointProblem::InlierShare(const Approach& approach) const {
   std::size_t inliers = 0, points = 0;
-  for (const PointSet& set : evidence_.sets) points += set.num_trusted;
-  ForEachCurve(evidence_, approach.state,
+  std::optional<RefocusedEvidence> refocused;
+  const JointEvidence& e = At(approach, &refocused);
+  for (const PointSet& set : e.sets) points += set.num_trusted;
+  ForEachCurve(e, approach.state,
                [&](const PointSet& set, bool, std::size_t, const std::vector<double>& distances) {
                  for (std::size_t i = 0; i < set.num_trusted; ++i)
                    inliers += std::abs(distances[i]) <= kInlierSigmas * set.sigma_px ? 1 : 0;
@@ -365,15 +343,21 @@ double JointProblem::InlierShare(const Approach& approach) const {
   return points > 0 ? static_cast<double>(inliers) / static_cast<double>(points) : 0.0;
 }
 
-Status JointProblem::Refine(const Approach& approach, Refined* refined) const {
-  const JointEvidence& e = evidence_;
+Status JointProblem::Refine(const Approach& start, Refined* refined) const {
   constexpr double kTolerance = 1e-7;  // Of cost: a two-thousandth of a standard deviation.
+  const EstimationOptions& options = evidence_.options;
   *refined = Refined();
   PoseHypothesis* h = &refined->hypothesis;
-  JointState state = approach.state;
-  const Status status = Minimize(e, 1.0, e.options.max_iterations, kTolerance, &state);
+  Approach approach = start;
+  JointState& state = approach.state;
+  const Status status =
+      options.focal_sigma > 0.0
+          ? MinimizeWithFocal(evidence_, scales_, kTolerance, &state, &approach.log_focal)
+          : Minimize(evidence_, 1.0, options.max_iterations, kTolerance, &state);
   if (!status.ok()) return status;
-  h->cost = JointCost(e, state, Weighing()) + LeftOutCost(e, state);
+  std::optional<RefocusedEvidence> refocused;
+  const JointEvidence& e = At(approach, &refocused);
+  h->cost = Cost(e, approach);
   const double inflation = Inflation(e, state);
   CountInliers(e, &state, h);
 
@@ -383,14 +367,24 @@ Status JointProblem::Refine(const Approach& approach, Refined* refined) const {
   const Eigen::Vector3d origin = OriginInPlane(e, state, approach.pose);
   FillPose(e, state, origin, h);
   const Eigen::MatrixXd T = PoseFromShared(e, state, origin, shared);
-  const Matrix6d covariance = inflation * T * shared.covariance * T.transpose();
+  Matrix6d covariance = inflation * T * shared.covariance * T.transpose();
+  refined->shared_log_det = shared.log_det;
+  if (options.focal_sigma > 0.0) {
+    FocalModel focal;
+    if (!ComputeFocalModel(evidence_, scales_, state, approach.log_focal, 1.0, shared.covariance,
+                           &focal)) {
+      return Status::Failed("the evidence cannot be evaluated at other focal lengths");
+    }
+    FillFocal(focal, approach.log_focal, inflation, options.focal_sigma, T, h, &covariance);
+    refined->notes.push_back(FocalNote(*h, options.focal_sigma));
+    refined->shared_log_det += 2.0 * std::log(h->focal_sigma / h->focal_scale);
+  }
   Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
   FillFreeDirections(T, shared.null_space, h);
   h->rank = CovarianceRank(covariance);
   FillFeatures(e, state, h->cam_from_world.translation.norm() / origin.norm(), h);
   FillNotes(e, state, &refined->notes);
 
-  refined->shared_log_det = shared.log_det;
   refined->own_log_det = shared.circle_log_det;
   refined->own_log_det.insert(refined->own_log_det.end(), shared.line_log_det.begin(),
                               shared.line_log_det.end());

@@ -16,6 +16,7 @@
 #define CIRCLINE_REFINE_JOINT_PROBLEM_H_
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
 #include "circline/refine/estimate_pose.h"
+#include "circline/refine/focal.h"
 #include "circline/refine/joint_evidence.h"
 #include "circline/refine/reduced_problem.h"
 
@@ -36,6 +38,7 @@ struct Approach {
   // degrees of freedom counted in; 0 where too few are redundant to tell.
   NoiseScales scales;
   JointState state;
+  double log_focal = 0.0;  // Of the focal lengths' scale, where that is refined too.
 };
 
 // A hypothesis without probability, and what it takes to compare it with others.
@@ -63,9 +66,12 @@ class JointProblem {
   // world frame take no part. `scales`: positive.
   JointProblem(const Observations& observations, const EstimationOptions& options,
                const NoiseScales& scales)
-      : evidence_(observations, options, scales) {}
+      : scales_(scales), evidence_(observations, options, scales) {}
 
-  void SetScales(const NoiseScales& scales) { evidence_.SetScales(scales); }
+  void SetScales(const NoiseScales& scales) {
+    scales_ = scales;
+    evidence_.SetScales(scales);
+  }
 
   // Robust cost at the seed with every other parameter at its closed-form value: ranks seeds
   // cheaply. Infinity where the seed is unusable.
@@ -90,6 +96,12 @@ class JointProblem {
   bool spin_is_free() const { return !evidence_.x_is_fixed; }
 
  private:
+  // The evidence through the camera of an approach; `refocused` holds it where need be.
+  const JointEvidence& At(const Approach& approach,
+                          std::optional<RefocusedEvidence>* refocused) const;
+  double Cost(const JointEvidence& evidence, const Approach& approach) const;
+
+  NoiseScales scales_;
   JointEvidence evidence_;
 };
 

@@ -89,15 +89,16 @@ double SumRobust(const PointSet& set, double stretch, const Distance& distance,
 }
 
 template <int kSize, typename Distance>
-double SumInliers(const PointSet& set, const Distance& distance,
+double SumInliers(const PointSet& set, double stretch, const Distance& distance,
                   Eigen::Matrix<double, kSize, 1>* gradient,
                   Eigen::Matrix<double, kSize, kSize>* hessian) {
   const double weight = set.weight / (set.sigma_px * set.sigma_px);
+  const double gate = stretch * kInlierSigmas * set.sigma_px;
   double squares = 0.0;
   Eigen::Matrix<double, kSize, 1> jacobian;
   for (const CalibratedPoint& p : set.points) {
     const double d = distance(p, &jacobian);
-    if (!(std::abs(d) <= kInlierSigmas * set.sigma_px)) continue;
+    if (!(std::abs(d) <= gate)) continue;
     squares += d * d;
     if (hessian == nullptr) continue;
     *gradient += weight * d * jacobian;
@@ -110,7 +111,8 @@ template <int kSize, typename Distance>
 double SumSet(const PointSet& set, const Weighing& weighing, const Distance& distance,
               Eigen::Matrix<double, kSize, 1>* gradient,
               Eigen::Matrix<double, kSize, kSize>* hessian) {
-  if (weighing.inliers_only) return SumInliers<kSize>(set, distance, gradient, hessian);
+  if (weighing.inliers_only)
+    return SumInliers<kSize>(set, weighing.stretch, distance, gradient, hessian);
   const auto sum = [&](auto loss) {
     return SumRobust<decltype(loss)::value, kSize>(set, weighing.stretch, distance, gradient,
                                                    hessian);

@@ -32,7 +32,7 @@ struct QuadraticModel {
 };
 
 // How residuals count: all under the loss, its tuning constant stretched (graduated refinement
-// lowers `stretch` from large to 1); or only inliers, without loss.
+// lowers `stretch` from large to 1); or only inliers, their gate stretched, without loss.
 struct Weighing {
   double stretch = 1.0;
   bool inliers_only = false;

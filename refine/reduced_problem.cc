@@ -173,6 +173,7 @@ class Assembler {
     }
     for (int a = 0; a < p; ++a) {
       own->step[static_cast<std::size_t>(a)] = -solution(a, s);
+      out_.own_gain += 0.5 * C(a, s) * solution(a, s);
       for (int b = 0; b < s; ++b) own->gain(a, b) = solution(a, b);
       *log_det += 2.0 * std::log(factor.matrixLLT()(a, a));
     }
@@ -406,7 +407,7 @@ double JointCost(const JointEvidence& e, const JointState& state, const Weighing
 
 bool Linearize(const JointEvidence& e, const JointState& state, const SharedColumns& columns,
                const Weighing& weighing, ReducedModel* out) {
-  out->cost = 0.0;
+  out->cost = out->own_gain = 0.0;
   out->gradient.setZero(columns.size);
   out->hessian.setZero(columns.size, columns.size);
   out->eliminated.clear();

@@ -60,6 +60,7 @@ struct ReducedModel {
   Eigen::VectorXd gradient;
   Eigen::MatrixXd hessian;
   std::vector<OwnUnknowns> eliminated;  // One for each term with unknowns of its own.
+  double own_gain = 0.0;                // What these lower the cost by, the shared unknowns held.
   // Log determinants of the own unknowns' information by term of the evidence, 0 where there are
   // none.
   std::vector<double> circle_log_det, line_log_det;
