@@ -90,6 +90,7 @@ std::optional<double> SigmaNormalDeg(const PoseHypothesis& hypothesis) {
   }
   const Eigen::Matrix3d covariance =
       across * hypothesis.Covariance().topLeftCorner<3, 3>() * across;
+  if (!covariance.allFinite()) return std::nullopt;  // Of a solver that gives none.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
   return std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) * kDegreesPerRadian;
 }

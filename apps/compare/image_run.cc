@@ -149,8 +149,8 @@ SolverRun RunSolver(const SolverSet::Task& task, const CompareOptions& options,
   if (task.loss >= 0) run.loss = &options.losses[static_cast<std::size_t>(task.loss)];
   const Observations& observations = evidence->For(run.loss);
   const Stopwatch watch;
-  run.estimate =
-      task.peer != nullptr ? task.peer->Solve(*image.image) : task.solver->Solve(observations);
+  run.estimate = task.peer != nullptr ? task.peer->Solve(*image.image, image.observations)
+                                      : task.solver->Solve(observations);
   run.microseconds = watch.Microseconds();
   for (const PoseHypothesis& hypothesis : run.estimate.hypotheses) {
     run.errors.push_back(ComparePose(hypothesis, *image.image));

@@ -3,10 +3,13 @@
 #include <gflags/gflags.h>
 
 #include <algorithm>
+#include <array>
+#include <iomanip>
 #include <optional>
 #include <sstream>
 
 #include "apps/common/text.h"
+#include "apps/compare/peers.h"
 #include "circline/estimators/robust_loss.h"
 #include "circline/estimators/solver_registry.h"
 #include "circline/refine/refined_solvers.h"
@@ -50,7 +53,8 @@ DEFINE_int32(threads, 0,
 DEFINE_bool(overlays, true, "Draw a picture of each photo with what was found in it.");
 DEFINE_bool(
     peers, false,
-    "Also run OpenCV's solvePnP (IPPE, SQPnP, iterative) on the 'points' of the scene file.");
+    "Also run OpenCV's solvePnP (IPPE, SQPnP, iterative) on the 'points' of the scene file, and "
+    "ViSP's solvers if they were built in; see --list_solvers.");
 DEFINE_bool(resume, false,
             "Go on where a run with the same flags was stopped: skip what results.jsonl has.");
 DEFINE_string(save_options, "",
@@ -302,9 +306,7 @@ std::vector<std::string> SolverNames() {
 
 std::string ListSolvers() {
   const SolverRegistry registry = AllSolvers();
-  std::size_t width = 0;
-  for (const std::string& name : SolverNames()) width = std::max(width, name.size());
-  std::ostringstream text;
+  std::vector<std::array<std::string, 3>> rows;  // Name, stages, needs.
   for (const std::string& name : SolverNames()) {
     std::vector<std::string> stages;
     std::string needs;
@@ -314,10 +316,15 @@ std::string ListSolvers() {
       stages.emplace_back(SolverStageName(stage));
       if (needs.empty()) needs = solver->needs();
     }
-    std::string stage_text = JoinList(stages, ", ");
-    stage_text.resize(std::max<std::size_t>(stage_text.size(), 20), ' ');
-    text << name << std::string(width + 2 - name.size(), ' ') << stage_text << "  " << needs
-         << "\n";
+    rows.push_back({name, JoinList(stages, ", "), needs});
+  }
+  for (const PeerSolver& peer : PeerSolvers()) {
+    rows.push_back({peer.name, SolverStageName(peer.stage), peer.needs + " (with --peers)"});
+  }
+  std::ostringstream text;
+  text << std::left;
+  for (const auto& [name, stages, needs] : rows) {
+    text << std::setw(29) << name << std::setw(22) << stages << needs << "\n";
   }
   return text.str();
 }

@@ -2,30 +2,54 @@
 #ifndef CIRCLINE_APPS_COMPARE_PEERS_H_
 #define CIRCLINE_APPS_COMPARE_PEERS_H_
 
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
 #include "apps/common/scene.h"
+#include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/solver_registry.h"
 
 namespace circline::apps {
 
-// A pose from known points of the world, which the scene file gives (`points`); our own solvers do
-// without them.
+// A neighbour's solver. Its evidence is the image's known points (`points` of the scene file; our
+// own solvers do without), or the observations, fitted, whose camera is the photo's.
 struct PeerSolver {
+  using Function = PoseEstimate (*)(const SceneImage& image, const Observations& observations);
+
   std::string name;
   SolverStage stage = SolverStage::kClosedForm;
-  int method = 0;  // OpenCV's number for it.
+  std::string needs;  // In words, for --list_solvers.
+  Function function = nullptr;
 
-  // Refuses without enough points. Hypotheses have no covariance (infinite) and no probability
-  // (NaN), for OpenCV gives none.
-  PoseEstimate Solve(const SceneImage& image) const;
+  // Refuses where evidence is missing. Hypotheses come best first, with no covariance (infinite)
+  // and no probability (NaN), for the neighbours give none.
+  PoseEstimate Solve(const SceneImage& image, const Observations& observations) const;
 };
 
-// opencv_ippe (two poses, coplanar points), opencv_iterative, opencv_sqpnp. Empty where OpenCV was
-// installed without its module calib3d.
+// In the order of the tables. Those of OpenCV where it was installed with its module calib3d:
+// opencv_ippe (two poses, coplanar points), opencv_sqpnp, opencv_iterative. Those of ViSP where the
+// build has CIRCLINE_WITH_VISP: visp_points, visp_circle.
 std::vector<PeerSolver> PeerSolvers();
+void AddOpenCvPeers(std::vector<PeerSolver>* peers);
+void AddVispPeers(std::vector<PeerSolver>* peers);
+
+// What the neighbours share.
+
+// The known points that a solver can use: seen by the camera, undistorted.
+struct PeerPoints {
+  std::vector<Eigen::Vector2d> calibrated;
+  std::vector<Eigen::Vector3d> world;
+};
+// Refused if there are fewer than four.
+Status UsablePoints(const SceneImage& image, const Camera& camera, PeerPoints* points);
+
+// A pose of known points: metric, its residual that of the points.
+PoseHypothesis PointsHypothesis(const CameraPose& pose, const SceneImage& image,
+                                const Camera& camera);
+// The metric pose of a peer; residual unknown.
+PoseHypothesis PeerHypothesis(const CameraPose& pose);
 
 }  // namespace circline::apps
 
