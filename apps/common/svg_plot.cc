@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kLeft = 58.0, kRight = 14.0, kTop = 30.0, kBottom = 46.0;
 constexpr double kLegendRow = 18.0;
+constexpr double kTickText = 6.5;      // Width of a digit of a label, half of a line's height.
 constexpr std::size_t kLongName = 32;  // Longer ones stand one below the other.
 
 struct Frame {
@@ -48,6 +49,7 @@ std::vector<double> LinearTicks(double low, double high) {
   return ticks;
 }
 
+// 1, 2 and 5 times powers of ten.
 std::vector<double> LogTicks(double low, double high) {
   std::vector<double> ticks;
   for (int decade = static_cast<int>(std::floor(std::log10(low))); decade < 12; ++decade) {
@@ -74,11 +76,17 @@ void DrawGrid(const Frame& frame, std::ostringstream* svg) {
          << "'/>";
   }
   *svg << "</g><g fill='currentColor' fill-opacity='.75' font-size='11'>";
+  double free_x = 0.0, free_y = frame.bottom() + kTickText;  // Up to where no label stands yet.
   for (const double x : x_ticks) {
+    const double half_width = 0.5 * kTickText * static_cast<double>(TickText(x).size());
+    if (frame.X(x) - half_width < free_x) continue;
+    free_x = frame.X(x) + half_width + kTickText;
     *svg << "<text text-anchor='middle' x='" << Number(frame.X(x)) << "' y='"
          << Number(frame.bottom() + 15) << "'>" << TickText(x) << "</text>";
   }
   for (const double y : y_ticks) {
+    if (frame.Y(y) + kTickText > free_y) continue;
+    free_y = frame.Y(y) - kTickText;
     *svg << "<text text-anchor='end' x='" << kLeft - 6 << "' y='" << Number(frame.Y(y) + 4) << "'>"
          << (plot.percent_y ? TickText(y * 100.0) + " %" : TickText(y)) << "</text>";
   }
@@ -153,7 +161,9 @@ std::string TickText(double value) {
 }
 
 std::vector<double> PlotTicks(bool log, double low, double high) {
-  return log ? LogTicks(low, high) : LinearTicks(low, high);
+  if (!log) return LinearTicks(low, high);
+  const std::vector<double> ticks = LogTicks(low, high);
+  return ticks.size() < 3 ? LinearTicks(low, high) : ticks;  // Hardly a decade: round values.
 }
 
 std::vector<double> DecadeTicks(double low, double high) {

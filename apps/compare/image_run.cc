@@ -234,8 +234,8 @@ std::vector<SolverKey> SolverSet::Keys(const CompareOptions& options) const {
 const SolverRun* RunToShow(const ImageRun& run) {
   const SolverRun* best = nullptr;
   const auto rank = [](const SolverRun& r) {
-    return ShowRank(r.solver, r.stage == SolverStage::kRefined,
-                    r.estimate.hypotheses.front().num_observations);
+    const PoseHypothesis& first = r.estimate.hypotheses.front();
+    return ShowRank(r.solver, r.loss != nullptr, first.probability, first.num_observations);
   };
   for (const SolverRun& candidate : run.solvers) {
     if (!candidate.estimate.status.ok() || candidate.estimate.hypotheses.empty()) continue;

@@ -158,7 +158,8 @@ std::string SolverKey::ScaleText() const {
 std::string SolverKey::LossText() const { return refined() ? loss + ", " + ScaleText() : "-"; }
 
 std::string SolverKey::Name() const {
-  return refined() ? solver + " refined, " + loss + " " + ScaleText() : solver;
+  const std::string name = stage == "refined" ? solver + " refined" : solver;
+  return refined() ? name + ", " + loss + " " + ScaleText() : name;
 }
 
 bool SolverKey::operator==(const SolverKey& other) const {
@@ -191,14 +192,17 @@ bool ReadLineCounts(const std::string& observation_line, LineCounts* counts) {
   return true;
 }
 
-std::array<int, 3> ShowRank(const std::string& solver, bool refined, int num_observations) {
-  return {solver == "joint" ? 1 : 0, refined ? 1 : 0, num_observations};
+std::array<int, 4> ShowRank(const std::string& solver, bool refined, double probability,
+                            int num_observations) {
+  return {std::isfinite(probability) ? 1 : 0, solver == "joint" ? 1 : 0, refined ? 1 : 0,
+          num_observations};
 }
 
 const SolverRecord* SolverToShow(const ImageRecord& record) {
   const SolverRecord* best = nullptr;
   const auto rank = [](const SolverRecord& r) {
-    return ShowRank(r.key.solver, r.key.refined(), r.hypotheses.front().num_observations);
+    const HypothesisRecord& first = r.hypotheses.front();
+    return ShowRank(r.key.solver, r.key.refined(), first.probability, first.num_observations);
   };
   for (const SolverRecord& candidate : record.solvers) {
     if (!candidate.HasAnswer()) continue;

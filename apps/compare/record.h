@@ -26,10 +26,10 @@ struct SolverKey {
   std::string loss;       // Empty for closed forms, which have none.
   double scale_px = 0.0;  // 0 = auto.
 
-  bool refined() const { return !loss.empty(); }
-  std::string ScaleText() const;  // "auto", the number, or "-" for closed forms.
-  std::string LossText() const;   // "huber, 0.5"; "-" for closed forms.
-  std::string Name() const;       // "circle_center", "circle_center refined, huber 0.5".
+  bool refined() const { return !loss.empty(); }  // By us, with a loss.
+  std::string ScaleText() const;                  // "auto", the number, or "-" for closed forms.
+  std::string LossText() const;                   // "huber, 0.5"; "-" for closed forms.
+  std::string Name() const;  // "circle_center", "circle_center refined, huber 0.5".
   bool operator==(const SolverKey& other) const;
 };
 
@@ -84,8 +84,10 @@ struct LineCounts {
 bool ReadLineCounts(const std::string& observation_line, LineCounts* counts);
 
 // The larger, the sooner an answer is the one to show for its photo: joint, else the refined answer
-// with the most evidence, else a closed form.
-std::array<int, 3> ShowRank(const std::string& solver, bool refined, int num_observations);
+// with the most evidence, else a closed form, and last the answers of peers, which state no
+// probability.
+std::array<int, 4> ShowRank(const std::string& solver, bool refined, double probability,
+                            int num_observations);
 
 // The answer to show; of the first loss. Null if every solver refused.
 const SolverRecord* SolverToShow(const ImageRecord& record);

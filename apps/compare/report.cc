@@ -20,6 +20,8 @@ namespace circline::apps {
 namespace {
 
 constexpr int kPictureWidth = 900;
+constexpr std::size_t kMostNamed = 5000;  // More rows make a browser slow.
+constexpr const char* kNotAll = " (the first 5000; results.jsonl has all)";
 
 std::string Lead(const Summary& summary) {
   std::string text = std::to_string(summary.num_images()) +
@@ -57,6 +59,12 @@ std::string SweepChapter(const Summary& summary) {
          Plots(SweepPlots(summary));
 }
 
+std::string SweepNote(const Summary& summary) {
+  if (LossPoints(summary).size() < 2) return "";
+  return "<p class='lead'>Each solver with its best loss and scale, and the answer drawn in the "
+         "picture; results.jsonl has the others.</p>";
+}
+
 std::string AgreementChapter(const Agreement& agreement) {
   const std::string table = AgreementTable(agreement);
   return table.empty() ? ""
@@ -74,7 +82,7 @@ std::string Chapters(const Digest& digest) {
   page.Add("sweep", "Losses and scales", SweepChapter(summary));
   page.Add("agreement", "Agreement", AgreementChapter(digest.agreement));
   page.Add("times", "Times", Plots(RuntimePlot(summary)));
-  page.Add("images", "Images", OverlayLegend());
+  page.Add("images", "Images", OverlayLegend() + SweepNote(summary));
   return page.Html();
 }
 
@@ -82,6 +90,13 @@ std::vector<std::uint8_t> ReadPicture(const std::string& folder, const std::stri
   if (overlay.empty()) return {};
   const cv::Mat picture = cv::imread(folder + "/" + overlay, cv::IMREAD_COLOR);
   return picture.empty() ? std::vector<std::uint8_t>() : EncodeJpeg(picture, kPictureWidth);
+}
+
+// The rows of the tables of single images.
+std::vector<SolverKey> KeysOfTables(const Summary& summary) {
+  std::vector<SolverKey> keys;
+  for (const SummaryRow* row : RowsToShow(summary)) keys.push_back(row->key);
+  return keys;
 }
 
 // Buttons that choose between the kinds of photos, where not all are shown.
@@ -105,7 +120,8 @@ std::string OtherImage(const ImageRecord& record, const ImageScore& score) {
 
 // Pictures are made by all threads, a few at a time.
 void WriteSections(const std::string& folder, const std::vector<ShownImage>& shown,
-                   const std::vector<ImageRecord>& records, OutputFile* file) {
+                   const std::vector<SolverKey>& keys, const std::vector<ImageRecord>& records,
+                   OutputFile* file) {
   constexpr std::size_t kAtATime = 16;
   for (std::size_t begin = 0; begin < shown.size(); begin += kAtATime) {
     const std::size_t count = std::min(kAtATime, shown.size() - begin);
@@ -117,7 +133,7 @@ void WriteSections(const std::string& folder, const std::vector<ShownImage>& sho
       }
     });
     for (std::size_t i = 0; i < count; ++i) {
-      file->Write(ImageSection(records[begin + i], pictures[i], shown[begin + i].why));
+      file->Write(ImageSection(records[begin + i], keys, pictures[i], shown[begin + i].why));
     }
   }
 }
@@ -131,6 +147,7 @@ Status AddImages(const std::string& folder, const Digest& digest, std::size_t ma
   for (std::size_t i = 0; i < shown.size(); ++i) slots[shown[i].position] = static_cast<int>(i);
   std::vector<ImageRecord> records(shown.size());
   std::string others;
+  std::size_t num_others = 0;
   RecordReader reader(folder);
   ImageLines lines;
   for (std::size_t i = 0; i < slots.size() && reader.Next(&lines); ++i) {
@@ -139,16 +156,17 @@ Status AddImages(const std::string& folder, const Digest& digest, std::size_t ma
     const Status status = ParseRecord(lines, &record);
     if (!status.ok()) return Status::Failed(folder + ": " + status.message);
     if (slots[i] < 0) {
-      others += OtherImage(record, digest.scores[i]);
+      if (++num_others <= kMostNamed) others += OtherImage(record, digest.scores[i]);
     } else {
       records[static_cast<std::size_t>(slots[i])] = std::move(record);
     }
   }
   file->Write(Chooser(shown, slots.size()));
-  WriteSections(folder, shown, records, file);
+  WriteSections(folder, shown, KeysOfTables(digest.summary), records, file);
   if (!others.empty()) {
     file->Write(
-        "<details><summary>The other images</summary><div class='scroll'>"
+        "<details><summary>The other images" + std::string(num_others > kMostNamed ? kNotAll : "") +
+        "</summary><div class='scroll'>"
         "<table class='sortable'><thead><tr><th class='l'>image</th><th>error or residual</th>"
         "<th class='l'>picture</th></tr></thead><tbody>" +
         others + "</tbody></table></div></details>\n");

@@ -26,6 +26,7 @@ std::string SigmaText(const HypothesisRecord& hypothesis) {
   std::vector<std::string> parts;
   for (const double sigma : hypothesis.sigma_rotation_deg)
     parts.push_back(std::isfinite(sigma) ? FormatShort(sigma, 2) : "free");
+  if (hypothesis.sigma_rotation_deg.array().isInf().all()) return "-";  // A peer says nothing.
   return JoinList(parts, " / ");
 }
 
@@ -99,12 +100,14 @@ std::string HypothesisRow(const SolverRecord& run, std::size_t i, const TruthCol
   return html + "</tr>";
 }
 
-std::string SolverTable(const ImageRecord& record) {
+std::string SolverTable(const ImageRecord& record, const std::vector<SolverKey>& keys) {
   const SolverRecord* shown = SolverToShow(record);
   if (shown == nullptr) return "";
   const TruthColumns truth(record);
   std::string html = "<div class='scroll'><table><thead>" + SolverHead(truth) + "</thead><tbody>";
   for (const SolverRecord& solver : record.solvers) {
+    const bool wanted = std::find(keys.begin(), keys.end(), solver.key) != keys.end();
+    if (!wanted && &solver != shown) continue;
     for (std::size_t i = 0; i < solver.hypotheses.size(); ++i) {
       html += HypothesisRow(solver, i, truth, &solver == shown);
     }
@@ -169,8 +172,8 @@ std::string Picture(const std::string& name, const std::vector<std::uint8_t>& jp
 
 }  // namespace
 
-std::string ImageSection(const ImageRecord& record, const std::vector<std::uint8_t>& picture,
-                         const std::string& why) {
+std::string ImageSection(const ImageRecord& record, const std::vector<SolverKey>& keys,
+                         const std::vector<std::uint8_t>& picture, const std::string& why) {
   std::string html = "<section class='image' data-why='" + why + "'><h3>" +
                      EscapeHtml(record.name) + (why.empty() ? "" : "<small>" + why + "</small>") +
                      "</h3>";
@@ -184,7 +187,7 @@ std::string ImageSection(const ImageRecord& record, const std::vector<std::uint8
     html += "<p class='lead'>Full picture: " + EscapeHtml(record.overlay) + "</p>";
   }
   return html + Problems(record.problems) + Refusals(record) + "</div></div>" +
-         SolverTable(record) + "</section>\n";
+         SolverTable(record, keys) + "</section>\n";
 }
 
 std::string OverlayLegend() {

@@ -10,10 +10,11 @@
 
 namespace circline::apps {
 
-// What was found, every hypothesis of every solver, and why the others refused. `picture` is the
+// What was found, every hypothesis of the solvers in `keys` and of the answer shown, and why the
+// others refused. `picture` is the
 // overlay as JPEG (may be empty), `why` as SelectImages says.
-std::string ImageSection(const ImageRecord& record, const std::vector<std::uint8_t>& picture,
-                         const std::string& why);
+std::string ImageSection(const ImageRecord& record, const std::vector<SolverKey>& keys,
+                         const std::vector<std::uint8_t>& picture, const std::string& why);
 
 // What the colours of the overlays mean.
 std::string OverlayLegend();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "apps/common/svg_plot.h"
@@ -24,12 +25,12 @@ struct PlotRow {
 // Ranked; only rows with an answer, and of the losses of a sweep only each solver's best.
 std::vector<PlotRow> PlotRows(const Summary& summary) {
   const bool is_sweep = LossPoints(summary).size() > 1;
+  const std::set<const SummaryRow*> shown = RowsToShow(summary);
   std::map<std::string, std::size_t> colors;
   std::vector<PlotRow> rows;
   for (const SummaryRow* row : summary.Ranked()) {
     const SolverKey& key = row->key;
-    if (row->ok == 0) continue;
-    if (key.refined() && is_sweep && row != BestRow(summary, key.solver)) continue;
+    if (row->ok == 0 || shown.count(row) == 0) continue;
     const std::string name = is_sweep || !key.refined() ? key.Name() : key.solver + " refined";
     rows.push_back(
         {row, name, SeriesColor(colors.emplace(key.solver, colors.size()).first->second)});
@@ -79,7 +80,7 @@ std::string ErrorPlot(const Summary& summary, const std::string& title,
     PlotSeries series = CumulativeCurve(*row.row, row.row->*errors, plot.x_min, plot.x_max);
     series.name = row.name;
     series.color = row.color;
-    series.dashed = !row.row->key.refined();
+    series.dashed = row.row->key.stage != "refined";
     plot.series.push_back(std::move(series));
   }
   if (plot.series.empty()) return "";

@@ -19,9 +19,12 @@ tr:last-child td{border-bottom:0}
 th{background:var(--card);font-weight:600;vertical-align:bottom}
 table.sortable th{cursor:pointer}
 th.up:after{content:" \25B4"}th.down:after{content:" \25BE"}
-table.matrix td{text-align:center}table.matrix th.l{max-width:260px}
+table.matrix td{text-align:center}table.matrix th{white-space:normal;text-align:center;padding:5px 6px}table.matrix th.l{white-space:nowrap;text-align:left}
+table.named td:first-child,table.named th:first-child,table.matrix th.l{position:sticky;left:0;background:var(--bg)}
+table.named th:first-child,table.matrix th.l{background:var(--card)}
+table.brief tr.rest{display:none}
 td.best{font-weight:700;color:var(--good)}
-table.matrix th{white-space:normal;overflow-wrap:anywhere;text-align:center}.l,th.l{text-align:left}td.say{text-align:left;white-space:normal;min-width:160px;color:var(--soft)}
+.l,th.l{text-align:left}td.say{text-align:left;white-space:normal;min-width:160px;color:var(--soft)}
 tr.more td{color:var(--soft)}tr.shown td{background:var(--card)}
 .failed{color:var(--bad);font-weight:600}
 .plots{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,560px),1fr));gap:20px}
@@ -34,6 +37,8 @@ ul.say{margin:6px 0 12px;padding-left:18px;color:var(--soft);font-size:13px}
 .legend span{display:inline-block;margin-right:16px}.legend i{display:inline-block;width:12px;height:12px;border-radius:3px;margin-right:5px;vertical-align:-1px}
 .choose button{font:inherit;font-size:14px;margin:0 6px 14px 0;padding:4px 14px;color:var(--fg);background:var(--card);border:1px solid var(--line);border-radius:16px;cursor:pointer}
 .choose button.on{color:#fff;background:#1f6fd1;border-color:#1f6fd1}
+.scroll+.choose{margin:12px 0 0}
+@media(max-width:600px){body{padding:0 12px 60px}nav{position:static}section.image,.plots>div{padding:10px}th,td{padding:4px 7px}td.say{min-width:220px}table.named td:first-child{white-space:normal}}
 details{margin:0 0 22px}summary{cursor:pointer;color:var(--accent)}
 #zoom{position:fixed;inset:0;z-index:3;display:none;overflow:hidden;background:#0d1014ee;cursor:grab}
 #zoom.on{display:block}#zoom img{position:absolute;left:0;top:0;transform-origin:0 0;max-width:none;user-select:none}
@@ -55,7 +60,12 @@ document.querySelectorAll('table.sortable').forEach(function(table){
       var order=typeof x===typeof y?(x<y?-1:x>y?1:0):(typeof x==='number'?-1:1);return up?order:-order});
     rows.forEach(function(row){body.appendChild(row)})})})});
 
-document.querySelectorAll('.choose button').forEach(function(button,i,all){
+document.querySelectorAll('button.rest').forEach(function(button){
+  button.addEventListener('click',function(){
+    document.querySelectorAll('table.brief').forEach(function(table){table.classList.remove('brief')});
+    button.remove()})});
+
+document.querySelectorAll('.choose button[value]').forEach(function(button,i,all){
   button.addEventListener('click',function(){
     all.forEach(function(b){b.classList.toggle('on',b===button)});
     document.querySelectorAll('section.image').forEach(function(section){

@@ -1,6 +1,7 @@
 #include "apps/compare/report_tables.h"
 
 #include <algorithm>
+#include <set>
 
 #include "apps/common/text.h"
 #include "apps/compare/sweep.h"
@@ -11,6 +12,15 @@ namespace {
 std::string Cell(const std::string& text, const char* css = nullptr) {
   return std::string("<td") + (css == nullptr ? "" : std::string(" class='") + css + "'") + ">" +
          EscapeHtml(text) + "</td>";
+}
+
+constexpr double kRounding = 1e-6;  // Degrees.
+
+// A name that may go on in the next line after an underscore.
+std::string Breakable(const std::string& name) {
+  std::string html;
+  for (const char c : name) html += c == '_' ? "_<wbr>" : EscapeHtml(std::string(1, c));
+  return html;
 }
 
 void AddOnce(const std::string& name, std::vector<std::string>* names) {
@@ -33,7 +43,9 @@ std::string SummaryTable(const Summary& summary) {
       {"time ms", "median time of a call", false, [](const SummaryRow& row) {
          return FormatShort(1e-3 * Median({row.microseconds.begin(), row.microseconds.end()}));
        }});
-  std::string html = "<div class='scroll'><table class='sortable'><thead><tr>";
+  std::string html = "<div class='scroll'><table class='sortable named brief'><thead><tr>";
+  const std::set<const SummaryRow*> shown = RowsToShow(summary);
+  int num_rest = 0;
   for (const SummaryColumn& column : columns) {
     html += std::string("<th") + (column.left ? " class='l'" : "") + " title='" +
             EscapeHtml(column.explanation) + "'>" + EscapeHtml(column.title) + "</th>";
@@ -45,13 +57,20 @@ std::string SummaryTable(const Summary& summary) {
       AddOnce(row->key.solver, &refused);
       continue;
     }
-    html += "<tr>";
+    const bool rest = shown.count(row) == 0;
+    num_rest += rest ? 1 : 0;
+    html += rest ? "<tr class='rest'>" : "<tr>";
     for (const SummaryColumn& column : columns) {
-      html += Cell(column.text(*row), column.left ? "l" : nullptr);
+      const std::string text = column.text(*row);
+      html += column.left ? "<td class='l'>" + Breakable(text) + "</td>" : Cell(text);
     }
     html += "</tr>";
   }
   html += "</tbody></table></div>";
+  if (num_rest > 0) {
+    html += "<p class='choose'><button class='rest'>show every loss and scale (" +
+            std::to_string(num_rest) + " more rows)</button></p>";
+  }
   if (refused.empty()) return html;
   return html + "<p class='lead'>Refused every image: " + EscapeHtml(JoinList(refused, ", ")) +
          ".</p>";
@@ -71,14 +90,15 @@ std::string AgreementTable(const Agreement& agreement) {
   std::string html = "<div class='scroll'><table class='matrix'><thead><tr><th></th>";
   for (const std::size_t i : used) {
     const SolverKey& key = agreement.keys()[i];
-    html += "<th>" + EscapeHtml(key.solver) + "<br>" +
+    html += "<th>" + Breakable(key.solver) + "<br>" +
             (key.stage == "refined" ? "refined" : "closed") + "</th>";
   }
   html += "</tr></thead><tbody>";
   for (const std::size_t i : used) {
     html += "<tr><th class='l'>" + EscapeHtml(agreement.keys()[i].Name()) + "</th>";
     for (const std::size_t j : used) {
-      const std::optional<double> median = i == j ? std::nullopt : agreement.MedianDeg(i, j);
+      std::optional<double> median = i == j ? std::nullopt : agreement.MedianDeg(i, j);
+      if (median && *median < kRounding) median = 0.0;
       html += "<td" +
               (median ? " title='" + std::to_string(agreement.Count(i, j)) + " images'"
                       : std::string()) +

@@ -58,7 +58,7 @@ void AddSolver(const SolverRecord& solver, SummaryRow* row) {
   }
   ++row->ok;
   const HypothesisRecord& best = solver.hypotheses.front();
-  row->rms_px.push_back(best.rms_px);
+  if (std::isfinite(best.rms_px)) row->rms_px.push_back(best.rms_px);
   if (best.num_observations > 0) {
     row->inlier_shares.push_back(static_cast<double>(best.num_inliers) / best.num_observations);
   }

@@ -71,6 +71,17 @@ const SummaryRow* BestRow(const Summary& summary, const std::string& solver) {
   return best;
 }
 
+std::set<const SummaryRow*> RowsToShow(const Summary& summary) {
+  const bool is_sweep = LossPoints(summary).size() > 1;
+  std::set<const SummaryRow*> rows;
+  for (const SummaryRow& row : summary.rows()) {
+    if (!is_sweep || !row.key.refined()) rows.insert(&row);
+  }
+  if (!is_sweep) return rows;
+  for (const std::string& solver : RefinedSolvers(summary)) rows.insert(BestRow(summary, solver));
+  return rows;
+}
+
 std::string DescribeRow(const SummaryRow& row) {
   const std::string images =
       std::to_string(row.ok) + " of " + std::to_string(row.images) + " images";

@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_COMPARE_SWEEP_H_
 #define CIRCLINE_APPS_COMPARE_SWEEP_H_
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,10 @@ const SummaryRow* FindRefined(const Summary& summary, const std::string& solver,
 // a loss that throws half of the points away has small residuals, too), then the smallest median
 // residual. Null if nothing was answered.
 const SummaryRow* BestRow(const Summary& summary, const std::string& solver = "");
+
+// The rows that tables and plots show beside those of the sweep: all but those with a loss and scale
+// that are not their solver's best.
+std::set<const SummaryRow*> RowsToShow(const Summary& summary);
 
 // "joint refined, tukey 0.5: median error 0.12 degrees in 26 of 26 images".
 std::string DescribeRow(const SummaryRow& row);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "apps/common/svg_plot.h"
 #include "apps/compare/digest.h"
 #include "apps/compare/report.h"
 #include "tests/apps/board_set.h"
@@ -54,6 +55,32 @@ TEST(CompareReport, ShowsSomeImagesAndNamesTheOthers) {
   EXPECT_EQ(Count(report, "<td class='l'>overlays/tilt"), 3);  // Named, not shown.
 }
 
+// Of the six losses and scales the tables show each solver's best; for a photo, too, and besides
+// the answer that its picture shows.
+TEST(CompareReport, ShowsTheBestOfASweep) {
+  const TestFolder folder;
+  const std::string report = ReadAll(RunSweep(folder) + "/report.html");
+  const auto joint_rows = [](const std::string& html) {
+    return Count(html, "<td class='l'>joint</td><td class='l'>refined</td>");
+  };
+  const std::size_t summary = report.find("<h2 id='summary'"),
+                    curves = report.find("<h2 id='curves'");
+  EXPECT_EQ(joint_rows(report.substr(summary, curves - summary)), 6);
+  EXPECT_EQ(Count(report, "<tr class='rest'><td class='l'>joint<"), 5);
+  const std::size_t image = report.find("<section class='image'");
+  const std::size_t next = report.find("<section class='image'", image + 1);
+  const int shown = joint_rows(report.substr(image, next - image));
+  EXPECT_GE(shown, 1);
+  EXPECT_LE(shown, 2);
+}
+
+TEST(CompareReport, NarrowAxesHaveLabels) {
+  for (const auto& [low, high] : {std::pair(0.031, 0.044), std::pair(0.09, 0.13)}) {
+    EXPECT_GE(PlotTicks(true, low, high).size(), 3U);
+  }
+  EXPECT_EQ(PlotTicks(true, 0.1, 10.0).size(), 7U);
+}
+
 TEST(CompareReport, HasEveryChapterAndNothingFromElsewhere) {
   const TestFolder folder;
   const std::string report = ReadAll(RunSweep(folder) + "/report.html");
@@ -88,7 +115,8 @@ TEST(CompareReport, RunsInABrowserWithoutAnError) {
       "document.querySelector('figure img').click();"
       "var zoom=document.getElementById('zoom');"
       "zoom.dispatchEvent(new WheelEvent('wheel',{deltaY:-300,clientX:9,clientY:9}));"
-      "document.title='open='+zoom.classList.contains('on');"
+      "document.title='brief='+document.querySelectorAll('table.brief').length"
+      "+' open='+zoom.classList.contains('on');"
       "document.dispatchEvent(new KeyboardEvent('keydown',{key:'ArrowRight'}));"
       "document.dispatchEvent(new KeyboardEvent('keydown',{key:'Escape'}));"
       "document.title+=' closed='+!zoom.classList.contains('on');"
@@ -114,7 +142,7 @@ TEST(CompareReport, RunsInABrowserWithoutAnError) {
   const std::string title =
       dom.substr(dom.find("<title>"), dom.find("</title>") - dom.find("<title>"));
   EXPECT_EQ(Count(log, "CONSOLE"), 0) << log;
-  EXPECT_EQ(title, "<title>open=true closed=true sorted=true requests=0");
+  EXPECT_EQ(title, "<title>brief=0 open=true closed=true sorted=true requests=0");
 }
 
 }  // namespace
