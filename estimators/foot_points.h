@@ -1,4 +1,4 @@
-// The points of an ellipse nearest to measured ones. Internal: not installed.
+// The points of an ellipse nearest to measured ones, for several at a time. Allocates nothing.
 #ifndef CIRCLINE_ESTIMATORS_FOOT_POINTS_H_
 #define CIRCLINE_ESTIMATORS_FOOT_POINTS_H_
 
