@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 namespace circline {
@@ -33,6 +34,19 @@ Status ValidateCircle(const CircleObservation& circle) {
     return Status::Invalid(name + ": center is not finite");
   for (const Segment& s : circle.diameters) {
     if (!Finite(s)) return Status::Invalid(name + ": a diameter is not finite");
+  }
+  return Status::Ok();
+}
+
+Status ValidateRadiusGroups(const Observations& observations) {
+  std::map<std::string, double> known;
+  for (const CircleObservation& circle : observations.circles) {
+    if (circle.radius_group.empty() || !(circle.radius > 0.0)) continue;
+    const double radius = known.emplace(circle.radius_group, circle.radius).first->second;
+    if (radius != circle.radius) {
+      return Status::Invalid("radius group '" + circle.radius_group +
+                             "': its circles have different radii");
+    }
   }
   return Status::Ok();
 }
@@ -121,6 +135,7 @@ Status Observations::Validate() const {
       status = Status::Invalid("two pencils have the id '" + pencil.id + "'");
     }
   }
+  if (status.ok()) status = ValidateRadiusGroups(*this);
   if (status.ok()) status = ValidateFrame(*this);
   if (status.ok()) status = ValidateKnown(*this);
   return status;
@@ -155,6 +170,19 @@ std::string FirstNamedPlane(const Observations& observations) {
 
 bool HasRole(const PencilObservation& pencil) { return pencil.direction != PencilDirection::kFree; }
 
+// A radius known of one circle is that of its group.
+void ShareRadii(std::vector<CircleObservation>* circles) {
+  std::map<std::string, double> known;
+  for (const CircleObservation& circle : *circles) {
+    if (!circle.radius_group.empty() && circle.radius > 0.0)
+      known[circle.radius_group] = circle.radius;
+  }
+  for (CircleObservation& circle : *circles) {
+    const auto group = known.find(circle.radius_group);
+    if (group != known.end()) circle.radius = group->second;
+  }
+}
+
 // Puts the first pair of pencils that span a plane onto `plane`.
 void SpanPlane(const std::string& plane, std::vector<PencilObservation>* pencils) {
   for (std::size_t i = 0; i < pencils->size(); ++i) {
@@ -174,6 +202,7 @@ Observations ResolveWorld(const Observations& observations) {
   Observations out = observations;
   FrameObservation& frame = out.frame;
   const bool has_role = std::any_of(out.pencils.begin(), out.pencils.end(), HasRole);
+  ShareRadii(&out.circles);
   frame.plane = FirstNamedPlane(out);
   if (frame.plane.empty()) {
     frame.plane = "world";

@@ -34,6 +34,8 @@ struct CircleObservation {
   double radius = 0.0;     // In the world's unit; 0 = not known.
   std::string plane;       // Circles and pencils with the same id share a plane; empty = with none.
   std::string concentric;  // Circles with the same id share their centre; empty = with none.
+  // Circles with the same id have equal radii, known or not; empty = with none.
+  std::string radius_group;
   std::vector<Segment> diameters;  // Chords through the centre, pixels.
 
   // Added by a fit.
@@ -112,6 +114,7 @@ int FindPencil(const Observations& observations, const std::string& id);
 //   first circle) and those concentric with it. Where there is no circle either, and no pencil has
 //   a role, the first two pencils of different direction span it.
 // - A free pencil on one of whose lines an axis is drawn gets that axis' role.
+// - A radius known of one circle holds for its whole radius group.
 // - Where nothing fixes the X axis (no role x or y, no axis drawn), the first free pencil of that
 // plane
 //   does: it gets role x.

@@ -151,13 +151,14 @@ void JointEvidence::AddCircle(int index, std::map<std::string, int>* concentric)
   if (set < 0) return;
   CircleTerm term{index, set, CenterBlock(circle, concentric), -1, 1.0};
   const bool has_center_evidence = circle.center || !circle.diameters.empty();
-  if (term.center >= 0 || has_center_evidence || circle.radius > 0.0) {
+  if (term.center >= 0 || has_center_evidence || circle.radius > 0.0 ||
+      !circle.radius_group.empty()) {
     // Two private blocks of one residual cannot both be eliminated first: the centre goes before
     // the radius.
     const bool center_is_private = term.center < 0 && !has_center_evidence;
     if (term.center < 0) term.center = AddParameter(2, center_is_private);
     term.factor = circle.radius > 0.0 ? circle.radius : 1.0;
-    term.radius = circle.radius > 0.0 ? ScaleBlock() : AddParameter(1, !center_is_private);
+    term.radius = RadiusBlock(circle, !center_is_private);
   } else {
     term.center = AddParameter(3, true);
   }
@@ -165,6 +166,14 @@ void JointEvidence::AddCircle(int index, std::map<std::string, int>* concentric)
   if (circle.center)
     AddPoint(*circle.center, 0.0, term.center, set, "the centre of circle '" + circle.id + "'");
   for (const Segment& diameter : circle.diameters) AddDiameter(circle, diameter, term.center);
+}
+
+int JointEvidence::RadiusBlock(const CircleObservation& circle, bool is_private) {
+  if (circle.radius > 0.0) return ScaleBlock();
+  if (circle.radius_group.empty()) return AddParameter(1, is_private);
+  const auto group = radius_groups_.find(circle.radius_group);
+  if (group != radius_groups_.end()) return group->second;
+  return radius_groups_[circle.radius_group] = AddParameter(1, false);
 }
 
 int JointEvidence::ScaleBlock() {

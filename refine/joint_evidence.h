@@ -19,8 +19,8 @@ namespace circline {
 // Parameter blocks are named by their index in JointEvidence::parameters; block 0 is the rotation.
 struct CircleTerm {
   int observation, set;
-  int center;  // Block (cx, cy), or (cx, cy, radius) if `radius` is -1.
-  int radius;
+  int center;     // Block (cx, cy), or (cx, cy, radius) if `radius` is -1.
+  int radius;     // The scale block, one that a group of equal circles shares, or its own.
   double factor;  // Known radius, where `radius` is the scale block; else 1.
 };
 
@@ -97,6 +97,8 @@ struct JointEvidence {
   void SetScales(const NoiseScales& scales);
 
  private:
+  std::map<std::string, int> radius_groups_;  // Of circles of equal, unknown radii: their block.
+
   int AddParameter(int size, bool is_private);
   int AddSet(const std::vector<Eigen::Vector2d>& pixels, const std::vector<std::uint8_t>& mask,
              double sigma_px, bool is_conic);
@@ -114,6 +116,7 @@ struct JointEvidence {
   void AddAngle(const KnownAngle& known);
   void AddLength(const KnownLength& known);
   int ScaleBlock();
+  int RadiusBlock(const CircleObservation& circle, bool is_private);
   double DrawnSigma() const;
   bool BothAxes() const;
   int AxisOfLine(int pencil, int line) const;

@@ -394,6 +394,7 @@ Status JointProblem::Refine(const Approach& start, Refined* refined) const {
   for (const CircleTerm& t : e.circles) {
     refined->radii.push_back(
         std::abs(t.radius < 0 ? state.At(t.center)[2] : t.factor * state.At(t.radius)[0]));
+    refined->radius_blocks.push_back(t.radius == e.scale ? -1 : t.radius);
   }
   h->log_det = LogDet(*refined, refined->left_out);
   return Finite(covariance.allFinite() && h->cam_from_world.rotation.allFinite() &&
@@ -402,6 +403,16 @@ Status JointProblem::Refine(const Approach& start, Refined* refined) const {
 
 double LogDet(const Refined& refined, const std::vector<std::uint8_t>& left_out) {
   double log_det = refined.shared_log_det, log_measure = 0.0, first_radius = 0.0;
+  // True if a circle before has the same radius by definition.
+  const auto is_counted = [&](std::size_t i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (left_out[k] == 0 && refined.radius_blocks[i] >= 0 &&
+          refined.radius_blocks[k] == refined.radius_blocks[i]) {
+        return true;
+      }
+    }
+    return false;
+  };
   for (std::size_t i = 0; i < left_out.size(); ++i) {
     if (left_out[i] != 0) continue;
     log_det += refined.own_log_det[i];
@@ -410,7 +421,8 @@ double LogDet(const Refined& refined, const std::vector<std::uint8_t>& left_out)
       first_radius = refined.radii[i];
       log_measure -= 4.0 * std::log(first_radius);
     } else {
-      log_measure -= 2.0 * std::log(first_radius) + std::log(refined.radii[i]);
+      log_measure -= 2.0 * std::log(first_radius);
+      if (!is_counted(i)) log_measure -= std::log(refined.radii[i]);
     }
   }
   return log_det + 2.0 * log_measure;

@@ -50,13 +50,15 @@ struct Refined {
   std::vector<double> own_log_det;
   std::vector<std::uint8_t> left_out;
   std::vector<double> radii;
+  std::vector<int> radius_blocks;  // Circles with the same one share their radius; -1: its own.
   std::vector<std::string> notes;  // What was left out, and why.
 };
 
 // Log determinant of the covariance of all unknowns but those of the features left out, in
 // parameters in which a scene is as likely anywhere: rotations by their invariant measure, the
 // first circle's centre uniform in space in units of its radius, the others in the plane in the
-// same unit, radii by their logarithm. Hypotheses compare on the features that all of them explain.
+// same unit, radii (a shared one once) by their logarithm. Hypotheses compare on the features that
+// all of them explain.
 double LogDet(const Refined& refined, const std::vector<std::uint8_t>& left_out);
 
 class JointProblem {

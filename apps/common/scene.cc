@@ -78,8 +78,8 @@ std::array<int, 4> ReadRectangle(const StorageNode& node) {
 }
 
 void ReadCircle(const StorageNode& node, SceneImage* image) {
-  node.AllowKeys(
-      {"id", "contour", "roi", "center", "radius", "plane", "concentric", "sigma_px", "diameters"});
+  node.AllowKeys({"id", "contour", "roi", "center", "radius", "plane", "concentric", "radius_group",
+                  "sigma_px", "diameters"});
   CircleObservation circle;
   circle.id = node.Require("id").Text();
   if (FindCircle(image->observations, circle.id) >= 0) {
@@ -89,6 +89,7 @@ void ReadCircle(const StorageNode& node, SceneImage* image) {
   circle.radius = ReadPositive(node.Get("radius"));
   circle.plane = ReadOptionalText(node.Get("plane"));
   circle.concentric = ReadOptionalText(node.Get("concentric"));
+  circle.radius_group = ReadOptionalText(node.Get("radius_group"));
   if (node.Get("center").Exists()) circle.center = ReadPoint(node.Get("center"));
   if (node.Get("diameters").Exists()) circle.diameters = ReadSegments(node.Get("diameters"));
   if (node.Get("contour").Exists()) {

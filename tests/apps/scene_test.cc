@@ -53,7 +53,7 @@ TEST(Scene, ReadsEverything) {
     camera: "cam0"
     circles:
       - { id: "c0", contour: [1,2, 3,4.5, 5,6, 7,8, 9,10], center: [5, 6], radius: 0.03, plane: "p0",
-          concentric: "g0", sigma_px: 0.2, diameters: [0,0,10,10, 0,10,10,0] }
+          concentric: "g0", radius_group: "dots", sigma_px: 0.2, diameters: [0,0,10,10, 0,10,10,0] }
       - { id: 1, roi: [10, 20.5, 30, 40], plane: "p0" }
     pencils:
       - { id: "L1", segments: [0,0,100,0, 0,50,100,50], direction: "x", plane: "p0", sigma_px: 1 }
@@ -87,6 +87,7 @@ TEST(Scene, ReadsEverything) {
   EXPECT_EQ(*o.circles[0].center, Eigen::Vector2d(5.0, 6.0));
   EXPECT_EQ(o.circles[0].radius, 0.03);
   EXPECT_EQ(o.circles[0].concentric, "g0");
+  EXPECT_EQ(o.circles[0].radius_group, "dots");
   EXPECT_EQ(o.circles[0].sigma_px, 0.2);
   EXPECT_EQ(o.circles[0].diameters.size(), 2U);
   EXPECT_EQ(o.circles[1].id, "1");
