@@ -68,18 +68,27 @@ Eigen::MatrixXd Sensitivity(const Evaluate& evaluate, const Inputs& inputs,
   return out;
 }
 
+// The pose; where neither an axis nor a direction is known, the spin about the normal is free.
+PoseHypothesis HypothesisOf(const Candidate& candidate, const Inputs& inputs) {
+  PoseHypothesis h;
+  h.cam_from_world = candidate.pose;
+  h.metric = inputs.IsMetric();
+  if (inputs.x_line.present() || inputs.y_line.present() || inputs.directions[0].present())
+    return h;
+  std::array<double, 6> spin{};
+  Eigen::Map<Vector6d>(spin.data()).head<3>() = candidate.pose.rotation.col(2);
+  h.free_directions.push_back(spin);
+  return h;
+}
+
 void FillUncertainty(const Evaluate& evaluate, const Inputs& inputs, const Candidate& candidate,
-                     bool rotation_is_free, PoseHypothesis* h) {
+                     PoseHypothesis* h) {
   const Eigen::MatrixXd S = Sensitivity(evaluate, inputs, candidate);
   Matrix6d covariance = S.topRows<6>() * S.topRows<6>().transpose();
-  if (rotation_is_free) {
-    Vector6d free = Vector6d::Zero();
-    free.head<3>() = candidate.pose.rotation.col(2);
+  for (const std::array<double, 6>& direction : h->free_directions) {
+    const Eigen::Map<const Vector6d> free(direction.data());
     const Matrix6d project = Matrix6d::Identity() - free * free.transpose();
     covariance = project * covariance * project;
-    std::array<double, 6> direction;
-    Eigen::Map<Vector6d>(direction.data()) = free;
-    h->free_directions.push_back(direction);
   }
   Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
   h->rank = CovarianceRank(covariance);
@@ -189,19 +198,14 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   if (estimate.status.ok()) estimate.status = recipe_.gather(evidence, options_.sigma_px, &inputs);
   if (!estimate.status.ok()) return estimate;
 
-  const std::vector<Candidate> candidates = recipe_.evaluate(inputs);
-  const bool free =
-      !inputs.x_line.present() && !inputs.y_line.present() && !inputs.directions[0].present();
-  for (const Candidate& candidate : candidates) {
-    PoseHypothesis h;
-    h.cam_from_world = candidate.pose;
-    h.metric = inputs.IsMetric();
+  for (const Candidate& candidate : recipe_.evaluate(inputs)) {
+    PoseHypothesis h = HypothesisOf(candidate, inputs);
     const FrameObservation& frame = evidence.frame;
     h.origin_observed =
         frame.origin || !frame.origin_is_center.empty() || (frame.x_axis && frame.y_axis);
     FillSupport(evidence, &h);
     if (candidate.circle) FillCircle(evidence, *candidate.circle, &h);
-    FillUncertainty(recipe_.evaluate, inputs, candidate, free, &h);
+    FillUncertainty(recipe_.evaluate, inputs, candidate, &h);
     estimate.hypotheses.push_back(std::move(h));
   }
   if (estimate.hypotheses.empty()) {
@@ -213,6 +217,23 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   }
   RankHypotheses(&estimate.hypotheses);
   estimate.decided_by = estimate.hypotheses.size() > 1 ? recipe_.decided_by : "only one pose fits";
+  return estimate;
+}
+
+PoseEstimate ClosedFormSolver::Seeds(const Observations& resolved) const {
+  PoseEstimate estimate;
+  estimate.solver = recipe_.name;
+  Observations evidence;
+  Inputs inputs;
+  estimate.status = recipe_.select(resolved, &evidence);
+  if (estimate.status.ok() && evidence.frame.plane != resolved.frame.plane)
+    estimate.status = Status::Refused(recipe_.name + ": its evidence spans another plane");
+  if (estimate.status.ok()) estimate.status = recipe_.gather(evidence, options_.sigma_px, &inputs);
+  if (!estimate.status.ok()) return estimate;
+  for (const Candidate& candidate : recipe_.evaluate(inputs))
+    estimate.hypotheses.push_back(HypothesisOf(candidate, inputs));
+  if (estimate.hypotheses.empty())
+    estimate.status = Status::Refused(recipe_.name + ": the evidence is degenerate");
   return estimate;
 }
 

@@ -22,6 +22,7 @@ class ClosedFormSolver : public Solver {
   std::string needs() const override { return recipe_.needs; }
   Observations Evidence(const Observations& observations) const override;
   PoseEstimate Solve(const Observations& observations) const override;
+  PoseEstimate Seeds(const Observations& resolved) const override;
 
  private:
   // Fitted and with a world frame; `problems`: see FitDirect.

@@ -24,6 +24,14 @@ class Solver {
   virtual std::string needs() const = 0;  // In words: "a circle and the image of its centre".
   // All hypotheses, best first, or a status that says what was missing or degenerate.
   virtual PoseEstimate Solve(const Observations& observations) const = 0;
+  // Where a refinement may start: poses of the plane of `resolved` (fitted, and ResolveWorld'ed),
+  // which need neither rank nor covariance.
+  virtual PoseEstimate Seeds(const Observations& resolved) const {
+    PoseEstimate estimate = Solve(resolved);
+    if (estimate.status.ok() && Evidence(resolved).frame.plane != resolved.frame.plane)
+      estimate.status = Status::Refused(name() + ": its evidence spans another plane");
+    return estimate;
+  }
   // The part of the observations that Solve uses, so that a refinement can be given the same.
   virtual Observations Evidence(const Observations& observations) const = 0;
 };

@@ -198,13 +198,11 @@ std::vector<CameraPose> CollectSeeds(const Observations& observations,
   std::vector<Seed> seeds;
   int source = 0;
   for (const std::shared_ptr<const Solver>& seeder : seeders) {
-    const PoseEstimate estimate = seeder->Solve(observations);
+    const PoseEstimate estimate = seeder->Seeds(observations);
     if (!estimate.status.ok()) {
       reasons->push_back(seeder->name() + ": " + estimate.status.message);
       continue;
     }
-    // Pencils tied to nothing span a plane of their own; a pose of that plane seeds nothing here.
-    if (seeder->Evidence(observations).frame.plane != observations.frame.plane) continue;
     ++source;
     for (const PoseHypothesis& h : estimate.hypotheses) {
       CameraPose pose = h.cam_from_world;
