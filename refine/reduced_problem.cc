@@ -144,25 +144,36 @@ class Assembler {
   }
 
  private:
-  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
-
   // Schur's complement, in place, of the own unknowns; where nothing is known of them (all points
   // far out under a redescending loss) they stay where they are.
   bool Eliminate(OwnUnknowns* own, QuadraticModel* model, double* log_det) {
-    const int p = own->size, s = own->shared_size;
-    Small H(p, p), C(p, s + 1);  // C: cross terms, then the gradient.
-    for (int a = 0; a < p; ++a) {
+    bool known = false;
+    if (own->size == 1) known = EliminateSome<1>(own, model, log_det);
+    if (own->size == 2) known = EliminateSome<2>(own, model, log_det);
+    if (own->size == 3) known = EliminateSome<3>(own, model, log_det);
+    if (!known) return !must_be_known_;
+    out_.eliminated.push_back(*own);
+    return true;
+  }
+
+  template <int kOwn>
+  bool EliminateSome(OwnUnknowns* own, QuadraticModel* model, double* log_det) {
+    const int s = own->shared_size;
+    Eigen::Matrix<double, kOwn, kOwn> H;
+    Eigen::Matrix<double, kOwn, 7> C, solution;  // Cross terms, then the gradient.
+    C.setZero();
+    for (int a = 0; a < kOwn; ++a) {
       const int ia = own->own[static_cast<std::size_t>(a)];
-      for (int b = 0; b < p; ++b)
+      for (int b = 0; b < kOwn; ++b)
         H(a, b) = model->hessian(ia, own->own[static_cast<std::size_t>(b)]);
       for (int b = 0; b < s; ++b)
         C(a, b) = model->hessian(ia, own->shared[static_cast<std::size_t>(b)]);
       C(a, s) = model->gradient[ia];
     }
-    const Eigen::LLT<Small> factor(H);
-    if (factor.info() != Eigen::Success) return !must_be_known_;
-    const Small solution = factor.solve(C);
-    if (!solution.allFinite()) return !must_be_known_;
+    const Eigen::LLT<Eigen::Matrix<double, kOwn, kOwn>> factor(H);
+    if (factor.info() != Eigen::Success) return false;
+    for (int b = 0; b <= s; ++b) solution.col(b) = factor.solve(C.col(b));
+    if (!solution.leftCols(s + 1).allFinite()) return false;
     for (int a = 0; a < s; ++a) {
       const int ia = own->shared[static_cast<std::size_t>(a)];
       for (int b = 0; b < s; ++b) {
@@ -171,13 +182,12 @@ class Assembler {
       }
       model->gradient[ia] -= C.col(a).dot(solution.col(s));
     }
-    for (int a = 0; a < p; ++a) {
+    for (int a = 0; a < kOwn; ++a) {
       own->step[static_cast<std::size_t>(a)] = -solution(a, s);
       out_.own_gain += 0.5 * C(a, s) * solution(a, s);
       for (int b = 0; b < s; ++b) own->gain(a, b) = solution(a, b);
       *log_det += 2.0 * std::log(factor.matrixLLT()(a, a));
     }
-    out_.eliminated.push_back(*own);
     return true;
   }
 
