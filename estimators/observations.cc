@@ -56,6 +56,9 @@ Status ValidatePencil(const PencilObservation& pencil) {
   if (!NonNegative(pencil.sigma_px)) return Status::Invalid(name + ": sigma_px must be 0 or more");
   for (const LineObservation& line : pencil.lines) {
     if (!Finite(line.points)) return Status::Invalid(name + ": a segment is not finite");
+    if (!NonNegative(line.sigma_px)) {
+      return Status::Invalid(name + ": sigma_px of a line must be 0 or more");
+    }
     if (!line.inliers.empty() && line.inliers.size() != line.points.size()) {
       return Status::Invalid(name + ": an inlier mask has another length than its line");
     }
@@ -139,6 +142,10 @@ Status Observations::Validate() const {
   if (status.ok()) status = ValidateFrame(*this);
   if (status.ok()) status = ValidateKnown(*this);
   return status;
+}
+
+double LineSigma(const PencilObservation& pencil, const LineObservation& line) {
+  return line.sigma_px > 0.0 ? line.sigma_px : pencil.sigma_px;
 }
 
 int FindCircle(const Observations& observations, const std::string& id) {
@@ -293,7 +300,7 @@ void FitDirect(double default_sigma_px, Observations* observations,
         observations->num_dropped_points +=
             CalibrateInliers(observations->camera, line.points, line.inliers, &points);
         LineFit fit;
-        const Status status = FitLine(points, sigma(pencil.sigma_px), &fit);
+        const Status status = FitLine(points, sigma(LineSigma(pencil, line)), &fit);
         if (status.ok()) line.fit = fit;
         report("pencil '" + pencil.id + "', line " + std::to_string(i), status);
       }

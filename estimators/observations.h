@@ -49,6 +49,8 @@ struct LineObservation {
 
   std::optional<LineFit> fit;
   std::vector<std::uint8_t> inliers;
+
+  double sigma_px = 0.0;  // Of each point's coordinates; 0 = that of the pencil.
 };
 
 enum class PencilDirection { kX, kY, kZ, kFree };            // Along a world axis, or unknown.
@@ -59,8 +61,9 @@ struct PencilObservation {
   std::string id;
   std::vector<LineObservation> lines;
   PencilDirection direction = PencilDirection::kFree;
-  std::string plane;      // The plane in which the lines lie; empty = none in particular.
-  double sigma_px = 0.0;  // Of each point's coordinates; 0 = not known.
+  std::string plane;  // The plane in which the lines lie; empty = none in particular.
+  double sigma_px =
+      0.0;  // Of each point's coordinates, where its line says nothing else; 0 = not known.
 
   std::optional<VanishingPointFit> fit;
 };
@@ -102,6 +105,9 @@ struct Observations {
   // non-finite number, a negative sigma, radius or length.
   Status Validate() const;
 };
+
+// Standard deviation of the points of a pencil's line: its own, else the pencil's; 0 = not known.
+double LineSigma(const PencilObservation& pencil, const LineObservation& line);
 
 // Index of a circle or pencil by id, or -1.
 int FindCircle(const Observations& observations, const std::string& id);

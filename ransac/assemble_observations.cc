@@ -12,6 +12,7 @@
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "circline/ransac/circle_grid.h"
+#include "circline/ransac/segment_meetings.h"
 
 namespace circline {
 namespace {
@@ -42,13 +43,15 @@ constexpr std::size_t kMaxSeeds = 16;
 constexpr double kDistinctDeg = 3.0;
 // Two pencils span a plane if they are this far from parallel.
 constexpr double kMinSpanDeg = 15.0;
-// Lines nearer than this meet in a corner, pixels; those that meet no line of the other pencil
-// count this much of their length for the plane of both.
-constexpr double kJunctionPx = 10.0;
+// Two pencils of one plane cross or form corners, while a wall and a floor far apart do not. Lines
+// that meet none of the other pencil count this much of their length for the plane of both.
 constexpr double kAloneWeight = 0.05;
-// A line counts fully if it meets this many of the other pencil: rows and columns, window fronts
-// and shelves do, lines that cross in the image by accident meet one or two.
-constexpr double kFullMeetings = 3.0;
+// The region of a thing's lines is widened by this factor: its outermost lines meet none.
+constexpr double kRegionGrowth = 1.1;
+// Lines that miss a direction by up to this are alike, radians.
+constexpr double kAlikeRad = 0.05;
+// It is one thing if its lines are this share of either pencil's length.
+constexpr double kMinLocalShare = 0.3;
 // A further pencil of the plane meets its lines over this share of its length.
 constexpr double kMinMeetingShare = 0.4;
 // The rim of a circle that agrees with two pencils counts as much as this many times its length in
@@ -125,23 +128,6 @@ bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
   return true;
 }
 
-double PointSegmentDistance(const Vector2d& p, const Segment& s) {
-  const Vector2d d = s[1] - s[0];
-  const double t = std::clamp((p - s[0]).dot(d) / std::max(d.squaredNorm(), 1e-12), 0.0, 1.0);
-  return (p - s[0] - t * d).norm();
-}
-
-// 0 where they cross.
-double SegmentDistance(const Segment& s, const Segment& t) {
-  const auto side = [](const Segment& line, const Vector2d& p) {
-    const Vector2d d = line[1] - line[0], e = p - line[0];
-    return d.x() * e.y() - d.y() * e.x();
-  };
-  if (side(s, t[0]) * side(s, t[1]) < 0.0 && side(t, s[0]) * side(t, s[1]) < 0.0) return 0.0;
-  return std::min({PointSegmentDistance(s[0], t), PointSegmentDistance(s[1], t),
-                   PointSegmentDistance(t[0], s), PointSegmentDistance(t[1], s)});
-}
-
 // A pencil, and its direction as the tests take it.
 struct PlacedPencil : DetectedPencil {
   PlacedPencil(DetectedPencil pencil, UncertainDirection d)
@@ -161,15 +147,16 @@ struct Plane {
 
 class Assembler {
  public:
-  Assembler(const AssemblyOptions& options, std::vector<CircleEvidence>* circles,
-            std::vector<DetectedPencil>* pencils)
-      : options_(options), circles_(*circles) {
+  Assembler(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
+            std::vector<CircleEvidence>* circles, std::vector<DetectedPencil>* pencils)
+      : options_(options), lines_(lines), circles_(*circles) {
     Place(pencils);
   }
 
   void Assemble(Observations* observations) {
     AddGrid(observations->camera);
-    const Plane plane = ChoosePlane();
+    Plane plane = ChoosePlane();
+    RefitOnPlane(&plane);
     SetPlane(plane);
     SetRoles(plane);
     Emit(plane, observations);
@@ -196,20 +183,6 @@ class Assembler {
     const std::size_t before = pencils_.size();
     Place(&rows);
     for (std::size_t i = before; i < pencils_.size(); ++i) pencils_[i].of_grid = true;
-  }
-
-  // Length of the lines of `a`, those that meet few of `b` at a reduced rate: two pencils of one
-  // plane cross or form corners, while a wall and a floor far apart do not.
-  static double JointSupport(const PlacedPencil& a, const PlacedPencil& b) {
-    double support = 0.0;
-    for (const Segment& s : a.ends) {
-      const auto meetings = std::count_if(b.ends.begin(), b.ends.end(), [&s](const Segment& t) {
-        return SegmentDistance(s, t) < kJunctionPx;
-      });
-      const double share = std::min(1.0, static_cast<double>(meetings) / kFullMeetings);
-      support += (s[1] - s[0]).norm() * (kAloneWeight + (1.0 - kAloneWeight) * share);
-    }
-    return support;
   }
 
   // The normal of a circle that agrees with the plane's, or null.
@@ -278,6 +251,24 @@ class Assembler {
     return mean;
   }
 
+  // Old houses have verticals a degree apart: the longest pencil stands for all that are nearly
+  // parallel to it.
+  bool HasLongerNeighbour(std::size_t i) const {
+    return !pencils_[i].of_grid &&
+           std::any_of(pencils_.begin(), pencils_.end(), [&](const PlacedPencil& other) {
+             return other.support_px > pencils_[i].support_px &&
+                    Near(pencils_[i], other.direction.vector);
+           });
+  }
+
+  // Length of the lines of two pencils that meet. No better than by the weaker of the two: one long
+  // pencil makes no plane.
+  double JointSupport(std::size_t i, std::size_t j) const {
+    const std::vector<Segment>& a = pencils_[i].ends;
+    const std::vector<Segment>& b = pencils_[j].ends;
+    return 2.0 * std::min(MeetingLength(a, b, kAloneWeight), MeetingLength(b, a, kAloneWeight));
+  }
+
   // The plane with most support: of two pencils and the circles that agree, or of circles alone.
   Plane ChoosePlane() const {
     Plane best;
@@ -285,19 +276,74 @@ class Assembler {
       if (plane.support_px > best.support_px) best = plane;
     };
     for (std::size_t i = 0; i < pencils_.size(); ++i) {
+      if (HasLongerNeighbour(i)) continue;
       for (std::size_t j = i + 1; j < pencils_.size(); ++j) {
+        if (HasLongerNeighbour(j)) continue;
         Plane plane;
         if (!SpannedNormal(pencils_[i].direction, pencils_[j].direction, &plane.normal)) continue;
         plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
-        // No better than by the weaker of the two: one long pencil makes no plane.
-        plane.support_px = 2.0 * std::min(JointSupport(pencils_[i], pencils_[j]),
-                                          JointSupport(pencils_[j], pencils_[i]));
+        plane.support_px = JointSupport(i, j);
         AddCircles(&plane);
         consider(plane);
       }
     }
     consider(circles_plane_);
     return best;
+  }
+
+  // The lines of the pencils that span the plane came from the whole photo, and only those that are
+  // exactly parallel. The region in which the two meet may be one thing: then all its lines count,
+  // bent or not, and no others.
+  void RefitOnPlane(Plane* plane) {
+    if (plane->pencils[0] < 0) return;
+    const std::array<int, 2> index = plane->pencils;
+    std::array<DetectedPencil, 2> local;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const PlacedPencil& pencil = pencils_[static_cast<std::size_t>(index[k])];
+      if (pencil.of_grid) return;
+      local[k] = pencil;
+    }
+    constexpr int kPasses = 4;  // The region grows with what it finds.
+    for (int pass = 0; pass < kPasses; ++pass) {
+      if (!RefitWhereTheyMeet(&local)) return;
+    }
+    for (std::size_t k = 0; k < 2; ++k) {
+      const PlacedPencil& pencil = pencils_[static_cast<std::size_t>(index[k])];
+      if (local[k].support_px < kMinLocalShare * pencil.support_px) return;
+    }
+    for (std::size_t k = 0; k < 2; ++k) {
+      const VanishingPointFit fit = *local[k].observation.fit;
+      pencils_[static_cast<std::size_t>(index[k])] =
+          PlacedPencil(std::move(local[k]), {fit.direction, fit.covariance});
+    }
+    SpannedNormal(pencils_[static_cast<std::size_t>(index[0])].direction,
+                  pencils_[static_cast<std::size_t>(index[1])].direction, &plane->normal);
+  }
+
+  // Fits two pencils to the lines of the region in which lines of about their directions meet;
+  // false where they do not.
+  bool RefitWhereTheyMeet(std::array<DetectedPencil, 2>* pair) const {
+    std::array<std::vector<Segment>, 2> alike;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Vector3d& direction = (*pair)[k].observation.fit->direction;
+      for (const DetectedLine& line : lines_) {
+        if (std::abs(line.fit.line.dot(direction)) < kAlikeRad) alike[k].push_back(line.ends);
+      }
+    }
+    const std::array<std::vector<int>, 2> core = ConnectedCore(alike[0], alike[1]);
+    std::vector<Vector2d> points;
+    for (std::size_t k = 0; k < 2; ++k) {
+      for (const int i : core[k]) {
+        const Segment& s = alike[k][static_cast<std::size_t>(i)];
+        points.insert(points.end(), s.begin(), s.end());
+      }
+    }
+    const ConvexRegion region(std::move(points), kRegionGrowth);
+    std::vector<int> inside;
+    for (std::size_t i = 0; i < lines_.size(); ++i) {
+      if (region.Contains(lines_[i].ends)) inside.push_back(static_cast<int>(i));
+    }
+    return RefitPencil(lines_, inside, &(*pair)[0]) && RefitPencil(lines_, inside, &(*pair)[1]);
   }
 
   // The plane with most support of circles alone.
@@ -335,7 +381,8 @@ class Assembler {
     if (plane.pencils[0] < 0) return plane.circles.size() >= 2;
     double meeting = 0.0;
     for (const int i : plane.pencils) {
-      meeting += JointSupport(pencil, pencils_[static_cast<std::size_t>(i)]);
+      meeting +=
+          MeetingLength(pencil.ends, pencils_[static_cast<std::size_t>(i)].ends, kAloneWeight);
     }
     return meeting >= kMinMeetingShare * pencil.support_px;
   }
@@ -423,6 +470,7 @@ class Assembler {
   }
 
   const AssemblyOptions& options_;
+  const std::vector<DetectedLine>& lines_;
   std::vector<CircleEvidence>& circles_;
   std::vector<PlacedPencil> pencils_;
   Plane circles_plane_;  // Of circles alone.
@@ -461,9 +509,10 @@ int CircleNormals(const ConicFit& fit, double inflation,
   return count;
 }
 
-void AssembleObservations(const AssemblyOptions& options, std::vector<CircleEvidence>* circles,
+void AssembleObservations(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
+                          std::vector<CircleEvidence>* circles,
                           std::vector<DetectedPencil>* pencils, Observations* observations) {
-  Assembler(options, circles, pencils).Assemble(observations);
+  Assembler(options, lines, circles, pencils).Assemble(observations);
 }
 
 }  // namespace circline

@@ -38,8 +38,11 @@ struct AssemblyOptions {
 // it, or of circles alone. Agreement is a test with the propagated covariances. Two pencils in it
 // that are orthogonal as far as can be told become x and y, a third orthogonal to both z; others
 // stay free. Appends circles ("c0", ...) and pencils ("L0", ...) to `observations`, those of the
-// plane first. `circles` and `pencils` are ordered by support; they are moved from.
-void AssembleObservations(const AssemblyOptions& options, std::vector<CircleEvidence>* circles,
+// plane first. `circles` and `pencils` are ordered by support; they are moved from. `lines` are
+// those that the pencils' members index; the two pencils that span the plane are fitted again to
+// all that lie where the two meet.
+void AssembleObservations(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
+                          std::vector<CircleEvidence>* circles,
                           std::vector<DetectedPencil>* pencils, Observations* observations);
 
 }  // namespace circline

@@ -3,9 +3,12 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 #include <utility>
 
 #include "circline/ransac/pencil_model.h"
+#include "circline/ransac/segment_meetings.h"
 
 namespace circline {
 namespace {
@@ -14,120 +17,203 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // Lines that are parallel in space miss their common direction by more than edges explain: in old
-// streets and on hand-made things by a third of a degree. The search allows for this much, the fit
-// then estimates how much it is, but not below what lens and calibration leave. Radians.
+// streets and on hand-made things by a third of a degree, on paper that bends by more. The search
+// allows for this much, and the fit for more where the lines are known to be of one thing; it
+// estimates how much it is, but not below what lens and calibration leave. Radians.
 constexpr double kSearchSigmaRad = 3e-3;
 constexpr double kExactSigmaRad = 5e-4;
 constexpr double kMinSpreadRad = 2e-4;
+constexpr double kMaxSpreadRad = 12e-3;
+// Around so many of the longest pencils, lines that meet them are searched by themselves for so
+// many.
+constexpr std::size_t kMaxSearchedAround = 3;
+constexpr int kFoundAround = 2;
+// Standard deviations within which a line belongs to a pencil.
+constexpr double kGate = 3.03;
+// What all points of a line share, pixels: no number of them averages it out. It turns short lines
+// by more than long ones; measured on the sides of chessboard squares.
+constexpr double kSharedErrorPx = 0.06;
 
-// The standard deviation (radians) by which lines miss the direction beyond what their own
-// covariances explain: chosen so that half of the total length has normalised residuals below the
-// median of a Gaussian's. Between kMinSpreadRad and kSearchSigmaRad.
-double EstimateSpread(const std::vector<DetectedLine>& lines, const std::vector<int>& members,
-                      const Vector3d& direction) {
-  const auto share_below = [&](double spread) {
-    double below = 0.0, total = 0.0;
-    for (const int i : members) {
-      const DetectedLine& line = lines[static_cast<std::size_t>(i)];
-      const double miss = line.fit.line.dot(direction);
-      const double variance = direction.dot(line.fit.covariance * direction) + spread * spread;
-      total += line.length_px;
-      if (miss * miss < 0.455 * variance) below += line.length_px;
+// A line's fit with the shared error in its covariance.
+LineFit WithSharedError(const DetectedLine& line) {
+  LineFit fit = line.fit;
+  const double n = static_cast<double>(line.points.size());
+  fit.covariance *= 1.0 + n * kSharedErrorPx * kSharedErrorPx / (line.sigma_px * line.sigma_px);
+  return fit;
+}
+
+// Fits the direction of one pencil to what it can have of all lines.
+class PencilFitter {
+ public:
+  PencilFitter(const std::vector<DetectedLine>& lines, const std::vector<LineFit>& fits,
+               double max_spread_rad)
+      : lines_(lines), fits_(fits), max_spread_(max_spread_rad) {}
+
+  // The search finds what roughly shares a direction. Here the scatter of the lines about it is
+  // estimated and the direction fitted to those of `candidates` within it, each with its own
+  // covariance and the common scatter: the lines of a printed board all count for what they were
+  // measured, those of an old street, each a third of a degree from parallel, count alike. False
+  // where nothing fits.
+  bool Fit(const std::vector<int>& candidates, FoundPencil* pencil, double* spread) const {
+    *spread = max_spread_;
+    constexpr int kPasses = 6;
+    for (int pass = 0; pass < kPasses; ++pass) {
+      const Vector3d direction = pencil->fit.direction;
+      const std::vector<int> near = Near(candidates, direction, max_spread_);
+      *spread = EstimateSpread(near, direction);
+      pencil->lines = Near(near, direction, *spread);
+      std::vector<LineFit> members;
+      for (const int i : pencil->lines) members.push_back(WithModelError(Line(i), *spread));
+      VanishingPointFit fit;
+      if (!FitVanishingPoint(members, &fit).ok()) return false;
+      pencil->fit = fit;
     }
-    return below / total;
-  };
-  double low = kMinSpreadRad, high = kSearchSigmaRad;
-  if (share_below(low) >= 0.5) return low;
-  if (share_below(high) <= 0.5) return high;
-  for (int step = 0; step < 12; ++step) {  // To a part in 4000 of the interval.
-    const double middle = 0.5 * (low + high);
-    (share_below(middle) < 0.5 ? low : high) = middle;
+    return true;
   }
-  return high;
-}
 
-// Moves the direction to where the pencil's lines are densest, if most of them are exactly
-// parallel.
-void StartAtDensest(const std::vector<DetectedLine>& lines, const PencilOptions& options,
-                    FoundPencil* pencil) {
-  std::vector<LineFit> members;
-  for (const int i : pencil->lines) members.push_back(lines[static_cast<std::size_t>(i)].fit);
-  PencilOptions exact = options;
-  exact.model_sigma_rad = kExactSigmaRad;
-  VanishingPointFit fit;
-  if (FitVanishingPointRobust(members, exact, &fit).ok()) pencil->fit = fit;
-}
-
-// The search finds what roughly shares a direction. Here the scatter of its lines about it is
-// estimated, those beyond it are dropped and the direction is fitted to the rest, each line with
-// its own covariance and the common scatter: the lines of a printed board all count for what they
-// were measured, those of an old street, each a third of a degree from parallel, count alike. No
-// line is left where nothing fits.
-void RefitPencil(const std::vector<DetectedLine>& lines, const PencilOptions& options,
-                 FoundPencil* pencil) {
-  const std::vector<int> all = pencil->lines;
-  double spread = kSearchSigmaRad;
-  StartAtDensest(lines, options, pencil);
-  constexpr int kPasses = 5;
-  for (int pass = 0; pass < kPasses; ++pass) {
-    spread = std::min(spread, EstimateSpread(lines, pencil->lines, pencil->fit.direction));
-    pencil->lines.clear();
-    std::vector<LineFit> fits;
-    for (const int i : all) {
-      LineFit line = lines[static_cast<std::size_t>(i)].fit;
-      line.covariance +=
-          spread * spread * (Matrix3d::Identity() - line.line * line.line.transpose());
-      const double r = VanishingPointResidual(line, pencil->fit.direction);
-      if (std::abs(r) > options.ransac.threshold) continue;
-      fits.push_back(line);
-      pencil->lines.push_back(i);
-    }
+  // Moves the direction to where the pencil's lines are densest, if most of them are exactly
+  // parallel.
+  void StartAtDensest(std::uint64_t seed, FoundPencil* pencil) const {
+    std::vector<LineFit> members;
+    for (const int i : pencil->lines) members.push_back(Line(i));
+    PencilOptions exact;
+    exact.ransac.seed = seed;
+    exact.model_sigma_rad = kExactSigmaRad;
     VanishingPointFit fit;
-    if (!FitVanishingPoint(fits, &fit).ok()) {
-      pencil->lines.clear();
-      break;
+    if (FitVanishingPointRobust(members, exact, &fit).ok()) pencil->fit = fit;
+  }
+
+ private:
+  const LineFit& Line(int i) const { return fits_[static_cast<std::size_t>(i)]; }
+
+  double Variance(int i, const Vector3d& direction, double spread) const {
+    return direction.dot(Line(i).covariance * direction) + spread * spread;
+  }
+
+  std::vector<int> Near(const std::vector<int>& candidates, const Vector3d& direction,
+                        double spread) const {
+    std::vector<int> near;
+    for (const int i : candidates) {
+      const double miss = Line(i).line.dot(direction);
+      if (miss * miss <= kGate * kGate * Variance(i, direction, spread)) near.push_back(i);
     }
-    pencil->fit = fit;
+    return near;
   }
-}
 
-// Of (value, weight) pairs, which it sorts; 0 for none.
-double WeightedMedian(std::vector<std::pair<double, double>>* values) {
-  std::sort(values->begin(), values->end());
-  double total = 0.0, sum = 0.0;
-  for (const auto& [value, weight] : *values) total += weight;
-  for (const auto& [value, weight] : *values) {
-    sum += weight;
-    if (sum >= 0.5 * total) return value;
+  // The standard deviation (radians) by which lines miss the direction beyond what their own
+  // covariances explain: chosen so that half of the total length has normalised residuals below the
+  // median of a Gaussian's. Between kMinSpreadRad and the largest.
+  double EstimateSpread(const std::vector<int>& members, const Vector3d& direction) const {
+    const auto share_below = [&](double spread) {
+      double below = 0.0, total = 0.0;
+      for (const int i : members) {
+        const double miss = Line(i).line.dot(direction);
+        const double length = lines_[static_cast<std::size_t>(i)].length_px;
+        total += length;
+        if (miss * miss < 0.455 * Variance(i, direction, spread)) below += length;
+      }
+      return below / std::max(total, 1.0);
+    };
+    double low = kMinSpreadRad, high = max_spread_;
+    if (share_below(low) >= 0.5) return low;
+    if (share_below(high) <= 0.5) return high;
+    for (int step = 0; step < 12; ++step) {  // To a part in 4000 of the interval.
+      const double middle = 0.5 * (low + high);
+      (share_below(middle) < 0.5 ? low : high) = middle;
+    }
+    return high;
   }
-  return 0.0;
-}
 
-DetectedPencil MakePencil(const FoundPencil& found, const std::vector<DetectedLine>& lines) {
+  const std::vector<DetectedLine>& lines_;
+  const std::vector<LineFit>& fits_;
+  double max_spread_;
+};
+
+DetectedPencil MakePencil(const FoundPencil& found, const std::vector<DetectedLine>& lines,
+                          const std::vector<LineFit>& fits, double spread) {
   DetectedPencil pencil;
   pencil.observation.fit = found.fit;
+  pencil.members = found.lines;
   double variance = 0.0, points = 0.0;
-  std::vector<std::pair<double, double>>
-      excess;  // Squared sigma that explains a line's miss; length.
+  const Vector3d& v = found.fit.direction;
   for (const int i : found.lines) {
     const DetectedLine& line = lines[static_cast<std::size_t>(i)];
+    const LineFit fit = WithModelError(fits[static_cast<std::size_t>(i)], spread);
     LineObservation observation;
     observation.points = line.points;
     observation.fit = line.fit;
-    pencil.observation.lines.push_back(std::move(observation));
+    // Points of lines that are not quite parallel are no better than the lines.
+    const double widening = v.dot(fit.covariance * v) / v.dot(line.fit.covariance * v);
+    observation.sigma_px = line.sigma_px * std::sqrt(widening);
+    observation.fit->covariance *= widening;
     const double n = static_cast<double>(line.points.size());
-    variance += n * line.sigma_px * line.sigma_px;
+    variance += n * observation.sigma_px * observation.sigma_px;
     points += n;
-    const double r = VanishingPointResidual(line.fit, found.fit.direction) * line.sigma_px;
-    excess.emplace_back(r * r, line.length_px);
+    pencil.observation.lines.push_back(std::move(observation));
     pencil.ends.push_back(line.ends);
     pencil.support_px += line.length_px;
   }
-  // Points of lines that are not quite parallel are no better than their lines' scatter. 0.455 is
-  // the median of the square of a standard Gaussian.
-  const double scatter = WeightedMedian(&excess) / 0.455;
-  pencil.observation.sigma_px = std::sqrt(std::max(variance / std::max(points, 1.0), scatter));
+  pencil.observation.sigma_px = std::sqrt(variance / std::max(points, 1.0));
   return pencil;
+}
+
+PencilOptions SearchOptions(int max_pencils, std::uint64_t seed) {
+  PencilOptions options;
+  options.ransac.seed = seed;
+  options.model_sigma_rad = kSearchSigmaRad;
+  options.max_pencils = max_pencils;
+  return options;
+}
+
+std::vector<LineFit> SharedErrorFits(const std::vector<DetectedLine>& lines) {
+  std::vector<LineFit> fits;
+  for (const DetectedLine& line : lines) fits.push_back(WithSharedError(line));
+  return fits;
+}
+
+// Pencils among lines[subset], each fitted to its own lines.
+std::vector<DetectedPencil> Search(const std::vector<DetectedLine>& lines,
+                                   const std::vector<LineFit>& fits, const std::vector<int>& subset,
+                                   const PencilOptions& options) {
+  std::vector<LineFit> chosen;
+  for (const int i : subset) chosen.push_back(fits[static_cast<std::size_t>(i)]);
+  std::vector<FoundPencil> found;
+  std::vector<DetectedPencil> pencils;
+  if (!FindPencils(chosen, options, &found).ok()) return pencils;
+  const PencilFitter fitter(lines, fits, kSearchSigmaRad);
+  for (FoundPencil& f : found) {
+    for (int& i : f.lines) i = subset[static_cast<std::size_t>(i)];
+    fitter.StartAtDensest(options.ransac.seed, &f);
+    double spread;
+    const std::vector<int> own = f.lines;
+    if (!fitter.Fit(own, &f, &spread)) continue;
+    if (static_cast<int>(f.lines.size()) < options.min_lines) continue;
+    pencils.push_back(MakePencil(f, lines, fits, spread));
+  }
+  return pencils;
+}
+
+// The lines that meet one of the pencil's, and are not of it.
+std::vector<int> LinesAround(const std::vector<DetectedLine>& lines, const DetectedPencil& pencil) {
+  std::vector<int> around;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const int k = static_cast<int>(i);
+    if (std::binary_search(pencil.members.begin(), pencil.members.end(), k)) continue;
+    const bool meets = std::any_of(pencil.ends.begin(), pencil.ends.end(),
+                                   [&](const Segment& s) { return Meet(s, lines[i].ends); });
+    if (meets) around.push_back(k);
+  }
+  return around;
+}
+
+// Whether most lines of `pencil` are those of one of the others already.
+bool IsKnown(const DetectedPencil& pencil, const std::vector<DetectedPencil>& others) {
+  return std::any_of(others.begin(), others.end(), [&](const DetectedPencil& other) {
+    std::vector<int> common;
+    std::set_intersection(pencil.members.begin(), pencil.members.end(), other.members.begin(),
+                          other.members.end(), std::back_inserter(common));
+    return 10 * common.size() >= 7 * pencil.members.size();
+  });
 }
 
 }  // namespace
@@ -135,24 +221,37 @@ DetectedPencil MakePencil(const FoundPencil& found, const std::vector<DetectedLi
 Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, std::uint64_t seed,
                      std::vector<DetectedPencil>* pencils) {
   pencils->clear();
-  std::vector<LineFit> fits;
-  for (const DetectedLine& line : lines) fits.push_back(line.fit);
-  PencilOptions pencil_options;
-  pencil_options.ransac.seed = seed;
-  pencil_options.model_sigma_rad = kSearchSigmaRad;
-  pencil_options.max_pencils = max_pencils;
-  std::vector<FoundPencil> found;
-  const Status status = FindPencils(fits, pencil_options, &found);
+  const PencilOptions options = SearchOptions(max_pencils, seed);
+  const Status status = options.Validate();
   if (!status.ok()) return status;
-  for (FoundPencil& f : found) {
-    RefitPencil(lines, pencil_options, &f);
-    if (static_cast<int>(f.lines.size()) < pencil_options.min_lines) continue;
-    pencils->push_back(MakePencil(f, lines));
+  const std::vector<LineFit> fits = SharedErrorFits(lines);
+  std::vector<int> all(lines.size());
+  std::iota(all.begin(), all.end(), 0);
+  *pencils = Search(lines, fits, all, options);
+  const auto longer = [](const DetectedPencil& a, const DetectedPencil& b) {
+    return a.support_px > b.support_px;
+  };
+  std::stable_sort(pencils->begin(), pencils->end(), longer);
+  const std::size_t num_around = std::min(kMaxSearchedAround, pencils->size());
+  for (std::size_t k = 0; k < num_around; ++k) {
+    const std::vector<int> around = LinesAround(lines, (*pencils)[k]);
+    for (DetectedPencil& found : Search(lines, fits, around, SearchOptions(kFoundAround, seed))) {
+      if (!IsKnown(found, *pencils)) pencils->push_back(std::move(found));
+    }
   }
-  std::stable_sort(
-      pencils->begin(), pencils->end(),
-      [](const DetectedPencil& a, const DetectedPencil& b) { return a.support_px > b.support_px; });
+  std::stable_sort(pencils->begin(), pencils->end(), longer);
   return Status::Ok();
+}
+
+bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
+                 DetectedPencil* pencil) {
+  const std::vector<LineFit> fits = SharedErrorFits(lines);
+  FoundPencil found;
+  found.fit = *pencil->observation.fit;
+  double spread;
+  if (!PencilFitter(lines, fits, kMaxSpreadRad).Fit(candidates, &found, &spread)) return false;
+  *pencil = MakePencil(found, lines, fits, spread);
+  return true;
 }
 
 }  // namespace circline

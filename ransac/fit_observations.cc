@@ -90,7 +90,8 @@ class Fitter {
       line.inliers.clear();
       Calibrate(line.points);
       LineFit fit;
-      const Status status = FitLineRobust(points_, FeatureOptions(pencil->sigma_px), &fit, &mask_);
+      const Status status =
+          FitLineRobust(points_, FeatureOptions(LineSigma(*pencil, line)), &fit, &mask_);
       if (!status.ok()) {
         Report(LineName(*pencil, i), status.message);
         continue;

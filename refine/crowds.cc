@@ -122,12 +122,12 @@ void RefitWithoutCrowds(const EstimationOptions& options, Observations* observat
     if (IsContaminated(circle.inliers)) Refit(camera, sigma, &circle);
   }
   for (PencilObservation& pencil : observations->pencils) {
-    const double sigma = SigmaPx(pencil.sigma_px, options.line_loss);
-    if (!(sigma > 0.0) || !Redescends(options.line_loss.type)) continue;
+    if (!Redescends(options.line_loss.type)) continue;
     bool changed = false;
     std::vector<LineFit> fits;
     for (LineObservation& line : pencil.lines) {
-      if (!line.fit) continue;
+      const double sigma = SigmaPx(LineSigma(pencil, line), options.line_loss);
+      if (!line.fit || !(sigma > 0.0)) continue;
       GateMisfit(camera, line.points, sigma, *line.fit, ToLine, &line.inliers);
       if (IsContaminated(line.inliers)) changed = Refit(camera, sigma, &line) || changed;
       fits.push_back(*line.fit);

@@ -231,7 +231,7 @@ void JointEvidence::AddPencil(int index) {
 void JointEvidence::AddLine(const PencilObservation& pencil, int theta, const LineObservation& line,
                             int axis, const std::string& name) {
   if (!line.fit) return;
-  const int set = AddSet(line.points, line.inliers, pencil.sigma_px, false);
+  const int set = AddSet(line.points, line.inliers, LineSigma(pencil, line), false);
   if (set < 0) return;
   LineTerm term{LineKind::kInPlane, set, theta, -1, line.fit->line, name};
   if (axis >= 0) {

@@ -132,7 +132,11 @@ class LossEvidence {
     if (!conic && !line) return image_.observations;
     stated_ = image_.observations;
     for (CircleObservation& circle : stated_.circles) circle.sigma_px *= conic ? 0.0 : 1.0;
-    for (PencilObservation& pencil : stated_.pencils) pencil.sigma_px *= line ? 0.0 : 1.0;
+    for (PencilObservation& pencil : stated_.pencils) {
+      if (!line) break;
+      pencil.sigma_px = 0.0;
+      for (LineObservation& observation : pencil.lines) observation.sigma_px = 0.0;
+    }
     return stated_;
   }
 

@@ -52,7 +52,7 @@ Observations Assemble(std::vector<CircleEvidence> circles, std::vector<DetectedP
   Observations observations;
   AssemblyOptions options;
   options.max_pencils = max_pencils;
-  AssembleObservations(options, &circles, &pencils, &observations);
+  AssembleObservations(options, {}, &circles, &pencils, &observations);
   return observations;
 }
 
