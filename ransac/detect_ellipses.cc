@@ -42,6 +42,7 @@ constexpr std::array<double, 3> kGatherPx = {2.5, 2.0, 1.5};
 // of a candidate's refit.
 constexpr double kTrimSigmas = 2.5;
 constexpr double kTrimMinSigmaPx = 0.1;
+constexpr int kMaxTrims = 10;
 // A first look at this many samples drops candidates with less than this share of support.
 constexpr int kQuickSamples = 40;
 constexpr double kQuickShare = 0.25;
@@ -65,9 +66,9 @@ constexpr double kIndependentPx = 3.0;
 // Candidates that are tried, as the number of tests of the false-alarm count.
 constexpr double kLog10Tests = 6.0;
 // Blobs and rounded rectangles resemble ellipses; what tells them apart is how closely edge points
-// keep to the contour and gradients to its normal. Each is measured in units of what a true rim
-// shows: its own imperfection, and in quadrature what the noise explains. Neither may exceed
-// kShapeLimit, nor both together 2.
+// keep to the contour, how nearly they run parallel to it, and how nearly their gradients are
+// across it. Each is measured in units of what a true rim shows at most: its own imperfection, and
+// in quadrature what the noise explains. Their sum may not exceed kShapeLimit.
 //
 // Root-mean-square distance, pixels. Prints, lenses and JPEG leave 0.05 to 0.15 px on photographed
 // rims, at most 2 % of the radius on small ones, while a blob's shape is off in proportion to its
@@ -79,13 +80,18 @@ constexpr double kShapeMaxSigmaPx = 0.5;
 constexpr double kShapeRmsPerPx = 5e-4;
 constexpr double kShapeRmsPerCoverage = 0.8;
 constexpr double kShapeUsualCoverage = 0.7;
-// Median angle between gradient and normal, degrees. Photographed rims leave 0.5 to 3 (the latter
-// at 4 px radius). Of Gaussian noise the median is 0.67 sigma; what is added accounts for the
-// points whose gradient is weaker than the average.
-constexpr double kShapeNormalDeg = 3.0;
-constexpr double kShapeNormalPerNoise = 1.0;
-constexpr double kShapeNormalPerPx = 2e-3;
-constexpr double kShapeLimit = 1.4;
+// Median angle between the contour and the chord from the kSlopeReach-th point before to that
+// behind on the chain, degrees: photographed rims leave 0.5 to 2.5.
+constexpr int kSlopeReach = 2;
+constexpr double kMaxChordPx = 3.0 * kSlopeReach;
+constexpr double kShapeSlopeDeg = 1.8;
+constexpr double kShapeSlopePerNoise = 0.5;
+constexpr double kShapeSlopePerPx = 4e-3;
+// Median angle between gradient and normal, degrees: mostly 0.5 to 3, but where the brightness
+// changes along a rim, as in a penumbra, gradients lean by that change over their own length.
+constexpr double kShapeNormalDeg = 6.0;
+constexpr double kShapeNormalPerNoise = 2.0;
+constexpr double kShapeLimit = 2.5;
 // While a candidate is still being refined, it may miss the limits by this factor.
 constexpr double kShapeSlack = 1.5;
 // A candidate with this much of its contour is accepted before pairs are looked at.
@@ -93,12 +99,14 @@ constexpr double kSureCoverage = 0.7;
 // The second look at a ragged contour: smoothing, and the largest part of the photo, pixels.
 constexpr double kSecondSmoothingPx = 1.6;
 constexpr int kMaxSecondLookPx = 200;
+// Up to this miss of the shape the first look has the better place.
+constexpr double kSecondLookLimit = 3.0;
 // Largest ellipse, in diagonals of the photo.
 constexpr double kMaxAxisDiagonals = 2.0;
 // Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
 constexpr double kDuplicatePx = 2.5;
 // Points beyond this many standard deviations take no part in the final fit.
-constexpr double kOutlierSigmas = 3.0;
+constexpr double kOutlierSigmas = 3.5;
 // No contour is known better than this, whatever its scatter says.
 constexpr double kMinSigmaPx = 0.05;
 
@@ -272,25 +280,58 @@ class EllipseDetector {
     }
   }
 
-  // Direct fit to the points at hand, and once more without those that stand out: the ends of an
-  // arc often follow a neighbour's edge, and a few such points spoil a least-squares fit.
-  bool FitTrimmed(Matrix3d* conic) {
+  // Direct fit to the points at hand, and again without those that stand out until these stay the
+  // same: the ends of an arc often follow a neighbour's edge, a shadow runs beside a rim, and a few
+  // such points spoil a least-squares fit.
+  bool FitTrimmed(Matrix3d* conic, int max_trims) {
     if (!FitConicDirect(fit_points_, conic).ok()) return false;
-    distances_.clear();
-    for (const CalibratedPoint& p : fit_points_) {
-      distances_.push_back(std::abs(ConicDistancePx(p, *conic)));
+    std::size_t before = fit_points_.size();
+    for (int round = 0; round < max_trims; ++round) {
+      Trim(*conic);
+      if (trimmed_.size() == before || trimmed_.size() < 6) break;
+      before = trimmed_.size();
+      Matrix3d better;
+      if (!FitConicDirect(trimmed_, &better).ok()) break;
+      *conic = better;
     }
-    sorted_ = distances_;
+    return true;
+  }
+
+  void Trim(const Matrix3d& conic) {
+    MeasureDistances(conic);
+    sorted_.clear();
+    for (const double d : distances_) sorted_.push_back(std::abs(d));
     const double limit = kTrimSigmas * std::max(kTrimMinSigmaPx, 1.4826 * Median(&sorted_));
     trimmed_.clear();
     for (std::size_t k = 0; k < fit_points_.size(); ++k) {
-      if (distances_[k] <= limit) trimmed_.push_back(fit_points_[k]);
+      if (std::abs(distances_[k]) <= limit) trimmed_.push_back(fit_points_[k]);
     }
-    if (trimmed_.size() == fit_points_.size() || trimmed_.size() < 6) return true;
-    Matrix3d better;
-    if (FitConicDirect(trimmed_, &better).ok()) *conic = better;
-    return true;
   }
+
+  // Signed, of the points at hand, pixels.
+  void MeasureDistances(const Matrix3d& conic) {
+    distances_.clear();
+    for (const CalibratedPoint& p : fit_points_) distances_.push_back(ConicDistancePx(p, conic));
+  }
+
+  // Median angle between the contour and the chains on which the points lie, degrees. (A chain's
+  // points follow each other in the map; where one ends, the next is elsewhere.)
+  double SlopeDeg(const Matrix3d& conic, const std::vector<int>& points) {
+    const int n = static_cast<int>(map_.points.size());
+    sorted_.clear();
+    for (const int i : points) {
+      if (i < kSlopeReach || i + kSlopeReach >= n) continue;
+      const CalibratedPoint* a = calibrated_.Get(i - kSlopeReach);
+      const CalibratedPoint* b = calibrated_.Get(i + kSlopeReach);
+      if (a == nullptr || b == nullptr) continue;
+      const double chord = (Pixel(i + kSlopeReach) - Pixel(i - kSlopeReach)).norm();
+      if (chord > kMaxChordPx || !(chord > 0.0)) continue;
+      sorted_.push_back(std::abs(ConicDistancePx(*b, conic) - ConicDistancePx(*a, conic)) / chord);
+    }
+    return ToDegrees(Median(&sorted_));
+  }
+
+  Vector2d Pixel(int i) const { return map_.points[static_cast<std::size_t>(i)].Position(); }
 
   // Whether the gradients on the arcs are across the contour that was fitted to their places: a
   // second opinion that costs little and is independent of the first.
@@ -330,18 +371,21 @@ class EllipseDetector {
       if (360.0 * support_.Coverage() < kEarlyShare * options_.min_arc_deg) return false;
       if (ToDegrees(support_.normal_median) > kEarlyNormalDeg) return false;
       CalibrateSupport(kRoughSamples);
-      if (!FitTrimmed(&candidate->conic)) return false;
+      if (!FitTrimmed(&candidate->conic, 1)) return false;
     }
     if (!Gather(*candidate, 1.5, kGatherPx.back(), 2 * kRoughSamples)) return false;
     candidate->score = support_.length_px * support_.Coverage();
     // One side all around explains more than either side does.
     if (candidate->bright == BrightSide::kEither) candidate->score *= 0.5;
     CalibrateSupport(kRoughSamples);
-    return Plausible(candidate->bright) && IsShaped(Rms(candidate->conic), kShapeSlack);
+    Trim(candidate->conic);
+    const double rms_px = Rms(trimmed_, candidate->conic);
+    return Plausible(candidate->bright) && rms_px <= kShapeSlack * options_.max_rms_px &&
+           ShapeMiss(rms_px, SlopeDeg(candidate->conic, fit_indices_)) <= kShapeSlack * kShapeLimit;
   }
 
-  // Whether the edges follow the contour as those of an ellipse do.
-  bool IsShaped(double rms_px, double slack) const {
+  // How far the edges are from following the contour as those of an ellipse do; see kShapeLimit.
+  double ShapeMiss(double rms_px, double slope_deg) const {
     const double coverage = std::min(support_.Coverage(), support_.turn / (2.0 * kPi));
     const double size = std::sqrt(contour_.major_px() * contour_.minor_px());
     const double rms_unit = std::hypot(std::min(kShapeRmsPx, kShapeRmsPerSize * size) +
@@ -349,12 +393,11 @@ class EllipseDetector {
                                        std::min(support_.sigma_px, kShapeMaxSigmaPx)) *
                             (1.0 + kShapeRmsPerCoverage * (coverage - kShapeUsualCoverage));
     const double noise_deg = ToDegrees(map_.gradient_noise / std::max(support_.gradient, 1e-9));
-    const double normal_unit = std::hypot(kShapeNormalDeg + kShapeNormalPerPx * support_.length_px,
-                                          kShapeNormalPerNoise * noise_deg);
-    const double rms = rms_px / rms_unit;
-    const double normal = ToDegrees(support_.normal_median) / normal_unit;
-    return rms_px <= slack * options_.max_rms_px && std::max(rms, normal) <= slack * kShapeLimit &&
-           rms + normal <= 2.0 * slack;
+    const double slope_unit = std::hypot(kShapeSlopeDeg + kShapeSlopePerPx * support_.length_px,
+                                         kShapeSlopePerNoise * noise_deg);
+    const double normal_unit = std::hypot(kShapeNormalDeg, kShapeNormalPerNoise * noise_deg);
+    return rms_px / rms_unit + slope_deg / slope_unit +
+           ToDegrees(support_.normal_median) / normal_unit;
   }
 
   bool Gather(const Candidate& candidate, double spacing, double reach, int max_samples = 20000) {
@@ -367,10 +410,14 @@ class EllipseDetector {
   // The calibrated support, or about `limit` points of it, evenly.
   void CalibrateSupport(std::size_t limit) {
     fit_points_.clear();
+    fit_indices_.clear();
     const std::size_t n = support_.points.size(), m = std::min(n, limit);
     for (std::size_t k = 0; k < m; ++k) {
-      const CalibratedPoint* p = calibrated_.Get(support_.points[k * n / m]);
-      if (p != nullptr) fit_points_.push_back(*p);
+      const int i = support_.points[k * n / m];
+      const CalibratedPoint* p = calibrated_.Get(i);
+      if (p == nullptr) continue;
+      fit_points_.push_back(*p);
+      fit_indices_.push_back(i);
     }
   }
 
@@ -431,13 +478,22 @@ class EllipseDetector {
   void Accept(Candidate candidate) {
     DetectedEllipse e;
     const Candidate rough = candidate;
-    if (!FinalFit(&candidate, &e)) {
-      candidate = rough;
-      if (!SecondLook(&candidate, &e)) return;
+    const double miss = FinalFit(&candidate, &e);
+    if (miss > kShapeLimit) {
+      Candidate smooth = rough;
+      DetectedEllipse seen;
+      if (!SecondLook(&smooth, &seen)) return;
+      // A wide Gaussian also takes in what runs beside the contour: it confirms the ellipse, but
+      // where the first scale is not too ragged, that has the better place.
+      if (miss > kSecondLookLimit) {
+        candidate = smooth;
+        e = std::move(seen);
+      }
     }
     e.bright = candidate.bright;
     if (IsDuplicate(e)) return;
-    supporter_.Take(support_.points);  // What the wider gathering finds belongs to it as well.
+    // What a wider gathering finds belongs to it as well.
+    if (Gather(candidate, 0.7, kGatherPx[1])) supporter_.Take(support_.points);
     supporter_.Take(e.points);
     accepted_.push_back(std::move(e));
   }
@@ -458,7 +514,7 @@ class EllipseDetector {
     Camera camera = camera_;  // Seen from the corner of the box; fits stay valid.
     camera.cx -= box.x;
     camera.cy -= box.y;
-    if (!EllipseDetector(map, camera, options_).FinalFit(candidate, e)) return false;
+    if (EllipseDetector(map, camera, options_).FinalFit(candidate, e) > kShapeLimit) return false;
     for (Vector2d& p : e->contour) p += Vector2d(box.x, box.y);
     // The points of the first scale that it explains.
     if (!Gather(*candidate, 0.7, kGatherPx[0])) return false;
@@ -478,24 +534,27 @@ class EllipseDetector {
   }
 
   // Maximum likelihood on all points of the contour, outliers left out; from a direct fit to all
-  // points, which brings the contour near enough for the nearest points to be its own.
-  bool FinalFit(Candidate* candidate, DetectedEllipse* e) {
-    if (!Gather(*candidate, 0.7, kGatherPx.back())) return false;
+  // points, which brings the contour near enough for the nearest points to be its own. Returns the
+  // shape's miss; infinite where there is no ellipse at all.
+  double FinalFit(Candidate* candidate, DetectedEllipse* e) {
+    constexpr double kNone = std::numeric_limits<double>::infinity();
+    if (!Gather(*candidate, 0.7, kGatherPx.back())) return kNone;
     Straighten(candidate->conic, e);
-    if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic)) return false;
+    if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic, kMaxTrims)) return kNone;
     const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
-    if (!Gather(*candidate, 0.7, reach)) return false;
-    if (!FitSupport(candidate->conic, e)) return false;
+    if (!Gather(*candidate, 0.7, reach)) return kNone;
+    if (!FitSupport(candidate->conic, e)) return kNone;
     candidate->conic = e->fit.conic;
-    if (!Plausible(candidate->bright) || !IsShaped(e->fit.rms_px, 1.0)) return false;
-    if (contour_.minor_px() < options_.min_axis_px) return false;
+    if (!Plausible(candidate->bright) || contour_.minor_px() < options_.min_axis_px ||
+        e->fit.rms_px > options_.max_rms_px) {
+      return kNone;
+    }
     e->coverage_deg = 360.0 * support_.Coverage();
     e->length_px = support_.length_px;
     e->turn_deg = ToDegrees(support_.turn);
     e->normal_deg = ToDegrees(support_.normal_median);
     e->contrast = support_.gradient;
-    Gather(*candidate, 0.7, kGatherPx[1]);
-    return true;
+    return ShapeMiss(e->fit.rms_px, SlopeDeg(candidate->conic, e->points));
   }
 
   // The edge points of the support where they would lie if the contour, `conic`, were straight.
@@ -545,16 +604,14 @@ class EllipseDetector {
   }
 
   void DropOutliers(DetectedEllipse* e) {
-    distances_.clear();
-    for (const CalibratedPoint& p : fit_points_) {
-      distances_.push_back(std::abs(ConicDistancePx(p, e->fit.conic)));
-    }
-    sorted_ = distances_;
+    MeasureDistances(e->fit.conic);
+    sorted_.clear();
+    for (const double d : distances_) sorted_.push_back(std::abs(d));
     // 1.4826: median absolute deviation to standard deviation of a Gaussian.
     const double limit = kOutlierSigmas * std::max(kMinSigmaPx, 1.4826 * Median(&sorted_));
     std::size_t kept = 0;
     for (std::size_t k = 0; k < distances_.size(); ++k) {
-      if (distances_[k] > limit) continue;
+      if (std::abs(distances_[k]) > limit) continue;
       fit_points_[kept] = fit_points_[k];
       e->contour[kept] = e->contour[k];
       e->points[kept++] = e->points[k];

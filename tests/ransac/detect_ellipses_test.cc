@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
@@ -15,9 +17,11 @@ namespace circline {
 namespace {
 
 using detection_test::AxisDeg;
+using detection_test::DataFolder;
 using detection_test::Develop;
 using detection_test::DistortedCamera;
 using detection_test::FisheyeCamera;
+using detection_test::HasSet;
 using detection_test::kPi;
 using detection_test::LookAt;
 using detection_test::Noise;
@@ -192,6 +196,45 @@ TEST(DetectEllipses, UndoesWhatTheBendDoesToTheRim) {
     EXPECT_NEAR(camera.fx * e.b, truth.b, 0.03) << blur;
     ASSERT_EQ(found[0].contour.size(), found[0].points.size());
   }
+}
+
+// Semi-axes in pixels.
+Ellipse InPixels(const DetectedEllipse& found, const Camera& camera) {
+  Ellipse e;
+  EXPECT_TRUE(ConicToEllipse(found.fit.conic, &e));
+  e.center = camera.fx * e.center + Vector2d(camera.cx, camera.cy);
+  e.a *= camera.fx;
+  e.b *= camera.fx;
+  return e;
+}
+
+// A photograph blurred by motion: grey copies of the dots lie on either side of them, and their
+// edges run beside the rims over part of these.
+TEST(DetectEllipses, KeepsToTheRimsBesideAPenumbra) {
+  if (!HasSet("ellipses-labelled")) GTEST_SKIP() << "no photographs in " << DataFolder();
+  const std::string folder = DataFolder() + "/ellipses-labelled/", file = "dots_00005.png";
+  const cv::Mat image = cv::imread(folder + file, cv::IMREAD_GRAYSCALE);
+  const Camera camera = TestCamera(image.cols, image.rows, image.cols);
+  std::vector<Ellipse> found;
+  for (const DetectedEllipse& e : Detect(image, camera)) found.push_back(InPixels(e, camera));
+  const cv::FileStorage storage(folder + "groundtruth.yml", cv::FileStorage::READ);
+  int labels = 0, hits = 0;
+  for (const cv::FileNode& node : storage["images"]) {
+    if (static_cast<std::string>(node["file"]) != file) continue;
+    for (const cv::FileNode& label : node["ellipses"]) {
+      cv::Mat truth;  // Centre, semi-axes, angle.
+      label["ellipse"] >> truth;
+      ++labels;
+      hits += std::any_of(found.begin(), found.end(), [&truth](const Ellipse& e) {
+        return std::hypot(e.center.x() - truth.at<double>(0), e.center.y() - truth.at<double>(1)) <
+                   0.5 &&
+               std::abs(e.a - truth.at<double>(2)) < 0.5 &&
+               std::abs(e.b - truth.at<double>(3)) < 0.5;
+      });
+    }
+  }
+  EXPECT_EQ(labels, 60);
+  EXPECT_GE(hits, 53);
 }
 
 TEST(DetectEllipses, RespectsItsLimits) {
