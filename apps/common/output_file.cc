@@ -1,6 +1,7 @@
 #include "apps/common/output_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -93,6 +94,17 @@ Status CreateFolder(const std::string& path) {
   if (fs::is_directory(path)) return Status::Ok();
   return Status::Invalid(path + ": this folder cannot be created" +
                          (error ? " (" + error.message() + ")" : ""));
+}
+
+FolderLock::~FolderLock() {
+  if (descriptor_ >= 0) close(descriptor_);
+}
+
+Status FolderLock::Take(const std::string& folder) {
+  descriptor_ = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool taken = descriptor_ < 0 || flock(descriptor_, LOCK_EX | LOCK_NB) == 0;
+  if (taken || errno != EWOULDBLOCK) return Status::Ok();
+  return Status::Invalid(folder + ": another run is writing into this folder");
 }
 
 std::vector<std::string> UniqueStems(const std::vector<std::string>& paths) {

@@ -53,6 +53,21 @@ Status WriteFile(const std::string& path, const std::string& content);
 // Creates a folder and its parents. Not ok where that cannot be, or where a file has that name.
 Status CreateFolder(const std::string& path);
 
+// While it lives, no other process has the folder; ends with this process, however that ends.
+class FolderLock {
+ public:
+  FolderLock() = default;
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+  // Not ok: another process has it. Ok also where the file system knows no locks.
+  Status Take(const std::string& folder);
+
+ private:
+  int descriptor_ = -1;
+};
+
 // One file name stem for each path, all different: the path's own stem where no other path has it,
 // else with as many folders in front as it takes ("left/01.jpg" -> "left_01"), or a number.
 std::vector<std::string> UniqueStems(const std::vector<std::string>& paths);

@@ -342,6 +342,7 @@ Status ExpandPattern(const std::string& pattern, std::vector<std::string>* paths
     return Status::Ok();
   }
   if (pattern.find_first_of("*?[") == std::string::npos) {
+    if (!IsPhotoName(pattern)) return Status::Invalid("--images: there is no folder " + pattern);
     *paths = {pattern};
     return Status::Ok();
   }

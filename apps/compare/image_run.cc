@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 
+#include "apps/common/photo_file.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/record.h"
 #include "circline/refine/refined_solvers.h"
@@ -22,20 +21,6 @@ class Stopwatch {
   using Clock = std::chrono::steady_clock;
   Clock::time_point start_ = Clock::now();
 };
-
-std::string ReadPhoto(const std::string& path, cv::Mat* photo) {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  if (!fs::exists(path, error)) return "the file does not exist";
-  if (fs::is_directory(path, error)) return "is a folder, not a photo";
-  if (fs::file_size(path, error) == 0 && !error) return "the file is empty";
-  try {
-    *photo = cv::imread(path, cv::IMREAD_ANYCOLOR);
-  } catch (const std::exception&) {
-    photo->release();
-  }
-  return photo->empty() ? "is not an image that can be read" : "";
-}
 
 std::string SizeError(const cv::Mat& photo, const Camera& camera) {
   const bool differs = (camera.width > 0 && camera.width != photo.cols) ||

@@ -92,11 +92,12 @@ void WorkAndSend(const ImageSet& images, const ImageWorker& worker, std::size_t 
 
 // Rank 0 alone looks at the folder; it tells the others how many images are done, or to stop.
 Status Prepare(const ImageSet& images, const CompareOptions& options, const ImageWorker& worker,
-               const Ranks& ranks, DonePart* done) {
+               const Ranks& ranks, FolderLock* lock, DonePart* done) {
   constexpr std::size_t kStop = static_cast<std::size_t>(-1);
   Status status;
   if (ranks.is_first()) {
     status = CreateFolder(options.overlays ? options.output + "/overlays" : options.output);
+    if (status.ok()) status = lock->Take(options.output);
     if (status.ok()) {
       status = PrepareFolder(options.output, options.resume, images, worker.solvers().Keys(options),
                              options.result_flags, done);
@@ -120,8 +121,9 @@ Status RunComparison(const ImageSet& images, const CompareOptions& options, cons
   if (options.threads > 0) cv::setNumThreads(std::min(options.threads, cv::getNumberOfCPUs()));
   LOG(INFO) << images.size() << " images, " << cv::getNumThreads() << " threads";
   const ImageWorker worker(options);
+  FolderLock lock;
   DonePart done;
-  Status status = Prepare(images, options, worker, ranks, &done);
+  Status status = Prepare(images, options, worker, ranks, &lock, &done);
   if (!status.ok()) return status;
   if (!ranks.is_first()) {
     WorkAndSend(images, worker, done.images, ranks);

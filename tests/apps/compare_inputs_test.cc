@@ -68,6 +68,14 @@ TEST_F(CompareInputs, WithoutACalibrationSaysHowToGetOne) {
   }
 }
 
+TEST_F(CompareInputs, FolderThatIsNotThere) {
+  const Outcome outcome = RunCompare("--images='" + folder_ / "photos" + "' --focal_px=300" +
+                                     " --output='" + folder_ / "out" + "'");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_CONTAINS(outcome.err, "there is no folder");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+}
+
 TEST_F(CompareInputs, BadValuesAreNamed) {
   ExpectUnusable("--fov_deg=180", "--fov_deg must be between 0 and 180");
   ExpectUnusable("--focal_px=-1", "--focal_px must be positive");

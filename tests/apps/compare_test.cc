@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/common/output_file.h"
 #include "tests/apps/board_set.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
@@ -253,6 +254,24 @@ TEST_F(CompareBadInput, OutputThatCannotBe) {
                                      folder_ / "file" + "'");
   EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
   EXPECT_EQ(ReadAll(folder_ / "file"), "x");
+}
+
+TEST_F(CompareBadInput, FolderOfARunUnderWay) {
+  const std::string arguments = Arguments(SceneOf(Image("good.png")));
+  ASSERT_EQ(RunCompare(arguments).exit_code, 0);
+  const std::string results = ReadAll(folder_ / "out/results.jsonl");
+  std::filesystem::copy(folder_ / "out", folder_ / "shard",
+                        std::filesystem::copy_options::recursive);
+  FolderLock lock;
+  ASSERT_TRUE(lock.Take(folder_ / "out").ok());
+  for (const std::string& flags :
+       {arguments + "--seed=3",
+        "--merge='" + folder_ / "shard" + "' --output='" + folder_ / "out" + "'"}) {
+    const Outcome outcome = RunCompare(flags);
+    EXPECT_EQ(outcome.exit_code, 2) << flags;
+    EXPECT_CONTAINS(outcome.err, "another run is writing into this folder");
+  }
+  EXPECT_EQ(ReadAll(folder_ / "out/results.jsonl"), results);
 }
 
 TEST_F(CompareBadInput, HelpAndVersionAndSolvers) {

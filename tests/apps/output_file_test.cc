@@ -32,6 +32,18 @@ TEST(OutputFile, NamesWhatCannotBeWritten) {
   EXPECT_TRUE(CreateFolder(folder / "new/sub").ok());
 }
 
+TEST(FolderLock, HasOneHolder) {
+  const TestFolder folder;
+  {
+    FolderLock first, second;
+    EXPECT_TRUE(first.Take(folder.path()).ok());
+    EXPECT_CONTAINS(second.Take(folder.path()).message, "another run is writing");
+  }
+  FolderLock third;
+  EXPECT_TRUE(third.Take(folder.path()).ok());
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
 TEST(UniqueStems, KeepNamesApart) {
   EXPECT_EQ(UniqueStems({"x/a.jpg", "x/b.jpg"}), (std::vector<std::string>{"a", "b"}));
   EXPECT_EQ(UniqueStems({"left/1.jpg", "right/1.jpg", "right/2.jpg"}),

@@ -1,0 +1,21 @@
+// Reading photos, of which any may be broken.
+#ifndef CIRCLINE_APPS_COMMON_PHOTO_FILE_H_
+#define CIRCLINE_APPS_COMMON_PHOTO_FILE_H_
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace circline::apps {
+
+// Grey or colour, 8 bits a channel. Returns what is wrong with the file, in words; empty: nothing.
+std::string ReadPhoto(const std::string& path, cv::Mat* photo);
+
+// Whether the file's end is missing, which decoders pass over with half a picture. False for what
+// is not a JPEG.
+bool IsCutOffJpeg(const std::vector<std::uint8_t>& bytes);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMMON_PHOTO_FILE_H_

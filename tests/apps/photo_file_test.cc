@@ -1,0 +1,88 @@
+#include "apps/common/photo_file.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/apps/test_files.h"
+
+namespace circline::apps {
+namespace {
+
+// A picture with enough in it that its file has a middle.
+cv::Mat Texture() {
+  cv::Mat picture(60, 80, CV_8UC3);
+  for (int v = 0; v < picture.rows; ++v) {
+    for (int u = 0; u < picture.cols; ++u) {
+      const int value = (u * u + 7 * v * v) % 256;
+      picture.at<cv::Vec3b>(v, u) = {static_cast<std::uint8_t>(value), 90, 200};
+    }
+  }
+  return picture;
+}
+
+std::vector<std::uint8_t> Encoded(const std::string& extension, const cv::Mat& picture) {
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(extension, picture, bytes);
+  return bytes;
+}
+
+class PhotoFile : public testing::Test {
+ protected:
+  std::string Read(const std::vector<std::uint8_t>& bytes) {
+    return ReadPhoto(folder_.Write("photo", std::string(bytes.begin(), bytes.end())), &photo_);
+  }
+  const TestFolder folder_;
+  cv::Mat photo_;
+};
+
+TEST_F(PhotoFile, ReadsWhateverDepthAndChannels) {
+  for (const char* extension : {".jpg", ".png", ".bmp", ".tiff"}) {
+    EXPECT_EQ(Read(Encoded(extension, Texture())), "") << extension;
+    EXPECT_EQ(photo_.type(), CV_8UC3) << extension;
+  }
+  cv::Mat grey, deep, with_alpha;
+  cv::extractChannel(Texture(), grey, 0);
+  EXPECT_EQ(Read(Encoded(".png", grey)), "");
+  EXPECT_EQ(photo_.type(), CV_8UC1);
+  grey.convertTo(deep, CV_16U, 257.0);
+  EXPECT_EQ(Read(Encoded(".png", deep)), "");
+  EXPECT_EQ(photo_.depth(), CV_8U);
+  EXPECT_EQ(cv::norm(photo_, grey, cv::NORM_INF), 0.0);
+  cv::merge(std::vector<cv::Mat>{grey, grey, grey, grey}, with_alpha);
+  EXPECT_EQ(Read(Encoded(".png", with_alpha)), "");
+  EXPECT_EQ(photo_.type(), CV_8UC3);
+}
+
+TEST_F(PhotoFile, SaysWhatIsWrong) {
+  EXPECT_EQ(ReadPhoto(folder_ / "none.jpg", &photo_), "the file does not exist");
+  EXPECT_EQ(ReadPhoto(folder_.path(), &photo_), "is a folder, not a photo");
+  EXPECT_EQ(Read({}), "the file is empty");
+  EXPECT_EQ(Read({1, 2, 3, 4}), "is not an image that can be read");
+}
+
+// A decoder would give half a picture.
+TEST_F(PhotoFile, FindsWhatIsCutOff) {
+  for (const char* extension : {".jpg", ".png"}) {
+    std::vector<std::uint8_t> bytes = Encoded(extension, Texture());
+    bytes.resize(bytes.size() / 2);
+    EXPECT_NE(Read(bytes), "") << extension;
+  }
+  // The end of a thumbnail is not that of the photo.
+  std::vector<std::uint8_t> photo = Encoded(".jpg", Texture());
+  const std::vector<std::uint8_t> thumbnail = Encoded(".jpg", Texture()(cv::Rect(0, 0, 16, 16)));
+  std::vector<std::uint8_t> segment = {0xFF, 0xE1,
+                                       static_cast<std::uint8_t>((thumbnail.size() + 2) / 256),
+                                       static_cast<std::uint8_t>((thumbnail.size() + 2) % 256)};
+  segment.insert(segment.end(), thumbnail.begin(), thumbnail.end());
+  photo.insert(photo.begin() + 2, segment.begin(), segment.end());
+  EXPECT_FALSE(IsCutOffJpeg(photo));
+  EXPECT_EQ(Read(photo), "");
+  photo.resize(photo.size() - 2);
+  EXPECT_TRUE(IsCutOffJpeg(photo));
+  photo.resize(segment.size() + 10);  // Before the first scan.
+  EXPECT_TRUE(IsCutOffJpeg(photo));
+}
+
+}  // namespace
+}  // namespace circline::apps
