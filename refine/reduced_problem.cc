@@ -160,8 +160,8 @@ class Assembler {
   bool EliminateSome(OwnUnknowns* own, QuadraticModel* model, double* log_det) {
     const int s = own->shared_size;
     Eigen::Matrix<double, kOwn, kOwn> H;
-    Eigen::Matrix<double, kOwn, 7> C, solution;  // Cross terms, then the gradient.
-    C.setZero();
+    // Of cross terms, then the gradient; what is not filled stays zero.
+    Eigen::Matrix<double, kOwn, 7> C = Eigen::Matrix<double, kOwn, 7>::Zero(), solution = C;
     for (int a = 0; a < kOwn; ++a) {
       const int ia = own->own[static_cast<std::size_t>(a)];
       for (int b = 0; b < kOwn; ++b)
