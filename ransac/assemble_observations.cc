@@ -43,15 +43,15 @@ constexpr std::size_t kMaxSeeds = 16;
 constexpr double kDistinctDeg = 3.0;
 // Two pencils span a plane if they are this far from parallel.
 constexpr double kMinSpanDeg = 15.0;
-// Two pencils of one plane cross or form corners, while a wall and a floor far apart do not. Lines
-// that meet none of the other pencil count this much of their length for the plane of both.
-constexpr double kAloneWeight = 0.05;
+// Two pencils of one plane cross or form corners, while the edges of a box and the stripes of a
+// cushion behind it do not: this share of either's length meets the other.
+constexpr double kMinSpanningShare = 0.1;
 // The region of a thing's lines is widened by this factor: its outermost lines meet none.
 constexpr double kRegionGrowth = 1.1;
 // Lines that miss a direction by up to this are alike, radians.
 constexpr double kAlikeRad = 0.05;
 // It is one thing if its lines are this share of either pencil's length.
-constexpr double kMinLocalShare = 0.3;
+constexpr double kMinLocalShare = 0.5;
 // A further pencil of the plane meets its lines over this share of its length.
 constexpr double kMinMeetingShare = 0.4;
 // The rim of a circle that agrees with two pencils counts as much as this many times its length in
@@ -261,12 +261,16 @@ class Assembler {
            });
   }
 
-  // Length of the lines of two pencils that meet. No better than by the weaker of the two: one long
-  // pencil makes no plane.
+  // Length of the lines of two pencils that meet; 0 where these are too few to tell a plane. No
+  // better than by the weaker of the two: one long pencil makes no plane.
   double JointSupport(std::size_t i, std::size_t j) const {
-    const std::vector<Segment>& a = pencils_[i].ends;
-    const std::vector<Segment>& b = pencils_[j].ends;
-    return 2.0 * std::min(MeetingLength(a, b, kAloneWeight), MeetingLength(b, a, kAloneWeight));
+    const PlacedPencil& a = pencils_[i];
+    const PlacedPencil& b = pencils_[j];
+    const double of_a = MeetingLength(a.ends, b.ends), of_b = MeetingLength(b.ends, a.ends);
+    if (of_a < kMinSpanningShare * a.support_px || of_b < kMinSpanningShare * b.support_px) {
+      return 0.0;
+    }
+    return 2.0 * std::min(of_a, of_b);
   }
 
   // The plane with most support: of two pencils and the circles that agree, or of circles alone.
@@ -283,6 +287,7 @@ class Assembler {
         if (!SpannedNormal(pencils_[i].direction, pencils_[j].direction, &plane.normal)) continue;
         plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
         plane.support_px = JointSupport(i, j);
+        if (!(plane.support_px > 0.0)) continue;
         AddCircles(&plane);
         consider(plane);
       }
@@ -381,8 +386,7 @@ class Assembler {
     if (plane.pencils[0] < 0) return plane.circles.size() >= 2;
     double meeting = 0.0;
     for (const int i : plane.pencils) {
-      meeting +=
-          MeetingLength(pencil.ends, pencils_[static_cast<std::size_t>(i)].ends, kAloneWeight);
+      meeting += MeetingLength(pencil.ends, pencils_[static_cast<std::size_t>(i)].ends);
     }
     return meeting >= kMinMeetingShare * pencil.support_px;
   }
@@ -450,7 +454,10 @@ class Assembler {
     for (PlacedPencil& pencil : pencils_) {
       if (static_cast<int>(observations->pencils.size()) >= options_.max_pencils) break;
       if (IsRepetition(pencil, observations->pencils)) continue;
-      pencil.observation.id = "L" + std::to_string(observations->pencils.size());
+      const std::string number = std::to_string(observations->pencils.size());
+      pencil.observation.id = "L" + number;
+      // Directions of different things: without a plane each they would be taken to span one.
+      if (!(plane.support_px > 0.0)) pencil.observation.plane = "p" + number;
       observations->pencils.push_back(std::move(pencil.observation));
     }
     if (plane.support_px > 0.0) observations->frame.plane = "p0";

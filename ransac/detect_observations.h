@@ -9,6 +9,8 @@
 // that has most support: of two pencils and the circles that agree with them, or of circles alone.
 // Two pencils in it that are orthogonal as far as their covariances can tell become its axes x and
 // y, a third one orthogonal to both z; where they are measurably not orthogonal, they stay free.
+// Pencils whose lines hardly meet (the edges of a box, the stripes of a cushion behind it) span no
+// plane: each is then in one of its own.
 // Rows and columns of a sheet of equal circles are pencils too: of lines through the images of
 // their centres. What cannot be a pose is said in `message`.
 #ifndef CIRCLINE_RANSAC_DETECT_OBSERVATIONS_H_

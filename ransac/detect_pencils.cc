@@ -1,10 +1,12 @@
 #include "circline/ransac/detect_pencils.h"
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "circline/ransac/pencil_model.h"
@@ -24,10 +26,11 @@ constexpr double kSearchSigmaRad = 3e-3;
 constexpr double kExactSigmaRad = 5e-4;
 constexpr double kMinSpreadRad = 2e-4;
 constexpr double kMaxSpreadRad = 12e-3;
-// Around so many of the longest pencils, lines that meet them are searched by themselves for so
-// many.
+// For so many of the longest pencils, so many are searched among the lines that meet theirs.
 constexpr std::size_t kMaxSearchedAround = 3;
 constexpr int kFoundAround = 2;
+// A line so nearly orthogonal to an axis (a sine) has no direction orthogonal to that axis.
+constexpr double kMinCross = 0.05;
 // Standard deviations within which a line belongs to a pencil.
 constexpr double kGate = 3.03;
 // What all points of a line share, pixels: no number of them averages it out. It turns short lines
@@ -147,7 +150,7 @@ DetectedPencil MakePencil(const FoundPencil& found, const std::vector<DetectedLi
     observation.sigma_px = line.sigma_px * std::sqrt(widening);
     observation.fit->covariance *= widening;
     const double n = static_cast<double>(line.points.size());
-    variance += n * observation.sigma_px * observation.sigma_px;
+    variance += n * line.sigma_px * line.sigma_px;
     points += n;
     pencil.observation.lines.push_back(std::move(observation));
     pencil.ends.push_back(line.ends);
@@ -193,17 +196,85 @@ std::vector<DetectedPencil> Search(const std::vector<DetectedLine>& lines,
   return pencils;
 }
 
-// The lines that meet one of the pencil's, and are not of it.
+// The lines that are near one of the pencil's, and not of it.
 std::vector<int> LinesAround(const std::vector<DetectedLine>& lines, const DetectedPencil& pencil) {
   std::vector<int> around;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const int k = static_cast<int>(i);
     if (std::binary_search(pencil.members.begin(), pencil.members.end(), k)) continue;
     const bool meets = std::any_of(pencil.ends.begin(), pencil.ends.end(),
-                                   [&](const Segment& s) { return Meet(s, lines[i].ends); });
+                                   [&](const Segment& s) { return AreNear(s, lines[i].ends); });
     if (meets) around.push_back(k);
   }
   return around;
+}
+
+// log of the number of directions with so many members expected among unrelated lines: the tests,
+// times the tail of the Poisson distribution (Chernoff's bound) for all members but the one that
+// proposed the direction.
+double LogFalseAlarms(std::size_t num_lines, double expected, std::size_t num_members) {
+  const double log_tests = std::log(std::max<double>(1.0, static_cast<double>(num_lines)));
+  const double k = static_cast<double>(num_members) - 1.0;
+  if (!(k > expected)) return log_tests;
+  return log_tests + k - expected - k * std::log(k / expected);
+}
+
+// Boxes, boards and rooms have right angles: each of lines[subset] proposes the direction that it
+// then has if it is orthogonal to `axis`, and that with the fewest false alarms is fitted.
+std::optional<DetectedPencil> SearchOrthogonal(const std::vector<DetectedLine>& lines,
+                                               const std::vector<LineFit>& fits,
+                                               const std::vector<int>& subset,
+                                               const Vector3d& axis) {
+  const PencilOptions options = SearchOptions(1, 0);
+  std::vector<LineFit> pool;
+  for (const int i : subset) {
+    pool.push_back(WithModelError(fits[static_cast<std::size_t>(i)], kSearchSigmaRad));
+  }
+  FoundPencil best;
+  best.log_false_alarms = std::log(options.max_false_alarms);
+  bool found = false;
+  for (const LineFit& proposer : pool) {
+    const Vector3d cross = axis.cross(proposer.line);
+    if (cross.norm() < kMinCross) continue;
+    const Vector3d direction = cross.normalized();
+    double expected = 0.0;
+    std::size_t members = 0;
+    for (const LineFit& line : pool) {
+      // A direction uniform on the sphere comes within kGate sigma with this probability.
+      expected += std::min(1.0, kGate * std::sqrt(direction.dot(line.covariance * direction)));
+      members += std::abs(VanishingPointResidual(line, direction)) <= kGate ? 1 : 0;
+    }
+    const double log_false_alarms = LogFalseAlarms(pool.size(), expected, members);
+    if (log_false_alarms >= best.log_false_alarms) continue;
+    best.log_false_alarms = log_false_alarms;
+    best.fit.direction = direction;
+    found = true;
+  }
+  double spread;
+  if (!found || !PencilFitter(lines, fits, kSearchSigmaRad).Fit(subset, &best, &spread)) {
+    return std::nullopt;
+  }
+  if (static_cast<int>(best.lines.size()) < options.min_lines) return std::nullopt;
+  return MakePencil(best, lines, fits, spread);
+}
+
+// The pencils orthogonal to one, among the lines that meet its own.
+std::vector<DetectedPencil> SearchAround(const std::vector<DetectedLine>& lines,
+                                         const std::vector<LineFit>& fits,
+                                         const DetectedPencil& pencil) {
+  std::vector<int> left = LinesAround(lines, pencil);
+  std::vector<DetectedPencil> found;
+  for (int k = 0; k < kFoundAround; ++k) {
+    std::optional<DetectedPencil> next =
+        SearchOrthogonal(lines, fits, left, pencil.observation.fit->direction);
+    if (!next) break;
+    std::vector<int> rest;
+    std::set_difference(left.begin(), left.end(), next->members.begin(), next->members.end(),
+                        std::back_inserter(rest));
+    left = std::move(rest);
+    found.push_back(std::move(*next));
+  }
+  return found;
 }
 
 // Whether most lines of `pencil` are those of one of the others already.
@@ -234,8 +305,7 @@ Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, st
   std::stable_sort(pencils->begin(), pencils->end(), longer);
   const std::size_t num_around = std::min(kMaxSearchedAround, pencils->size());
   for (std::size_t k = 0; k < num_around; ++k) {
-    const std::vector<int> around = LinesAround(lines, (*pencils)[k]);
-    for (DetectedPencil& found : Search(lines, fits, around, SearchOptions(kFoundAround, seed))) {
+    for (DetectedPencil& found : SearchAround(lines, fits, (*pencils)[k])) {
       if (!IsKnown(found, *pencils)) pencils->push_back(std::move(found));
     }
   }

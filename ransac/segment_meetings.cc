@@ -9,7 +9,10 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double kJunctionPx = 10.0;
+// The sides of chessboard squares form corners; the lines of a printed border, of a window and its
+// frame, keep a small distance. Pixels.
+constexpr double kCornerPx = 10.0;
+constexpr double kNearPx = 25.0;
 constexpr double kFullMeetings = 3.0;
 constexpr std::size_t kCoreMeetings = 2;
 
@@ -21,13 +24,17 @@ double PointSegmentDistance(const Vector2d& p, const Segment& s) {
   return (p - s[0] - t * d).norm();
 }
 
-// Whether the rectangles about two segments are farther apart than a junction.
-bool FarApart(const Segment& s, const Segment& t) {
+// Whether the rectangles about two segments are farther apart than `px`.
+bool FarApart(const Segment& s, const Segment& t, double px) {
   for (int k = 0; k < 2; ++k) {
-    if (std::min(s[0][k], s[1][k]) > std::max(t[0][k], t[1][k]) + kJunctionPx) return true;
-    if (std::min(t[0][k], t[1][k]) > std::max(s[0][k], s[1][k]) + kJunctionPx) return true;
+    if (std::min(s[0][k], s[1][k]) > std::max(t[0][k], t[1][k]) + px) return true;
+    if (std::min(t[0][k], t[1][k]) > std::max(s[0][k], s[1][k]) + px) return true;
   }
   return false;
+}
+
+bool AreWithin(double px, const Segment& s, const Segment& t) {
+  return !FarApart(s, t, px) && SegmentDistance(s, t) < px;
 }
 
 double Length(const Segment& s) { return (s[1] - s[0]).norm(); }
@@ -43,7 +50,7 @@ class Graph {
     }
     for (std::size_t i = 0; i < a.size(); ++i) {
       for (std::size_t j = 0; j < b.size(); ++j) {
-        if (!Meet(a[i], b[j])) continue;
+        if (!AreWithin(kCornerPx, a[i], b[j])) continue;
         neighbours_[i].push_back(size_a_ + j);
         neighbours_[size_a_ + j].push_back(i);
       }
@@ -122,17 +129,15 @@ double SegmentDistance(const Segment& s, const Segment& t) {
                    PointSegmentDistance(t[0], s), PointSegmentDistance(t[1], s)});
 }
 
-bool Meet(const Segment& s, const Segment& t) {
-  return !FarApart(s, t) && SegmentDistance(s, t) < kJunctionPx;
-}
+bool AreNear(const Segment& s, const Segment& t) { return AreWithin(kNearPx, s, t); }
 
-double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& b, double alone) {
+double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& b) {
   double length = 0.0;
   for (const Segment& s : a) {
     const auto meetings =
-        std::count_if(b.begin(), b.end(), [&s](const Segment& t) { return Meet(s, t); });
+        std::count_if(b.begin(), b.end(), [&s](const Segment& t) { return AreNear(s, t); });
     const double share = std::min(1.0, static_cast<double>(meetings) / kFullMeetings);
-    length += Length(s) * (alone + (1.0 - alone) * share);
+    length += Length(s) * share;
   }
   return length;
 }

@@ -14,16 +14,16 @@ namespace circline {
 // Smallest distance between two segments, pixels; 0 where they cross.
 double SegmentDistance(const Segment& s, const Segment& t);
 
-// Whether they cross or come within 10 pixels.
-bool Meet(const Segment& s, const Segment& t);
+// Whether they cross or come within 25 pixels.
+bool AreNear(const Segment& s, const Segment& t);
 
-// Length of the segments of `a`, pixels, each counted by how many of `b` it meets: fully from three
-// on (lines that cross by accident meet one or two), with `alone` of its length if none.
-double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& b, double alone);
+// Length of the segments of `a`, pixels, each counted by how many of `b` it is near to: fully from
+// three on; lines that cross by accident meet one or two.
+double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& b);
 
-// The largest (by length) set of segments of both lists that meetings between the two lists
-// connect, each of them meeting two or more of it (a line that touches a grid by accident meets
-// one): indices into either, ascending. Both empty where there is none.
+// The largest (by length) set of segments of both lists that crossings and corners (to 10
+// pixels) between the two lists connect, each of them with two or more of it (a line that touches a
+// grid by accident has one): indices into either, ascending. Both empty where there is none.
 std::array<std::vector<int>, 2> ConnectedCore(const std::vector<Segment>& a,
                                               const std::vector<Segment>& b);
 

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "tests/ransac/detection_test_util.h"
 
@@ -85,10 +87,61 @@ TEST(DetectPencils, KnowsTheScatterOfLinesThatAreNotQuiteParallel) {
     const Vector3d truth = kFirst * (kFirst.dot(fit.direction) < 0.0 ? -1.0 : 1.0);
     const Vector2d error(e1.dot(truth), e2.dot(truth));
     chi2 += error.dot(c.inverse() * error) / (2.0 * kTrials);
-    EXPECT_GT(pencils[0].observation.sigma_px, 0.16);
+    // So must the noise that the lines state, the longer the line the more.
+    const std::vector<LineObservation>& lines = pencils[0].observation.lines;
+    for (const LineObservation& line : lines) EXPECT_GT(line.sigma_px, 0.16);
   }
   EXPECT_GT(chi2, 0.3);
   EXPECT_LT(chi2, 3.0);
+}
+
+// A sheet that bends: its rows, in one part of the photo, point half a degree to either side.
+TEST(DetectPencils, ARefitTakesAllLinesOfWhatBends) {
+  constexpr int kLines = 40;
+  std::vector<DetectedLine> lines = MakePencil(kFirst, kLines, 0.009, 5);
+  const std::vector<DetectedLine> strangers = MakePencil(kSecond, 12, 0.0, 2);
+  lines.insert(lines.end(), strangers.begin(), strangers.end());
+  std::vector<int> all(lines.size());
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<DetectedPencil> pencils;
+  ASSERT_TRUE(DetectPencils(lines, 1, 1, &pencils).ok());
+  ASSERT_FALSE(pencils.empty());
+  DetectedPencil& pencil = pencils[0];
+  ASSERT_TRUE(RefitPencil(lines, all, &pencil));
+  EXPECT_GE(pencil.members.size(), 0.9 * kLines);
+  EXPECT_LT(pencil.members.back(), kLines);
+  const double error = AxisDeg(pencil.observation.fit->direction, kFirst);
+  const double sigma =
+      detection_test::kDegrees * std::sqrt(pencil.observation.fit->covariance.trace());
+  EXPECT_LT(error, 3.0 * sigma);
+  EXPECT_LT(sigma, 0.6);
+  const DetectedPencil before = pencil;
+  EXPECT_FALSE(RefitPencil(lines, {}, &pencil));
+  EXPECT_EQ(pencil.members, before.members);
+}
+
+// A few short lines that meet those of a long pencil are found though a crowd of others is about.
+TEST(DetectPencils, LooksAroundTheLongest) {
+  const Camera camera = detection_test::TestCamera();
+  Random random(3);
+  std::vector<DetectedLine> lines;
+  for (int k = 0; k < 12; ++k) {
+    lines.push_back(MakeLine(camera, 240.0, 100.0 + 11.0 * k, kFirst, 160.0, 0.0, 0.1, &random));
+  }
+  for (int k = 0; k < 7; ++k) {
+    lines.push_back(MakeLine(camera, 190.0 + 16.0 * k, 170.0, kSecond, 40.0, 0.0, 0.1, &random));
+  }
+  for (int k = 0; k < 30; ++k) {
+    const double u = random.Uniform(20.0, 460.0), v = random.Uniform(240.0, 350.0);
+    lines.push_back(MakeLine(camera, u, v, kFirst, 40.0, random.Uniform(-1.5, 1.5), 0.1, &random));
+  }
+  std::vector<DetectedPencil> pencils;
+  ASSERT_TRUE(DetectPencils(lines, 1, 1, &pencils).ok());
+  ASSERT_GE(pencils.size(), 2U);
+  EXPECT_LT(AxisDeg(pencils[0].observation.fit->direction, kFirst), 1.0);
+  EXPECT_TRUE(std::any_of(pencils.begin() + 1, pencils.end(), [](const DetectedPencil& p) {
+    return AxisDeg(p.observation.fit->direction, kSecond) < 1.5;
+  }));
 }
 
 TEST(DetectPencils, NothingFromNothing) {

@@ -17,18 +17,19 @@ TEST(SegmentMeetings, DistanceIsThatOfTheNearestPoints) {
   EXPECT_NEAR(SegmentDistance(s, Make(50, 7, 50, 40)), 7.0, 1e-12);
   EXPECT_NEAR(SegmentDistance(s, Make(103, 4, 140, 30)), 5.0, 1e-12);
   EXPECT_NEAR(SegmentDistance(Make(5, 5, 5, 5), s), 5.0, 1e-12);  // A point.
-  EXPECT_TRUE(Meet(s, Make(103, 4, 140, 30)));
-  EXPECT_FALSE(Meet(s, Make(50, 11, 50, 40)));
-  EXPECT_FALSE(Meet(s, Make(111, 0, 140, 0)));
+  EXPECT_TRUE(AreNear(s, Make(103, 4, 140, 30)));
+  EXPECT_TRUE(AreNear(s, Make(50, 24, 50, 40)));
+  EXPECT_FALSE(AreNear(s, Make(50, 26, 50, 40)));
+  EXPECT_FALSE(AreNear(s, Make(126, 0, 140, 0)));
 }
 
 TEST(SegmentMeetings, LengthCountsByTheNumberOfMeetings) {
-  const std::vector<Segment> across = {Make(10, -50, 10, 50), Make(40, -50, 40, 50),
-                                       Make(70, -50, 70, 50), Make(90, -50, 90, 50)};
-  EXPECT_NEAR(MeetingLength({Make(0, 0, 100, 0)}, across, 0.1), 100.0, 1e-9);
-  EXPECT_NEAR(MeetingLength({Make(0, 0, 15, 0)}, across, 0.1), 15.0 * (0.1 + 0.9 / 3.0), 1e-9);
-  EXPECT_NEAR(MeetingLength({Make(0, 90, 100, 90)}, across, 0.1), 10.0, 1e-9);
-  EXPECT_EQ(MeetingLength({}, across, 0.1), 0.0);
+  const std::vector<Segment> across = {Make(40, -50, 40, 50), Make(140, -50, 140, 50),
+                                       Make(240, -50, 240, 50), Make(280, -50, 280, 50)};
+  EXPECT_NEAR(MeetingLength({Make(0, 0, 300, 0)}, across), 300.0, 1e-9);
+  EXPECT_NEAR(MeetingLength({Make(0, 0, 60, 0)}, across), 20.0, 1e-9);
+  EXPECT_NEAR(MeetingLength({Make(0, 90, 300, 90)}, across), 0.0, 1e-9);
+  EXPECT_EQ(MeetingLength({}, across), 0.0);
 }
 
 // Rows and columns, and what touches them by accident.
