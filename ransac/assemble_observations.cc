@@ -1,137 +1,38 @@
 #include "circline/ransac/assemble_observations.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 
-#include "circline/estimators/circle_pose.h"
-#include "circline/estimators/conic.h"
 #include "circline/ransac/circle_grid.h"
+#include "circline/ransac/local_pencils.h"
 #include "circline/ransac/segment_meetings.h"
 
 namespace circline {
 namespace {
 
 using Eigen::Matrix3d;
-using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kRadians = 3.14159265358979323846 / 180.0;
-
-// Errors of a direction or a normal that no covariance of edge points knows: calibration, surfaces
-// that are not quite plane, prints that are not quite round. Standard deviation, degrees.
-constexpr double kModelSigmaDeg = 0.5;
-// Agreement is believed up to this many standard deviations.
-constexpr double kMaxSigmas = 3.0;
-// Two directions count as orthogonal within 2.5 standard deviations plus a quarter of a degree, and
-// never beyond 1.25 degrees: real streets and walls are off by more, and a false right angle
-// biases.
-constexpr double kOrthogonalSigmas = 2.5;
-constexpr double kOrthogonalDeg = 0.25;
-constexpr double kMaxOrthogonalDeg = 1.25;
-// Rows and columns of a sheet of circles are made at right angles; paper that bends shows them at
-// others. A lattice this near to a rectangular one is rectangular.
-constexpr double kRectangularDeg = 4.0;
 // Planes of circles alone start from this many of the best supported ones.
 constexpr std::size_t kMaxSeeds = 16;
-// Directions nearer than this are one.
-constexpr double kDistinctDeg = 3.0;
-// Two pencils span a plane if they are this far from parallel.
-constexpr double kMinSpanDeg = 15.0;
+// Directions nearer than this (a sine; 3 degrees) are one.
+constexpr double kDistinctSine = 0.0523;
 // Two pencils of one plane cross or form corners, while the edges of a box and the stripes of a
 // cushion behind it do not: this share of either's length meets the other.
 constexpr double kMinSpanningShare = 0.1;
-// The region of a thing's lines is widened by this factor: its outermost lines meet none.
-constexpr double kRegionGrowth = 1.1;
-// Lines that miss a direction by up to this are alike, radians.
-constexpr double kAlikeRad = 0.05;
-// It is one thing if its lines are this share of either pencil's length.
-constexpr double kMinLocalShare = 0.5;
 // A further pencil of the plane meets its lines over this share of its length.
 constexpr double kMinMeetingShare = 0.4;
 // The rim of a circle that agrees with two pencils counts as much as this many times its length in
 // lines: it is rarer than a line, and fixes both directions.
 constexpr double kCircleWeight = 3.0;
 
-// Angle between two axes (no sense of sign) and its standard deviation.
-struct AngleTest {
-  double angle_deg = 0.0, sigma_deg = 0.0;
-};
-
-AngleTest Compare(const UncertainDirection& a, const UncertainDirection& b) {
-  const double sign = a.vector.dot(b.vector) < 0.0 ? -1.0 : 1.0;
-  const Vector3d difference = a.vector - sign * b.vector;
-  const double norm = difference.norm();
-  AngleTest test;
-  test.angle_deg = 2.0 * std::asin(std::min(1.0, 0.5 * norm)) / kRadians;
-  const Matrix3d covariance = a.covariance + b.covariance;
-  const double variance = norm > 1e-12 ? difference.dot(covariance * difference) / (norm * norm)
-                                       : 0.5 * covariance.trace();
-  test.sigma_deg = std::hypot(std::sqrt(std::max(0.0, variance)) / kRadians, kModelSigmaDeg);
-  return test;
-}
-
-// How far from 90 degrees.
-AngleTest CompareToRightAngle(const UncertainDirection& a, const UncertainDirection& b) {
-  AngleTest test;
-  test.angle_deg = std::asin(std::min(1.0, std::abs(a.vector.dot(b.vector)))) / kRadians;
-  const double variance =
-      a.vector.dot(b.covariance * a.vector) + b.vector.dot(a.covariance * b.vector);
-  test.sigma_deg = std::sqrt(std::max(0.0, variance)) / kRadians;
-  return test;
-}
-
-bool SamePlane(const UncertainDirection& a, const UncertainDirection& b, double max_deg) {
-  const AngleTest test = Compare(a, b);
-  return test.angle_deg <= std::min(max_deg, kMaxSigmas * test.sigma_deg);
-}
-
-bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal,
-             double max_deg) {
-  const AngleTest test = CompareToRightAngle(direction, normal);
-  return test.angle_deg <=
-         std::min(max_deg, kMaxSigmas * std::hypot(test.sigma_deg, kModelSigmaDeg));
-}
-
-bool Orthogonal(const UncertainDirection& a, const UncertainDirection& b) {
-  const AngleTest test = CompareToRightAngle(a, b);
-  return test.angle_deg <=
-         std::min(kMaxOrthogonalDeg, kOrthogonalSigmas * test.sigma_deg + kOrthogonalDeg);
-}
-
-bool Rectangular(const UncertainDirection& a, const UncertainDirection& b) {
-  return CompareToRightAngle(a, b).angle_deg <= kRectangularDeg;
-}
-
-// Normal of the plane that two directions span: first-order propagation through the normalised
-// cross product. False where they are too nearly parallel.
-bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
-                   UncertainDirection* normal) {
-  const Vector3d cross = a.vector.cross(b.vector);
-  const double sine = cross.norm();
-  if (sine < std::sin(kMinSpanDeg * kRadians)) return false;
-  normal->vector = cross / sine;
-  const Matrix3d tangent =
-      (Matrix3d::Identity() - normal->vector * normal->vector.transpose()) / sine;
-  Matrix3d cross_a, cross_b;
-  for (int k = 0; k < 3; ++k) {
-    cross_a.col(k) = a.vector.cross(Vector3d::Unit(k));
-    cross_b.col(k) = Vector3d::Unit(k).cross(b.vector);
-  }
-  const Matrix3d ja = tangent * cross_b, jb = tangent * cross_a;
-  normal->covariance = ja * a.covariance * ja.transpose() + jb * b.covariance * jb.transpose();
-  return true;
-}
-
 // A pencil, and its direction as the tests take it.
 struct PlacedPencil : DetectedPencil {
-  PlacedPencil(DetectedPencil pencil, UncertainDirection d)
-      : DetectedPencil(std::move(pencil)), direction(std::move(d)) {}
+  explicit PlacedPencil(DetectedPencil pencil)
+      : DetectedPencil(std::move(pencil)),
+        direction{observation.fit->direction, observation.fit->covariance} {}
   UncertainDirection direction;
   bool of_grid = false;  // A row or column of circles.
   bool spans = false;    // One of the two that the plane was chosen by.
@@ -164,11 +65,7 @@ class Assembler {
 
  private:
   void Place(std::vector<DetectedPencil>* pencils) {
-    for (DetectedPencil& pencil : *pencils) {
-      const VanishingPointFit fit = *pencil.observation.fit;
-      const UncertainDirection direction{fit.direction, fit.covariance};
-      pencils_.emplace_back(std::move(pencil), direction);
-    }
+    for (DetectedPencil& pencil : *pencils) pencils_.emplace_back(std::move(pencil));
   }
 
   // Rows and columns of the circles' centres are pencils too.
@@ -193,7 +90,7 @@ class Assembler {
     for (int k = 0; k < circle.num_normals; ++k) {
       const UncertainDirection& candidate = circle.normals[static_cast<std::size_t>(k)];
       if (!SamePlane(candidate, normal, options_.max_shared_plane_deg)) continue;
-      const double angle = Compare(candidate, normal).angle_deg;
+      const double angle = AngleBetweenDeg(candidate, normal);
       if (angle > smallest) continue;
       smallest = angle;
       nearest = &candidate;
@@ -227,28 +124,11 @@ class Assembler {
   }
 
   UncertainDirection MeanNormal(const Plane& plane) const {
-    const double model = kModelSigmaDeg * kRadians;
-    Vector3d sum = Vector3d::Zero();
-    Matrix3d information = Matrix3d::Zero();
-    const Matrix3d tangent =
-        Matrix3d::Identity() - plane.normal.vector * plane.normal.vector.transpose();
+    std::vector<const UncertainDirection*> normals;
     for (const int i : plane.circles) {
-      const UncertainDirection* n =
-          AgreeingNormal(circles_[static_cast<std::size_t>(i)], plane.normal);
-      // Regular across the tangent plane by the model's variance, along the normal by a nominal
-      // one.
-      const Matrix3d weight = (n->covariance + model * model * Matrix3d::Identity()).inverse();
-      const Matrix3d w = tangent * weight * tangent;
-      information += w;
-      sum += w * (n->vector - plane.normal.vector);
+      normals.push_back(AgreeingNormal(circles_[static_cast<std::size_t>(i)], plane.normal));
     }
-    // Invertible: what is added acts along the normal only.
-    const Matrix3d normal_part = plane.normal.vector * plane.normal.vector.transpose();
-    const Matrix3d inverse = (information + information.trace() * normal_part).inverse();
-    UncertainDirection mean;
-    mean.vector = (plane.normal.vector + tangent * (inverse * sum)).normalized();
-    mean.covariance = tangent * inverse * tangent;
-    return mean;
+    return MeanDirection(plane.normal, normals);
   }
 
   // Old houses have verticals a degree apart: the longest pencil stands for all that are nearly
@@ -296,59 +176,18 @@ class Assembler {
     return best;
   }
 
-  // The lines of the pencils that span the plane came from the whole photo, and only those that are
-  // exactly parallel. The region in which the two meet may be one thing: then all its lines count,
-  // bent or not, and no others.
+  // The two pencils that span the plane may be of one thing, whose lines tell more than those of
+  // the whole photo.
   void RefitOnPlane(Plane* plane) {
     if (plane->pencils[0] < 0) return;
-    const std::array<int, 2> index = plane->pencils;
-    std::array<DetectedPencil, 2> local;
-    for (std::size_t k = 0; k < 2; ++k) {
-      const PlacedPencil& pencil = pencils_[static_cast<std::size_t>(index[k])];
-      if (pencil.of_grid) return;
-      local[k] = pencil;
-    }
-    constexpr int kPasses = 4;  // The region grows with what it finds.
-    for (int pass = 0; pass < kPasses; ++pass) {
-      if (!RefitWhereTheyMeet(&local)) return;
-    }
-    for (std::size_t k = 0; k < 2; ++k) {
-      const PlacedPencil& pencil = pencils_[static_cast<std::size_t>(index[k])];
-      if (local[k].support_px < kMinLocalShare * pencil.support_px) return;
-    }
-    for (std::size_t k = 0; k < 2; ++k) {
-      const VanishingPointFit fit = *local[k].observation.fit;
-      pencils_[static_cast<std::size_t>(index[k])] =
-          PlacedPencil(std::move(local[k]), {fit.direction, fit.covariance});
-    }
-    SpannedNormal(pencils_[static_cast<std::size_t>(index[0])].direction,
-                  pencils_[static_cast<std::size_t>(index[1])].direction, &plane->normal);
-  }
-
-  // Fits two pencils to the lines of the region in which lines of about their directions meet;
-  // false where they do not.
-  bool RefitWhereTheyMeet(std::array<DetectedPencil, 2>* pair) const {
-    std::array<std::vector<Segment>, 2> alike;
-    for (std::size_t k = 0; k < 2; ++k) {
-      const Vector3d& direction = (*pair)[k].observation.fit->direction;
-      for (const DetectedLine& line : lines_) {
-        if (std::abs(line.fit.line.dot(direction)) < kAlikeRad) alike[k].push_back(line.ends);
-      }
-    }
-    const std::array<std::vector<int>, 2> core = ConnectedCore(alike[0], alike[1]);
-    std::vector<Vector2d> points;
-    for (std::size_t k = 0; k < 2; ++k) {
-      for (const int i : core[k]) {
-        const Segment& s = alike[k][static_cast<std::size_t>(i)];
-        points.insert(points.end(), s.begin(), s.end());
-      }
-    }
-    const ConvexRegion region(std::move(points), kRegionGrowth);
-    std::vector<int> inside;
-    for (std::size_t i = 0; i < lines_.size(); ++i) {
-      if (region.Contains(lines_[i].ends)) inside.push_back(static_cast<int>(i));
-    }
-    return RefitPencil(lines_, inside, &(*pair)[0]) && RefitPencil(lines_, inside, &(*pair)[1]);
+    PlacedPencil& first = pencils_[static_cast<std::size_t>(plane->pencils[0])];
+    PlacedPencil& second = pencils_[static_cast<std::size_t>(plane->pencils[1])];
+    if (first.of_grid || second.of_grid) return;
+    std::array<DetectedPencil, 2> pair = {first, second};
+    if (!RefitWhereTheyMeet(lines_, &pair)) return;
+    first = PlacedPencil(std::move(pair[0]));
+    second = PlacedPencil(std::move(pair[1]));
+    SpannedNormal(first.direction, second.direction, &plane->normal);
   }
 
   // The plane with most support of circles alone.
@@ -464,7 +303,7 @@ class Assembler {
   }
 
   static bool Near(const PlacedPencil& pencil, const Vector3d& direction) {
-    return pencil.direction.vector.cross(direction).norm() < std::sin(kDistinctDeg * kRadians);
+    return pencil.direction.vector.cross(direction).norm() < kDistinctSine;
   }
 
   // Old houses have verticals a degree apart: what is nearly parallel to a better supported pencil
@@ -484,37 +323,6 @@ class Assembler {
 };
 
 }  // namespace
-
-int CircleNormals(const ConicFit& fit, double inflation,
-                  std::array<UncertainDirection, 2>* normals) {
-  std::array<CirclePose, 2> poses;
-  const int count = CirclePoses(fit.conic, &poses);
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(fit.Covariance());
-  for (int i = 0; i < count; ++i) {
-    UncertainDirection& normal = (*normals)[static_cast<std::size_t>(i)];
-    normal.vector = poses[static_cast<std::size_t>(i)].normal;
-    normal.covariance.setZero();
-    for (int k = 0; k < 6; ++k) {
-      // Steps of a tenth of a standard deviation: small enough to be linear.
-      constexpr double kStep = 0.1;
-      const double sigma = std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
-      const Vector6d moved = ConicToVector(fit.conic) + kStep * sigma * eigen.eigenvectors().col(k);
-      std::array<CirclePose, 2> moved_poses;
-      const int moved_count = CirclePoses(VectorToConic(moved), &moved_poses);
-      Vector3d change = Vector3d::Zero();
-      double nearest = std::numeric_limits<double>::infinity();
-      for (int j = 0; j < moved_count; ++j) {
-        const Vector3d d = moved_poses[static_cast<std::size_t>(j)].normal - normal.vector;
-        if (d.norm() < nearest) {
-          nearest = d.norm();
-          change = d / kStep;
-        }
-      }
-      normal.covariance += inflation * change * change.transpose();
-    }
-  }
-  return count;
-}
 
 void AssembleObservations(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
                           std::vector<CircleEvidence>* circles,

@@ -2,20 +2,14 @@
 #ifndef CIRCLINE_RANSAC_ASSEMBLE_OBSERVATIONS_H_
 #define CIRCLINE_RANSAC_ASSEMBLE_OBSERVATIONS_H_
 
-#include <Eigen/Core>
 #include <array>
 #include <vector>
 
 #include "circline/estimators/observations.h"
 #include "circline/ransac/detect_pencils.h"
+#include "circline/ransac/uncertain_direction.h"
 
 namespace circline {
-
-// A unit vector (a normal, or a pencil's direction) and its covariance, rank 2, rad^2.
-struct UncertainDirection {
-  Eigen::Vector3d vector = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-};
 
 struct CircleEvidence {
   CircleObservation observation;              // Points, sigma_px, fit; no id or plane yet.
@@ -23,11 +17,6 @@ struct CircleEvidence {
   int num_normals = 0;
   double support_px = 0.0;  // Length of rim that edges support.
 };
-
-// The normals of the planes that a circle can lie in, with covariances: those of the conic's own
-// covariance times `inflation`, by differences. Returns how many: 0, 1 or 2.
-int CircleNormals(const ConicFit& fit, double inflation,
-                  std::array<UncertainDirection, 2>* normals);
 
 struct AssemblyOptions {
   int max_pencils = 3;                // That are kept, those with a role first.

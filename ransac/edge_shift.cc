@@ -34,24 +34,20 @@ double MedianOf(std::vector<double> values) {
   return *middle;
 }
 
-// Unit gradient of the edge nearest to a point, among those across the line; else zero.
+// Unit gradient of the edge at a point of a line, or else of one beside it, across the line; zero
+// where there is none. Points of lines are means over a few pixels.
 Vector2d GradientAt(const EdgeMap& edges, const Vector2d& pixel, const Vector2d& across) {
   const int x = static_cast<int>(std::lround(pixel.x()));
   const int y = static_cast<int>(std::lround(pixel.y()));
-  Vector2d gradient = Vector2d::Zero();
-  double smallest = std::numeric_limits<double>::infinity();
-  for (int dy = -1; dy <= 1; ++dy) {
-    for (int dx = -1; dx <= 1; ++dx) {
-      const int i = edges.PointAt(x + dx, y + dy);
-      if (i < 0) continue;
-      const EdgePoint& edge = edges.points[static_cast<std::size_t>(i)];
-      const double distance = (edge.Position() - pixel).squaredNorm();
-      if (distance >= smallest || std::abs(edge.Normal().dot(across)) < kMinCosine) continue;
-      smallest = distance;
-      gradient = edge.Normal();
-    }
+  const bool steep = std::abs(across.x()) > std::abs(across.y());
+  for (const int step :
+       {0, -1, 1}) {  // Beside it is along the axis that is nearer to the gradient.
+    const int i = steep ? edges.PointAt(x + step, y) : edges.PointAt(x, y + step);
+    if (i < 0) continue;
+    const Vector2d gradient = edges.points[static_cast<std::size_t>(i)].Normal();
+    if (std::abs(gradient.dot(across)) >= kMinCosine) return gradient;
   }
-  return gradient;
+  return Vector2d::Zero();
 }
 
 // The gradients along a line; empty unless it has edges of both kinds.
@@ -59,6 +55,7 @@ std::vector<Vector2d> GradientsOfBothKinds(const EdgeMap& edges, const DetectedL
   const Vector2d along = (line.ends[1] - line.ends[0]).normalized();
   const Vector2d across(-along.y(), along.x());
   std::vector<Vector2d> gradients;
+  gradients.reserve(line.points.size());
   int left = 0, right = 0;
   for (const Vector2d& p : line.points) {
     gradients.push_back(GradientAt(edges, p, across));
