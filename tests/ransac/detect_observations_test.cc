@@ -6,23 +6,25 @@
 #include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/line_pose.h"
 #include "tests/ransac/detection_test_util.h"
+#include "tests/ransac/observations_test_util.h"
 
 namespace circline {
 namespace {
 
+using detection_test::Axes;
+using detection_test::AxesErrorDeg;
 using detection_test::AxisDeg;
-using detection_test::DataFolder;
+using detection_test::BetterNormalDeg;
+using detection_test::Detect;
 using detection_test::Develop;
 using detection_test::DistortedCamera;
 using detection_test::FisheyeCamera;
-using detection_test::HasSet;
 using detection_test::kDegrees;
 using detection_test::kPi;
 using detection_test::LookAt;
@@ -34,54 +36,10 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-Observations Detect(const cv::Mat& image, const Camera& camera,
-                    const DetectionOptions& options = {}) {
-  Observations found;
-  const Status status = DetectObservations(image, camera, options, &found);
-  EXPECT_TRUE(status.ok()) << status.message;
-  const Status valid = found.Validate();
-  EXPECT_TRUE(valid.ok()) << valid.message;
-  return found;
-}
-
 double Checker(double x, double y, double half_width, double half_height) {
   if (std::abs(x) > half_width || std::abs(y) > half_height) return 220.0;
   const int i = static_cast<int>(std::floor(x)), j = static_cast<int>(std::floor(y));
   return (i + j) % 2 == 0 ? 30.0 : 220.0;
-}
-
-// The x and y directions of the pencils with these roles; false where they are not both there.
-bool Axes(const Observations& found, Vector3d* x, Vector3d* y) {
-  bool has_x = false, has_y = false;
-  for (const PencilObservation& pencil : found.pencils) {
-    if (!pencil.fit) continue;
-    if (pencil.direction == PencilDirection::kX) {
-      *x = pencil.fit->direction;
-      has_x = true;
-    }
-    if (pencil.direction == PencilDirection::kY) {
-      *y = pencil.fit->direction;
-      has_y = true;
-    }
-  }
-  return has_x && has_y;
-}
-
-// Largest angle of the two directions to the nearest board axis (each to its own).
-double AxesErrorDeg(const Vector3d& x, const Vector3d& y, const Matrix3d& rotation) {
-  const Vector3d r1 = rotation.col(0), r2 = rotation.col(1);
-  return std::min(std::max(AxisDeg(x, r1), AxisDeg(y, r2)),
-                  std::max(AxisDeg(x, r2), AxisDeg(y, r1)));
-}
-
-double BetterNormalDeg(const CircleObservation& circle, const Vector3d& normal) {
-  std::array<CirclePose, 2> poses;
-  const int n = CirclePoses(circle.fit->conic, &poses);
-  double best = 180.0;
-  for (int k = 0; k < n; ++k) {
-    best = std::min(best, AxisDeg(poses[static_cast<std::size_t>(k)].normal, normal));
-  }
-  return best;
 }
 
 TEST(DetectObservations, ABoardGivesItsAxesThroughEveryLens) {
@@ -291,6 +249,29 @@ TEST(DetectObservations, OnePencilIsSaidToBeTooLittle) {
   EXPECT_NE(found.message.find("one pencil"), std::string::npos);
 }
 
+TEST(DetectObservations, DirectionsOfDifferentThingsSpanNoPlane) {
+  // Stripes on the left and other stripes on the right, nowhere near each other.
+  const Camera camera = TestCamera();
+  const cv::Mat image = Develop(Render(camera.width, camera.height, [](double u, double v) {
+    const auto stripe = [](double across) {
+      return static_cast<int>(std::floor(across / 12.0)) % 2 == 0 ? 60.0 : 190.0;
+    };
+    if (v < 60.0 || v > 300.0) return 120.0;
+    if (u > 40.0 && u < 160.0) return stripe(400.0 + u + 0.2 * v);
+    if (u > 300.0 && u < 440.0) return stripe(400.0 + v - 0.3 * u);
+    return 120.0;
+  }));
+  const Observations found = Detect(image, camera);
+  ASSERT_EQ(found.pencils.size(), 2U);
+  EXPECT_TRUE(found.circles.empty());
+  EXPECT_TRUE(found.frame.plane.empty());
+  EXPECT_NE(found.pencils[0].plane, found.pencils[1].plane);
+  EXPECT_NE(found.message.find("span no plane"), std::string::npos);
+  for (const PencilObservation& pencil : found.pencils) {
+    EXPECT_EQ(pencil.direction, PencilDirection::kFree);
+  }
+}
+
 TEST(DetectObservations, LimitsAreKept) {
   const Camera camera = TestCamera();
   const cv::Mat image =
@@ -417,119 +398,6 @@ TEST(DetectCircleInRoi, RefusesWhereThereIsNone) {
             StatusCode::kInvalidArgument);
   EXPECT_EQ(DetectCircleInRoi(cv::Mat(), camera, cv::Rect(0, 0, 50, 50), {}, &circle).code,
             StatusCode::kInvalidArgument);
-}
-
-// ------------------------------------------------------------------------------ real photographs
-
-cv::Mat ReadMatrix(const cv::FileNode& node, const char* key) {
-  cv::Mat m;
-  if (!node[key].empty()) node[key] >> m;
-  return m;
-}
-
-Camera ReadCamera(const cv::FileNode& node, const cv::Mat& photo) {
-  const cv::Mat k = ReadMatrix(node, "camera_matrix");
-  const cv::Mat d = ReadMatrix(node, "distortion_coefficients");
-  Camera camera;
-  camera.model = CameraModel::kOpenCV;
-  camera.width = photo.cols;
-  camera.height = photo.rows;
-  camera.fx = k.at<double>(0, 0);
-  camera.fy = k.at<double>(1, 1);
-  camera.cx = k.at<double>(0, 2);
-  camera.cy = k.at<double>(1, 2);
-  for (int i = 0; i < std::min(8, static_cast<int>(d.total())); ++i) {
-    camera.distortion[static_cast<std::size_t>(i)] = d.at<double>(i);
-  }
-  return camera;
-}
-
-// One photo of a set, its observations and its truth.
-struct Photo {
-  std::string file;
-  Observations found;
-  Matrix3d rotation;
-};
-
-std::vector<Photo> DetectSet(const std::string& set, std::size_t every) {
-  std::vector<Photo> photos;
-  const std::string folder = DataFolder() + "/" + set;
-  const cv::FileStorage storage(folder + "/groundtruth.yml", cv::FileStorage::READ);
-  std::size_t k = 0;
-  for (const cv::FileNode& node : storage["images"]) {
-    if (k++ % every != 0) continue;
-    Photo photo;
-    photo.file = static_cast<std::string>(node["file"]);
-    const cv::Mat image = cv::imread(folder + "/" + photo.file, cv::IMREAD_COLOR);
-    if (image.empty()) continue;
-    cv::FileNode camera_node = storage.root();
-    for (const cv::FileNode& c : storage["cameras"]) {
-      if (static_cast<std::string>(c["name"]) == static_cast<std::string>(node["camera"])) {
-        camera_node = c;
-      }
-    }
-    photo.found = Detect(image, ReadCamera(camera_node, image));
-    const cv::Mat r = ReadMatrix(node, "R");
-    for (int i = 0; i < 9 && !r.empty(); ++i)
-      photo.rotation(i / 3, i % 3) = r.at<double>(i / 3, i % 3);
-    photos.push_back(photo);
-  }
-  return photos;
-}
-
-double Median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values.empty() ? 1e9 : values[values.size() / 2];
-}
-
-TEST(RealPhotographs, ChessboardsGiveTheirAxes) {
-  if (!HasSet("chessboard-opencv")) GTEST_SKIP() << "no photographs in " << DataFolder();
-  std::vector<double> errors;
-  for (const Photo& photo : DetectSet("chessboard-opencv", 4)) {
-    Vector3d x, y;
-    const bool found = Axes(photo.found, &x, &y);
-    EXPECT_TRUE(found) << photo.file;
-    if (found) errors.push_back(AxesErrorDeg(x, y, photo.rotation));
-  }
-  EXPECT_GE(errors.size(), 6U);
-  EXPECT_LT(Median(errors), 0.5);
-}
-
-TEST(RealPhotographs, TheDiscOfTheTurntableIsFound) {
-  if (!HasSet("turntable-teabox")) GTEST_SKIP() << "no photographs in " << DataFolder();
-  std::vector<double> errors;
-  for (const Photo& photo : DetectSet("turntable-teabox", 2)) {
-    double best = 180.0;
-    for (const CircleObservation& circle : photo.found.circles) {
-      if (circle.points.size() < 150) continue;  // The rim, not a print on the box.
-      best = std::min(best, BetterNormalDeg(circle, photo.rotation.col(2)));
-    }
-    errors.push_back(best);
-  }
-  EXPECT_LT(Median(errors), 2.0);
-}
-
-TEST(RealPhotographs, LargeDiscsInStrongDistortionAreFoundAndShareAPlane) {
-  if (!HasSet("circles-discocal-tir")) GTEST_SKIP() << "no photographs in " << DataFolder();
-  for (const Photo& photo : DetectSet("circles-discocal-tir", 3)) {
-    int good = 0, on_plane = 0;
-    for (const CircleObservation& circle : photo.found.circles) {
-      good += BetterNormalDeg(circle, photo.rotation.col(2)) < 3.0 ? 1 : 0;
-      on_plane += circle.plane == "p0" ? 1 : 0;
-    }
-    EXPECT_GE(good, 11) << photo.file;
-    EXPECT_GE(on_plane, 9) << photo.file;
-  }
-}
-
-TEST(RealPhotographs, AStreetIsNotTakenForARightAngle) {
-  if (!HasSet("scene-lund")) GTEST_SKIP() << "no photographs in " << DataFolder();
-  for (const Photo& photo : DetectSet("scene-lund", 3)) {
-    EXPECT_GE(photo.found.pencils.size(), 2U) << photo.file;
-    for (const PencilObservation& pencil : photo.found.pencils) {
-      EXPECT_EQ(pencil.direction, PencilDirection::kFree) << photo.file;
-    }
-  }
 }
 
 }  // namespace

@@ -6,38 +6,16 @@
 #include <cmath>
 #include <numeric>
 
+#include "tests/ransac/detected_line_scene.h"
 #include "tests/ransac/detection_test_util.h"
 
 namespace circline {
 namespace {
 
 using detection_test::AxisDeg;
+using detection_test::MakeLine;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-// An image line of `length` pixels through (u, v), towards the vanishing point of `direction`
-// turned by `turn` radians, its points moved by noise of `sigma` pixels.
-DetectedLine MakeLine(const Camera& camera, double u, double v, const Vector3d& direction,
-                      double length, double turn, double sigma, Random* random) {
-  CalibratedPoint middle;
-  EXPECT_TRUE(PixelToCalibrated(camera, Vector2d(u, v), &middle));
-  const Vector2d to_vp = direction.head<2>() - direction.z() * middle.x;
-  const double angle = std::atan2(to_vp.y(), to_vp.x()) + turn;
-  const Vector2d along(std::cos(angle), std::sin(angle)), across(-along.y(), along.x());
-  DetectedLine line;
-  std::vector<CalibratedPoint> points;
-  for (double s = -0.5 * length; s <= 0.5 * length; s += 5.0) {
-    line.points.push_back(Vector2d(u, v) + s * along + sigma * random->Normal() * across);
-    CalibratedPoint p;
-    EXPECT_TRUE(PixelToCalibrated(camera, line.points.back(), &p));
-    points.push_back(p);
-  }
-  line.ends = {line.points.front(), line.points.back()};
-  line.length_px = length;
-  line.sigma_px = sigma;
-  EXPECT_TRUE(FitLine(points, sigma, &line.fit).ok());
-  return line;
-}
 
 std::vector<DetectedLine> MakePencil(const Vector3d& direction, int count, double scatter,
                                      std::uint64_t seed) {
