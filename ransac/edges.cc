@@ -1,6 +1,7 @@
 #include "circline/ransac/edges.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -21,11 +22,7 @@ constexpr double kRoundingNoise = 0.29;
 // noise.
 constexpr double kMaxThresholdRaise = 3.0;
 // Localisation is never better than this, whatever the noise says: pixels are not points.
-constexpr double kMinSigmaPx = 0.03;
-
-struct Gradient {
-  cv::Mat x, y, squared;  // 32-bit float; `squared` is the squared length.
-};
+constexpr float kMinSigmaPx = 0.03f;
 
 // Samples of a Gaussian and of its derivative; scaled so that a constant stays, and a ramp of slope
 // one yields one.
@@ -44,24 +41,6 @@ void GaussianKernels(double sigma, cv::Mat* smooth, cv::Mat* derivative) {
     smooth->at<float>(0, i + radius) = static_cast<float>(g / sum);
     derivative->at<float>(0, i + radius) = static_cast<float>(i * g / moment);
   }
-}
-
-Gradient ComputeGradient(const cv::Mat& gray, double sigma) {
-  cv::Mat smooth, derivative;
-  GaussianKernels(sigma, &smooth, &derivative);
-  Gradient g;
-  cv::sepFilter2D(gray, g.x, CV_32F, derivative, smooth, cv::Point(-1, -1), 0.0,
-                  cv::BORDER_REPLICATE);
-  cv::sepFilter2D(gray, g.y, CV_32F, smooth, derivative, cv::Point(-1, -1), 0.0,
-                  cv::BORDER_REPLICATE);
-  g.squared.create(gray.size(), CV_32F);
-  for (int y = 0; y < gray.rows; ++y) {
-    const float* gx = g.x.ptr<float>(y);
-    const float* gy = g.y.ptr<float>(y);
-    float* out = g.squared.ptr<float>(y);
-    for (int x = 0; x < gray.cols; ++x) out[x] = gx[x] * gx[x] + gy[x] * gy[x];
-  }
-  return g;
 }
 
 // Standard deviation of the pixels' noise: the mask (1 -2 1; -2 4 -2; 1 -2 1) cancels whatever is
@@ -98,85 +77,119 @@ double Threshold(double value, double factor, double noise) {
 
 // The vertex of the parabola through the logarithms of three samples of a squared gradient, in
 // samples from the middle one, and the variance of the Gaussian that it stands for.
-bool LocatePeak(float before, float middle, float after, double* offset, double* variance) {
+bool LocatePeak(float before, float middle, float after, float* offset, float* variance) {
   constexpr float kTiny = 1e-6f;  // The logarithm of zero, for a step between two pixels exactly.
-  const double a = std::log(static_cast<double>(std::max(before, kTiny)));
-  const double b = std::log(static_cast<double>(middle));
-  const double c = std::log(static_cast<double>(std::max(after, kTiny)));
-  const double curvature = a - 2.0 * b + c;
-  if (!(curvature < 0.0)) return false;
-  *offset = 0.5 * (a - c) / curvature;
-  *variance = -2.0 / curvature;  // The squared gradient halves the variance of the gradient.
-  return std::abs(*offset) <= 0.5 + 1e-9;
+  const float a = std::max(before, kTiny), c = std::max(after, kTiny);
+  const float curvature = std::log(a * c / (middle * middle));
+  if (!(curvature < 0.0f)) return false;
+  *offset = 0.5f * std::log(a / c) / curvature;
+  *variance = -2.0f / curvature;  // The squared gradient halves the variance of the gradient.
+  return std::abs(*offset) <= 0.5f + 1e-6f;
 }
 
 // The maxima of the gradient across itself, one a pixel at most, row by row.
 class PointFinder {
  public:
-  PointFinder(const Gradient& gradient, double low, double noise, double smoothing)
-      : gradient_(gradient),
+  PointFinder(const cv::Mat& gray, double smoothing, double low, double noise)
+      : gray_(gray),
         low_squared_(static_cast<float>(low * low)),
         // Noise of the gradient's slope at its peak, from that of the gradient, for white noise
         // seen through a Gaussian: sqrt(3/2) / sigma.
-        slope_noise_(noise * std::sqrt(1.5) / smoothing) {}
+        slope_noise_(static_cast<float>(noise * std::sqrt(1.5) / smoothing)) {
+    GaussianKernels(smoothing, &smooth_, &derivative_);
+    for (std::vector<float>& row : squared_) row.resize(static_cast<std::size_t>(gray.cols));
+  }
 
-  void Find(std::vector<EdgePoint>* points, std::vector<std::int32_t>* index) const {
-    const int width = gradient_.squared.cols, height = gradient_.squared.rows;
-    const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-    index->assign(pixels, -1);
-    points->reserve(pixels / 16);  // A busy photo's.
-    for (int y = 1; y + 1 < height; ++y) {
-      std::int32_t* out = index->data() + static_cast<std::ptrdiff_t>(y) * width;
-      const float* s = gradient_.squared.ptr<float>(y);
-      for (int x = 1; x + 1 < width; ++x) {
-        EdgePoint point;
-        if (s[x] < low_squared_ || !Locate(x, y, &point)) continue;
-        out[x] = static_cast<std::int32_t>(points->size());
-        points->push_back(point);
-      }
+  // The gradient is worked off in bands of rows, which stay in the processor's cache.
+  void Find(std::vector<EdgePoint>* points, std::vector<std::int32_t>* index) {
+    constexpr int kBandRows = 48;
+    index->assign(gray_.total(), -1);
+    points->reserve(gray_.total() / 8);  // A busy photo's.
+    for (int y = 1; y + 1 < gray_.rows; y += kBandRows) {
+      FindInBand(y, std::min(y + kBandRows, gray_.rows - 1), points, index);
     }
   }
 
  private:
-  bool Locate(int x, int y, EdgePoint* point) const {
-    const float gx = gradient_.x.at<float>(y, x), gy = gradient_.y.at<float>(y, x);
-    const bool horizontal = std::abs(gx) >= std::abs(gy);
-    const float* s = gradient_.squared.ptr<float>(y) + x;
-    const std::ptrdiff_t step =
-        horizontal ? 1 : static_cast<std::ptrdiff_t>(gradient_.squared.step1());
-    if (!(s[0] > s[-step] && s[0] >= s[step])) return false;
-    double offset, variance;
-    if (!LocatePeak(s[-step], s[0], s[step], &offset, &variance)) return false;
-    const float length = std::sqrt(s[0]);
-    point->x = static_cast<float>(x) + (horizontal ? static_cast<float>(offset) : 0.0f);
-    point->y = static_cast<float>(y) + (horizontal ? 0.0f : static_cast<float>(offset));
-    SetNormal(x, y, horizontal, static_cast<float>(offset), point);
-    point->gradient = length;
-    // Across the edge rather than along the axis.
-    const double cosine = static_cast<double>(std::max(std::abs(gx), std::abs(gy)) / length);
-    variance *= cosine * cosine;
-    point->blur_px = static_cast<float>(std::sqrt(variance));
-    point->sigma_px = static_cast<float>(
-        std::max(kMinSigmaPx, slope_noise_ * variance / static_cast<double>(length)));
-    return true;
+  // Rows [begin, end). (Filters see the pixels beyond a range of rows.)
+  void FindInBand(int begin, int end, std::vector<EdgePoint>* points,
+                  std::vector<std::int32_t>* index) {
+    top_ = begin - 1;
+    const cv::Mat band = gray_.rowRange(top_, end + 1);
+    cv::sepFilter2D(band, x_, CV_32F, derivative_, smooth_, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
+    cv::sepFilter2D(band, y_, CV_32F, smooth_, derivative_, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
+    Square(begin - 1);
+    Square(begin);
+    for (int y = begin; y < end; ++y) {
+      Square(y + 1);
+      FindInRow(y, index->data() + static_cast<std::ptrdiff_t>(y) * gray_.cols, points);
+    }
   }
 
-  // The direction of the gradient at the point, between the pixel and its neighbour.
-  void SetNormal(int x, int y, bool horizontal, float offset, EdgePoint* point) const {
+  // Rows of the gradient's components, and of its squared length: the last three squared.
+  const float* X(int y) const { return x_.ptr<float>(y - top_); }
+  const float* Y(int y) const { return y_.ptr<float>(y - top_); }
+  float* Squared(int y) { return squared_[static_cast<std::size_t>(y % 3)].data(); }
+
+  void Square(int y) {
+    const float* gx = X(y);
+    const float* gy = Y(y);
+    float* out = Squared(y);
+    for (int x = 0; x < gray_.cols; ++x) out[x] = gx[x] * gx[x] + gy[x] * gy[x];
+  }
+
+  void FindInRow(int y, std::int32_t* index, std::vector<EdgePoint>* points) {
+    const float* gx = X(y);
+    const float* gy = Y(y);
+    const float* above = Squared(y - 1);
+    const float* s = Squared(y);
+    const float* below = Squared(y + 1);
+    for (int x = 1; x + 1 < gray_.cols; ++x) {
+      if (s[x] < low_squared_) continue;
+      const bool horizontal = std::abs(gx[x]) >= std::abs(gy[x]);
+      const float before = horizontal ? s[x - 1] : above[x];
+      const float after = horizontal ? s[x + 1] : below[x];
+      if (!(s[x] > before && s[x] >= after)) continue;
+      float offset, variance;
+      if (!LocatePeak(before, s[x], after, &offset, &variance)) continue;
+      index[x] = static_cast<std::int32_t>(points->size());
+      points->push_back(MakePoint(x, y, horizontal, offset, variance, std::sqrt(s[x])));
+    }
+  }
+
+  EdgePoint MakePoint(int x, int y, bool horizontal, float offset, float variance,
+                      float length) const {
+    EdgePoint point;
+    point.x = static_cast<float>(x) + (horizontal ? offset : 0.0f);
+    point.y = static_cast<float>(y) + (horizontal ? 0.0f : offset);
+    const float gx = X(y)[x], gy = Y(y)[x];
+    // The gradient at the point, between the pixel and its neighbour.
     const int side = offset < 0.0f ? -1 : 1;
     const int x1 = horizontal ? x + side : x, y1 = horizontal ? y : y + side;
     const float t = std::abs(offset);
-    const float gx = (1.0f - t) * gradient_.x.at<float>(y, x) + t * gradient_.x.at<float>(y1, x1);
-    const float gy = (1.0f - t) * gradient_.y.at<float>(y, x) + t * gradient_.y.at<float>(y1, x1);
-    const float length = std::sqrt(gx * gx + gy * gy);
-    if (!(length > 0.0f)) return;
-    point->nx = gx / length;
-    point->ny = gy / length;
+    const float nx = (1.0f - t) * gx + t * X(y1)[x1];
+    const float ny = (1.0f - t) * gy + t * Y(y1)[x1];
+    const float norm = std::sqrt(nx * nx + ny * ny);
+    if (norm > 0.0f) {
+      point.nx = nx / norm;
+      point.ny = ny / norm;
+    }
+    point.gradient = length;
+    // Across the edge rather than along the axis.
+    const float cosine = std::max(std::abs(gx), std::abs(gy)) / length;
+    variance *= cosine * cosine;
+    point.blur_px = std::sqrt(variance);
+    point.sigma_px = std::max(kMinSigmaPx, slope_noise_ * variance / length);
+    return point;
   }
 
-  const Gradient& gradient_;
-  float low_squared_;
-  double slope_noise_;
+  const cv::Mat& gray_;
+  const float low_squared_;
+  const float slope_noise_;
+  cv::Mat smooth_, derivative_;
+  cv::Mat x_, y_;  // Of a band, 32-bit float, grey levels per pixel.
+  int top_ = 0;    // The photo's row that is the band's first.
+  std::array<std::vector<float>, 3> squared_;
 };
 
 // For each point the next and the previous one along its edge, or -1.
@@ -249,6 +262,7 @@ class ChainBuilder {
     const std::size_t n = map_->points.size();
     renumbered_.assign(n, -1);
     seen_.assign(n, 0);
+    kept_.reserve(n);
     for (std::size_t i = 0; i < n; ++i) {
       if (links_.previous[i] < 0) Walk(static_cast<std::int32_t>(i), false);
     }
@@ -348,13 +362,12 @@ Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edg
   edges->width = gray.cols;
   edges->height = gray.rows;
   edges->gray = gray;
-  const Gradient gradient = ComputeGradient(gray, options.smoothing_px);
   const double noise = GradientNoise(EstimateNoise(gray), options.smoothing_px);
   edges->gradient_noise = noise;
   const double low = Threshold(options.low_gradient, options.low_noise_factor, noise);
   const double high =
       std::max(low, Threshold(options.high_gradient, options.high_noise_factor, noise));
-  PointFinder(gradient, low, noise, options.smoothing_px).Find(&edges->points, &edges->index);
+  PointFinder(gray, options.smoothing_px, low, noise).Find(&edges->points, &edges->index);
   ChainBuilder(LinkPoints(*edges), static_cast<float>(high), options.min_chain_points, edges)
       .Build();
   return Status::Ok();
