@@ -12,6 +12,7 @@
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "circline/ransac/arcs.h"
+#include "circline/ransac/calibrated_edges.h"
 #include "circline/ransac/contour_support.h"
 
 namespace circline {
@@ -44,7 +45,8 @@ constexpr double kTrimSigmas = 2.5;
 constexpr double kTrimMinSigmaPx = 0.1;
 constexpr int kMaxTrims = 10;
 // A first look at this many samples drops candidates with less than this share of support.
-constexpr int kQuickSamples = 40;
+constexpr int kQuickSamples = 24;
+constexpr double kQuickPx = 2.0;
 constexpr double kQuickShare = 0.25;
 // ... or where so few of the samples near edges have them across the contour: on clutter 50 to 100
 // of 360 degrees pass for across.
@@ -117,28 +119,6 @@ using Eigen::Vector3d;
 double ToDegrees(double radians) { return radians * 180.0 / kPi; }
 
 // ------------------------------------------------------------------------------------ calibration
-
-// Edge points in calibrated coordinates, computed once and only where needed.
-class CalibratedEdges {
- public:
-  CalibratedEdges(const EdgeMap& map, const Camera& camera)
-      : map_(map), camera_(camera), points_(map.points.size()), state_(map.points.size(), 0) {}
-
-  // Null where the camera cannot undistort the point.
-  const CalibratedPoint* Get(int i) {
-    const auto k = static_cast<std::size_t>(i);
-    if (state_[k] == 0) {
-      state_[k] = PixelToCalibrated(camera_, map_.points[k].Position(), &points_[k]) ? 1 : 2;
-    }
-    return state_[k] == 1 ? &points_[k] : nullptr;
-  }
-
- private:
-  const EdgeMap& map_;
-  const Camera& camera_;
-  std::vector<CalibratedPoint> points_;
-  std::vector<std::uint8_t> state_;
-};
 
 Vector2d FromPixels(const CalibratedPoint& p, const Vector2d& shift) {
   return {p.x_from_pixel[0] * shift.x() + p.x_from_pixel[1] * shift.y(),
@@ -223,7 +203,7 @@ class EllipseDetector {
   void Consider(const Candidate& rough) {
     if (!contour_.Project(rough.conic, 0.5 * options_.min_axis_px, max_axis_px_)) return;
     if (!contour_.SampleCount(kQuickSamples, &samples_)) return;
-    const QuickSupport look = supporter_.QuickLook(samples_, kGatherPx[0]);
+    const QuickSupport look = supporter_.QuickLook(samples_, kQuickPx);
     const double own = look.across[static_cast<std::size_t>(rough.bright)];
     Candidate candidate = rough;
     if (own >= std::max(kQuickShare, kQuickAcross * look.any) && Improve(&candidate)) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "circline/ransac/calibrated_edges.h"
+
 namespace circline {
 namespace {
 
@@ -12,8 +14,6 @@ namespace {
 // below, any smooth curve passes for straight.
 constexpr int kSeedPoints = 9;
 constexpr double kMinPiecePx = 10.0;
-// Reach of the linear approximation of the lens, pixels.
-constexpr double kAnchorPx = 2.5;
 // So many points in a row off the line end a piece; fewer are noise.
 constexpr int kMaxMisses = 2;
 // Pieces are joined if the gap between them is not longer than the shorter of the two, nor than
@@ -92,9 +92,7 @@ class LineDetector {
  public:
   LineDetector(const EdgeMap& map, const Camera& camera, const LineOptions& options,
                const std::vector<std::uint8_t>* skip)
-      : map_(map), options_(options), points_(map.points.size()), usable_(map.points.size(), 0) {
-    for (const EdgeChain& chain : map.chains) Calibrate(camera, chain, skip);
-  }
+      : map_(map), options_(options), skip_(skip), calibrated_edges_(map, camera) {}
 
   std::vector<DetectedLine> Detect() {
     for (const EdgeChain& chain : map_.chains) CutChain(chain);
@@ -111,35 +109,15 @@ class LineDetector {
   }
 
  private:
-  const CalibratedPoint& X(int i) const { return points_[static_cast<std::size_t>(i)]; }
+  // Of usable points.
+  const CalibratedPoint& X(int i) const { return *calibrated_edges_.Get(i); }
   Vector2d Pixel(int i) const { return map_.points[static_cast<std::size_t>(i)].Position(); }
-  bool Usable(int i) const { return usable_[static_cast<std::size_t>(i)] != 0; }
+  bool Usable(int i) const {
+    if (skip_ != nullptr && (*skip_)[static_cast<std::size_t>(i)]) return false;
+    return calibrated_edges_.Get(i) != nullptr;
+  }
   double Distance(int i, const Vector3d& line) const {
     return std::abs(LineDistancePx(X(i), line));
-  }
-
-  // Undistorting is what takes longest: within kAnchorPx of a point the camera is linear, to 0.005
-  // px in the strongest distortion.
-  void Calibrate(const Camera& camera, const EdgeChain& chain,
-                 const std::vector<std::uint8_t>* skip) {
-    const CalibratedPoint* anchor = nullptr;
-    Vector2d anchor_px = Vector2d::Zero();
-    for (int i = chain.begin; i < chain.end; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (skip != nullptr && (*skip)[k]) continue;
-      const Vector2d from_anchor = Pixel(i) - anchor_px;
-      if (anchor != nullptr && from_anchor.squaredNorm() < kAnchorPx * kAnchorPx) {
-        const std::array<double, 4>& j = anchor->x_from_pixel;
-        points_[k] = *anchor;
-        points_[k].x += Vector2d(j[0] * from_anchor.x() + j[1] * from_anchor.y(),
-                                 j[2] * from_anchor.x() + j[3] * from_anchor.y());
-        usable_[k] = 1;
-        continue;
-      }
-      usable_[k] = PixelToCalibrated(camera, Pixel(i), &points_[k]) ? 1 : 0;
-      anchor = usable_[k] ? &points_[k] : nullptr;
-      anchor_px = Pixel(i);
-    }
   }
 
   // Greedily, from the first point on: seed, grow, go on behind.
@@ -158,6 +136,7 @@ class LineDetector {
   }
 
   bool Seed(int begin, Piece* piece) {
+    if (!Usable(begin)) return false;
     moments_ = Moments(X(begin).x);
     for (int i = begin; i < begin + kSeedPoints; ++i) {
       if (!Usable(i)) return false;
@@ -385,8 +364,8 @@ class LineDetector {
 
   const EdgeMap& map_;
   const LineOptions& options_;
-  std::vector<CalibratedPoint> points_;
-  std::vector<std::uint8_t> usable_;
+  const std::vector<std::uint8_t>* skip_;
+  mutable CalibratedEdges calibrated_edges_;  // Remembers what it was asked.
   std::vector<Piece> pieces_;
   std::vector<DetectedLine> lines_;
   // Scratch.
