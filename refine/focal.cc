@@ -10,6 +10,7 @@
 #include "circline/estimators/pose.h"
 #include "circline/refine/covariance.h"
 #include "circline/refine/graduated.h"
+#include "circline/refine/minimize.h"
 
 namespace circline {
 namespace {
@@ -96,7 +97,10 @@ void RefocusedEvidence::KeepInliers(const JointState& state, const JointEvidence
                  const auto index = static_cast<std::size_t>(&set - at.sets.data());
                  KeepFlagged(flags, &evidence_.sets[index].points);
                });
-  for (PointSet& set : evidence_.sets) set.loss = LossType::kTrivial;
+  for (PointSet& set : evidence_.sets) {
+    set.loss = LossType::kTrivial;
+    set.scatter.reset();
+  }
   for (PointTerm& point : evidence_.points) point.measured.loss = LossType::kTrivial;
 }
 

@@ -47,7 +47,7 @@ bool ComputeFocalModel(const JointEvidence& base, const NoiseScales& scales,
 // 1/2 (log_focal / prior sigma)^2; 0 where the focal length is fixed.
 double FocalPriorCost(const JointEvidence& evidence, double log_focal);
 
-// Minimize (reduced_problem.h) with graduated losses over the focal length as well: steps of
+// Minimize (minimize.h) with graduated losses over the focal length as well: steps of
 // Newton's method on the cost left by the others.
 Status MinimizeWithFocal(const JointEvidence& base, const NoiseScales& scales, double tolerance,
                          JointState* state, double* log_focal);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/refine/minimize.h"
+
 namespace circline {
 namespace {
 

@@ -42,7 +42,7 @@ void ForEachCurve(const JointEvidence& e, const JointState& state, const Visit& 
 // 1 where nothing lies far in their tails.
 double NeededStretch(const JointEvidence& evidence, const JointState& state);
 
-// Minimize (reduced_problem.h), where residuals lie far in the tails under losses as wide as these
+// Minimize (minimize.h), where residuals lie far in the tails under losses as wide as these
 // ask for, which narrow to their own width as the residuals shrink (Black and Rangarajan 1996).
 Status GraduatedMinimize(const JointEvidence& evidence, int max_iterations, double tolerance,
                          JointState* state);

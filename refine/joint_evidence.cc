@@ -88,7 +88,11 @@ int JointEvidence::AddSet(const std::vector<Eigen::Vector2d>& pixels,
     set.points.insert(set.points.end(), more.begin(), more.end());
   }
   if (set.points.empty()) return -1;
-  if (is_conic) set.Normalize();
+  if (is_conic) {
+    set.Normalize();
+  } else {
+    set.Compress();
+  }
   sets.push_back(std::move(set));
   return static_cast<int>(sets.size()) - 1;
 }

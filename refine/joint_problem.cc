@@ -14,6 +14,7 @@
 #include "circline/refine/covariance.h"
 #include "circline/refine/graduated.h"
 #include "circline/refine/joint_start.h"
+#include "circline/refine/minimize.h"
 
 namespace circline {
 namespace {

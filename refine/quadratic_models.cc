@@ -137,6 +137,25 @@ double SumSet(const PointSet& set, const Weighing& weighing, const Distance& dis
   return sum(std::integral_constant<LossType, LossType::kTrivial>());
 }
 
+// SumRobust of distances to a line without loss, from the points' scatter S alone: with q = l^T S l
+// and D = diag(what a pixel is worth, squared), g^2 = l^T D l, they sum to q / g^2.
+double SumScatter(const PointSet& set, const Eigen::Vector3d& line, Eigen::Vector3d* gradient,
+                  Eigen::Matrix3d* hessian) {
+  const CalibratedPoint& p = set.points.front();
+  const Eigen::Vector2d g = p.GradientPerPixel(line.head<2>());
+  const double weight = set.weight / (set.sigma_px * set.sigma_px * g.squaredNorm());
+  const Eigen::Vector3d Sl = *set.scatter * line;
+  const double q = line.dot(Sl);
+  if (hessian != nullptr) {
+    Eigen::Vector3d Dl = Eigen::Vector3d::Zero();  // Over g^2.
+    Dl.head<2>() = NormGradient(p, g) / g.squaredNorm();
+    *gradient += weight * (Sl - q * Dl);
+    *hessian += weight * (*set.scatter - Sl * Dl.transpose() - Dl * Sl.transpose() +
+                          q * Dl * Dl.transpose());
+  }
+  return 0.5 * weight * q;
+}
+
 // A calibrated point x meets the plane at y = R^T x; with Q the circle in (X, Y, 1) and (X, Y, 1) ~
 // (y1, y2, facing y3), the image is R M R^T, M = D Q D, D = diag(1, 1, facing).
 Eigen::Matrix3d PlaneCircle(double facing, double cx, double cy, double radius) {
@@ -224,6 +243,17 @@ void PointSet::Normalize() {
   scale *= spread;
 }
 
+void PointSet::Compress() {
+  constexpr std::size_t kFew = 4;  // Below, the points themselves are as quick.
+  if (loss != LossType::kTrivial || points.size() < kFew) return;
+  const auto same = [this](const CalibratedPoint& p) {
+    return p.x_from_pixel == points.front().x_from_pixel;
+  };
+  if (!std::all_of(points.begin(), points.end(), same)) return;
+  scatter = Eigen::Matrix3d::Zero();
+  for (const CalibratedPoint& p : points) *scatter += p.Homogeneous() * p.Homogeneous().transpose();
+}
+
 Eigen::Matrix3d ImageOfPlaneCircle(const Eigen::Matrix3d& R, double facing, double cx, double cy,
                                    double radius) {
   return R * PlaneCircle(facing, cx, cy, radius) * R.transpose();
@@ -252,10 +282,15 @@ double EvaluateLine(const PointSet& set, const Weighing& weighing, const Eigen::
   const auto distance = [&line](const CalibratedPoint& p, Eigen::Vector3d* jacobian) {
     return jacobian == nullptr ? LineDistancePx(p, line) : LineDistance(p, line, jacobian);
   };
-  if (model == nullptr) return SumSet<3>(set, weighing, distance, nullptr, nullptr);
+  const auto sum = [&](Eigen::Vector3d* gradient, Eigen::Matrix3d* hessian) {
+    return set.scatter && !weighing.inliers_only
+               ? SumScatter(set, line, gradient, hessian)
+               : SumSet<3>(set, weighing, distance, gradient, hessian);
+  };
+  if (model == nullptr) return sum(nullptr, nullptr);
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
-  model->cost = SumSet<3>(set, weighing, distance, &gradient, &hessian);
+  model->cost = sum(&gradient, &hessian);
   Eigen::Matrix<double, 3, 6> J;
   J << -R * CrossMatrix(m), R * dm;
   hessian.triangularView<Eigen::StrictlyUpper>() = hessian.transpose();

@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "circline/estimators/camera.h"
@@ -57,8 +58,14 @@ struct PointSet {
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();
   double scale = 1.0;
 
+  // Sum of p p^T, p = (x, y, 1): all that least squares of a line needs of its points where a pixel
+  // is worth the same at each.
+  std::optional<Eigen::Matrix3d> scatter;
+
   // Moves the points' middle to the origin and their mean distance to 1.
   void Normalize();
+  // Fills `scatter` where it is exact.
+  void Compress();
 };
 
 // Image of the plane's circle, in calibrated coordinates.

@@ -1,7 +1,7 @@
-// The joint problem as its solver sees it: only the shared unknowns (the rotation, the origin,
-// common centres, directions and scales), each circle's and line's own ones eliminated where they
-// stand (Schur's complement). Small and dense, however many features there are. Internal: not
-// installed.
+// The joint problem as its solver (minimize.h) sees it: only the shared unknowns (the rotation, the
+// origin, common centres, directions and scales), each circle's and line's own ones eliminated
+// where they stand (Schur's complement). Small and dense, however many features there are.
+// Internal: not installed.
 #ifndef CIRCLINE_REFINE_REDUCED_PROBLEM_H_
 #define CIRCLINE_REFINE_REDUCED_PROBLEM_H_
 
@@ -69,12 +69,6 @@ struct ReducedModel {
 // False if some residual cannot be evaluated or an own unknown carries no information.
 bool Linearize(const JointEvidence& evidence, const JointState& state, const SharedColumns& columns,
                const Weighing& weighing, ReducedModel* model);
-
-// Lowers the cost of `state` under the stretched loss, by Levenberg and Marquardt's method
-// (ceres::TinySolver) on the shared unknowns. Stops when a step gains less than `tolerance` in
-// cost. Not ok where the evidence cannot be evaluated.
-Status Minimize(const JointEvidence& evidence, double stretch, int max_iterations, double tolerance,
-                JointState* state);
 
 // Normal of a line's interpretation plane in the world frame, and its derivatives by the unknowns
 // of LineTerm's blocks, in order.

@@ -126,12 +126,15 @@ struct Seed {
 
 void AddSeed(const JointProblem& problem, const CameraPose& pose, int source,
              std::vector<Seed>* seeds) {
+  const auto same = std::find_if(seeds->begin(), seeds->end(), [&](const Seed& seed) {
+    return seed.source != source && RotationAngle(seed.pose.rotation, pose.rotation) <= kSameSeed;
+  });
+  // The better of the two matters only where outliers make the way to the minimum hard.
+  if (same != seeds->end() && !problem.is_contaminated()) return;
   const double cost = problem.SeedCost(pose);
   if (!std::isfinite(cost)) return;
-  for (Seed& seed : *seeds) {
-    if (seed.source == source || RotationAngle(seed.pose.rotation, pose.rotation) > kSameSeed)
-      continue;
-    if (cost < seed.cost) seed = {pose, cost, source};
+  if (same != seeds->end()) {
+    if (cost < same->cost) *same = {pose, cost, source};
     return;
   }
   seeds->push_back({pose, cost, source});

@@ -17,6 +17,8 @@ import subprocess
 import sys
 import tempfile
 
+EQUAL = 'equal circles'  # Not for the converter: all circles of a photo are one radius_group.
+
 # set, converter's arguments, solver, stage, field, "best" or "better" of the hypotheses, bar in degrees (median)
 CLAIMS = [
     ('chessboard-opencv', [], 'line_pairs', 'closed_form', 'rotation_error_deg', 'best', 1.0),
@@ -27,6 +29,9 @@ CLAIMS = [
     ('circles-discocal-rgb', ['--circles=all'], 'joint', 'refined', 'normal_error_deg', 'best', 0.2),
     ('circles-discocal-tir', ['--centre'], 'circle_center', 'refined', 'normal_error_deg', 'best', 0.7),
     ('circles-discocal-tir', ['--circles=all'], 'joint', 'refined', 'normal_error_deg', 'best', 0.2),
+    ('circles-discocal-rgb', ['--circles=all', EQUAL], 'joint', 'refined', 'normal_error_deg', 'best', 0.1),
+    ('circles-discocal-tir', ['--circles=all', EQUAL], 'joint', 'refined', 'normal_error_deg', 'best', 0.1),
+    ('circles-visp36', ['--circles=all', EQUAL], 'joint', 'refined', 'normal_error_deg', 'best', 0.2),
     ('chessboard-charuco-robot', ['--evidence=auto'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.5),
     ('circles-visp36', ['--evidence=auto'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.3),
     ('circles-discocal-rgb', ['--evidence=auto'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.3),
@@ -47,14 +52,23 @@ FAR_DEG = 5.0
 SURE = 0.9
 
 
+def group_circles(scene):
+    with open(scene) as file:
+        text = file.read()
+    with open(scene, 'w') as file:
+        file.write(re.sub(r'(\{ id: "\w+", )(contour:)', r'\1radius_group: "dots", \2', text))
+
+
 def run(args, data_set, options, scratch, cache={}):
     """Result lines by image, solver and stage; one run for each set and evidence."""
     key = (data_set, *options)
     if key not in cache:
-        scene = os.path.join(scratch, '_'.join(key).replace('=', '') + '.yaml')
+        scene = os.path.join(scratch, '_'.join(key).replace('=', '').replace(' ', '_') + '.yaml')
         out = scene[:-5]
-        subprocess.run(['/usr/bin/python3', args.converter, os.path.join(args.data, data_set), scene, *options],
-                       check=True)
+        subprocess.run(['/usr/bin/python3', args.converter, os.path.join(args.data, data_set), scene,
+                        *(o for o in options if o != EQUAL)], check=True)
+        if EQUAL in options:
+            group_circles(scene)
         subprocess.run([args.compare, f'--scene={scene}', f'--output={out}', '--overlays=false'], check=True,
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         with open(os.path.join(out, 'results.jsonl')) as lines:

@@ -169,12 +169,14 @@ BENCHMARK_CAPTURE(BM_RefineCircleAndLines, warm_cauchy, LossType::kCauchy, kWarm
 void BM_RefineUndistortedCircleAndLines(benchmark::State& state, LossType loss, double error) {
   RefineOneSeed(state, AddPaperLikeUndistorted, loss, error);
 }
+BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, cold_cauchy, LossType::kCauchy, kCold);
+BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, cold_trivial, LossType::kTrivial, kCold);
+BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, warm_cauchy, LossType::kCauchy, kWarm);
+
 void BM_RefineOrthogonalDistances(benchmark::State& state, LossType loss, double error) {
   RefineOneSeed(state, AddPaperLikeUndistorted, loss, error, ConicDistanceType::kOrthogonal);
 }
 BENCHMARK_CAPTURE(BM_RefineOrthogonalDistances, cold_cauchy, LossType::kCauchy, kCold);
-BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, cold_cauchy, LossType::kCauchy, kCold);
-BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, warm_cauchy, LossType::kCauchy, kWarm);
 
 void BM_RefineOneCircle(benchmark::State& state, LossType loss, double error) {
   RefineOneSeed(state, AddOneCircle, loss, error);

@@ -31,6 +31,9 @@ DEFINE_string(line_loss_scale_px, "", "Scale of points of lines, where it differ
 DEFINE_string(conic_distance,
               circline::ConicDistanceName(circline::EstimationOptions().conic_distance),
               "Distance of contour points in the refinement: sampson (first order) or orthogonal.");
+DEFINE_double(focal_sigma, circline::EstimationOptions().focal_sigma,
+              "Relative standard deviation of the camera's focal length (0.03: 3 %), which is then "
+              "refined too; 0 = fixed.");
 DEFINE_double(inlier_threshold_px, circline::FitOptions().inlier_threshold_px,
               "A point farther than this from its curve is an outlier, pixels; positive.");
 DEFINE_double(ransac_confidence, circline::FitOptions().confidence,
@@ -108,6 +111,16 @@ struct LossOverride {
   }
 };
 
+// Sets one field from its flag and checks it apart from the others, so that the flag can be named.
+template <typename Options, typename Field, typename Value>
+Status SetOption(const std::string& flag, Field Options::*field, const Value& value,
+                 Options* options) {
+  Options alone;
+  alone.*field = static_cast<Field>(value);
+  options->*field = static_cast<Field>(value);
+  return CheckFlag(flag, alone.Validate());
+}
+
 Status ReadLosses(std::vector<LossSetting>* losses) {
   LossOverride conic, line;
   Status status = conic.Read("conic_loss", FLAGS_conic_loss, FLAGS_conic_loss_scale_px);
@@ -117,6 +130,10 @@ Status ReadLosses(std::vector<LossSetting>* losses) {
     status = Status::Invalid("--conic_distance: '" + FLAGS_conic_distance +
                              "' is not one of sampson, orthogonal" +
                              DidYouMean(FLAGS_conic_distance, {"sampson", "orthogonal"}));
+  }
+  if (status.ok()) {
+    status = SetOption("focal_sigma", &EstimationOptions::focal_sigma, FLAGS_focal_sigma,
+                       &common_options);
   }
   if (!status.ok()) return status;
   losses->clear();
@@ -137,16 +154,6 @@ Status ReadLosses(std::vector<LossSetting>* losses) {
     }
   }
   return Status::Ok();
-}
-
-// Sets one field from its flag and checks it apart from the others, so that the flag can be named.
-template <typename Options, typename Field, typename Value>
-Status SetOption(const std::string& flag, Field Options::*field, const Value& value,
-                 Options* options) {
-  Options alone;
-  alone.*field = static_cast<Field>(value);
-  options->*field = static_cast<Field>(value);
-  return CheckFlag(flag, alone.Validate());
 }
 
 Status FirstError(const std::vector<Status>& checks) {
@@ -230,6 +237,7 @@ std::string ResultFlags() {
                            "line_loss",
                            "line_loss_scale_px",
                            "conic_distance",
+                           "focal_sigma",
                            "inlier_threshold_px",
                            "ransac_confidence",
                            "ransac_max_iterations",
@@ -257,8 +265,9 @@ std::string OtherFlags() {
   std::string lines;
   for (const char* name :
        {"conic_loss", "conic_loss_scale_px", "line_loss", "line_loss_scale_px", "conic_distance",
-        "inlier_threshold_px", "ransac_confidence", "ransac_max_iterations", "min_ellipse_axis_px",
-        "min_arc_deg", "min_segment_length_px", "max_circles", "max_pencils", "seed"}) {
+        "focal_sigma", "inlier_threshold_px", "ransac_confidence", "ransac_max_iterations",
+        "min_ellipse_axis_px", "min_arc_deg", "min_segment_length_px", "max_circles", "max_pencils",
+        "seed"}) {
     gflags::CommandLineFlagInfo info;
     if (!gflags::GetCommandLineFlagInfo(name, &info) || info.is_default) continue;
     lines += std::string("--") + name + "=" + info.current_value + "\n";

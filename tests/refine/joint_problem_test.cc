@@ -16,7 +16,7 @@ namespace {
 Refined RefineTwo(bool second_is_wrong, double sigma_px) {
   PlaneScene scene(0.6, 0.0);
   Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", -1.0, 0.2, 1.0), scene.Circle("c1", 1.5, 0.5, 0.8)};
+  observations.circles = {scene.Circle("c0", -1.0, 0.2, 1.0), scene.Circle("c1", 1.5, 0.5, 0.8, 12)};
   FitDirect(sigma_px, &observations);
   for (CircleObservation& circle : observations.circles) circle.sigma_px = sigma_px;
   if (second_is_wrong) {
@@ -26,7 +26,7 @@ Refined RefineTwo(bool second_is_wrong, double sigma_px) {
       p += Eigen::Vector2d(dx, dy);
     }
     // As a robust fit marks them: it found hardly any inliers.
-    observations.circles[1].inliers.assign(60, 0);
+    observations.circles[1].inliers.assign(12, 0);
     std::fill_n(observations.circles[1].inliers.begin(), 6, 1);
   }
   observations = ResolveWorld(observations);

@@ -298,6 +298,45 @@ TEST(InliersOnlyTest, PointsBeyondTheGateDoNotCount) {
   EXPECT_LT((a.hessian - b.hessian).norm(), 1e-12 * b.hessian.norm());
 }
 
+// Without loss and lens the points' scatter says the same as the points.
+TEST(ScatterTest, IsExactWithoutLossAndLens) {
+  Camera camera = DistortedCamera();
+  camera.model = CameraModel::kPinhole;
+  Random random(3);
+  PointSet set;
+  set.sigma_px = 3.0;
+  set.weight = 0.7;
+  for (int i = 0; i < 20; ++i) {
+    CalibratedPoint p;
+    ASSERT_TRUE(PixelToCalibrated(
+        camera, {random.Uniform(0.0, 640.0), 200.0 + random.Uniform(-9.0, 9.0)}, &p));
+    set.points.push_back(p);
+  }
+  PointSet robust = set, distorted = set;
+  robust.loss = LossType::kCauchy;
+  distorted.points[3].x_from_pixel[0] *= 1.01;
+  for (PointSet* s : {&set, &robust, &distorted}) s->Compress();
+  EXPECT_FALSE(robust.scatter);
+  EXPECT_FALSE(distorted.scatter);
+  ASSERT_TRUE(set.scatter);
+  PointSet plain = set;
+  plain.scatter.reset();
+  const Eigen::Matrix3d R = ExpRotation({0.01, 0.02, 0.03});
+  const Eigen::Vector3d m(0.02, 1.0, 0.09);
+  const Eigen::Matrix3d dm = Eigen::Vector3d(0.5, 0.1, 1.0).asDiagonal();
+  for (const Weighing& weighing :
+       {Weighing{1.0, false}, Weighing{7.0, false}, Weighing{1.0, true}}) {
+    QuadraticModel a, b;
+    EvaluateLine(set, weighing, R, m, dm, &a);
+    EvaluateLine(plain, weighing, R, m, dm, &b);
+    ASSERT_GT(b.cost, 0.0);
+    EXPECT_NEAR(a.cost, b.cost, 1e-11 * b.cost);
+    EXPECT_NEAR(EvaluateLine(set, weighing, R, m, dm, nullptr), a.cost, 1e-11 * a.cost);
+    EXPECT_LT((a.gradient - b.gradient).norm(), 1e-10 * b.gradient.norm());
+    EXPECT_LT((a.hessian - b.hessian).norm(), 1e-10 * b.hessian.norm());
+  }
+}
+
 TEST(AngleModelTest, GradientAndSenseDoesNotMatter) {
   const Model model = [](const std::vector<double>& x, QuadraticModel* out) {
     return EvaluateAngle(1.5, 0.01, x.data(), out);
