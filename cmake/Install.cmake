@@ -22,7 +22,7 @@ foreach(module estimators ransac refine)
   install(FILES ${headers} DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/circline/${module}")
 endforeach()
 
-foreach(app compare simulate)
+foreach(app compare reconstruct simulate)
   if(TARGET circline_${app})
     install(TARGETS circline_${app} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
   endif()

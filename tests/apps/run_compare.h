@@ -1,4 +1,4 @@
-// Runs circline_compare as its users do.
+// Runs circline_compare, and other programs, as their users do.
 #ifndef CIRCLINE_TESTS_APPS_RUN_COMPARE_H_
 #define CIRCLINE_TESTS_APPS_RUN_COMPARE_H_
 
@@ -24,13 +24,17 @@ struct Outcome {
   std::string out, err;
 };
 
-inline Outcome RunCompare(const std::string& arguments) {
+inline Outcome RunProgram(const std::string& program, const std::string& arguments) {
   const TestFolder folder;
-  const std::string command = std::string("'") + CIRCLINE_COMPARE_BINARY + "' " + arguments +
-                              " >'" + folder / "out" + "' 2>'" + folder / "err" + "' </dev/null";
+  const std::string command = "'" + program + "' " + arguments + " >'" + folder / "out" + "' 2>'" +
+                              folder / "err" + "' </dev/null";
   const int status = std::system(command.c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadAll(folder / "out"),
           ReadAll(folder / "err")};
+}
+
+inline Outcome RunCompare(const std::string& arguments) {
+  return RunProgram(CIRCLINE_COMPARE_BINARY, arguments);
 }
 
 inline std::vector<nlohmann::json> ReadJsonLines(const std::string& path) {

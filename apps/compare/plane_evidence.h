@@ -1,0 +1,18 @@
+// Where on the world's plane the evidence lies.
+#ifndef CIRCLINE_APPS_COMPARE_PLANE_EVIDENCE_H_
+#define CIRCLINE_APPS_COMPARE_PLANE_EVIDENCE_H_
+
+#include <Eigen/Geometry>
+
+#include "circline/estimators/observations.h"
+#include "circline/estimators/pose.h"
+
+namespace circline::apps {
+
+// The part of the plane Z = 0 that carries evidence, world coordinates; without what lies much
+// farther away than the nearest, towards the vanishing line. May be empty.
+Eigen::AlignedBox2d EvidenceOnPlane(const Observations& observations, const CameraPose& pose);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMPARE_PLANE_EVIDENCE_H_

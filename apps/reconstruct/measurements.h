@@ -1,0 +1,36 @@
+// Lengths, angles, heights and radii of what one photo shows, each with its standard deviation.
+#ifndef CIRCLINE_APPS_RECONSTRUCT_MEASUREMENTS_H_
+#define CIRCLINE_APPS_RECONSTRUCT_MEASUREMENTS_H_
+
+#include <string>
+#include <vector>
+
+#include "apps/reconstruct/model.h"
+#include "circline/estimators/observations.h"
+#include "circline/estimators/pose.h"
+
+namespace circline::apps {
+
+struct MeasuredValue {
+  std::string what;  // "length", "angle", "radius", "height", "distance".
+  std::string id;    // Of what it was measured.
+  double value = 0.0;
+  double sigma = 0.0;
+  std::string unit;  // "world" (that of the known radius or length), "distance", "deg".
+};
+
+// Of the plane: the segments of its pencils, the pairs of points of `known.length`, the angles
+// between pencils, each by its own lines alone, the circles' radii; the heights of the upright
+// edges; the distance of the camera from the plane. Standard deviations are first-order, of the
+// pose and of the points, taken as independent: `point_sigma_px` is that of each coordinate where a
+// pencil states none.
+std::vector<MeasuredValue> Measure(const Observations& observations,
+                                   const PoseHypothesis& hypothesis, const Model& model,
+                                   double point_sigma_px);
+
+// what,id,value,sigma,unit
+std::string MeasurementsCsv(const std::vector<MeasuredValue>& measurements);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_RECONSTRUCT_MEASUREMENTS_H_
