@@ -40,13 +40,19 @@ Json Array(const Eigen::MatrixBase<Derived>& m) {  // Row by row.
 
 Json ScaleJson(double scale_px) { return scale_px > 0.0 ? Json(scale_px) : Json("auto"); }
 
-Json ResultHead(const ImageRun& image, const SolverRun& run) {
+// Which solver ran on which image, with which loss.
+Json RunHead(const ImageRun& image, const SolverRun& run) {
   Json line;
   line["image"] = image.image->name;
   line["solver"] = run.solver;
   line["stage"] = SolverStageName(run.stage);
   line["loss"] = run.loss == nullptr ? Json() : Json(run.loss->loss);
   line["loss_scale_px"] = run.loss == nullptr ? Json() : ScaleJson(run.loss->scale_px);
+  return line;
+}
+
+Json ResultHead(const ImageRun& image, const SolverRun& run) {
+  Json line = RunHead(image, run);
   line["status"] = StatusText(run.estimate.status);
   line["message"] = run.estimate.status.message;
   return line;
@@ -220,12 +226,7 @@ std::string TimingLines(const ImageRun& run) {
     lines += Line(line);
   }
   for (const SolverRun& solver : run.solvers) {
-    Json line;
-    line["image"] = run.image->name;
-    line["solver"] = solver.solver;
-    line["stage"] = SolverStageName(solver.stage);
-    line["loss"] = solver.loss == nullptr ? Json() : Json(solver.loss->loss);
-    line["loss_scale_px"] = solver.loss == nullptr ? Json() : ScaleJson(solver.loss->scale_px);
+    Json line = RunHead(run, solver);
     line["microseconds"] = whole(solver.microseconds);
     lines += Line(line);
   }
