@@ -158,8 +158,8 @@ class Assembler {
   bool EliminateSome(OwnUnknowns* own, QuadraticModel* model, double* log_det) {
     const int s = own->shared_size;
     Eigen::Matrix<double, kOwn, kOwn> H;
+    // Cross terms of the own unknowns, then their gradient.
     Eigen::Matrix<double, kOwn, 7> C = Eigen::Matrix<double, kOwn, 7>::Zero();
-    // Of the own unknowns, and their cross terms, then the gradient.
     for (int a = 0; a < kOwn; ++a) {
       const int ia = own->own[static_cast<std::size_t>(a)];
       for (int b = 0; b < kOwn; ++b)
