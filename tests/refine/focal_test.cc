@@ -231,6 +231,47 @@ TEST(FocalTest, RobustLossesFindIt) {
   }
 }
 
+// Whatever can and cannot be told of it: finite, positive and within the prior's reach.
+TEST(FocalTest, PoorEvidenceStaysFinite) {
+  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(),
+                        z = Eigen::Vector3d::UnitZ();
+  Random random(5);
+  for (int i = 0; i < 120; ++i) {
+    PlaneScene scene(random.Uniform(0.05, 1.35), random.Uniform(),
+                     static_cast<std::uint64_t>(i + 1));
+    Observations observations = scene.Empty();
+    if (i % 4 == 0) {
+      observations.circles = {scene.Circle("a", 0.4, -0.3, 1.0)};
+      observations.circles[0].center = scene.Pixel(0.0, 0.0);  // Not where it is.
+    } else if (i % 4 == 1) {
+      observations.pencils = {scene.Pencil("1", PencilDirection::kX, x, 2),
+                              scene.Pencil("2", PencilDirection::kFree, y, 2)};
+    } else if (i % 4 == 2) {
+      observations.pencils = {scene.Pencil("1", PencilDirection::kX, x),
+                              scene.Pencil("2", PencilDirection::kZ, z)};
+    } else {
+      observations.circles = {scene.Circle("a", -1.0, 0.0, 1.0), scene.Circle("b", 1.5, 0.5, 0.6)};
+    }
+    if (i % 3 == 0) {
+      for (CircleObservation& circle : observations.circles) circle.sigma_px = 0.0;
+      for (PencilObservation& pencil : observations.pencils) pencil.sigma_px = 0.0;
+    }
+    Mistake(1.02, &observations);
+    EstimationOptions options;
+    options.conic_loss.type = options.line_loss.type =
+        i % 5 < 3 ? LossType::kCauchy : LossType::kTukey;
+    options.focal_sigma = kPrior;
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << i << ": " << estimate.status.message;
+    for (const PoseHypothesis& h : estimate.hypotheses) {
+      EXPECT_TRUE(h.Covariance().allFinite()) << i;
+      EXPECT_LT(std::abs(std::log(h.focal_scale)), 4.001 * kPrior) << i;
+      EXPECT_GT(h.focal_sigma, 0.0) << i;
+      EXPECT_LT(h.focal_sigma, 1.001 * kPrior * h.focal_scale) << i;
+    }
+  }
+}
+
 TEST(FocalTest, SigmaIsChecked) {
   EstimationOptions options;
   options.focal_sigma = -0.1;
