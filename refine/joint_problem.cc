@@ -266,11 +266,15 @@ void FillFocal(const FocalModel& focal, double log_focal, double inflation, doub
 std::string FocalNote(const PoseHypothesis& h, double prior_sigma) {
   // Then the evidence alone tells it no better than three times as badly as the prior does.
   constexpr double kPriorDecides = 0.95;
-  const bool observed = h.focal_sigma < kPriorDecides * prior_sigma * h.focal_scale;
+  const char* remark = "";
+  if (!(h.focal_sigma < kPriorDecides * prior_sigma * h.focal_scale)) {
+    remark = std::abs(std::log(h.focal_scale)) < prior_sigma
+                 ? "; the evidence cannot tell, the prior alone decides"
+                 : "; the evidence contradicts the prior but does not fix it";
+  }
   char text[160];
   std::snprintf(text, sizeof(text), "focal length: %.4f times the camera's, +- %.4f%s",
-                h.focal_scale, h.focal_sigma,
-                observed ? "" : "; the evidence cannot tell, the prior alone decides");
+                h.focal_scale, h.focal_sigma, remark);
   return text;
 }
 
