@@ -26,6 +26,11 @@ constexpr double kJoinSigmas = 2.0;
 constexpr double kMaxJoinPx = 1.5;
 // Standard deviation of one edge point in that extrapolation, pixels.
 constexpr double kPointSigmaPx = 0.3;
+// Where bright areas bleed into dark ones, edges with the bright side on one side and on the other,
+// like the sides of a row of chessboard squares, lie on either side of their line by about this.
+// Pieces of both kinds are joined up to this far off.
+constexpr double kBleedSigmaPx = 0.4;
+constexpr double kMaxAlternatingPx = 2.0;
 // Averaged points are not trusted beyond this: lenses and edges are not straight to better.
 constexpr double kMinSigmaPx = 0.1;
 
@@ -76,11 +81,14 @@ struct Piece {
   double from = 0.0, to = 0.0;  // Positions of its ends along it, calibrated.
   double length_px = 0.0;
   Vector2d first_px, last_px;
+  Vector2d gradient;  // At its middle, unit.
 };
 
 // A line being joined from pieces.
 struct Joined {
   std::vector<int> pieces;
+  Vector2d gradient;        // Of the first piece.
+  bool alternates = false;  // The bright side is not the same on all pieces.
   Moments moments;
   Vector3d line;
   Vector2d along;
@@ -173,6 +181,8 @@ class LineDetector {
     piece->first_px = Pixel(piece->begin);
     piece->last_px = Pixel(piece->end - 1);
     piece->length_px = (piece->last_px - piece->first_px).norm();
+    const int middle = (piece->begin + piece->end) / 2;
+    piece->gradient = map_.points[static_cast<std::size_t>(middle)].Normal();
     if (piece->length_px < kMinPiecePx || !IsStraight(*piece)) return;
     SetRange(piece->along, *piece, &piece->from, &piece->to);
     pieces_.push_back(*piece);
@@ -231,6 +241,7 @@ class LineDetector {
     const Piece& p = pieces_[static_cast<std::size_t>(piece)];
     Joined joined;
     joined.pieces = {piece};
+    joined.gradient = p.gradient;
     joined.moments = Moments(X(p.begin).x);
     AddPoints(p, &joined.moments);
     joined.line = joined.moments.Line(&joined.along);
@@ -245,8 +256,10 @@ class LineDetector {
   }
 
   void Append(int piece, Joined* joined) const {
+    const Piece& p = pieces_[static_cast<std::size_t>(piece)];
     joined->pieces.push_back(piece);
-    AddPoints(pieces_[static_cast<std::size_t>(piece)], &joined->moments);
+    joined->alternates = joined->alternates || joined->gradient.dot(p.gradient) < 0.0;
+    AddPoints(p, &joined->moments);
     joined->line = joined->moments.Line(&joined->along);
     joined->covered.clear();
     for (const int i : joined->pieces) {
@@ -260,8 +273,8 @@ class LineDetector {
     // Cheap first: the middle of a piece that continues the line lies near it.
     const CalibratedPoint& first = X(p.begin);
     const CalibratedPoint& last = X(p.end - 1);
-    if (std::abs(LineDistancePx(first, joined.line)) > kMaxJoinPx) return false;
-    if (std::abs(LineDistancePx(last, joined.line)) > kMaxJoinPx) return false;
+    if (std::abs(LineDistancePx(first, joined.line)) > kMaxAlternatingPx) return false;
+    if (std::abs(LineDistancePx(last, joined.line)) > kMaxAlternatingPx) return false;
     double from, to;
     SetRange(joined.along, p, &from, &to);
     double gap = std::numeric_limits<double>::infinity(), length = 0.0;
@@ -282,8 +295,14 @@ class LineDetector {
   bool NearExtrapolation(const Joined& joined, const Piece& p, double length, double beyond) const {
     const double n = std::max(2, joined.moments.count());
     const double u = (0.5 * length + beyond) / std::max(length, 1.0);
-    const double sigma = kPointSigmaPx * std::sqrt((1.0 + 12.0 * u * u) / n);
-    const double limit = std::min(kMaxJoinPx, 0.5 * options_.max_distance_px + kJoinSigmas * sigma);
+    const double lever = 1.0 + 12.0 * u * u;
+    const double sigma = kPointSigmaPx * std::sqrt(lever / n);
+    double limit = std::min(kMaxJoinPx, 0.5 * options_.max_distance_px + kJoinSigmas * sigma);
+    if (joined.alternates || joined.gradient.dot(p.gradient) < 0.0) {
+      const double pieces = static_cast<double>(joined.pieces.size());
+      const double bleed = kBleedSigmaPx * std::sqrt(1.0 + (pieces > 1.0 ? lever / pieces : 1.0));
+      limit = std::min(kMaxAlternatingPx, kJoinSigmas * std::hypot(sigma, bleed));
+    }
     return std::abs(LineDistancePx(X(p.begin), joined.line)) <= limit &&
            std::abs(LineDistancePx(X(p.end - 1), joined.line)) <= limit;
   }

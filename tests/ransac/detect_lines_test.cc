@@ -91,6 +91,32 @@ TEST(DetectLines, JoinsTheSidesOfARowOfSquares) {
   EXPECT_GE(whole, 8);
 }
 
+TEST(DetectLines, JoinsSidesThatTheBrightBleedsAcross) {
+  // Overexposed: the white is a third of a pixel wider on every side, so that the sides of a row of
+  // squares lie on either side of their line in turn. Joined, the steps cancel.
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(25.0, 15.0, 10.0, 9.0);
+  const double bleed = 0.3 * 9.0 / camera.fx;
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 220.0, [bleed](double x, double y) {
+    if (std::abs(x) > 3.0 || std::abs(y) > 2.0) return 220.0;
+    const double u = x - std::floor(x), v = y - std::floor(y);
+    const bool inner = std::min({u, v, 1.0 - u, 1.0 - v}) > bleed;
+    return inner && (static_cast<int>(std::floor(x)) + static_cast<int>(std::floor(y))) % 2 == 0
+               ? 30.0
+               : 220.0;
+  }));
+  int whole = 0;
+  for (const DetectedLine& line : Detect(image, camera)) {
+    if ((line.ends[1] - line.ends[0]).norm() < 150.0) continue;
+    ++whole;
+    const Vector3d l = line.fit.line;
+    EXPECT_LT(
+        std::min(std::abs(l.dot(pose.rotation.col(0))), std::abs(l.dot(pose.rotation.col(1)))),
+        4e-3);
+  }
+  EXPECT_GE(whole, 6);
+}
+
 TEST(DetectLines, StatesHowWellItKnowsALine) {
   // The miss of the true direction, in standard deviations, over many noisy photos.
   double chi2 = 0.0;
