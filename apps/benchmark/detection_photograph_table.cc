@@ -1,0 +1,196 @@
+// The table of whole photographs: circles, pencils, and the contours of circles.
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
+#include "apps/benchmark/detection_statistics.h"
+#include "apps/benchmark/detection_tables.h"
+#include "apps/benchmark/detection_truth.h"
+#include "apps/benchmark/ellipse_overlap.h"
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/conic.h"
+#include "circline/estimators/line_pose.h"
+#include "circline/estimators/pose.h"
+#include "circline/ransac/detect_observations.h"
+
+namespace circline::benchmark {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// What is true of one photo, and how far the observations are from it; NaN = not to be had.
+struct PhotoErrors {
+  int circles = 0, circles_found = 0;
+  double normal_deg = std::nan("");    // Median over the circles found, better of two.
+  double rotation_deg = std::nan("");  // From the two in-plane pencils, up to the board's symmetry.
+  std::vector<double> directions_deg;
+};
+
+double DirectionDeg(const Vector3d& a, const Vector3d& b) {
+  return kDegrees * std::atan2(a.cross(b).norm(), std::abs(a.dot(b)));
+}
+
+// Angle between rotations up to the symmetry of a square board.
+double BoardRotationDeg(const Matrix3d& a, const Matrix3d& b) {
+  double best = 1e9;
+  for (int axis = 0; axis < 2; ++axis) {
+    for (int quarter = 0; quarter < 4; ++quarter) {
+      Matrix3d s = Matrix3d::Identity();
+      const double half_turn = axis == 0 ? 1.0 : -1.0;
+      s << 1, 0, 0, 0, half_turn, 0, 0, 0, half_turn;
+      const double c = std::cos(quarter * 1.5707963267948966);
+      const double d = std::sin(quarter * 1.5707963267948966);
+      Matrix3d z;
+      z << c, -d, 0, d, c, 0, 0, 0, 1;
+      best = std::min(best, kDegrees * RotationAngle(a * z * s, b));
+    }
+  }
+  return best;
+}
+
+PhotoErrors MeasurePhoto(const cv::FileNode& node, const Camera& camera,
+                         const Observations& found) {
+  PhotoErrors errors;
+  std::vector<PolygonPoints> truth, polygons;
+  std::vector<Vector3d> normals;
+  for (const char* key : {"circles", "ellipses"}) {
+    for (const cv::FileNode& circle : node[key]) {
+      const cv::Mat e = ReadMatrix(circle, "fitted_ellipse_raw");
+      const cv::Mat n = ReadMatrix(circle, "normal_cam");
+      if (e.empty()) continue;
+      truth.push_back(EllipsePolygon(ReadEllipse(e)));
+      normals.push_back(n.empty() ? Vector3d::Zero() : ToVector(n));
+    }
+  }
+  for (const CircleObservation& circle : found.circles) {
+    polygons.push_back(circle.fit ? ContourPolygon(camera, circle.fit->conic) : PolygonPoints());
+  }
+  std::vector<double> overlap, normal_errors;
+  const std::vector<int> partner = Match(truth, polygons, &overlap);
+  errors.circles = static_cast<int>(truth.size());
+  for (std::size_t k = 0; k < partner.size(); ++k) {
+    if (overlap[k] < 0.8) continue;
+    ++errors.circles_found;
+    const CircleObservation& circle = found.circles[static_cast<std::size_t>(partner[k])];
+    if (!normals[k].isZero())
+      normal_errors.push_back(BetterNormalDeg(circle.fit->conic, normals[k]));
+  }
+  if (!normal_errors.empty()) errors.normal_deg = Quantile(normal_errors, 0.5);
+  const cv::Mat rotation = ReadMatrix(node, "R");
+  std::vector<Vector3d> in_plane;
+  for (const PencilObservation& pencil : found.pencils) {
+    if (!pencil.plane.empty() && pencil.fit) in_plane.push_back(pencil.fit->direction);
+  }
+  Matrix3d estimate;
+  if (!rotation.empty() && in_plane.size() >= 2 &&
+      RotationFromOrthogonalDirections(in_plane[0], 1.0, in_plane[1], 1.0, &estimate)) {
+    errors.rotation_deg = BoardRotationDeg(estimate, ToEigen(rotation));
+  }
+  for (const cv::FileNode& direction : node["directions"]) {
+    const Vector3d d = ToVector(ReadMatrix(direction, "direction_cam"));
+    double best = 90.0;
+    for (const PencilObservation& pencil : found.pencils) {
+      if (pencil.fit) best = std::min(best, DirectionDeg(pencil.fit->direction, d));
+    }
+    errors.directions_deg.push_back(best);
+  }
+  return errors;
+}
+
+// Root mean square distances of the points of the circles found to the true conics, and what the
+// set records of its own edge points.
+struct ContourRms {
+  std::vector<double> found, recorded;
+};
+
+void MeasureContours(const cv::FileNode& node, const Camera& camera, const Observations& found,
+                     ContourRms* rms) {
+  for (const cv::FileNode& circle : node["circles"]) {
+    const cv::Mat center = ReadMatrix(circle, "centre_cam"),
+                  normal = ReadMatrix(circle, "normal_cam");
+    const cv::FileNode recorded = circle["contour_rms_to_ground_truth_px"];
+    if (center.empty() || normal.empty() || recorded.empty() || circle["radius"].empty()) continue;
+    CirclePose pose;
+    pose.normal = ToVector(normal);
+    pose.center = ToVector(center) / static_cast<double>(circle["radius"]);
+    const Matrix3d conic = ProjectCircle(pose);
+    const PolygonPoints truth = ContourPolygon(camera, conic);
+    for (const CircleObservation& observation : found.circles) {
+      if (!observation.fit ||
+          IntersectionOverUnion(truth, ContourPolygon(camera, observation.fit->conic)) < 0.8) {
+        continue;
+      }
+      double sum = 0.0, n = 0.0;
+      for (const Vector2d& pixel : observation.points) {
+        CalibratedPoint p;
+        if (!PixelToCalibrated(camera, pixel, &p)) continue;
+        const double d = ConicDistancePx(p, conic);
+        sum += d * d;
+        n += 1.0;
+      }
+      rms->found.push_back(std::sqrt(sum / n));
+      rms->recorded.push_back(static_cast<double>(recorded));
+      break;
+    }
+  }
+}
+
+}  // namespace
+
+void MeasurePhotographs(const std::string& folder, const cv::FileNode& root) {
+  std::printf(
+      "photographs %s\n  photo                       circles pencils  normal deg  board deg"
+      "  directions deg     ms\n",
+      folder.c_str());
+  std::vector<double> normals, rotations, ms;
+  ContourRms contours;
+  int circles = 0, circles_found = 0;
+  for (const cv::FileNode& node : root["images"]) {
+    const std::string file = ReadText(node, "file");
+    const cv::Mat image = cv::imread(folder + "/" + file, cv::IMREAD_COLOR);
+    Camera camera;
+    if (image.empty() || !CameraOf(root, node, image.size(), &camera)) continue;
+    Observations found;
+    const std::clock_t start = std::clock();
+    const Status status = DetectObservations(image, camera, DetectionOptions(), &found);
+    ms.push_back(Milliseconds(start));
+    if (!status.ok()) {
+      std::printf("  %s: %s\n", file.c_str(), status.message.c_str());
+      continue;
+    }
+    const PhotoErrors e = MeasurePhoto(node, camera, found);
+    MeasureContours(node, camera, found, &contours);
+    circles += e.circles;
+    circles_found += e.circles_found;
+    if (!std::isnan(e.normal_deg)) normals.push_back(e.normal_deg);
+    if (!std::isnan(e.rotation_deg)) rotations.push_back(e.rotation_deg);
+    std::printf("  %-26s %3d/%3d/%2d", file.c_str(), e.circles_found, e.circles,
+                static_cast<int>(found.circles.size()));
+    for (const PencilObservation& pencil : found.pencils) {
+      std::printf(" %s%s%d", PencilDirectionName(pencil.direction), pencil.plane.c_str(),
+                  static_cast<int>(pencil.lines.size()));
+    }
+    std::printf("  %.3f  %.3f ", e.normal_deg, e.rotation_deg);
+    for (const double d : e.directions_deg) std::printf(" %.3f", d);
+    std::printf("  %.1f  %s\n", ms.back(), found.message.c_str());
+  }
+  std::printf(
+      "  circles %d of %d; median normal %.3f (90%% %.3f), board %.3f (90%% %.3f, %d photos)"
+      "; ms median %.1f worst %.1f\n",
+      circles_found, circles, Quantile(normals, 0.5), Quantile(normals, 0.9),
+      Quantile(rotations, 0.5), Quantile(rotations, 0.9), static_cast<int>(rotations.size()),
+      Quantile(ms, 0.5), Quantile(ms, 1.0));
+  if (!contours.found.empty()) {
+    std::printf("  contour rms to the truth: median %.3f px of %d, the set's own edges %.3f px\n",
+                Quantile(contours.found, 0.5), static_cast<int>(contours.found.size()),
+                Quantile(contours.recorded, 0.5));
+  }
+}
+
+}  // namespace circline::benchmark

@@ -1,0 +1,30 @@
+// The tables of detection, one a kind of truth: each reads the photographs of a folder, detects,
+// and prints how far that is from what is true of them.
+#ifndef CIRCLINE_APPS_BENCHMARK_DETECTION_TABLES_H_
+#define CIRCLINE_APPS_BENCHMARK_DETECTION_TABLES_H_
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <string>
+
+namespace circline::benchmark {
+
+// Renderings with a truth.csv: ellipses and normals, ours and OpenCV's.
+void MeasureRenderings(const std::string& folder);
+
+// Photographs with labelled ellipses, not calibrated.
+void MeasureLabels(const std::string& folder, const cv::FileNode& root);
+
+// Calibrated photographs: circles, pencils and contours.
+void MeasurePhotographs(const std::string& folder, const cv::FileNode& root);
+
+// End points of segments on the edges of chessboards, ours and OpenCV's; nothing where the set has
+// no chessboards.
+void MeasureSegments(const std::string& folder, const cv::FileNode& root);
+
+// The angle between a normal and the better of the two that an ellipse allows.
+double BetterNormalDeg(const Eigen::Matrix3d& conic, const Eigen::Vector3d& normal);
+
+}  // namespace circline::benchmark
+
+#endif  // CIRCLINE_APPS_BENCHMARK_DETECTION_TABLES_H_

@@ -1,0 +1,74 @@
+#include "apps/benchmark/ellipse_overlap.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+namespace circline::benchmark {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+PolygonPoints EllipsePolygon(const Ellipse& e) {
+  PolygonPoints polygon;
+  for (int k = 0; k < 128; ++k) {
+    const Vector2d p = EllipsePoint(e, 2.0 * 3.14159265358979 * k / 128);
+    polygon.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()));
+  }
+  return polygon;
+}
+
+PolygonPoints ContourPolygon(const Camera& camera, const Matrix3d& conic) {
+  PolygonPoints polygon;
+  Ellipse e;
+  if (!ConicToEllipse(conic, &e)) return polygon;
+  for (int k = 0; k < 128; ++k) {
+    const Vector2d x = EllipsePoint(e, 2.0 * 3.14159265358979 * k / 128);
+    Vector2d p;
+    if (!CameraToPixel(camera, Vector3d(x.x(), x.y(), 1.0), &p)) return {};
+    polygon.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()));
+  }
+  return polygon;
+}
+
+double IntersectionOverUnion(const PolygonPoints& a, const PolygonPoints& b) {
+  if (a.empty() || b.empty()) return 0.0;
+  PolygonPoints common;
+  const double both = static_cast<double>(cv::intersectConvexConvex(a, b, common));
+  return both / (cv::contourArea(a) + cv::contourArea(b) - both);
+}
+
+std::vector<int> Match(const std::vector<PolygonPoints>& truth,
+                       const std::vector<PolygonPoints>& found, std::vector<double>* overlap) {
+  struct Pair {
+    double overlap;
+    int truth, found;
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t t = 0; t < truth.size(); ++t) {
+    for (std::size_t f = 0; f < found.size(); ++f) {
+      const double o = IntersectionOverUnion(truth[t], found[f]);
+      if (o > 0.5) pairs.push_back({o, static_cast<int>(t), static_cast<int>(f)});
+    }
+  }
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const Pair& a, const Pair& b) { return a.overlap > b.overlap; });
+  std::vector<int> partner(truth.size(), -1), used(found.size(), 0);
+  overlap->assign(truth.size(), 0.0);
+  for (const Pair& p : pairs) {
+    const auto t = static_cast<std::size_t>(p.truth), f = static_cast<std::size_t>(p.found);
+    if (partner[t] >= 0 || used[f]) continue;
+    partner[t] = p.found;
+    used[f] = 1;
+    (*overlap)[t] = p.overlap;
+  }
+  return partner;
+}
+
+double SemiMinorPx(const PolygonPoints& polygon) {
+  if (polygon.size() < 5) return 0.0;
+  const cv::RotatedRect box = cv::fitEllipse(polygon);
+  return 0.5 * static_cast<double>(std::min(box.size.width, box.size.height));
+}
+
+}  // namespace circline::benchmark
