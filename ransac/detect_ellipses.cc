@@ -1,19 +1,12 @@
 #include "circline/ransac/detect_ellipses.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstdint>
-#include <limits>
-#include <numeric>
 #include <utility>
 
 #include "circline/estimators/circle_pose.h"
-#include "circline/estimators/conic.h"
 #include "circline/ransac/arcs.h"
-#include "circline/ransac/calibrated_edges.h"
-#include "circline/ransac/contour_support.h"
+#include "circline/ransac/ellipse_fitter.h"
 
 namespace circline {
 namespace {
@@ -25,147 +18,20 @@ constexpr double kMinSingleTurn = 50.0 * kPi / 180.0;
 // Arcs that take part in pairs: the most bent and longest ones. Bounds the quadratic step.
 constexpr std::size_t kMaxPairedArcs = 256;
 constexpr std::size_t kMaxPairCandidates = 1000;
-// Points that a candidate is fitted to, of each arc.
-constexpr int kFitPoints = 24;
-// An arc fits its candidate when the root-mean-square distance stays below this, pixels.
-constexpr double kMaxArcRmsPx = 1.0;
-// ... and on this share of its points the gradient is within 15 degrees, plus two standard
-// deviations of its noise, of the contour's normal. (A sine.)
-constexpr double kArcNormalSine = 0.26;
-constexpr double kArcNormalSigmas = 2.0;
-constexpr double kArcAgreement = 0.85;
 // Parts of an arc that are tried where the whole is no ellipse, in sixths.
 constexpr std::array<std::array<int, 2>, 4> kArcParts = {{{0, 5}, {1, 6}, {0, 3}, {3, 6}}};
 constexpr int kMinPartPoints = 12;
-// Edge points support a contour within this distance, pixels: at first, and after refits.
-constexpr std::array<double, 3> kGatherPx = {2.5, 2.0, 1.5};
-// Points farther off than this many standard deviations (at least so many pixels each) are left out
-// of a candidate's refit.
-constexpr double kTrimSigmas = 2.5;
-constexpr double kTrimMinSigmaPx = 0.1;
-constexpr int kMaxTrims = 10;
-// A first look at this many samples drops candidates with less than this share of support.
-constexpr int kQuickSamples = 24;
-constexpr double kQuickPx = 2.0;
-constexpr double kQuickShare = 0.25;
-// ... or where so few of the samples near edges have them across the contour: on clutter 50 to 100
-// of 360 degrees pass for across.
-constexpr double kQuickAcross = 0.4;
-// Samples of a contour, at most, while a candidate is being improved.
-constexpr int kRoughSamples = 120;
-// The other bright side is looked at too if it adds this share.
-constexpr double kOtherSideShare = 0.15;
-// Before the first refit, this share of the smallest arc must be there.
-constexpr double kEarlyShare = 0.7;
-// ... and gradients this near to the contour's normals, degrees: of accidental ones within the 25
-// that count as support the median is 12.
-constexpr double kEarlyNormalDeg = 10.0;
-// Share of random contour samples that find an edge point in place and direction by accident, in a
-// busy photo: edge points on a tenth of the pixels, 3 of them looked at, 50 of 360 degrees.
-constexpr double kChance = 0.08;
-// Neighbouring edge points are not independent: one in this many pixels is.
-constexpr double kIndependentPx = 3.0;
-// Candidates that are tried, as the number of tests of the false-alarm count.
-constexpr double kLog10Tests = 6.0;
-// Blobs and rounded rectangles resemble ellipses; what tells them apart is how closely edge points
-// keep to the contour, how nearly they run parallel to it, and how nearly their gradients are
-// across it. Each is measured in units of what a true rim shows at most: its own imperfection, and
-// in quadrature what the noise explains. Their sum may not exceed kShapeLimit.
-//
-// Root-mean-square distance, pixels. Prints, lenses and JPEG leave 0.05 to 0.15 px on photographed
-// rims, at most 2 % of the radius on small ones, while a blob's shape is off in proportion to its
-// size; long rims follow an ellipse less exactly (no blob follows one so far); and a short arc has
-// less to keep to than a full contour.
-constexpr double kShapeRmsPx = 0.17;
-constexpr double kShapeRmsPerSize = 0.022;
-constexpr double kShapeMaxSigmaPx = 0.5;
-constexpr double kShapeRmsPerPx = 5e-4;
-constexpr double kShapeRmsPerCoverage = 0.8;
-constexpr double kShapeUsualCoverage = 0.7;
-// Median angle between the contour and the chord from the kSlopeReach-th point before to that
-// behind on the chain, degrees: photographed rims leave 0.5 to 2.5.
-constexpr int kSlopeReach = 2;
-constexpr double kMaxChordPx = 3.0 * kSlopeReach;
-constexpr double kShapeSlopeDeg = 1.8;
-constexpr double kShapeSlopePerNoise = 0.5;
-constexpr double kShapeSlopePerPx = 4e-3;
-// Median angle between gradient and normal, degrees: mostly 0.5 to 3, but where the brightness
-// changes along a rim, as in a penumbra, gradients lean by that change over their own length.
-constexpr double kShapeNormalDeg = 6.0;
-constexpr double kShapeNormalPerNoise = 2.0;
-constexpr double kShapeLimit = 2.5;
-// While a candidate is still being refined, it may miss the limits by this factor.
-constexpr double kShapeSlack = 1.5;
 // A candidate with this much of its contour is accepted before pairs are looked at.
 constexpr double kSureCoverage = 0.7;
-// The second look at a ragged contour: smoothing, and the largest part of the photo, pixels.
-constexpr double kSecondSmoothingPx = 1.6;
-constexpr int kMaxSecondLookPx = 200;
-// Up to this miss of the shape the first look has the better place.
-constexpr double kSecondLookLimit = 3.0;
-// Largest ellipse, in diagonals of the photo.
-constexpr double kMaxAxisDiagonals = 2.0;
 // Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
 constexpr double kDuplicatePx = 2.5;
-// Points beyond this many standard deviations take no part in the final fit.
-constexpr double kOutlierSigmas = 3.5;
-// No contour is known better than this, whatever its scatter says.
-constexpr double kMinSigmaPx = 0.05;
 
-using Eigen::Matrix3d;
 using Eigen::Vector2d;
-using Eigen::Vector3d;
-
-double ToDegrees(double radians) { return radians * 180.0 / kPi; }
-
-// ------------------------------------------------------------------------------------ calibration
-
-Vector2d FromPixels(const CalibratedPoint& p, const Vector2d& shift) {
-  return {p.x_from_pixel[0] * shift.x() + p.x_from_pixel[1] * shift.y(),
-          p.x_from_pixel[2] * shift.x() + p.x_from_pixel[3] * shift.y()};
-}
-
-// Curvature, 1 / pixels of the photo, of the level line of a conic through a point, and the unit
-// normal that points outward: t^T H t / |g| with gradient g, Hessian H, unit tangent t.
-double CurvatureAt(const Matrix3d& conic, const CalibratedPoint& p, Vector2d* outward) {
-  const Vector2d g = p.GradientPerPixel((conic * p.Homogeneous()).head<2>());
-  const double length = g.norm();
-  if (!(length > 0.0)) {
-    outward->setZero();
-    return 0.0;
-  }
-  *outward = g / length;
-  const Vector2d along = FromPixels(p, Vector2d(-outward->y(), outward->x()));
-  return along.dot(conic.topLeftCorner<2, 2>() * along) / length;
-}
-
-// --------------------------------------------------------------------------------------- detector
-
-// Logarithm (base 10) of the upper tail of the binomial distribution by Hoeffding's bound in its
-// Chernoff form: k of n successes or more at probability p.
-double Log10BinomialTail(double n, double k, double p) {
-  const double q = k / n;
-  if (q <= p) return 0.0;
-  if (q >= 1.0) return n * std::log10(p);
-  return -n * (q * std::log10(q / p) + (1.0 - q) * std::log10((1.0 - q) / (1.0 - p)));
-}
-
-struct Candidate {
-  Matrix3d conic = Matrix3d::Zero();
-  BrightSide bright = BrightSide::kOutside;
-  double score = 0.0;
-};
 
 class EllipseDetector {
  public:
   EllipseDetector(const EdgeMap& map, const Camera& camera, const EllipseOptions& options)
-      : map_(map),
-        camera_(camera),
-        options_(options),
-        calibrated_(map, camera),
-        contour_(camera),
-        supporter_(map),
-        max_axis_px_(kMaxAxisDiagonals * std::hypot(map.width, map.height)) {}
+      : map_(map), options_(options), fitter_(map, camera, options) {}
 
   std::vector<DetectedEllipse> Detect() {
     arcs_ = FindArcs(map_);
@@ -188,35 +54,10 @@ class EllipseDetector {
   // Fits an ellipse to the arcs and keeps it for later if edges elsewhere support it too. False if
   // the arcs themselves are not on one ellipse.
   bool AddCandidate(std::initializer_list<const Arc*> arcs) {
-    fit_points_.clear();
-    fit_indices_.clear();
-    for (const Arc* arc : arcs) AppendPoints(*arc);
-    Candidate candidate;
-    candidate.bright = SideOf(arcs);
-    if (!FitConicDirect(fit_points_, &candidate.conic).ok()) return false;
-    if (Rms(candidate.conic) > kMaxArcRmsPx || !GradientsAgree(candidate)) return false;
-    Consider(candidate);
+    EllipseCandidate candidate;
+    if (!fitter_.FitArcs(arcs, &candidate)) return false;
+    if (fitter_.Improve(&candidate)) candidates_.push_back(candidate);
     return true;
-  }
-
-  // Keeps a candidate that edges elsewhere support too.
-  void Consider(const Candidate& rough) {
-    if (!contour_.Project(rough.conic, 0.5 * options_.min_axis_px, max_axis_px_)) return;
-    if (!contour_.SampleCount(kQuickSamples, &samples_)) return;
-    const QuickSupport look = supporter_.QuickLook(samples_, kQuickPx);
-    const double own = look.across[static_cast<std::size_t>(rough.bright)];
-    Candidate candidate = rough;
-    if (own >= std::max(kQuickShare, kQuickAcross * look.any) && Improve(&candidate)) {
-      candidates_.push_back(candidate);
-      return;
-    }
-    // Before a busy ground the bright side changes along the contour.
-    const double either = look.across[static_cast<std::size_t>(BrightSide::kEither)];
-    if (either < std::max(kQuickShare, own) + kOtherSideShare) return;
-    if (either < 2.0 * kQuickAcross * look.any) return;
-    candidate = rough;
-    candidate.bright = BrightSide::kEither;
-    if (Improve(&candidate)) candidates_.push_back(candidate);
   }
 
   // An arc may be an ellipse's but for a stretch where something else touches the contour: the
@@ -233,182 +74,11 @@ class EllipseDetector {
     }
   }
 
-  static BrightSide SideOf(std::initializer_list<const Arc*> arcs) {
-    const bool inside = (*arcs.begin())->bright_inside;
-    for (const Arc* arc : arcs) {
-      if (arc->bright_inside != inside) return BrightSide::kEither;
-    }
-    return inside ? BrightSide::kInside : BrightSide::kOutside;
-  }
-
   // Replaces an arc that is no ellipse's by its parts on either side of its sharpest point.
   void Split(std::size_t k) {
     const std::vector<Arc> parts = SplitArc(map_, arcs_[k]);
     arcs_[k].turn = 0.0;  // Takes no further part.
     arcs_.insert(arcs_.end(), parts.begin(), parts.end());
-  }
-
-  void AppendPoints(const Arc& arc) {
-    const int n = std::min(arc.size(), kFitPoints);
-    for (int k = 0; k < n; ++k) {
-      const int i = arc.begin + static_cast<int>((static_cast<long>(k) * (arc.size() - 1)) /
-                                                 std::max(n - 1, 1));
-      const CalibratedPoint* p = calibrated_.Get(i);
-      if (p == nullptr) continue;
-      fit_points_.push_back(*p);
-      fit_indices_.push_back(i);
-    }
-  }
-
-  // Direct fit to the points at hand, and again without those that stand out until these stay the
-  // same: the ends of an arc often follow a neighbour's edge, a shadow runs beside a rim, and a few
-  // such points spoil a least-squares fit.
-  bool FitTrimmed(Matrix3d* conic, int max_trims) {
-    if (!FitConicDirect(fit_points_, conic).ok()) return false;
-    std::size_t before = fit_points_.size();
-    for (int round = 0; round < max_trims; ++round) {
-      Trim(*conic);
-      if (trimmed_.size() == before || trimmed_.size() < 6) break;
-      before = trimmed_.size();
-      Matrix3d better;
-      if (!FitConicDirect(trimmed_, &better).ok()) break;
-      *conic = better;
-    }
-    return true;
-  }
-
-  void Trim(const Matrix3d& conic) {
-    MeasureDistances(conic);
-    sorted_.clear();
-    for (const double d : distances_) sorted_.push_back(std::abs(d));
-    const double limit = kTrimSigmas * std::max(kTrimMinSigmaPx, 1.4826 * Median(&sorted_));
-    trimmed_.clear();
-    for (std::size_t k = 0; k < fit_points_.size(); ++k) {
-      if (std::abs(distances_[k]) <= limit) trimmed_.push_back(fit_points_[k]);
-    }
-  }
-
-  // Signed, of the points at hand, pixels.
-  void MeasureDistances(const Matrix3d& conic) {
-    distances_.clear();
-    for (const CalibratedPoint& p : fit_points_) distances_.push_back(ConicDistancePx(p, conic));
-  }
-
-  // Median angle between the contour and the chains on which the points lie, degrees. (A chain's
-  // points follow each other in the map; where one ends, the next is elsewhere.)
-  double SlopeDeg(const Matrix3d& conic, const std::vector<int>& points) {
-    const int n = static_cast<int>(map_.points.size());
-    sorted_.clear();
-    for (const int i : points) {
-      if (i < kSlopeReach || i + kSlopeReach >= n) continue;
-      const CalibratedPoint* a = calibrated_.Get(i - kSlopeReach);
-      const CalibratedPoint* b = calibrated_.Get(i + kSlopeReach);
-      if (a == nullptr || b == nullptr) continue;
-      const double chord = (Pixel(i + kSlopeReach) - Pixel(i - kSlopeReach)).norm();
-      if (chord > kMaxChordPx || !(chord > 0.0)) continue;
-      sorted_.push_back(std::abs(ConicDistancePx(*b, conic) - ConicDistancePx(*a, conic)) / chord);
-    }
-    return ToDegrees(Median(&sorted_));
-  }
-
-  Vector2d Pixel(int i) const { return map_.points[static_cast<std::size_t>(i)].Position(); }
-
-  // Whether the gradients on the arcs are across the contour that was fitted to their places: a
-  // second opinion that costs little and is independent of the first.
-  bool GradientsAgree(const Candidate& candidate) const {
-    const double side = candidate.bright == BrightSide::kInside ? -1.0 : 1.0;
-    const bool either = candidate.bright == BrightSide::kEither;
-    std::size_t agree = 0;
-    for (std::size_t k = 0; k < fit_points_.size(); ++k) {
-      const CalibratedPoint& p = fit_points_[k];
-      const Vector3d g = candidate.conic * p.Homogeneous();
-      const Vector2d outward = p.GradientPerPixel(g.head<2>());
-      const EdgePoint& edge = map_.points[static_cast<std::size_t>(fit_indices_[k])];
-      const double cosine = outward.normalized().dot(edge.Normal());
-      const double noise =
-          kArcNormalSigmas * map_.gradient_noise / static_cast<double>(edge.gradient);
-      const double sine_squared = kArcNormalSine * kArcNormalSine + noise * noise;
-      if (!either && side * cosine < 0.0) continue;
-      agree += 1.0 - cosine * cosine < sine_squared ? 1U : 0U;
-    }
-    return static_cast<double>(agree) >= kArcAgreement * static_cast<double>(fit_points_.size());
-  }
-
-  double Rms(const Matrix3d& conic) const { return Rms(fit_points_, conic); }
-  static double Rms(const std::vector<CalibratedPoint>& points, const Matrix3d& conic) {
-    double sum = 0.0;
-    for (const CalibratedPoint& p : points) {
-      const double d = ConicDistancePx(p, conic);
-      sum += d * d;
-    }
-    return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(points.size(), 1)));
-  }
-
-  // Refits a candidate to the points along its contour; false if there are too few.
-  bool Improve(Candidate* candidate) {
-    for (std::size_t round = 0; round + 1 < kGatherPx.size(); ++round) {
-      if (!Gather(*candidate, 1.5, kGatherPx[round], kRoughSamples)) return false;
-      if (360.0 * support_.Coverage() < kEarlyShare * options_.min_arc_deg) return false;
-      if (ToDegrees(support_.normal_median) > kEarlyNormalDeg) return false;
-      CalibrateSupport(kRoughSamples);
-      if (!FitTrimmed(&candidate->conic, 1)) return false;
-    }
-    if (!Gather(*candidate, 1.5, kGatherPx.back(), 2 * kRoughSamples)) return false;
-    candidate->score = support_.length_px * support_.Coverage();
-    // One side all around explains more than either side does.
-    if (candidate->bright == BrightSide::kEither) candidate->score *= 0.5;
-    CalibrateSupport(kRoughSamples);
-    Trim(candidate->conic);
-    const double rms_px = Rms(trimmed_, candidate->conic);
-    return Plausible(candidate->bright) && rms_px <= kShapeSlack * options_.max_rms_px &&
-           ShapeMiss(rms_px, SlopeDeg(candidate->conic, fit_indices_)) <= kShapeSlack * kShapeLimit;
-  }
-
-  // How far the edges are from following the contour as those of an ellipse do; see kShapeLimit.
-  double ShapeMiss(double rms_px, double slope_deg) const {
-    const double coverage = std::min(support_.Coverage(), support_.turn / (2.0 * kPi));
-    const double size = std::sqrt(contour_.major_px() * contour_.minor_px());
-    const double rms_unit = std::hypot(std::min(kShapeRmsPx, kShapeRmsPerSize * size) +
-                                           kShapeRmsPerPx * support_.length_px,
-                                       std::min(support_.sigma_px, kShapeMaxSigmaPx)) *
-                            (1.0 + kShapeRmsPerCoverage * (coverage - kShapeUsualCoverage));
-    const double noise_deg = ToDegrees(map_.gradient_noise / std::max(support_.gradient, 1e-9));
-    const double slope_unit = std::hypot(kShapeSlopeDeg + kShapeSlopePerPx * support_.length_px,
-                                         kShapeSlopePerNoise * noise_deg);
-    const double normal_unit = std::hypot(kShapeNormalDeg, kShapeNormalPerNoise * noise_deg);
-    return rms_px / rms_unit + slope_deg / slope_unit +
-           ToDegrees(support_.normal_median) / normal_unit;
-  }
-
-  bool Gather(const Candidate& candidate, double spacing, double reach, int max_samples = 20000) {
-    if (!contour_.Project(candidate.conic, 0.7 * options_.min_axis_px, max_axis_px_)) return false;
-    if (!contour_.SampleEvery(spacing, &samples_, max_samples)) return false;
-    supporter_.Collect(samples_, candidate.bright, reach, &support_);
-    return support_.points.size() >= 6;
-  }
-
-  // The calibrated support, or about `limit` points of it, evenly.
-  void CalibrateSupport(std::size_t limit) {
-    fit_points_.clear();
-    fit_indices_.clear();
-    const std::size_t n = support_.points.size(), m = std::min(n, limit);
-    for (std::size_t k = 0; k < m; ++k) {
-      const int i = support_.points[k * n / m];
-      const CalibratedPoint* p = calibrated_.Get(i);
-      if (p == nullptr) continue;
-      fit_points_.push_back(*p);
-      fit_indices_.push_back(i);
-    }
-  }
-
-  // Enough of the contour, and more than chance explains.
-  bool Plausible(BrightSide bright) const {
-    if (support_.Coverage() * 360.0 < options_.min_arc_deg) return false;
-    if (ToDegrees(support_.turn) < options_.min_arc_deg) return false;
-    const double n = support_.perimeter_px / kIndependentPx;
-    const double chance = bright == BrightSide::kEither ? 2.0 * kChance : kChance;
-    return kLog10Tests + Log10BinomialTail(n, n * support_.Coverage(), chance) <=
-           options_.max_log10_false_alarms;
   }
 
   void AddPairs() {
@@ -434,19 +104,21 @@ class EllipseDetector {
   // Whether accepted ellipses took most of the arc.
   bool Explained(const Arc& arc) const {
     int taken = 0;
-    for (int i = arc.begin; i < arc.end; ++i) taken += supporter_.IsTaken(i) ? 1 : 0;
+    for (int i = arc.begin; i < arc.end; ++i) taken += fitter_.IsTaken(i) ? 1 : 0;
     return 2 * taken > arc.size();
   }
 
   // Accepts candidates with at least `min_coverage`, best first; the others wait.
   void AcceptBest(double min_coverage) {
-    std::stable_sort(candidates_.begin(), candidates_.end(),
-                     [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
-    std::vector<Candidate> waiting;
-    for (Candidate& candidate : candidates_) {
+    std::stable_sort(
+        candidates_.begin(), candidates_.end(),
+        [](const EllipseCandidate& a, const EllipseCandidate& b) { return a.score > b.score; });
+    std::vector<EllipseCandidate> waiting;
+    for (const EllipseCandidate& candidate : candidates_) {
       // Points taken meanwhile no longer count.
-      if (!Gather(candidate, 1.5, kGatherPx.back()) || !Plausible(candidate.bright)) continue;
-      if (support_.Coverage() < min_coverage) {
+      const double coverage = fitter_.Coverage(candidate);
+      if (!(coverage > 0.0)) continue;
+      if (coverage < min_coverage) {
         waiting.push_back(candidate);
       } else {
         Accept(candidate);
@@ -455,165 +127,19 @@ class EllipseDetector {
     candidates_ = std::move(waiting);
   }
 
-  void Accept(Candidate candidate) {
+  void Accept(const EllipseCandidate& candidate) {
     DetectedEllipse e;
-    const Candidate rough = candidate;
-    const double miss = FinalFit(&candidate, &e);
-    if (miss > kShapeLimit) {
-      Candidate smooth = rough;
-      DetectedEllipse seen;
-      if (!SecondLook(&smooth, &seen)) return;
-      // A wide Gaussian also takes in what runs beside the contour: it confirms the ellipse, but
-      // where the first scale is not too ragged, that has the better place.
-      if (miss > kSecondLookLimit) {
-        candidate = smooth;
-        e = std::move(seen);
-      }
-    }
-    e.bright = candidate.bright;
-    if (IsDuplicate(e)) return;
-    // What a wider gathering finds belongs to it as well.
-    if (Gather(candidate, 0.7, kGatherPx[1])) supporter_.Take(support_.points);
-    supporter_.Take(e.points);
+    if (!fitter_.Fit(candidate, &e) || IsDuplicate(e)) return;
+    fitter_.Take(e);
     accepted_.push_back(std::move(e));
-  }
-
-  // What surrounds a contour but is too ragged for an ellipse at the first scale - a penumbra, a
-  // blur by motion, the steps of a bad print - is looked at once more, through a wider Gaussian,
-  // which averages over it.
-  bool SecondLook(Candidate* candidate, DetectedEllipse* e) {
-    if (!Gather(*candidate, 1.5, kGatherPx.back()) || support_.Coverage() < kSureCoverage) {
-      return false;
-    }
-    const cv::Rect box = Surroundings();
-    if (box.empty() || box.width > kMaxSecondLookPx || box.height > kMaxSecondLookPx) return false;
-    EdgeOptions edge_options;
-    edge_options.smoothing_px = kSecondSmoothingPx;
-    EdgeMap map;
-    if (!DetectEdges(map_.gray(box), edge_options, &map).ok()) return false;
-    Camera camera = camera_;  // Seen from the corner of the box; fits stay valid.
-    camera.cx -= box.x;
-    camera.cy -= box.y;
-    if (EllipseDetector(map, camera, options_).FinalFit(candidate, e) > kShapeLimit) return false;
-    for (Vector2d& p : e->contour) p += Vector2d(box.x, box.y);
-    // The points of the first scale that it explains.
-    if (!Gather(*candidate, 0.7, kGatherPx[0])) return false;
-    e->points = support_.points;
-    return true;
-  }
-
-  // The samples at hand with a margin for the smoothing, within the photo.
-  cv::Rect Surroundings() const {
-    Eigen::AlignedBox2d box;
-    for (const ContourSample& s : samples_) box.extend(s.pixel);
-    constexpr int kMargin = 8;
-    const cv::Point low(static_cast<int>(box.min().x()), static_cast<int>(box.min().y()));
-    const cv::Point high(static_cast<int>(box.max().x()), static_cast<int>(box.max().y()));
-    const cv::Point margin(kMargin, kMargin);
-    return cv::Rect(low - margin, high + margin) & cv::Rect({}, map_.gray.size());
-  }
-
-  // Maximum likelihood on all points of the contour, outliers left out; from a direct fit to all
-  // points, which brings the contour near enough for the nearest points to be its own. Returns the
-  // shape's miss; infinite where there is no ellipse at all.
-  double FinalFit(Candidate* candidate, DetectedEllipse* e) {
-    constexpr double kNone = std::numeric_limits<double>::infinity();
-    if (!Gather(*candidate, 0.7, kGatherPx.back())) return kNone;
-    Straighten(candidate->conic, e);
-    if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic, kMaxTrims)) return kNone;
-    const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
-    if (!Gather(*candidate, 0.7, reach)) return kNone;
-    if (!FitSupport(candidate->conic, e)) return kNone;
-    candidate->conic = e->fit.conic;
-    if (!Plausible(candidate->bright) || contour_.minor_px() < options_.min_axis_px ||
-        e->fit.rms_px > options_.max_rms_px) {
-      return kNone;
-    }
-    e->coverage_deg = 360.0 * support_.Coverage();
-    e->length_px = support_.length_px;
-    e->turn_deg = ToDegrees(support_.turn);
-    e->normal_deg = ToDegrees(support_.normal_median);
-    e->contrast = support_.gradient;
-    return ShapeMiss(e->fit.rms_px, SlopeDeg(candidate->conic, e->points));
-  }
-
-  // The edge points of the support where they would lie if the contour, `conic`, were straight.
-  void Straighten(const Matrix3d& conic, DetectedEllipse* e) {
-    e->points.clear();
-    e->contour.clear();
-    fit_points_.clear();
-    const double blur = MedianBlur();
-    for (const int i : support_.points) {
-      const CalibratedPoint* p = calibrated_.Get(i);
-      if (p == nullptr) continue;
-      const EdgePoint& edge = map_.points[static_cast<std::size_t>(i)];
-      Vector2d outward;
-      const double curvature = CurvatureAt(conic, *p, &outward);
-      const Vector2d shift = CurvatureBias(edge, blur, curvature) * outward;
-      CalibratedPoint moved = *p;
-      moved.x += FromPixels(*p, shift);
-      e->points.push_back(i);
-      e->contour.push_back(edge.Position() + shift);
-      fit_points_.push_back(moved);
-    }
-  }
-
-  double MedianBlur() {
-    sorted_.clear();
-    for (const int i : support_.points) {
-      sorted_.push_back(static_cast<double>(map_.points[static_cast<std::size_t>(i)].blur_px));
-    }
-    return Median(&sorted_);
-  }
-
-  bool FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
-    Straighten(initial, e);
-    if (fit_points_.size() < 6) return false;
-    if (!RefineConic(fit_points_, 1.0, initial, &e->fit).ok()) return false;
-    DropOutliers(e);
-    if (fit_points_.size() < 6) return false;
-    e->sigma_px = kMinSigmaPx;
-    const Matrix3d conic = e->fit.conic;
-    if (!RefineConic(fit_points_, e->sigma_px, conic, &e->fit).ok()) return false;
-    // Degrees of freedom: five go into the ellipse.
-    const double n = static_cast<double>(fit_points_.size());
-    e->sigma_px = std::max(kMinSigmaPx, e->fit.rms_px * std::sqrt(n / (n - 5.0)));
-    const double scale = e->sigma_px / kMinSigmaPx;
-    for (double& c : e->fit.covariance) c *= scale * scale;
-    return true;
-  }
-
-  void DropOutliers(DetectedEllipse* e) {
-    MeasureDistances(e->fit.conic);
-    sorted_.clear();
-    for (const double d : distances_) sorted_.push_back(std::abs(d));
-    // 1.4826: median absolute deviation to standard deviation of a Gaussian.
-    const double limit = kOutlierSigmas * std::max(kMinSigmaPx, 1.4826 * Median(&sorted_));
-    std::size_t kept = 0;
-    for (std::size_t k = 0; k < distances_.size(); ++k) {
-      if (std::abs(distances_[k]) > limit) continue;
-      fit_points_[kept] = fit_points_[k];
-      e->contour[kept] = e->contour[k];
-      e->points[kept++] = e->points[k];
-    }
-    fit_points_.resize(kept);
-    e->contour.resize(kept);
-    e->points.resize(kept);
   }
 
   // The same contour found again from other points.
   bool IsDuplicate(const DetectedEllipse& e) {
     for (const DetectedEllipse& other : accepted_) {
-      if (other.bright != e.bright && other.bright != BrightSide::kEither &&
-          e.bright != BrightSide::kEither) {
-        continue;
-      }
-      double worst = 0.0;
-      for (std::size_t k = 0; k < e.points.size(); k += 1 + e.points.size() / 16) {
-        const CalibratedPoint& p = *calibrated_.Get(e.points[k]);
-        worst = std::max(worst, std::abs(ConicDistancePx(p, other.fit.conic)));
-      }
-      if (worst < kDuplicatePx) return true;
+      const bool same_side = other.bright == e.bright || other.bright == BrightSide::kEither ||
+                             e.bright == BrightSide::kEither;
+      if (same_side && fitter_.Farthest(e, other.fit.conic) < kDuplicatePx) return true;
     }
     return false;
   }
@@ -629,24 +155,12 @@ class EllipseDetector {
   }
 
   const EdgeMap& map_;
-  const Camera& camera_;
   const EllipseOptions& options_;
-  CalibratedEdges calibrated_;
-  Contour contour_;
-  Supporter supporter_;
-  const double max_axis_px_;
+  EllipseFitter fitter_;
   std::vector<Arc> arcs_;
-  std::vector<Candidate> candidates_;
+  std::vector<EllipseCandidate> candidates_;
   std::vector<DetectedEllipse> accepted_;
-  // Scratch.
-  std::vector<CalibratedPoint> fit_points_, trimmed_;
-  std::vector<int> fit_indices_;
-  std::vector<ContourSample> samples_;
-  Support support_;
-  std::vector<double> distances_, sorted_;
 };
-
-// ------------------------------------------------------------------------------------- concentric
 
 // Images of the centres that the two poses of an ellipse put there, and their normals.
 bool CanBeConcentric(const DetectedEllipse& a, const DetectedEllipse& b, const Camera& camera) {
