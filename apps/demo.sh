@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Shows circline on real photographs, on Debian 12: installs the packages that are missing, builds in
-# build/release, fetches the photographs (they come with two Debian packages) and runs
-# circline_compare on the three sets described in apps/demo/*.yaml. The results are in build/demo.
+# build/release, fetches the photographs (they come with two Debian packages), runs circline_compare
+# on the three sets described in apps/demo/*.yaml and circline_reconstruct on one photograph. The
+# results are in build/demo.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/setup.sh
@@ -50,13 +51,19 @@ compare() {
 }
 
 install_packages "${BUILD_PACKAGES[@]}"
-build release circline_compare
+build release circline_compare circline_reconstruct
 
 find_folder opencv-doc /usr/share/doc/opencv-doc/examples/data
 compare chessboard "$found"
 find_folder visp-images-data /usr/share/visp-images-data/ViSP-images
 compare disc "$found/mire-2"
 compare dots "$found/calibration"
+
+echo
+say "disc: a model of the plate, with measurements, from one photograph"
+build/release/bin/circline_reconstruct --scene=build/demo/disc/scene.yaml --image=image.0007.pgm \
+  --output=build/demo/disc/model
+cat build/demo/disc/model/measurements.csv
 
 echo
 say "the reports, with a picture of every photograph:"

@@ -53,6 +53,7 @@ struct SceneImage {
   std::string name;                // As the scene file writes it.
   std::string path;                // Where it is.
   std::size_t index = 0;           // In the whole set, also where only a part of it is worked on.
+  std::size_t set_size = 0;        // Images in the whole set.
   std::string stem;                // Of file names that belong to it, unique in the whole set.
   Observations observations;       // Camera, and what is annotated; nothing fitted or detected yet.
   bool detect_everything = false;  // No circle and no pencil is annotated.

@@ -26,7 +26,8 @@ bool IsPlain(const SceneImage& image) {
 
 }  // namespace
 
-ImageSet::ImageSet(std::vector<SceneImage> images, int shard_index, int num_shards) {
+ImageSet::ImageSet(std::vector<SceneImage> images, int shard_index, int num_shards)
+    : set_size_(images.size()) {
   std::vector<std::string> paths;
   for (const SceneImage& image : images) paths.push_back(image.path);
   std::vector<std::string> stems = UniqueStems(paths);
@@ -66,6 +67,7 @@ SceneImage ImageSet::At(std::size_t i) const {
     if (entry.truth != nullptr) image.truth = *entry.truth;
   }
   image.index = entry.index;
+  image.set_size = set_size_;
   image.stem = entry.stem;
   return image;
 }

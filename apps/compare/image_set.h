@@ -37,6 +37,7 @@ class ImageSet {
 
   std::vector<Entry> entries_;
   std::vector<Camera> cameras_;
+  std::size_t set_size_ = 0;
 };
 
 }  // namespace circline::apps

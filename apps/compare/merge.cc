@@ -77,10 +77,10 @@ std::vector<SolverKey> Keys(const ImageRecord& record) {
   return keys;
 }
 
-// Every index once, the same solvers everywhere.
+// Every index of the set once, the same solvers everywhere.
 Status CheckImages(const std::vector<std::string>& folders) {
   Merger merger(folders);
-  std::size_t expected = 0;
+  std::size_t expected = 0, set_size = 0;
   std::optional<std::vector<SolverKey>> keys;
   while (const Source* source = merger.Next()) {
     ImageRecord record;
@@ -92,12 +92,21 @@ Status CheckImages(const std::vector<std::string>& folders) {
           "--merge: image " + std::to_string(twice ? source->index : expected) +
           (twice ? " (" + record.name + ") is there twice" : " is missing: is a shard not named?"));
     }
-    ++expected;
+    if (expected++ == 0) set_size = record.set_size;
+    if (record.set_size != set_size) {
+      return Status::Invalid("--merge: " + source->folder + " is of a set of " +
+                             std::to_string(record.set_size) + " images, not " +
+                             std::to_string(set_size));
+    }
     if (!record.error.empty()) continue;
     if (!keys) keys = Keys(record);
     if (!(*keys == Keys(record))) {
       return Status::Invalid("--merge: " + source->folder + " ran other solvers or losses");
     }
+  }
+  if (expected < set_size) {
+    return Status::Invalid("--merge: image " + std::to_string(expected) + " of " +
+                           std::to_string(set_size) + " is missing: is a shard not named?");
   }
   return expected > 0 ? Status::Ok() : Status::Invalid("--merge: there are no images");
 }

@@ -137,6 +137,7 @@ Camera ReadCamera(const Json& json) {
 void ReadObservations(const std::string& text, ImageRecord* record) {
   const Json line = Json::parse(text);
   record->index = line.at("index").get<std::size_t>();
+  record->set_size = line.at("set_size").get<std::size_t>();
   record->name = line.at("image").get<std::string>();
   record->error = TextOr(line, "error");
   record->overlay = TextOr(line, "overlay");

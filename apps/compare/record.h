@@ -58,6 +58,7 @@ struct SolverRecord {
 
 struct ImageRecord {
   std::size_t index = 0;  // In the whole set, whatever the shard.
+  std::size_t set_size = 0;
   std::string name;
   std::string error;    // Not empty: the photo could not be used.
   std::string overlay;  // Relative to the output folder; empty if none was drawn.

@@ -38,7 +38,7 @@ ul.say{margin:6px 0 12px;padding-left:18px;color:var(--soft);font-size:13px}
 .choose button{font:inherit;font-size:14px;margin:0 6px 14px 0;padding:4px 14px;color:var(--fg);background:var(--card);border:1px solid var(--line);border-radius:16px;cursor:pointer}
 .choose button.on{color:#fff;background:#1f6fd1;border-color:#1f6fd1}
 .scroll+.choose{margin:12px 0 0}
-@media(max-width:600px){body{padding:0 12px 60px}nav{position:static}section.image,.plots>div{padding:10px}th,td{padding:4px 7px}td.say{min-width:220px}table.named td:first-child{white-space:normal}}
+@media(max-width:600px){body{padding:0 12px 60px}nav{position:static}section.image,.plots>div{padding:10px}th,td{padding:4px 7px}td.say{min-width:220px}table.named td:first-child,table.matrix th.l{white-space:normal}}
 details{margin:0 0 22px}summary{cursor:pointer;color:var(--accent)}
 #zoom{position:fixed;inset:0;z-index:3;display:none;overflow:hidden;background:#0d1014ee;cursor:grab}
 #zoom.on{display:block}#zoom img{position:absolute;left:0;top:0;transform-origin:0 0;max-width:none;user-select:none}

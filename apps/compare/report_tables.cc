@@ -95,7 +95,7 @@ std::string AgreementTable(const Agreement& agreement) {
   }
   html += "</tr></thead><tbody>";
   for (const std::size_t i : used) {
-    html += "<tr><th class='l'>" + EscapeHtml(agreement.keys()[i].Name()) + "</th>";
+    html += "<tr><th class='l'>" + Breakable(agreement.keys()[i].Name()) + "</th>";
     for (const std::size_t j : used) {
       std::optional<double> median = i == j ? std::nullopt : agreement.MedianDeg(i, j);
       if (median && *median < kRounding) median = 0.0;

@@ -195,6 +195,7 @@ std::string ObservationLine(const ImageRun& run, const std::string& overlay,
   Json line;
   line["image"] = run.image->name;
   line["index"] = run.image->index;
+  line["set_size"] = run.image->set_size;
   line["detected"] = run.image->detect_everything;
   line["camera"] = CameraJson(run);
   for (const char* key : {"ellipses", "segments", "pencils"}) line[key] = Json::array();

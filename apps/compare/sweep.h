@@ -33,8 +33,8 @@ const SummaryRow* FindRefined(const Summary& summary, const std::string& solver,
 // residual. Null if nothing was answered.
 const SummaryRow* BestRow(const Summary& summary, const std::string& solver = "");
 
-// The rows that tables and plots show beside those of the sweep: all but those with a loss and scale
-// that are not their solver's best.
+// The rows that tables and plots show beside those of the sweep: all but those with a loss and
+// scale that are not their solver's best.
 std::set<const SummaryRow*> RowsToShow(const Summary& summary);
 
 // "joint refined, tukey 0.5: median error 0.12 degrees in 26 of 26 images".

@@ -51,12 +51,16 @@ TEST_F(CompareMerge, RefusesWhatIsNotOneSet) {
   ASSERT_EQ(Run("--shard=0/2 --overlays=false", "a").exit_code, 1);
   ASSERT_EQ(Run("--shard=1/2 --overlays=false", "b").exit_code, 0);
   ASSERT_EQ(Run("--shard=1/2 --overlays=false --solvers=joint", "other").exit_code, 0);
+  ASSERT_EQ(Run("--shard=0/7 --overlays=false", "first").exit_code, 0);
   std::filesystem::copy(folder_ / "b", folder_ / "unfinished");
   folder_.Write("unfinished/unfinished.flags", "--seed=1\n");
-  const std::map<std::string, std::string> cases = {
-      {"a", "image 1 is missing"},         {"b", "image 0 is missing"},
-      {"a b b", "is there twice"},         {"a other", "ran other solvers or losses"},
-      {"a unfinished", "is not finished"}, {"a nothing", "nothing has no results.jsonl"}};
+  const std::map<std::string, std::string> cases = {{"first", "image 1 of 7 is missing"},
+                                                    {"a", "image 1 is missing"},
+                                                    {"b", "image 0 is missing"},
+                                                    {"a b b", "is there twice"},
+                                                    {"a other", "ran other solvers or losses"},
+                                                    {"a unfinished", "is not finished"},
+                                                    {"a nothing", "nothing has no results.jsonl"}};
   for (const auto& [inputs, words] : cases) {
     const Outcome outcome = Merge(inputs);
     EXPECT_EQ(outcome.exit_code, 2) << inputs;
