@@ -138,6 +138,9 @@ int Reconstruct() {
   SceneImage image;
   Status status = OptionsFromFlags(&options);
   if (status.ok()) status = ModelFromFlags(&model_options);
+  if (status.ok() && options.losses.front().estimation.focal_sigma > 0.0) {
+    status = Status::Invalid("--focal_sigma: a model needs the focal length as the camera says it");
+  }
   if (status.ok()) status = ImagesFromFlags(options.inputs, &images);
   if (status.ok()) status = FindImage(images, &image);
   if (!status.ok()) return Refuse(status);
