@@ -364,6 +364,17 @@ bool ApproachFromPrior(const JointProblem& problem, const EstimationOptions& opt
   return true;
 }
 
+// What the closed forms missed, led by the one thing where all of them miss it.
+Status NoSeed(const Observations& fitted, const std::vector<std::string>& reasons) {
+  const auto has_fit = [](const auto& feature) { return feature.fit.has_value(); };
+  const auto circles = std::count_if(fitted.circles.begin(), fitted.circles.end(), has_fit);
+  const auto pencils = std::count_if(fitted.pencils.begin(), fitted.pencils.end(), has_fit);
+  if (circles > 0 || pencils > 1) return Status::Refused(Join(reasons));
+  const std::string lead = "a pose takes a circle or two pencils of parallel lines; there is " +
+                           std::string(pencils == 0 ? "neither" : "one pencil only");
+  return Status::Refused(reasons.empty() ? lead : lead + " (" + Join(reasons) + ")");
+}
+
 Status RefineFitted(const Observations& fitted,
                     const std::vector<std::shared_ptr<const Solver>>& seeders,
                     const EstimationOptions& options, PoseEstimate* estimate) {
@@ -380,8 +391,7 @@ Status RefineFitted(const Observations& fitted,
   }
   std::vector<std::string> reasons;
   const std::vector<CameraPose> seeds = CollectSeeds(scaled, seeders, options, problem, &reasons);
-  Status last = Status::Refused(
-      reasons.empty() ? "there is no circle and no pencil of parallel lines" : Join(reasons));
+  Status last = NoSeed(fitted, reasons);
   approaches = ApproachAll(problem, seeds, &last);
   if (approaches.empty()) return last;
   if (RaiseScales(approaches.front().scales, &scales)) {
