@@ -24,6 +24,8 @@ using Eigen::Vector2d;
 // sure.
 constexpr std::size_t kThinFrom = 60;  // Points from which every second one is dropped.
 constexpr double kCorrelationDense = 1.9;
+// No contour lies farther than this from the edges it was fitted to, pixels.
+constexpr double kMaxBiasPx = 1.0;
 // What the shape of a whole contour may be off by, whatever its points scatter, pixels: prints,
 // lenses and sensors bend edges by about that.
 constexpr double kShapeErrorPx = 0.1;
@@ -38,11 +40,18 @@ struct Evidence {
 
 // Points of an ellipse as an observation: thinned, and the fit's covariance widened by the
 // correlation of dense points.
-void FillCircle(const DetectedEllipse& ellipse, CircleObservation* circle) {
+void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, CircleObservation* circle) {
   const bool thin = ellipse.contour.size() >= kThinFrom;
+  // The contour of a second look is not that of the edges.
+  const bool has_normals = ellipse.contour.size() == ellipse.points.size();
   circle->points.clear();
+  circle->normals.clear();
   for (std::size_t k = 0; k < ellipse.contour.size(); k += thin ? 2 : 1) {
     circle->points.push_back(ellipse.contour[k]);
+    if (!has_normals) continue;
+    const EdgePoint& edge = edges.points[static_cast<std::size_t>(ellipse.points[k])];
+    const bool is_near = (edge.Position() - ellipse.contour[k]).norm() < kMaxBiasPx;
+    circle->normals.push_back(is_near ? edge.Normal() : Vector2d::Zero());
   }
   // The scatter of a smooth contour says little of its error: the estimate measures that, on all
   // circles.
@@ -62,11 +71,12 @@ double ShapeInflation(const DetectedEllipse& ellipse) {
   return 1.0 + kShapeErrorPx * kShapeErrorPx * n / (5.0 * sigma * sigma);
 }
 
-std::vector<CircleEvidence> MakeCircles(const std::vector<DetectedEllipse>& ellipses) {
+std::vector<CircleEvidence> MakeCircles(const EdgeMap& edges,
+                                        const std::vector<DetectedEllipse>& ellipses) {
   std::vector<CircleEvidence> circles;
   for (const DetectedEllipse& ellipse : ellipses) {
     CircleEvidence circle;
-    FillCircle(ellipse, &circle.observation);
+    FillCircle(edges, ellipse, &circle.observation);
     if (ellipse.concentric >= 0) {
       circle.observation.concentric = "g" + std::to_string(ellipse.concentric);
     }
@@ -107,7 +117,7 @@ Status CollectEvidence(const cv::Mat& image, const Camera& camera, const Detecti
   std::vector<DetectedEllipse> ellipses;
   status = DetectEllipses(edges, camera, ToEllipseOptions(options), &ellipses);
   if (!status.ok()) return status;
-  evidence->circles = MakeCircles(ellipses);
+  evidence->circles = MakeCircles(edges, ellipses);
   if (options.max_pencils == 0) return Status::Ok();
   LineOptions line_options;
   line_options.min_length_px = options.min_segment_length_px;
@@ -211,7 +221,7 @@ Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::R
   status = DetectEllipses(edges, shifted, ToEllipseOptions(options), &ellipses);
   if (!status.ok()) return status;
   if (ellipses.empty()) return Status::Refused("no ellipse found inside the rectangle");
-  FillCircle(ellipses.front(), circle);
+  FillCircle(edges, ellipses.front(), circle);
   for (Vector2d& p : circle->points) p += Vector2d(inside.x, inside.y);
   return Status::Ok();
 }

@@ -232,9 +232,19 @@ TEST(DetectObservations, OneCircleIsSaidToHaveTwoPoses) {
         return std::hypot(x, y) < 1.0 ? 40.0 : 120.0;
       }));
   const Observations found = Detect(image, camera);
-  EXPECT_EQ(found.circles.size(), 1U);
+  ASSERT_EQ(found.circles.size(), 1U);
   EXPECT_TRUE(found.pencils.empty());
   EXPECT_NE(found.message.find("two poses"), std::string::npos);
+  // What FitObservations may want: each point with the edge's normal, which is the contour's.
+  const CircleObservation& circle = found.circles[0];
+  ASSERT_EQ(circle.normals.size(), circle.points.size());
+  for (std::size_t k = 0; k < circle.points.size(); ++k) {
+    CalibratedPoint p;
+    ASSERT_TRUE(PixelToCalibrated(camera, circle.points[k], &p));
+    const Vector3d polar = circle.fit->conic * p.Homogeneous();
+    const Vector2d across = p.GradientPerPixel(polar.head<2>()).normalized();
+    EXPECT_GT(std::abs(across.dot(circle.normals[k])), std::cos(15.0 / kDegrees));
+  }
 }
 
 TEST(DetectObservations, OnePencilIsSaidToBeTooLittle) {
