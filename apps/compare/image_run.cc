@@ -88,6 +88,7 @@ void DetectInRois(const CompareOptions& options, ImageRun* run) {
                                             options.detection, &detected);
     if (status.ok()) {
       circle.points = std::move(detected.points);
+      circle.normals = std::move(detected.normals);
     } else {
       run->problems.push_back("circle '" + circle.id + "': " + status.message);
     }
