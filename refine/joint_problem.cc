@@ -35,6 +35,27 @@ double LeftOutCost(const JointEvidence& e, const JointState& state) {
   return cost;
 }
 
+// A smooth error that a feature's points share (SetScales) makes them count less, yet it explains
+// no point that is many of its standard deviations off: those count in full where poses are
+// compared.
+double FarOffCost(const JointEvidence& e, const JointState& state) {
+  constexpr double kFarSigmas = 5.0;
+  double cost = 0.0;
+  ForEachCurve(
+      e, state,
+      [&](const PointSet& set, bool is_circle, std::size_t, const std::vector<double>& distances) {
+        if (!(set.weight < 1.0)) return;
+        const double bias = is_circle ? e.options.contour_bias_px : e.options.line_bias_px;
+        const double far = kFarSigmas * std::hypot(set.sigma_px, bias);
+        for (const double d : distances) {
+          if (!(std::abs(d) > far)) continue;
+          const double sigmas = d / set.sigma_px;
+          cost += 0.5 * (1.0 - set.weight) * EvaluateLoss(set.loss, sigmas * sigmas).rho;
+        }
+      });
+  return cost;
+}
+
 // --- Results ---
 
 // 1.4826 x the median; `parameters` of the values' degrees of freedom are spent.
@@ -292,7 +313,7 @@ const JointEvidence& JointProblem::At(const Approach& approach,
 
 double JointProblem::Cost(const JointEvidence& e, const Approach& approach) const {
   return JointCost(e, approach.state, Weighing()) + LeftOutCost(e, approach.state) +
-         FocalPriorCost(evidence_, approach.log_focal);
+         FarOffCost(e, approach.state) + FocalPriorCost(evidence_, approach.log_focal);
 }
 
 bool JointProblem::is_contaminated() const {

@@ -54,6 +54,35 @@ TEST(EstimatePoseTest, MoreEvidenceDecides) {
   }
 }
 
+// The points of a contour share an error and count less for it; a pose that has none of them within
+// reach of a redescending loss, and the few ends of the lines exactly, must not win by that.
+TEST(EstimatePoseTest, ExplainingNoContourIsDear) {
+  for (const LossType loss : {LossType::kTukey, LossType::kGemanMcClure}) {
+    EstimationOptions options;
+    options.conic_loss.type = options.line_loss.type = loss;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      PlaneScene scene(0.8, 0.05, seed);
+      Observations observations = scene.Empty();
+      observations.circles = {scene.Circle("c0", 0.0, 0.0, 0.5, 80)};
+      observations.circles[0].sigma_px = 0.0;
+      observations.pencils = {scene.Pencil("x", PencilDirection::kX, Eigen::Vector3d::UnitX(), 2),
+                              scene.Pencil("y", PencilDirection::kY, Eigen::Vector3d::UnitY(), 2)};
+      // Drawn by hand: half a pixel off.
+      for (PencilObservation& pencil : observations.pencils) {
+        pencil.sigma_px = 0.2;
+        for (LineObservation& line : pencil.lines) {
+          for (Eigen::Vector2d& p : line.points)
+            p += 0.5 * Eigen::Vector2d(scene.random.Normal(), scene.random.Normal());
+        }
+      }
+      const PoseEstimate estimate = EstimatePose(observations, options);
+      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.05)
+          << LossName(loss) << ", seed " << seed;
+    }
+  }
+}
+
 TEST(EstimatePoseTest, KnownSizesMakeItMetric) {
   PlaneScene scene(0.7, 0.05);
   Observations observations = scene.Empty();
