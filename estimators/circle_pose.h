@@ -1,4 +1,4 @@
-// Poses of one imaged circle (METHOD section 2, proposition 3; section 4 of Wang, Wu and Ji 2007).
+// Poses of one imaged circle (proposition 3 of Wang, Wu and Ji 2007, their section 4).
 #ifndef CIRCLINE_ESTIMATORS_CIRCLE_POSE_H_
 #define CIRCLINE_ESTIMATORS_CIRCLE_POSE_H_
 

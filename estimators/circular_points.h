@@ -1,6 +1,6 @@
 // Imaged circular points (ICPs): where every circle of a plane, seen by a calibrated camera, meets
 // the image of the absolute conic x^2 + y^2 + z^2 = 0. With them go the projective forms of the
-// propositions (METHOD sections 1 and 2): "orthogonal" becomes "harmonic", a cross ratio of -1.
+// propositions of Wang, Wu and Ji 2007: "orthogonal" becomes "harmonic", a cross ratio of -1.
 //
 // All in calibrated coordinates, homogeneous 3-vectors; nothing allocates or iterates.
 #ifndef CIRCLINE_ESTIMATORS_CIRCULAR_POINTS_H_

@@ -1,5 +1,5 @@
-// What one image says about a plane once the pose is known, and about what stands on it (METHOD
-// section 2, proposition 6).
+// What one image says about a plane once the pose is known, and about what stands on it
+// (proposition 6 of Wang, Wu and Ji 2007).
 //
 // Conventions: image points are homogeneous calibrated 3-vectors (x, y, 1) or rays, any positive
 // multiple; image lines and conics are calibrated as well. The plane is Z = 0 of the world frame of

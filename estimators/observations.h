@@ -68,8 +68,8 @@ struct PencilObservation {
   std::optional<VanishingPointFit> fit;
 };
 
-// Where the user wants the world frame. All optional; what is not given follows DESIGN conventions:
-// the plane is the first one named, +Z faces the camera, the origin is the first circle's centre.
+// Where the user wants the world frame. All optional; where nothing is said, the plane is the first
+// one named, +Z faces the camera, the origin is the first circle's centre.
 struct FrameObservation {
   std::string plane;                      // The plane Z = 0.
   std::optional<Eigen::Vector2d> origin;  // Image of the world origin, pixels.

@@ -1,6 +1,5 @@
 // One least-squares problem over everything that is known of the world plane: circles, lines,
-// centres, axes, known angles and lengths (METHOD section 6), minimised in Ceres from one seed
-// pose.
+// centres, axes, known angles and lengths, minimised in Ceres from one seed pose.
 //
 // Parameters. The plane's distance from the camera is the unit of length, and the plane's own frame
 // has its origin at the foot of the perpendicular, so that a plane point (X, Y) is R (X, Y, facing)

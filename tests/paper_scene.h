@@ -1,4 +1,4 @@
-// The scene of the paper's simulation (METHOD sections 3 and 4): a circle in a square of two
+// The scene of the paper's simulation (docs/paper.md): a circle in a square of two
 // orthogonal pairs of parallel lines, seen by a camera of focal length 1800 from 100 units away.
 #ifndef CIRCLINE_TESTS_PAPER_SCENE_H_
 #define CIRCLINE_TESTS_PAPER_SCENE_H_
@@ -12,8 +12,8 @@
 
 namespace circline {
 
-// Cramer-Rao bounds of the total rotation angle for this scene, rad per px of noise (METHOD section
-// 4).
+// Cramer-Rao bounds of the total rotation angle for this scene, rad per px of noise
+// (docs/paper.md).
 constexpr double kBoundCircleFrame = 0.00389;
 constexpr double kBoundLines = 0.00800;
 constexpr double kBoundJoint = 0.00336;

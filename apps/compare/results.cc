@@ -91,6 +91,10 @@ Json HypothesisLine(const ImageRun& image, const SolverRun& run, std::size_t ind
     line["free_directions"].push_back(direction);
   }
   line["origin_observed"] = h.origin_observed;
+  if (h.focal_sigma > 0.0) {
+    line["focal_scale"] = Number(h.focal_scale);
+    line["focal_sigma"] = Number(h.focal_sigma);
+  }
   line["decided_by"] = run.estimate.decided_by;
   line["notes"] = run.estimate.notes;
   if (image.image->truth) AddErrors(run.errors[index], *image.image->truth, &line);

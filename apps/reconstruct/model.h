@@ -1,4 +1,4 @@
-// What one photo shows of its scene once the pose is known (METHOD section 2, proposition 6): the
+// What one photo shows of its scene once the pose is known (proposition 6 of the paper): the
 // world's plane, discs on it and on planes parallel to it, and upright faces, each with its part of
 // the photo as a texture.
 #ifndef CIRCLINE_APPS_RECONSTRUCT_MODEL_H_

@@ -50,8 +50,8 @@ class PaperScene {
   // points are not outliers.
   Observations Observe(const Disturbance& disturbance, Random* random, InlierMasks* masks) const;
 
-  // Cramer-Rao bound on the covariance of the rotation (DESIGN: of delta, camera frame) from the
-  // points that the masks keep, for a noise of 1 px; it grows with the square of the noise.
+  // Cramer-Rao bound on the covariance of the rotation (of delta, camera frame) from the points
+  // that the masks keep, for a noise of 1 px; it grows with the square of the noise.
   Eigen::Matrix3d BoundCovariance(Evidence evidence, const InlierMasks& masks) const;
   InlierMasks AllPoints() const;
 

@@ -99,6 +99,27 @@ TEST(Compare, ExactEvidenceGivesTheTruth) {
   EXPECT_EQ(solvers.count("joint"), 1U);
 }
 
+TEST(Compare, StatesTheFocalLengthItFinds) {
+  const TestFolder folder;
+  const std::string scene = MakeSet(folder);
+  ASSERT_EQ(RunCompare("--scene='" + scene + "' --focal_sigma=0.05 --overlays=false --output='" +
+                       folder / "out" + "'")
+                .exit_code,
+            0);
+  int found = 0;
+  for (const Json& line : ReadJsonLines(folder / "out/results.jsonl")) {
+    if (line["status"] != "ok") continue;
+    EXPECT_EQ(line.contains("focal_scale"), line["stage"] == "refined") << line;
+    if (line["solver"] != "joint" || line["hypothesis"] != 0) continue;
+    const double scale = line["focal_scale"], sigma = line["focal_sigma"];
+    EXPECT_GT(sigma, 0.0);
+    EXPECT_LE(sigma, 0.05 * scale);
+    EXPECT_LT(std::abs(scale - 1.0), 3.0 * sigma);
+    ++found;
+  }
+  EXPECT_EQ(found, 6);
+}
+
 TEST(Compare, SameBytesForAnyNumberOfThreads) {
   const TestFolder folder;
   const std::string scene = MakeSet(folder);

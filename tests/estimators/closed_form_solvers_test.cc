@@ -166,7 +166,7 @@ TEST(ClosedFormSolversTest, AxesDecideTheSigns) {
   EXPECT_LT(RotationAngle(estimate.hypotheses[0].cam_from_world.rotation, drawn), 1e-7);
 }
 
-// METHOD section 5: an axis through the circle's centre along the tilt makes both candidates pass
+// An axis through the circle's centre along the tilt makes both candidates pass
 // the test of orthogonality. They are both returned as equals, unless the origin is the centre.
 TEST(ClosedFormSolversTest, CircleFrameSaysWhenItCannotDecide) {
   PlaneScene scene;

@@ -1,4 +1,4 @@
-// The degenerate and ambiguous cases of METHOD section 5, one test for each: a defined answer from
+// The degenerate and ambiguous cases of circles and lines, one test for each: a defined answer from
 // every closed form, with a status and a sentence, never NaN, never a hypothesis silently dropped.
 #include <gtest/gtest.h>
 

@@ -133,7 +133,7 @@ TEST(EfficiencyTest, LinePairsIsWithinTenPercentOfTheBound) {
 }
 
 TEST(EfficiencyTest, ClosedFormsReachThePapersAccuracy) {
-  // METHOD section 4, 1 px: 0.0053 for algorithm 1, 0.0139 for algorithm 2.
+  // docs/paper.md, 1 px: 0.0053 for algorithm 1, 0.0139 for algorithm 2.
   EXPECT_LT(
       Measure("circle_frame", SolverStage::kClosedForm, LossType::kTrivial, 1.0, kTrials).rms_rad,
       0.0058);
