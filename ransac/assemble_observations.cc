@@ -20,8 +20,10 @@ constexpr std::size_t kMaxSeeds = 16;
 // Directions nearer than this (a sine; 3 degrees) are one.
 constexpr double kDistinctSine = 0.0523;
 // Two pencils of one plane cross or form corners, while the edges of a box and the stripes of a
-// cushion behind it do not: this share of either's length meets the other.
-constexpr double kMinSpanningShare = 0.1;
+// cushion behind it do not: this share of either's length meets the other, and if they are at right
+// angles, as those of houses are, the lower one.
+constexpr double kMinSpanningShare = 0.3;
+constexpr double kMinRectangularShare = 0.1;
 // A further pencil of the plane meets its lines over this share of its length.
 constexpr double kMinMeetingShare = 0.4;
 // The rim of a circle that agrees with two pencils counts as much as this many times its length in
@@ -147,10 +149,10 @@ class Assembler {
     const PlacedPencil& a = pencils_[i];
     const PlacedPencil& b = pencils_[j];
     const double of_a = MeetingLength(a.ends, b.ends), of_b = MeetingLength(b.ends, a.ends);
-    if (of_a < kMinSpanningShare * a.support_px || of_b < kMinSpanningShare * b.support_px) {
-      return 0.0;
-    }
-    return 2.0 * std::min(of_a, of_b);
+    const double share = std::min(of_a / a.support_px, of_b / b.support_px);
+    const bool is_plane = share >= kMinSpanningShare ||
+                          (share >= kMinRectangularShare && Rectangular(a.direction, b.direction));
+    return is_plane ? 2.0 * std::min(of_a, of_b) : 0.0;
   }
 
   // The plane with most support: of two pencils and the circles that agree, or of circles alone.

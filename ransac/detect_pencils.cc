@@ -33,6 +33,8 @@ constexpr int kFoundAround = 2;
 constexpr double kMinCross = 0.05;
 // Standard deviations within which a line belongs to a pencil.
 constexpr double kGate = 3.03;
+// The two sides of a thin line are so near to each other, pixels.
+constexpr double kTwinPx = 4.0;
 // What all points of a line share, pixels: no number of them averages it out. It turns short lines
 // by more than long ones; measured on the sides of chessboard squares.
 constexpr double kSharedErrorPx = 0.06;
@@ -45,12 +47,52 @@ LineFit WithSharedError(const DetectedLine& line) {
   return fit;
 }
 
+// Of each line the longer one whose other side it is, or -1. Both sides are measurements; but that
+// they are parallel is no accident and says nothing of a pencil.
+std::vector<int> FindTwins(const std::vector<DetectedLine>& lines) {
+  std::vector<int> order(lines.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto line = [&lines](int i) -> const DetectedLine& {
+    return lines[static_cast<std::size_t>(i)];
+  };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return line(a).length_px > line(b).length_px; });
+  std::vector<int> twin_of(lines.size(), -1);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const auto beside = [&](int longer) {
+      return twin_of[static_cast<std::size_t>(longer)] < 0 &&
+             LiesAlong(line(order[k]).ends, line(longer).ends, kTwinPx);
+    };
+    const auto end = order.begin() + static_cast<std::ptrdiff_t>(k);
+    const auto found = std::find_if(order.begin(), end, beside);
+    if (found != end) twin_of[static_cast<std::size_t>(order[k])] = *found;
+  }
+  return twin_of;
+}
+
+// Detected lines with what the search for pencils knows of them.
+struct LineSet {
+  explicit LineSet(const std::vector<DetectedLine>& detected)
+      : lines(detected), twin_of(FindTwins(detected)) {
+    for (const DetectedLine& line : lines) fits.push_back(WithSharedError(line));
+  }
+  bool IsTwin(int i) const { return twin_of[static_cast<std::size_t>(i)] >= 0; }
+  // Twins count once.
+  int Count(const std::vector<int>& members) const {
+    return static_cast<int>(
+        std::count_if(members.begin(), members.end(), [this](int i) { return !IsTwin(i); }));
+  }
+
+  const std::vector<DetectedLine>& lines;
+  std::vector<LineFit> fits;  // With the shared error.
+  std::vector<int> twin_of;
+};
+
 // Fits the direction of one pencil to what it can have of all lines.
 class PencilFitter {
  public:
-  PencilFitter(const std::vector<DetectedLine>& lines, const std::vector<LineFit>& fits,
-               double max_spread_rad)
-      : lines_(lines), fits_(fits), max_spread_(max_spread_rad) {}
+  PencilFitter(const LineSet& set, double max_spread_rad)
+      : set_(set), max_spread_(max_spread_rad) {}
 
   // The search finds what roughly shares a direction. Here the scatter of the lines about it is
   // estimated and the direction fitted to those of `candidates` within it, each with its own
@@ -87,7 +129,7 @@ class PencilFitter {
   }
 
  private:
-  const LineFit& Line(int i) const { return fits_[static_cast<std::size_t>(i)]; }
+  const LineFit& Line(int i) const { return set_.fits[static_cast<std::size_t>(i)]; }
 
   double Variance(int i, const Vector3d& direction, double spread) const {
     return direction.dot(Line(i).covariance * direction) + spread * spread;
@@ -111,7 +153,7 @@ class PencilFitter {
       double below = 0.0, total = 0.0;
       for (const int i : members) {
         const double miss = Line(i).line.dot(direction);
-        const double length = lines_[static_cast<std::size_t>(i)].length_px;
+        const double length = set_.lines[static_cast<std::size_t>(i)].length_px;
         total += length;
         if (miss * miss < 0.455 * Variance(i, direction, spread)) below += length;
       }
@@ -127,21 +169,19 @@ class PencilFitter {
     return high;
   }
 
-  const std::vector<DetectedLine>& lines_;
-  const std::vector<LineFit>& fits_;
+  const LineSet& set_;
   double max_spread_;
 };
 
-DetectedPencil MakePencil(const FoundPencil& found, const std::vector<DetectedLine>& lines,
-                          const std::vector<LineFit>& fits, double spread) {
+DetectedPencil MakePencil(const FoundPencil& found, const LineSet& set, double spread) {
   DetectedPencil pencil;
   pencil.observation.fit = found.fit;
   pencil.members = found.lines;
   double variance = 0.0, points = 0.0;
   const Vector3d& v = found.fit.direction;
   for (const int i : found.lines) {
-    const DetectedLine& line = lines[static_cast<std::size_t>(i)];
-    const LineFit fit = WithModelError(fits[static_cast<std::size_t>(i)], spread);
+    const DetectedLine& line = set.lines[static_cast<std::size_t>(i)];
+    const LineFit fit = WithModelError(set.fits[static_cast<std::size_t>(i)], spread);
     LineObservation observation;
     observation.points = line.points;
     observation.fit = line.fit;
@@ -168,30 +208,38 @@ PencilOptions SearchOptions(int max_pencils, std::uint64_t seed) {
   return options;
 }
 
-std::vector<LineFit> SharedErrorFits(const std::vector<DetectedLine>& lines) {
-  std::vector<LineFit> fits;
-  for (const DetectedLine& line : lines) fits.push_back(WithSharedError(line));
-  return fits;
+// Lines and their twins, ascending.
+std::vector<int> WithTwins(const LineSet& set, std::vector<int> members) {
+  const std::size_t own = members.size();
+  for (std::size_t i = 0; i < set.twin_of.size(); ++i) {
+    const auto end = members.begin() + static_cast<std::ptrdiff_t>(own);
+    if (std::find(members.begin(), end, set.twin_of[i]) != end)
+      members.push_back(static_cast<int>(i));
+  }
+  std::sort(members.begin(), members.end());
+  return members;
 }
 
-// Pencils among lines[subset], each fitted to its own lines.
-std::vector<DetectedPencil> Search(const std::vector<DetectedLine>& lines,
-                                   const std::vector<LineFit>& fits, const std::vector<int>& subset,
-                                   const PencilOptions& options) {
+// Pencils among all lines, each fitted to its own ones.
+std::vector<DetectedPencil> Search(const LineSet& set, const PencilOptions& options) {
+  std::vector<int> subset;
   std::vector<LineFit> chosen;
-  for (const int i : subset) chosen.push_back(fits[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < static_cast<int>(set.lines.size()); ++i) {
+    if (set.IsTwin(i)) continue;
+    subset.push_back(i);
+    chosen.push_back(set.fits[static_cast<std::size_t>(i)]);
+  }
   std::vector<FoundPencil> found;
   std::vector<DetectedPencil> pencils;
   if (!FindPencils(chosen, options, &found).ok()) return pencils;
-  const PencilFitter fitter(lines, fits, kSearchSigmaRad);
+  const PencilFitter fitter(set, kSearchSigmaRad);
   for (FoundPencil& f : found) {
     for (int& i : f.lines) i = subset[static_cast<std::size_t>(i)];
     fitter.StartAtDensest(options.ransac.seed, &f);
     double spread;
-    const std::vector<int> own = f.lines;
-    if (!fitter.Fit(own, &f, &spread)) continue;
-    if (static_cast<int>(f.lines.size()) < options.min_lines) continue;
-    pencils.push_back(MakePencil(f, lines, fits, spread));
+    if (!fitter.Fit(WithTwins(set, f.lines), &f, &spread)) continue;
+    if (set.Count(f.lines) < options.min_lines) continue;
+    pencils.push_back(MakePencil(f, set, spread));
   }
   return pencils;
 }
@@ -221,14 +269,13 @@ double LogFalseAlarms(std::size_t num_lines, double expected, std::size_t num_me
 
 // Boxes, boards and rooms have right angles: each of lines[subset] proposes the direction that it
 // then has if it is orthogonal to `axis`, and that with the fewest false alarms is fitted.
-std::optional<DetectedPencil> SearchOrthogonal(const std::vector<DetectedLine>& lines,
-                                               const std::vector<LineFit>& fits,
-                                               const std::vector<int>& subset,
+std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::vector<int>& subset,
                                                const Vector3d& axis) {
   const PencilOptions options = SearchOptions(1, 0);
   std::vector<LineFit> pool;
   for (const int i : subset) {
-    pool.push_back(WithModelError(fits[static_cast<std::size_t>(i)], kSearchSigmaRad));
+    if (set.IsTwin(i)) continue;
+    pool.push_back(WithModelError(set.fits[static_cast<std::size_t>(i)], kSearchSigmaRad));
   }
   FoundPencil best;
   best.log_false_alarms = std::log(options.max_false_alarms);
@@ -251,22 +298,20 @@ std::optional<DetectedPencil> SearchOrthogonal(const std::vector<DetectedLine>& 
     found = true;
   }
   double spread;
-  if (!found || !PencilFitter(lines, fits, kSearchSigmaRad).Fit(subset, &best, &spread)) {
+  if (!found || !PencilFitter(set, kSearchSigmaRad).Fit(subset, &best, &spread)) {
     return std::nullopt;
   }
-  if (static_cast<int>(best.lines.size()) < options.min_lines) return std::nullopt;
-  return MakePencil(best, lines, fits, spread);
+  if (set.Count(best.lines) < options.min_lines) return std::nullopt;
+  return MakePencil(best, set, spread);
 }
 
 // The pencils orthogonal to one, among the lines that meet its own.
-std::vector<DetectedPencil> SearchAround(const std::vector<DetectedLine>& lines,
-                                         const std::vector<LineFit>& fits,
-                                         const DetectedPencil& pencil) {
-  std::vector<int> left = LinesAround(lines, pencil);
+std::vector<DetectedPencil> SearchAround(const LineSet& set, const DetectedPencil& pencil) {
+  std::vector<int> left = LinesAround(set.lines, pencil);
   std::vector<DetectedPencil> found;
   for (int k = 0; k < kFoundAround; ++k) {
     std::optional<DetectedPencil> next =
-        SearchOrthogonal(lines, fits, left, pencil.observation.fit->direction);
+        SearchOrthogonal(set, left, pencil.observation.fit->direction);
     if (!next) break;
     std::vector<int> rest;
     std::set_difference(left.begin(), left.end(), next->members.begin(), next->members.end(),
@@ -295,17 +340,15 @@ Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, st
   const PencilOptions options = SearchOptions(max_pencils, seed);
   const Status status = options.Validate();
   if (!status.ok()) return status;
-  const std::vector<LineFit> fits = SharedErrorFits(lines);
-  std::vector<int> all(lines.size());
-  std::iota(all.begin(), all.end(), 0);
-  *pencils = Search(lines, fits, all, options);
+  const LineSet set(lines);
+  *pencils = Search(set, options);
   const auto longer = [](const DetectedPencil& a, const DetectedPencil& b) {
     return a.support_px > b.support_px;
   };
   std::stable_sort(pencils->begin(), pencils->end(), longer);
   const std::size_t num_around = std::min(kMaxSearchedAround, pencils->size());
   for (std::size_t k = 0; k < num_around; ++k) {
-    for (DetectedPencil& found : SearchAround(lines, fits, (*pencils)[k])) {
+    for (DetectedPencil& found : SearchAround(set, (*pencils)[k])) {
       if (!IsKnown(found, *pencils)) pencils->push_back(std::move(found));
     }
   }
@@ -315,12 +358,12 @@ Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, st
 
 bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
                  DetectedPencil* pencil) {
-  const std::vector<LineFit> fits = SharedErrorFits(lines);
+  const LineSet set(lines);
   FoundPencil found;
   found.fit = *pencil->observation.fit;
   double spread;
-  if (!PencilFitter(lines, fits, kMaxSpreadRad).Fit(candidates, &found, &spread)) return false;
-  *pencil = MakePencil(found, lines, fits, spread);
+  if (!PencilFitter(set, kMaxSpreadRad).Fit(candidates, &found, &spread)) return false;
+  *pencil = MakePencil(found, set, spread);
   return true;
 }
 

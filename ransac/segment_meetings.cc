@@ -129,6 +129,11 @@ double SegmentDistance(const Segment& s, const Segment& t) {
                    PointSegmentDistance(t[0], s), PointSegmentDistance(t[1], s)});
 }
 
+bool LiesAlong(const Segment& s, const Segment& t, double px) {
+  return !FarApart(s, t, px) && PointSegmentDistance(s[0], t) < px &&
+         PointSegmentDistance(s[1], t) < px;
+}
+
 bool AreNear(const Segment& s, const Segment& t) { return AreWithin(kNearPx, s, t); }
 
 double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& b) {

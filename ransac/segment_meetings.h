@@ -14,6 +14,9 @@ namespace circline {
 // Smallest distance between two segments, pixels; 0 where they cross.
 double SegmentDistance(const Segment& s, const Segment& t);
 
+// Whether `s` runs along `t`: both of its ends are within `px` of it.
+bool LiesAlong(const Segment& s, const Segment& t, double px);
+
 // Whether they cross or come within 25 pixels.
 bool AreNear(const Segment& s, const Segment& t);
 

@@ -73,6 +73,28 @@ TEST(DetectPencils, KnowsTheScatterOfLinesThatAreNotQuiteParallel) {
   EXPECT_LT(chi2, 3.0);
 }
 
+// The two sides of a thin line are parallel by themselves: drawn lines that have nothing to do with
+// each other have no pencil.
+TEST(DetectPencils, BothSidesOfALineCountOnce) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed);
+    std::vector<DetectedLine> lines;
+    for (int i = 0; i < 12; ++i) {
+      const double u = random.Uniform(60.0, 420.0), v = random.Uniform(60.0, 300.0);
+      const double angle = random.Uniform(0.0, 3.1416);
+      const Vector3d direction(std::cos(angle), std::sin(angle), 0.0);
+      const Vector2d across = 2.5 * Vector2d(-direction.y(), direction.x());
+      for (const double side : {0.0, 1.0}) {
+        lines.push_back(MakeLine(detection_test::TestCamera(), u + side * across.x(),
+                                 v + side * across.y(), direction, 60.0, 0.0, 0.15, &random));
+      }
+    }
+    std::vector<DetectedPencil> pencils;
+    ASSERT_TRUE(DetectPencils(lines, 3, seed, &pencils).ok());
+    EXPECT_TRUE(pencils.empty()) << "seed " << seed;
+  }
+}
+
 // A sheet that bends: its rows, in one part of the photo, point half a degree to either side.
 TEST(DetectPencils, ARefitTakesAllLinesOfWhatBends) {
   constexpr int kLines = 40;
