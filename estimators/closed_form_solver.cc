@@ -227,7 +227,7 @@ PoseEstimate ClosedFormSolver::Seeds(const Observations& resolved) const {
   Inputs inputs;
   estimate.status = recipe_.select(resolved, &evidence);
   if (estimate.status.ok() && evidence.frame.plane != resolved.frame.plane)
-    estimate.status = Status::Refused(recipe_.name + ": its evidence spans another plane");
+    estimate.status = Status::Refused("nothing ties its evidence to the world's plane");
   if (estimate.status.ok()) estimate.status = recipe_.gather(evidence, options_.sigma_px, &inputs);
   if (!estimate.status.ok()) return estimate;
   for (const Candidate& candidate : recipe_.evaluate(inputs))

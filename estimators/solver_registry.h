@@ -29,7 +29,7 @@ class Solver {
   virtual PoseEstimate Seeds(const Observations& resolved) const {
     PoseEstimate estimate = Solve(resolved);
     if (estimate.status.ok() && Evidence(resolved).frame.plane != resolved.frame.plane)
-      estimate.status = Status::Refused(name() + ": its evidence spans another plane");
+      estimate.status = Status::Refused("nothing ties its evidence to the world's plane");
     return estimate;
   }
   // The part of the observations that Solve uses, so that a refinement can be given the same.
