@@ -16,7 +16,8 @@ namespace {
 Refined RefineTwo(bool second_is_wrong, double sigma_px) {
   PlaneScene scene(0.6, 0.0);
   Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", -1.0, 0.2, 1.0), scene.Circle("c1", 1.5, 0.5, 0.8, 12)};
+  observations.circles = {scene.Circle("c0", -1.0, 0.2, 1.0),
+                          scene.Circle("c1", 1.5, 0.5, 0.8, 12)};
   FitDirect(sigma_px, &observations);
   for (CircleObservation& circle : observations.circles) circle.sigma_px = sigma_px;
   if (second_is_wrong) {
