@@ -1,7 +1,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <functional>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "circline/estimators/closed_form_recipes.h"
 

@@ -62,8 +62,8 @@ struct PencilObservation {
   std::vector<LineObservation> lines;
   PencilDirection direction = PencilDirection::kFree;
   std::string plane;  // The plane in which the lines lie; empty = none in particular.
-  double sigma_px =
-      0.0;  // Of each point's coordinates, where its line says nothing else; 0 = not known.
+  // Of each point's coordinates, where its line says nothing else; 0 = not known.
+  double sigma_px = 0.0;
 
   std::optional<VanishingPointFit> fit;
 };

@@ -1,6 +1,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "circline/estimators/closed_form_recipes.h"
 

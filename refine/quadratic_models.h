@@ -73,9 +73,9 @@ Eigen::Matrix3d ImageOfPlaneCircle(const Eigen::Matrix3d& R, double facing, doub
                                    double radius);
 
 // Models of a contour in (delta, cx, cy, radius), at Sampson's distance where its image is no
-// ellipse, and of a line in (delta, up to three more) whose
-// interpretation plane has the normal m(others) in the world frame, `dm` its derivatives. Returns
-// the cost; `model` may be null. Not finite where a residual is not.
+// ellipse, and of a line in (delta, up to three more) whose interpretation plane has the normal
+// m(others) in the world frame, `dm` its derivatives. Returns the cost; `model` may be null. Not
+// finite where a residual is not.
 double EvaluateCircle(const PointSet& set, const Weighing& weighing, const Eigen::Matrix3d& R,
                       double facing, double cx, double cy, double radius, QuadraticModel* model);
 double EvaluateLine(const PointSet& set, const Weighing& weighing, const Eigen::Matrix3d& R,

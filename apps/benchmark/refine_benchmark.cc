@@ -133,13 +133,16 @@ void RunInTurn(benchmark::State& state, const std::vector<Scene>& scenes, const 
   }
 }
 
-// From observations with fits and a seed `error` radians and 1 % off to pose and covariance.
-void RefineOneSeed(benchmark::State& state, void (*add)(Scene*), LossType loss, double error,
-                   ConicDistanceType distance = ConicDistanceType::kSampson) {
-  std::vector<Scene> scenes = Scenes(add);
+EstimationOptions WithLoss(LossType loss) {
   EstimationOptions options;
-  options.conic_distance = distance;
   options.conic_loss.type = options.line_loss.type = loss;
+  return options;
+}
+
+// From observations with fits and a seed `error` radians and 1 % off to pose and covariance.
+void RefineOneSeed(benchmark::State& state, void (*add)(Scene*), const EstimationOptions& options,
+                   double error) {
+  std::vector<Scene> scenes = Scenes(add);
   for (Scene& scene : scenes) {
     FitDirect(kNoisePx, &scene.observations);
     scene.observations = ResolveWorld(scene.observations);
@@ -159,7 +162,7 @@ void RefineOneSeed(benchmark::State& state, void (*add)(Scene*), LossType loss, 
 constexpr double kCold = 0.01, kWarm = 0.001;
 
 void BM_RefineCircleAndLines(benchmark::State& state, LossType loss, double error) {
-  RefineOneSeed(state, AddPaperLike, loss, error);
+  RefineOneSeed(state, AddPaperLike, WithLoss(loss), error);
 }
 BENCHMARK_CAPTURE(BM_RefineCircleAndLines, cold_cauchy, LossType::kCauchy, kCold);
 BENCHMARK_CAPTURE(BM_RefineCircleAndLines, cold_tukey, LossType::kTukey, kCold);
@@ -167,24 +170,33 @@ BENCHMARK_CAPTURE(BM_RefineCircleAndLines, cold_trivial, LossType::kTrivial, kCo
 BENCHMARK_CAPTURE(BM_RefineCircleAndLines, warm_cauchy, LossType::kCauchy, kWarm);
 
 void BM_RefineUndistortedCircleAndLines(benchmark::State& state, LossType loss, double error) {
-  RefineOneSeed(state, AddPaperLikeUndistorted, loss, error);
+  RefineOneSeed(state, AddPaperLikeUndistorted, WithLoss(loss), error);
 }
 BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, cold_cauchy, LossType::kCauchy, kCold);
 BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, cold_trivial, LossType::kTrivial, kCold);
 BENCHMARK_CAPTURE(BM_RefineUndistortedCircleAndLines, warm_cauchy, LossType::kCauchy, kWarm);
 
 void BM_RefineOrthogonalDistances(benchmark::State& state, LossType loss, double error) {
-  RefineOneSeed(state, AddPaperLikeUndistorted, loss, error, ConicDistanceType::kOrthogonal);
+  EstimationOptions options = WithLoss(loss);
+  options.conic_distance = ConicDistanceType::kOrthogonal;
+  RefineOneSeed(state, AddPaperLikeUndistorted, options, error);
 }
 BENCHMARK_CAPTURE(BM_RefineOrthogonalDistances, cold_cauchy, LossType::kCauchy, kCold);
 
+void BM_RefineFocalLength(benchmark::State& state, LossType loss, double error) {
+  EstimationOptions options = WithLoss(loss);
+  options.focal_sigma = 0.03;
+  RefineOneSeed(state, AddPaperLike, options, error);
+}
+BENCHMARK_CAPTURE(BM_RefineFocalLength, cold_cauchy, LossType::kCauchy, kCold);
+
 void BM_RefineOneCircle(benchmark::State& state, LossType loss, double error) {
-  RefineOneSeed(state, AddOneCircle, loss, error);
+  RefineOneSeed(state, AddOneCircle, WithLoss(loss), error);
 }
 BENCHMARK_CAPTURE(BM_RefineOneCircle, cold_cauchy, LossType::kCauchy, kCold);
 
 void BM_RefineManyFeatures(benchmark::State& state, LossType loss, double error) {
-  RefineOneSeed(state, AddManyFeatures, loss, error);
+  RefineOneSeed(state, AddManyFeatures, WithLoss(loss), error);
 }
 BENCHMARK_CAPTURE(BM_RefineManyFeatures, cold_cauchy, LossType::kCauchy, kCold);
 
