@@ -92,7 +92,7 @@ double CurvatureBias(const EdgePoint& point, double blur_px, double curvature);
 // channels (BGR, BGRA).
 Status ToGray(const cv::Mat& image, cv::Mat* gray);
 
-// `gray` is 8-bit with one channel. About 3 ms for a 640x480 photo.
+// `gray` is 8-bit with one channel. About 2 ms for a 640x480 photo.
 Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edges);
 
 }  // namespace circline
