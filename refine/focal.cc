@@ -17,11 +17,31 @@ namespace {
 
 constexpr double kStep = 1e-5;  // Of log_focal, for differences: a hundredth of a pixel.
 
-Observations Refocus(const Observations& observations, double log_focal) {
-  Observations result = observations;
-  result.camera.fx *= std::exp(log_focal);
-  result.camera.fy *= std::exp(log_focal);
+Camera Refocused(const Camera& camera, double log_focal) {
+  Camera result = camera;
+  result.fx *= std::exp(log_focal);
+  result.fy *= std::exp(log_focal);
   return result;
+}
+
+// The calibrated point of the pixel that `from` sees at x, as `to` sees it; false where it cannot.
+bool Refocus(const Camera& from, const Camera& to, const Eigen::Vector2d& x,
+             CalibratedPoint* point) {
+  Eigen::Vector2d pixel;
+  std::array<double, 4> unused;
+  DistortWithJacobian(from, x, &pixel, &unused);
+  return PixelToCalibrated(to, pixel, point);
+}
+
+// The same for all points of a set, which keeps its own coordinates.
+bool Refocus(const Camera& from, const Camera& to, PointSet* set) {
+  for (CalibratedPoint& p : set->points) {
+    if (!Refocus(from, to, set->scale * p.x + set->shift, &p)) return false;
+    p.x = (p.x - set->shift) / set->scale;
+    for (double& v : p.x_from_pixel) v /= set->scale;
+  }
+  if (set->scatter) set->Compress();
+  return true;
 }
 
 // The points whose flag is 0 go.
@@ -35,10 +55,9 @@ void KeepFlagged(const std::vector<std::uint8_t>& flags, std::vector<CalibratedP
 
 // d cost / d log_focal with every other unknown held, which at their minimum is that of the cost
 // left by them; the prior's part included.
-double Slope(const JointEvidence& base, const NoiseScales& scales, const JointState& state,
-             double log_focal, double stretch) {
+double Slope(const JointEvidence& base, const JointState& state, double log_focal, double stretch) {
   const auto cost = [&](double at) {
-    const RefocusedEvidence refocused(base, scales, at);
+    const RefocusedEvidence refocused(base, at);
     return JointCost(refocused.evidence(), state, Weighing{stretch, false}) +
            FocalPriorCost(base, at);
   };
@@ -83,10 +102,17 @@ JointState Moved(const JointState& state, const Values& by_block, double step) {
 
 }  // namespace
 
-RefocusedEvidence::RefocusedEvidence(const JointEvidence& base, const NoiseScales& scales,
-                                     double log_focal)
-    : observations_(Refocus(base.observations, log_focal)),
-      evidence_(observations_, base.options, scales) {}
+RefocusedEvidence::RefocusedEvidence(const JointEvidence& base, double log_focal)
+    : evidence_(base) {
+  if (log_focal == 0.0) return;
+  evidence_.camera = Refocused(base.camera, log_focal);
+  is_possible_ =
+      std::all_of(evidence_.sets.begin(), evidence_.sets.end(),
+                  [&](PointSet& set) { return Refocus(base.camera, evidence_.camera, &set); }) &&
+      std::all_of(evidence_.points.begin(), evidence_.points.end(), [&](PointTerm& point) {
+        return Refocus(base.camera, evidence_.camera, point.measured.x.x, &point.measured.x);
+      });
+}
 
 void RefocusedEvidence::KeepInliers(const JointState& state, const JointEvidence& at, double gate) {
   ForEachCurve(at, state,
@@ -111,14 +137,15 @@ double FocalPriorCost(const JointEvidence& evidence, double log_focal) {
 
 // Differences of the inliers' least squares problem: how its reduced gradient moves with the focal
 // length is the mixed curvature, how the cost does that its own unknowns leave, the focal length's.
-bool ComputeFocalModel(const JointEvidence& base, const NoiseScales& scales,
-                       const JointState& state, double log_focal, double stretch,
-                       const Eigen::MatrixXd& shared_covariance, FocalModel* model) {
-  const RefocusedEvidence here(base, scales, log_focal);
+bool ComputeFocalModel(const JointEvidence& base, const JointState& state, double log_focal,
+                       double stretch, const Eigen::MatrixXd& shared_covariance,
+                       FocalModel* model) {
+  const RefocusedEvidence here(base, log_focal);
   const SharedColumns columns(base);
   ReducedModel at[3];
   for (int k = 0; k < 3; ++k) {
-    RefocusedEvidence moved(base, scales, log_focal + (k - 1) * kStep);
+    RefocusedEvidence moved(base, log_focal + (k - 1) * kStep);
+    if (!moved.is_possible()) return false;
     moved.KeepInliers(state, here.evidence(), stretch * kInlierSigmas);
     if (!Linearize(moved.evidence(), state, columns, Weighing(), &at[k])) return false;
   }
@@ -131,46 +158,57 @@ bool ComputeFocalModel(const JointEvidence& base, const NoiseScales& scales,
   return std::isfinite(model->information);
 }
 
-Status MinimizeWithFocal(const JointEvidence& base, const NoiseScales& scales, double tolerance,
-                         JointState* state, double* log_focal) {
+Status MinimizeWithFocal(const JointEvidence& base, double tolerance, JointState* state,
+                         double* log_focal) {
   constexpr int kMaxSteps = 30;
   constexpr double kSmallStep = 0.01;  // Standard deviations.
   constexpr double kFarthest = 4.0;    // Standard deviations of the prior.
   constexpr double kShrink = 0.5;      // Of the stretch, and of a step that leads uphill.
   const double sigma = base.options.focal_sigma;
-  double stretch = NeededStretch(RefocusedEvidence(base, scales, *log_focal).evidence(), *state);
-  double cost = std::numeric_limits<double>::infinity(), trial = *log_focal, spread = 0.0;
+  double stretch = NeededStretch(RefocusedEvidence(base, *log_focal).evidence(), *state);
+  double cost = 0.0, trial = *log_focal, spread = 0.0;
+  bool is_first = true;  // With this stretch: at the same focal length, for costs to compare with.
   FocalModel model;
   for (int i = 0; i < kMaxSteps; ++i) {
-    const RefocusedEvidence at(base, scales, trial);
+    const RefocusedEvidence at(base, trial);
     JointState moved = Moved(*state, model.by_block, trial - *log_focal);
-    const Status status =
-        Minimize(at.evidence(), stretch, base.options.max_iterations, tolerance, &moved);
-    if (!status.ok()) return status;
-    const double moved_cost =
-        JointCost(at.evidence(), moved, Weighing{stretch, false}) + FocalPriorCost(base, trial);
-    if (!(moved_cost <= cost + tolerance)) {  // Uphill.
-      trial = *log_focal + kShrink * (trial - *log_focal);
-      if (std::abs(trial - *log_focal) < kSmallStep * spread) break;
+    double moved_cost = std::numeric_limits<double>::infinity();
+    if (at.is_possible()) {
+      const Status status =
+          Minimize(at.evidence(), stretch, base.options.max_iterations, tolerance, &moved);
+      if (!status.ok()) return status;
+      moved_cost =
+          JointCost(at.evidence(), moved, Weighing{stretch, false}) + FocalPriorCost(base, trial);
+    }
+    const double step = trial - *log_focal;
+    bool is_done = !is_first && std::abs(step) < kSmallStep * spread;
+    if (is_first || moved_cost <= cost + tolerance) {
+      *state = moved;
+      *log_focal = trial;
+      cost = moved_cost;
+    } else if (!is_done) {  // Uphill.
+      trial = *log_focal + kShrink * step;
       continue;
     }
-    *state = moved;
-    const double step_taken = trial - *log_focal;
-    *log_focal = trial;
-    cost = moved_cost;
-    if (i > 0 && stretch <= 1.0 && std::abs(step_taken) < kSmallStep * spread) break;
-    SharedCovariance shared;
-    if (!ComputeCovariance(at.evidence(), *state, &shared, stretch) ||
-        !ComputeFocalModel(base, scales, *state, *log_focal, stretch, shared.covariance, &model)) {
-      break;  // Some feature has no inliers here: nothing to steer by.
+    if (!is_done) {
+      SharedCovariance shared;
+      // Else some feature has no inliers here, or lies at the lens' rim: nothing to steer by.
+      is_done = !ComputeCovariance(at.evidence(), *state, &shared, stretch) ||
+                !ComputeFocalModel(base, *state, *log_focal, stretch, shared.covariance, &model);
     }
-    const double variance = 1.0 / (model.information + 1.0 / (sigma * sigma));
-    spread = std::sqrt(variance);
-    trial = std::clamp(*log_focal - variance * Slope(base, scales, *state, *log_focal, stretch),
-                       -kFarthest * sigma, kFarthest * sigma);
-    if (stretch <= 1.0 || i == 0) continue;
-    stretch = std::max(1.0, std::min(kShrink * stretch, NeededStretch(at.evidence(), *state)));
-    cost = std::numeric_limits<double>::infinity();  // Not to be compared with the next.
+    if (!is_done) {
+      const double variance = 1.0 / (model.information + 1.0 / (sigma * sigma));
+      spread = std::sqrt(variance);
+      trial = std::clamp(*log_focal - variance * Slope(base, *state, *log_focal, stretch),
+                         -kFarthest * sigma, kFarthest * sigma);
+    }
+    if (is_done && stretch <= 1.0) break;
+    const bool narrows = stretch > 1.0 && (is_done || !is_first);
+    is_first = narrows;
+    if (!narrows) continue;
+    trial = *log_focal;
+    const RefocusedEvidence here(base, trial);
+    stretch = std::max(1.0, std::min(kShrink * stretch, NeededStretch(here.evidence(), *state)));
   }
   return Status::Ok();
 }

@@ -5,28 +5,28 @@
 
 #include <Eigen/Core>
 
-#include "circline/estimators/observations.h"
 #include "circline/estimators/status.h"
 #include "circline/refine/joint_evidence.h"
 #include "circline/refine/reduced_problem.h"
 
 namespace circline {
 
-// The same evidence through a camera whose focal lengths are exp(log_focal) times as long; the lens
-// distortion bends the same rays. Parameters and terms are numbered alike.
+// The same evidence, point by point, through a camera whose focal lengths are exp(log_focal) times
+// as long; the lens distortion bends the same rays.
 class RefocusedEvidence {
  public:
-  RefocusedEvidence(const JointEvidence& base, const NoiseScales& scales, double log_focal);
-  RefocusedEvidence(const RefocusedEvidence&) = delete;
-  RefocusedEvidence& operator=(const RefocusedEvidence&) = delete;
+  RefocusedEvidence(const JointEvidence& base, double log_focal);
 
+  // False where that camera cannot have seen one of the points (beyond the range in which its
+  // distortion is one-to-one): such a focal length is out of the question.
+  bool is_possible() const { return is_possible_; }
   const JointEvidence& evidence() const { return evidence_; }
   // Keeps the inliers of `state` within `gate` standard deviations, without loss.
   void KeepInliers(const JointState& state, const JointEvidence& at, double gate);
 
  private:
-  Observations observations_;
   JointEvidence evidence_;
+  bool is_possible_ = true;
 };
 
 // What the inliers at a minimum say of the focal length, every other unknown free to follow.
@@ -40,17 +40,16 @@ struct FocalModel {
 
 // False where the evidence cannot be evaluated. `shared_covariance`: ComputeCovariance's. Inliers
 // lie within `stretch` times their gate.
-bool ComputeFocalModel(const JointEvidence& base, const NoiseScales& scales,
-                       const JointState& state, double log_focal, double stretch,
-                       const Eigen::MatrixXd& shared_covariance, FocalModel* model);
+bool ComputeFocalModel(const JointEvidence& base, const JointState& state, double log_focal,
+                       double stretch, const Eigen::MatrixXd& shared_covariance, FocalModel* model);
 
 // 1/2 (log_focal / prior sigma)^2; 0 where the focal length is fixed.
 double FocalPriorCost(const JointEvidence& evidence, double log_focal);
 
 // Minimize (minimize.h) with graduated losses over the focal length as well: steps of
 // Newton's method on the cost left by the others.
-Status MinimizeWithFocal(const JointEvidence& base, const NoiseScales& scales, double tolerance,
-                         JointState* state, double* log_focal);
+Status MinimizeWithFocal(const JointEvidence& base, double tolerance, JointState* state,
+                         double* log_focal);
 
 }  // namespace circline
 

@@ -17,7 +17,7 @@ void LineTerm::SetDirection(const Eigen::Vector3d& direction) {
 
 JointEvidence::JointEvidence(const Observations& obs, const EstimationOptions& opts,
                              const NoiseScales& scales)
-    : observations(obs), options(opts) {
+    : observations(obs), options(opts), camera(obs.camera) {
   AddParameter(3, false);  // The rotation.
   AddFrame();
   std::map<std::string, int> concentric;
@@ -80,11 +80,11 @@ int JointEvidence::AddSet(const std::vector<Eigen::Vector2d>& pixels,
       }
     }
   }
-  CalibrateInliers(observations.camera, pixels, trusted, &set.points);
+  CalibrateInliers(camera, pixels, trusted, &set.points);
   set.num_trusted = set.points.size();
   if (!doubted.empty()) {
     std::vector<CalibratedPoint> more;
-    CalibrateInliers(observations.camera, pixels, doubted, &more);
+    CalibrateInliers(camera, pixels, doubted, &more);
     set.points.insert(set.points.end(), more.begin(), more.end());
   }
   if (set.points.empty()) return -1;
@@ -101,7 +101,7 @@ int JointEvidence::AddSet(const std::vector<Eigen::Vector2d>& pixels,
 void JointEvidence::AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block, int like_set,
                              const std::string& name) {
   CalibratedPoint p;
-  if (PixelToCalibrated(observations.camera, pixel, &p))
+  if (PixelToCalibrated(camera, pixel, &p))
     points.push_back({{p, sigma_px, options.line_loss.type}, block, like_set, name});
 }
 
@@ -296,8 +296,8 @@ void JointEvidence::AddAngle(const KnownAngle& known) {
 void JointEvidence::AddLength(const KnownLength& known) {
   if (!known.plane.empty() && known.plane != observations.frame.plane) return;
   CalibratedPoint a, b;
-  if (!PixelToCalibrated(observations.camera, known.points[0], &a) ||
-      !PixelToCalibrated(observations.camera, known.points[1], &b)) {
+  if (!PixelToCalibrated(camera, known.points[0], &a) ||
+      !PixelToCalibrated(camera, known.points[1], &b)) {
     return;
   }
   const LengthTerm term{AddParameter(2, false), AddParameter(2, false), known.value};

@@ -78,6 +78,7 @@ struct NoiseScales {
 struct JointEvidence {
   const Observations& observations;  // Outlive this.
   const EstimationOptions& options;
+  Camera camera;  // That of the observations, unless it has been refocused (focal.h).
   std::vector<ParameterInfo> parameters;
   std::vector<PointSet> sets;
   std::vector<CircleTerm> circles;

@@ -198,7 +198,7 @@ void FillFeatures(const JointEvidence& e, const JointState& state, double unit, 
     const Eigen::Vector3d center = R * Eigen::Vector3d(c[0], c[1], state.facing);
     estimate.center = unit * center;
     estimate.radius = unit * std::abs(t.radius < 0 ? c[2] : t.factor * state.At(t.radius)[0]);
-    CameraToPixel(e.observations.camera, center, &estimate.center_px);
+    CameraToPixel(e.camera, center, &estimate.center_px);
     h->circles.push_back(estimate);
   }
   const Eigen::Matrix3d rotation_covariance = h->Covariance().topLeftCorner<3, 3>();
@@ -308,7 +308,7 @@ Status Finite(bool finite) {
 const JointEvidence& JointProblem::At(const Approach& approach,
                                       std::optional<RefocusedEvidence>* refocused) const {
   if (approach.log_focal == 0.0) return evidence_;
-  return refocused->emplace(evidence_, scales_, approach.log_focal).evidence();
+  return refocused->emplace(evidence_, approach.log_focal).evidence();
 }
 
 double JointProblem::Cost(const JointEvidence& e, const Approach& approach) const {
@@ -340,10 +340,9 @@ Status JointProblem::Continue(Approach* approach) const {
   const EstimationOptions& options = evidence_.options;
   const int iterations = std::min(kFirstIterations, options.max_iterations);
   JointState* state = &approach->state;
-  const Status status =
-      options.focal_sigma > 0.0
-          ? MinimizeWithFocal(evidence_, scales_, kTolerance, state, &approach->log_focal)
-          : GraduatedMinimize(evidence_, iterations, kTolerance, state);
+  const Status status = options.focal_sigma > 0.0
+                            ? MinimizeWithFocal(evidence_, kTolerance, state, &approach->log_focal)
+                            : GraduatedMinimize(evidence_, iterations, kTolerance, state);
   if (!status.ok()) return status;
   std::optional<RefocusedEvidence> refocused;
   const JointEvidence& e = At(*approach, &refocused);
@@ -376,10 +375,9 @@ Status JointProblem::Refine(const Approach& start, Refined* refined) const {
   PoseHypothesis* h = &refined->hypothesis;
   Approach approach = start;
   JointState& state = approach.state;
-  const Status status =
-      options.focal_sigma > 0.0
-          ? MinimizeWithFocal(evidence_, scales_, kTolerance, &state, &approach.log_focal)
-          : Minimize(evidence_, 1.0, options.max_iterations, kTolerance, &state);
+  const Status status = options.focal_sigma > 0.0
+                            ? MinimizeWithFocal(evidence_, kTolerance, &state, &approach.log_focal)
+                            : Minimize(evidence_, 1.0, options.max_iterations, kTolerance, &state);
   if (!status.ok()) return status;
   std::optional<RefocusedEvidence> refocused;
   const JointEvidence& e = At(approach, &refocused);
@@ -397,8 +395,7 @@ Status JointProblem::Refine(const Approach& start, Refined* refined) const {
   refined->shared_log_det = shared.log_det;
   if (options.focal_sigma > 0.0) {
     FocalModel focal;
-    if (!ComputeFocalModel(evidence_, scales_, state, approach.log_focal, 1.0, shared.covariance,
-                           &focal)) {
+    if (!ComputeFocalModel(evidence_, state, approach.log_focal, 1.0, shared.covariance, &focal)) {
       return Status::Failed("the evidence cannot be evaluated at other focal lengths");
     }
     FillFocal(focal, approach.log_focal, inflation, options.focal_sigma, T, h, &covariance);

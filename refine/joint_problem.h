@@ -67,12 +67,9 @@ class JointProblem {
   // world frame take no part. `scales`: positive.
   JointProblem(const Observations& observations, const EstimationOptions& options,
                const NoiseScales& scales)
-      : scales_(scales), evidence_(observations, options, scales) {}
+      : evidence_(observations, options, scales) {}
 
-  void SetScales(const NoiseScales& scales) {
-    scales_ = scales;
-    evidence_.SetScales(scales);
-  }
+  void SetScales(const NoiseScales& scales) { evidence_.SetScales(scales); }
 
   // Robust cost at the seed with every other parameter at its closed-form value: ranks seeds
   // cheaply. Infinity where the seed is unusable.
@@ -102,7 +99,6 @@ class JointProblem {
                           std::optional<RefocusedEvidence>* refocused) const;
   double Cost(const JointEvidence& evidence, const Approach& approach) const;
 
-  NoiseScales scales_;
   JointEvidence evidence_;
 };
 

@@ -272,6 +272,29 @@ TEST(FocalTest, PoorEvidenceStaysFinite) {
   }
 }
 
+// A circle near the rim of what the lens can image, where shorter focal lengths would lose points or
+// all of it: it stays in the problem, whole.
+TEST(FocalTest, PointsAtTheLensRimAreKept) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlaneScene scene(0.8, 0.5, seed);
+    scene.camera.fx = scene.camera.fy = 420.0;
+    scene.camera.distortion = {-0.45, 0.0, 0.0, 0.0, 0.0};  // One-to-one up to 241 px.
+    Observations observations = Grid(&scene);
+    observations.circles = {scene.Circle("rim", 0.0, 5.4, 0.4, 30),
+                            scene.Circle("middle", 0.3, 0.2, 1.0)};
+    Mistake(1.03, &observations);
+    EstimationOptions options;
+    options.focal_sigma = 0.1;
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& best = estimate.hypotheses[0];
+    EXPECT_EQ(best.num_observations, 30 + 60 + 2 * 5 * 9);
+    EXPECT_LT(best.cam_from_world.rotation.col(2).cross(scene.pose.rotation.col(2)).norm(), 0.03)
+        << seed;
+    EXPECT_NEAR(1.03 * best.focal_scale, 1.0, 0.1) << seed;
+  }
+}
+
 TEST(FocalTest, SigmaIsChecked) {
   EstimationOptions options;
   options.focal_sigma = -0.1;
