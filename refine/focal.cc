@@ -53,17 +53,6 @@ void KeepFlagged(const std::vector<std::uint8_t>& flags, std::vector<CalibratedP
   points->resize(kept);
 }
 
-// d cost / d log_focal with every other unknown held, which at their minimum is that of the cost
-// left by them; the prior's part included.
-double Slope(const JointEvidence& base, const JointState& state, double log_focal, double stretch) {
-  const auto cost = [&](double at) {
-    const RefocusedEvidence refocused(base, at);
-    return JointCost(refocused.evidence(), state, Weighing{stretch, false}) +
-           FocalPriorCost(base, at);
-  };
-  return (cost(log_focal + kStep) - cost(log_focal - kStep)) / (2.0 * kStep);
-}
-
 // How every unknown follows where the shared ones do, from the models a step below and above.
 Values Follow(const JointEvidence& e, const SharedColumns& columns, const Eigen::VectorXd& shared,
               const ReducedModel& below, const ReducedModel& above) {
@@ -143,19 +132,24 @@ bool ComputeFocalModel(const JointEvidence& base, const JointState& state, doubl
   const RefocusedEvidence here(base, log_focal);
   const SharedColumns columns(base);
   ReducedModel at[3];
+  double cost[3];
   for (int k = 0; k < 3; ++k) {
-    RefocusedEvidence moved(base, log_focal + (k - 1) * kStep);
+    const double place = log_focal + (k - 1) * kStep;
+    RefocusedEvidence moved = k == 1 ? here : RefocusedEvidence(base, place);
     if (!moved.is_possible()) return false;
+    cost[k] =
+        JointCost(moved.evidence(), state, Weighing{stretch, false}) + FocalPriorCost(base, place);
     moved.KeepInliers(state, here.evidence(), stretch * kInlierSigmas);
     if (!Linearize(moved.evidence(), state, columns, Weighing(), &at[k])) return false;
   }
   const auto left = [](const ReducedModel& m) { return m.cost - m.own_gain; };
+  model->slope = (cost[2] - cost[0]) / (2.0 * kStep);
   const double curvature = (left(at[0]) - 2.0 * left(at[1]) + left(at[2])) / (kStep * kStep);
   const Eigen::VectorXd mixed = (at[2].gradient - at[0].gradient) / (2.0 * kStep);
   model->by_focal = -shared_covariance * mixed;
   model->information = std::max(0.0, curvature + mixed.dot(model->by_focal));
   model->by_block = Follow(base, columns, model->by_focal, at[0], at[2]);
-  return std::isfinite(model->information);
+  return std::isfinite(model->information) && std::isfinite(model->slope);
 }
 
 Status MinimizeWithFocal(const JointEvidence& base, double tolerance, JointState* state,
@@ -199,8 +193,8 @@ Status MinimizeWithFocal(const JointEvidence& base, double tolerance, JointState
     if (!is_done) {
       const double variance = 1.0 / (model.information + 1.0 / (sigma * sigma));
       spread = std::sqrt(variance);
-      trial = std::clamp(*log_focal - variance * Slope(base, *state, *log_focal, stretch),
-                         -kFarthest * sigma, kFarthest * sigma);
+      trial =
+          std::clamp(*log_focal - variance * model.slope, -kFarthest * sigma, kFarthest * sigma);
     }
     if (is_done && stretch <= 1.0) break;
     const bool narrows = stretch > 1.0 && (is_done || !is_first);

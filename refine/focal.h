@@ -32,6 +32,9 @@ class RefocusedEvidence {
 // What the inliers at a minimum say of the focal length, every other unknown free to follow.
 struct FocalModel {
   double information = 0.0;  // Of log_focal, without prior.
+  // d cost / d log_focal under the losses, prior included, with every other unknown held, which at
+  // their minimum is that of the cost left by them.
+  double slope = 0.0;
   // Along the valley, by log_focal: the shared unknowns by column, and all of them by block (of
   // block 0, the rotation, delta).
   Eigen::VectorXd by_focal;

@@ -272,8 +272,8 @@ TEST(FocalTest, PoorEvidenceStaysFinite) {
   }
 }
 
-// A circle near the rim of what the lens can image, where shorter focal lengths would lose points or
-// all of it: it stays in the problem, whole.
+// A circle near the rim of what the lens can image, of which shorter focal lengths would lose
+// points or all: it stays in the problem, whole.
 TEST(FocalTest, PointsAtTheLensRimAreKept) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     PlaneScene scene(0.8, 0.5, seed);
