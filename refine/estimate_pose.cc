@@ -1,13 +1,12 @@
 #include "circline/refine/estimate_pose.h"
 
-#include <algorithm>
+#include <Eigen/LU>
 #include <cmath>
+#include <memory>
 #include <utility>
+#include <vector>
 
-#include "circline/estimators/circle_pose.h"
 #include "circline/estimators/closed_form_solvers.h"
-#include "circline/refine/joint_problem.h"
-#include "circline/refine/refined_solvers.h"
 #include "circline/refine/seeded_refinement.h"
 
 namespace circline {
@@ -43,8 +42,8 @@ Status EstimationOptions::Validate() const {
   if (prior) {
     const Eigen::Matrix3d product = prior->rotation * prior->rotation.transpose();
     constexpr double kTolerance = 1e-6;
-    if (!product.isIdentity(kTolerance) || !prior->translation.allFinite() ||
-        !(prior->translation.norm() > 0.0)) {
+    if (!product.isIdentity(kTolerance) || !(prior->rotation.determinant() > 0.0) ||
+        !prior->translation.allFinite() || !(prior->translation.norm() > 0.0)) {
       return Status::Invalid("prior must be a rotation and a translation that is not zero");
     }
   }

@@ -128,24 +128,31 @@ void JointEvidence::AddFrame() {
   AddPoint(*frame.origin, DrawnSigma(), origin, -1, "the origin of the frame");
 }
 
+// Whether the circle's centre is the origin: that is said of it or of one about the same centre. By
+// convention the first circle's is, where nothing else is the origin.
+bool JointEvidence::IsAtOrigin(const CircleObservation& circle) const {
+  const std::string& named = observations.frame.origin_is_center;
+  if (named.empty()) return origin < 0 && circles.empty();
+  if (named == circle.id) return true;
+  const int index = FindCircle(observations, named);
+  return index >= 0 && !circle.concentric.empty() &&
+         observations.circles[static_cast<std::size_t>(index)].concentric == circle.concentric;
+}
+
 // The block of a centre that other residuals share (the world origin, a concentric group), or -1.
 int JointEvidence::CenterBlock(const CircleObservation& circle,
                                std::map<std::string, int>* concentric) {
-  const std::string& named_origin = observations.frame.origin_is_center;
-  // By convention the first circle's centre is the origin where nothing else is.
-  const bool is_origin =
-      named_origin.empty() ? origin < 0 && circles.empty() : named_origin == circle.id;
-  const auto group = concentric->find(circle.concentric);
-  int center = !circle.concentric.empty() && group != concentric->end() ? group->second : -1;
-  if (is_origin) {
-    origin_observed = origin_observed || !named_origin.empty();
-    if (origin < 0) origin = center >= 0 ? center : AddParameter(2, false);
-    if (center < 0) center = origin;
+  int center = -1;
+  if (IsAtOrigin(circle)) {
+    origin_observed = origin_observed || !observations.frame.origin_is_center.empty();
+    if (origin < 0) origin = AddParameter(2, false);
+    center = origin;
   }
   if (circle.concentric.empty()) return center;
+  const auto group = concentric->find(circle.concentric);
+  if (group != concentric->end()) return group->second;
   if (center < 0) center = AddParameter(2, false);
-  (*concentric)[circle.concentric] = center;
-  return center;
+  return (*concentric)[circle.concentric] = center;
 }
 
 void JointEvidence::AddCircle(int index, std::map<std::string, int>* concentric) {

@@ -108,6 +108,7 @@ struct JointEvidence {
                 const std::string& name);
   void AddFrame();
   void AddCircle(int index, std::map<std::string, int>* concentric);
+  bool IsAtOrigin(const CircleObservation& circle) const;
   int CenterBlock(const CircleObservation& circle, std::map<std::string, int>* concentric);
   void AddDiameter(const CircleObservation& circle, const Segment& diameter, int center);
   void AddPencil(int index);

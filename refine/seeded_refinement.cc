@@ -53,15 +53,14 @@ double ConicScale(const Observations& observations) {
 }
 
 // The same for lines of more than two points; segments known by their ends alone are judged by how
-// far they miss their pencil's vanishing point, in units of the sigma that their fits assumed.
+// far they miss their pencil's vanishing point, in standard deviations if the ends' were 1 px.
 double LineScale(const Observations& observations) {
   std::vector<double> along, across;
   std::vector<CalibratedPoint> points;
   for (const PencilObservation& pencil : observations.pencils) {
-    if (pencil.sigma_px > 0.0) continue;
     const double lines = static_cast<double>(pencil.lines.size());
     for (const LineObservation& line : pencil.lines) {
-      if (!line.fit) continue;
+      if (!line.fit || LineSigma(pencil, line) > 0.0) continue;
       CalibrateInliers(observations.camera, line.points, line.inliers, &points);
       const double n = static_cast<double>(points.size());
       if (n > 2.0) {
@@ -69,11 +68,8 @@ double LineScale(const Observations& observations) {
         for (const CalibratedPoint& p : points)
           along.push_back(gain * LineDistancePx(p, line.fit->line));
       } else if (pencil.fit && lines > 2.0) {
-        // Sigma of an end point under which this line's miss is one standard deviation: scale the
-        // assumed one. An end-point line's covariance is proportional to its sigma squared.
-        const Eigen::Matrix3d& C = line.fit->covariance;
         LineFit unit;
-        if (!FitLine(points, 1.0, &unit).ok() || !(C.trace() > 0.0)) continue;
+        if (!FitLine(points, 1.0, &unit).ok()) continue;
         across.push_back(std::sqrt(lines / (lines - 2.0)) *
                          VanishingPointResidual(unit, pencil.fit->direction));
       }

@@ -226,10 +226,32 @@ TEST(EstimatePoseTest, APriorPoseDecidesWhereItExplainsThePoints) {
   // The plane seen from behind its edge: nothing lies where it would.
   options.prior->rotation = ExpRotation({1.5, 0.0, 0.0}) * scene.pose.rotation;
   EXPECT_EQ(EstimatePose(observations, options).hypotheses.size(), 2U);
-  options.prior->rotation.setZero();
-  const PoseEstimate invalid = EstimatePose(observations, options);
-  EXPECT_EQ(invalid.status.code, StatusCode::kInvalidArgument);
-  EXPECT_NE(invalid.status.message.find("prior"), std::string::npos);
+  for (const double scale : {0.0, -1.0}) {  // No rotation; a reflection.
+    options.prior->rotation = scale * scene.pose.rotation;
+    const PoseEstimate invalid = EstimatePose(observations, options);
+    EXPECT_EQ(invalid.status.code, StatusCode::kInvalidArgument);
+    EXPECT_NE(invalid.status.message.find("prior"), std::string::npos);
+  }
+}
+
+// The origin, measured by itself, is the centre of two rings: whichever of them is named, and in
+// whatever order they come.
+TEST(EstimatePoseTest, TheOriginIsTheCenterOfAllRingsAboutIt) {
+  PlaneScene scene(0.7, 0.3, 3);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("a", 0.5, 0.2, 1.0), scene.Circle("b", 0.5, 0.2, 1.6)};
+  for (CircleObservation& circle : observations.circles) circle.concentric = "rings";
+  observations.frame.origin = scene.Pixel(0.5, 0.2);
+  for (const char* named : {"a", "b"}) {
+    observations.frame.origin_is_center = named;
+    const PoseEstimate estimate = EstimatePose(observations);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& best = estimate.hypotheses[0];
+    for (const CircleEstimate& circle : best.circles) {
+      EXPECT_LT((circle.center - best.cam_from_world.translation).norm(), 1e-9)
+          << circle.id << " where " << named << " is named";
+    }
+  }
 }
 
 // The sense of an X axis that points straight down in the photo is a toss-up; that makes no second
@@ -323,6 +345,34 @@ TEST(EstimatePoseTest, CovarianceKnowsOfOutliersAmongTheInliers) {
     EXPECT_GT(nees, 2.4) << LossName(loss);
     EXPECT_LT(nees, 3.9) << LossName(loss);
   }
+}
+
+// Lines that state a large noise of their own, and have it, say nothing of that of the others.
+TEST(EstimatePoseTest, StatedLinesDoNotRaiseTheScaleOfOthers) {
+  PlaneScene scene(0.7, 0.1, 3);
+  Observations observations = scene.Empty();
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX(), 5, 9),
+                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY(), 5, 9)};
+  for (PencilObservation& pencil : observations.pencils) {
+    pencil.sigma_px = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      LineObservation& line = pencil.lines[i];
+      line.sigma_px = 3.0;
+      for (Eigen::Vector2d& p : line.points) {
+        const double dx = scene.random.Normal(), dy = scene.random.Normal();
+        p += line.sigma_px * Eigen::Vector2d(dx, dy);
+      }
+    }
+  }
+  Observations others = observations;
+  for (PencilObservation& pencil : others.pencils)
+    pencil.lines.erase(pencil.lines.begin(), pencil.lines.begin() + 3);
+  const auto variance = [](const Observations& o) {
+    const PoseEstimate estimate = EstimatePose(o);
+    EXPECT_TRUE(estimate.status.ok()) << estimate.status.message;
+    return estimate.hypotheses[0].Covariance().topLeftCorner<3, 3>().trace();
+  };
+  EXPECT_LT(variance(observations), 1.05 * variance(others));
 }
 
 TEST(EstimatePoseTest, SameInputSameBits) {
