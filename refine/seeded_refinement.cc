@@ -233,7 +233,8 @@ std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
   if (hypotheses.size() < 2) return "only one pose fits the evidence";
   const double gap = hypotheses[1].cost - hypotheses[0].cost;
   char text[120];
-  if (std::abs(gap) < 0.5) return "nothing decides: both poses explain the evidence equally well";
+  // Below nought the widths of the minima have tipped the scales, as far as they ever do.
+  if (gap < 0.5) return "nothing decides: both poses explain the evidence equally well";
   std::snprintf(text, sizeof(text),
                 "residuals: chi-square lower by %.3g than that of the second pose", 2.0 * gap);
   return text;

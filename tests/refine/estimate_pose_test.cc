@@ -375,6 +375,35 @@ TEST(EstimatePoseTest, StatedLinesDoNotRaiseTheScaleOfOthers) {
   EXPECT_LT(variance(observations), 1.05 * variance(others));
 }
 
+// The first pose may be the more probable one although its residuals are the larger: then it is not
+// these that decide.
+TEST(EstimatePoseTest, WhatDecidesIsSaidTruly) {
+  int by_residuals = 0, by_nothing = 0, larger_residuals = 0;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    PlaneScene scene(0.1 + 0.004 * static_cast<double>(seed), 0.5, seed);
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", 0.5, 0.2, 0.6), scene.Circle("c1", -1.5, 0.2, 0.5)};
+    observations.circles[1].plane.clear();
+    observations.circles[0].center = scene.Pixel(0.5, 0.2);
+    const PoseEstimate estimate = EstimatePose(observations);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    if (estimate.hypotheses.size() < 2) continue;
+    const PoseHypothesis &first = estimate.hypotheses[0], &second = estimate.hypotheses[1];
+    larger_residuals += first.cost > second.cost ? 1 : 0;
+    if (estimate.decided_by.find("residuals") != std::string::npos) {
+      ++by_residuals;
+      EXPECT_GT(second.cost - first.cost, 0.49) << estimate.decided_by;
+    } else {
+      ++by_nothing;
+      EXPECT_NE(estimate.decided_by.find("nothing"), std::string::npos) << estimate.decided_by;
+      EXPECT_LT(first.probability, 3.0 * second.probability);
+    }
+  }
+  EXPECT_GT(by_residuals, 0);
+  EXPECT_GT(by_nothing, 0);
+  EXPECT_GT(larger_residuals, 0);
+}
+
 TEST(EstimatePoseTest, SameInputSameBits) {
   PlaneScene scene(0.7, 0.3);
   Observations observations = scene.Empty();
