@@ -74,18 +74,4 @@ void RankHypotheses(std::vector<PoseHypothesis>* hypotheses) {
   for (PoseHypothesis& h : *hypotheses) h.probability /= sum;
 }
 
-void MergeHypotheses(double max_angle, std::vector<PoseHypothesis>* hypotheses) {
-  std::vector<PoseHypothesis> kept;
-  for (PoseHypothesis& h : *hypotheses) {
-    const bool duplicate = std::any_of(kept.begin(), kept.end(), [&](const PoseHypothesis& k) {
-      const Eigen::Vector3d a = k.cam_from_world.translation, b = h.cam_from_world.translation;
-      return RotationAngle(k.cam_from_world.rotation, h.cam_from_world.rotation) < max_angle &&
-             a.cross(b).norm() <= max_angle * a.norm() * b.norm();
-    });
-    if (!duplicate) kept.push_back(std::move(h));
-  }
-  *hypotheses = std::move(kept);
-  RankHypotheses(hypotheses);
-}
-
 }  // namespace circline

@@ -4,8 +4,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -80,10 +78,6 @@ struct PoseEstimate {
 
 // Sorts by posterior, proportional to exp(-cost) sqrt(det covariance), and fills the probabilities.
 void RankHypotheses(std::vector<PoseHypothesis>* hypotheses);
-
-// Removes hypotheses whose rotations agree within `max_angle` radians (and translations within the
-// same angle) with a better one. Call after RankHypotheses; ranks again.
-void MergeHypotheses(double max_angle, std::vector<PoseHypothesis>* hypotheses);
 
 // Rank of a covariance of [delta, delta_t] whatever the units of the two.
 int CovarianceRank(const Matrix6d& covariance);

@@ -1,6 +1,7 @@
 #include "circline/estimators/vanishing_point.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "circline/estimators/weights.h"

@@ -17,9 +17,10 @@ struct VanishingPointFit {
 };
 
 // Maximum-likelihood direction common to two or more lines: minimises
-// sum_i (l_i . v)^2 / (v^T Cov(l_i) v) over unit v by reweighted eigenvectors, so that long
-// segments count for more than short ones. Refuses fewer than two lines, and lines that all
-// coincide. `weights` (optional, one per line) multiply the terms.
+// sum_i (l_i . v)^2 / (v^T Cov(l_i) v) over unit v, so that long segments count for more than short
+// ones, by damped Gauss-Newton steps from the eigenvector of the weighted scatter. Refuses fewer
+// than two lines, and lines that all coincide. `weights` (optional, one per line) multiply the
+// terms.
 Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* fit,
                          const std::vector<double>* weights = nullptr);
 
