@@ -45,8 +45,7 @@ Observations KeepCircles(const Observations& observations, std::vector<CircleObs
     evidence.frame.origin_is_center.clear();
   }
   for (const KnownLength& known : observations.known_lengths) {
-    if (known.plane.empty() || known.plane == evidence.frame.plane)
-      evidence.known_lengths.push_back(known);
+    if (IsInWorldPlane(known, evidence)) evidence.known_lengths.push_back(known);
   }
   evidence.circles = std::move(circles);
   return evidence;

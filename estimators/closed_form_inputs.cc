@@ -36,14 +36,11 @@ Measured BestLine(const Observations& observations, PencilDirection role) {
   return best == nullptr ? Measured() : FromLine(*best);
 }
 
-// The given angle between two pencils, radians.
+// The given angle between two pencils, radians, from 0 to pi.
 std::optional<double> KnownAngleBetween(const std::string& a, const std::string& b,
                                         const Observations& observations) {
   for (const KnownAngle& known : observations.known_angles) {
-    if ((known.pencils[0] == a && known.pencils[1] == b) ||
-        (known.pencils[0] == b && known.pencils[1] == a)) {
-      return known.value;
-    }
+    if (IsBetween(known, a, b)) return std::acos(std::cos(known.value));
   }
   return {};
 }
@@ -117,6 +114,11 @@ Measured AxisLine(const Observations& observations, const Segment& axis, double 
 }
 
 }  // namespace
+
+bool IsBetween(const KnownAngle& known, const std::string& a, const std::string& b) {
+  return (known.pencils[0] == a && known.pencils[1] == b) ||
+         (known.pencils[0] == b && known.pencils[1] == a);
+}
 
 void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, Inputs* inputs) {
   const std::array<PencilObservation, 2> pencils = {evidence.pencils[0], evidence.pencils[1]};
@@ -201,7 +203,7 @@ void GatherFrame(const Observations& observations, double sigma_px, Inputs* inpu
   if (frame.y_axis) inputs->y_sense = CalibrateSegment(camera, *frame.y_axis);
   if (frame.origin) inputs->origin = MeasuredPoint(camera, *frame.origin, sigma_px);
   for (const KnownLength& known : observations.known_lengths) {
-    if (!known.plane.empty() && known.plane != frame.plane) continue;
+    if (!IsInWorldPlane(known, observations)) continue;
     inputs->length_points = CalibrateSegment(camera, known.points);
     inputs->length = inputs->length_points ? known.value : 0.0;
     break;

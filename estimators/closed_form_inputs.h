@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "circline/estimators/observations.h"
@@ -47,6 +48,8 @@ struct Inputs {
 };
 
 // `sigma_px` below: of points that state none. `observations` are fitted and resolved.
+
+bool IsBetween(const KnownAngle& known, const std::string& a, const std::string& b);  // Pencils.
 
 // A pixel as a homogeneous calibrated point; absent where the camera cannot undistort it.
 Measured MeasuredPoint(const Camera& camera, const Eigen::Vector2d& pixel, double sigma_px);

@@ -35,34 +35,45 @@ Eigen::Matrix3d SameSenses(const Candidate& perturbed, const Candidate& referenc
   return best;
 }
 
+// Half the difference of two perturbed candidates, in rows [delta, delta_t, contradiction].
+Eigen::VectorXd HalfDifference(const Candidate& plus, const Candidate& minus,
+                               const Candidate& reference) {
+  Eigen::VectorXd half(6 + reference.contradiction.size());
+  half.head<3>() =
+      0.5 * LogRotation(SameSenses(plus, reference) * SameSenses(minus, reference).transpose());
+  half.segment<3>(3) = 0.5 * (plus.pose.translation - minus.pose.translation);
+  half.tail(half.size() - 6) = 0.5 * (plus.contradiction - minus.contradiction);
+  return half;
+}
+
 // Statistical linearisation: every independent error of the inputs, one standard deviation up and
-// down, through the closed form itself. Returns columns of [delta, delta_t, contradiction].
+// down, through the closed form itself; a part of that where it would lead to no pose (beyond the
+// ellipses). Returns columns of [delta, delta_t, contradiction].
 Eigen::MatrixXd Sensitivity(const Evaluate& evaluate, const Inputs& inputs,
                             const Candidate& candidate) {
-  const Eigen::Index rows = 6 + candidate.contradiction.size();
+  constexpr double kShrink = 0.1, kSmallestPart = 1e-4;
   std::vector<Eigen::VectorXd> columns;
   Inputs perturbed = inputs;
   for (Measured* m : perturbed.All()) {
     const Eigen::VectorXd value = m->value;
     for (Eigen::Index k = 0; k < m->columns.cols(); ++k) {
       if (m->columns.col(k).isZero(0.0)) continue;
-      m->value = value + m->columns.col(k);
-      const std::vector<Candidate> plus_all = evaluate(perturbed);
-      m->value = value - m->columns.col(k);
-      const std::vector<Candidate> minus_all = evaluate(perturbed);
+      for (double part = 1.0; part > kSmallestPart; part *= kShrink) {
+        m->value = value + part * m->columns.col(k);
+        const std::vector<Candidate> plus_all = evaluate(perturbed);
+        m->value = value - part * m->columns.col(k);
+        const std::vector<Candidate> minus_all = evaluate(perturbed);
+        const Candidate* plus = Nearest(plus_all, candidate);
+        const Candidate* minus = Nearest(minus_all, candidate);
+        if (plus == nullptr || minus == nullptr) continue;
+        columns.push_back(HalfDifference(*plus, *minus, candidate) / part);
+        break;
+      }
       m->value = value;
-      const Candidate* plus = Nearest(plus_all, candidate);
-      const Candidate* minus = Nearest(minus_all, candidate);
-      if (plus == nullptr || minus == nullptr) continue;
-      Eigen::VectorXd column(rows);
-      column.head<3>() = 0.5 * LogRotation(SameSenses(*plus, candidate) *
-                                           SameSenses(*minus, candidate).transpose());
-      column.segment<3>(3) = 0.5 * (plus->pose.translation - minus->pose.translation);
-      column.tail(rows - 6) = 0.5 * (plus->contradiction - minus->contradiction);
-      columns.push_back(column);
     }
   }
-  Eigen::MatrixXd out(rows, static_cast<Eigen::Index>(columns.size()));
+  Eigen::MatrixXd out(6 + candidate.contradiction.size(),
+                      static_cast<Eigen::Index>(columns.size()));
   for (std::size_t k = 0; k < columns.size(); ++k)
     out.col(static_cast<Eigen::Index>(k)) = columns[k];
   return out;

@@ -23,7 +23,8 @@ struct ClosedFormOptions {
 // circle_frame                 prop. 4   a circle and the images of the X and Y axes
 //
 // Hypotheses carry a covariance by statistical linearisation: each independent error of the fits,
-// one standard deviation up and down, through the closed form itself. Senses of axes that nothing
+// one standard deviation up and down (or as much of it as leads to a pose), through the closed form
+// itself. Senses of axes that nothing
 // decides follow the conventions of WorldRotation.
 void AddClosedFormSolvers(SolverRegistry* registry, const ClosedFormOptions& options = {});
 

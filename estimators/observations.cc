@@ -81,6 +81,13 @@ Status ValidateFrame(const Observations& observations) {
   return Status::Ok();
 }
 
+bool NamesPlane(const Observations& observations, const std::string& plane) {
+  const auto is_on = [&plane](const auto& feature) { return feature.plane == plane; };
+  return observations.frame.plane == plane ||
+         std::any_of(observations.circles.begin(), observations.circles.end(), is_on) ||
+         std::any_of(observations.pencils.begin(), observations.pencils.end(), is_on);
+}
+
 Status ValidateKnown(const Observations& observations) {
   for (const KnownAngle& angle : observations.known_angles) {
     for (const std::string& id : angle.pencils) {
@@ -102,6 +109,9 @@ Status ValidateKnown(const Observations& observations) {
     }
     if (!Finite(length.points) || !(length.value > 0.0) || !std::isfinite(length.value)) {
       return Status::Invalid("known length: points must be finite and value positive");
+    }
+    if (!length.plane.empty() && !NamesPlane(observations, length.plane)) {
+      return Status::Invalid("known length: there is no plane '" + length.plane + "'");
     }
   }
   return Status::Ok();
@@ -204,6 +214,10 @@ void SpanPlane(const std::string& plane, std::vector<PencilObservation>* pencils
 }
 
 }  // namespace
+
+bool IsInWorldPlane(const KnownLength& length, const Observations& resolved) {
+  return length.plane.empty() || length.plane == resolved.frame.plane;
+}
 
 Observations ResolveWorld(const Observations& observations) {
   Observations out = observations;

@@ -77,7 +77,8 @@ struct FrameObservation {
   std::string origin_is_center;           // Id of the circle whose centre is the origin.
 };
 
-// The angle between the directions of two pencils.
+// The angle between the directions of two pencils. These have no sense: it and its supplement are
+// the same.
 struct KnownAngle {
   std::array<std::string, 2> pencils;  // Ids.
   double value = 0.0;                  // Radians.
@@ -87,7 +88,7 @@ struct KnownAngle {
 // The distance between two points of a plane.
 struct KnownLength {
   Segment points;     // Pixels.
-  std::string plane;  // Empty = the frame's plane.
+  std::string plane;  // Empty = the frame's plane; of another plane it is not used.
   double value = 0.0;
 };
 
@@ -101,8 +102,9 @@ struct Observations {
   int num_dropped_points = 0;  // Pixels that the camera model cannot undistort, counted by fits.
   std::string message;  // What a detection wants to say ("one pencil only: ..."); may be empty.
 
-  // Ok, or a sentence naming what is inconsistent: an id used twice, a reference to nothing, a
-  // non-finite number, a negative sigma, radius or length.
+  // Ok, or a sentence naming what is inconsistent: an id used twice, a reference to nothing (a
+  // circle, a pencil, the plane of a length), a non-finite number, a negative sigma, radius or
+  // length.
   Status Validate() const;
 };
 
@@ -113,6 +115,9 @@ double LineSigma(const PencilObservation& pencil, const LineObservation& line);
 int FindCircle(const Observations& observations, const std::string& id);
 int FindPencil(const Observations& observations, const std::string& id);
 
+// Whether a known length lies in the plane Z = 0 of resolved observations (ResolveWorld).
+bool IsInWorldPlane(const KnownLength& length, const Observations& resolved);
+
 // Settles by convention what the user left open, so that every solver speaks of the same world
 // frame; returns the observations with frame.plane and the roles filled in:
 // - The plane Z = 0 is frame.plane, else the first plane named by a circle, then by a pencil. Where
@@ -122,8 +127,7 @@ int FindPencil(const Observations& observations, const std::string& id);
 // - A free pencil on one of whose lines an axis is drawn gets that axis' role.
 // - A radius known of one circle holds for its whole radius group.
 // - Where nothing fixes the X axis (no role x or y, no axis drawn), the first free pencil of that
-// plane
-//   does: it gets role x.
+//   plane does: it gets role x.
 Observations ResolveWorld(const Observations& observations);
 
 // The line of a pencil of which `axis` is a part: both its end points are points of the line. Such

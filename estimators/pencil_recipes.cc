@@ -22,9 +22,8 @@ bool Differ(const PencilObservation& a, const PencilObservation& b,
   if (!(a.fit->direction.cross(b.fit->direction).norm() > kRounding)) return false;
   if (HasRole(a) && HasRole(b)) return a.direction != b.direction;
   for (const KnownAngle& known : known_angles) {
-    const bool between = (known.pencils[0] == a.id && known.pencils[1] == b.id) ||
-                         (known.pencils[0] == b.id && known.pencils[1] == a.id);
-    if (between && std::abs(std::sin(known.value)) > kGate * known.sigma) return true;
+    if (IsBetween(known, a.id, b.id) && std::abs(std::sin(known.value)) > kGate * known.sigma)
+      return true;
   }
   return DirectionSeparation(*a.fit, *b.fit) > kGate;
 }
@@ -99,14 +98,19 @@ Status GatherPencils(const Observations& evidence, bool axes_are_orthogonal, dou
   return Status::Ok();
 }
 
+// The pair, and what is known of it and of the frame's plane.
 Observations KeepPencils(const Observations& observations, const PencilPair& pair,
                          const FrameObservation& frame) {
   Observations evidence;
   evidence.camera = observations.camera;
   evidence.frame = frame;
   evidence.pencils = {pair[0], pair[1]};
-  evidence.known_lengths = observations.known_lengths;
-  evidence.known_angles = observations.known_angles;
+  for (const KnownLength& known : observations.known_lengths) {
+    if (IsInWorldPlane(known, evidence)) evidence.known_lengths.push_back(known);
+  }
+  for (const KnownAngle& known : observations.known_angles) {
+    if (IsBetween(known, pair[0].id, pair[1].id)) evidence.known_angles.push_back(known);
+  }
   return evidence;
 }
 

@@ -301,7 +301,7 @@ void JointEvidence::AddAngle(const KnownAngle& known) {
 }
 
 void JointEvidence::AddLength(const KnownLength& known) {
-  if (!known.plane.empty() && known.plane != observations.frame.plane) return;
+  if (!IsInWorldPlane(known, observations)) return;
   CalibratedPoint a, b;
   if (!PixelToCalibrated(camera, known.points[0], &a) ||
       !PixelToCalibrated(camera, known.points[1], &b)) {

@@ -147,7 +147,7 @@ std::vector<MeasuredValue> Measure(const Observations& observations,
   add("distance", "camera", Distance, {}, 0.0);
   for (std::size_t i = 0; i < resolved.known_lengths.size(); ++i) {
     const KnownLength& known = resolved.known_lengths[i];
-    if (!known.plane.empty() && known.plane != resolved.frame.plane) continue;
+    if (!IsInWorldPlane(known, resolved)) continue;
     add("length", "known_" + std::to_string(i), Length, {known.points[0], known.points[1]},
         point_sigma_px);
   }

@@ -287,6 +287,55 @@ TEST(ClosedFormSolversTest, BrokenInputIsInvalidNotFatal) {
   EXPECT_EQ(Solve("single_circle", observations).status.code, StatusCode::kInvalidArgument);
 }
 
+TEST(ClosedFormSolversTest, ALengthOfAPlaneThatIsNotThereIsNamed) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
+  observations.known_lengths = {KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(1, 0)}, "", 1}};
+  EXPECT_TRUE(observations.Validate().ok());
+  observations.known_lengths[0].plane = observations.circles[0].plane;
+  EXPECT_TRUE(observations.Validate().ok());
+  observations.known_lengths[0].plane = "table";
+  EXPECT_NE(Solve("circle_frame", observations).status.message.find("'table'"), std::string::npos);
+}
+
+// One standard deviation of a short arc's conic may lead beyond the ellipses: that is no reason to
+// leave out what it says.
+TEST(ClosedFormSolversTest, MoreNoiseIsNeverMoreCertain) {
+  PlaneScene scene;
+  Observations observations = scene.Empty();
+  CircleObservation arc = scene.Circle("c0", 0.5, 0.2, 1.0, 60);
+  arc.points.resize(15);
+  double before = 0.0;
+  for (const double sigma_px : {0.03, 0.1, 0.3, 1.0, 3.0, 10.0}) {
+    arc.sigma_px = sigma_px;
+    observations.circles = {arc};
+    const PoseEstimate estimate = Solve("single_circle", observations);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const double variance = estimate.hypotheses[0].Covariance().topLeftCorner<3, 3>().trace();
+    EXPECT_GT(variance, before) << sigma_px;
+    before = variance;
+  }
+}
+
+// Directions have no sense: 70 degrees are 110, -70 and 250.
+TEST(ClosedFormSolversTest, KnownAnglesHaveNoSense) {
+  constexpr double kPi = 3.14159265358979323846;
+  const Eigen::Vector3d oblique(std::cos(1.2), std::sin(1.2), 0.0);
+  PlaneScene scene(0.7, 0.3);
+  Observations observations = scene.Empty();
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX(), 4),
+                          scene.Pencil("L2", PencilDirection::kFree, oblique, 4)};
+  std::vector<Eigen::Matrix3d> rotations;
+  for (const double angle : {1.2, -1.2, kPi - 1.2, kPi + 1.2, 2.0 * kPi - 1.2}) {
+    observations.known_angles = {KnownAngle{{"L1", "L2"}, angle, 0.0}};
+    const PoseEstimate estimate = Solve("line_pairs", observations);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    rotations.push_back(estimate.hypotheses[0].cam_from_world.rotation);
+    EXPECT_LT((rotations.back() - rotations.front()).norm(), 1e-12) << angle;
+  }
+}
+
 // The covariance that the closed forms report is that of their errors.
 TEST(ClosedFormSolversTest, CovarianceIsHonest) {
   constexpr int kTrials = 400;

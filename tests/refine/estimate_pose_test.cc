@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "circline/estimators/closed_form_solvers.h"
+#include "circline/refine/refined_solvers.h"
 #include "tests/paper_scene.h"
 #include "tests/plane_scene.h"
 
@@ -123,6 +125,29 @@ TEST(EstimatePoseTest, KnownAngleSharpensTheRotation) {
   const double cosine = std::abs(
       with.hypotheses[0].pencils[0].direction.dot(with.hypotheses[0].pencils[1].direction));
   EXPECT_NEAR(cosine, 0.6, 1e-4);
+}
+
+// What is known of features that a solver does not take is not its business.
+TEST(EstimatePoseTest, PairsLeaveOutWhatIsKnownOfOthers) {
+  PlaneScene scene(0.7, 0.2);
+  Observations observations = scene.Empty();
+  observations.pencils = {
+      scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+      scene.Pencil("L2", PencilDirection::kFree, Eigen::Vector3d(0.6, 0.8, 0.0)),
+      scene.Pencil("L3", PencilDirection::kFree, Eigen::Vector3d(-0.8, 0.6, 0.0))};
+  observations.circles = {scene.Circle("c0", 1.0, 1.0, 0.5)};
+  observations.circles[0].plane = "p1";
+  observations.frame.plane = "p0";
+  observations.known_angles = {KnownAngle{{"L2", "L3"}, 0.5 * 3.14159265358979323846, 0.0}};
+  observations.known_lengths = {
+      KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(1, 0)}, "p1", 1.0}};
+  SolverRegistry registry;
+  AddClosedFormSolvers(&registry);
+  AddRefinedSolvers(&registry);
+  const PoseEstimate estimate =
+      registry.Find("line_pairs", SolverStage::kRefined)->Solve(observations);
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.02);
 }
 
 // Rotation and translation covariance against the errors of many trials, all kinds of evidence at
