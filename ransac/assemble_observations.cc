@@ -2,10 +2,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "circline/ransac/circle_grid.h"
+#include "circline/ransac/find_box.h"
 #include "circline/ransac/local_pencils.h"
 #include "circline/ransac/segment_meetings.h"
 
@@ -35,6 +37,8 @@ struct PlacedPencil : DetectedPencil {
   explicit PlacedPencil(DetectedPencil pencil)
       : DetectedPencil(std::move(pencil)),
         direction{observation.fit->direction, observation.fit->covariance} {}
+  PlacedPencil(DetectedPencil pencil, const Vector3d& along)
+      : DetectedPencil(std::move(pencil)), direction{along, Matrix3d::Zero()} {}
   UncertainDirection direction;
   bool of_grid = false;  // A row or column of circles.
   bool spans = false;    // One of the two that the plane was chosen by.
@@ -51,8 +55,9 @@ struct Plane {
 class Assembler {
  public:
   Assembler(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
-            std::vector<CircleEvidence>* circles, std::vector<DetectedPencil>* pencils)
-      : options_(options), lines_(lines), circles_(*circles) {
+            const std::vector<DetectedLine>& bent, std::vector<CircleEvidence>* circles,
+            std::vector<DetectedPencil>* pencils)
+      : options_(options), lines_(lines), bent_(bent), circles_(*circles) {
     Place(pencils);
   }
 
@@ -60,8 +65,9 @@ class Assembler {
     AddGrid(observations->camera);
     Plane plane = ChoosePlane();
     RefitOnPlane(&plane);
+    const bool has_box = AddBox(&plane);
     SetPlane(plane);
-    SetRoles(plane);
+    if (!has_box) SetRoles(plane);
     Emit(plane, observations);
   }
 
@@ -192,6 +198,30 @@ class Assembler {
     SpannedNormal(first.direction, second.direction, &plane->normal);
   }
 
+  // Where circles are all that the plane has: a box on it, whose edges become its axes.
+  bool AddBox(Plane* plane) {
+    if (plane->pencils[0] >= 0 || plane->circles.empty()) return false;
+    std::vector<UncertainDirection> normals = {plane->normal};
+    if (plane->circles.size() == 1) {
+      const CircleEvidence& circle = circles_[static_cast<std::size_t>(plane->circles[0])];
+      normals.assign(circle.normals.begin(), circle.normals.begin() + circle.num_normals);
+    }
+    std::vector<DetectedLine> lines = lines_;
+    lines.insert(lines.end(), bent_.begin(), bent_.end());
+    std::vector<Vector3d> vectors;
+    for (const UncertainDirection& normal : normals) vectors.push_back(normal.vector);
+    std::optional<FoundBox> box = FindBox(lines, vectors);
+    if (!box) return false;
+    plane->normal = normals[box->normal];
+    for (int k = 0; k < 3; ++k) {
+      PlacedPencil pencil(std::move(box->pencils[static_cast<std::size_t>(k)]), box->axes.col(k));
+      pencil.observation.direction = static_cast<PencilDirection>(k);
+      if (k < 2) pencil.observation.plane = "p0";
+      pencils_.push_back(std::move(pencil));
+    }
+    return true;
+  }
+
   // The plane with most support of circles alone.
   Plane FindCirclesPlane() const {
     Plane best;
@@ -292,9 +322,11 @@ class Assembler {
       circle.observation.id = "c" + std::to_string(observations->circles.size());
       observations->circles.push_back(std::move(circle.observation));
     }
+    std::vector<Vector3d> directions;
     for (PlacedPencil& pencil : pencils_) {
       if (static_cast<int>(observations->pencils.size()) >= options_.max_pencils) break;
-      if (IsRepetition(pencil, observations->pencils)) continue;
+      if (IsRepetition(pencil, directions)) continue;
+      directions.push_back(pencil.direction.vector);
       const std::string number = std::to_string(observations->pencils.size());
       pencil.observation.id = "L" + number;
       // Directions of different things: without a plane each they would be taken to span one.
@@ -310,15 +342,13 @@ class Assembler {
 
   // Old houses have verticals a degree apart: what is nearly parallel to a better supported pencil
   // says nothing new, and no plane is spanned by both.
-  static bool IsRepetition(const PlacedPencil& pencil,
-                           const std::vector<PencilObservation>& emitted) {
-    return std::any_of(emitted.begin(), emitted.end(), [&](const PencilObservation& other) {
-      return Near(pencil, other.fit->direction);
-    });
+  static bool IsRepetition(const PlacedPencil& pencil, const std::vector<Vector3d>& emitted) {
+    return std::any_of(emitted.begin(), emitted.end(),
+                       [&](const Vector3d& direction) { return Near(pencil, direction); });
   }
 
   const AssemblyOptions& options_;
-  const std::vector<DetectedLine>& lines_;
+  const std::vector<DetectedLine>&lines_, &bent_;
   std::vector<CircleEvidence>& circles_;
   std::vector<PlacedPencil> pencils_;
   Plane circles_plane_;  // Of circles alone.
@@ -327,9 +357,10 @@ class Assembler {
 }  // namespace
 
 void AssembleObservations(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
+                          const std::vector<DetectedLine>& bent,
                           std::vector<CircleEvidence>* circles,
                           std::vector<DetectedPencil>* pencils, Observations* observations) {
-  Assembler(options, lines, circles, pencils).Assemble(observations);
+  Assembler(options, lines, bent, circles, pencils).Assemble(observations);
 }
 
 }  // namespace circline

@@ -29,8 +29,11 @@ struct AssemblyOptions {
 // stay free. Appends circles ("c0", ...) and pencils ("L0", ...) to `observations`, those of the
 // plane first. `circles` and `pencils` are ordered by support; they are moved from. `lines` are
 // those that the pencils' members index; the two pencils that span the plane are fitted again to
-// all that lie where the two meet.
+// all that lie where the two meet. Where circles are all that a plane has, a box that stands on it
+// (of `lines` and `bent` ones) gives it x and y, and tells which of a lone circle's two normals it
+// has.
 void AssembleObservations(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
+                          const std::vector<DetectedLine>& bent,
                           std::vector<CircleEvidence>* circles,
                           std::vector<DetectedPencil>* pencils, Observations* observations);
 

@@ -14,6 +14,9 @@ namespace {
 // below, any smooth curve passes for straight.
 constexpr int kSeedPoints = 9;
 constexpr double kMinPiecePx = 10.0;
+// All but straight: a sagitta of up to this many pixels, and this share of the length.
+constexpr double kMaxBentPx = 1.2;
+constexpr double kMaxBentShare = 0.018;
 // So many points in a row off the line end a piece; fewer are noise.
 constexpr int kMaxMisses = 2;
 // Pieces are joined if the gap between them is not longer than the shorter of the two, nor than
@@ -117,21 +120,34 @@ class LineDetector {
                const std::vector<std::uint8_t>* skip)
       : map_(map), options_(options), skip_(skip), calibrated_edges_(map, camera) {}
 
-  std::vector<DetectedLine> Detect() {
+  std::vector<DetectedLine> Straight() {
     for (const EdgeChain& chain : map_.chains) CutChain(chain);
     std::stable_sort(pieces_.begin(), pieces_.end(),
                      [](const Piece& a, const Piece& b) { return a.length_px > b.length_px; });
     JoinPieces();
-    std::stable_sort(
-        lines_.begin(), lines_.end(),
-        [](const DetectedLine& a, const DetectedLine& b) { return a.length_px > b.length_px; });
-    if (lines_.size() > static_cast<std::size_t>(options_.max_lines)) {
-      lines_.resize(static_cast<std::size_t>(options_.max_lines));
-    }
-    return std::move(lines_);
+    return Longest();
+  }
+
+  // After Straight().
+  std::vector<DetectedLine> Bent() {
+    pieces_ = std::move(bent_);
+    for (std::size_t k = 0; k < pieces_.size(); ++k) Finish(Start(static_cast<int>(k)));
+    return Longest();
   }
 
  private:
+  std::vector<DetectedLine> Longest() {
+    std::vector<DetectedLine> lines = std::move(lines_);
+    lines_.clear();
+    std::stable_sort(lines.begin(), lines.end(), [](const DetectedLine& a, const DetectedLine& b) {
+      return a.length_px > b.length_px;
+    });
+    if (lines.size() > static_cast<std::size_t>(options_.max_lines)) {
+      lines.resize(static_cast<std::size_t>(options_.max_lines));
+    }
+    return lines;
+  }
+
   // Of usable points.
   CalibratedPoint X(int i) const {
     CalibratedPoint point;
@@ -203,9 +219,14 @@ class LineDetector {
     piece->length_px = (piece->last_px - piece->first_px).norm();
     const int middle = (piece->begin + piece->end) / 2;
     piece->gradient = map_.points[static_cast<std::size_t>(middle)].Normal();
-    if (piece->length_px < kMinPiecePx || !IsStraight(*piece)) return;
+    if (piece->length_px < kMinPiecePx) return;
+    const double sagitta = SagittaPx(*piece);
+    if (sagitta >
+        std::max(options_.max_sagitta_px, std::min(kMaxBentPx, kMaxBentShare * piece->length_px))) {
+      return;
+    }
     SetRange(piece->along, *piece, &piece->from, &piece->to);
-    pieces_.push_back(*piece);
+    (sagitta <= options_.max_sagitta_px ? pieces_ : bent_).push_back(*piece);
   }
 
   // Where a piece lies along a line.
@@ -216,7 +237,7 @@ class LineDetector {
   }
 
   // The middle half of the points on one side of the line and the ends on the other is a curve.
-  bool IsStraight(const Piece& piece) const {
+  double SagittaPx(const Piece& piece) const {
     const int n = piece.end - piece.begin;
     double middle = 0.0, ends = 0.0;
     int num_middle = 0, num_ends = 0;
@@ -231,9 +252,9 @@ class LineDetector {
         ++num_ends;
       }
     }
-    if (num_middle == 0 || num_ends == 0) return false;
+    if (num_middle == 0 || num_ends == 0) return std::numeric_limits<double>::infinity();
     // For a parabola the two means differ by half its sagitta.
-    return 2.0 * std::abs(middle / num_middle - ends / num_ends) <= options_.max_sagitta_px;
+    return 2.0 * std::abs(middle / num_middle - ends / num_ends);
   }
 
   void JoinPieces() {
@@ -419,7 +440,7 @@ class LineDetector {
   const LineOptions& options_;
   const std::vector<std::uint8_t>* skip_;
   mutable CalibratedEdges calibrated_edges_;  // Remembers what it was asked.
-  std::vector<Piece> pieces_;
+  std::vector<Piece> pieces_, bent_;
   std::vector<Beginning> beginnings_;
   std::vector<DetectedLine> lines_;
   // Scratch.
@@ -440,12 +461,15 @@ Status LineOptions::Validate() const {
 }
 
 Status DetectLines(const EdgeMap& edges, const Camera& camera, const LineOptions& options,
-                   std::vector<DetectedLine>* lines, const std::vector<std::uint8_t>* skip) {
+                   std::vector<DetectedLine>* lines, const std::vector<std::uint8_t>* skip,
+                   std::vector<DetectedLine>* bent) {
   lines->clear();
   Status status = options.Validate();
   if (status.ok()) status = camera.Validate();
   if (!status.ok()) return status;
-  *lines = LineDetector(edges, camera, options, skip).Detect();
+  LineDetector detector(edges, camera, options, skip);
+  *lines = detector.Straight();
+  if (bent != nullptr) *bent = detector.Bent();
   return Status::Ok();
 }
 

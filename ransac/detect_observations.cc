@@ -34,7 +34,7 @@ constexpr double kShapeErrorPx = 0.1;
 constexpr int kExtraPencils = 3;
 struct Evidence {
   std::vector<CircleEvidence> circles;  // Best first.
-  std::vector<DetectedLine> lines;
+  std::vector<DetectedLine> lines, bent;
   std::vector<DetectedPencil> pencils;
 };
 
@@ -122,7 +122,7 @@ Status CollectEvidence(const cv::Mat& image, const Camera& camera, const Detecti
   LineOptions line_options;
   line_options.min_length_px = options.min_segment_length_px;
   const std::vector<std::uint8_t> skip = EllipsePoints(edges, ellipses);
-  status = DetectLines(edges, camera, line_options, &evidence->lines, &skip);
+  status = DetectLines(edges, camera, line_options, &evidence->lines, &skip, &evidence->bent);
   if (!status.ok()) return status;
   UndoEdgeShift(edges, camera, &evidence->lines);
   return DetectPencils(evidence->lines, options.max_pencils + kExtraPencils, options.seed,
@@ -191,8 +191,8 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   AssemblyOptions assembly;
   assembly.max_pencils = options.max_pencils;
   assembly.max_shared_plane_deg = options.max_shared_plane_deg;
-  AssembleObservations(assembly, evidence.lines, &evidence.circles, &evidence.pencils,
-                       observations);
+  AssembleObservations(assembly, evidence.lines, evidence.bent, &evidence.circles,
+                       &evidence.pencils, observations);
   observations->message = Describe(*observations);
   return Status::Ok();
 }

@@ -39,42 +39,11 @@ constexpr double kTwinPx = 4.0;
 // by more than long ones; measured on the sides of chessboard squares.
 constexpr double kSharedErrorPx = 0.06;
 
-// A line's fit with the shared error in its covariance.
-LineFit WithSharedError(const DetectedLine& line) {
-  LineFit fit = line.fit;
-  const double n = static_cast<double>(line.points.size());
-  fit.covariance *= 1.0 + n * kSharedErrorPx * kSharedErrorPx / (line.sigma_px * line.sigma_px);
-  return fit;
-}
-
-// Of each line the longer one whose other side it is, or -1. Both sides are measurements; but that
-// they are parallel is no accident and says nothing of a pencil.
-std::vector<int> FindTwins(const std::vector<DetectedLine>& lines) {
-  std::vector<int> order(lines.size());
-  std::iota(order.begin(), order.end(), 0);
-  const auto line = [&lines](int i) -> const DetectedLine& {
-    return lines[static_cast<std::size_t>(i)];
-  };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](int a, int b) { return line(a).length_px > line(b).length_px; });
-  std::vector<int> twin_of(lines.size(), -1);
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    const auto beside = [&](int longer) {
-      return twin_of[static_cast<std::size_t>(longer)] < 0 &&
-             LiesAlong(line(order[k]).ends, line(longer).ends, kTwinPx);
-    };
-    const auto end = order.begin() + static_cast<std::ptrdiff_t>(k);
-    const auto found = std::find_if(order.begin(), end, beside);
-    if (found != end) twin_of[static_cast<std::size_t>(order[k])] = *found;
-  }
-  return twin_of;
-}
-
 // Detected lines with what the search for pencils knows of them.
 struct LineSet {
   explicit LineSet(const std::vector<DetectedLine>& detected)
       : lines(detected), twin_of(FindTwins(detected)) {
-    for (const DetectedLine& line : lines) fits.push_back(WithSharedError(line));
+    for (const DetectedLine& line : lines) fits.push_back(WithSharedError(line, kSharedErrorPx));
   }
   bool IsTwin(int i) const { return twin_of[static_cast<std::size_t>(i)] >= 0; }
   // Twins count once.
@@ -173,30 +142,14 @@ class PencilFitter {
   double max_spread_;
 };
 
+// With the fit that was found, and its lines' scatter about it in their covariances.
 DetectedPencil MakePencil(const FoundPencil& found, const LineSet& set, double spread) {
-  DetectedPencil pencil;
-  pencil.observation.fit = found.fit;
-  pencil.members = found.lines;
-  double variance = 0.0, points = 0.0;
-  const Vector3d& v = found.fit.direction;
+  std::vector<LineFit> fits;
   for (const int i : found.lines) {
-    const DetectedLine& line = set.lines[static_cast<std::size_t>(i)];
-    const LineFit fit = WithModelError(set.fits[static_cast<std::size_t>(i)], spread);
-    LineObservation observation;
-    observation.points = line.points;
-    observation.fit = line.fit;
-    // Points of lines that are not quite parallel are no better than the lines.
-    const double widening = v.dot(fit.covariance * v) / v.dot(line.fit.covariance * v);
-    observation.sigma_px = line.sigma_px * std::sqrt(widening);
-    observation.fit->covariance *= widening;
-    const double n = static_cast<double>(line.points.size());
-    variance += n * line.sigma_px * line.sigma_px;
-    points += n;
-    pencil.observation.lines.push_back(std::move(observation));
-    pencil.ends.push_back(line.ends);
-    pencil.support_px += line.length_px;
+    fits.push_back(WithModelError(set.fits[static_cast<std::size_t>(i)], spread));
   }
-  pencil.observation.sigma_px = std::sqrt(variance / std::max(points, 1.0));
+  DetectedPencil pencil = MakePencil(set.lines, found.lines, fits, found.fit.direction);
+  pencil.observation.fit = found.fit;
   return pencil;
 }
 
@@ -365,6 +318,60 @@ bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>&
   if (!PencilFitter(set, kMaxSpreadRad).Fit(candidates, &found, &spread)) return false;
   *pencil = MakePencil(found, set, spread);
   return true;
+}
+
+DetectedPencil MakePencil(const std::vector<DetectedLine>& lines, const std::vector<int>& members,
+                          const std::vector<LineFit>& fits, const Vector3d& direction) {
+  DetectedPencil pencil;
+  pencil.members = members;
+  double variance = 0.0, points = 0.0;
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const DetectedLine& line = lines[static_cast<std::size_t>(members[k])];
+    LineObservation observation;
+    observation.points = line.points;
+    observation.fit = line.fit;
+    // Points of lines that are not quite parallel are no better than the lines.
+    const double widening = direction.dot(fits[k].covariance * direction) /
+                            direction.dot(line.fit.covariance * direction);
+    observation.sigma_px = line.sigma_px * std::sqrt(widening);
+    observation.fit->covariance *= widening;
+    const double n = static_cast<double>(line.points.size());
+    variance += n * line.sigma_px * line.sigma_px;
+    points += n;
+    pencil.observation.lines.push_back(std::move(observation));
+    pencil.ends.push_back(line.ends);
+    pencil.support_px += line.length_px;
+  }
+  pencil.observation.sigma_px = std::sqrt(variance / std::max(points, 1.0));
+  return pencil;
+}
+
+LineFit WithSharedError(const DetectedLine& line, double shared_px) {
+  LineFit fit = line.fit;
+  const double n = static_cast<double>(line.points.size());
+  fit.covariance *= 1.0 + n * shared_px * shared_px / (line.sigma_px * line.sigma_px);
+  return fit;
+}
+
+std::vector<int> FindTwins(const std::vector<DetectedLine>& lines) {
+  std::vector<int> order(lines.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto line = [&lines](int i) -> const DetectedLine& {
+    return lines[static_cast<std::size_t>(i)];
+  };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return line(a).length_px > line(b).length_px; });
+  std::vector<int> twin_of(lines.size(), -1);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const auto beside = [&](int longer) {
+      return twin_of[static_cast<std::size_t>(longer)] < 0 &&
+             LiesAlong(line(order[k]).ends, line(longer).ends, kTwinPx);
+    };
+    const auto end = order.begin() + static_cast<std::ptrdiff_t>(k);
+    const auto found = std::find_if(order.begin(), end, beside);
+    if (found != end) twin_of[static_cast<std::size_t>(order[k])] = *found;
+  }
+  return twin_of;
 }
 
 }  // namespace circline

@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_RANSAC_DETECT_PENCILS_H_
 #define CIRCLINE_RANSAC_DETECT_PENCILS_H_
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
@@ -33,6 +34,19 @@ Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, st
 // may bend or be badly printed. False, and nothing changed, where none do.
 bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
                  DetectedPencil* pencil);
+
+// The pencil of lines[members] along `direction`, each as good as its `fits` says (one a member):
+// the line's own with a covariance that counts whatever else the line may miss the direction by.
+// No fit.
+DetectedPencil MakePencil(const std::vector<DetectedLine>& lines, const std::vector<int>& members,
+                          const std::vector<LineFit>& fits, const Eigen::Vector3d& direction);
+
+// A line's fit if all of its points share an error, pixels: no number of them averages it out.
+LineFit WithSharedError(const DetectedLine& line, double shared_px);
+
+// Of each line the longer one whose other side it is, or -1. Both sides are measurements; but that
+// they are parallel is no accident and says nothing of a pencil.
+std::vector<int> FindTwins(const std::vector<DetectedLine>& lines);
 
 }  // namespace circline
 

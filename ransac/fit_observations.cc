@@ -106,6 +106,8 @@ class Fitter {
 
   void FitDirection(const std::vector<LineFit>& fits, const std::vector<std::size_t>& positions,
                     PencilObservation* pencil) {
+    // A single line along an axis is evidence of its own.
+    if (pencil->direction != PencilDirection::kFree && fits.size() == 1) return;
     PencilOptions pencil_options;
     pencil_options.ransac = FeatureOptions(pencil->sigma_px).ransac;
     pencil_options.ransac.threshold = kInlierSigmas;

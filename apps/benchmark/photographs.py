@@ -40,6 +40,7 @@ CLAIMS = [
     ('scene-lund', ['--evidence=auto'], 'joint', 'refined', 'direction_error_deg', 'best', 1.0),
     ('circle-mire2', [], 'single_circle', 'refined', 'normal_error_deg', 'better', 0.2),
     ('turntable-teabox', ['--evidence=auto'], 'single_circle', 'refined', 'normal_error_deg', 'better', 1.3),
+    ('turntable-teabox', ['--evidence=auto'], 'joint', 'refined', 'normal_error_deg', 'best', 1.3),
     ('scene-lund', [], 'joint', 'refined', 'direction_error_deg', 'best', 0.5),
     ('box-camprodon', [], 'joint', 'refined', 'rotation_error_deg', 'best', 1.0),
 ]
@@ -59,22 +60,30 @@ def group_circles(scene):
         file.write(re.sub(r'(\{ id: "\w+", )(contour:)', r'\1radius_group: "dots", \2', text))
 
 
+def folder(data_set, options, scratch):
+    return os.path.join(scratch, '_'.join((data_set, *options)).replace('=', '').replace(' ', '_'))
+
+
+def json_lines(file):
+    with open(file) as lines:
+        return [json.loads(line) for line in lines]
+
+
 def run(args, data_set, options, scratch, cache={}):
     """Result lines by image, solver and stage; one run for each set and evidence."""
     key = (data_set, *options)
     if key not in cache:
-        scene = os.path.join(scratch, '_'.join(key).replace('=', '').replace(' ', '_') + '.yaml')
-        out = scene[:-5]
+        out = folder(data_set, options, scratch)
+        scene = out + '.yaml'
         subprocess.run(['/usr/bin/python3', args.converter, os.path.join(args.data, data_set), scene,
                         *(o for o in options if o != EQUAL)], check=True)
         if EQUAL in options:
             group_circles(scene)
         subprocess.run([args.compare, f'--scene={scene}', f'--output={out}', '--overlays=false'], check=True,
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        with open(os.path.join(out, 'results.jsonl')) as lines:
-            cache[key] = [json.loads(line) for line in lines]
+        cache[key] = json_lines(os.path.join(out, 'results.jsonl'))
         if data_set == 'box-camprodon':
-            cache[key] = set_box_errors(scene, cache[key])
+            cache[key] = set_box_errors(scene_rotations(scene), cache[key])
     return cache[key]
 
 
@@ -114,15 +123,39 @@ def box_error(rotation, truth):
     return best
 
 
-def set_box_errors(scene, lines):
+def matrices(file, before):
+    """The numbers in the brackets that follow each `before`."""
+    with open(file) as text:
+        return [list(map(float, numbers.split(','))) for numbers in re.findall(before + r'\[([^\]]*)\]', text.read())]
+
+
+def scene_rotations(scene):
+    return matrices(scene, r'truth: \{ rotation: ')
+
+
+def box_axes(args, data_set):
+    """Of a box in each photo: rotations from its frame to the camera's."""
+    return matrices(os.path.join(args.data, data_set, 'groundtruth.yml'), r'box_axes_cam: !![^\[]*')
+
+
+def set_box_errors(truths, lines):
     """A box has no front: what is right of any of its faces is right."""
-    with open(scene) as text:
-        truths = [list(map(float, numbers.split(','))) for numbers in re.findall(r'truth: \{ rotation: \[([^\]]*)\]', text.read())]
     images = list(dict.fromkeys(line['image'] for line in lines))
     for line in lines:
         if line.get('rotation_error_deg') is not None:
             line['rotation_error_deg'] = box_error(line['rotation'], truths[images.index(line['image'])])
     return lines
+
+
+def sure_errors(images):
+    """Of the rotation, of the photos with an answer that is sure."""
+    return [error(h[0], 'rotation_error_deg') for h in images if h and h[0]['probability'] >= SURE]
+
+
+def shares_plane(observation):
+    """Whether a circle and pencils along x and y were found to lie in the plane of the world."""
+    along = {p['along'] for p in observation['pencils'] if p['plane'] == 'p0'}
+    return {'x', 'y'} <= along and any(e['plane'] == 'p0' for e in observation['ellipses'])
 
 
 def any_error(line):
@@ -165,11 +198,18 @@ def main():
         claim(f'--evidence=auto: of {len(sure)} answers with a probability of {SURE} or more, '
               f'{len(far)} are off by more than {FAR_DEG} degrees: ' + ', '.join(f'{n} {e:.1f}' for n, e in far.items()),
               not far)
-        box = [error(h[0], 'rotation_error_deg') for h in answers(automatic['box-camprodon'], 'joint', 'refined')
-               if h and h[0]['probability'] >= SURE]
+        box = sure_errors(answers(automatic['box-camprodon'], 'joint', 'refined'))
         median = statistics.median(box) if box else float('inf')
         claim(f'box-camprodon --evidence=auto: joint (refined), rotation_error_deg up to the choice of the face, median of the '
               f'{len(box)} of 10 photos with a sure answer: {median:.3f} <= 1.5', median <= 1.5 and len(box) >= 7)
+        set_box_errors(box_axes(args, 'turntable-teabox'), automatic['turntable-teabox'])
+        box = sure_errors(answers(automatic['turntable-teabox'], 'joint', 'refined'))
+        median = statistics.median(box) if box else float('inf')
+        claim(f'turntable-teabox --evidence=auto: joint (refined), axes of the box, median of the {len(box)} of 9 photos with a '
+              f'sure answer: {median:.3f} <= 1.3', median <= 1.3 and len(box) >= 8)
+        observations = json_lines(os.path.join(folder('turntable-teabox', ['--evidence=auto'], scratch), 'observations.jsonl'))
+        shared = sum(map(shares_plane, observations))
+        claim(f'turntable-teabox --evidence=auto: the disc and the box share a plane in {shared} of 9', shared >= 8)
         for data_set in ('circles-discocal-rgb', 'circles-discocal-tir'):
             images = answers(run(args, data_set, ['--centre'], scratch), 'circle_center', 'refined')
             right = sum(bool(h) and error(h[0], 'normal_error_deg') <= min(error(l, 'normal_error_deg') for l in h)

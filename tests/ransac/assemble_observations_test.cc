@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "circline/estimators/circle_pose.h"
+#include "tests/ransac/detected_line_scene.h"
 #include "tests/ransac/detection_test_util.h"
 
 namespace circline {
@@ -48,11 +49,11 @@ CircleEvidence Circle(const Vector3d& normal, double support) {
 }
 
 Observations Assemble(std::vector<CircleEvidence> circles, std::vector<DetectedPencil> pencils,
-                      int max_pencils = 3) {
+                      int max_pencils = 3, const std::vector<DetectedLine>& bent = {}) {
   Observations observations;
   AssemblyOptions options;
   options.max_pencils = max_pencils;
-  AssembleObservations(options, {}, &circles, &pencils, &observations);
+  AssembleObservations(options, {}, bent, &circles, &pencils, &observations);
   return observations;
 }
 
@@ -126,6 +127,43 @@ TEST(AssembleObservations, CirclesAloneAgreeOnAPlane) {
   EXPECT_EQ(found.circles[0].plane, "p0");
   EXPECT_EQ(found.circles[1].plane, "p0");
   EXPECT_TRUE(found.circles[2].plane.empty());
+}
+
+// A lone circle leaves two normals, and nothing says where x is; a box on its plane says both.
+TEST(AssembleObservations, ABoxOnACirclesPlaneGivesTheAxes) {
+  Random random(1);
+  const Matrix3d axes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
+  const std::vector<DetectedLine> edges =
+      detection_test::BoxEdges(detection_test::TestCamera(), axes, 0.2, &random);
+  const Vector3d unrelated(1.0, 1.0, 1.0);
+  const Observations found =
+      Assemble({Circle(axes.col(2), 500.0)}, {Pencil(unrelated, 900.0)}, 3, edges);
+  ASSERT_EQ(found.circles.size(), 1U);
+  EXPECT_EQ(found.circles[0].plane, "p0");
+  EXPECT_EQ(found.frame.plane, "p0");
+  ASSERT_EQ(found.pencils.size(), 3U);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const PencilObservation& pencil = found.pencils[k];
+    EXPECT_EQ(pencil.direction, static_cast<PencilDirection>(k));
+    EXPECT_EQ(pencil.plane, k < 2 ? "p0" : "");
+    EXPECT_EQ(pencil.lines.size(), 3U);
+    for (const LineObservation& line : pencil.lines) {
+      EXPECT_LT(std::abs(line.fit->line.dot(axes.col(static_cast<Eigen::Index>(k)))), 0.02);
+      // Points of edges that may be worn count for less than they scatter.
+      EXPECT_GT(line.sigma_px, 0.3);
+    }
+  }
+}
+
+TEST(AssembleObservations, TwoPencilsOfAPlaneNeedNoBox) {
+  Random random(1);
+  const Matrix3d axes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
+  const std::vector<DetectedLine> edges =
+      detection_test::BoxEdges(detection_test::TestCamera(), axes, 0.2, &random);
+  const Observations found =
+      Assemble({}, {Pencil(kFrame.col(0), 500.0), Pencil(kFrame.col(1), 400.0)}, 3, edges);
+  ASSERT_EQ(found.pencils.size(), 2U);
+  EXPECT_LT(AxisDeg(found.pencils[0].fit->direction, kFrame.col(0)), 0.1);
 }
 
 TEST(AssembleObservations, KeepsNoMorePencilsThanAsked) {

@@ -149,6 +149,37 @@ TEST(DetectLines, ACircleIsNoLine) {
   }
 }
 
+TEST(DetectLines, KeepsBentEdgesApart) {
+  // Sides that bulge by 0.8 px over 80, by 0.1 px over 80, and by 3 px over 50: edges of a worn
+  // thing, straight, and round.
+  const auto bulge = [](double v, double middle, double half, double sagitta) {
+    const double s = (v - middle) / half;
+    return sagitta * (1.0 - s * s);
+  };
+  const cv::Mat image = Develop(Render(200, 120, [&](double u, double v) {
+    const bool worn = u > 30.0 - bulge(v, 60.0, 40.0, 0.8) && u < 60.0 + bulge(v, 60.0, 40.0, 0.1);
+    const bool round = u > 120.0 - bulge(v, 60.0, 25.0, 3.0) && u < 150.0;
+    if (worn && std::abs(v - 60.0) < 40.0) return 40.0;
+    return round && std::abs(v - 60.0) < 25.0 ? 40.0 : 160.0;
+  }));
+  EdgeMap edges;
+  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &edges).ok());
+  std::vector<DetectedLine> lines, bent;
+  LineOptions options;
+  options.min_length_px = 45.0;
+  ASSERT_TRUE(DetectLines(edges, TestCamera(200, 120), options, &lines, nullptr, &bent).ok());
+  const auto near = [](const DetectedLine& line, double u) {
+    return std::abs(line.points[line.points.size() / 2].x() - u) < 2.0;
+  };
+  ASSERT_EQ(lines.size(), 2U);
+  EXPECT_TRUE(near(lines[0], 60.0));
+  EXPECT_TRUE(near(lines[1], 150.0));
+  ASSERT_EQ(bent.size(), 1U);
+  EXPECT_TRUE(near(bent[0], 29.5));
+  EXPECT_GT(bent[0].length_px, 70.0);
+  EXPECT_EQ(Detect(image, TestCamera(200, 120), options).size(), 2U);
+}
+
 TEST(DetectLines, DropsShortOnesAndSkippedPoints) {
   const cv::Mat image = Develop(Render(120, 120, [](double u, double v) {
     return u > 30.2 && u < 90.1 && v > 40.3 && v < 70.4 ? 40.0 : 160.0;

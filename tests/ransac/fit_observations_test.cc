@@ -183,6 +183,22 @@ TEST(FitObservations, NamesWhatCannotBeFitted) {
   EXPECT_FALSE(observations.pencils[0].fit.has_value());
 }
 
+TEST(FitObservations, ASingleLineAlongAnAxisIsNoProblem) {
+  Observations observations = MakeObservations();
+  PencilObservation& pencil = observations.pencils[0];
+  pencil.lines.resize(1);
+  std::vector<std::string> problems;
+  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+  EXPECT_NE(problems.back().find("two lines"), std::string::npos);
+  pencil.direction = PencilDirection::kX;
+  const std::size_t before = problems.size();
+  problems.clear();
+  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+  EXPECT_EQ(problems.size(), before - 1);
+  EXPECT_TRUE(pencil.lines[0].fit.has_value());
+  EXPECT_FALSE(pencil.fit.has_value());
+}
+
 TEST(FitObservations, NamesBadOptionsAndBadInput) {
   struct Case {
     const char* field;

@@ -23,6 +23,16 @@ TEST(SegmentMeetings, DistanceIsThatOfTheNearestPoints) {
   EXPECT_FALSE(AreNear(s, Make(126, 0, 140, 0)));
 }
 
+TEST(SegmentMeetings, CornersMayBeRoundedButEndThere) {
+  const Segment s = Make(0, 0, 100, 0);
+  EXPECT_NEAR(CornerGap(s, Make(100, 0, 100, 60)), 0.0, 1e-12);
+  EXPECT_NEAR(CornerGap(s, Make(107, 0, 107, 60)), 0.5, 1e-12);  // 7 of 14 px.
+  EXPECT_NEAR(CornerGap(s, Make(100, 6, 100, 26)), 1.0, 1e-12);  // 6 px, and short.
+  EXPECT_GT(CornerGap(s, Make(50, 0, 50, 60)), 2.0);             // A T junction.
+  EXPECT_GT(CornerGap(s, Make(100, 0, 200, 10)), 2.0);           // Nearly parallel.
+  EXPECT_GT(CornerGap(s, Make(130, 0, 130, 60)), 2.0);
+}
+
 TEST(SegmentMeetings, LengthCountsByTheNumberOfMeetings) {
   const std::vector<Segment> across = {Make(40, -50, 40, 50), Make(140, -50, 140, 50),
                                        Make(240, -50, 240, 50), Make(280, -50, 280, 50)};
