@@ -12,7 +12,9 @@
 // Pencils whose lines hardly meet (the edges of a box, the stripes of a cushion behind it) span no
 // plane: each is then in one of its own.
 // Rows and columns of a sheet of equal circles are pencils too: of lines through the images of
-// their centres. What cannot be a pose is said in `message`.
+// their centres. A box that stands on the plane of circles, found by its corners, gives that plane
+// its axes x and y (one line may be all that there is along each), and tells which of the two
+// normals of a lone circle is right. What cannot be a pose is said in `message`.
 #ifndef CIRCLINE_RANSAC_DETECT_OBSERVATIONS_H_
 #define CIRCLINE_RANSAC_DETECT_OBSERVATIONS_H_
 
