@@ -30,11 +30,17 @@ double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y(
 }  // namespace
 
 bool Contour::Project(const Matrix3d& conic, double min_axis_px, double max_axis_px) {
-  if (!ConicToEllipse(conic, &ellipse_)) return false;
+  Ellipse ellipse;
+  if (!ConicToEllipse(conic, &ellipse)) return false;
+  const double cosine = std::cos(ellipse.angle), sine = std::sin(ellipse.angle);
+  center_ = ellipse.center;
+  major_ = ellipse.a * Vector2d(cosine, sine);
+  minor_ = ellipse.b * Vector2d(-sine, cosine);
   // Axes on the photo, from four points: good enough to bound sizes and to choose a spacing.
   std::array<Vector2d, 4> ends;
-  for (int k = 0; k < 4; ++k) {
-    if (!PixelAt(0.5 * kPi * k, &ends[static_cast<std::size_t>(k)])) return false;
+  if (!ToPixel(center_ + major_, &ends[0]) || !ToPixel(center_ + minor_, &ends[1]) ||
+      !ToPixel(center_ - major_, &ends[2]) || !ToPixel(center_ - minor_, &ends[3])) {
+    return false;
   }
   const double a = 0.5 * (ends[0] - ends[2]).norm(), b = 0.5 * (ends[1] - ends[3]).norm();
   major_px_ = std::max(a, b);
@@ -52,37 +58,36 @@ bool Contour::SampleEvery(double spacing_px, std::vector<ContourSample>* samples
 
 bool Contour::SampleCount(int n, std::vector<ContourSample>* samples) const {
   samples->resize(static_cast<std::size_t>(n));
-  const double cosine = std::cos(ellipse_.angle), sine = std::sin(ellipse_.angle);
-  const Vector2d major = ellipse_.a * Vector2d(cosine, sine),
-                 minor = ellipse_.b * Vector2d(-sine, cosine);
   // The anomaly advances by rotation: its rounding error is far below a pixel for any n here.
   const double step_c = std::cos(2.0 * kPi / n), step_s = std::sin(2.0 * kPi / n);
   Vector2d anomaly(1.0, 0.0);
-  for (int k = 0; k < n; ++k) {
-    const Vector2d x = ellipse_.center + anomaly.x() * major + anomaly.y() * minor;
-    Vector2d* pixel = &(*samples)[static_cast<std::size_t>(k)].pixel;
-    if (!ToPixel(x, pixel)) return false;
+  for (ContourSample& s : *samples) {
+    if (!ToPixel(center_ + anomaly.x() * major_ + anomaly.y() * minor_, &s.pixel)) return false;
     // Beyond what Round() takes: no part of a photo.
-    if (!(pixel->cwiseAbs().maxCoeff() < kFarPx)) *pixel = Vector2d(-kFarPx, -kFarPx);
+    if (!(s.pixel.cwiseAbs().maxCoeff() < kFarPx)) s.pixel = Vector2d(-kFarPx, -kFarPx);
     anomaly = Vector2d(step_c * anomaly.x() - step_s * anomaly.y(),
                        step_s * anomaly.x() + step_c * anomaly.y());
   }
-  for (int k = 0; k < n; ++k) {
-    const auto before = static_cast<std::size_t>((k + n - 1) % n);
-    const auto after = static_cast<std::size_t>((k + 1) % n);
-    const Vector2d along = (*samples)[after].pixel - (*samples)[before].pixel;
-    ContourSample& s = (*samples)[static_cast<std::size_t>(k)];
+  ContourSample* before = &samples->back();
+  for (std::size_t k = 0; k < samples->size(); ++k) {
+    ContourSample* s = &(*samples)[k];
+    const ContourSample& after = k + 1 < samples->size() ? s[1] : samples->front();
+    const Vector2d along = after.pixel - before->pixel;
     const double length = along.norm();
-    s.length = 0.5 * length;
+    const double inverse = length > 0.0 ? 1.0 / length : 0.0;
+    s->length = 0.5 * length;
     // The anomaly runs from +x towards +y, so that outward is on its right (y down).
-    s.normal =
-        length > 0.0 ? Vector2d(along.y() / length, -along.x() / length) : Vector2d(1.0, 0.0);
+    s->normal =
+        length > 0.0 ? Vector2d(along.y() * inverse, -along.x() * inverse) : Vector2d(1.0, 0.0);
+    before = s;
   }
-  for (int k = 0; k < n; ++k) {
-    const Vector2d& before = (*samples)[static_cast<std::size_t>((k + n - 1) % n)].normal;
-    const Vector2d& after = (*samples)[static_cast<std::size_t>((k + 1) % n)].normal;
+  before = &samples->back();
+  for (std::size_t k = 0; k < samples->size(); ++k) {
+    ContourSample* s = &(*samples)[k];
+    const ContourSample& after = k + 1 < samples->size() ? s[1] : samples->front();
     // Twice the sine is close enough to the angle for steps of a few degrees.
-    (*samples)[static_cast<std::size_t>(k)].turn = 0.5 * std::abs(Cross(before, after));
+    s->turn = 0.5 * std::abs(Cross(before->normal, after.normal));
+    before = s;
   }
   return true;
 }
@@ -97,26 +102,37 @@ bool Contour::ToPixel(const Vector2d& x, Vector2d* pixel) const {
   return true;
 }
 
-bool Contour::PixelAt(double t, Vector2d* pixel) const {
-  const Vector2d x = EllipsePoint(ellipse_, t);
-  return ToPixel(x, pixel);
-}
-
 void Supporter::Take(const std::vector<int>& points) {
   for (const int i : points) taken_[static_cast<std::size_t>(i)] = 1;
 }
 
+// The edge points in the pixels within `steps` of a sample along its normal, in order. Gathered
+// before they are looked at: the photo is large, and so all its pixels are fetched at once.
+int Supporter::PointsAcross(const ContourSample& s, int steps, std::array<int, 16>* points) const {
+  std::size_t count = 0;
+  double x = s.pixel.x() - steps * s.normal.x(), y = s.pixel.y() - steps * s.normal.y();
+  for (int step = -steps; step <= steps; ++step) {
+    const int i = map_.PointAt(Round(x), Round(y));
+    (*points)[count] = i;
+    count += i >= 0 ? 1U : 0U;
+    x += s.normal.x();
+    y += s.normal.y();
+  }
+  return static_cast<int>(count);
+}
+
 QuickSupport Supporter::QuickLook(const std::vector<ContourSample>& samples, double reach) const {
-  const int steps = static_cast<int>(reach + 0.5);
+  const int steps = std::min(static_cast<int>(reach + 0.5), kMaxSteps);
   std::array<int, 3> across{};
   int any = 0;
+  std::array<int, 16> points;
   for (const ContourSample& s : samples) {
     bool outside = false, inside = false, found = false;
-    for (int step = -steps; step <= steps; ++step) {
-      const int i = map_.PointAt(Round(s.pixel.x() + step * s.normal.x()),
-                                 Round(s.pixel.y() + step * s.normal.y()));
-      if (i < 0 || taken_[static_cast<std::size_t>(i)]) continue;
-      const double cosine = s.normal.dot(map_.points[static_cast<std::size_t>(i)].Normal());
+    const int count = PointsAcross(s, steps, &points);
+    for (int k = 0; k < count; ++k) {
+      const auto i = static_cast<std::size_t>(points[static_cast<std::size_t>(k)]);
+      if (taken_[i]) continue;
+      const double cosine = s.normal.dot(map_.points[i].Normal());
       found = true;
       outside = outside || cosine > kMinNormalCosine;
       inside = inside || cosine < -kMinNormalCosine;
@@ -136,7 +152,8 @@ void Supporter::Collect(const std::vector<ContourSample>& samples, BrightSide br
   nearest_.resize(n);
   for (std::size_t k = 0; k < n; ++k) nearest_[k] = Strongest(samples[k], bright, reach);
   FindRuns(samples);
-  *support = Support();
+  support->points.clear();
+  support->perimeter_px = support->length_px = support->turn = 0.0;
   int last = -1;
   sines_.clear();
   for (std::size_t k = 0; k < n; ++k) {
@@ -152,7 +169,6 @@ void Supporter::Collect(const std::vector<ContourSample>& samples, BrightSide br
   }
   support->normal_median = Median(&sines_);
   Unique(&support->points);
-  AverageStrength(support);
 }
 
 // Angle between the gradient at an edge point and the contour's normal beside it, which has turned
@@ -168,14 +184,14 @@ double Supporter::NormalMiss(const ContourSample& s, const EdgePoint& p) {
 // The free edge point near the contour at a sample with the right direction: of several the
 // strongest, with allowance for distance, as shadows and fringes run beside rims; or -1.
 int Supporter::Strongest(const ContourSample& s, BrightSide bright, double reach) const {
-  const int steps = static_cast<int>(std::ceil(reach));
+  std::array<int, 16> points;
+  const int count =
+      PointsAcross(s, std::min(static_cast<int>(std::ceil(reach)), kMaxSteps), &points);
   int best = -1;
   double best_weight = 0.0;
-  for (int step = -steps; step <= steps; ++step) {
-    const int x = Round(s.pixel.x() + step * s.normal.x());
-    const int y = Round(s.pixel.y() + step * s.normal.y());
-    const int i = map_.PointAt(x, y);
-    if (i < 0 || taken_[static_cast<std::size_t>(i)]) continue;
+  for (int k = 0; k < count; ++k) {
+    const int i = points[static_cast<std::size_t>(k)];
+    if (taken_[static_cast<std::size_t>(i)]) continue;
     const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
     const double cosine = s.normal.dot(p.Normal());  // 1: bright outside, -1: inside.
     if (std::abs(cosine) < kMinNormalCosine) continue;
@@ -192,14 +208,14 @@ int Supporter::Strongest(const ContourSample& s, BrightSide bright, double reach
 }
 
 void Supporter::AverageStrength(Support* support) {
-  if (support->points.empty()) return;
+  support->gradient = 0.0;
   sigmas_.clear();
   for (const int i : support->points) {
     const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
     support->gradient += static_cast<double>(p.gradient);
     sigmas_.push_back(static_cast<double>(p.sigma_px));
   }
-  support->gradient /= static_cast<double>(support->points.size());
+  support->gradient /= std::max(1.0, static_cast<double>(support->points.size()));
   support->sigma_px = Median(&sigmas_);
 }
 

@@ -39,11 +39,10 @@ class Contour {
   double minor_px() const { return minor_px_; }
 
  private:
-  bool PixelAt(double t, Eigen::Vector2d* pixel) const;
   bool ToPixel(const Eigen::Vector2d& x, Eigen::Vector2d* pixel) const;
 
   const Camera& camera_;
-  Ellipse ellipse_;
+  Eigen::Vector2d center_, major_, minor_;  // Of the ellipse, calibrated: centre and semi-axes.
   double major_px_ = 0.0, minor_px_ = 0.0;
 };
 
@@ -53,8 +52,9 @@ struct Support {
   double length_px = 0.0;      // Of the parts of the contour that edges support.
   double turn = 0.0;           // Of the contour over those parts, radians.
   double normal_median = 0.0;  // Angle between the gradients and the contour's normal, radians.
-  double gradient = 0.0;       // Mean over the points, grey levels per pixel.
-  double sigma_px = 0.0;       // Of the points, expected from the noise alone; median.
+  // By AverageStrength only:
+  double gradient = 0.0;  // Mean over the points, grey levels per pixel.
+  double sigma_px = 0.0;  // Of the points, expected from the noise alone; median.
 
   // Share of the contour.
   double Coverage() const { return perimeter_px > 0.0 ? length_px / perimeter_px : 0.0; }
@@ -76,19 +76,22 @@ class Supporter {
   void Take(const std::vector<int>& points);
   bool IsTaken(int i) const { return taken_[static_cast<std::size_t>(i)] != 0; }
 
-  // A first look with few samples.
+  // A first look with few samples. (Here and below a reach over kMaxSteps pixels is cut to that.)
   QuickSupport QuickLook(const std::vector<ContourSample>& samples, double reach) const;
 
   // The strongest points along the contour with the right bright side, as far as they come in runs.
   void Collect(const std::vector<ContourSample>& samples, BrightSide bright, double reach,
                Support* support);
+  void AverageStrength(Support* support);
 
  private:
+  static constexpr int kMaxSteps = 7;
+
   static double NormalMiss(const ContourSample& s, const EdgePoint& p);
+  int PointsAcross(const ContourSample& s, int steps, std::array<int, 16>* points) const;
   int Strongest(const ContourSample& s, BrightSide bright, double reach) const;
   void FindRuns(const std::vector<ContourSample>& samples);
   std::size_t BehindHole(const std::vector<ContourSample>& samples) const;
-  void AverageStrength(Support* support);
   void Unique(std::vector<int>* points);
 
   const EdgeMap& map_;

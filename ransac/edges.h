@@ -72,7 +72,11 @@ struct EdgeMap {
   cv::Mat gray;                 // The photo, shared, for whoever wants a second look.
 
   int PointAt(int x, int y) const {
-    if (x < 0 || y < 0 || x >= width || y >= height) return -1;
+    // Below 0 is beyond the end, once without a sign.
+    if (static_cast<unsigned>(x) >= static_cast<unsigned>(width) ||
+        static_cast<unsigned>(y) >= static_cast<unsigned>(height)) {
+      return -1;
+    }
     return index[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
                  static_cast<std::size_t>(x)];
   }

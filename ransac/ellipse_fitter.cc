@@ -42,8 +42,10 @@ constexpr double kQuickAcross = 0.4;
 constexpr int kRoughSamples = 120;
 // The other bright side is looked at too if it adds this share.
 constexpr double kOtherSideShare = 0.15;
-// Before the first refit, this share of the smallest arc must be there.
+// Before each refit, this share of the smallest arc must be there, and what chance may explain is
+// so many orders of magnitude more than in the end: refits add little to a contour.
 constexpr double kEarlyShare = 0.7;
+constexpr double kEarlyLog10 = 6.0;
 // ... and gradients this near to the contour's normals, degrees: of accidental ones within the 25
 // that count as support the median is 12.
 constexpr double kEarlyNormalDeg = 10.0;
@@ -157,7 +159,7 @@ bool EllipseFitter::FitArcs(std::initializer_list<const Arc*> arcs, EllipseCandi
   for (const Arc* arc : arcs) AppendPoints(*arc);
   candidate->bright = SideOf(arcs);
   if (!FitConicDirect(fit_points_, &candidate->conic).ok()) return false;
-  return Rms(fit_points_, candidate->conic) <= kMaxArcRmsPx && GradientsAgree(*candidate);
+  return ArcsAgree(*candidate);
 }
 
 bool EllipseFitter::Improve(EllipseCandidate* candidate) {
@@ -276,25 +278,34 @@ double EllipseFitter::SlopeDeg(const Matrix3d& conic, const std::vector<int>& po
   return ToDegrees(Median(&sorted_));
 }
 
-// Whether the gradients on the arcs are across the contour that was fitted to their places: a
-// second opinion that costs little and is independent of the first.
-bool EllipseFitter::GradientsAgree(const EllipseCandidate& candidate) const {
+// Whether the points of the arcs are near the contour that was fitted to them, and the gradients
+// there across it: a second opinion that costs little and is independent of the first. All in
+// squares, without roots: nothing is asked more often.
+bool EllipseFitter::ArcsAgree(const EllipseCandidate& candidate) const {
   const double side = candidate.bright == BrightSide::kInside ? -1.0 : 1.0;
   const bool either = candidate.bright == BrightSide::kEither;
-  std::size_t agree = 0;
+  const double noise = kArcNormalSigmas * map_.gradient_noise;
+  const Matrix3d& conic = candidate.conic;
+  double squares = 0.0;
+  int agree = 0;
   for (std::size_t k = 0; k < fit_points_.size(); ++k) {
     const CalibratedPoint& p = fit_points_[k];
-    const Vector3d g = candidate.conic * p.Homogeneous();
+    const Vector3d g = conic * p.Homogeneous();
     const Vector2d outward = p.GradientPerPixel(g.head<2>());
+    const double length_squared = outward.squaredNorm();
+    const double value = p.x.dot(g.head<2>()) + g.z();
+    squares += value * value / (4.0 * length_squared);
     const EdgePoint& edge = map_.points[static_cast<std::size_t>(fit_indices_[k])];
-    const double cosine = outward.normalized().dot(edge.Normal());
-    const double noise =
-        kArcNormalSigmas * map_.gradient_noise / static_cast<double>(edge.gradient);
-    const double sine_squared = kArcNormalSine * kArcNormalSine + noise * noise;
-    if (!either && side * cosine < 0.0) continue;
-    agree += 1.0 - cosine * cosine < sine_squared ? 1U : 0U;
+    const double along = outward.dot(edge.Normal());
+    const double strength = static_cast<double>(edge.gradient) * static_cast<double>(edge.gradient);
+    // sin^2 < kArcNormalSine^2 + (noise / gradient)^2, times both denominators.
+    const bool across =
+        (length_squared - along * along) * strength <
+        (kArcNormalSine * kArcNormalSine * strength + noise * noise) * length_squared;
+    agree += across && (either || side * along >= 0.0) ? 1 : 0;
   }
-  return static_cast<double>(agree) >= kArcAgreement * static_cast<double>(fit_points_.size());
+  const double n = static_cast<double>(fit_points_.size());
+  return squares <= kMaxArcRmsPx * kMaxArcRmsPx * n && agree >= kArcAgreement * n;
 }
 
 double EllipseFitter::Rms(const std::vector<CalibratedPoint>& points, const Matrix3d& conic) {
@@ -310,7 +321,7 @@ double EllipseFitter::Rms(const std::vector<CalibratedPoint>& points, const Matr
 bool EllipseFitter::Refit(EllipseCandidate* candidate) {
   for (std::size_t round = 0; round + 1 < kGatherPx.size(); ++round) {
     if (!Gather(*candidate, 1.5, kGatherPx[round], kRoughSamples)) return false;
-    if (360.0 * support_.Coverage() < kEarlyShare * options_.min_arc_deg) return false;
+    if (!Plausible(candidate->bright, kEarlyShare, kEarlyLog10)) return false;
     if (ToDegrees(support_.normal_median) > kEarlyNormalDeg) return false;
     CalibrateSupport(kRoughSamples);
     if (!FitTrimmed(&candidate->conic, 1)) return false;
@@ -319,15 +330,17 @@ bool EllipseFitter::Refit(EllipseCandidate* candidate) {
   candidate->score = support_.length_px * support_.Coverage();
   // One side all around explains more than either side does.
   if (candidate->bright == BrightSide::kEither) candidate->score *= 0.5;
+  if (!Plausible(candidate->bright)) return false;
   CalibrateSupport(kRoughSamples);
   Trim(candidate->conic);
   const double rms_px = Rms(trimmed_, candidate->conic);
-  return Plausible(candidate->bright) && rms_px <= kShapeSlack * options_.max_rms_px &&
+  return rms_px <= kShapeSlack * options_.max_rms_px &&
          ShapeMiss(rms_px, SlopeDeg(candidate->conic, fit_indices_)) <= kShapeSlack * kShapeLimit;
 }
 
 // How far the edges are from following the contour as those of an ellipse do; see kShapeLimit.
-double EllipseFitter::ShapeMiss(double rms_px, double slope_deg) const {
+double EllipseFitter::ShapeMiss(double rms_px, double slope_deg) {
+  supporter_.AverageStrength(&support_);
   const double coverage = std::min(support_.Coverage(), support_.turn / (2.0 * kPi));
   const double size = std::sqrt(contour_.major_px() * contour_.minor_px());
   const double rms_unit = std::hypot(std::min(kShapeRmsPx, kShapeRmsPerSize * size) +
@@ -364,14 +377,15 @@ void EllipseFitter::CalibrateSupport(std::size_t limit) {
   }
 }
 
-// Enough of the contour, and more than chance explains.
-bool EllipseFitter::Plausible(BrightSide bright) const {
-  if (support_.Coverage() * 360.0 < options_.min_arc_deg) return false;
-  if (ToDegrees(support_.turn) < options_.min_arc_deg) return false;
+// Enough of the contour, and more than chance explains. Before the end `share` of the one will do,
+// and `slack` orders of magnitude less of the other.
+bool EllipseFitter::Plausible(BrightSide bright, double share, double slack) const {
+  if (support_.Coverage() * 360.0 < share * options_.min_arc_deg) return false;
+  if (ToDegrees(support_.turn) < share * options_.min_arc_deg) return false;
   const double n = support_.perimeter_px / kIndependentPx;
   const double chance = bright == BrightSide::kEither ? 2.0 * kChance : kChance;
   return kLog10Tests + Log10BinomialTail(n, n * support_.Coverage(), chance) <=
-         options_.max_log10_false_alarms;
+         options_.max_log10_false_alarms + slack;
 }
 
 // What surrounds a contour but is too ragged for an ellipse at the first scale - a penumbra, a
@@ -429,8 +443,9 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   e->length_px = support_.length_px;
   e->turn_deg = ToDegrees(support_.turn);
   e->normal_deg = ToDegrees(support_.normal_median);
+  const double miss = ShapeMiss(e->fit.rms_px, SlopeDeg(candidate->conic, e->points));
   e->contrast = support_.gradient;
-  return ShapeMiss(e->fit.rms_px, SlopeDeg(candidate->conic, e->points));
+  return miss;
 }
 
 // The edge points of the support where they would lie if the contour, `conic`, were straight.

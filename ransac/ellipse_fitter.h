@@ -55,14 +55,14 @@ class EllipseFitter {
   void Trim(const Eigen::Matrix3d& conic);
   void MeasureDistances(const Eigen::Matrix3d& conic);
   double SlopeDeg(const Eigen::Matrix3d& conic, const std::vector<int>& points);
-  bool GradientsAgree(const EllipseCandidate& candidate) const;
+  bool ArcsAgree(const EllipseCandidate& candidate) const;
   static double Rms(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic);
   bool Refit(EllipseCandidate* candidate);
-  double ShapeMiss(double rms_px, double slope_deg) const;
+  double ShapeMiss(double rms_px, double slope_deg);
   bool Gather(const EllipseCandidate& candidate, double spacing, double reach,
               int max_samples = 20000);
   void CalibrateSupport(std::size_t limit);
-  bool Plausible(BrightSide bright) const;
+  bool Plausible(BrightSide bright, double share = 1.0, double slack = 0.0) const;
   bool SecondLook(EllipseCandidate* candidate, DetectedEllipse* e);
   cv::Rect Surroundings() const;
   double FinalFit(EllipseCandidate* candidate, DetectedEllipse* e);

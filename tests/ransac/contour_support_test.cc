@@ -95,6 +95,7 @@ TEST(Supporter, MeasuresCoverageAndRemembersWhatIsTaken) {
   EXPECT_NEAR(look.any, 2.0 / 3.0, 0.1);
   Support support;
   supporter.Collect(samples, BrightSide::kOutside, 2.0, &support);
+  supporter.AverageStrength(&support);
   EXPECT_NEAR(support.Coverage(), 2.0 / 3.0, 0.04);
   EXPECT_NEAR(support.turn, 4.0 * kPi / 3.0, 0.25);
   EXPECT_LT(support.normal_median, 0.03);
