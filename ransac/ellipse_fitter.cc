@@ -333,6 +333,11 @@ bool EllipseFitter::Refit(EllipseCandidate* candidate) {
   if (!Plausible(candidate->bright)) return false;
   CalibrateSupport(kRoughSamples);
   Trim(candidate->conic);
+  // Of rivals for one contour the one that it keeps to: what strays, of a neighbouring edge that
+  // runs together with it, counts against it.
+  const double kept =
+      static_cast<double>(trimmed_.size()) / static_cast<double>(fit_points_.size());
+  candidate->score *= kept * kept;
   const double rms_px = Rms(trimmed_, candidate->conic);
   return rms_px <= kShapeSlack * options_.max_rms_px &&
          ShapeMiss(rms_px, SlopeDeg(candidate->conic, fit_indices_)) <= kShapeSlack * kShapeLimit;

@@ -20,7 +20,8 @@ namespace circline {
 struct EllipseCandidate {
   Eigen::Matrix3d conic = Eigen::Matrix3d::Zero();
   BrightSide bright = BrightSide::kOutside;
-  double score = 0.0;  // Length of the support times its share of the contour.
+  // Length of the support times its share of the contour, less for what strays.
+  double score = 0.0;
 };
 
 // Keeps book of the points that accepted ellipses took.
