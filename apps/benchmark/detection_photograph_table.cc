@@ -1,4 +1,5 @@
-// The table of whole photographs: circles, pencils, and the contours of circles.
+// The table of whole photographs: circles, pencils, and the contours of circles. Times are of
+// DetectObservations, everything in it.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -7,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
+#include "apps/benchmark/detection_contours.h"
 #include "apps/benchmark/detection_statistics.h"
 #include "apps/benchmark/detection_tables.h"
 #include "apps/benchmark/detection_truth.h"
@@ -21,7 +23,6 @@ namespace circline::benchmark {
 namespace {
 
 using Eigen::Matrix3d;
-using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 // What is true of one photo, and how far the observations are from it; NaN = not to be had.
@@ -103,44 +104,6 @@ PhotoErrors MeasurePhoto(const cv::FileNode& node, const Camera& camera,
   return errors;
 }
 
-// Root mean square distances of the points of the circles found to the true conics, and what the
-// set records of its own edge points.
-struct ContourRms {
-  std::vector<double> found, recorded;
-};
-
-void MeasureContours(const cv::FileNode& node, const Camera& camera, const Observations& found,
-                     ContourRms* rms) {
-  for (const cv::FileNode& circle : node["circles"]) {
-    const cv::Mat center = ReadMatrix(circle, "centre_cam"),
-                  normal = ReadMatrix(circle, "normal_cam");
-    const cv::FileNode recorded = circle["contour_rms_to_ground_truth_px"];
-    if (center.empty() || normal.empty() || recorded.empty() || circle["radius"].empty()) continue;
-    CirclePose pose;
-    pose.normal = ToVector(normal);
-    pose.center = ToVector(center) / static_cast<double>(circle["radius"]);
-    const Matrix3d conic = ProjectCircle(pose);
-    const PolygonPoints truth = ContourPolygon(camera, conic);
-    for (const CircleObservation& observation : found.circles) {
-      if (!observation.fit ||
-          IntersectionOverUnion(truth, ContourPolygon(camera, observation.fit->conic)) < 0.8) {
-        continue;
-      }
-      double sum = 0.0, n = 0.0;
-      for (const Vector2d& pixel : observation.points) {
-        CalibratedPoint p;
-        if (!PixelToCalibrated(camera, pixel, &p)) continue;
-        const double d = ConicDistancePx(p, conic);
-        sum += d * d;
-        n += 1.0;
-      }
-      rms->found.push_back(std::sqrt(sum / n));
-      rms->recorded.push_back(static_cast<double>(recorded));
-      break;
-    }
-  }
-}
-
 }  // namespace
 
 void MeasurePhotographs(const std::string& folder, const cv::FileNode& root) {
@@ -149,7 +112,7 @@ void MeasurePhotographs(const std::string& folder, const cv::FileNode& root) {
       "  directions deg     ms\n",
       folder.c_str());
   std::vector<double> normals, rotations, ms;
-  ContourRms contours;
+  ContourResiduals contours;
   int circles = 0, circles_found = 0;
   for (const cv::FileNode& node : root["images"]) {
     const std::string file = ReadText(node, "file");
@@ -165,7 +128,7 @@ void MeasurePhotographs(const std::string& folder, const cv::FileNode& root) {
       continue;
     }
     const PhotoErrors e = MeasurePhoto(node, camera, found);
-    MeasureContours(node, camera, found, &contours);
+    contours.Add(node, camera, found);
     circles += e.circles;
     circles_found += e.circles_found;
     if (!std::isnan(e.normal_deg)) normals.push_back(e.normal_deg);
@@ -186,11 +149,7 @@ void MeasurePhotographs(const std::string& folder, const cv::FileNode& root) {
       circles_found, circles, Quantile(normals, 0.5), Quantile(normals, 0.9),
       Quantile(rotations, 0.5), Quantile(rotations, 0.9), static_cast<int>(rotations.size()),
       Quantile(ms, 0.5), Quantile(ms, 1.0));
-  if (!contours.found.empty()) {
-    std::printf("  contour rms to the truth: median %.3f px of %d, the set's own edges %.3f px\n",
-                Quantile(contours.found, 0.5), static_cast<int>(contours.found.size()),
-                Quantile(contours.recorded, 0.5));
-  }
+  contours.Print();
 }
 
 }  // namespace circline::benchmark

@@ -97,7 +97,8 @@ void PrintResiduals(const std::string& name, const std::vector<double>& squares,
   double sum = 0.0;
   for (const double s : squares) sum += s;
   std::printf(
-      "  segments, %-22s %6d ends, rms to the board's lines %.3f px, median %.3f; ms %.1f\n",
+      "  segments, %-22s %6d ends, rms to the board's lines %.3f px, median %.3f; ms with edges "
+      "%.1f\n",
       name.c_str(), static_cast<int>(squares.size()),
       std::sqrt(sum / static_cast<double>(squares.size())), std::sqrt(Quantile(squares, 0.5)),
       Quantile(ms, 0.5));
