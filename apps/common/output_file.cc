@@ -88,6 +88,12 @@ Status WriteFile(const std::string& path, const std::string& content) {
   return file.Commit();
 }
 
+Status CanWriteFile(const std::string& path) {
+  std::error_code error;
+  const bool can = !fs::is_directory(path, error) && OutputFile(path).is_open();
+  return can ? Status::Ok() : Status::Invalid(path + ": cannot be written");
+}
+
 Status CreateFolder(const std::string& path) {
   std::error_code error;
   fs::create_directories(path, error);

@@ -20,6 +20,7 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
+  bool is_open() const { return stream_.is_open(); }
   void Write(const std::string& text) { stream_ << text; }
   // Not ok: names the file that could not be written.
   Status Commit();
@@ -49,6 +50,9 @@ class AppendFile {
 };
 
 Status WriteFile(const std::string& path, const std::string& content);
+
+// Whether WriteFile would succeed, as far as can be told without writing.
+Status CanWriteFile(const std::string& path);
 
 // Creates a folder and its parents. Not ok where that cannot be, or where a file has that name.
 Status CreateFolder(const std::string& path);

@@ -30,10 +30,13 @@ std::string ReadPhoto(const std::string& path, cv::Mat* photo) {
   std::error_code error;
   if (!fs::exists(path, error)) return "the file does not exist";
   if (fs::is_directory(path, error)) return "is a folder, not a photo";
+  const std::uintmax_t size = fs::file_size(path, error);
+  if (error) return "is not a file that can be read: " + error.message();
   std::ifstream file(path, std::ios::binary);
   if (!file) return "cannot be opened";
-  std::vector<std::uint8_t> bytes(fs::file_size(path, error));
+  std::vector<std::uint8_t> bytes(size);
   file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  if (!file) return "cannot be read to its end";
   if (bytes.empty()) return "the file is empty";
   if (IsCutOffJpeg(bytes)) return "is cut off: the end of the JPEG is missing";
   try {

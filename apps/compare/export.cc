@@ -21,7 +21,8 @@ Status WriteExports(const std::string& folder, const std::vector<std::string>& f
     if (shown == nullptr) continue;
     const HypothesisRecord& best = shown->hypotheses.front();
     for (const auto& exporter : exporters) {
-      exporter->Add({record.name, record.index, record.camera, best.rotation, best.translation});
+      exporter->Add({record.name, record.index, Refocused(record.camera, best.focal_scale),
+                     best.rotation, best.translation});
     }
   }
   for (const auto& exporter : exporters) {

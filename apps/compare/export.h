@@ -15,7 +15,7 @@ namespace circline::apps {
 struct ExportedPose {
   std::string name;  // Of the photo.
   std::size_t index = 0;
-  Camera camera;
+  Camera camera;  // Of the refined focal length, where that was refined.
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation;
 };

@@ -1,5 +1,7 @@
 #include "apps/compare/finish.h"
 
+#include <filesystem>
+
 #include "apps/common/output_file.h"
 #include "apps/compare/digest.h"
 #include "apps/compare/export.h"
@@ -26,6 +28,19 @@ Status SaveBest(const Summary& summary, const FinishOptions& options) {
 }
 
 }  // namespace
+
+Status CheckFinish(const std::string& folder, const FinishOptions& options) {
+  namespace fs = std::filesystem;
+  if (options.save_options.empty()) return Status::Ok();
+  std::error_code error;
+  const fs::path parent = fs::absolute(options.save_options).lexically_normal().parent_path();
+  if (parent == (fs::absolute(folder) / "").lexically_normal().parent_path() &&
+      !fs::exists(parent, error)) {
+    return Status::Ok();  // It is about to be made.
+  }
+  const Status status = CanWriteFile(options.save_options);
+  return status.ok() ? status : Status::Invalid("--save_options: " + status.message);
+}
 
 Status FinishFolder(const std::string& folder, const FinishOptions& options,
                     ComparisonResult* result) {

@@ -20,6 +20,9 @@ struct FinishOptions {
   std::vector<std::string> exports;  // See WriteExports.
 };
 
+// Before the work: whether what the options say could be written. The folder need not exist yet.
+Status CheckFinish(const std::string& folder, const FinishOptions& options);
+
 // Writes summary.csv and report.html into the folder, and what else the options say.
 Status FinishFolder(const std::string& folder, const FinishOptions& options,
                     ComparisonResult* result);

@@ -77,11 +77,12 @@ std::vector<SolverKey> Keys(const ImageRecord& record) {
   return keys;
 }
 
-// Every index of the set once, the same solvers everywhere.
+// Every index of the set once, the same solvers and flags everywhere.
 Status CheckImages(const std::vector<std::string>& folders) {
   Merger merger(folders);
   std::size_t expected = 0, set_size = 0;
   std::optional<std::vector<SolverKey>> keys;
+  std::vector<std::string> flags;
   while (const Source* source = merger.Next()) {
     ImageRecord record;
     const Status status = ParseRecord(source->lines, &record);
@@ -92,11 +93,18 @@ Status CheckImages(const std::vector<std::string>& folders) {
           "--merge: image " + std::to_string(twice ? source->index : expected) +
           (twice ? " (" + record.name + ") is there twice" : " is missing: is a shard not named?"));
     }
-    if (expected++ == 0) set_size = record.set_size;
+    if (expected++ == 0) {
+      set_size = record.set_size;
+      flags = record.flags;
+    }
     if (record.set_size != set_size) {
       return Status::Invalid("--merge: " + source->folder + " is of a set of " +
                              std::to_string(record.set_size) + " images, not " +
                              std::to_string(set_size));
+    }
+    if (record.flags != flags) {
+      return Status::Invalid("--merge: " + source->folder + " ran with " + FlagText(record.flags) +
+                             ", others with " + FlagText(flags));
     }
     if (!record.error.empty()) continue;
     if (!keys) keys = Keys(record);

@@ -226,53 +226,36 @@ SolverRegistry AllSolvers() {
   return registry;
 }
 
-// Names and values of the flags that shape what is found in a photo.
-std::string ResultFlags() {
-  std::string lines;
-  for (const char* name : {"solvers",
-                           "robust_loss",
-                           "loss_scale_px",
-                           "conic_loss",
-                           "conic_loss_scale_px",
-                           "line_loss",
-                           "line_loss_scale_px",
-                           "conic_distance",
-                           "focal_sigma",
-                           "inlier_threshold_px",
-                           "ransac_confidence",
-                           "ransac_max_iterations",
-                           "min_ellipse_axis_px",
-                           "min_arc_deg",
-                           "min_segment_length_px",
-                           "max_circles",
-                           "max_pencils",
-                           "seed",
-                           "shard",
-                           "overlays",
-                           "fov_deg",
-                           "focal_px",
-                           "roi",
-                           "circle_radius"}) {
-    std::string value;
-    gflags::GetCommandLineOption(name, &value);
-    lines += std::string("--") + name + "=" + value + "\n";
-  }
-  return lines;
+// The flags beside solvers and losses that shape what is found in a photo; and those that say how
+// to see photos without a scene file.
+std::vector<std::string> TuningFlags() {
+  return {"conic_loss",          "conic_loss_scale_px", "line_loss",
+          "line_loss_scale_px",  "conic_distance",      "focal_sigma",
+          "inlier_threshold_px", "ransac_confidence",   "ransac_max_iterations",
+          "min_ellipse_axis_px", "min_arc_deg",         "min_segment_length_px",
+          "max_circles",         "max_pencils",         "seed"};
 }
+std::vector<std::string> InputFlags() { return {"fov_deg", "focal_px", "roi", "circle_radius"}; }
 
-// The flags beside the losses that were given another value than their own, for --save_options.
-std::string OtherFlags() {
-  std::string lines;
-  for (const char* name :
-       {"conic_loss", "conic_loss_scale_px", "line_loss", "line_loss_scale_px", "conic_distance",
-        "focal_sigma", "inlier_threshold_px", "ransac_confidence", "ransac_max_iterations",
-        "min_ellipse_axis_px", "min_arc_deg", "min_segment_length_px", "max_circles", "max_pencils",
-        "seed"}) {
-    gflags::CommandLineFlagInfo info;
-    if (!gflags::GetCommandLineFlagInfo(name, &info) || info.is_default) continue;
-    lines += std::string("--") + name + "=" + info.current_value + "\n";
+using FlagInfo = gflags::CommandLineFlagInfo;
+
+// Those that are wanted, as "--name=value".
+std::vector<std::string> FlagTexts(const std::vector<std::string>& names,
+                                   bool (*is_wanted)(const FlagInfo&)) {
+  std::vector<std::string> texts;
+  for (const std::string& name : names) {
+    FlagInfo info;
+    if (gflags::GetCommandLineFlagInfo(name.c_str(), &info) && is_wanted(info))
+      texts.push_back("--" + name + "=" + info.current_value);
   }
-  return lines;
+  return texts;
+}
+bool Any(const FlagInfo& /*info*/) { return true; }
+bool IsGiven(const FlagInfo& info) { return !info.is_default; }
+bool IsUnusual(const FlagInfo& info) { return info.current_value != info.default_value; }
+
+std::string Lines(const std::vector<std::string>& texts) {
+  return texts.empty() ? "" : JoinList(texts, "\n") + "\n";
 }
 
 }  // namespace
@@ -296,9 +279,14 @@ Status OptionsFromFlags(CompareOptions* options) {
   options->overlays = FLAGS_overlays;
   options->resume = FLAGS_resume;
   options->peers = FLAGS_peers;
-  options->result_flags = ResultFlags();
+  options->result_flags =
+      Lines(FlagTexts({"solvers", "robust_loss", "loss_scale_px", "shard", "overlays"}, Any)) +
+      Lines(FlagTexts(TuningFlags(), Any)) + Lines(FlagTexts(InputFlags(), Any));
+  options->unusual_flags = FlagTexts(TuningFlags(), IsUnusual);
+  for (std::string& text : FlagTexts(InputFlags(), IsUnusual))
+    options->unusual_flags.push_back(std::move(text));
   options->finish.save_options = FLAGS_save_options;
-  options->finish.other_flags = OtherFlags();
+  options->finish.other_flags = Lines(FlagTexts(TuningFlags(), IsGiven));
   return Status::Ok();
 }
 

@@ -36,6 +36,8 @@ struct CompareOptions {
   InputOptions inputs;
   FinishOptions finish;
   std::string result_flags;  // All flags that shape the results, one a line.
+  // Of these, beside solvers and losses, those with another value than their own: "--seed=2".
+  std::vector<std::string> unusual_flags;
 };
 
 // From the flags (flags.cc); not ok: one line that names the flag. Nothing is read from disk.

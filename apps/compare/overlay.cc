@@ -214,13 +214,14 @@ Eigen::Vector3d AxesOrigin(const WorldDrawing& world, const Eigen::AlignedBox2d&
 
 void DrawPose(const Observations& observations, const PoseEstimate& estimate, Canvas* canvas) {
   const PoseHypothesis& best = estimate.hypotheses.front();
-  const WorldDrawing world{observations.camera, best.cam_from_world};
-  const Eigen::AlignedBox2d box = EvidenceOnPlane(observations, best.cam_from_world);
+  const Camera camera = Refocused(observations.camera, best.focal_scale);
+  const WorldDrawing world{camera, best.cam_from_world};
+  const Eigen::AlignedBox2d box = EvidenceOnPlane(observations, camera, best.cam_from_world);
   if (!box.isEmpty()) {
     canvas->Blend(0.35, [&] { DrawGrid(world, box, kGridRim, 3, canvas); });
     canvas->Blend(0.7, [&] { DrawGrid(world, box, kGrid, 1, canvas); });
   }
-  DrawVanishingLine(observations.camera, best.cam_from_world.rotation.col(2), canvas);
+  DrawVanishingLine(camera, best.cam_from_world.rotation.col(2), canvas);
   DrawCenters(estimate, canvas);
   DrawAxes(world, AxesOrigin(world, box, *canvas), best.RotationIsFree(), canvas);
 }

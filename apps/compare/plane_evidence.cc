@@ -51,13 +51,14 @@ std::vector<Eigen::Vector2d> PixelsOfPlane(const Observations& observations) {
 
 }  // namespace
 
-Eigen::AlignedBox2d EvidenceOnPlane(const Observations& observations, const CameraPose& pose) {
+Eigen::AlignedBox2d EvidenceOnPlane(const Observations& observations, const Camera& camera,
+                                    const CameraPose& pose) {
   constexpr double kDepthRange = 4.0;
   std::vector<PlanePoint> points;
   double nearest = std::numeric_limits<double>::infinity();
   for (const Eigen::Vector2d& pixel : PixelsOfPlane(observations)) {
     PlanePoint point;
-    if (!PixelOnPlane(observations.camera, pose, pixel, &point)) continue;
+    if (!PixelOnPlane(camera, pose, pixel, &point)) continue;
     points.push_back(point);
     nearest = std::min(nearest, point.depth);
   }

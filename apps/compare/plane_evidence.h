@@ -10,8 +10,10 @@
 namespace circline::apps {
 
 // The part of the plane Z = 0 that carries evidence, world coordinates; without what lies much
-// farther away than the nearest, towards the vanishing line. May be empty.
-Eigen::AlignedBox2d EvidenceOnPlane(const Observations& observations, const CameraPose& pose);
+// farther away than the nearest, towards the vanishing line. May be empty. `camera`: that of the
+// observations, or as the pose's hypothesis sees through it.
+Eigen::AlignedBox2d EvidenceOnPlane(const Observations& observations, const Camera& camera,
+                                    const CameraPose& pose);
 
 }  // namespace circline::apps
 

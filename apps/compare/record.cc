@@ -73,6 +73,7 @@ HypothesisRecord ReadHypothesis(const Json& line) {
   h.translation = ReadVector(line.at("translation"));
   h.metric = line.at("metric").get<bool>();
   h.origin_observed = line.at("origin_observed").get<bool>();
+  h.focal_scale = NumberOr(line, "focal_scale", 1.0);
   h.rms_px = NumberOr(line, "rms_px", kUnknown);
   h.num_inliers = line.at("num_inliers").get<int>();
   h.num_observations = line.at("num_observations").get<int>();
@@ -147,6 +148,7 @@ void ReadObservations(const std::string& text, ImageRecord* record) {
   record->num_pencils = line.at("pencils").size();
   record->camera = ReadCamera(line.at("camera"));
   record->problems = Texts(line, "problems");
+  record->flags = Texts(line, "flags");
 }
 
 }  // namespace
@@ -166,6 +168,13 @@ std::string SolverKey::Name() const {
 bool SolverKey::operator==(const SolverKey& other) const {
   return std::tie(solver, stage, loss, scale_px) ==
          std::tie(other.solver, other.stage, other.loss, other.scale_px);
+}
+
+Camera Refocused(const Camera& camera, double focal_scale) {
+  Camera refocused = camera;
+  refocused.fx *= focal_scale;
+  refocused.fy *= focal_scale;
+  return refocused;
 }
 
 Status ParseRecord(const ImageLines& lines, ImageRecord* record) {
@@ -197,6 +206,10 @@ std::array<int, 4> ShowRank(const std::string& solver, bool refined, double prob
                             int num_observations) {
   return {std::isfinite(probability) ? 1 : 0, solver == "joint" ? 1 : 0, refined ? 1 : 0,
           num_observations};
+}
+
+std::string FlagText(const std::vector<std::string>& flags) {
+  return flags.empty() ? "the default flags" : JoinList(flags, " ");
 }
 
 const SolverRecord* SolverToShow(const ImageRecord& record) {

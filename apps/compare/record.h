@@ -39,6 +39,7 @@ struct HypothesisRecord {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   bool metric = false, origin_observed = false, rotation_is_free = false;
+  double focal_scale = 1.0;  // As PoseHypothesis::focal_scale.
   double rms_px = kUnknown;
   int num_inliers = 0, num_observations = 0;
   Eigen::Vector3d sigma_rotation_deg = Eigen::Vector3d::Zero();
@@ -66,6 +67,7 @@ struct ImageRecord {
   std::size_t num_ellipses = 0, num_segments = 0, num_pencils = 0;
   Camera camera;
   std::vector<std::string> problems;
+  std::vector<std::string> flags;                      // CompareOptions::unusual_flags.
   std::vector<std::pair<std::string, double>> stages;  // "read", "detect", "fit"; microseconds.
   std::vector<SolverRecord> solvers;
 };
@@ -74,6 +76,9 @@ struct ImageRecord {
 struct ImageLines {
   std::string results, observations, timings;
 };
+
+// The camera with focal lengths `focal_scale` times as long, as a hypothesis sees through it.
+Camera Refocused(const Camera& camera, double focal_scale);
 
 // Not ok: a sentence that says what is not as this program writes it. `timings` may be empty.
 Status ParseRecord(const ImageLines& lines, ImageRecord* record);
@@ -89,6 +94,9 @@ bool ReadLineCounts(const std::string& observation_line, LineCounts* counts);
 // probability.
 std::array<int, 4> ShowRank(const std::string& solver, bool refined, double probability,
                             int num_observations);
+
+// "--seed=2 --max_pencils=3", or that none was given.
+std::string FlagText(const std::vector<std::string>& flags);
 
 // The answer to show; of the first loss. Null if every solver refused.
 const SolverRecord* SolverToShow(const ImageRecord& record);

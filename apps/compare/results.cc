@@ -195,7 +195,7 @@ Json CameraJson(const ImageRun& run) {
 }
 
 std::string ObservationLine(const ImageRun& run, const std::string& overlay,
-                            const LineCounts& counts) {
+                            const std::vector<std::string>& flags, const LineCounts& counts) {
   Json line;
   line["image"] = run.image->name;
   line["index"] = run.image->index;
@@ -215,6 +215,7 @@ std::string ObservationLine(const ImageRun& run, const std::string& overlay,
   }
   line["problems"] = run.problems;
   line["overlay"] = TextOrNull(overlay);
+  if (!flags.empty()) line["flags"] = flags;
   line["lines"] = {{"results", counts.results}, {"timings", counts.timings}};
   if (!run.read_error.empty()) line["error"] = run.read_error;
   return Line(line);
@@ -244,12 +245,13 @@ std::size_t CountLines(const std::string& text) {
 
 }  // namespace
 
-ImageLines WriteLines(const ImageRun& run, const std::string& overlay) {
+ImageLines WriteLines(const ImageRun& run, const std::string& overlay,
+                      const std::vector<std::string>& flags) {
   ImageLines lines;
   lines.results = ResultLines(run);
   lines.timings = TimingLines(run);
   const LineCounts counts{run.image->index, CountLines(lines.results), CountLines(lines.timings)};
-  lines.observations = ObservationLine(run, overlay, counts);
+  lines.observations = ObservationLine(run, overlay, flags, counts);
   return lines;
 }
 

@@ -3,6 +3,7 @@
 #define CIRCLINE_APPS_COMPARE_RESULTS_H_
 
 #include <string>
+#include <vector>
 
 #include "apps/compare/image_run.h"
 #include "apps/compare/record.h"
@@ -15,8 +16,10 @@ namespace circline::apps {
 // observations: one line. `conic` is calibrated, of unit norm: C00 C01 C02 C11 C12 C22; `axes` are
 // semi-axes; `coverage` is the share of the ellipse's full turn that has points; `index` counts the
 // images of the whole set, `lines` those of the other files that belong to this one. A photo that
-// could not be used has an `error`. `overlay` may be empty.
-ImageLines WriteLines(const ImageRun& run, const std::string& overlay);
+// could not be used has an `error`. `overlay` may be empty, and so may `flags`, those with which
+// the run was made where they are not the default (CompareOptions::unusual_flags).
+ImageLines WriteLines(const ImageRun& run, const std::string& overlay,
+                      const std::vector<std::string>& flags);
 
 }  // namespace circline::apps
 

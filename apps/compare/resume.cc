@@ -46,8 +46,9 @@ bool SameSolvers(const ImageRecord& record, const std::vector<SolverKey>& solver
   return true;
 }
 
-Status FindDone(const std::string& folder, const ImageSet& images,
+Status FindDone(const CompareOptions& options, const ImageSet& images,
                 const std::vector<SolverKey>& solvers, DonePart* done) {
+  const std::string& folder = options.output;
   RecordReader reader(folder);
   ImageRecord record;
   for (ImageLines lines; reader.Next(&lines);) {
@@ -59,6 +60,10 @@ Status FindDone(const std::string& folder, const ImageSet& images,
                                   record.name + ", not " + name);
     }
     if (!SameSolvers(record, solvers)) return OtherRun(folder, "its solvers or losses differ");
+    if (record.flags != options.unusual_flags) {
+      return OtherRun(folder, "it was made with " + FlagText(record.flags) + ", not with " +
+                                  FlagText(options.unusual_flags));
+    }
     if (!record.error.empty()) SayOnStderr(images.path(done->images) + ": " + record.error);
     ++done->images;
     done->bytes = reader.bytes_read();
@@ -76,13 +81,13 @@ void RemoveParts(const std::string& folder) {
 
 }  // namespace
 
-Status PrepareFolder(const std::string& folder, bool resume, const ImageSet& images,
-                     const std::vector<SolverKey>& solvers, const std::string& flags,
-                     DonePart* done) {
+Status PrepareFolder(const CompareOptions& options, const ImageSet& images,
+                     const std::vector<SolverKey>& solvers, DonePart* done) {
+  const std::string& folder = options.output;
   *done = {};
-  if (resume) {
-    Status status = CheckFlags(folder, flags);
-    if (status.ok()) status = FindDone(folder, images, solvers, done);
+  if (options.resume) {
+    Status status = CheckFlags(folder, options.result_flags);
+    if (status.ok()) status = FindDone(options, images, solvers, done);
     if (!status.ok()) return status;
   } else {
     for (const char* name :
@@ -93,7 +98,7 @@ Status PrepareFolder(const std::string& folder, bool resume, const ImageSet& ima
   }
   RemoveParts(folder);
   RemoveParts(folder + "/overlays");
-  return WriteFile(MarkerPath(folder), flags);
+  return WriteFile(MarkerPath(folder), options.result_flags);
 }
 
 void MarkFinished(const std::string& folder) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/compare/image_set.h"
+#include "apps/compare/options.h"
 #include "apps/compare/record.h"
 #include "circline/estimators/status.h"
 
@@ -21,11 +22,10 @@ struct DonePart {
 };
 
 // Clears a folder of the results of an earlier run, or, with `resume`, finds what of them stands.
-// Not ok: they are those of other images, solvers or flags. `flags` are all that shape the results,
-// one a line. Photos that could not be read are named on stderr again.
-Status PrepareFolder(const std::string& folder, bool resume, const ImageSet& images,
-                     const std::vector<SolverKey>& solvers, const std::string& flags,
-                     DonePart* done);
+// Not ok: they are those of other images, solvers or flags. Photos that could not be read are named
+// on stderr again.
+Status PrepareFolder(const CompareOptions& options, const ImageSet& images,
+                     const std::vector<SolverKey>& solvers, DonePart* done);
 
 // A folder is unfinished from PrepareFolder until this.
 void MarkFinished(const std::string& folder);

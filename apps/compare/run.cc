@@ -96,11 +96,12 @@ Status Prepare(const ImageSet& images, const CompareOptions& options, const Imag
   constexpr std::size_t kStop = static_cast<std::size_t>(-1);
   Status status;
   if (ranks.is_first()) {
-    status = CreateFolder(options.overlays ? options.output + "/overlays" : options.output);
+    status = CheckFinish(options.output, options.finish);
+    if (status.ok())
+      status = CreateFolder(options.overlays ? options.output + "/overlays" : options.output);
     if (status.ok()) status = lock->Take(options.output);
     if (status.ok()) {
-      status = PrepareFolder(options.output, options.resume, images, worker.solvers().Keys(options),
-                             options.result_flags, done);
+      status = PrepareFolder(options, images, worker.solvers().Keys(options), done);
     }
   }
   done->images = ranks.FromFirst(status.ok() ? done->images : kStop);
@@ -110,7 +111,8 @@ Status Prepare(const ImageSet& images, const CompareOptions& options, const Imag
 }  // namespace
 
 Status MergeComparison(const CompareOptions& options, ComparisonResult* result) {
-  Status status = MergeFolders(options.inputs.merge, options.output);
+  Status status = CheckFinish(options.output, options.finish);
+  if (status.ok()) status = MergeFolders(options.inputs.merge, options.output);
   if (status.ok()) status = FinishFolder(options.output, options.finish, result);
   return status;
 }

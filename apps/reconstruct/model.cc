@@ -184,7 +184,7 @@ Model BuildModel(const cv::Mat& photo, const Observations& observations,
                  const PoseHypothesis& hypothesis, const ModelOptions& options) {
   Model model;
   const View view{photo, observations.camera, hypothesis.cam_from_world};
-  Eigen::AlignedBox2d box = EvidenceOnPlane(observations, view.pose);
+  Eigen::AlignedBox2d box = EvidenceOnPlane(observations, view.camera, view.pose);
   const double longest = box.isEmpty() ? 0.0 : box.sizes().maxCoeff();
   if (!(longest > 0.0) || !std::isfinite(longest)) return model;
   box.min().array() -= options.margin * longest;

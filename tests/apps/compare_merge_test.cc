@@ -51,6 +51,7 @@ TEST_F(CompareMerge, RefusesWhatIsNotOneSet) {
   ASSERT_EQ(Run("--shard=0/2 --overlays=false", "a").exit_code, 1);
   ASSERT_EQ(Run("--shard=1/2 --overlays=false", "b").exit_code, 0);
   ASSERT_EQ(Run("--shard=1/2 --overlays=false --solvers=joint", "other").exit_code, 0);
+  ASSERT_EQ(Run("--shard=1/2 --overlays=false --seed=2", "seed").exit_code, 0);
   ASSERT_EQ(Run("--shard=0/7 --overlays=false", "first").exit_code, 0);
   std::filesystem::copy(folder_ / "b", folder_ / "unfinished");
   folder_.Write("unfinished/unfinished.flags", "--seed=1\n");
@@ -59,6 +60,7 @@ TEST_F(CompareMerge, RefusesWhatIsNotOneSet) {
                                                     {"b", "image 0 is missing"},
                                                     {"a b b", "is there twice"},
                                                     {"a other", "ran other solvers or losses"},
+                                                    {"a seed", "seed ran with --seed=2, others"},
                                                     {"a unfinished", "is not finished"},
                                                     {"a nothing", "nothing has no results.jsonl"}};
   for (const auto& [inputs, words] : cases) {
@@ -85,6 +87,41 @@ TEST_F(CompareMerge, SweepNamesTheBestAndSavesItsFlags) {
   const std::string csv = ReadAll(folder_ / "sweep/summary.csv");
   std::istringstream lines(ReadAll(folder_ / "again/summary.csv"));
   for (std::string line; std::getline(lines, line);) EXPECT_CONTAINS(csv, line.c_str());
+}
+
+// Hours of work, and then nowhere to put the flags: said before.
+TEST_F(CompareMerge, FlagsThatCannotBeSavedAreNoticedFirst) {
+  const std::string flags = "--overlays=false --solvers=joint --save_options=";
+  for (const std::string& path : {folder_ / "none/best.flags", folder_.path()}) {
+    const Outcome outcome = Run(flags + "'" + path + "'", "out");
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_CONTAINS(outcome.err, ("--save_options: " + path + ": cannot be written").c_str());
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+  }
+  ASSERT_EQ(Run(flags + "'" + folder_ / "out/best.flags" + "'", "out").exit_code, 1);
+  EXPECT_CONTAINS(ReadAll(folder_ / "out/best.flags"), "--robust_loss=");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/best.flags.part"));
+}
+
+// Where the focal length was refined, the camera goes with the pose.
+TEST_F(CompareMerge, ExportsTheRefinedFocalLength) {
+  ASSERT_EQ(Run("--overlays=false --solvers=joint --focal_sigma=0.05 --export_as=colmap", "out")
+                .exit_code,
+            1);
+  std::vector<double> expected;
+  for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
+    if (line["hypothesis"] == 0) expected.push_back(kFocal * line["focal_scale"].get<double>());
+  }
+  std::istringstream cameras(ReadAll(folder_ / "out/cameras.txt"));
+  std::string line, model;
+  std::getline(cameras, line);
+  std::vector<double> exported;
+  for (double id, width, height, fx; std::getline(cameras, line);) {
+    std::istringstream(line) >> id >> model >> width >> height >> fx;
+    exported.push_back(fx);
+  }
+  ASSERT_EQ(exported.size(), expected.size());
+  for (std::size_t i = 0; i < exported.size(); ++i) EXPECT_NEAR(exported[i], expected[i], 1e-9);
 }
 
 TEST_F(CompareMerge, ExportsThePosesThatAreShown) {

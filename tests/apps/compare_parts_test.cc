@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "apps/compare/agreement.h"
+#include "apps/compare/overlay.h"
 #include "apps/compare/record_files.h"
 #include "apps/compare/selection.h"
 #include "apps/compare/sweep.h"
@@ -96,6 +97,39 @@ TEST(Record, NamesALineThatIsNotOfThisProgram) {
   ImageRecord record;
   EXPECT_FALSE(ParseRecord({"", "not json\n", ""}, &record).ok());
   EXPECT_FALSE(ParseRecord({"{\"solver\":1}\n", OneImage(0).observations, ""}, &record).ok());
+}
+
+// The same pose, seen through the camera given and through a wrong one that was refined to it.
+TEST(Overlay, DrawsWithTheRefinedFocalLength) {
+  const auto draw = [](double given, double focal_scale) {
+    SceneImage image;
+    ImageRun run;
+    run.image = &image;
+    run.photo = cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(90));
+    Camera& camera = run.observations.camera;
+    camera.fx = camera.fy = given;
+    camera.cx = 319.5;
+    camera.cy = 239.5;
+    CircleObservation circle;  // Without a fit: its points alone say where the grid is.
+    circle.id = "c";
+    circle.plane = "p";
+    circle.points = {{200.0, 150.0}, {420.0, 140.0}, {450.0, 330.0}, {190.0, 350.0}};
+    run.observations.circles = {circle};
+    PoseHypothesis hypothesis;
+    hypothesis.cam_from_world.rotation =
+        ExpRotation({0.6, 0.2, 0.1}) * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+    hypothesis.cam_from_world.translation = Eigen::Vector3d(0.0, 0.0, 5.0);
+    hypothesis.focal_scale = focal_scale;
+    SolverRun solver;
+    solver.solver = "joint";
+    solver.estimate.hypotheses = {hypothesis};
+    solver.errors.resize(1);
+    run.solvers = {solver};
+    return DrawOverlay(run);
+  };
+  const cv::Mat expected = draw(600.0, 1.0);
+  EXPECT_EQ(cv::norm(draw(500.0, 1.2), expected, cv::NORM_INF), 0.0);
+  EXPECT_GT(cv::norm(draw(500.0, 1.0), expected, cv::NORM_INF), 0.0);
 }
 
 TEST(Selection, TakesWorstMedianAndRefused) {

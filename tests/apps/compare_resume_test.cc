@@ -137,6 +137,10 @@ TEST(CompareResume, RefusesTheResultsOfAnotherRun) {
   outcome = RunCompare(arguments + "--shard=1/2");
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_CONTAINS(outcome.err, "its image 1 is tilt25.png");
+  outcome = RunCompare(arguments + "--seed=2 --max_pencils=4");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_CONTAINS(outcome.err, "with the default flags, not with --max_pencils=4 --seed=2");
+  EXPECT_EQ(RunCompare(arguments + "--seed=1").exit_code, 0);  // The default, said aloud.
   EXPECT_EQ(ReadAll(folder / "out/results.jsonl"), before);
 }
 

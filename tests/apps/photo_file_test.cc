@@ -1,6 +1,7 @@
 #include "apps/common/photo_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <opencv2/imgcodecs.hpp>
 
@@ -57,6 +58,8 @@ TEST_F(PhotoFile, ReadsWhateverDepthAndChannels) {
 TEST_F(PhotoFile, SaysWhatIsWrong) {
   EXPECT_EQ(ReadPhoto(folder_ / "none.jpg", &photo_), "the file does not exist");
   EXPECT_EQ(ReadPhoto(folder_.path(), &photo_), "is a folder, not a photo");
+  ASSERT_EQ(mkfifo((folder_ / "pipe.jpg").c_str(), 0600), 0);
+  EXPECT_CONTAINS(ReadPhoto(folder_ / "pipe.jpg", &photo_), "is not a file that can be read");
   EXPECT_EQ(Read({}), "the file is empty");
   EXPECT_EQ(Read({1, 2, 3, 4}), "is not an image that can be read");
 }
