@@ -14,10 +14,7 @@
 #ifndef CIRCLINE_REFINE_JOINT_PROBLEM_H_
 #define CIRCLINE_REFINE_JOINT_PROBLEM_H_
 
-#include <cstdint>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
@@ -25,6 +22,7 @@
 #include "circline/refine/estimate_pose.h"
 #include "circline/refine/focal.h"
 #include "circline/refine/joint_evidence.h"
+#include "circline/refine/joint_result.h"
 #include "circline/refine/reduced_problem.h"
 
 namespace circline {
@@ -39,26 +37,6 @@ struct Approach {
   JointState state;
   double log_focal = 0.0;  // Of the focal lengths' scale, where that is refined too.
 };
-
-// A hypothesis without probability, and what it takes to compare it with others.
-struct Refined {
-  PoseHypothesis hypothesis;
-  // Log determinants of the covariance of the shared unknowns and of what each circle, then each
-  // line, has of its own; the same features that the hypothesis does not explain; circles' radii.
-  double shared_log_det = 0.0;
-  std::vector<double> own_log_det;
-  std::vector<std::uint8_t> left_out;
-  std::vector<double> radii;
-  std::vector<int> radius_blocks;  // Circles with the same one share their radius; -1: its own.
-  std::vector<std::string> notes;  // What was left out, and why.
-};
-
-// Log determinant of the covariance of all unknowns but those of the features left out, in
-// parameters in which a scene is as likely anywhere: rotations by their invariant measure, the
-// first circle's centre uniform in space in units of its radius, the others in the plane in the
-// same unit, radii (a shared one once) by their logarithm. Hypotheses compare on the features that
-// all of them explain.
-double LogDet(const Refined& refined, const std::vector<std::uint8_t>& left_out);
 
 class JointProblem {
  public:

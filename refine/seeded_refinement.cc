@@ -2,232 +2,23 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
+#include <cstdint>
 #include <cstdio>
-#include <limits>
 #include <utility>
 
-#include "circline/estimators/circle_pose.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/crowds.h"
 #include "circline/refine/joint_problem.h"
+#include "circline/refine/noise_scales.h"
+#include "circline/refine/pose_seeds.h"
 
 namespace circline {
 namespace {
 
-// Seeds closer than this are one; far inside the basin of convergence of each other.
-constexpr double kSameSeed = 0.02;  // Radians.
 // Seeds that arrive this close to each other in a few iterations go to one minimum.
 constexpr double kSameApproach = 1e-3;  // Radians.
 // Refined poses closer than this are one.
 constexpr double kSamePose = 1e-4;  // Radians; far below any standard deviation.
-constexpr std::size_t kMaxSeeds = 8;
-constexpr std::size_t kMaxCircleSeeds = 6;  // Circles that propose both their planes.
-// Where nothing is redundant, so that nothing can be measured.
-constexpr double kDefaultConicSigmaPx = 0.3;
-constexpr double kDefaultLineSigmaPx = 0.4;
-
-// 1.4826 x the median of |values|: the standard deviation of a Gaussian, whatever the outliers.
-double MadSigma(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  for (double& v : values) v = std::abs(v);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return 1.4826 * *middle;
-}
-
-// Scatter of the points about their own fits, the degrees of freedom of each fit counted in.
-double ConicScale(const Observations& observations) {
-  std::vector<double> residuals;
-  std::vector<CalibratedPoint> points;
-  for (const CircleObservation& circle : observations.circles) {
-    if (!circle.fit || circle.sigma_px > 0.0) continue;
-    CalibrateInliers(observations.camera, circle.points, circle.inliers, &points);
-    if (points.size() <= 5) continue;
-    const double n = static_cast<double>(points.size());
-    const double gain = std::sqrt(n / (n - 5.0));
-    for (const CalibratedPoint& p : points)
-      residuals.push_back(gain * ConicDistancePx(p, circle.fit->conic));
-  }
-  return MadSigma(std::move(residuals));
-}
-
-// The same for lines of more than two points; segments known by their ends alone are judged by how
-// far they miss their pencil's vanishing point, in standard deviations if the ends' were 1 px.
-double LineScale(const Observations& observations) {
-  std::vector<double> along, across;
-  std::vector<CalibratedPoint> points;
-  for (const PencilObservation& pencil : observations.pencils) {
-    const double lines = static_cast<double>(pencil.lines.size());
-    for (const LineObservation& line : pencil.lines) {
-      if (!line.fit || LineSigma(pencil, line) > 0.0) continue;
-      CalibrateInliers(observations.camera, line.points, line.inliers, &points);
-      const double n = static_cast<double>(points.size());
-      if (n > 2.0) {
-        const double gain = std::sqrt(n / (n - 2.0));
-        for (const CalibratedPoint& p : points)
-          along.push_back(gain * LineDistancePx(p, line.fit->line));
-      } else if (pencil.fit && lines > 2.0) {
-        LineFit unit;
-        if (!FitLine(points, 1.0, &unit).ok()) continue;
-        across.push_back(std::sqrt(lines / (lines - 2.0)) *
-                         VanishingPointResidual(unit, pencil.fit->direction));
-      }
-    }
-  }
-  constexpr std::size_t kEnough = 8;
-  if (along.size() >= kEnough) return MadSigma(std::move(along));
-  return across.size() >= kEnough ? MadSigma(std::move(across)) : 0.0;
-}
-
-// "auto": measured, where anything is redundant; else 0.
-NoiseScales MeasureScales(const Observations& observations) {
-  return {ConicScale(observations), LineScale(observations)};
-}
-
-NoiseScales OrDefault(const NoiseScales& scales) {
-  return {scales.conic_px > 0.0 ? scales.conic_px : kDefaultConicSigmaPx,
-          scales.line_px > 0.0 ? scales.line_px : kDefaultLineSigmaPx};
-}
-
-// For the closed forms: gives every feature that states no sigma_px the one that options or
-// measurement say, its shared error included (EstimationOptions::contour_bias_px).
-Observations ApplyScales(const Observations& observations, const EstimationOptions& options,
-                         const NoiseScales& scales) {
-  Observations out = observations;
-  const auto effective = [](const LossOptions& loss, double sigma, double bias, std::size_t n) {
-    if (loss.scale_px > 0.0) return loss.scale_px;
-    return std::sqrt(sigma * sigma + static_cast<double>(n) * bias * bias);
-  };
-  for (CircleObservation& circle : out.circles) {
-    if (circle.sigma_px > 0.0) continue;
-    circle.sigma_px = effective(options.conic_loss, scales.conic_px, options.contour_bias_px,
-                                circle.points.size());
-  }
-  for (PencilObservation& pencil : out.pencils) {
-    if (pencil.sigma_px > 0.0) continue;
-    std::size_t longest = 2;
-    for (const LineObservation& line : pencil.lines)
-      longest = std::max(longest, line.points.size());
-    pencil.sigma_px = effective(options.line_loss, scales.line_px, options.line_bias_px, longest);
-  }
-  return out;
-}
-
-struct Seed {
-  CameraPose pose;
-  double cost;
-  int source;  // The two poses of one circle, however close, are two seeds.
-};
-
-void AddSeed(const JointProblem& problem, const CameraPose& pose, int source,
-             std::vector<Seed>* seeds) {
-  const auto same = std::find_if(seeds->begin(), seeds->end(), [&](const Seed& seed) {
-    return seed.source != source && RotationAngle(seed.pose.rotation, pose.rotation) <= kSameSeed;
-  });
-  // The better of the two matters only where outliers make the way to the minimum hard.
-  if (same != seeds->end() && !problem.is_contaminated()) return;
-  const double cost = problem.SeedCost(pose);
-  if (!std::isfinite(cost)) return;
-  if (same != seeds->end()) {
-    if (cost < same->cost) *same = {pose, cost, source};
-    return;
-  }
-  seeds->push_back({pose, cost, source});
-}
-
-// The rotations about the plane's normal under which one line or another of a pencil along an axis
-// has its direction: some of these lines may be wrong. The senses of the axes are those of
-// `rotation`.
-void AddSpinSeeds(const Observations& observations, const JointProblem& problem,
-                  const CameraPose& pose, int source, std::vector<Seed>* seeds) {
-  constexpr int kMaxLines = 8;
-  int lines = 0;
-  const Eigen::Vector3d n = pose.rotation.col(2);
-  for (const PencilObservation& pencil : observations.pencils) {
-    if (pencil.direction != PencilDirection::kX && pencil.direction != PencilDirection::kY)
-      continue;
-    const Eigen::Vector3d axis = pose.rotation.col(static_cast<int>(pencil.direction));
-    for (const LineObservation& line : pencil.lines) {
-      if (!line.fit || ++lines > kMaxLines) continue;
-      Eigen::Vector3d direction = n.cross(line.fit->line);
-      if (direction.dot(axis) < 0.0) direction = -direction;
-      const double angle = std::atan2(axis.cross(direction).dot(n), axis.dot(direction));
-      AddSeed(problem, {ExpRotation(angle * n) * pose.rotation, pose.translation}, source, seeds);
-    }
-  }
-}
-
-// Both planes of the largest circles of the world plane, turned in the plane as the other evidence
-// says.
-void AddCircleSeeds(const Observations& observations, const JointProblem& problem,
-                    std::vector<Seed>* seeds) {
-  std::vector<const CircleObservation*> circles;
-  for (const CircleObservation& circle : observations.circles) {
-    if (circle.fit && circle.plane == observations.frame.plane) circles.push_back(&circle);
-  }
-  std::stable_sort(circles.begin(), circles.end(),
-                   [](const CircleObservation* a, const CircleObservation* b) {
-                     return a->fit->Covariance().trace() < b->fit->Covariance().trace();
-                   });
-  circles.resize(std::min(circles.size(), kMaxCircleSeeds));
-  int source = 0;
-  for (const CircleObservation* circle : circles) {
-    --source;  // Closed forms count upwards.
-    std::array<CirclePose, 2> poses;
-    const int count = CirclePoses(circle->fit->conic, &poses);
-    for (int i = 0; i < count; ++i) {
-      const CirclePose& p = poses[static_cast<std::size_t>(i)];
-      CameraPose pose;
-      if (!WorldRotation(observations, p.normal, p.center, kDefaultLineSigmaPx, &pose.rotation))
-        continue;
-      pose.translation = p.center;
-      AddSeed(problem, pose, source, seeds);
-      if (problem.is_contaminated()) AddSpinSeeds(observations, problem, pose, source, seeds);
-    }
-  }
-}
-
-// Poses that the closed forms propose for the same world plane, and those of its circles. `reason`
-// receives why the last of the closed forms refused.
-std::vector<CameraPose> CollectSeeds(const Observations& observations,
-                                     const std::vector<std::shared_ptr<const Solver>>& seeders,
-                                     const EstimationOptions& options, const JointProblem& problem,
-                                     std::vector<std::string>* reasons) {
-  std::vector<Seed> seeds;
-  int source = 0;
-  for (const std::shared_ptr<const Solver>& seeder : seeders) {
-    const PoseEstimate estimate = seeder->Seeds(observations);
-    if (!estimate.status.ok()) {
-      reasons->push_back(seeder->name() + ": " + estimate.status.message);
-      continue;
-    }
-    ++source;
-    for (const PoseHypothesis& h : estimate.hypotheses) {
-      CameraPose pose = h.cam_from_world;
-      // A solver that leaves the spin about the normal open has chosen it by convention; the other
-      // evidence knows better.
-      if (h.RotationIsFree() && !WorldRotation(observations, pose.rotation.col(2), pose.translation,
-                                               kDefaultLineSigmaPx, &pose.rotation)) {
-        continue;
-      }
-      AddSeed(problem, pose, source, &seeds);
-    }
-  }
-  AddCircleSeeds(observations, problem, &seeds);
-  std::stable_sort(seeds.begin(), seeds.end(),
-                   [](const Seed& a, const Seed& b) { return a.cost < b.cost; });
-  seeds.resize(std::min(seeds.size(), kMaxSeeds));
-  // A closed form lies so near its minimum that one that costs far more leads to none that counts.
-  constexpr double kMargin = 4.0;
-  std::vector<CameraPose> poses;
-  for (const Seed& seed : seeds) {
-    if (seed.cost <= kMargin * (seeds.front().cost + options.max_cost_gap))
-      poses.push_back(seed.pose);
-  }
-  return poses;
-}
-
 // What tells the best hypothesis from the next, in words.
 std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
   if (hypotheses.size() < 2) return "only one pose fits the evidence";
@@ -270,17 +61,6 @@ std::vector<Approach> ApproachAll(const JointProblem& problem, const std::vector
     if (!known) distinct.push_back(a);
   }
   return distinct;
-}
-
-// Features that fit well one by one may fit badly together (a plane not quite flat): then the
-// scatter about the common pose is the noise that counts. True if that raised an automatic scale.
-bool RaiseScales(const NoiseScales& measured, NoiseScales* scales) {
-  constexpr double kTolerated = 1.3;
-  const bool conic = measured.conic_px > kTolerated * scales->conic_px;
-  const bool line = measured.line_px > kTolerated * scales->line_px;
-  if (conic) scales->conic_px = measured.conic_px;
-  if (line) scales->line_px = measured.line_px;
-  return conic || line;
 }
 
 // Hypotheses that explain different features compare on those that all of them do.
@@ -375,7 +155,7 @@ Status NoSeed(const Observations& fitted, const std::vector<std::string>& reason
 Status RefineFitted(const Observations& fitted,
                     const std::vector<std::shared_ptr<const Solver>>& seeders,
                     const EstimationOptions& options, PoseEstimate* estimate) {
-  NoiseScales scales = MeasureScales(fitted);
+  NoiseScales scales = ScatterAboutFits(fitted);
   const Observations scaled = ApplyScales(fitted, options, OrDefault(scales));
   JointProblem problem(fitted, options, OrDefault(scales));
   std::vector<Approach> approaches;
