@@ -1,0 +1,102 @@
+// Pencils of parallel segments.
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "apps/benchmark/robust_fit_options.h"
+#include "apps/benchmark/robust_fit_rows.h"
+#include "apps/benchmark/robust_fit_scenes.h"
+#include "apps/benchmark/robust_fit_table.h"
+#include "circline/ransac/pencil_model.h"
+#include "circline/ransac/robust_directions.h"
+
+namespace circline::apps {
+namespace {
+
+using Eigen::Matrix3d;
+
+PencilOptions LineOptions() {
+  PencilOptions options;
+  options.ransac = EngineOptions();
+  options.model_sigma_rad = 0.0;  // The segments are exactly parallel but for their noise.
+  return options;
+}
+
+// The nearest rotation to three directions found one by one.
+bool RotationFromPencils(const PencilScene& scene, Matrix3d* rotation) {
+  std::vector<FoundPencil> pencils;
+  if (!FindPencils(scene.lines, LineOptions(), &pencils).ok() || pencils.size() < 3) return false;
+  Matrix3d directions;
+  for (int k = 0; k < 3; ++k) {
+    directions.col(k) = pencils[static_cast<std::size_t>(k)].fit.direction;
+  }
+  if (directions.determinant() < 0.0) directions.col(2) *= -1.0;
+  const Eigen::JacobiSVD<Matrix3d> svd(directions, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  *rotation = svd.matrixU() * svd.matrixV().transpose();
+  return true;
+}
+
+bool RotationFromTriplet(const PencilScene& scene, Matrix3d* rotation) {
+  OrthogonalTripletFit fit;
+  if (!FitOrthogonalTriplet(scene.lines, LineOptions(), &fit).ok()) return false;
+  *rotation = fit.rotation;
+  return true;
+}
+
+// The maximum-likelihood rotation of the inliers alone, known to belong to their directions: what
+// the data allow, in these very trials.
+bool RotationOfInliers(const PencilScene& scene, Matrix3d* rotation) {
+  PencilScene inliers = scene;
+  inliers.lines.resize(static_cast<std::size_t>(3 * scene.per_direction));
+  return RotationFromTriplet(inliers, rotation);
+}
+
+// The error of a row is rms error over rms bound; lost are errors beyond ten times the bound.
+void RunPencilRow(const std::string& name, double clutter_ratio, const Bar& bar) {
+  struct Method {
+    const char* name;
+    bool (*fit)(const PencilScene&, Matrix3d*);
+    bool ours;
+  };
+  const Method methods[] = {{"inliers alone", RotationOfInliers, false},
+                            {"one by one, then SVD", RotationFromPencils, false},
+                            {"ours, orthogonal triplet", RotationFromTriplet, true}};
+  constexpr double kLost = 10.0;
+  for (const Method& method : methods) {
+    std::vector<double> times;
+    double squares = 0.0, bounds = 0.0;
+    int ok = 0, same = 0;
+    for (int trial = 0; trial < FLAGS_trials; ++trial) {
+      const PencilScene scene = MakePencilScene(30, clutter_ratio, TrialSeed(trial));
+      Matrix3d rotation, again;
+      bool found = false;
+      times.push_back(Timed([&] { found = method.fit(scene, &rotation); }));
+      same += found && method.fit(scene, &again) && again == rotation ? 1 : 0;
+      const double error = found ? scene.Error(rotation) : 1e9;
+      if (error > kLost * scene.rotation_bound) continue;
+      ++ok;
+      squares += error * error;
+      bounds += scene.rotation_bound * scene.rotation_bound;
+    }
+    const double percent = 100.0 * ok / FLAGS_trials, ratio = std::sqrt(squares / bounds);
+    std::printf("%-26s %-28s %6.1f %9.3f %9.3f  %ssame bits %d of %d\n", name.c_str(), method.name,
+                percent, ratio, Median(times),
+                Verdict(method.ours ? bar : Bar(), percent, ratio, Median(times)).c_str(), same,
+                FLAGS_trials);
+  }
+}
+
+}  // namespace
+
+void RunPencils() {
+  PrintHead("Pencils: 30 segments along each of three orthogonal directions, sigma 0.5 px",
+            "rms/bound");
+  if (Wanted("pencils, clean")) RunPencilRow("pencils, clean", 0.0, {100.0, 1.10, 2.0});
+  if (Wanted("pencils, 50 %")) RunPencilRow("pencils, 50 %", 0.5, {100.0, 1.10, 2.0});
+  if (Wanted("pencils, 70 %")) RunPencilRow("pencils, 70 %", 0.7, {});
+}
+
+}  // namespace circline::apps
