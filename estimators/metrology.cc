@@ -54,17 +54,31 @@ CameraPose Moved(const CameraPose& pose, int parameter, double by) {
   return moved;
 }
 
-// The measurement `measure(pose, image points, &value)` and its variance, by central differences
-// along every pixel coordinate and every parameter of the pose. `subtract` tells how values are
-// compared; `x` are the image points of `points`.
-template <typename Measured, typename Image, typename Measure>
-bool Propagate(const Measure& measure, double (*subtract)(double), const CameraPose& pose,
-               const std::array<double, 36>& pose_covariance, const Measured& points, Image x,
-               double sigma_px, Measurement* result) {
-  for (std::size_t i = 0; i < points.size(); ++i) x[i] = points[i].Homogeneous();
-  Measurement m;
-  if (!measure(pose, x, &m.value)) return false;
+// Image points of pixels, and what a pixel is worth at each.
+bool Calibrate(const Camera& camera, double focal_scale, const std::vector<Vector2d>& pixels,
+               std::vector<CalibratedPoint>* points, std::vector<Vector3d>* x) {
+  Camera scaled = camera;
+  scaled.fx *= focal_scale;
+  scaled.fy *= focal_scale;
+  if (PixelsToCalibrated(scaled, pixels, points) > 0) return false;
+  x->clear();
+  for (const CalibratedPoint& p : *points) x->push_back(p.Homogeneous());
+  return true;
+}
 
+// The value of `function` and its variance, by central differences along every pixel coordinate,
+// every parameter of the pose and the focal length. `subtract` tells how values are compared.
+bool Propagate(const PlaneFunction& function, double (*subtract)(double),
+               const PoseHypothesis& hypothesis, const Camera& camera,
+               const std::vector<Vector2d>& pixels, double sigma_px, Measurement* result) {
+  const CameraPose& pose = hypothesis.cam_from_world;
+  std::vector<CalibratedPoint> points, unused;
+  std::vector<Vector3d> x, x_high, x_low;
+  Measurement m;
+  if (!Calibrate(camera, hypothesis.focal_scale, pixels, &points, &x) ||
+      !function(pose, x, &m.value)) {
+    return false;
+  }
   constexpr double kStepPx = 1e-3;
   double variance = 0.0, high, low;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -73,26 +87,38 @@ bool Propagate(const Measure& measure, double (*subtract)(double), const CameraP
       const Vector3d step(kStepPx * points[i].x_from_pixel[k],
                           kStepPx * points[i].x_from_pixel[2 + k], 0.0);
       x[i] = at + step;
-      if (!measure(pose, x, &high)) return false;
+      if (!function(pose, x, &high)) return false;
       x[i] = at - step;
-      if (!measure(pose, x, &low)) return false;
+      if (!function(pose, x, &low)) return false;
       const double gradient = subtract(high - low) / (2.0 * kStepPx);
       variance += gradient * gradient * sigma_px * sigma_px;
     }
     x[i] = at;
   }
-  constexpr double kStep = 1e-6;  // Radians, and in units of the translation's length.
+  constexpr double kStep = 1e-6;  // Radians, in units of the translation's length, and relative.
   const double length = pose.translation.norm();
   Vector6d gradient;
   for (int k = 0; k < 6; ++k) {
     const double h = k < 3 ? kStep : kStep * length;
-    if (!measure(Moved(pose, k, h), x, &high) || !measure(Moved(pose, k, -h), x, &low))
+    if (!function(Moved(pose, k, h), x, &high) || !function(Moved(pose, k, -h), x, &low))
       return false;
     gradient[k] = subtract(high - low) / (2.0 * h);
   }
-  variance += gradient.dot(Eigen::Map<const Matrix6d>(pose_covariance.data()) * gradient);
+  variance += gradient.dot(hypothesis.Covariance() * gradient);
+  if (hypothesis.focal_sigma > 0.0) {
+    const double h = kStep * hypothesis.focal_scale;
+    if (!Calibrate(camera, hypothesis.focal_scale + h, pixels, &unused, &x_high) ||
+        !Calibrate(camera, hypothesis.focal_scale - h, pixels, &unused, &x_low) ||
+        !function(pose, x_high, &high) || !function(pose, x_low, &low)) {
+      return false;
+    }
+    const double by_focal = subtract(high - low) / (2.0 * h);
+    const Eigen::Map<const Vector6d> with_pose(hypothesis.focal_covariance.data());
+    variance += by_focal * (2.0 * gradient.dot(with_pose) +
+                            by_focal * hypothesis.focal_sigma * hypothesis.focal_sigma);
+  }
   m.sigma = std::sqrt(std::fmax(0.0, variance));
-  if (!std::isfinite(variance)) return false;
+  if (!std::isfinite(variance) || !std::isfinite(m.value)) return false;
   *result = m;
   return true;
 }
@@ -254,49 +280,55 @@ bool HeightOverPlane(const CameraPose& pose, const Vector3d& foot, const Vector3
   return true;
 }
 
-bool LengthOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
-                   const MeasuredPair& segment, double sigma_px, Measurement* length) {
-  const auto measure = [](const CameraPose& at, const std::array<Vector3d, 2>& x, double* value) {
+bool LengthOnPlane(const PoseHypothesis& pose, const Camera& camera,
+                   const std::array<Vector2d, 2>& segment, double sigma_px, Measurement* length) {
+  const auto function = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
     return LengthOnPlane(at, x[0], x[1], value);
   };
-  return Propagate(measure, &Plain, pose, pose_covariance, segment, std::array<Vector3d, 2>(),
-                   sigma_px, length);
+  return Propagate(function, &Plain, pose, camera, {segment.begin(), segment.end()}, sigma_px,
+                   length);
 }
 
-bool LengthRatio(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
-                 const MeasuredSegmentPair& segments, double sigma_px, Measurement* ratio) {
-  const auto measure = [](const CameraPose& at, const SegmentPair& x, double* value) {
-    return LengthRatio(at, x, value);
+bool LengthRatio(const PoseHypothesis& pose, const Camera& camera,
+                 const std::array<Vector2d, 4>& segments, double sigma_px, Measurement* ratio) {
+  const auto function = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
+    return LengthRatio(at, {x[0], x[1], x[2], x[3]}, value);
   };
-  return Propagate(measure, &Plain, pose, pose_covariance, segments, SegmentPair(), sigma_px,
+  return Propagate(function, &Plain, pose, camera, {segments.begin(), segments.end()}, sigma_px,
                    ratio);
 }
 
-bool AngleOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
-                  const MeasuredSegmentPair& segments, double sigma_px, Measurement* angle) {
-  const auto measure = [](const CameraPose& at, const SegmentPair& x, double* value) {
-    return AngleOnPlane(at, x, value);
+bool AngleOnPlane(const PoseHypothesis& pose, const Camera& camera,
+                  const std::array<Vector2d, 4>& segments, double sigma_px, Measurement* angle) {
+  const auto function = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
+    return AngleOnPlane(at, {x[0], x[1], x[2], x[3]}, value);
   };
-  return Propagate(measure, &Wrapped, pose, pose_covariance, segments, SegmentPair(), sigma_px,
+  return Propagate(function, &Wrapped, pose, camera, {segments.begin(), segments.end()}, sigma_px,
                    angle);
 }
 
-bool AreaOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
-                 const std::vector<CalibratedPoint>& corners, double sigma_px, Measurement* area) {
-  const auto measure = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
+bool AreaOnPlane(const PoseHypothesis& pose, const Camera& camera,
+                 const std::vector<Vector2d>& corners, double sigma_px, Measurement* area) {
+  const auto function = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
     return AreaOnPlane(at, x, value);
   };
-  return Propagate(measure, &Plain, pose, pose_covariance, corners,
-                   std::vector<Vector3d>(corners.size()), sigma_px, area);
+  return Propagate(function, &Plain, pose, camera, corners, sigma_px, area);
 }
 
-bool HeightOverPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
-                     const MeasuredPair& foot_and_top, double sigma_px, Measurement* height) {
-  const auto measure = [](const CameraPose& at, const std::array<Vector3d, 2>& x, double* value) {
+bool HeightOverPlane(const PoseHypothesis& pose, const Camera& camera,
+                     const std::array<Vector2d, 2>& foot_and_top, double sigma_px,
+                     Measurement* height) {
+  const auto function = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
     return HeightOverPlane(at, x[0], x[1], value);
   };
-  return Propagate(measure, &Plain, pose, pose_covariance, foot_and_top, std::array<Vector3d, 2>(),
+  return Propagate(function, &Plain, pose, camera, {foot_and_top.begin(), foot_and_top.end()},
                    sigma_px, height);
+}
+
+bool MeasureOnPlane(const PlaneFunction& function, const PoseHypothesis& pose, const Camera& camera,
+                    const std::vector<Vector2d>& pixels, double sigma_px,
+                    Measurement* measurement) {
+  return Propagate(function, &Plain, pose, camera, pixels, sigma_px, measurement);
 }
 
 }  // namespace circline

@@ -13,6 +13,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "circline/estimators/camera.h"
@@ -75,26 +76,33 @@ bool HeightOverPlane(const CameraPose& pose, const Eigen::Vector3d& foot,
 struct Measurement {
   double value = 0.0, sigma = 0.0;
 };
-// The same of points measured with the standard deviation `sigma_px` (pixels of the photo, each
-// coordinate), on a pose with the covariance of PoseHypothesis (of [delta, delta_t], 6x6
-// row-major), independent of the points: first-order propagation. Free directions of the pose,
-// which that covariance leaves out, must not matter to the result; a free rotation about the normal
-// does not. Nor does it hold the length of a translation that is not metric: lengths, areas and
-// heights are then exact multiples of that unit. Where the focal length was refined as well, what
-// its correlation with the pose takes or adds is left out.
-using MeasuredPair = std::array<CalibratedPoint, 2>;
-using MeasuredSegmentPair = std::array<CalibratedPoint, 4>;
-bool LengthOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
-                   const MeasuredPair& segment, double sigma_px, Measurement* length);
-bool LengthRatio(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
-                 const MeasuredSegmentPair& segments, double sigma_px, Measurement* ratio);
-bool AngleOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
-                  const MeasuredSegmentPair& segments, double sigma_px, Measurement* angle);
-// Allocates.
-bool AreaOnPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
-                 const std::vector<CalibratedPoint>& corners, double sigma_px, Measurement* area);
-bool HeightOverPlane(const CameraPose& pose, const std::array<double, 36>& pose_covariance,
-                     const MeasuredPair& foot_and_top, double sigma_px, Measurement* height);
+// The same of pixels of the photo as taken, with a standard deviation: first-order propagation of
+// the points' noise, `sigma_px` for each coordinate, of the hypothesis' covariance, taken as
+// independent of it, and where the focal length was refined, of that too, with its covariance with
+// the pose. `camera` is the one that the pose was estimated with, its focal length as given. Free
+// directions of the pose, which the covariance leaves out, must not matter to the result; a free
+// rotation about the normal does not. Nor does it hold the length of a translation that is not
+// metric: lengths, areas and heights are then exact multiples of that unit. Allocates.
+bool LengthOnPlane(const PoseHypothesis& pose, const Camera& camera,
+                   const std::array<Eigen::Vector2d, 2>& segment, double sigma_px,
+                   Measurement* length);
+bool LengthRatio(const PoseHypothesis& pose, const Camera& camera,
+                 const std::array<Eigen::Vector2d, 4>& segments, double sigma_px,
+                 Measurement* ratio);
+bool AngleOnPlane(const PoseHypothesis& pose, const Camera& camera,
+                  const std::array<Eigen::Vector2d, 4>& segments, double sigma_px,
+                  Measurement* angle);
+bool AreaOnPlane(const PoseHypothesis& pose, const Camera& camera,
+                 const std::vector<Eigen::Vector2d>& corners, double sigma_px, Measurement* area);
+bool HeightOverPlane(const PoseHypothesis& pose, const Camera& camera,
+                     const std::array<Eigen::Vector2d, 2>& foot_and_top, double sigma_px,
+                     Measurement* height);
+// And of anything else: `function(pose, image points of the pixels, &value)`.
+using PlaneFunction =
+    std::function<bool(const CameraPose&, const std::vector<Eigen::Vector3d>&, double*)>;
+bool MeasureOnPlane(const PlaneFunction& function, const PoseHypothesis& pose, const Camera& camera,
+                    const std::vector<Eigen::Vector2d>& pixels, double sigma_px,
+                    Measurement* measurement);
 
 }  // namespace circline
 

@@ -19,6 +19,7 @@ namespace {
 constexpr double kSameApproach = 1e-3;  // Radians.
 // Refined poses closer than this are one.
 constexpr double kSamePose = 1e-4;  // Radians; far below any standard deviation.
+
 // What tells the best hypothesis from the next, in words.
 std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
   if (hypotheses.size() < 2) return "only one pose fits the evidence";

@@ -2,6 +2,7 @@
 // stands on it, with measurements.
 #include <gflags/gflags.h>
 
+#include <cmath>
 #include <iostream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -51,7 +52,8 @@ Status ModelFromFlags(ModelOptions* options) {
   if (!(FLAGS_margin >= 0.0 && FLAGS_margin <= 10.0)) {
     return Status::Invalid("--margin must be between 0 and 10");
   }
-  if (!(FLAGS_point_sigma_px > 0.0)) return Status::Invalid("--point_sigma_px must be positive");
+  if (!(FLAGS_point_sigma_px > 0.0) || !std::isfinite(FLAGS_point_sigma_px))
+    return Status::Invalid("--point_sigma_px must be positive");
   if (FLAGS_hypothesis < 0) return Status::Invalid("--hypothesis must be 0 or more");
   return Status::Ok();
 }

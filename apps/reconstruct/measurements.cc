@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <functional>
 #include <iomanip>
 #include <sstream>
 #include <utility>
@@ -16,72 +15,6 @@ namespace {
 constexpr double kDegreesPerRadian = 57.295779513082323;
 
 using Rays = std::vector<Eigen::Vector3d>;
-// What the points seen along the rays measure under a pose; false if nothing.
-using Function = std::function<bool(const CameraPose&, const Rays&, double*)>;
-
-class Measurer {
- public:
-  Measurer(const Camera& camera, const PoseHypothesis& hypothesis)
-      : camera_(camera), hypothesis_(hypothesis) {}
-
-  // Central differences, of steps that are small beside the noise and large beside rounding. False
-  // where the measurement itself fails.
-  bool Measure(const Function& function, const std::vector<Eigen::Vector2d>& pixels,
-               double sigma_px, MeasuredValue* measured) const {
-    const CameraPose& pose = hypothesis_.cam_from_world;
-    if (!Value(function, pose, pixels, &measured->value)) return false;
-    double variance = 0.0;
-    Eigen::Matrix<double, 6, 1> by_pose = Eigen::Matrix<double, 6, 1>::Zero();
-    for (int i = 0; i < 6; ++i) {
-      const double step = 1e-6 * (i < 3 ? 1.0 : pose.translation.norm());
-      double up, down;
-      if (!Value(function, Moved(i, step), pixels, &up) ||
-          !Value(function, Moved(i, -step), pixels, &down)) {
-        return false;
-      }
-      by_pose[i] = (up - down) / (2.0 * step);
-    }
-    variance += by_pose.dot(hypothesis_.Covariance() * by_pose);
-    for (std::size_t i = 0; i < 2 * pixels.size(); ++i) {
-      constexpr double kStepPx = 1e-3;
-      std::vector<Eigen::Vector2d> moved = pixels;
-      double up, down;
-      moved[i / 2][static_cast<Eigen::Index>(i % 2)] += kStepPx;
-      const bool has_up = Value(function, pose, moved, &up);
-      moved[i / 2][static_cast<Eigen::Index>(i % 2)] -= 2.0 * kStepPx;
-      if (!has_up || !Value(function, pose, moved, &down)) return false;
-      const double slope = (up - down) / (2.0 * kStepPx);
-      variance += slope * slope * sigma_px * sigma_px;
-    }
-    measured->sigma = std::sqrt(variance);
-    return std::isfinite(measured->value) && std::isfinite(measured->sigma);
-  }
-
- private:
-  CameraPose Moved(int direction, double step) const {
-    CameraPose pose = hypothesis_.cam_from_world;
-    if (direction < 3) {
-      pose.rotation = Eigen::AngleAxisd(step, Eigen::Vector3d::Unit(direction)).toRotationMatrix() *
-                      pose.rotation;
-    } else {
-      pose.translation[direction - 3] += step;
-    }
-    return pose;
-  }
-  bool Value(const Function& function, const CameraPose& pose,
-             const std::vector<Eigen::Vector2d>& pixels, double* value) const {
-    Rays rays;
-    for (const Eigen::Vector2d& pixel : pixels) {
-      CalibratedPoint point;
-      if (!PixelToCalibrated(camera_, pixel, &point)) return false;
-      rays.push_back(point.Homogeneous());
-    }
-    return function(pose, rays, value);
-  }
-
-  const Camera& camera_;
-  const PoseHypothesis& hypothesis_;
-};
 
 bool Length(const CameraPose& pose, const Rays& rays, double* value) {
   return LengthOnPlane(pose, rays[0], rays[1], value);
@@ -95,21 +28,24 @@ bool Distance(const CameraPose& pose, const Rays& /*rays*/, double* value) {
 }
 
 // Of the plane's circle, whose contour's own noise counts as that of all its points together.
-bool MeasureRadius(const Measurer& measurer, const CircleObservation& circle, double sigma_px,
-                   const Camera& camera, MeasuredValue* measured) {
+bool MeasureRadius(const PoseHypothesis& hypothesis, const CircleObservation& circle,
+                   double sigma_px, const Camera& camera, Measurement* radius) {
   if (!circle.fit || circle.points.empty()) return false;
   const Eigen::Matrix3d& conic = circle.fit->conic;
-  const Function radius = [&conic](const CameraPose& pose, const Rays&, double* value) {
+  const PlaneFunction function = [&conic](const CameraPose& pose, const Rays&, double* value) {
     Ellipse ellipse;
     if (!ConicOnPlane(pose, conic, &ellipse)) return false;
     *value = std::sqrt(ellipse.a * ellipse.b);
     return true;
   };
   Ellipse seen;
-  if (!measurer.Measure(radius, {}, 0.0, measured) || !ConicToEllipse(conic, &seen)) return false;
+  if (!MeasureOnPlane(function, hypothesis, camera, {}, 0.0, radius) ||
+      !ConicToEllipse(conic, &seen)) {
+    return false;
+  }
   const double noise_px = sigma_px / std::sqrt(0.5 * static_cast<double>(circle.points.size()));
   const double mean_px = std::sqrt(seen.a * seen.b * camera.fx * camera.fy);
-  measured->sigma = std::hypot(measured->sigma, measured->value * noise_px / mean_px);
+  radius->sigma = std::hypot(radius->sigma, radius->value * noise_px / mean_px);
   return true;
 }
 
@@ -136,13 +72,14 @@ std::vector<MeasuredValue> Measure(const Observations& observations,
                                    const PoseHypothesis& hypothesis, const Model& model,
                                    double point_sigma_px) {
   const Observations resolved = ResolveWorld(observations);
-  const Measurer measurer(observations.camera, hypothesis);
+  const Camera& camera = observations.camera;
   const std::string unit = hypothesis.metric ? "world" : "distance";
   std::vector<MeasuredValue> all;
-  const auto add = [&](const char* what, const std::string& id, const Function& function,
+  const auto add = [&](const char* what, const std::string& id, const PlaneFunction& function,
                        const std::vector<Eigen::Vector2d>& pixels, double sigma_px) {
-    MeasuredValue measured{what, id, 0.0, 0.0, unit};
-    if (measurer.Measure(function, pixels, sigma_px, &measured)) all.push_back(measured);
+    Measurement m;
+    if (MeasureOnPlane(function, hypothesis, camera, pixels, sigma_px, &m))
+      all.push_back({what, id, m.value, m.sigma, unit});
   };
   add("distance", "camera", Distance, {}, 0.0);
   for (std::size_t i = 0; i < resolved.known_lengths.size(); ++i) {
@@ -155,8 +92,9 @@ std::vector<MeasuredValue> Measure(const Observations& observations,
     if (!IsInPlane(pencil, resolved.frame.plane)) continue;
     for (std::size_t i = 0; i < pencil.lines.size(); ++i) {
       const Segment ends = EndPoints(pencil.lines[i]);
+      const double sigma_px = LineSigma(pencil, pencil.lines[i]);
       add("length", pencil.id + "_" + std::to_string(i), Length, {ends[0], ends[1]},
-          pencil.sigma_px > 0.0 ? pencil.sigma_px : point_sigma_px);
+          sigma_px > 0.0 ? sigma_px : point_sigma_px);
     }
   }
   for (const UprightEdge& edge : model.edges) {
@@ -164,11 +102,10 @@ std::vector<MeasuredValue> Measure(const Observations& observations,
   }
   for (const CircleObservation& circle : resolved.circles) {
     if (circle.plane != resolved.frame.plane) continue;
-    MeasuredValue measured{"radius", circle.id, 0.0, 0.0, unit};
+    Measurement radius;
     const double sigma_px = circle.sigma_px > 0.0 ? circle.sigma_px : point_sigma_px;
-    if (MeasureRadius(measurer, circle, sigma_px, observations.camera, &measured)) {
-      all.push_back(measured);
-    }
+    if (MeasureRadius(hypothesis, circle, sigma_px, camera, &radius))
+      all.push_back({"radius", circle.id, radius.value, radius.sigma, unit});
   }
   for (std::size_t i = 0; i < resolved.pencils.size(); ++i) {
     for (std::size_t j = i + 1; j < resolved.pencils.size(); ++j) {

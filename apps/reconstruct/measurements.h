@@ -23,7 +23,7 @@ struct MeasuredValue {
 // between pencils, each by its own lines alone, the circles' radii; the heights of the upright
 // edges; the distance of the camera from the plane. Standard deviations are first-order, of the
 // pose and of the points, taken as independent: `point_sigma_px` is that of each coordinate where a
-// pencil states none.
+// line and its pencil state none.
 std::vector<MeasuredValue> Measure(const Observations& observations,
                                    const PoseHypothesis& hypothesis, const Model& model,
                                    double point_sigma_px);

@@ -303,16 +303,21 @@ bool FuzzMetrology(Fuzzer* f) {
   if (AreaOnPlane(pose, corners, &value) && !Finite(value)) return false;
   if (HeightOverPlane(pose, segments[0], segments[1], &value) && !Finite(value)) return false;
 
-  std::array<double, 36> covariance;
-  for (double& c : covariance) c = f->Number();
-  MeasuredSegmentPair points;
-  for (CalibratedPoint& p : points) p.x = f->Vector2();
+  PoseHypothesis h;
+  h.cam_from_world = pose;
+  for (double& c : h.covariance) c = f->Number();
+  for (double& c : h.focal_covariance) c = f->Number();
+  h.focal_sigma = f->Number();
+  Camera camera;
+  camera.fx = camera.fy = 1.0;
+  std::array<Vector2d, 4> points;
+  for (Vector2d& p : points) p = f->Vector2();
   Measurement m;
   const double sigma = f->Number();
-  if (LengthRatio(pose, covariance, points, sigma, &m) && !(Finite(m.value) && Finite(m.sigma))) {
+  if (LengthRatio(h, camera, points, sigma, &m) && !(Finite(m.value) && Finite(m.sigma))) {
     return false;
   }
-  return !AngleOnPlane(pose, covariance, points, sigma, &m) || (Finite(m.value) && Finite(m.sigma));
+  return !AngleOnPlane(h, camera, points, sigma, &m) || (Finite(m.value) && Finite(m.sigma));
 }
 
 bool FuzzCamera(Fuzzer* f) {

@@ -200,64 +200,95 @@ TEST(MetrologyPoseTest, ACameraInThePlaneSeesNothingOfIt) {
   EXPECT_FALSE(RectifyingHomography(pose, &H));
 }
 
-// Propagated standard deviations against the spread of simulated measurements.
-TEST(MetrologyUncertaintyTest, SigmaIsTheSpread) {
-  const CameraPose pose = SlantedPose();
-  constexpr double kFocal = 800.0, kSigmaPx = 0.3;
+// Propagated standard deviations against the spread of simulated measurements; with a focal length
+// that was refined, too, and is 10 % off what the camera says.
+class MetrologyUncertaintyTest : public ::testing::TestWithParam<bool> {};
+
+TEST_P(MetrologyUncertaintyTest, SigmaIsTheSpread) {
+  using Matrix7d = Eigen::Matrix<double, 7, 7>;
+  const bool focal_is_refined = GetParam();
+  constexpr double kSigmaPx = 0.3;
+  Camera given, camera;
+  given.model = camera.model = CameraModel::kOpenCV;
+  given.distortion = camera.distortion = {-0.2, 0.05, 1e-3, -5e-4};
+  camera.fx = camera.fy = 800.0;
+  PoseHypothesis h;
+  h.cam_from_world = SlantedPose();
+  const CameraPose& pose = h.cam_from_world;
   Random random(2);
-  // Some full covariance, of 2 mrad and 1 % of the distance or so.
-  Matrix6d root;
-  for (int i = 0; i < 36; ++i) root(i / 6, i % 6) = 1e-3 * random.Normal();
-  root.bottomRows<3>() *= 6.0;
-  std::array<double, 36> covariance;
-  Eigen::Map<Matrix6d>(covariance.data()) = root * root.transpose();
+  // Some full covariance, of 2 mrad, 1 % of the distance and 1 % of the focal length or so.
+  Matrix7d root;
+  for (int i = 0; i < 49; ++i) root(i / 7, i % 7) = 1e-3 * random.Normal();
+  root.middleRows<3>(3) *= 6.0;
+  root.row(6) *= focal_is_refined ? 4.0 : 0.0;
+  const Matrix7d covariance = root * root.transpose();
+  Eigen::Map<Matrix6d>(h.covariance.data()) = covariance.topLeftCorner<6, 6>();
+  if (focal_is_refined) {
+    h.focal_scale = 1.1;
+    h.focal_sigma = std::sqrt(covariance(6, 6));
+    Eigen::Map<Vector6d>(h.focal_covariance.data()) = covariance.topRightCorner<6, 1>();
+  }
+  given.fx = given.fy = camera.fx / h.focal_scale;
 
   // Four corners of a quadrangle, two segments, and a point over the first corner.
   const std::array<Vector3d, 5> corners = {Vector3d(0, 0, 0), Vector3d(1, 0.2, 0),
                                            Vector3d(-1, 1, 0), Vector3d(-0.5, 2, 0),
                                            Vector3d(0, 0, 0.8)};
-  std::array<CalibratedPoint, 5> p;
+  std::array<Vector2d, 5> p;
   for (std::size_t i = 0; i < 5; ++i) {
-    p[i].x = Image(pose, corners[i].x(), corners[i].y(), corners[i].z()).hnormalized();
-    p[i].x_from_pixel = {1.0 / kFocal, 0.0, 0.0, 1.0 / kFocal};
+    const Vector3d seen = Image(pose, corners[i].x(), corners[i].y(), corners[i].z());
+    ASSERT_TRUE(CameraToPixel(camera, seen, &p[i]));
   }
-  const MeasuredSegmentPair segments = {p[0], p[1], p[2], p[3]};
-  std::array<Measurement, 5> m;
-  ASSERT_TRUE(LengthRatio(pose, covariance, segments, kSigmaPx, &m[0]));
-  ASSERT_TRUE(AngleOnPlane(pose, covariance, segments, kSigmaPx, &m[1]));
-  ASSERT_TRUE(LengthOnPlane(pose, covariance, {p[0], p[1]}, kSigmaPx, &m[2]));
-  ASSERT_TRUE(AreaOnPlane(pose, covariance, {p[0], p[1], p[3], p[2]}, kSigmaPx, &m[3]));
-  ASSERT_TRUE(HeightOverPlane(pose, covariance, {p[0], p[4]}, kSigmaPx, &m[4]));
+  std::array<Measurement, 6> m;
+  ASSERT_TRUE(LengthRatio(h, given, {p[0], p[1], p[2], p[3]}, kSigmaPx, &m[0]));
+  ASSERT_TRUE(AngleOnPlane(h, given, {p[0], p[1], p[2], p[3]}, kSigmaPx, &m[1]));
+  ASSERT_TRUE(LengthOnPlane(h, given, {p[0], p[1]}, kSigmaPx, &m[2]));
+  ASSERT_TRUE(AreaOnPlane(h, given, {p[0], p[1], p[3], p[2]}, kSigmaPx, &m[3]));
+  ASSERT_TRUE(HeightOverPlane(h, given, {p[0], p[4]}, kSigmaPx, &m[4]));
+  const auto distance = [](const CameraPose& at, const std::vector<Vector3d>&, double* value) {
+    *value = std::abs(at.rotation.col(2).dot(at.translation));
+    return true;
+  };
+  ASSERT_TRUE(MeasureOnPlane(distance, h, given, {}, kSigmaPx, &m[5]));
+  EXPECT_NEAR(m[2].value, std::hypot(1.0, 0.2), 1e-7);
+  EXPECT_NEAR(m[4].value, 0.8, 1e-7);
 
-  std::array<double, 5> sum{};
+  std::array<double, 6> sum{};
   constexpr int kTrials = 20000;
   for (int trial = 0; trial < kTrials; ++trial) {
-    Vector6d z;
-    for (int k = 0; k < 6; ++k) z[k] = random.Normal();
-    const Vector6d delta = root * z;
+    Eigen::Matrix<double, 7, 1> z;
+    for (int k = 0; k < 7; ++k) z[k] = random.Normal();
+    const Eigen::Matrix<double, 7, 1> delta = root * z;
     CameraPose noisy = pose;
     noisy.rotation = ExpRotation(delta.head<3>()) * pose.rotation;
-    noisy.translation += delta.tail<3>();
+    noisy.translation += delta.segment<3>(3);
+    Camera refined = given;
+    refined.fx = refined.fy = given.fx * (h.focal_scale + delta[6]);
     std::array<Vector3d, 5> x;
     for (std::size_t i = 0; i < 5; ++i) {
       const double dx = random.Normal(), dy = random.Normal();
-      x[i] = (p[i].x + kSigmaPx / kFocal * Vector2d(dx, dy)).homogeneous();
+      CalibratedPoint point;
+      ASSERT_TRUE(PixelToCalibrated(refined, p[i] + kSigmaPx * Vector2d(dx, dy), &point));
+      x[i] = point.Homogeneous();
     }
-    std::array<double, 5> v;
+    std::array<double, 6> v;
     ASSERT_TRUE(LengthRatio(noisy, {x[0], x[1], x[2], x[3]}, &v[0]));
     ASSERT_TRUE(AngleOnPlane(noisy, {x[0], x[1], x[2], x[3]}, &v[1]));
     ASSERT_TRUE(LengthOnPlane(noisy, x[0], x[1], &v[2]));
     ASSERT_TRUE(AreaOnPlane(noisy, {x[0], x[1], x[3], x[2]}, &v[3]));
     ASSERT_TRUE(HeightOverPlane(noisy, x[0], x[4], &v[4]));
-    for (std::size_t k = 0; k < 5; ++k) sum[k] += std::pow(v[k] - m[k].value, 2);
+    ASSERT_TRUE(distance(noisy, {}, &v[5]));
+    for (std::size_t k = 0; k < 6; ++k) sum[k] += std::pow(v[k] - m[k].value, 2);
   }
-  const char* const names[] = {"ratio", "angle", "length", "area", "height"};
-  for (std::size_t k = 0; k < 5; ++k) {
+  const char* const names[] = {"ratio", "angle", "length", "area", "height", "distance"};
+  for (std::size_t k = 0; k < 6; ++k) {
     // 20 000 trials: the spread is known to 0.5 %; the second order adds about one.
     EXPECT_NEAR(m[k].sigma / std::sqrt(sum[k] / kTrials), 1.0, 0.03) << names[k];
     EXPECT_GT(m[k].sigma, 1e-3 * std::abs(m[k].value)) << names[k];
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(FocalLength, MetrologyUncertaintyTest, ::testing::Bool());
 
 }  // namespace
 }  // namespace circline
