@@ -14,7 +14,7 @@ function(circline_own_target target)
     $<$<BOOL:${CIRCLINE_WERROR}>:-Werror>)
   if(CIRCLINE_SANITIZE)
     # GCC guesses wrong on code that the sanitizers have rewritten.
-    target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized)
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   endif()
 endfunction()
 
@@ -77,6 +77,9 @@ function(circline_test folder)
   circline_own_target(${target})
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
   target_compile_definitions(${target} PRIVATE CIRCLINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  if(CIRCLINE_SANITIZE)
+    target_compile_definitions(${target} PRIVATE CIRCLINE_SANITIZED)
+  endif()
   target_link_libraries(${target} PRIVATE ${ARGN} GTest::gtest GTest::gtest_main Threads::Threads)
   gtest_discover_tests(${target} TEST_PREFIX ${folder}. DISCOVERY_MODE PRE_TEST
                        DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)

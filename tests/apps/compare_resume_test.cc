@@ -9,6 +9,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
 #include <string>
@@ -18,6 +19,7 @@
 #include "tests/apps/board_set.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
+#include "tests/trials.h"
 
 namespace circline::apps {
 namespace {
@@ -55,11 +57,7 @@ std::string MakeLongSet(const TestFolder& folder) {
   return folder.Write("scene.yaml", scene + "  - { file: \"gone.png\", camera: \"k\" }\n");
 }
 
-#ifdef __SANITIZE_ADDRESS__
-constexpr int kTrials = 4;  // Each takes seconds.
-#else
-constexpr int kTrials = 20;
-#endif
+constexpr int kTrials = Trials(20);
 
 TEST(CompareResume, KilledAtRandomGivesTheSameBytes) {
   const TestFolder folder;
@@ -159,9 +157,7 @@ long PeakKilobytes(const std::string& photos, const std::string& camera,
 }
 
 TEST(CompareScale, MemoryIsFlatInTheNumberOfImages) {
-#ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "AddressSanitizer keeps freed memory";
-#endif
+  if (kSanitized) GTEST_SKIP() << "sanitizers keep freed memory";
   const TestFolder folder;
   constexpr int kFew = 100, kMany = 2000;
   Board(35.0).Paint(folder / "big.png");

@@ -22,6 +22,7 @@
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
 #include "circline/estimators/vanishing_point.h"
+#include "tests/trials.h"
 
 namespace circline {
 namespace {
@@ -33,11 +34,7 @@ using Eigen::Vector3d;
 long NumCalls() {
   const char* text = std::getenv("CIRCLINE_FUZZ_CALLS");
   if (text != nullptr && std::atol(text) > 0) return std::atol(text);
-#if defined(__SANITIZE_ADDRESS__)
-  return 100000;
-#else
-  return 2000000;
-#endif
+  return Trials(2000000);
 }
 
 // Draws inputs. Each one is bad in its own way: how likely a number is to be strange is drawn once

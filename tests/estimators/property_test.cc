@@ -15,6 +15,7 @@
 #include "circline/estimators/line_pose.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
+#include "tests/trials.h"
 
 namespace circline {
 namespace {
@@ -29,11 +30,7 @@ constexpr double kDegree = kPi / 180.0;
 int NumScenes() {
   const char* text = std::getenv("CIRCLINE_PROPERTY_SCENES");
   if (text != nullptr && std::atoi(text) > 0) return std::atoi(text);
-#if defined(__SANITIZE_ADDRESS__)
-  return 50000;
-#else
-  return 1000000;
-#endif
+  return Trials(1000000);
 }
 
 // A plane with a circle in it, all of which is in front of the camera; the plane's frame; two

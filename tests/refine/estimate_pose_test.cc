@@ -11,6 +11,7 @@
 #include "circline/refine/refined_solvers.h"
 #include "tests/paper_scene.h"
 #include "tests/plane_scene.h"
+#include "tests/trials.h"
 
 namespace circline {
 namespace {
@@ -153,7 +154,7 @@ TEST(EstimatePoseTest, PairsLeaveOutWhatIsKnownOfOthers) {
 // Rotation and translation covariance against the errors of many trials, all kinds of evidence at
 // once.
 TEST(EstimatePoseTest, CovarianceIsHonest) {
-  constexpr int kTrials = 200;
+  constexpr int kTrials = Trials(200);
   PlaneScene scene(0.7, 0.3, 5);
   EstimationOptions options;
   options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
@@ -182,6 +183,7 @@ TEST(EstimatePoseTest, CovarianceIsHonest) {
     translation_nees +=
         translation.dot(C.bottomRightCorner<3, 3>().inverse() * translation) / kTrials;
   }
+  if (kSanitized) return;
   EXPECT_NEAR(rotation_nees, 3.0, 0.5);
   EXPECT_NEAR(translation_nees, 3.0, 0.5);
 }
@@ -319,7 +321,7 @@ TEST(EstimatePoseTest, EvidenceLeftOutIsNamed) {
 // Half of the points of every feature spread over a band: the mask finds most, the loss the rest,
 // and the covariance says what those cost that lie among the inliers.
 double NeesOfBands(LossType loss) {
-  constexpr int kTrials = 150;
+  constexpr int kTrials = Trials(150);
   EstimationOptions options;
   options.conic_loss.type = options.line_loss.type = loss;
   double nees = 0.0;
@@ -366,6 +368,7 @@ double NeesOfBands(LossType loss) {
 TEST(EstimatePoseTest, CovarianceKnowsOfOutliersAmongTheInliers) {
   for (const LossType loss : {LossType::kTukey, LossType::kCauchy}) {
     const double nees = NeesOfBands(loss);
+    if (kSanitized) continue;
     std::printf("half of the points in bands, %s: NEES %.2f\n", LossName(loss), nees);
     EXPECT_GT(nees, 2.4) << LossName(loss);
     EXPECT_LT(nees, 3.9) << LossName(loss);

@@ -15,6 +15,7 @@
 #include "circline/estimators/random.h"
 #include "circline/refine/estimate_pose.h"
 #include "tests/pinhole_camera.h"
+#include "tests/trials.h"
 
 namespace circline {
 namespace {
@@ -167,7 +168,7 @@ class PencilsTest : public ::testing::TestWithParam<PencilCase> {};
 TEST_P(PencilsTest, RotationSitsOnItsBound) {
   const PencilCase c = GetParam();
   constexpr double kAngleSigma = 0.6 * kDegree;  // How far real buildings are off.
-  constexpr int kTrials = 1500;
+  constexpr int kTrials = Trials(1500);
   constexpr double kNearlyLinear = 3.0 * kDegree;  // Scenes whose bound is a bound.
   Random random(21);
   double square = 0.0, bound = 0.0, nees = 0.0;
@@ -186,6 +187,7 @@ TEST_P(PencilsTest, RotationSitsOnItsBound) {
     nees += error.dot(best.Covariance().topLeftCorner<3, 3>().inverse() * error) / kTrials;
     ++i;
   }
+  if (kSanitized) return;
   const char* const names[] = {"known", "known to 0.6 degrees", "unknown"};
   std::printf("2 x %2d lines, angle %s: rms %.3f degrees, bound %.3f, ratio %.3f, NEES %.2f\n",
               c.lines, names[static_cast<int>(c.angle)], std::sqrt(square) / kDegree,
