@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <set>
 #include <thread>

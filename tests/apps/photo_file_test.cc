@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <opencv2/imgcodecs.hpp>
+#include <vector>
 
 #include "tests/apps/test_files.h"
 
