@@ -2,118 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
+#include <algorithm>
 #include <climits>
-#include <cstdlib>
-#include <new>
-#include <set>
+#include <cmath>
+#include <vector>
 
-#include "circline/ransac/conic_model.h"
-#include "circline/ransac/direction_models.h"
-#include "circline/ransac/line_model.h"
-#include "circline/ransac/oriented_conic_model.h"
-#include "circline/ransac/pencil_model.h"
-#include "tests/ransac/conic_scene.h"
-#include "tests/ransac/segment_scene.h"
-
-namespace {
-// Allocations of the whole program: the engine promises none after its set-up.
-std::atomic<int> allocations{0};
-
-void* Allocate(std::size_t size) {
-  ++allocations;
-  void* p = std::malloc(size > 0 ? size : 1);
-  if (p == nullptr) throw std::bad_alloc();
-  return p;
-}
-}  // namespace
-
-void* operator new(std::size_t size) { return Allocate(size); }
-void* operator new[](std::size_t size) { return Allocate(size); }
-// The standard library's temporary buffers come from here.
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  ++allocations;
-  return std::malloc(size > 0 ? size : 1);
-}
-void operator delete(void* p, const std::nothrow_t&) noexcept { std::free(p); }
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete[](void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
+#include "tests/ransac/location_model.h"
 
 namespace circline {
 namespace {
-
-// The location of scalars: two equal enough ones make a sample, their mean the model. It keeps a
-// record of how it was called.
-class Location {
- public:
-  using Value = std::array<double, 1>;
-  static constexpr int kMinSamples = 2;
-
-  explicit Location(std::vector<double> data) : data_(std::move(data)) {}
-
-  int NumData() const { return static_cast<int>(data_.size()); }
-  bool Fit(const int* sample, Value* value) const {
-    if (fits_++ == 0) allocations_at_first_fit_ = allocations;
-    if (always_degenerate_) return false;
-    const double a = Datum(sample[0]), b = Datum(sample[1]);
-    EXPECT_NE(sample[0], sample[1]);
-    if (seconds_per_fit_ > 0.0) Wait();
-    const bool all_inliers = std::abs(a) < 10.0 && std::abs(b) < 10.0;
-    if (all_inliers && first_good_ == 0) first_good_ = fits_;
-    *value = {0.5 * (a + b)};
-    return std::abs(a - b) < 10.0;
-  }
-  void SquaredResiduals(const Value& value, int begin, int end, float* r2) const {
-    for (int i = begin; i < end; ++i) {
-      const double r = Datum(i) - value[0];
-      *r2++ = static_cast<float>(r * r);
-    }
-  }
-  bool Refine(const float* weights, Value* value) const {
-    double sum = 0.0, mean = 0.0;
-    for (int i = 0; i < NumData(); ++i) {
-      const double w = static_cast<double>(weights[i]);
-      sum += w;
-      mean += w * Datum(i);
-    }
-    if (!(sum > 0.0)) return false;
-    *value = {mean / sum};
-    return true;
-  }
-  bool Accept(const Value& value, double /*threshold*/) const { return value[0] < accept_below_; }
-
-  double Datum(int i) const { return data_[static_cast<std::size_t>(i)]; }
-
-  bool always_degenerate_ = false;
-  double seconds_per_fit_ = 0.0;
-  double accept_below_ = std::numeric_limits<double>::infinity();
-  mutable int fits_ = 0, first_good_ = 0, allocations_at_first_fit_ = 0;
-
- private:
-  void Wait() const {
-    const auto start = std::chrono::steady_clock::now();
-    while (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() <
-           seconds_per_fit_) {
-    }
-  }
-
-  std::vector<double> data_;
-};
-
-// `inliers` values about 0 with standard deviation `sigma`, the rest 100 apart from each other.
-Location MakeData(int n, int inliers, double sigma, std::vector<int>* order = nullptr) {
-  const std::vector<int> position = RandomOrder(n, 7);
-  std::vector<double> data(static_cast<std::size_t>(n));
-  Random random(3);
-  for (int i = 0; i < n; ++i) {
-    data[static_cast<std::size_t>(position[static_cast<std::size_t>(i)])] =
-        i < inliers ? sigma * random.Normal() : 100.0 * (i + 1);
-  }
-  if (order != nullptr) *order = position;
-  return Location(data);
-}
 
 TEST(RequiredIterations, IsHypergeometric) {
   // p = (5 4) / (10 9) = 2 / 9; log 0.01 / log(7 / 9) = 18.3.
@@ -303,7 +200,7 @@ TEST(Ransac, LocalOptimizationImprovesTheScore) {
   Ransac<Location>(options).Run(model, &with);
   options.local_steps = 0;
   Ransac<Location>(options).Run(model, &without);
-  EXPECT_LE(with.score, without.score);
+  EXPECT_LT(with.score, without.score);
   EXPECT_EQ(without.num_local_optimizations, 0);
   EXPECT_NEAR(with.model[0], 0.0, 0.1);
 }
@@ -320,62 +217,6 @@ TEST(Ransac, SameSeedSameBits) {
   EXPECT_EQ(a.score, b.score);
   EXPECT_EQ(a.num_iterations, b.num_iterations);
   EXPECT_EQ(a.inlier_mask, b.inlier_mask);
-}
-
-TEST(Ransac, AllocatesNothingAfterSetUp) {
-  for (const ScoreType score : {ScoreType::kMsac, ScoreType::kMagsac}) {
-    std::vector<int> order;
-    const Location model = MakeData(500, 100, 0.4, &order);
-    RansacOptions options;
-    options.score = score;
-    Ransac<Location> engine(options);
-    Ransac<Location>::Report report;
-    engine.Run(model, &report);
-    EXPECT_GT(report.num_local_optimizations, 0);
-    EXPECT_EQ(model.allocations_at_first_fit_, allocations);
-    // Used again, it allocates nothing at all.
-    const int before = allocations;
-    engine.Run(model, &report);
-    engine.Run(model, &report, &order);
-    EXPECT_EQ(before, allocations);
-  }
-}
-
-template <typename Model>
-void ExpectNoAllocations(const Model& model, double threshold) {
-  RansacOptions options;
-  options.threshold = threshold;
-  options.max_iterations = 2000;
-  Ransac<Model> engine(options);
-  typename Ransac<Model>::Report report;
-  engine.Run(model, &report);
-  EXPECT_TRUE(report.success);
-  EXPECT_GT(report.num_local_optimizations, 0);
-  const int before = allocations;
-  engine.Run(model, &report);
-  EXPECT_EQ(before, allocations);
-}
-
-TEST(Ransac, TheModelsAllocateNothingInTheLoop) {
-  const conic_scene::Scene contour = conic_scene::MakeScene(1, 0.5);
-  const ConicModel conic(contour.points, ConicLimits());
-  const ConicModel oriented(contour.points, ConicLimits(), &contour.directions);
-  ExpectNoAllocations(conic, 3.03);
-  ExpectNoAllocations(OrientedConicModel(oriented), 3.03);
-  ExpectNoAllocations(LineModel(contour.points), 3.03);
-  Random random(1);
-  const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
-  std::vector<LineFit> lines;
-  std::vector<int> indices;
-  for (int i = 0; i < 60; ++i) {
-    const Eigen::Vector3d v = R.col(i % 2);
-    segment_scene::AddSegment(i < 40 ? &v : nullptr, &random, &lines);
-    indices.push_back(i);
-  }
-  const PencilModel pencil(lines, indices, 0.0);
-  ExpectNoAllocations(pencil, 3.03);
-  ExpectNoAllocations(OrthogonalTripletModel(pencil), 3.03);
-  ExpectNoAllocations(DirectionPairModel(pencil), 3.03);
 }
 
 TEST(Ransac, ProsacFindsGoodDataFirst) {

@@ -1,0 +1,116 @@
+// The engine promises to allocate nothing after its set-up, whatever the model.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+#include <utility>
+#include <vector>
+
+#include "circline/ransac/conic_model.h"
+#include "circline/ransac/direction_models.h"
+#include "circline/ransac/line_model.h"
+#include "circline/ransac/oriented_conic_model.h"
+#include "circline/ransac/pencil_model.h"
+#include "circline/ransac/ransac.h"
+#include "tests/ransac/conic_scene.h"
+#include "tests/ransac/location_model.h"
+#include "tests/ransac/segment_scene.h"
+
+namespace {
+// Allocations of the whole program.
+std::atomic<int> allocations{0};
+
+void* Allocate(std::size_t size) {
+  ++allocations;
+  void* p = std::malloc(size > 0 ? size : 1);
+  if (p == nullptr) throw std::bad_alloc();
+  return p;
+}
+}  // namespace
+
+void* operator new(std::size_t size) { return Allocate(size); }
+void* operator new[](std::size_t size) { return Allocate(size); }
+// The standard library's temporary buffers come from here.
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  ++allocations;
+  return std::malloc(size > 0 ? size : 1);
+}
+void operator delete(void* p, const std::nothrow_t&) noexcept { std::free(p); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete[](void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
+
+namespace circline {
+namespace {
+
+// Remembers how many there were when the engine's loop began.
+class WatchedLocation : public Location {
+ public:
+  explicit WatchedLocation(Location location) : Location(std::move(location)) {}
+  bool Fit(const int* sample, Value* value) const {
+    if (fits_ == 0) allocations_at_first_fit_ = allocations;
+    return Location::Fit(sample, value);
+  }
+  mutable int allocations_at_first_fit_ = 0;
+};
+
+TEST(Ransac, AllocatesNothingAfterSetUp) {
+  for (const ScoreType score : {ScoreType::kMsac, ScoreType::kMagsac}) {
+    std::vector<int> order;
+    const WatchedLocation model(MakeData(500, 100, 0.4, &order));
+    RansacOptions options;
+    options.score = score;
+    Ransac<WatchedLocation> engine(options);
+    Ransac<WatchedLocation>::Report report;
+    engine.Run(model, &report);
+    EXPECT_GT(report.num_local_optimizations, 0);
+    EXPECT_EQ(model.allocations_at_first_fit_, allocations);
+    // Used again, it allocates nothing at all.
+    const int before = allocations;
+    engine.Run(model, &report);
+    engine.Run(model, &report, &order);
+    EXPECT_EQ(before, allocations);
+  }
+}
+
+template <typename Model>
+void ExpectNoAllocations(const Model& model, double threshold) {
+  RansacOptions options;
+  options.threshold = threshold;
+  options.max_iterations = 2000;
+  Ransac<Model> engine(options);
+  typename Ransac<Model>::Report report;
+  engine.Run(model, &report);
+  EXPECT_TRUE(report.success);
+  EXPECT_GT(report.num_local_optimizations, 0);
+  const int before = allocations;
+  engine.Run(model, &report);
+  EXPECT_EQ(before, allocations);
+}
+
+TEST(Ransac, TheModelsAllocateNothingInTheLoop) {
+  const conic_scene::Scene contour = conic_scene::MakeScene(1, 0.5);
+  const ConicModel conic(contour.points, ConicLimits());
+  const ConicModel oriented(contour.points, ConicLimits(), &contour.directions);
+  ExpectNoAllocations(conic, 3.03);
+  ExpectNoAllocations(OrientedConicModel(oriented), 3.03);
+  ExpectNoAllocations(LineModel(contour.points), 3.03);
+  Random random(1);
+  const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
+  std::vector<LineFit> lines;
+  std::vector<int> indices;
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::Vector3d v = R.col(i % 2);
+    segment_scene::AddSegment(i < 40 ? &v : nullptr, &random, &lines);
+    indices.push_back(i);
+  }
+  const PencilModel pencil(lines, indices, 0.0);
+  ExpectNoAllocations(pencil, 3.03);
+  ExpectNoAllocations(OrthogonalTripletModel(pencil), 3.03);
+  ExpectNoAllocations(DirectionPairModel(pencil), 3.03);
+}
+
+}  // namespace
+}  // namespace circline
