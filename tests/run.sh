@@ -4,19 +4,22 @@
 # package. The last line is `N passed, N failed`; the exit code is 0 if none failed.
 #
 #   tests/run.sh              the tests
-#   tests/run.sh --sanitize   the same under AddressSanitizer and UBSan, in build/sanitize
+#   tests/run.sh --sanitize   the same under AddressSanitizer and UBSan, built with clang in
+#                             build/sanitize; few trials where many serve a statistic only, and no
+#                             installed package
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/setup.sh
 
 preset=release
+packages=("${BUILD_PACKAGES[@]}")
 case "$*" in
   "") ;;
-  --sanitize) preset=sanitize ;;
+  --sanitize) preset=sanitize packages+=(clang libclang-rt-dev) ;;
   *) fail "usage: tests/run.sh [--sanitize]" ;;
 esac
 
-install_packages "${BUILD_PACKAGES[@]}"
+install_packages "${packages[@]}"
 build "$preset"
 
 log=build/$preset-tests.log
