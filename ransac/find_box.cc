@@ -28,9 +28,9 @@ struct Readiness {
 // To be sure that there is a box; and then for all of its edges, with rounded and hidden corners.
 constexpr Readiness kFind{1.0, -2.0}, kComplete{2.0, -1.0};
 // Least odds of a box, kLogCorners times the logarithm of the number of corners in the photo beyond
-// kLogOddsOfNone: by accident one in sixty normals has as much, whatever the photo (200 random
-// normals in each of 100 photographs). And by how much the odds exceed those of a box on the other
-// plane.
+// kLogOddsOfNone: by accident 2 to 3 normals in 100 have as much, on photos of few lines and of
+// many (the test RealPhotographs.BoxesAreRare*). And by how much the odds exceed those of a box on
+// the other plane.
 constexpr double kLogCorners = 2.0;
 constexpr double kLogOddsOfNone = -5.0;
 constexpr double kMinLogMargin = 2.0;
