@@ -59,6 +59,14 @@ def check_choice(name, solver, stage, share):
           right >= share * num_photos(name), f'{right} of {num_photos(name)}')
 
 
+def check_sure_axes(name, least, limit_deg):
+    """In how many photos the axes are known, and that none of these is farther off."""
+    errors = [lines[0]['rotation_error_deg'] for lines in select(name, 'joint', 'refined')
+              if lines[0]['rotation_error_deg'] is not None]
+    check(f'{name}: axes found', len(errors) >= least, f'{len(errors)} of {num_photos(name)}')
+    check(f'{name}: the worst of these axes', max(errors, default=0.0) <= limit_deg, f'{max(errors, default=0.0):.2f} <= {limit_deg}')
+
+
 def check_files(name):
     out = os.path.join(DEMO, name, 'out')
     files = ['results.jsonl', 'observations.jsonl', 'summary.csv', 'report.html', 'timings.jsonl']
@@ -93,7 +101,7 @@ def check_lines(name):
     check(f'{name}: lines of results.jsonl', not bad, bad[0] if bad else 'sound')
 
 
-for scene in ('chessboard', 'disc', 'dots'):
+for scene in ('chessboard', 'disc', 'box', 'dots'):
     check_files(scene)
     check_lines(scene)
 
@@ -103,6 +111,8 @@ check_error('disc', 'joint', 'refined', 'rotation_error_deg', 0.2)
 check_error('disc', 'circle_center', 'refined', 'normal_error_deg', 0.2)
 check_error('disc', 'single_circle', 'closed_form', 'normal_error_deg', 0.2, 'better')
 check_error('dots', 'joint', 'refined', 'normal_error_deg', 0.3)
+check_error('box', 'joint', 'refined', 'normal_error_deg', 0.3)
+check_sure_axes('box', 8, 1.0)
 check_choice('disc', 'circle_center', 'refined', 0.95)
 
 print(f'{passed} passed, {failed} failed')

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Shows circline on real photographs, on Debian 12: installs the packages that are missing, builds in
 # build/release, fetches the photographs (they come with two Debian packages), runs circline_compare
-# on the three sets described in apps/demo/*.yaml and circline_reconstruct on one photograph. The
+# on the four sets described in apps/demo/*.yaml and circline_reconstruct on one photograph. The
 # results are in build/demo.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -57,6 +57,7 @@ find_folder opencv-doc /usr/share/doc/opencv-doc/examples/data
 compare chessboard "$found"
 find_folder visp-images-data /usr/share/visp-images-data/ViSP-images
 compare disc "$found/mire-2"
+compare box "$found/mire-2"
 compare dots "$found/calibration"
 
 echo
@@ -67,6 +68,6 @@ cat build/demo/disc/model/measurements.csv
 
 echo
 say "the reports, with a picture of every photograph:"
-for set in chessboard disc dots; do
+for set in chessboard disc box dots; do
   echo "  $PWD/build/demo/$set/out/report.html"
 done

@@ -28,6 +28,8 @@ constexpr double kMinSpanningShare = 0.3;
 constexpr double kMinRectangularShare = 0.1;
 // A further pencil of the plane meets its lines over this share of its length.
 constexpr double kMinMeetingShare = 0.4;
+// Or lies in the convex hull of its circles, widened by this factor: a plate reaches beyond them.
+constexpr double kCirclesGrowth = 2.0;
 // The rim of a circle that agrees with two pencils counts as much as this many times its length in
 // lines: it is rarer than a line, and fixes both directions.
 constexpr double kCircleWeight = 3.0;
@@ -251,15 +253,32 @@ class Assembler {
   }
 
   // Any direction lies in a plane to within a few degrees once in ten times, by accident. So its
-  // lines must also meet those that span the plane; or, where circles are all there is, two of them
-  // at least must have settled the normal (one leaves two, which doubles the accidents).
+  // lines must also meet those that span the plane; or, where circles are all there is, be among
+  // them, and two of them at least must have settled the normal (one leaves two, which doubles the
+  // accidents).
   bool BelongsTo(const Plane& plane, const PlacedPencil& pencil) const {
-    if (plane.pencils[0] < 0) return plane.circles.size() >= 2;
+    if (plane.pencils[0] < 0) return plane.circles.size() >= 2 && IsAmongCircles(plane, pencil);
     double meeting = 0.0;
     for (const int i : plane.pencils) {
       meeting += MeetingLength(pencil.ends, pencils_[static_cast<std::size_t>(i)].ends);
     }
     return meeting >= kMinMeetingShare * pencil.support_px;
+  }
+
+  bool IsAmongCircles(const Plane& plane, const PlacedPencil& pencil) const {
+    std::vector<Eigen::Vector2d> points;
+    for (const int i : plane.circles) {
+      const auto& contour = circles_[static_cast<std::size_t>(i)].observation.points;
+      points.insert(points.end(), contour.begin(), contour.end());
+    }
+    const ConvexRegion region(std::move(points), kCirclesGrowth);
+    double inside = 0.0, total = 0.0;
+    for (const Segment& s : pencil.ends) {
+      const double length = (s[1] - s[0]).norm();
+      total += length;
+      inside += region.Contains(s) ? length : 0.0;
+    }
+    return inside >= kMinMeetingShare * total;
   }
 
   // The strongest pencil of the plane is the candidate for x, the strongest one orthogonal to it y.

@@ -26,13 +26,13 @@ struct Readiness {
   double max_gap, log_odds;
 };
 // To be sure that there is a box; and then for all of its edges, with rounded and hidden corners.
-constexpr Readiness kFind{1.0, -2.0}, kComplete{2.0, -1.0};
+constexpr Readiness kFind{1.5, -1.5}, kComplete{2.0, -1.0};
 // Least odds of a box, kLogCorners times the logarithm of the number of corners in the photo beyond
-// kLogOddsOfNone: by accident 2 to 3 normals in 100 have as much, on photos of few lines and of
+// kLogOddsOfNone: by accident one normal in a hundred has as much, on photos of few lines and of
 // many (the test RealPhotographs.BoxesAreRare*). And by how much the odds exceed those of a box on
 // the other plane.
 constexpr double kLogCorners = 2.0;
-constexpr double kLogOddsOfNone = -5.0;
+constexpr double kLogOddsOfNone = -4.0;
 constexpr double kMinLogMargin = 2.0;
 // Angles about the normal that are tried: one in half a degree.
 constexpr int kAngles = 180;
@@ -159,7 +159,8 @@ class BoxSearch {
     }
   }
 
-  // The likeliest set of edges that corners between different axes connect, if all axes are in it.
+  // The likeliest set of edges that corners between different axes connect. Each two of the axes
+  // have a corner in common: only lines that differ in the photo can be told from one another.
   void Consider(const Matrix3d& axes, const Readiness& readiness, Box* best) {
     Assign(axes, readiness.log_odds);
     std::fill(seen_.begin(), seen_.end(), char{0});
@@ -168,6 +169,7 @@ class BoxSearch {
       Box box;
       box.axes = axes;
       box.log_odds = 0.0;
+      std::array<bool, 3> have_corner{};  // Of the axes other than the index.
       queue_.assign(1, static_cast<int>(start));
       seen_[start] = 1;
       while (!queue_.empty()) {
@@ -177,14 +179,14 @@ class BoxSearch {
         box.edges[static_cast<std::size_t>(axis_[i])].push_back(static_cast<int>(i));
         for (const Corner& corner : edges_[i].corners) {
           const std::size_t j = static_cast<std::size_t>(corner.edge);
-          if (corner.gap > readiness.max_gap || seen_[j] || gain_[j] <= 0.0 || axis_[j] == axis_[i])
-            continue;
+          if (corner.gap > readiness.max_gap || gain_[j] <= 0.0 || axis_[j] == axis_[i]) continue;
+          have_corner[static_cast<std::size_t>(3 - axis_[i] - axis_[j])] = true;
+          if (seen_[j]) continue;
           seen_[j] = 1;
           queue_.push_back(corner.edge);
         }
       }
-      const bool is_box =
-          std::none_of(box.edges.begin(), box.edges.end(), [](const auto& e) { return e.empty(); });
+      const bool is_box = have_corner[0] && have_corner[1] && have_corner[2];
       if (is_box && box.log_odds > best->log_odds) *best = std::move(box);
     }
   }

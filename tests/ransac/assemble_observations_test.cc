@@ -32,10 +32,11 @@ DetectedPencil Pencil(const Vector3d& direction, double support) {
 }
 
 // A circle of the plane with this normal, its conic known as a rim of 100 px radius would be.
-CircleEvidence Circle(const Vector3d& normal, double support) {
+CircleEvidence Circle(const Vector3d& normal, double support,
+                      const Vector3d& center = Vector3d(0.5, 0.2, 6.0)) {
   CirclePose pose;
   pose.normal = normal.z() > 0.0 ? Vector3d(-normal.normalized()) : normal.normalized();
-  pose.center = Vector3d(0.5, 0.2, 6.0);
+  pose.center = center;
   ConicFit fit;
   fit.conic = ProjectCircle(pose);
   const Vector6d v = ConicToVector(fit.conic);
@@ -164,6 +165,22 @@ TEST(AssembleObservations, TwoPencilsOfAPlaneNeedNoBox) {
       Assemble({}, {Pencil(kFrame.col(0), 500.0), Pencil(kFrame.col(1), 400.0)}, 3, edges);
   ASSERT_EQ(found.pencils.size(), 2U);
   EXPECT_LT(AxisDeg(found.pencils[0].fit->direction, kFrame.col(0)), 0.1);
+}
+
+// Of directions in their plane only those of lines among them: others are so by accident.
+TEST(AssembleObservations, LinesFarFromAPlanesCirclesAreNotInIt) {
+  for (const bool is_far : {false, true}) {
+    std::vector<CircleEvidence> circles;
+    for (int k = 0; k < 3; ++k) {
+      circles.push_back(Circle(kFrame.col(2), 300.0, Vector3d(2.0 * k - 2.0, 1.0 * k, 6.0)));
+      circles.back().observation.points = {{100.0 * k, 0.0}, {100.0 * k, 50.0}};
+    }
+    DetectedPencil pencil = Pencil(kFrame.col(0), 200.0);
+    for (Eigen::Vector2d& end : pencil.ends[0]) end.y() += is_far ? 200.0 : 25.0;
+    const Observations found = Assemble(circles, {pencil});
+    ASSERT_EQ(found.pencils.size(), 1U);
+    EXPECT_EQ(found.pencils[0].plane, is_far ? "" : "p0");
+  }
 }
 
 TEST(AssembleObservations, KeepsNoMorePencilsThanAsked) {
