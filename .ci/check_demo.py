@@ -62,9 +62,10 @@ def check_choice(name, solver, stage, share):
 def check_sure_axes(name, least, limit_deg):
     """In how many photos the axes are known, and that none of these is farther off."""
     errors = [lines[0]['rotation_error_deg'] for lines in select(name, 'joint', 'refined')
-              if lines[0]['rotation_error_deg'] is not None]
+              if 'rotation_error_deg' in lines[0]]
     check(f'{name}: axes found', len(errors) >= least, f'{len(errors)} of {num_photos(name)}')
-    check(f'{name}: the worst of these axes', max(errors, default=0.0) <= limit_deg, f'{max(errors, default=0.0):.2f} <= {limit_deg}')
+    worst = max(errors, default=0.0)
+    check(f'{name}: the worst of these axes', worst <= limit_deg, f'{worst:.2f} <= {limit_deg}')
 
 
 def check_files(name):
