@@ -17,7 +17,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kMinSingleTurn = 50.0 * kPi / 180.0;
 // Arcs that take part in pairs: the most bent and longest ones. Bounds the quadratic step.
 constexpr std::size_t kMaxPairedArcs = 256;
-constexpr std::size_t kMaxPairCandidates = 1000;
+// Pairs tried, the most promising ones: what comes after them has not added an ellipse.
+constexpr std::size_t kMaxPairCandidates = 500;
 // Parts of an arc that are tried where the whole is no ellipse, in sixths.
 constexpr std::array<std::array<int, 2>, 4> kArcParts = {{{0, 5}, {1, 6}, {0, 3}, {3, 6}}};
 constexpr int kMinPartPoints = 12;

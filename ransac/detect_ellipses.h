@@ -52,7 +52,7 @@ struct DetectedEllipse {
       -1;  // Ellipses with the same number can be circles about one centre; -1 = alone.
 };
 
-// Best supported first. `camera` must be valid. About 5 ms for a 640x480 photo.
+// Best supported first. `camera` must be valid. About 4 ms for a 640x480 photo.
 Status DetectEllipses(const EdgeMap& edges, const Camera& camera, const EllipseOptions& options,
                       std::vector<DetectedEllipse>* ellipses);
 
