@@ -5,20 +5,11 @@
 #include <cmath>
 #include <limits>
 
-#include "circline/ransac/calibrated_edges.h"
+#include "circline/ransac/line_pieces.h"
 
 namespace circline {
 namespace {
 
-// A piece starts from this many consecutive points on one line, and has at least this length:
-// below, any smooth curve passes for straight.
-constexpr int kSeedPoints = 9;
-constexpr double kMinPiecePx = 10.0;
-// All but straight: a sagitta of up to this many pixels, and this share of the length.
-constexpr double kMaxBentPx = 1.2;
-constexpr double kMaxBentShare = 0.018;
-// So many points in a row off the line end a piece; fewer are noise.
-constexpr int kMaxMisses = 2;
 // Pieces are joined if the gap between them is not longer than the shorter of the two, nor than
 // this many pixels; an overlap up to kMaxOverlapPx is what rounded corners and crossings cause.
 constexpr double kMaxGapPx = 100.0;
@@ -40,63 +31,6 @@ constexpr double kMinSigmaPx = 0.1;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// (cos t, sin t) for cos 2t and sin 2t given up to a factor; cos t is not negative.
-Vector2d MainAxis(double cosine, double sine) {
-  const double length = std::sqrt(cosine * cosine + sine * sine);
-  if (!(length > 0.0)) return {1.0, 0.0};
-  const double side = sine < 0.0 ? -1.0 : 1.0;
-  // Of the two forms of the half angle the one in which nothing cancels.
-  const Vector2d axis = cosine >= 0.0 ? Vector2d(length + cosine, sine)
-                                      : Vector2d(side * sine, side * (length - cosine));
-  return axis.normalized();
-}
-
-// Sums of calibrated points, about a shift near them so that nothing cancels.
-class Moments {
- public:
-  explicit Moments(const Vector2d& shift = Vector2d::Zero()) : shift_(shift) {}
-
-  void Add(const Vector2d& point) {
-    const Vector2d p = point - shift_;
-    ++n_;
-    sum_ += p;
-    xx_ += p.x() * p.x();
-    xy_ += p.x() * p.y();
-    yy_ += p.y() * p.y();
-  }
-
-  int count() const { return n_; }
-  Vector2d Mean() const { return shift_ + sum_ / n_; }
-
-  // Total least squares line, unit normal; its direction to `along`.
-  Vector3d Line(Vector2d* along) const {
-    const Vector2d mean = sum_ / n_;
-    const double a = xx_ / n_ - mean.x() * mean.x();
-    const double b = xy_ / n_ - mean.x() * mean.y();
-    const double c = yy_ / n_ - mean.y() * mean.y();
-    *along = MainAxis(a - c, 2.0 * b);
-    const Vector2d normal(-along->y(), along->x());
-    return {normal.x(), normal.y(), -normal.dot(mean + shift_)};
-  }
-
- private:
-  Vector2d shift_;
-  int n_ = 0;
-  Vector2d sum_ = Vector2d::Zero();
-  double xx_ = 0.0, xy_ = 0.0, yy_ = 0.0;
-};
-
-// A run of edge points on one line.
-struct Piece {
-  int begin = 0, end = 0;       // Points of the map (all usable, in order).
-  Vector3d line;                // Calibrated; unit normal.
-  Vector2d along;               // Its direction.
-  double from = 0.0, to = 0.0;  // Positions of its ends along it, calibrated.
-  double length_px = 0.0;
-  Vector2d first_px, last_px;
-  Vector2d gradient;  // At its middle, unit.
-};
-
 // The first point of a piece, calibrated, and no less than what kMaxAlternatingPx are there.
 struct Beginning {
   double x, y, reach;
@@ -107,23 +41,23 @@ struct Joined {
   std::vector<int> pieces;
   Vector2d gradient;        // Of the first piece.
   bool alternates = false;  // The bright side is not the same on all pieces.
-  Moments moments;
+  LineMoments moments;
   Vector3d line;
   Vector2d along;
   // The parts that the pieces cover, along the line.
   std::vector<std::array<double, 2>> covered;
 };
 
-class LineDetector {
+class LineJoiner {
  public:
-  LineDetector(const EdgeMap& map, const Camera& camera, const LineOptions& options,
-               const std::vector<std::uint8_t>* skip)
-      : map_(map), options_(options), skip_(skip), calibrated_edges_(map, camera) {}
+  LineJoiner(const LineEdges& edges, const LineOptions& options)
+      : edges_(edges), options_(options) {}
 
   std::vector<DetectedLine> Straight() {
-    for (const EdgeChain& chain : map_.chains) CutChain(chain);
-    std::stable_sort(pieces_.begin(), pieces_.end(),
-                     [](const Piece& a, const Piece& b) { return a.length_px > b.length_px; });
+    CutIntoPieces(edges_, options_, &pieces_, &bent_);
+    std::stable_sort(pieces_.begin(), pieces_.end(), [](const LinePiece& a, const LinePiece& b) {
+      return a.length_px > b.length_px;
+    });
     JoinPieces();
     return Longest();
   }
@@ -148,118 +82,9 @@ class LineDetector {
     return lines;
   }
 
-  // Of usable points.
-  CalibratedPoint X(int i) const {
-    CalibratedPoint point;
-    calibrated_edges_.Get(i, &point);
-    return point;
-  }
-  Vector2d Pixel(int i) const { return map_.points[static_cast<std::size_t>(i)].Position(); }
-  bool Usable(int i) const {
-    if (skip_ != nullptr && (*skip_)[static_cast<std::size_t>(i)]) return false;
-    CalibratedPoint point;
-    return calibrated_edges_.Get(i, &point);
-  }
-  double Distance(int i, const Vector3d& line) const {
-    return std::abs(LineDistancePx(X(i), line));
-  }
-
-  // Greedily, from the first point on: seed, grow, go on behind.
-  void CutChain(const EdgeChain& chain) {
-    int i = chain.begin;
-    while (i + kSeedPoints <= chain.end) {
-      Piece piece;
-      if (!Seed(i, &piece)) {
-        i += 2;
-        continue;
-      }
-      Grow(chain, &piece);
-      Keep(&piece);
-      i = piece.end;
-    }
-  }
-
-  bool Seed(int begin, Piece* piece) {
-    if (!Usable(begin)) return false;
-    moments_ = Moments(X(begin).x);
-    for (int i = begin; i < begin + kSeedPoints; ++i) {
-      if (!Usable(i)) return false;
-      moments_.Add(X(i).x);
-    }
-    piece->begin = begin;
-    piece->end = begin + kSeedPoints;
-    piece->line = moments_.Line(&piece->along);
-    for (int i = piece->begin; i < piece->end; ++i) {
-      // Seeds are stricter than growth: they carry no average yet.
-      if (Distance(i, piece->line) > 0.75 * options_.max_distance_px) return false;
-    }
-    return true;
-  }
-
-  void Grow(const EdgeChain& chain, Piece* piece) {
-    int misses = 0, refit_at = kSeedPoints + 2;
-    for (int i = piece->end; i < chain.end && Usable(i) && misses <= kMaxMisses; ++i) {
-      if (Distance(i, piece->line) > options_.max_distance_px) {
-        ++misses;
-        continue;
-      }
-      misses = 0;
-      moments_.Add(X(i).x);
-      piece->end = i + 1;
-      if (moments_.count() < refit_at) continue;
-      piece->line = moments_.Line(&piece->along);
-      refit_at = moments_.count() + std::max(2, moments_.count() / 8);
-    }
-    piece->line = moments_.Line(&piece->along);
-  }
-
-  void Keep(Piece* piece) {
-    piece->first_px = Pixel(piece->begin);
-    piece->last_px = Pixel(piece->end - 1);
-    piece->length_px = (piece->last_px - piece->first_px).norm();
-    const int middle = (piece->begin + piece->end) / 2;
-    piece->gradient = map_.points[static_cast<std::size_t>(middle)].Normal();
-    if (piece->length_px < kMinPiecePx) return;
-    const double sagitta = SagittaPx(*piece);
-    if (sagitta >
-        std::max(options_.max_sagitta_px, std::min(kMaxBentPx, kMaxBentShare * piece->length_px))) {
-      return;
-    }
-    SetRange(piece->along, *piece, &piece->from, &piece->to);
-    (sagitta <= options_.max_sagitta_px ? pieces_ : bent_).push_back(*piece);
-  }
-
-  // Where a piece lies along a line.
-  void SetRange(const Vector2d& along, const Piece& piece, double* from, double* to) const {
-    const double a = along.dot(X(piece.begin).x), b = along.dot(X(piece.end - 1).x);
-    *from = std::min(a, b);
-    *to = std::max(a, b);
-  }
-
-  // The middle half of the points on one side of the line and the ends on the other is a curve.
-  double SagittaPx(const Piece& piece) const {
-    const int n = piece.end - piece.begin;
-    double middle = 0.0, ends = 0.0;
-    int num_middle = 0, num_ends = 0;
-    for (int k = 0; k < n; ++k) {
-      const double d = LineDistancePx(X(piece.begin + k), piece.line);
-      if (std::abs(d) > options_.max_distance_px) continue;
-      if (4 * k >= n && 4 * k < 3 * n) {
-        middle += d;
-        ++num_middle;
-      } else {
-        ends += d;
-        ++num_ends;
-      }
-    }
-    if (num_middle == 0 || num_ends == 0) return std::numeric_limits<double>::infinity();
-    // For a parabola the two means differ by half its sagitta.
-    return 2.0 * std::abs(middle / num_middle - ends / num_ends);
-  }
-
   void JoinPieces() {
     std::vector<std::uint8_t> used(pieces_.size(), 0);
-    for (const Piece& piece : pieces_) beginnings_.push_back(BeginningOf(piece));
+    for (const LinePiece& piece : pieces_) beginnings_.push_back(BeginningOf(piece));
     for (std::size_t k = 0; k < pieces_.size(); ++k) {
       if (used[k]) continue;
       used[k] = 1;
@@ -281,8 +106,8 @@ class LineDetector {
     }
   }
 
-  Beginning BeginningOf(const Piece& piece) const {
-    const CalibratedPoint first = X(piece.begin);
+  Beginning BeginningOf(const LinePiece& piece) const {
+    const CalibratedPoint first = edges_.X(piece.begin);
     const std::array<double, 4>& j = first.x_from_pixel;
     const double square = j[0] * j[0] + j[1] * j[1] + j[2] * j[2] + j[3] * j[3];
     return {first.x.x(), first.x.y(), kMaxAlternatingPx * std::sqrt(square)};
@@ -295,25 +120,25 @@ class LineDetector {
   }
 
   Joined Start(int piece) const {
-    const Piece& p = pieces_[static_cast<std::size_t>(piece)];
+    const LinePiece& p = pieces_[static_cast<std::size_t>(piece)];
     Joined joined;
     joined.pieces = {piece};
     joined.gradient = p.gradient;
-    joined.moments = Moments(X(p.begin).x);
+    joined.moments = LineMoments(edges_.X(p.begin).x);
     AddPoints(p, &joined.moments);
     joined.line = joined.moments.Line(&joined.along);
     joined.covered = {{p.from, p.to}};
     return joined;
   }
 
-  void AddPoints(const Piece& p, Moments* moments) const {
+  void AddPoints(const LinePiece& p, LineMoments* moments) const {
     for (int i = p.begin; i < p.end; ++i) {
-      if (Distance(i, p.line) <= options_.max_distance_px) moments->Add(X(i).x);
+      if (edges_.Distance(i, p.line) <= options_.max_distance_px) moments->Add(edges_.X(i).x);
     }
   }
 
   void Append(int piece, Joined* joined) const {
-    const Piece& p = pieces_[static_cast<std::size_t>(piece)];
+    const LinePiece& p = pieces_[static_cast<std::size_t>(piece)];
     joined->pieces.push_back(piece);
     joined->alternates = joined->alternates || joined->gradient.dot(p.gradient) < 0.0;
     AddPoints(p, &joined->moments);
@@ -321,17 +146,17 @@ class LineDetector {
     joined->covered.clear();
     for (const int i : joined->pieces) {
       std::array<double, 2> range;
-      SetRange(joined->along, pieces_[static_cast<std::size_t>(i)], &range[0], &range[1]);
+      edges_.SetRange(joined->along, pieces_[static_cast<std::size_t>(i)], &range[0], &range[1]);
       joined->covered.push_back(range);
     }
   }
 
-  bool Continues(const Joined& joined, const Piece& p) const {
-    const CalibratedPoint first = X(p.begin), last = X(p.end - 1);
+  bool Continues(const Joined& joined, const LinePiece& p) const {
+    const CalibratedPoint first = edges_.X(p.begin), last = edges_.X(p.end - 1);
     if (std::abs(LineDistancePx(first, joined.line)) > kMaxAlternatingPx) return false;
     if (std::abs(LineDistancePx(last, joined.line)) > kMaxAlternatingPx) return false;
     double from, to;
-    SetRange(joined.along, p, &from, &to);
+    edges_.SetRange(joined.along, p, &from, &to);
     double gap = std::numeric_limits<double>::infinity(), length = 0.0;
     for (const std::array<double, 2>& c : joined.covered) {
       gap = std::min(gap, std::max(from - c[1], c[0] - to));
@@ -347,7 +172,8 @@ class LineDetector {
   }
 
   // Both ends within the uncertainty of the line extrapolated from `length` over `beyond` pixels.
-  bool NearExtrapolation(const Joined& joined, const Piece& p, double length, double beyond) const {
+  bool NearExtrapolation(const Joined& joined, const LinePiece& p, double length,
+                         double beyond) const {
     const double n = std::max(2, joined.moments.count());
     const double u = (0.5 * length + beyond) / std::max(length, 1.0);
     const double lever = 1.0 + 12.0 * u * u;
@@ -358,15 +184,15 @@ class LineDetector {
       const double bleed = kBleedSigmaPx * std::sqrt(1.0 + (pieces > 1.0 ? lever / pieces : 1.0));
       limit = std::min(kMaxAlternatingPx, kJoinSigmas * std::hypot(sigma, bleed));
     }
-    return std::abs(LineDistancePx(X(p.begin), joined.line)) <= limit &&
-           std::abs(LineDistancePx(X(p.end - 1), joined.line)) <= limit;
+    return std::abs(LineDistancePx(edges_.X(p.begin), joined.line)) <= limit &&
+           std::abs(LineDistancePx(edges_.X(p.end - 1), joined.line)) <= limit;
   }
 
   void Finish(const Joined& joined) {
     DetectedLine line;
     averages_.clear();
     for (const int k : joined.pieces) {
-      const Piece& p = pieces_[static_cast<std::size_t>(k)];
+      const LinePiece& p = pieces_[static_cast<std::size_t>(k)];
       line.length_px += p.length_px;
       AppendAverages(p, joined.line, &line.points);
     }
@@ -385,7 +211,7 @@ class LineDetector {
   }
 
   // Means of the points of a piece over point_spacing_px, in pixels and calibrated (averages_).
-  void AppendAverages(const Piece& p, const Vector3d& line, std::vector<Vector2d>* points) {
+  void AppendAverages(const LinePiece& p, const Vector3d& line, std::vector<Vector2d>* points) {
     const int bins = std::max(2, static_cast<int>(p.length_px / options_.point_spacing_px));
     const int n = p.end - p.begin;
     for (int k = 0; k < bins; ++k) {
@@ -393,14 +219,14 @@ class LineDetector {
       int count = 0;
       const int begin = p.begin + k * n / bins, end = p.begin + (k + 1) * n / bins;
       for (int i = begin; i < end; ++i) {
-        if (Distance(i, line) > kMaxJoinPx) continue;
-        pixel += Pixel(i);
-        x += X(i).x;
+        if (edges_.Distance(i, line) > kMaxJoinPx) continue;
+        pixel += edges_.Pixel(i);
+        x += edges_.X(i).x;
         ++count;
       }
       if (count == 0) continue;
       points->push_back(pixel / count);
-      CalibratedPoint average = X((begin + end) / 2);
+      CalibratedPoint average = edges_.X((begin + end) / 2);
       average.x = x / count;
       averages_.push_back(average);
     }
@@ -421,30 +247,27 @@ class LineDetector {
   void SetEnds(const Joined& joined, DetectedLine* line) const {
     double from = std::numeric_limits<double>::infinity(), to = -from;
     for (const int k : joined.pieces) {
-      const Piece& p = pieces_[static_cast<std::size_t>(k)];
+      const LinePiece& p = pieces_[static_cast<std::size_t>(k)];
       for (const int i : {p.begin, p.end - 1}) {
-        const double s = joined.along.dot(X(i).x);
+        const double s = joined.along.dot(edges_.X(i).x);
         if (s < from) {
           from = s;
-          line->ends[0] = Pixel(i);
+          line->ends[0] = edges_.Pixel(i);
         }
         if (s > to) {
           to = s;
-          line->ends[1] = Pixel(i);
+          line->ends[1] = edges_.Pixel(i);
         }
       }
     }
   }
 
-  const EdgeMap& map_;
+  const LineEdges& edges_;
   const LineOptions& options_;
-  const std::vector<std::uint8_t>* skip_;
-  mutable CalibratedEdges calibrated_edges_;  // Remembers what it was asked.
-  std::vector<Piece> pieces_, bent_;
+  std::vector<LinePiece> pieces_, bent_;
   std::vector<Beginning> beginnings_;
   std::vector<DetectedLine> lines_;
   // Scratch.
-  Moments moments_;
   std::vector<CalibratedPoint> averages_, calibrated_;
   std::vector<std::pair<double, int>> order_;
 };
@@ -467,9 +290,10 @@ Status DetectLines(const EdgeMap& edges, const Camera& camera, const LineOptions
   Status status = options.Validate();
   if (status.ok()) status = camera.Validate();
   if (!status.ok()) return status;
-  LineDetector detector(edges, camera, options, skip);
-  *lines = detector.Straight();
-  if (bent != nullptr) *bent = detector.Bent();
+  const LineEdges usable(edges, camera, skip);
+  LineJoiner joiner(usable, options);
+  *lines = joiner.Straight();
+  if (bent != nullptr) *bent = joiner.Bent();
   return Status::Ok();
 }
 
