@@ -9,6 +9,7 @@
 
 #include "circline/estimators/conic.h"
 #include "circline/estimators/conic_fit.h"
+#include "circline/ransac/ellipse_shape.h"
 
 namespace circline {
 namespace {
@@ -49,40 +50,6 @@ constexpr double kEarlyLog10 = 6.0;
 // ... and gradients this near to the contour's normals, degrees: of accidental ones within the 25
 // that count as support the median is 12.
 constexpr double kEarlyNormalDeg = 10.0;
-// Share of random contour samples that find an edge point in place and direction by accident, in a
-// busy photo: edge points on a tenth of the pixels, 3 of them looked at, 50 of 360 degrees.
-constexpr double kChance = 0.08;
-// Neighbouring edge points are not independent: one in this many pixels is.
-constexpr double kIndependentPx = 3.0;
-// Candidates that are tried, as the number of tests of the false-alarm count.
-constexpr double kLog10Tests = 6.0;
-// Blobs and rounded rectangles resemble ellipses; what tells them apart is how closely edge points
-// keep to the contour, how nearly they run parallel to it, and how nearly their gradients are
-// across it. Each is measured in units of what a true rim shows at most: its own imperfection, and
-// in quadrature what the noise explains. Their sum may not exceed kShapeLimit.
-//
-// Root-mean-square distance, pixels. Prints, lenses and JPEG leave 0.05 to 0.15 px on photographed
-// rims, at most 2 % of the radius on small ones, while a blob's shape is off in proportion to its
-// size; long rims follow an ellipse less exactly (no blob follows one so far); and a short arc has
-// less to keep to than a full contour.
-constexpr double kShapeRmsPx = 0.17;
-constexpr double kShapeRmsPerSize = 0.022;
-constexpr double kShapeMaxSigmaPx = 0.5;
-constexpr double kShapeRmsPerPx = 5e-4;
-constexpr double kShapeRmsPerCoverage = 0.8;
-constexpr double kShapeUsualCoverage = 0.7;
-// Median angle between the contour and the chord from the kSlopeReach-th point before to that
-// behind on the chain, degrees: photographed rims leave 0.5 to 2.5.
-constexpr int kSlopeReach = 2;
-constexpr double kMaxChordPx = 3.0 * kSlopeReach;
-constexpr double kShapeSlopeDeg = 1.8;
-constexpr double kShapeSlopePerNoise = 0.5;
-constexpr double kShapeSlopePerPx = 4e-3;
-// Median angle between gradient and normal, degrees: mostly 0.5 to 3, but where the brightness
-// changes along a rim, as in a penumbra, gradients lean by that change over their own length.
-constexpr double kShapeNormalDeg = 6.0;
-constexpr double kShapeNormalPerNoise = 2.0;
-constexpr double kShapeLimit = 2.5;
 // While a candidate is still being refined, it may miss the limits by this factor.
 constexpr double kShapeSlack = 1.5;
 // What a second look needs of the contour.
@@ -91,7 +58,7 @@ constexpr double kSecondCoverage = 0.7;
 constexpr double kSecondSmoothingPx = 1.6;
 constexpr int kMaxSecondLookPx = 200;
 // Up to this miss of the shape the first look has the better place.
-constexpr double kSecondLookLimit = 3.0;
+constexpr double kSecondLookLimit = 1.2;
 // Largest ellipse, in diagonals of the photo.
 constexpr double kMaxAxisDiagonals = 2.0;
 // Points beyond this many standard deviations take no part in the final fit.
@@ -122,15 +89,6 @@ double CurvatureAt(const Matrix3d& conic, const CalibratedPoint& p, Vector2d* ou
   *outward = g / length;
   const Vector2d along = FromPixels(p, Vector2d(-outward->y(), outward->x()));
   return along.dot(conic.topLeftCorner<2, 2>() * along) / length;
-}
-
-// Logarithm (base 10) of the upper tail of the binomial distribution by Hoeffding's bound in its
-// Chernoff form: k of n successes or more at probability p.
-double Log10BinomialTail(double n, double k, double p) {
-  const double q = k / n;
-  if (q <= p) return 0.0;
-  if (q >= 1.0) return n * std::log10(p);
-  return -n * (q * std::log10(q / p) + (1.0 - q) * std::log10((1.0 - q) / (1.0 - p)));
 }
 
 BrightSide SideOf(std::initializer_list<const Arc*> arcs) {
@@ -186,7 +144,7 @@ double EllipseFitter::Coverage(const EllipseCandidate& candidate) {
 bool EllipseFitter::Fit(EllipseCandidate candidate, DetectedEllipse* e) {
   EllipseCandidate smooth = candidate;
   const double miss = FinalFit(&candidate, e);
-  if (miss > kShapeLimit) {
+  if (miss > 1.0) {
     DetectedEllipse seen;
     if (!SecondLook(&smooth, &seen)) return false;
     // A wide Gaussian also takes in what runs beside the contour: it confirms the ellipse, but
@@ -262,22 +220,6 @@ void EllipseFitter::MeasureDistances(const Matrix3d& conic) {
   for (const CalibratedPoint& p : fit_points_) distances_.push_back(ConicDistancePx(p, conic));
 }
 
-// Median angle between the contour and the chains on which the points lie, degrees. (A chain's
-// points follow each other in the map; where one ends, the next is elsewhere.)
-double EllipseFitter::SlopeDeg(const Matrix3d& conic, const std::vector<int>& points) {
-  const int n = static_cast<int>(map_.points.size());
-  sorted_.clear();
-  for (const int i : points) {
-    if (i < kSlopeReach || i + kSlopeReach >= n) continue;
-    CalibratedPoint a, b;
-    if (!calibrated_.Get(i - kSlopeReach, &a) || !calibrated_.Get(i + kSlopeReach, &b)) continue;
-    const double chord = (Pixel(i + kSlopeReach) - Pixel(i - kSlopeReach)).norm();
-    if (chord > kMaxChordPx || !(chord > 0.0)) continue;
-    sorted_.push_back(std::abs(ConicDistancePx(b, conic) - ConicDistancePx(a, conic)) / chord);
-  }
-  return ToDegrees(Median(&sorted_));
-}
-
 // Whether the points of the arcs are near the contour that was fitted to them, and the gradients
 // there across it: a second opinion that costs little and is independent of the first. All in
 // squares, without roots: nothing is asked more often.
@@ -340,24 +282,18 @@ bool EllipseFitter::Refit(EllipseCandidate* candidate) {
   candidate->score *= kept * kept;
   const double rms_px = Rms(trimmed_, candidate->conic);
   return rms_px <= kShapeSlack * options_.max_rms_px &&
-         ShapeMiss(rms_px, SlopeDeg(candidate->conic, fit_indices_)) <= kShapeSlack * kShapeLimit;
+         ShapeMiss(rms_px, candidate->conic, fit_indices_) <= kShapeSlack;
 }
 
-// How far the edges are from following the contour as those of an ellipse do; see kShapeLimit.
-double EllipseFitter::ShapeMiss(double rms_px, double slope_deg) {
+double EllipseFitter::ShapeMiss(double rms_px, const Matrix3d& conic,
+                                const std::vector<int>& points) {
   supporter_.AverageStrength(&support_);
-  const double coverage = std::min(support_.Coverage(), support_.turn / (2.0 * kPi));
-  const double size = std::sqrt(contour_.major_px() * contour_.minor_px());
-  const double rms_unit = std::hypot(std::min(kShapeRmsPx, kShapeRmsPerSize * size) +
-                                         kShapeRmsPerPx * support_.length_px,
-                                     std::min(support_.sigma_px, kShapeMaxSigmaPx)) *
-                          (1.0 + kShapeRmsPerCoverage * (coverage - kShapeUsualCoverage));
-  const double noise_deg = ToDegrees(map_.gradient_noise / std::max(support_.gradient, 1e-9));
-  const double slope_unit = std::hypot(kShapeSlopeDeg + kShapeSlopePerPx * support_.length_px,
-                                       kShapeSlopePerNoise * noise_deg);
-  const double normal_unit = std::hypot(kShapeNormalDeg, kShapeNormalPerNoise * noise_deg);
-  return rms_px / rms_unit + slope_deg / slope_unit +
-         ToDegrees(support_.normal_median) / normal_unit;
+  EllipseShape shape;
+  shape.rms_px = rms_px;
+  shape.slope_deg = SlopeDeg(map_, conic, points, &calibrated_);
+  shape.size_px = std::sqrt(contour_.major_px() * contour_.minor_px());
+  shape.noise = map_.gradient_noise;
+  return shape.Miss(support_);
 }
 
 bool EllipseFitter::Gather(const EllipseCandidate& candidate, double spacing, double reach,
@@ -387,10 +323,7 @@ void EllipseFitter::CalibrateSupport(std::size_t limit) {
 bool EllipseFitter::Plausible(BrightSide bright, double share, double slack) const {
   if (support_.Coverage() * 360.0 < share * options_.min_arc_deg) return false;
   if (ToDegrees(support_.turn) < share * options_.min_arc_deg) return false;
-  const double n = support_.perimeter_px / kIndependentPx;
-  const double chance = bright == BrightSide::kEither ? 2.0 * kChance : kChance;
-  return kLog10Tests + Log10BinomialTail(n, n * support_.Coverage(), chance) <=
-         options_.max_log10_false_alarms + slack;
+  return Log10FalseAlarms(support_, bright) <= options_.max_log10_false_alarms + slack;
 }
 
 // What surrounds a contour but is too ragged for an ellipse at the first scale - a penumbra, a
@@ -409,7 +342,7 @@ bool EllipseFitter::SecondLook(EllipseCandidate* candidate, DetectedEllipse* e) 
   Camera camera = camera_;  // Seen from the corner of the box; fits stay valid.
   camera.cx -= box.x;
   camera.cy -= box.y;
-  if (EllipseFitter(map, camera, options_).FinalFit(candidate, e) > kShapeLimit) return false;
+  if (EllipseFitter(map, camera, options_).FinalFit(candidate, e) > 1.0) return false;
   for (Vector2d& p : e->contour) p += Vector2d(box.x, box.y);
   // The points of the first scale that it explains.
   if (!Gather(*candidate, 0.7, kGatherPx[0])) return false;
@@ -448,7 +381,7 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   e->length_px = support_.length_px;
   e->turn_deg = ToDegrees(support_.turn);
   e->normal_deg = ToDegrees(support_.normal_median);
-  const double miss = ShapeMiss(e->fit.rms_px, SlopeDeg(candidate->conic, e->points));
+  const double miss = ShapeMiss(e->fit.rms_px, candidate->conic, e->points);
   e->contrast = support_.gradient;
   return miss;
 }

@@ -55,11 +55,10 @@ class EllipseFitter {
   bool FitTrimmed(Eigen::Matrix3d* conic, int max_trims);
   void Trim(const Eigen::Matrix3d& conic);
   void MeasureDistances(const Eigen::Matrix3d& conic);
-  double SlopeDeg(const Eigen::Matrix3d& conic, const std::vector<int>& points);
   bool ArcsAgree(const EllipseCandidate& candidate) const;
   static double Rms(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic);
   bool Refit(EllipseCandidate* candidate);
-  double ShapeMiss(double rms_px, double slope_deg);
+  double ShapeMiss(double rms_px, const Eigen::Matrix3d& conic, const std::vector<int>& points);
   bool Gather(const EllipseCandidate& candidate, double spacing, double reach,
               int max_samples = 20000);
   void CalibrateSupport(std::size_t limit);
@@ -71,7 +70,6 @@ class EllipseFitter {
   double MedianBlur();
   bool FitSupport(const Eigen::Matrix3d& initial, DetectedEllipse* e);
   void DropOutliers(DetectedEllipse* e);
-  Eigen::Vector2d Pixel(int i) const { return map_.points[static_cast<std::size_t>(i)].Position(); }
 
   const EdgeMap& map_;
   const Camera& camera_;

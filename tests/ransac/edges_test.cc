@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "tests/ransac/detection_test_util.h"
 
@@ -198,6 +200,53 @@ TEST(DetectEdges, TakesTheSmallestImages) {
     EXPECT_TRUE(DetectEdges(cv::Mat(size, CV_8UC1, cv::Scalar(0)), EdgeOptions(), &map).ok());
     EXPECT_TRUE(map.points.empty());
   }
+}
+
+// Whatever the photo: every pixel of the index leads to a point near it and back, every point is in
+// one chain, and the points of a chain follow each other.
+void ExpectWholeMap(const EdgeMap& map) {
+  std::vector<int> found(map.points.size(), 0);
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const int i = map.PointAt(x, y);
+      if (i < 0) continue;
+      ASSERT_LT(i, static_cast<int>(map.points.size()));
+      const EdgePoint& p = map.points[static_cast<std::size_t>(i)];
+      EXPECT_NEAR(p.x, x, 0.501);
+      EXPECT_NEAR(p.y, y, 0.501);
+      ++found[static_cast<std::size_t>(i)];
+    }
+  }
+  EXPECT_EQ(std::count(found.begin(), found.end(), 1), static_cast<std::ptrdiff_t>(found.size()));
+  int end = 0;
+  for (const EdgeChain& chain : map.chains) {
+    EXPECT_EQ(chain.begin, end);
+    end = chain.end;
+    for (int i = chain.begin + 1; i < chain.end; ++i) {
+      const EdgePoint& a = map.points[static_cast<std::size_t>(i - 1)];
+      const EdgePoint& b = map.points[static_cast<std::size_t>(i)];
+      EXPECT_LT((a.Position() - b.Position()).norm(), 5.0);
+      EXPECT_GT(a.Normal().dot(b.Normal()), 0.6);
+    }
+  }
+  EXPECT_EQ(end, static_cast<int>(map.points.size()));
+}
+
+TEST(DetectEdges, MapsAreWholeUpToTheBorder) {
+  EdgeOptions options;
+  options.min_chain_points = 2;
+  options.smoothing_px = 0.5;
+  options.low_gradient = options.high_gradient = 0.5;
+  options.low_noise_factor = options.high_noise_factor = 0.0;
+  std::size_t points = 0;
+  for (int size = 3; size < 40; ++size) {
+    EdgeMap map;
+    const cv::Mat image = Noise(size, 43 - size, 60.0);
+    ASSERT_TRUE(DetectEdges(image, options, &map).ok());
+    ExpectWholeMap(map);
+    points += map.points.size();
+  }
+  EXPECT_GT(points, 1000U);
 }
 
 TEST(DetectEdges, RefusesWhatIsNotAGreyImage) {
