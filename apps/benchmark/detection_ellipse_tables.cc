@@ -161,8 +161,10 @@ void MeasureRenderings(const std::string& folder) {
 void MeasureLabels(const std::string& folder, const cv::FileNode& root) {
   Score all;
   std::vector<double> ms;
-  std::printf("labelled ellipses %s\n  photo            labels found  recall(0.8) (0.95)\n",
-              folder.c_str());
+  std::printf(
+      "labelled ellipses %s\n  photo            labels found  recall(0.8) (0.95)   ms: edges "
+      "ellipses besides\n",
+      folder.c_str());
   for (const cv::FileNode& node : root["images"]) {
     const std::string file = ReadText(node, "file");
     const cv::Mat image = cv::imread(folder + "/" + file, cv::IMREAD_COLOR);
@@ -185,9 +187,9 @@ void MeasureLabels(const std::string& folder, const cv::FileNode& root) {
     Score s;
     s.Add(overlap, t.polygons.size());
     all.Add(overlap, t.polygons.size());
-    std::printf("  %-16s %5d %5d   %8.3f  %8.3f\n", file.c_str(), s.truth, s.found,
+    std::printf("  %-16s %5d %5d   %8.3f  %8.3f  %9.1f %.1f\n", file.c_str(), s.truth, s.found,
                 static_cast<double>(s.hit80) / std::max(1, s.truth),
-                static_cast<double>(s.hit95) / std::max(1, s.truth));
+                static_cast<double>(s.hit95) / std::max(1, s.truth), t.edges_ms, t.ellipses_ms);
   }
   std::printf("  all %18d %5d   %8.3f  %8.3f   ms with edges: median %.1f worst %.1f\n", all.truth,
               all.found, static_cast<double>(all.hit80) / std::max(1, all.truth),
