@@ -22,17 +22,26 @@ double Extent(const CircleObservation& circle) {
 using CircleTest = std::function<bool(const CircleObservation&)>;
 
 // Fitted circles of the world plane that pass the test, the largest first.
-std::vector<CircleObservation> WorldCircles(const Observations& observations,
-                                            const CircleTest& test) {
-  std::vector<CircleObservation> circles;
+std::vector<const CircleObservation*> WorldCircles(const Observations& observations,
+                                                   const CircleTest& test) {
+  std::vector<std::pair<double, const CircleObservation*>> sized;
   for (const CircleObservation& circle : observations.circles) {
     if (circle.fit && circle.plane == observations.frame.plane && test(circle))
-      circles.push_back(circle);
+      sized.emplace_back(Extent(circle), &circle);
   }
-  std::stable_sort(
-      circles.begin(), circles.end(),
-      [](const CircleObservation& a, const CircleObservation& b) { return Extent(a) > Extent(b); });
+  std::stable_sort(sized.begin(), sized.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<const CircleObservation*> circles;
+  for (const auto& [extent, circle] : sized) circles.push_back(circle);
   return circles;
+}
+
+// Copies of the first ones.
+std::vector<CircleObservation> Copies(const std::vector<const CircleObservation*>& circles,
+                                      std::size_t most) {
+  std::vector<CircleObservation> copies;
+  for (std::size_t i = 0; i < std::min(most, circles.size()); ++i) copies.push_back(*circles[i]);
+  return copies;
 }
 
 // Camera, frame and known lengths of the world plane, and `circles`.
@@ -62,11 +71,9 @@ std::vector<CircleObservation> Bare(std::vector<CircleObservation> circles) {
 
 // Keeps the largest circle, its contour alone.
 Status SelectBareCircle(const Observations& observations, Observations* evidence) {
-  std::vector<CircleObservation> circles =
-      Bare(WorldCircles(observations, [](const auto&) { return true; }));
+  const auto circles = WorldCircles(observations, [](const auto&) { return true; });
   if (circles.empty()) return Status::Refused("no circle of the world's plane could be fitted");
-  circles.resize(1);
-  *evidence = KeepCircles(observations, std::move(circles));
+  *evidence = KeepCircles(observations, Bare(Copies(circles, 1)));
   return Status::Ok();
 }
 
@@ -119,11 +126,10 @@ Recipe CenterRecipe(
   r.needs = needs;
   r.decided_by = decided_by;
   r.select = [has_center, needs](const Observations& observations, Observations* evidence) {
-    std::vector<CircleObservation> circles = WorldCircles(
+    const auto circles = WorldCircles(
         observations, [&](const auto& circle) { return has_center(observations, circle); });
     if (circles.empty()) return Status::Refused("the world's plane does not hold " + needs);
-    circles.resize(1);
-    *evidence = KeepCircles(observations, std::move(circles));
+    *evidence = KeepCircles(observations, Copies(circles, 1));
     KeepAxisLines(observations, evidence);
     return Status::Ok();
   };
@@ -231,12 +237,11 @@ Recipe ParallelCirclesRecipe() {
   r.needs = "two or more circles of one plane";
   r.decided_by = "the plane that the circles have in common";
   r.select = [](const Observations& observations, Observations* evidence) {
-    std::vector<CircleObservation> circles =
-        Bare(WorldCircles(observations, [](const auto&) { return true; }));
-    if (circles.size() < 2) {
+    const auto found = WorldCircles(observations, [](const auto&) { return true; });
+    if (found.size() < 2) {
       return Status::Refused("the world's plane holds fewer than two fitted circles");
     }
-    circles.resize(std::min(circles.size(), kMaxCircles));
+    std::vector<CircleObservation> circles = Bare(Copies(found, kMaxCircles));
     for (CircleObservation& circle : circles) circle.concentric.clear();
     *evidence = KeepCircles(observations, std::move(circles));
     KeepAxisLines(observations, evidence);
@@ -253,12 +258,12 @@ Recipe ConcentricCirclesRecipe() {
   r.needs = "two or more concentric circles";
   r.decided_by = "the plane and centre that the circles have in common";
   r.select = [](const Observations& observations, Observations* evidence) {
-    for (const CircleObservation& first :
+    for (const CircleObservation* first :
          WorldCircles(observations, [](const auto& c) { return !c.concentric.empty(); })) {
-      std::vector<CircleObservation> circles = Bare(WorldCircles(
-          observations, [&](const auto& c) { return c.concentric == first.concentric; }));
+      const auto circles = WorldCircles(
+          observations, [first](const auto& c) { return c.concentric == first->concentric; });
       if (circles.size() < 2) continue;
-      *evidence = KeepCircles(observations, std::move(circles));
+      *evidence = KeepCircles(observations, Bare(Copies(circles, circles.size())));
       KeepAxisLines(observations, evidence);
       return Status::Ok();
     }

@@ -93,13 +93,18 @@ Eigen::Vector2d CenterMiss(const CirclePose& circle, const Eigen::VectorXd& meas
   return (circle.center / circle.center.z()).head<2>() - measured.head<2>() / measured[2];
 }
 
+// The poses of a circle, none to two.
+struct PosePair {
+  std::array<CirclePose, 2> poses;
+  int count;
+};
+
 // The weighted mean of the circles' normals, each nearest to the candidate's; and how far they miss
-// it.
-Candidate CommonPlane(const Candidate& seed, const Inputs& inputs, bool concentric, bool* valid) {
+// it. `more`: the poses of Inputs::more_conics.
+Candidate CommonPlane(const Candidate& seed, const std::vector<PosePair>& more,
+                      const Inputs& inputs, bool concentric, bool* valid) {
   std::vector<CirclePose> nearest = {*seed.circle};
-  for (const Measured& conic : inputs.more_conics) {
-    std::array<CirclePose, 2> poses;
-    const int count = CirclePoses(VectorToConic(conic.value), &poses);
+  for (const auto& [poses, count] : more) {
     if (count == 0) continue;
     const bool second = count == 2 && poses[1].normal.dot(seed.circle->normal) >
                                           poses[0].normal.dot(seed.circle->normal);
@@ -131,10 +136,14 @@ Candidate CommonPlane(const Candidate& seed, const Inputs& inputs, bool concentr
 }
 
 std::vector<Candidate> CommonPlanes(const Inputs& inputs, bool concentric) {
+  std::vector<PosePair> more(inputs.more_conics.size());
+  for (std::size_t i = 0; i < more.size(); ++i) {
+    more[i].count = CirclePoses(VectorToConic(inputs.more_conics[i].value), &more[i].poses);
+  }
   std::vector<Candidate> common;
   for (const Candidate& seed : SingleCirclePoses(inputs)) {
     bool valid;
-    const Candidate c = CommonPlane(seed, inputs, concentric, &valid);
+    const Candidate c = CommonPlane(seed, more, inputs, concentric, &valid);
     if (valid) common.push_back(c);
   }
   return common;

@@ -27,6 +27,17 @@ TEST_P(RobustLossTest, DerivativeMatchesDifferences) {
   }
 }
 
+TEST_P(RobustLossTest, SecondDerivativeMatchesDifferences) {
+  const double c2 = std::pow(LossTuningConstant(type_), 2);
+  for (double s = 0.05; s < 200.0; s *= 1.3) {
+    const double h = 1e-5 * s;
+    if (std::abs(s - c2) < 2.0 * h) continue;  // Huber's slope and Tukey's bend there.
+    const double numeric =
+        (LossSlopesAt(type_, s + h).first - LossSlopesAt(type_, s - h).first) / (2.0 * h);
+    EXPECT_NEAR(LossSlopesAt(type_, s).second, numeric, 1e-7) << "s " << s;
+  }
+}
+
 // Asymptotic efficiency on unit Gaussian noise, E[psi']^2 / E[psi^2] with psi = rho'(r^2) r.
 TEST_P(RobustLossTest, KeepsNinetyFivePercentOfTheEfficiency) {
   const auto psi = [this](double r) { return EvaluateLoss(type_, r * r).rho_prime * r; };
