@@ -12,8 +12,9 @@
 namespace circline {
 namespace {
 
-const Candidate* Nearest(const std::vector<Candidate>& candidates, const Candidate& reference) {
-  const Candidate* best = nullptr;
+// Of one candidate or more.
+const Candidate& Nearest(const std::vector<Candidate>& candidates, const Candidate& reference) {
+  const Candidate* best = &candidates.front();
   double best_angle = std::numeric_limits<double>::infinity();
   for (const Candidate& c : candidates) {
     const double angle = RotationAngle(c.pose.rotation, reference.pose.rotation);
@@ -22,7 +23,7 @@ const Candidate* Nearest(const std::vector<Candidate>& candidates, const Candida
       best = &c;
     }
   }
-  return best;
+  return *best;
 }
 
 // A perturbation may tip the convention that settles the senses of the axes; that is no error.
@@ -46,13 +47,20 @@ Eigen::VectorXd HalfDifference(const Candidate& plus, const Candidate& minus,
   return half;
 }
 
+Eigen::MatrixXd FromColumns(const std::vector<Eigen::VectorXd>& columns, Eigen::Index rows) {
+  Eigen::MatrixXd matrix(rows, static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    matrix.col(static_cast<Eigen::Index>(k)) = columns[k];
+  return matrix;
+}
+
 // Statistical linearisation: every independent error of the inputs, one standard deviation up and
 // down, through the closed form itself; a part of that where it would lead to no pose (beyond the
-// ellipses). Returns columns of [delta, delta_t, contradiction].
-Eigen::MatrixXd Sensitivity(const Evaluate& evaluate, const Inputs& inputs,
-                            const Candidate& candidate) {
+// ellipses). Returns for each candidate columns of [delta, delta_t, contradiction].
+std::vector<Eigen::MatrixXd> Sensitivities(const Evaluate& evaluate, const Inputs& inputs,
+                                           const std::vector<Candidate>& candidates) {
   constexpr double kShrink = 0.1, kSmallestPart = 1e-4;
-  std::vector<Eigen::VectorXd> columns;
+  std::vector<std::vector<Eigen::VectorXd>> columns(candidates.size());
   Inputs perturbed = inputs;
   for (Measured* m : perturbed.All()) {
     const Eigen::VectorXd value = m->value;
@@ -63,20 +71,21 @@ Eigen::MatrixXd Sensitivity(const Evaluate& evaluate, const Inputs& inputs,
         const std::vector<Candidate> plus_all = evaluate(perturbed);
         m->value = value - part * m->columns.col(k);
         const std::vector<Candidate> minus_all = evaluate(perturbed);
-        const Candidate* plus = Nearest(plus_all, candidate);
-        const Candidate* minus = Nearest(minus_all, candidate);
-        if (plus == nullptr || minus == nullptr) continue;
-        columns.push_back(HalfDifference(*plus, *minus, candidate) / part);
+        if (plus_all.empty() || minus_all.empty()) continue;
+        for (std::size_t i = 0; i < candidates.size(); ++i) {
+          columns[i].push_back(HalfDifference(Nearest(plus_all, candidates[i]),
+                                              Nearest(minus_all, candidates[i]), candidates[i]) /
+                               part);
+        }
         break;
       }
       m->value = value;
     }
   }
-  Eigen::MatrixXd out(6 + candidate.contradiction.size(),
-                      static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t k = 0; k < columns.size(); ++k)
-    out.col(static_cast<Eigen::Index>(k)) = columns[k];
-  return out;
+  std::vector<Eigen::MatrixXd> matrices;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    matrices.push_back(FromColumns(columns[i], 6 + candidates[i].contradiction.size()));
+  return matrices;
 }
 
 // The pose; where neither an axis nor a direction is known, the spin about the normal is free.
@@ -92,9 +101,8 @@ PoseHypothesis HypothesisOf(const Candidate& candidate, const Inputs& inputs) {
   return h;
 }
 
-void FillUncertainty(const Evaluate& evaluate, const Inputs& inputs, const Candidate& candidate,
-                     PoseHypothesis* h) {
-  const Eigen::MatrixXd S = Sensitivity(evaluate, inputs, candidate);
+// `S`: the candidate's sensitivity.
+void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseHypothesis* h) {
   Matrix6d covariance = S.topRows<6>() * S.topRows<6>().transpose();
   for (const std::array<double, 6>& direction : h->free_directions) {
     const Eigen::Map<const Vector6d> free(direction.data());
@@ -209,14 +217,18 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   if (estimate.status.ok()) estimate.status = recipe_.gather(evidence, options_.sigma_px, &inputs);
   if (!estimate.status.ok()) return estimate;
 
-  for (const Candidate& candidate : recipe_.evaluate(inputs)) {
+  const std::vector<Candidate> candidates = recipe_.evaluate(inputs);
+  const std::vector<Eigen::MatrixXd> sensitivities =
+      Sensitivities(recipe_.evaluate, inputs, candidates);
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Candidate& candidate = candidates[i];
     PoseHypothesis h = HypothesisOf(candidate, inputs);
     const FrameObservation& frame = evidence.frame;
     h.origin_observed =
         frame.origin || !frame.origin_is_center.empty() || (frame.x_axis && frame.y_axis);
     FillSupport(evidence, &h);
     if (candidate.circle) FillCircle(evidence, *candidate.circle, &h);
-    FillUncertainty(recipe_.evaluate, inputs, candidate, &h);
+    FillUncertainty(sensitivities[i], candidate, &h);
     estimate.hypotheses.push_back(std::move(h));
   }
   if (estimate.hypotheses.empty()) {
