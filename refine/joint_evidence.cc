@@ -101,8 +101,11 @@ int JointEvidence::AddSet(const std::vector<Eigen::Vector2d>& pixels,
 void JointEvidence::AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block, int like_set,
                              const std::string& name) {
   CalibratedPoint p;
-  if (PixelToCalibrated(camera, pixel, &p))
+  if (PixelToCalibrated(camera, pixel, &p)) {
     points.push_back({{p, sigma_px, options.line_loss.type}, block, like_set, name});
+  } else {
+    unused.push_back(name + ": not used, it lies where the camera model cannot undistort it");
+  }
 }
 
 bool JointEvidence::BothAxes() const {
@@ -277,9 +280,10 @@ void JointEvidence::AddAxis(const std::optional<Segment>& axis, bool is_x) {
   lines.push_back(term);
 }
 
-// Between pencils of the plane; one that involves another direction has no parameter here to act
-// on.
+// Between pencils of the plane, of which one at least is free; else there is nothing to act on.
 void JointEvidence::AddAngle(const KnownAngle& known) {
+  const std::string name =
+      "the known angle between '" + known.pencils[0] + "' and '" + known.pencils[1] + "'";
   constexpr double kExact = 1e-6;  // Radians: stands for an angle that is known exactly.
   AngleTerm term{known.value, std::max(known.sigma, kExact), {0.0, 0.0}, {-1, -1}};
   for (std::size_t k = 0; k < 2; ++k) {
@@ -294,17 +298,28 @@ void JointEvidence::AddAngle(const KnownAngle& known) {
     } else if (direction == PencilDirection::kY) {
       term.fixed[k] = 0.5 * 3.14159265358979323846;
     } else if (direction != PencilDirection::kX) {
+      unused.push_back(name + ": not used, '" + known.pencils[k] +
+                       "' is no pencil of the world's plane");
       return;
     }
   }
-  if (term.theta[0] >= 0 || term.theta[1] >= 0) angles.push_back(term);
+  if (term.theta[0] >= 0 || term.theta[1] >= 0) {
+    angles.push_back(term);
+  } else {
+    unused.push_back(name + ": not used, both run along axes, which are orthogonal");
+  }
 }
 
 void JointEvidence::AddLength(const KnownLength& known) {
-  if (!IsInWorldPlane(known, observations)) return;
+  if (!IsInWorldPlane(known, observations)) {
+    unused.push_back("a known length of the plane '" + known.plane +
+                     "': not used, the world's is '" + observations.frame.plane + "'");
+    return;
+  }
   CalibratedPoint a, b;
   if (!PixelToCalibrated(camera, known.points[0], &a) ||
       !PixelToCalibrated(camera, known.points[1], &b)) {
+    unused.push_back("a known length: not used, the camera model cannot undistort its ends");
     return;
   }
   const LengthTerm term{AddParameter(2, false), AddParameter(2, false), known.value};

@@ -90,6 +90,7 @@ struct JointEvidence {
   int origin = -1, scale = -1;        // Blocks, or -1.
   bool origin_observed = false;       // Else the origin is a convention.
   bool x_is_fixed = false;            // Whether anything fixes the rotation about the normal.
+  std::vector<std::string> unused;    // What was said and has no part in it, and why.
 
   // See JointProblem for what is expected of both.
   JointEvidence(const Observations& observations, const EstimationOptions& options,

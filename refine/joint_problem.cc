@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -67,17 +66,19 @@ bool JointProblem::is_contaminated() const {
                      [](const PointSet& set) { return set.is_contaminated; });
 }
 
-double JointProblem::SeedCost(const CameraPose& seed) const {
+Status JointProblem::SeedCost(const CameraPose& seed, double* cost) const {
   JointState state;
-  if (!InitializeState(evidence_, seed, &state)) return std::numeric_limits<double>::infinity();
-  return JointCost(evidence_, state, Weighing()) + LeftOutCost(evidence_, state);
+  const Status status = InitializeState(evidence_, seed, &state);
+  if (!status.ok()) return status;
+  *cost = JointCost(evidence_, state, Weighing()) + LeftOutCost(evidence_, state);
+  return std::isfinite(*cost) ? Status::Ok()
+                              : Status::Failed("the evidence cannot be evaluated at the seed");
 }
 
 Status JointProblem::ApproachFrom(const CameraPose& seed, Approach* approach) const {
   approach->pose = seed;
-  if (!InitializeState(evidence_, seed, &approach->state))
-    return Status::Failed("a seed pose contradicts the evidence");
-  return Continue(approach);
+  const Status status = InitializeState(evidence_, seed, &approach->state);
+  return status.ok() ? Continue(approach) : status;
 }
 
 Status JointProblem::Continue(Approach* approach) const {

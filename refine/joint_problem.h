@@ -15,6 +15,8 @@
 #define CIRCLINE_REFINE_JOINT_PROBLEM_H_
 
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
@@ -50,8 +52,8 @@ class JointProblem {
   void SetScales(const NoiseScales& scales) { evidence_.SetScales(scales); }
 
   // Robust cost at the seed with every other parameter at its closed-form value: ranks seeds
-  // cheaply. Infinity where the seed is unusable.
-  double SeedCost(const CameraPose& seed) const;
+  // cheaply. Refused where the seed contradicts the evidence.
+  Status SeedCost(const CameraPose& seed, double* cost) const;
 
   // The first iterations from a seed (its rotation and, where the origin is known, its
   // translation), or further ones: enough to see which basin it lies in.
@@ -64,6 +66,9 @@ class JointProblem {
   // Runs an approach to its end; fills everything that a hypothesis holds but the probability. Not
   // ok: degenerate evidence, or no convergence.
   Status Refine(const Approach& approach, Refined* refined) const;
+
+  // What the observations say that has no part in the problem, and why, a sentence each.
+  const std::vector<std::string>& unused() const { return evidence_.unused; }
 
   // True if so many points are doubted that some features' fits may be wrong.
   bool is_contaminated() const;

@@ -188,7 +188,7 @@ bool PlanePoint(const Eigen::Matrix3d& R, double facing, const Eigen::Vector3d& 
   return true;
 }
 
-bool InitializeState(const JointEvidence& e, const CameraPose& seed, JointState* state) {
+Status InitializeState(const JointEvidence& e, const CameraPose& seed, JointState* state) {
   state->rotation = seed.rotation;
   state->facing = seed.rotation.col(2).dot(seed.translation) > 0.0 ? 1.0 : -1.0;
   state->values.assign(e.parameters.size(), {0.0, 0.0, 0.0});
@@ -198,8 +198,11 @@ bool InitializeState(const JointEvidence& e, const CameraPose& seed, JointState*
   const auto place = [&](const Eigen::Vector3d& ray, int block) {
     return PlanePoint(state->rotation, state->facing, ray, state->At(block));
   };
-  if (e.origin >= 0 && !place(seed.translation, e.origin)) return false;
-  if (!InitializeCircles(e, state)) return false;
+  if (e.origin >= 0 && !place(seed.translation, e.origin))
+    return Status::Refused("the origin lies beyond the horizon of the plane");
+  if (!InitializeCircles(e, state))
+    return Status::Refused(
+        "no circle can lie in the plane: each crosses its horizon or lies beyond");
   for (const auto& [id, theta] : e.thetas) {
     const PencilObservation& pencil =
         e.observations.pencils[static_cast<std::size_t>(FindPencil(e.observations, id))];
@@ -215,11 +218,12 @@ bool InitializeState(const JointEvidence& e, const CameraPose& seed, JointState*
                           [block](const PointTerm& p) { return p.point == block; })
           ->measured.x.Homogeneous();
     };
-    if (!place(ray(term.a), term.a) || !place(ray(term.b), term.b)) return false;
+    if (!place(ray(term.a), term.a) || !place(ray(term.b), term.b))
+      return Status::Refused("a known length ends beyond the horizon of the plane");
   }
   InitializeScale(e, state);
   Reconsider(e, state);
-  return true;
+  return Status::Ok();
 }
 
 }  // namespace circline

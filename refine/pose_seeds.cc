@@ -23,27 +23,34 @@ struct Seed {
   int source;  // The two poses of one circle, however close, are two seeds.
 };
 
-void AddSeed(const JointProblem& problem, const CameraPose& pose, int source,
-             std::vector<Seed>* seeds) {
-  const auto same = std::find_if(seeds->begin(), seeds->end(), [&](const Seed& seed) {
-    return seed.source != source && RotationAngle(seed.pose.rotation, pose.rotation) <= kSameSeed;
-  });
-  // The better of the two matters only where outliers make the way to the minimum hard.
-  if (same != seeds->end() && !problem.is_contaminated()) return;
-  const double cost = problem.SeedCost(pose);
-  if (!std::isfinite(cost)) return;
-  if (same != seeds->end()) {
-    if (cost < same->cost) *same = {pose, cost, source};
-    return;
+struct SeedList {
+  const JointProblem& problem;
+  std::vector<Seed> seeds = {};
+  Status refusal = {};  // Why the last one that was refused was.
+
+  void Add(const CameraPose& pose, int source) {
+    const auto same = std::find_if(seeds.begin(), seeds.end(), [&](const Seed& seed) {
+      return seed.source != source && RotationAngle(seed.pose.rotation, pose.rotation) <= kSameSeed;
+    });
+    // The better of the two matters only where outliers make the way to the minimum hard.
+    if (same != seeds.end() && !problem.is_contaminated()) return;
+    double cost;
+    const Status status = problem.SeedCost(pose, &cost);
+    if (!status.ok()) {
+      refusal = status;
+    } else if (same == seeds.end()) {
+      seeds.push_back({pose, cost, source});
+    } else if (cost < same->cost) {
+      *same = {pose, cost, source};
+    }
   }
-  seeds->push_back({pose, cost, source});
-}
+};
 
 // The rotations about the plane's normal under which one line or another of a pencil along an axis
 // has its direction: some of these lines may be wrong. The senses of the axes are those of
 // `rotation`.
-void AddSpinSeeds(const Observations& observations, const JointProblem& problem,
-                  const CameraPose& pose, int source, std::vector<Seed>* seeds) {
+void AddSpinSeeds(const Observations& observations, const CameraPose& pose, int source,
+                  SeedList* list) {
   constexpr int kMaxLines = 8;
   int lines = 0;
   const Eigen::Vector3d n = pose.rotation.col(2);
@@ -56,15 +63,14 @@ void AddSpinSeeds(const Observations& observations, const JointProblem& problem,
       Eigen::Vector3d direction = n.cross(line.fit->line);
       if (direction.dot(axis) < 0.0) direction = -direction;
       const double angle = std::atan2(axis.cross(direction).dot(n), axis.dot(direction));
-      AddSeed(problem, {ExpRotation(angle * n) * pose.rotation, pose.translation}, source, seeds);
+      list->Add({ExpRotation(angle * n) * pose.rotation, pose.translation}, source);
     }
   }
 }
 
 // Both planes of the largest circles of the world plane, turned in the plane as the other evidence
 // says.
-void AddCircleSeeds(const Observations& observations, const JointProblem& problem,
-                    std::vector<Seed>* seeds) {
+void AddCircleSeeds(const Observations& observations, SeedList* list) {
   std::vector<const CircleObservation*> circles;
   for (const CircleObservation& circle : observations.circles) {
     if (circle.fit && circle.plane == observations.frame.plane) circles.push_back(&circle);
@@ -85,8 +91,8 @@ void AddCircleSeeds(const Observations& observations, const JointProblem& proble
       if (!WorldRotation(observations, p.normal, p.center, kDefaultLineSigmaPx, &pose.rotation))
         continue;
       pose.translation = p.center;
-      AddSeed(problem, pose, source, seeds);
-      if (problem.is_contaminated()) AddSpinSeeds(observations, problem, pose, source, seeds);
+      list->Add(pose, source);
+      if (list->problem.is_contaminated()) AddSpinSeeds(observations, pose, source, list);
     }
   }
 }
@@ -97,7 +103,7 @@ std::vector<CameraPose> CollectSeeds(const Observations& observations,
                                      const std::vector<std::shared_ptr<const Solver>>& seeders,
                                      const EstimationOptions& options, const JointProblem& problem,
                                      std::vector<std::string>* reasons) {
-  std::vector<Seed> seeds;
+  SeedList list{problem};
   int source = 0;
   for (const std::shared_ptr<const Solver>& seeder : seeders) {
     const PoseEstimate estimate = seeder->Seeds(observations);
@@ -114,10 +120,13 @@ std::vector<CameraPose> CollectSeeds(const Observations& observations,
                                                kDefaultLineSigmaPx, &pose.rotation)) {
         continue;
       }
-      AddSeed(problem, pose, source, &seeds);
+      list.Add(pose, source);
     }
   }
-  AddCircleSeeds(observations, problem, &seeds);
+  AddCircleSeeds(observations, &list);
+  std::vector<Seed>& seeds = list.seeds;
+  if (seeds.empty() && !list.refusal.ok())
+    reasons->insert(reasons->begin(), "no pose agrees with all evidence: " + list.refusal.message);
   std::stable_sort(seeds.begin(), seeds.end(),
                    [](const Seed& a, const Seed& b) { return a.cost < b.cost; });
   seeds.resize(std::min(seeds.size(), kMaxSeeds));

@@ -159,6 +159,7 @@ Status RefineFitted(const Observations& fitted,
   NoiseScales scales = ScatterAboutFits(fitted);
   const Observations scaled = ApplyScales(fitted, options, OrDefault(scales));
   JointProblem problem(fitted, options, OrDefault(scales));
+  estimate->notes.insert(estimate->notes.end(), problem.unused().begin(), problem.unused().end());
   std::vector<Approach> approaches;
   if (ApproachFromPrior(problem, options, &approaches)) {
     const Status status = RefineApproaches(problem, scaled, options, approaches, estimate);

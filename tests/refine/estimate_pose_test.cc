@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -149,6 +150,39 @@ TEST(EstimatePoseTest, PairsLeaveOutWhatIsKnownOfOthers) {
       registry.Find("line_pairs", SolverStage::kRefined)->Solve(observations);
   ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
   EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.02);
+}
+
+// What cannot be used, or contradicts every pose, is named.
+TEST(EstimatePoseTest, KnowledgeThatHasNoPartIsNamed) {
+  PlaneScene scene(1.1, 0.1);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0), scene.Circle("c1", 2.0, 1.0, 0.4)};
+  observations.circles[1].plane = "p1";
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+  observations.known_angles = {KnownAngle{{"L1", "L2"}, 1.5, 0.0}};
+  observations.known_lengths = {
+      KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(1, 0)}, "p1", 1.0}};
+  PoseEstimate estimate = EstimatePose(observations);
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  const auto has_note = [&estimate](const std::string& words) {
+    return std::any_of(estimate.notes.begin(), estimate.notes.end(), [&](const std::string& note) {
+      return note.find(words) != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(has_note("'L1' and 'L2': not used, both run along axes"));
+  EXPECT_TRUE(has_note("a known length of the plane 'p1': not used"));
+  // One end is in the sky; the lines alone have one pose.
+  observations.circles.clear();
+  const Eigen::Vector3d normal = scene.pose.rotation.col(2), ahead = Eigen::Vector3d::UnitZ();
+  Eigen::Vector2d sky;
+  ASSERT_TRUE(CameraToPixel(scene.camera, ahead - (normal.dot(ahead) - 0.1) * normal, &sky));
+  observations.known_lengths = {KnownLength{Segment{scene.Pixel(0, 0), sky}, "p0", 1.0}};
+  estimate = EstimatePose(observations);
+  EXPECT_EQ(estimate.status.code, StatusCode::kRefused);
+  EXPECT_EQ(estimate.status.message.find("no pose agrees with all evidence: a known length ends"),
+            0U)
+      << estimate.status.message;
 }
 
 // Rotation and translation covariance against the errors of many trials, all kinds of evidence at
