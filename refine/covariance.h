@@ -15,8 +15,8 @@ struct SharedCovariance {
   std::vector<int> offsets;    // Of each shared block's first column; -1 for features' own.
   Eigen::MatrixXd covariance;  // Of the shared unknowns, pseudo-inverse on the observed subspace.
   Eigen::MatrixXd null_space;  // Orthonormal columns: directions without information.
-  // Log determinants of covariances, observed subspace: of the shared unknowns, and of what each
-  // circle and line has of its own.
+  // Log determinants of covariances, observed subspace: of the shared unknowns (but those that
+  // known lengths alone have), and of what each circle and line has of its own.
   double log_det = 0.0;
   std::vector<double> circle_log_det, line_log_det;
 };

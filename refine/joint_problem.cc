@@ -13,8 +13,8 @@
 namespace circline {
 namespace {
 
-// What the circles left out cost: as much as points far off, so that no pose gains by explaining
-// less.
+// What the circles and lengths left out cost: as much as points far off, so that no pose gains by
+// explaining less.
 double LeftOutCost(const JointEvidence& e, const JointState& state) {
   constexpr double kFarOffSigmas = 30.0;
   double cost = 0.0;
@@ -24,7 +24,10 @@ double LeftOutCost(const JointEvidence& e, const JointState& state) {
     cost += 0.5 * static_cast<double>(set.points.size()) *
             EvaluateLoss(set.loss, kFarOffSigmas * kFarOffSigmas).rho;
   }
-  return cost;
+  const auto lengths = std::count(state.length_left_out.begin(), state.length_left_out.end(), 1);
+  const double of_one_end =
+      0.5 * EvaluateLoss(e.options.line_loss.type, kFarOffSigmas * kFarOffSigmas).rho;
+  return cost + static_cast<double>(lengths) * of_one_end;
 }
 
 // A smooth error that a feature's points share (SetScales) makes them count less, yet it explains

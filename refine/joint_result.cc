@@ -65,11 +65,16 @@ Eigen::Vector3d OriginInPlane(const JointEvidence& e, const JointState& state,
   return {o[0], o[1], state.facing};
 }
 
+// Whether a known radius or length that has not been left out says how large all is.
+bool IsMetric(const JointEvidence& e, const JointState& state) {
+  return e.scale >= 0 && state.At(e.scale)[0] > 0.0;
+}
+
 void FillPose(const JointEvidence& e, const JointState& state, const Eigen::Vector3d& origin,
               PoseHypothesis* h) {
   h->cam_from_world.rotation = state.rotation;
   const Eigen::Vector3d t = state.rotation * origin;
-  h->metric = e.scale >= 0;
+  h->metric = IsMetric(e, state);
   h->origin_observed = e.origin_observed;
   h->cam_from_world.translation =
       h->metric ? Eigen::Vector3d(t / state.At(e.scale)[0]) : t.normalized();
@@ -84,7 +89,7 @@ Eigen::MatrixXd PoseFromShared(const JointEvidence& e, const JointState& state,
   // d t / d P: a direction's length does not vary.
   Eigen::Matrix3d by_P =
       (Eigen::Matrix3d::Identity() - P * P.transpose() / P.squaredNorm()) / P.norm();
-  if (e.scale >= 0) {
+  if (IsMetric(e, state)) {
     const double scale = state.At(e.scale)[0];
     by_P = Eigen::Matrix3d::Identity() / scale;
     T.block<3, 1>(3, shared.offsets[static_cast<std::size_t>(e.scale)]) = -P / (scale * scale);

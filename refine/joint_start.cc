@@ -64,15 +64,38 @@ void SetAngle(const LineTerm& t, const Eigen::Vector3d& m, JointState* state) {
   }
 }
 
-// Plane distances per world unit, where no circle of known radius has set it already.
+// The ends of the known lengths. One that does not lie in the plane in front of the camera is an
+// outlier of this seed, with both its ends.
+void InitializeLengths(const JointEvidence& e, JointState* state) {
+  for (std::size_t i = 0; i < e.lengths.size(); ++i) {
+    bool is_placed = true;
+    for (const int block : {e.lengths[i].a, e.lengths[i].b}) {
+      const auto point = std::find_if(e.points.begin(), e.points.end(),
+                                      [block](const PointTerm& p) { return p.point == block; });
+      is_placed = PlanePoint(state->rotation, state->facing, point->measured.x.Homogeneous(),
+                             state->At(block)) &&
+                  is_placed;
+    }
+    if (is_placed) continue;
+    state->length_left_out[i] = 1;
+    for (std::size_t k = 0; k < e.points.size(); ++k) {
+      if (e.points[k].point == e.lengths[i].a || e.points[k].point == e.lengths[i].b)
+        state->point_left_out[k] = 1;
+    }
+  }
+}
+
+// Plane distances per world unit, where no circle of known radius has set it already; 0 where
+// nothing does.
 void InitializeScale(const JointEvidence& e, JointState* state) {
-  const bool from_circle = std::any_of(e.circles.begin(), e.circles.end(),
-                                       [&](const CircleTerm& t) { return t.radius == e.scale; });
-  if (e.scale < 0 || from_circle || e.lengths.empty()) return;
-  const LengthTerm& t = e.lengths.front();
-  const double* a = state->At(t.a);
-  const double* b = state->At(t.b);
-  state->At(e.scale)[0] = std::hypot(a[0] - b[0], a[1] - b[1]) / t.length;
+  if (e.scale < 0) return;
+  double* scale = state->At(e.scale);
+  for (std::size_t i = 0; i < e.lengths.size() && !(scale[0] > 0.0); ++i) {
+    if (state->length_left_out[i] != 0) continue;
+    const double* a = state->At(e.lengths[i].a);
+    const double* b = state->At(e.lengths[i].b);
+    scale[0] = std::hypot(a[0] - b[0], a[1] - b[1]) / e.lengths[i].length;
+  }
 }
 
 // --- Where a fit may have followed outliers ---
@@ -195,6 +218,7 @@ Status InitializeState(const JointEvidence& e, const CameraPose& seed, JointStat
   state->circle_left_out.assign(e.circles.size(), 0);
   state->line_left_out.assign(e.lines.size(), 0);
   state->point_left_out.assign(e.points.size(), 0);
+  state->length_left_out.assign(e.lengths.size(), 0);
   const auto place = [&](const Eigen::Vector3d& ray, int block) {
     return PlanePoint(state->rotation, state->facing, ray, state->At(block));
   };
@@ -212,15 +236,7 @@ Status InitializeState(const JointEvidence& e, const CameraPose& seed, JointStat
   for (const LineTerm& term : e.lines) {
     if (term.angle >= 0) SetAngle(term, state->rotation.transpose() * term.line, state);
   }
-  for (const LengthTerm& term : e.lengths) {
-    const auto ray = [&](int block) {
-      return std::find_if(e.points.begin(), e.points.end(),
-                          [block](const PointTerm& p) { return p.point == block; })
-          ->measured.x.Homogeneous();
-    };
-    if (!place(ray(term.a), term.a) || !place(ray(term.b), term.b))
-      return Status::Refused("a known length ends beyond the horizon of the plane");
-  }
+  InitializeLengths(e, state);
   InitializeScale(e, state);
   Reconsider(e, state);
   return Status::Ok();

@@ -15,7 +15,8 @@ namespace circline {
 // closed forms from each feature's fit; where many of a feature's points are doubted, so that the
 // fit may have followed outliers, the best of a few dozen trials under the robust loss. Refused
 // where the seed contradicts the evidence. An ellipse that the plane cannot explain (across or
-// beyond the horizon) is left out; the seed is refused only where that leaves no circle.
+// beyond the horizon) is left out, and so is a length of which one end lies beyond; the seed is
+// refused only where that leaves no circle.
 Status InitializeState(const JointEvidence& evidence, const CameraPose& seed, JointState* state);
 
 // Plane coordinates (X, Y) at which a ray meets the plane; false where it does not, in front.

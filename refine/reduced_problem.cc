@@ -259,7 +259,9 @@ double JointCost(const JointEvidence& e, const JointState& state, const Weighing
     if (state.point_left_out[i] == 0) cost += Evaluate(e.points[i], state, weighing, nullptr);
   }
   for (const AngleTerm& t : e.angles) cost += Evaluate(t, state, nullptr);
-  for (const LengthTerm& t : e.lengths) cost += Evaluate(t, e.scale, state, nullptr);
+  for (std::size_t i = 0; i < e.lengths.size(); ++i) {
+    if (state.length_left_out[i] == 0) cost += Evaluate(e.lengths[i], e.scale, state, nullptr);
+  }
   return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
 }
 
@@ -294,7 +296,9 @@ bool Linearize(const JointEvidence& e, const JointState& state, const SharedColu
     Evaluate(t, state, &model);
     if (!assembler.Add(VariablesOf(t), &model, &unused)) return false;
   }
-  for (const LengthTerm& t : e.lengths) {
+  for (std::size_t i = 0; i < e.lengths.size(); ++i) {
+    if (state.length_left_out[i] != 0) continue;
+    const LengthTerm& t = e.lengths[i];
     if (!std::isfinite(Evaluate(t, e.scale, state, &model)) ||
         !assembler.Add(VariablesOf(t, e.scale), &model, &unused))
       return false;

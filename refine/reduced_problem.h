@@ -24,9 +24,9 @@ struct JointState {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   double facing = -1.0;
   Values values;  // Of block 0, the rotation, unused.
-  // By term of the evidence, 1 = left out: circles that cannot lie on this plane in front of the
-  // camera, and what turned out to be an outlier as a whole.
-  std::vector<std::uint8_t> circle_left_out, line_left_out, point_left_out;
+  // By term of the evidence, 1 = left out: circles and lengths that cannot lie on this plane in
+  // front of the camera, and what turned out to be an outlier as a whole.
+  std::vector<std::uint8_t> circle_left_out, line_left_out, point_left_out, length_left_out;
 
   double* At(int block) { return values[static_cast<std::size_t>(block)].data(); }
   const double* At(int block) const { return values[static_cast<std::size_t>(block)].data(); }

@@ -172,17 +172,42 @@ TEST(EstimatePoseTest, KnowledgeThatHasNoPartIsNamed) {
   };
   EXPECT_TRUE(has_note("'L1' and 'L2': not used, both run along axes"));
   EXPECT_TRUE(has_note("a known length of the plane 'p1': not used"));
-  // One end is in the sky; the lines alone have one pose.
-  observations.circles.clear();
+}
+
+// One end of a known length is in the sky: that turns no pose over, it is left out and named.
+TEST(EstimatePoseTest, ALengthBeyondTheHorizonIsLeftOut) {
+  PlaneScene scene(1.1, 0.1);
   const Eigen::Vector3d normal = scene.pose.rotation.col(2), ahead = Eigen::Vector3d::UnitZ();
   Eigen::Vector2d sky;
   ASSERT_TRUE(CameraToPixel(scene.camera, ahead - (normal.dot(ahead) - 0.1) * normal, &sky));
-  observations.known_lengths = {KnownLength{Segment{scene.Pixel(0, 0), sky}, "p0", 1.0}};
-  estimate = EstimatePose(observations);
-  EXPECT_EQ(estimate.status.code, StatusCode::kRefused);
-  EXPECT_EQ(estimate.status.message.find("no pose agrees with all evidence: a known length ends"),
-            0U)
-      << estimate.status.message;
+  Observations circle = scene.Empty(), lines = scene.Empty();
+  circle.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  circle.circles[0].center = scene.Pixel(0.5, 0.2);
+  lines.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                   scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+  Observations both = circle;
+  both.pencils = lines.pencils;
+  for (Observations observations : {circle, lines, both}) {
+    observations.known_lengths = {KnownLength{Segment{scene.Pixel(0, 0), sky}, "p0", 1.0}};
+    const PoseEstimate wrong = EstimatePose(observations);
+    ASSERT_TRUE(wrong.status.ok()) << wrong.status.message;
+    // Of the circle alone another pose may explain the length and not the centre.
+    if (!observations.pencils.empty()) {
+      EXPECT_LT(NormalError(wrong.hypotheses[0], scene), 0.05);
+      EXPECT_FALSE(wrong.hypotheses[0].metric);
+      EXPECT_NE(wrong.notes.back().find("known length"), std::string::npos);
+    } else {
+      EXPECT_GT(wrong.hypotheses.size(), 1U);
+    }
+    // Another that is right makes it metric.
+    observations.known_lengths.push_back(
+        KnownLength{Segment{scene.Pixel(-1, 0), scene.Pixel(1, 0)}, "p0", 2.0});
+    const PoseEstimate right = EstimatePose(observations);
+    ASSERT_TRUE(right.status.ok()) << right.status.message;
+    EXPECT_LT(NormalError(right.hypotheses[0], scene), 0.05);
+    EXPECT_TRUE(right.hypotheses[0].metric);
+    EXPECT_TRUE(right.hypotheses[0].Covariance().allFinite());
+  }
 }
 
 // Rotation and translation covariance against the errors of many trials, all kinds of evidence at
