@@ -195,8 +195,7 @@ TEST(FitConicRobust, CovarianceIsHonest) {
     sum += e.dot((covariance + scale * v * v.transpose()).inverse() * e);
   }
   if (kSanitized) return;
-  EXPECT_GT(sum / kTrials, 3.5);
-  EXPECT_LT(sum / kTrials, 7.0);
+  EXPECT_NEAR(sum / kTrials, 5.0, 1.0);  // 100 trials scatter it by 0.32.
 }
 
 TEST(FitConicRobust, ExactPointsGiveTheExactEllipse) {
