@@ -136,8 +136,7 @@ TEST(DetectLines, StatesHowWellItKnowsALine) {
     ++count;
   }
   ASSERT_GE(count, 35);
-  EXPECT_GT(chi2 / count, 0.3);
-  EXPECT_LT(chi2 / count, 2.5);
+  EXPECT_NEAR(chi2 / count, 1.0, 0.67);  // 40 trials scatter it by 0.22.
 }
 
 TEST(DetectLines, ACircleIsNoLine) {

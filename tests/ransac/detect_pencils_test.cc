@@ -69,8 +69,9 @@ TEST(DetectPencils, KnowsTheScatterOfLinesThatAreNotQuiteParallel) {
     const std::vector<LineObservation>& lines = pencils[0].observation.lines;
     for (const LineObservation& line : lines) EXPECT_GT(line.sigma_px, 0.16);
   }
-  EXPECT_GT(chi2, 0.3);
-  EXPECT_LT(chi2, 3.0);
+  // 30 trials scatter it by 0.18. The spread is that of the lines it chose, so it is a little sure.
+  EXPECT_GT(chi2, 0.5);
+  EXPECT_LT(chi2, 2.2);
 }
 
 // The two sides of a thin line are parallel by themselves: drawn lines that have nothing to do with

@@ -79,6 +79,7 @@ TEST(EdgeShift, UndoneItLeavesLinesStraight) {
 TEST(EdgeShift, NoneWhereThereIsNone) {
   const Camera camera = detection_test::TestCamera();
   const Lines found = Detect(Board(0.0));
+  ASSERT_GE(found.lines.size(), 10u);
   EXPECT_NEAR(EstimateEdgeShift(found.edges, camera, found.lines), 0.0, 0.03);
   EXPECT_EQ(EstimateEdgeShift(found.edges, camera, {}), 0.0);
   std::vector<DetectedLine> few(found.lines.begin(), found.lines.begin() + 2);
