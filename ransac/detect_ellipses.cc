@@ -28,6 +28,7 @@ constexpr double kSureCoverage = 0.7;
 constexpr double kDuplicatePx = 2.5;
 
 using Eigen::Vector2d;
+using Eigen::Vector3d;
 
 class EllipseDetector {
  public:
@@ -163,21 +164,34 @@ class EllipseDetector {
   std::vector<DetectedEllipse> accepted_;
 };
 
-// Images of the centres that the two poses of an ellipse put there, and their normals.
-bool CanBeConcentric(const DetectedEllipse& a, const DetectedEllipse& b, const Camera& camera) {
+// A pose of an ellipse: the plane's normal, and where it puts the circle's centre on the photo.
+struct SeenPose {
+  Vector3d normal;
+  Vector2d center;
+};
+
+std::vector<SeenPose> SeenPoses(const DetectedEllipse& ellipse, const Camera& camera) {
+  std::array<CirclePose, 2> poses;
+  const int n = CirclePoses(ellipse.fit.conic, &poses);
+  std::vector<SeenPose> seen;
+  for (int i = 0; i < n; ++i) {
+    const CirclePose& pose = poses[static_cast<std::size_t>(i)];
+    Vector2d pixel;
+    if (CameraToPixel(camera, pose.center, &pixel)) seen.push_back({pose.normal, pixel});
+  }
+  return seen;
+}
+
+bool CanBeConcentric(const std::vector<SeenPose>& a, const std::vector<SeenPose>& b) {
   // Both centres within this many pixels. The centre of a well-seen rim is good to a tenth of one.
   constexpr double kMaxCentrePx = 1.5;
   constexpr double kMinNormalCosineConcentric = 0.966;  // 15 degrees: normals are less certain.
-  std::array<CirclePose, 2> pa, pb;
-  const int na = CirclePoses(a.fit.conic, &pa), nb = CirclePoses(b.fit.conic, &pb);
-  for (int i = 0; i < na; ++i) {
-    for (int j = 0; j < nb; ++j) {
-      const CirclePose& p = pa[static_cast<std::size_t>(i)];
-      const CirclePose& q = pb[static_cast<std::size_t>(j)];
-      if (p.normal.dot(q.normal) < kMinNormalCosineConcentric) continue;
-      Vector2d u, v;
-      if (!CameraToPixel(camera, p.center, &u) || !CameraToPixel(camera, q.center, &v)) continue;
-      if ((u - v).norm() < kMaxCentrePx) return true;
+  for (const SeenPose& p : a) {
+    for (const SeenPose& q : b) {
+      if ((p.center - q.center).squaredNorm() < kMaxCentrePx * kMaxCentrePx &&
+          p.normal.dot(q.normal) >= kMinNormalCosineConcentric) {
+        return true;
+      }
     }
   }
   return false;
@@ -185,12 +199,14 @@ bool CanBeConcentric(const DetectedEllipse& a, const DetectedEllipse& b, const C
 
 // Numbers the groups in the order of their best members.
 void GroupConcentric(const Camera& camera, std::vector<DetectedEllipse>* ellipses) {
+  std::vector<std::vector<SeenPose>> poses;
+  for (const DetectedEllipse& e : *ellipses) poses.push_back(SeenPoses(e, camera));
   int groups = 0;
   for (std::size_t i = 0; i < ellipses->size(); ++i) {
     DetectedEllipse& a = (*ellipses)[i];
     for (std::size_t j = i + 1; j < ellipses->size(); ++j) {
       DetectedEllipse& b = (*ellipses)[j];
-      if (b.concentric >= 0 || !CanBeConcentric(a, b, camera)) continue;
+      if (b.concentric >= 0 || !CanBeConcentric(poses[i], poses[j])) continue;
       if (a.concentric < 0) a.concentric = groups++;
       b.concentric = a.concentric;
     }

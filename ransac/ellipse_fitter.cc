@@ -418,20 +418,20 @@ bool EllipseFitter::FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
   Straighten(initial, e);
   if (fit_points_.size() < 6) return false;
   if (!RefineConic(fit_points_, 1.0, initial, &e->fit).ok()) return false;
-  DropOutliers(e);
-  if (fit_points_.size() < 6) return false;
-  e->sigma_px = kMinSigmaPx;
-  const Matrix3d conic = e->fit.conic;
-  if (!RefineConic(fit_points_, e->sigma_px, conic, &e->fit).ok()) return false;
+  if (DropOutliers(e)) {
+    if (fit_points_.size() < 6) return false;
+    const Matrix3d conic = e->fit.conic;
+    if (!RefineConic(fit_points_, 1.0, conic, &e->fit).ok()) return false;
+  }
   // Degrees of freedom: five go into the ellipse.
   const double n = static_cast<double>(fit_points_.size());
   e->sigma_px = std::max(kMinSigmaPx, e->fit.rms_px * std::sqrt(n / (n - 5.0)));
-  const double scale = e->sigma_px / kMinSigmaPx;
-  for (double& c : e->fit.covariance) c *= scale * scale;
+  for (double& c : e->fit.covariance) c *= e->sigma_px * e->sigma_px;
   return true;
 }
 
-void EllipseFitter::DropOutliers(DetectedEllipse* e) {
+// False if there are none.
+bool EllipseFitter::DropOutliers(DetectedEllipse* e) {
   MeasureDistances(e->fit.conic);
   sorted_.clear();
   for (const double d : distances_) sorted_.push_back(std::abs(d));
@@ -444,9 +444,11 @@ void EllipseFitter::DropOutliers(DetectedEllipse* e) {
     e->contour[kept] = e->contour[k];
     e->points[kept++] = e->points[k];
   }
+  if (kept == fit_points_.size()) return false;
   fit_points_.resize(kept);
   e->contour.resize(kept);
   e->points.resize(kept);
+  return true;
 }
 
 }  // namespace circline

@@ -69,7 +69,7 @@ class EllipseFitter {
   void Straighten(const Eigen::Matrix3d& conic, DetectedEllipse* e);
   double MedianBlur();
   bool FitSupport(const Eigen::Matrix3d& initial, DetectedEllipse* e);
-  void DropOutliers(DetectedEllipse* e);
+  bool DropOutliers(DetectedEllipse* e);
 
   const EdgeMap& map_;
   const Camera& camera_;
