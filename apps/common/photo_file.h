@@ -9,7 +9,8 @@
 
 namespace circline::apps {
 
-// Grey or colour, 8 bits a channel, turned as its EXIF data say. Returns what is wrong with the file, in words; empty: nothing.
+// Grey or colour, 8 bits a channel, turned as its EXIF data say. Returns what is wrong with the
+// file, in words; empty: nothing.
 std::string ReadPhoto(const std::string& path, cv::Mat* photo);
 
 // Whether the file's end is missing, which decoders pass over with half a picture. False for what
