@@ -197,7 +197,9 @@ class Assembler {
     if (!RefitWhereTheyMeet(lines_, &pair)) return;
     first = PlacedPencil(std::move(pair[0]));
     second = PlacedPencil(std::move(pair[1]));
-    SpannedNormal(first.direction, second.direction, &plane->normal);
+    if (!SpannedNormal(first.direction, second.direction, &plane->normal)) return;
+    plane->circles.clear();
+    AddCircles(plane);
   }
 
   // Where circles are all that the plane has: a box on it, whose edges become its axes.

@@ -122,11 +122,11 @@ class LatticeFinder {
         if (j == order[k] || step.norm() > reach) continue;
         int support = 0;
         for (std::size_t i = 0; i < points_.size(); ++i) support += After(i, step) >= 0 ? 1 : 0;
-        // A tenth of a point for a tenth of the length: a diagonal step is nearly as common.
         steps.push_back({step, support});
       }
     }
     const double n = static_cast<double>(points_.size());
+    // A diagonal step is nearly as common: the whole reach costs three tenths of the points.
     const auto merit = [&](const Step& s) { return s.support - n * 0.3 * s.step.norm() / reach; };
     std::stable_sort(steps.begin(), steps.end(),
                      [&](const Step& a, const Step& b) { return merit(a) > merit(b); });

@@ -64,7 +64,8 @@ bool Contour::SampleCount(int n, std::vector<ContourSample>* samples) const {
   for (ContourSample& s : *samples) {
     if (!ToPixel(center_ + anomaly.x() * major_ + anomaly.y() * minor_, &s.pixel)) return false;
     // Beyond what Round() takes: no part of a photo.
-    if (!(s.pixel.cwiseAbs().maxCoeff() < kFarPx)) s.pixel = Vector2d(-kFarPx, -kFarPx);
+    if (!s.pixel.allFinite() || s.pixel.cwiseAbs().maxCoeff() >= kFarPx)
+      s.pixel = Vector2d(-kFarPx, -kFarPx);
     anomaly = Vector2d(step_c * anomaly.x() - step_s * anomaly.y(),
                        step_s * anomaly.x() + step_c * anomaly.y());
   }

@@ -212,8 +212,9 @@ class LineJoiner {
 
   // Means of the points of a piece over point_spacing_px, in pixels and calibrated (averages_).
   void AppendAverages(const LinePiece& p, const Vector3d& line, std::vector<Vector2d>* points) {
-    const int bins = std::max(2, static_cast<int>(p.length_px / options_.point_spacing_px));
-    const int n = p.end - p.begin;
+    const int n = p.end - p.begin;  // More than two.
+    const int bins =
+        static_cast<int>(std::clamp(p.length_px / options_.point_spacing_px, 2.0, 1.0 * n));
     for (int k = 0; k < bins; ++k) {
       Vector2d pixel = Vector2d::Zero(), x = Vector2d::Zero();
       int count = 0;

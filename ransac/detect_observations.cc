@@ -32,6 +32,9 @@ constexpr double kShapeErrorPx = 0.1;
 // Directions looked for beyond those wanted, so that the choice is made by the length of their
 // lines and by the circles rather than by the number of lines.
 constexpr int kExtraPencils = 3;
+// A photo has no more directions worth telling apart.
+constexpr int kMaxPencils = 100;
+
 struct Evidence {
   std::vector<CircleEvidence> circles;  // Best first.
   std::vector<DetectedLine> lines, bent;
@@ -172,7 +175,9 @@ Status DetectionOptions::Validate() const {
     return Status::Invalid("min_segment_length_px must be positive");
   }
   if (max_circles < 0) return Status::Invalid("max_circles must not be negative");
-  if (max_pencils < 0) return Status::Invalid("max_pencils must not be negative");
+  if (max_pencils < 0 || max_pencils > kMaxPencils) {
+    return Status::Invalid("max_pencils must be from 0 to " + std::to_string(kMaxPencils));
+  }
   if (!(max_shared_plane_deg > 0.0)) {
     return Status::Invalid("max_shared_plane_deg must be positive");
   }

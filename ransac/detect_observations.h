@@ -31,7 +31,7 @@ struct DetectionOptions {
   double min_arc_deg = 100.0;           // Smallest angular coverage of an ellipse; in (0, 360].
   double min_segment_length_px = 20.0;  // Shortest line; > 0.
   int max_circles = 128;                // The best ones by coverage and size; 0 or more.
-  int max_pencils = 3;                  // Directions of parallel lines to look for; 0 or more.
+  int max_pencils = 3;                  // Directions of parallel lines to look for; 0 to 100.
   double max_shared_plane_deg =
       5.0;  // Two planes nearer than this may be one (a statistical test decides); > 0.
   std::uint64_t seed = 1;  // Same photo, options and seed: same bits out.

@@ -34,8 +34,12 @@ constexpr Readiness kFind{1.5, -1.5}, kComplete{2.0, -1.0};
 constexpr double kLogCorners = 2.0;
 constexpr double kLogOddsOfNone = -4.0;
 constexpr double kMinLogMargin = 2.0;
-// Angles about the normal that are tried: one in half a degree.
+// Angles about the normal that are tried: the quarter turn in half degrees; and 3 degrees to either
+// side of a box that was found.
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kAngleStep = 0.5 * kPi / 180.0;
 constexpr int kAngles = 180;
+constexpr int kAnglesAbout = 6;
 constexpr int kPasses = 4;
 
 // The lines that end where others do: only they can be edges of a box.
@@ -55,22 +59,13 @@ class BoxSearch {
     double log_odds = -std::numeric_limits<double>::infinity();
   };
 
-  Box Find(const Vector3d& normal, const Readiness& readiness) {
-    Box best;
+  Box Find(const Vector3d& normal) {
     const Vector3d x = normal.unitOrthogonal();
-    for (int k = 0; k < kAngles; ++k) {
-      const double angle = 0.5 * M_PI * k / kAngles;
-      Consider(Axes(std::cos(angle) * x + std::sin(angle) * normal.cross(x), normal), readiness,
-               &best);
-    }
-    // To where its edges agree best.
-    for (int pass = 0; pass < kPasses && std::isfinite(best.log_odds); ++pass) {
-      const double before = best.log_odds;
-      Consider(Turned(best), readiness, &best);
-      if (!(best.log_odds > before)) break;
-    }
-    return best;
+    return Scan(Axes(x, normal), 0, kAngles - 1, kFind);
   }
+
+  // The same with all of its edges; those that proposed it may have been a little off.
+  Box Completed(const Box& box) { return Scan(box.axes, -kAnglesAbout, kAnglesAbout, kComplete); }
 
   double LeastLogOdds() const {
     return kLogCorners * std::log(std::max(1, num_corners_)) + kLogOddsOfNone;
@@ -91,7 +86,7 @@ class BoxSearch {
     }
     if (found.pencils[1].support_px > found.pencils[0].support_px) {
       std::swap(found.pencils[0], found.pencils[1]);
-      found.axes.col(0).swap(found.axes.col(1));
+      found.axes = Axes(found.axes.col(1), found.axes.col(2));
     }
     return found;
   }
@@ -135,6 +130,23 @@ class BoxSearch {
     }
   }
 
+  // The best box at the angles first ... last (times kAngleStep) from `axes`.
+  Box Scan(const Matrix3d& axes, int first, int last, const Readiness& readiness) {
+    Box best;
+    for (int k = first; k <= last; ++k) Consider(Rotated(axes, k * kAngleStep), readiness, &best);
+    // To where its edges agree best.
+    for (int pass = 0; pass < kPasses && std::isfinite(best.log_odds); ++pass) {
+      const double before = best.log_odds;
+      Consider(Turned(best), readiness, &best);
+      if (!(best.log_odds > before)) break;
+    }
+    return best;
+  }
+
+  static Matrix3d Rotated(const Matrix3d& axes, double angle) {
+    return Axes(std::cos(angle) * axes.col(0) + std::sin(angle) * axes.col(1), axes.col(2));
+  }
+
   static Matrix3d Axes(const Vector3d& x, const Vector3d& normal) {
     Matrix3d axes;
     axes << x, normal.cross(x), normal;
@@ -150,7 +162,7 @@ class BoxSearch {
         const Vector3d v = axes.col(k);
         const double miss = edges_[i].fit.line.dot(v);
         const double variance = v.dot(edges_[i].fit.covariance * v);
-        const double gain = 0.5 * std::log(2.0 / (M_PI * variance)) - 0.5 * miss * miss / variance -
+        const double gain = 0.5 * std::log(2.0 / (kPi * variance)) - 0.5 * miss * miss / variance -
                             std::log(3.0) + log_odds;
         if (gain <= gain_[i]) continue;
         gain_[i] = gain;
@@ -206,8 +218,7 @@ class BoxSearch {
       }
     }
     const double angle = denominator > 0.0 ? -numerator / denominator : 0.0;
-    const Vector3d x = std::cos(angle) * box.axes.col(0) + std::sin(angle) * box.axes.col(1);
-    return Axes(x, box.axes.col(2));
+    return Rotated(box.axes, angle);
   }
 
   const std::vector<DetectedLine>& lines_;
@@ -229,7 +240,7 @@ std::optional<FoundBox> FindBox(const std::vector<DetectedLine>& lines,
   std::size_t best_normal = 0;
   double second = -std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < normals.size(); ++k) {
-    BoxSearch::Box box = search.Find(normals[k], kFind);
+    BoxSearch::Box box = search.Find(normals[k]);
     second = std::max(second, std::min(box.log_odds, best.log_odds));
     if (!(box.log_odds > best.log_odds)) continue;
     best = std::move(box);
@@ -238,7 +249,7 @@ std::optional<FoundBox> FindBox(const std::vector<DetectedLine>& lines,
   if (!(best.log_odds >= search.LeastLogOdds() && best.log_odds - second >= kMinLogMargin)) {
     return std::nullopt;
   }
-  FoundBox found = search.Finish(search.Find(normals[best_normal], kComplete));
+  FoundBox found = search.Finish(search.Completed(best));
   found.log_odds = best.log_odds;
   found.normal = best_normal;
   return found;

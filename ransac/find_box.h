@@ -19,7 +19,7 @@ namespace circline {
 
 struct FoundBox {
   std::size_t normal = 0;                 // Which of those given.
-  Eigen::Matrix3d axes;                   // Columns: directions in the plane, the normal.
+  Eigen::Matrix3d axes;                   // A rotation: directions in the plane, the normal.
   std::array<DetectedPencil, 3> pencils;  // Along them; one line or more each, no fit.
   // Logarithm of how much likelier the lines are as edges of the box than as lines of any
   // direction.

@@ -14,8 +14,8 @@
 //       // Squared residuals of the data begin..end-1, to r2[0..]. At most kRansacBlock at a time.
 //       void SquaredResiduals(const Value& value, int begin, int end, float* r2) const;
 //       // One step (Gauss-Newton or a reweighted fit) towards the minimum of the sum of weight
-//       times
-//       // squared residual, one weight per datum; false, with `value` untouched, if there is none.
+//       // times squared residual, one weight per datum; false, with `value` untouched, if there
+//       // is none.
 //       bool Refine(const float* weights, Value* value) const;
 //       // A last look at a candidate that would become the best: false rejects it.
 //       bool Accept(const Value& value, double threshold) const;
@@ -187,6 +187,7 @@ class Ransac {
     limits_.assign(n / kRansacBlock + 1, 0.0);
     report->inlier_mask.assign(n, 0);
     report->success = false;
+    report->model = typename Model::Value{};
     report->num_inliers = report->num_iterations = 0;
     report->num_degenerate = report->num_local_optimizations = 0;
     report->stop_reason = StopReason::kTooFewData;

@@ -59,6 +59,7 @@ TEST(FindBox, FindsItsAxesOnTheRightOfTwoPlanes) {
     EXPECT_EQ(box->normal, 1u) << seed;
     // Edges of 100 pixels that may be worn by a third of a pixel: 0.7 degrees each.
     EXPECT_LT(AxisErrorDeg(box->axes.col(0)), 1.0) << seed;
+    EXPECT_NEAR(box->axes.determinant(), 1.0, 1e-9);
     // All three edges along each direction, and hardly anything else.
     for (const DetectedPencil& pencil : box->pencils) {
       EXPECT_GE(
