@@ -18,6 +18,10 @@ using Eigen::Vector3d;
 
 constexpr double kInverseRoot2Pi = 0.3989422804014327;
 
+// Radians. The engine's residuals are of single precision: of lines that claim to be known better
+// than that it would see the rounding, and of exact ones 0 / 0.
+double ModelSigma(const PencilOptions& options) { return std::max(options.model_sigma_rad, 1e-6); }
+
 // Usable lines, and for each and each of K directions the posterior probability that it belongs.
 template <std::size_t K>
 struct Mixture {
@@ -31,15 +35,18 @@ struct Mixture {
   Mixture(const std::vector<LineFit>& input, const PencilOptions& options)
       : indices(UsableLines(input)), threshold(options.ransac.threshold) {
     for (const int i : indices) {
-      lines.push_back(WithModelError(input[static_cast<std::size_t>(i)], options.model_sigma_rad));
+      lines.push_back(WithModelError(input[static_cast<std::size_t>(i)], ModelSigma(options)));
     }
     weights.resize(lines.size());
     shares.fill(0.5 / K);
   }
 
   // Expectation step. For a direction without relation to the line, l . v is uniform on [-1, 1]
-  // (Archimedes): density 1/2.
+  // (Archimedes): density 1/2. No line is cut off at the threshold: the density knows how far is
+  // too far for each, and to lose what is likely to belong would make the rest seem better than it
+  // is.
   void Weigh() {
+    constexpr double kNowhere = 8.0;  // Standard deviations; beyond it weights are below 1e-6.
     std::array<double, K> sums{};
     const double stray = 0.5 * (1.0 - std::accumulate(shares.begin(), shares.end(), 0.0));
     for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -47,8 +54,9 @@ struct Mixture {
       for (std::size_t k = 0; k < K; ++k) {
         const double sigma = std::sqrt(directions[k].dot(lines[i].covariance * directions[k]));
         const double r = lines[i].line.dot(directions[k]) / sigma;
-        const bool near = std::abs(r) <= threshold;
-        weights[i][k] = near ? shares[k] * kInverseRoot2Pi * std::exp(-0.5 * r * r) / sigma : 0.0;
+        weights[i][k] = std::abs(r) < kNowhere
+                            ? shares[k] * kInverseRoot2Pi * std::exp(-0.5 * r * r) / sigma
+                            : 0.0;
         total += weights[i][k];
       }
       for (std::size_t k = 0; k < K; ++k) {
@@ -97,7 +105,7 @@ std::array<std::size_t, K> BySupport(const std::vector<int>& membership,
 template <typename Model>
 bool Draw(const std::vector<LineFit>& lines, const PencilOptions& options,
           typename Model::Value* value) {
-  const PencilModel pencil(lines, UsableLines(lines), options.model_sigma_rad);
+  const PencilModel pencil(lines, UsableLines(lines), ModelSigma(options));
   RansacReport<typename Model::Value> report;
   Ransac<Model>(options.ransac).Run(Model(pencil), &report);
   *value = report.model;
@@ -106,26 +114,57 @@ bool Draw(const std::vector<LineFit>& lines, const PencilOptions& options,
 
 constexpr int kPasses = 8;
 
-// The sums of one Gauss-Newton step of the rotation.
-struct RotationEquations {
-  Matrix3d information = Matrix3d::Zero();  // As if the weights were known memberships.
-  Matrix3d missing = Matrix3d::Zero();      // What is lost because they are not.
-  Vector3d gradient = Vector3d::Zero();
+// How each of K directions moves with P parameters.
+template <std::size_t K, int P>
+using Slopes = std::array<Eigen::Matrix<double, 3, P>, K>;
 
-  RotationEquations(const Mixture<3>& mixture, const Matrix3d& rotation) {
+// v moves by delta x v.
+Slopes<3, 3> SlopesOfRotation(const std::array<Vector3d, 3>& directions) {
+  Slopes<3, 3> slopes;
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (int j = 0; j < 3; ++j) slopes[k].col(j) = Vector3d::Unit(j).cross(directions[k]);
+  }
+  return slopes;
+}
+
+// Each direction in its own tangent plane.
+Slopes<2, 4> SlopesOfPair(const std::array<Vector3d, 2>& directions) {
+  Slopes<2, 4> slopes;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const int own = 2 * static_cast<int>(k);
+    slopes[k].setZero();
+    slopes[k].col(own) = directions[k].unitOrthogonal();
+    slopes[k].col(own + 1) = directions[k].cross(slopes[k].col(own));
+  }
+  return slopes;
+}
+
+// The sums of one Gauss-Newton step of the directions.
+template <int P>
+struct Equations {
+  using Vector = Eigen::Matrix<double, P, 1>;
+  using Matrix = Eigen::Matrix<double, P, P>;
+  Matrix information = Matrix::Zero();  // As if the weights were known memberships.
+  Matrix missing = Matrix::Zero();      // What is lost because they are not.
+  Vector gradient = Vector::Zero();
+
+  template <std::size_t K>
+  Equations(const Mixture<K>& mixture, const Slopes<K, P>& slopes) {
     for (std::size_t i = 0; i < mixture.lines.size(); ++i) {
-      Vector3d line_gradient = Vector3d::Zero();
-      for (std::size_t k = 0; k < 3; ++k) {
+      Vector line_gradient = Vector::Zero();
+      for (std::size_t k = 0; k < K; ++k) {
         const double w = mixture.weights[i][k];
         if (w < 1e-6) continue;
-        // r = l . v / sqrt(v^T S v), and v moves by delta x v.
-        const Vector3d v = rotation.col(static_cast<int>(k));
+        // r = l . v / sqrt(v^T S v).
+        const Vector3d& v = mixture.directions[k];
         const Vector3d s_v = mixture.lines[i].covariance * v;
         const double sigma = std::sqrt(v.dot(s_v));
         const double r = mixture.lines[i].line.dot(v) / sigma;
-        const Vector3d slope = v.cross(mixture.lines[i].line - (r / sigma) * s_v) / sigma;
-        information += w * slope * slope.transpose();
-        missing += w * r * r * slope * slope.transpose();
+        const Vector3d of_direction = (mixture.lines[i].line - (r / sigma) * s_v) / sigma;
+        const Vector slope = slopes[k].transpose() * of_direction;
+        const Matrix product = w * slope * slope.transpose();
+        information += product;
+        missing += r * r * product;
         line_gradient += w * r * slope;
       }
       missing -= line_gradient * line_gradient.transpose();
@@ -134,18 +173,36 @@ struct RotationEquations {
   }
 };
 
-bool Invert(const Matrix3d& information, Matrix3d* inverse) {
-  const double mean = information.trace() / 3.0;
-  if (!(information.determinant() > 1e-12 * mean * mean * mean)) return false;
-  *inverse = information.inverse();
+// False where it is not safely positive definite, each parameter in its own scale: one direction
+// may be known far better than another.
+template <int P>
+bool Invert(const Eigen::Matrix<double, P, P>& information, Eigen::Matrix<double, P, P>* inverse) {
+  const Eigen::Matrix<double, P, 1> scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::Matrix<double, P, P> scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  if (!scaled.allFinite()) return false;
+  const Eigen::LDLT<Eigen::Matrix<double, P, P>> ldlt(scaled);
+  if (!ldlt.isPositive() || !(ldlt.rcond() > 1e-12)) return false;
+  *inverse = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
   return true;
+}
+
+// Of the parameters. Observed information of a mixture: that of the complete data less what is
+// missing (T. Louis, Finding the observed information matrix when using the EM algorithm, JRSS B
+// 1982).
+template <std::size_t K, int P>
+bool MixtureCovariance(const Mixture<K>& mixture, const Slopes<K, P>& slopes,
+                       Eigen::Matrix<double, P, P>* covariance) {
+  const Equations<P> equations(mixture, slopes);
+  const Eigen::Matrix<double, P, P> observed = equations.information - equations.missing;
+  // Far from a maximum it need not be one of a covariance.
+  return Invert<P>(observed, covariance) || Invert<P>(equations.information, covariance);
 }
 
 // Maximisation step. False where the lines do not fix the rotation.
 bool StepRotation(Mixture<3>* mixture, Matrix3d* rotation) {
-  const RotationEquations equations(*mixture, *rotation);
+  const Equations<3> equations(*mixture, SlopesOfRotation(mixture->directions));
   Matrix3d inverse;
-  if (!Invert(equations.information, &inverse)) return false;
+  if (!Invert<3>(equations.information, &inverse)) return false;
   const Vector3d delta = -inverse * equations.gradient;
   const double angle = delta.norm();
   if (!(angle < 1.0)) return false;
@@ -154,16 +211,6 @@ bool StepRotation(Mixture<3>* mixture, Matrix3d* rotation) {
     mixture->directions[static_cast<std::size_t>(k)] = rotation->col(k);
   }
   return true;
-}
-
-// Observed information of a mixture: that of the complete data less what is missing (T. Louis,
-// Finding the observed information matrix when using the EM algorithm, JRSS B 1982).
-bool RotationCovariance(const Mixture<3>& mixture, const Matrix3d& rotation, Matrix3d* covariance) {
-  const RotationEquations equations(mixture, rotation);
-  const Matrix3d observed = equations.information - equations.missing;
-  // Far from a maximum it need not be one of a covariance.
-  const bool definite = observed.ldlt().isPositive();
-  return (definite && Invert(observed, covariance)) || Invert(equations.information, covariance);
 }
 
 }  // namespace
@@ -186,7 +233,9 @@ Status FitOrthogonalTriplet(const std::vector<LineFit>& lines, const PencilOptio
     if (!StepRotation(&mixture, &result.rotation)) return status;
   }
   mixture.Weigh();
-  if (!RotationCovariance(mixture, result.rotation, &result.covariance)) return status;
+  if (!MixtureCovariance(mixture, SlopesOfRotation(mixture.directions), &result.covariance)) {
+    return status;
+  }
   std::array<int, 3> support;
   std::vector<int> members = mixture.Membership(lines.size());
   const std::array<std::size_t, 3> order = BySupport<3>(members, &support);
@@ -225,6 +274,15 @@ Status FitDirectionPair(const std::vector<LineFit>& lines, const PencilOptions& 
       if (!status.ok()) return status;
       mixture.directions[k] = result[k].direction;
     }
+  }
+  mixture.Weigh();
+  const Slopes<2, 4> slopes = SlopesOfPair(mixture.directions);
+  Eigen::Matrix4d covariance;
+  if (!MixtureCovariance(mixture, slopes, &covariance)) {
+    return Status::Refused("the lines do not fix two directions");
+  }
+  for (std::size_t k = 0; k < 2; ++k) {
+    result[k].covariance = slopes[k] * covariance * slopes[k].transpose();
   }
   std::array<int, 2> support;
   std::vector<int> members = mixture.Membership(lines.size());

@@ -24,19 +24,24 @@ struct OrthogonalTripletFit {
 
 // The three orthogonal directions that most lines point along, fitted jointly: each line weighs as
 // the posterior probability that it belongs to a direction rather than to none. The third direction
-// may be without lines. `membership` (optional) receives for each line 0, 1, 2 (column) or -1.
+// may be without lines. `membership` (optional) receives for each line 0, 1, 2 (column) or -1: that
+// which it misses least, within the threshold. Lines known to better than 1e-6 rad count as known
+// to that.
 // Refuses where fewer than two directions have two lines each. Of `options`, max_pencils, min_lines
 // and max_false_alarms play no part. Outputs are written only if the status is ok.
 //
 // 30 segments of 20 to 120 px along each direction among 90 stray ones: 0.2 ms; rms error 1.05 to
 // 1.13 of the Cramer-Rao bound of the 90, by the seed of 300 trials; maximum likelihood on the 90
 // alone, told which is which, 1.00 to 1.04. The covariance has the mixture's observed information;
-// one error in a hundred is larger than it says (mean NEES 3.6 of 3, median 2.7 of 2.4).
+// one error in a hundred is larger than it says (mean NEES 3.6 of 3, median 2.5 of 2.4).
 Status FitOrthogonalTriplet(const std::vector<LineFit>& lines, const PencilOptions& options,
                             OrthogonalTripletFit* fit, std::vector<int>* membership = nullptr);
 
 // The same for the two best supported directions together, at whatever angle; the better supported
 // one first. Refuses where a direction has fewer than three lines. `membership`: 0, 1 or -1.
+//
+// 30 and 20 segments along two directions among 50 stray ones: median NEES 1.44 of 1.39, mean 2.2
+// of 2 but for one scene in 1500 that takes strays for a direction; without strays 2.02.
 Status FitDirectionPair(const std::vector<LineFit>& lines, const PencilOptions& options,
                         std::array<VanishingPointFit, 2>* fits,
                         std::vector<int>* membership = nullptr);

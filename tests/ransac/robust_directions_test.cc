@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <numeric>
 
 #include "circline/estimators/random.h"
 #include "tests/ransac/segment_scene.h"
@@ -184,6 +186,70 @@ TEST(FitDirectionPair, IsNearTheBoundAtAnyAngle) {
     }
   }
   EXPECT_LT(std::sqrt(squares / bounds), 1.2);
+}
+
+// Error of a direction in its own tangent plane, squared and in units of its covariance.
+double Nees(const VanishingPointFit& fit, const Vector3d& truth) {
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = fit.direction.unitOrthogonal();
+  basis.col(1) = fit.direction.cross(basis.col(0));
+  const double sense = fit.direction.dot(truth) < 0.0 ? -1.0 : 1.0;
+  const Eigen::Vector2d error = sense * basis.transpose() * truth;
+  return error.dot((basis.transpose() * fit.covariance * basis).inverse() * error);
+}
+
+TEST(FitDirectionPair, TheCovarianceKnowsThatMembershipsAreGuessed) {
+  constexpr int kScenes = 80;
+  std::vector<double> nees;
+  for (const double angle : {0.4, 1.0, 1.5708}) {
+    for (int scene = 0; scene < kScenes; ++scene) {
+      std::array<Vector3d, 2> truth;
+      const std::uint64_t seed = 1000 + nees.size();
+      std::array<VanishingPointFit, 2> fits;
+      ASSERT_TRUE(
+          FitDirectionPair(MakePair(seed, angle, &truth[0], &truth[1]), ExactOptions(), &fits)
+              .ok());
+      // Strays decide now and then which of the two has more lines.
+      if (AngleBetween(fits[0].direction, truth[0]) > AngleBetween(fits[1].direction, truth[0])) {
+        std::swap(fits[0], fits[1]);
+      }
+      for (std::size_t k = 0; k < 2; ++k) nees.push_back(Nees(fits[k], truth[k]));
+    }
+  }
+  const double n = static_cast<double>(nees.size());
+  const double mean = std::accumulate(nees.begin(), nees.end(), 0.0) / n;
+  std::printf("pair: mean NEES %.2f of 2 over %.0f directions\n", mean, n);
+  // Chi-square with two degrees of freedom has variance 4.
+  EXPECT_NEAR(mean, 2.0, 3.0 * 2.0 / std::sqrt(n));
+}
+
+// Lines without any error along three orthogonal directions, ten each, and ten strays.
+TEST(RobustDirections, ExactLinesGiveTheExactDirections) {
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    Random random(seed);
+    const Matrix3d truth = RandomRotation(&random);
+    std::vector<LineFit> lines(40);
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      const double x = random.Normal(), y = random.Normal(), z = random.Normal();
+      const Vector3d point(x, y, z);
+      lines[i].line = i < 30 ? truth.col(static_cast<int>(i / 10)).cross(point).normalized()
+                             : point.normalized();
+    }
+    OrthogonalTripletFit triplet;
+    std::vector<int> membership;
+    ASSERT_TRUE(FitOrthogonalTriplet(lines, ExactOptions(), &triplet, &membership).ok()) << seed;
+    EXPECT_LT(RotationError(truth, triplet.rotation).norm(), 1e-12);
+    EXPECT_EQ(std::count(membership.begin(), membership.begin() + 30, -1), 0);
+    EXPECT_EQ(std::count(membership.begin() + 30, membership.end(), -1), 10);
+    std::array<VanishingPointFit, 2> pair;
+    ASSERT_TRUE(FitDirectionPair(lines, ExactOptions(), &pair).ok()) << seed;
+    for (const VanishingPointFit& fit : pair) {
+      const double nearest = std::min({AngleBetween(fit.direction, truth.col(0)),
+                                       AngleBetween(fit.direction, truth.col(1)),
+                                       AngleBetween(fit.direction, truth.col(2))});
+      EXPECT_LT(nearest, 1e-12) << seed;
+    }
+  }
 }
 
 TEST(FitDirectionPair, RefusesOneDirectionAlone) {
