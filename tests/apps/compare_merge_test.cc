@@ -143,10 +143,9 @@ TEST_F(CompareMerge, ExportsThePosesThatAreShown) {
   std::getline(colmap, line);
   std::getline(tum, line);
   for (std::size_t i = 0; i < shown.size(); ++i) {
-    Eigen::Matrix3d rotation;
-    Eigen::Vector3d translation;
-    for (int k = 0; k < 9; ++k) rotation(k / 3, k % 3) = shown[i]["rotation"][k];
-    for (int k = 0; k < 3; ++k) translation[k] = shown[i]["translation"][k];
+    const std::vector<double> r = shown[i]["rotation"], t_shown = shown[i]["translation"];
+    const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix3d>(r.data()).transpose();
+    const Eigen::Vector3d translation = Eigen::Map<const Eigen::Vector3d>(t_shown.data());
     const Eigen::Vector3d center = -rotation.transpose() * translation;
 
     int id = 0, camera = 0;
@@ -174,7 +173,8 @@ TEST_F(CompareMerge, ExportsThePosesThatAreShown) {
                                      .toRotationMatrix();
     EXPECT_LT((-turn.col(2) - rotation.transpose().col(2)).norm(), 1e-12);
     EXPECT_LT((turn.col(1) + rotation.transpose().col(1)).norm(), 1e-12);
-    for (int k = 0; k < 3; ++k) EXPECT_NEAR(node["translation"][k], center[k], 1e-12);
+    const std::vector<double> placed = node["translation"];
+    EXPECT_LT((Eigen::Map<const Eigen::Vector3d>(placed.data()) - center).norm(), 1e-12);
   }
   EXPECT_NEAR(gltf["cameras"][0]["perspective"]["yfov"], 2.0 * std::atan(0.5 * kHeight / kFocal),
               1e-12);
