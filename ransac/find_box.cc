@@ -19,14 +19,9 @@ using Eigen::Vector3d;
 constexpr double kWornPx = 0.35;
 // What lens and calibration leave beyond that, radians.
 constexpr double kModelSigmaRad = 1.7e-3;
-// How readily lines are taken for edges: the gap of the corners that they form (see CornerGap), and
-// the logarithm of the odds, before its direction is looked at, that a line with such a corner is
-// one (the choice between three directions not counted).
-struct Readiness {
-  double max_gap, log_odds;
-};
-// To be sure that there is a box; and then for all of its edges, with rounded and hidden corners.
-constexpr Readiness kFind{1.5, -1.5}, kComplete{2.0, -1.0};
+// The logarithm of the odds, before its direction is looked at, that a line that forms corners is
+// an edge of the box (the choice between three directions not counted).
+constexpr double kLogOddsOfAnEdge = -1.5;
 // Least odds of a box, kLogCorners times the logarithm of the number of corners in the photo beyond
 // kLogOddsOfNone: by accident one normal in a hundred has as much, on photos of few lines and of
 // many (the test RealPhotographs.BoxesAreRare*). And by how much the odds exceed those of a box on
@@ -34,12 +29,9 @@ constexpr Readiness kFind{1.5, -1.5}, kComplete{2.0, -1.0};
 constexpr double kLogCorners = 2.0;
 constexpr double kLogOddsOfNone = -4.0;
 constexpr double kMinLogMargin = 2.0;
-// Angles about the normal that are tried: the quarter turn in half degrees; and 3 degrees to either
-// side of a box that was found.
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kAngleStep = 0.5 * kPi / 180.0;
+// Angles about the normal that are tried, of a quarter turn: one in half a degree.
 constexpr int kAngles = 180;
-constexpr int kAnglesAbout = 6;
 constexpr int kPasses = 4;
 
 // The lines that end where others do: only they can be edges of a box.
@@ -60,12 +52,17 @@ class BoxSearch {
   };
 
   Box Find(const Vector3d& normal) {
-    const Vector3d x = normal.unitOrthogonal();
-    return Scan(Axes(x, normal), 0, kAngles - 1, kFind);
+    Box best;
+    const Matrix3d axes = Axes(normal.unitOrthogonal(), normal);
+    for (int k = 0; k < kAngles; ++k) Consider(Rotated(axes, 0.5 * kPi * k / kAngles), &best);
+    // To where its edges agree best.
+    for (int pass = 0; pass < kPasses && std::isfinite(best.log_odds); ++pass) {
+      const double before = best.log_odds;
+      Consider(Turned(best), &best);
+      if (!(best.log_odds > before)) break;
+    }
+    return best;
   }
-
-  // The same with all of its edges; those that proposed it may have been a little off.
-  Box Completed(const Box& box) { return Scan(box.axes, -kAnglesAbout, kAnglesAbout, kComplete); }
 
   double LeastLogOdds() const {
     return kLogCorners * std::log(std::max(1, num_corners_)) + kLogOddsOfNone;
@@ -73,6 +70,7 @@ class BoxSearch {
 
   FoundBox Finish(const Box& box) const {
     FoundBox found;
+    found.log_odds = box.log_odds;
     for (std::size_t k = 0; k < 3; ++k) {
       std::vector<int> members;
       std::vector<LineFit> fits;
@@ -92,29 +90,22 @@ class BoxSearch {
   }
 
  private:
-  struct Corner {
-    int edge;    // The other one, index into edges_.
-    double gap;  // See CornerGap.
-  };
-
   struct Edge {
-    int line;     // Index into lines_.
-    LineFit fit;  // With all that it may miss its direction by.
-    std::vector<Corner> corners;
+    int line;                  // Index into lines_.
+    LineFit fit;               // With all that it may miss its direction by.
+    std::vector<int> corners;  // Those it forms a corner with, indices into edges_.
   };
 
   // Of lines that form corners: edges, and which form them.
   void FindCorners() {
     const std::vector<int> twin_of = FindTwins(lines_);
-    std::vector<std::vector<Corner>> corners(lines_.size());
+    std::vector<std::vector<int>> corners(lines_.size());
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       for (std::size_t j = i + 1; j < lines_.size() && twin_of[i] < 0; ++j) {
-        if (twin_of[j] >= 0) continue;
-        const double gap = CornerGap(lines_[i].ends, lines_[j].ends);
-        if (!(gap <= kComplete.max_gap)) continue;
-        corners[i].push_back({static_cast<int>(j), gap});
-        corners[j].push_back({static_cast<int>(i), gap});
-        if (gap <= kFind.max_gap) ++num_corners_;
+        if (twin_of[j] >= 0 || !FormCorner(lines_[i].ends, lines_[j].ends)) continue;
+        corners[i].push_back(static_cast<int>(j));
+        corners[j].push_back(static_cast<int>(i));
+        ++num_corners_;
       }
     }
     std::vector<int> edge_of(lines_.size(), -1);
@@ -125,22 +116,8 @@ class BoxSearch {
       edges_.push_back({static_cast<int>(i), fit, std::move(corners[i])});
     }
     for (Edge& edge : edges_) {
-      for (Corner& corner : edge.corners)
-        corner.edge = edge_of[static_cast<std::size_t>(corner.edge)];
+      for (int& corner : edge.corners) corner = edge_of[static_cast<std::size_t>(corner)];
     }
-  }
-
-  // The best box at the angles first ... last (times kAngleStep) from `axes`.
-  Box Scan(const Matrix3d& axes, int first, int last, const Readiness& readiness) {
-    Box best;
-    for (int k = first; k <= last; ++k) Consider(Rotated(axes, k * kAngleStep), readiness, &best);
-    // To where its edges agree best.
-    for (int pass = 0; pass < kPasses && std::isfinite(best.log_odds); ++pass) {
-      const double before = best.log_odds;
-      Consider(Turned(best), readiness, &best);
-      if (!(best.log_odds > before)) break;
-    }
-    return best;
   }
 
   static Matrix3d Rotated(const Matrix3d& axes, double angle) {
@@ -155,7 +132,7 @@ class BoxSearch {
 
   // Which axis each edge is most likely along, and the logarithm of its odds: a line of any
   // direction misses an axis by a sine that is uniform in [0, 1], one along it by a Gaussian.
-  void Assign(const Matrix3d& axes, double log_odds) {
+  void Assign(const Matrix3d& axes) {
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       gain_[i] = -std::numeric_limits<double>::infinity();
       for (int k = 0; k < 3; ++k) {
@@ -163,7 +140,7 @@ class BoxSearch {
         const double miss = edges_[i].fit.line.dot(v);
         const double variance = v.dot(edges_[i].fit.covariance * v);
         const double gain = 0.5 * std::log(2.0 / (kPi * variance)) - 0.5 * miss * miss / variance -
-                            std::log(3.0) + log_odds;
+                            std::log(3.0) + kLogOddsOfAnEdge;
         if (gain <= gain_[i]) continue;
         gain_[i] = gain;
         axis_[i] = k;
@@ -173,8 +150,8 @@ class BoxSearch {
 
   // The likeliest set of edges that corners between different axes connect. Each two of the axes
   // have a corner in common: only lines that differ in the photo can be told from one another.
-  void Consider(const Matrix3d& axes, const Readiness& readiness, Box* best) {
-    Assign(axes, readiness.log_odds);
+  void Consider(const Matrix3d& axes, Box* best) {
+    Assign(axes);
     std::fill(seen_.begin(), seen_.end(), char{0});
     for (std::size_t start = 0; start < edges_.size(); ++start) {
       if (seen_[start] || gain_[start] <= 0.0) continue;
@@ -189,13 +166,13 @@ class BoxSearch {
         queue_.pop_back();
         box.log_odds += gain_[i];
         box.edges[static_cast<std::size_t>(axis_[i])].push_back(static_cast<int>(i));
-        for (const Corner& corner : edges_[i].corners) {
-          const std::size_t j = static_cast<std::size_t>(corner.edge);
-          if (corner.gap > readiness.max_gap || gain_[j] <= 0.0 || axis_[j] == axis_[i]) continue;
+        for (const int corner : edges_[i].corners) {
+          const std::size_t j = static_cast<std::size_t>(corner);
+          if (gain_[j] <= 0.0 || axis_[j] == axis_[i]) continue;
           have_corner[static_cast<std::size_t>(3 - axis_[i] - axis_[j])] = true;
           if (seen_[j]) continue;
           seen_[j] = 1;
-          queue_.push_back(corner.edge);
+          queue_.push_back(corner);
         }
       }
       const bool is_box = have_corner[0] && have_corner[1] && have_corner[2];
@@ -249,8 +226,7 @@ std::optional<FoundBox> FindBox(const std::vector<DetectedLine>& lines,
   if (!(best.log_odds >= search.LeastLogOdds() && best.log_odds - second >= kMinLogMargin)) {
     return std::nullopt;
   }
-  FoundBox found = search.Finish(search.Completed(best));
-  found.log_odds = best.log_odds;
+  FoundBox found = search.Finish(best);
   found.normal = best_normal;
   return found;
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 namespace circline {
 namespace {
@@ -14,12 +13,11 @@ using Eigen::Vector2d;
 // frame, keep a small distance. Pixels.
 constexpr double kCornerPx = 10.0;
 constexpr double kNearPx = 25.0;
-// Of CornerGap.
-constexpr double kCornerShare = 0.3;
-constexpr double kMinCornerGapPx = 6.0;
-constexpr double kMaxCornerGapPx = 14.0;
+// Of FormCorner.
+constexpr double kCornerShare = 0.45;
+constexpr double kMinCornerGapPx = 9.0;
+constexpr double kMaxCornerGapPx = 21.0;
 constexpr double kMinCornerSine = 0.17;
-constexpr double kMaxCornerGaps = 2.0;
 constexpr double kFullMeetings = 3.0;
 constexpr std::size_t kCoreMeetings = 2;
 
@@ -143,19 +141,17 @@ bool LiesAlong(const Segment& s, const Segment& t, double px) {
 
 bool AreNear(const Segment& s, const Segment& t) { return AreWithin(kNearPx, s, t); }
 
-double CornerGap(const Segment& s, const Segment& t) {
-  constexpr double kFar = std::numeric_limits<double>::infinity();
-  if (FarApart(s, t, 2.0 * kMaxCornerGaps * kMaxCornerGapPx)) return kFar;
+bool FormCorner(const Segment& s, const Segment& t) {
+  if (FarApart(s, t, 2.0 * kMaxCornerGapPx)) return false;
   const Vector2d d = s[1] - s[0], e = t[1] - t[0];
   const double sine_scaled = Cross(d, e), d_length = d.norm(), e_length = e.norm();
-  if (std::abs(sine_scaled) < kMinCornerSine * d_length * e_length) return kFar;
+  if (std::abs(sine_scaled) <= kMinCornerSine * d_length * e_length) return false;
   const Vector2d crossing = s[0] + d * (Cross(t[0] - s[0], e) / sine_scaled);
-  const auto gap = [&](const Segment& segment, double length) {
-    const double px = std::min((crossing - segment[0]).norm(), (crossing - segment[1]).norm());
-    return px / std::clamp(kCornerShare * length, kMinCornerGapPx, kMaxCornerGapPx);
+  const auto ends_there = [&](const Segment& segment, double length) {
+    const double gap = std::min((crossing - segment[0]).norm(), (crossing - segment[1]).norm());
+    return gap <= std::clamp(kCornerShare * length, kMinCornerGapPx, kMaxCornerGapPx);
   };
-  const double larger = std::max(gap(s, d_length), gap(t, e_length));
-  return larger <= kMaxCornerGaps ? larger : kFar;
+  return ends_there(s, d_length) && ends_there(t, e_length);
 }
 
 double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& b) {

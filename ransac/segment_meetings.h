@@ -20,11 +20,9 @@ bool LiesAlong(const Segment& s, const Segment& t, double px);
 // Whether they cross or come within 25 pixels.
 bool AreNear(const Segment& s, const Segment& t);
 
-// How far two segments are from forming a corner: the larger of the gaps between their ends and
-// where their lines cross, each as a multiple of what is allowed, 30 % of the segment's length but
-// 6 to 14 pixels (corners are rounded, and lines stop short of them). 1 or less is a corner.
-// Infinite for lines within ten degrees of parallel, and for multiples beyond 2.
-double CornerGap(const Segment& s, const Segment& t);
+// Whether both end where their lines cross: within 45 % of their lengths, but of 9 to 21 pixels
+// (corners are rounded, and lines stop short of them). Not for lines within ten degrees.
+bool FormCorner(const Segment& s, const Segment& t);
 
 // Length of the segments of `a`, pixels, each counted by how many of `b` it is near to: fully from
 // three on; lines that cross by accident meet one or two.

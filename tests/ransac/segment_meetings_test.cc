@@ -25,12 +25,14 @@ TEST(SegmentMeetings, DistanceIsThatOfTheNearestPoints) {
 
 TEST(SegmentMeetings, CornersMayBeRoundedButEndThere) {
   const Segment s = Make(0, 0, 100, 0);
-  EXPECT_NEAR(CornerGap(s, Make(100, 0, 100, 60)), 0.0, 1e-12);
-  EXPECT_NEAR(CornerGap(s, Make(107, 0, 107, 60)), 0.5, 1e-12);  // 7 of 14 px.
-  EXPECT_NEAR(CornerGap(s, Make(100, 6, 100, 26)), 1.0, 1e-12);  // 6 px, and short.
-  EXPECT_GT(CornerGap(s, Make(50, 0, 50, 60)), 2.0);             // A T junction.
-  EXPECT_GT(CornerGap(s, Make(100, 0, 200, 10)), 2.0);           // Nearly parallel.
-  EXPECT_GT(CornerGap(s, Make(130, 0, 130, 60)), 2.0);
+  EXPECT_TRUE(FormCorner(s, Make(100, 0, 100, 60)));
+  EXPECT_TRUE(FormCorner(s, Make(120, 0, 120, 60)));  // 20 of 21 px.
+  EXPECT_FALSE(FormCorner(s, Make(122, 0, 122, 60)));
+  EXPECT_TRUE(FormCorner(s, Make(100, 8, 100, 28)));  // 8 of 9 px, and short.
+  EXPECT_FALSE(FormCorner(s, Make(100, 10, 100, 30)));
+  EXPECT_FALSE(FormCorner(s, Make(50, 0, 50, 60)));    // A T junction.
+  EXPECT_FALSE(FormCorner(s, Make(100, 0, 200, 10)));  // Nearly parallel.
+  EXPECT_FALSE(FormCorner(s, Make(40, 0, 40, 0)));     // A point.
 }
 
 TEST(SegmentMeetings, LengthCountsByTheNumberOfMeetings) {
