@@ -24,8 +24,7 @@ struct ClosedFormOptions {
 //
 // Hypotheses carry a covariance by statistical linearisation: each independent error of the fits,
 // one standard deviation up and down (or as much of it as leads to a pose), through the closed form
-// itself. Senses of axes that nothing
-// decides follow the conventions of WorldRotation.
+// itself. Senses of axes that nothing decides follow the conventions of WorldRotation.
 void AddClosedFormSolvers(SolverRegistry* registry, const ClosedFormOptions& options = {});
 
 // Rotation of the world frame whose plane has the unit normal +-`normal`: the in-plane angle from

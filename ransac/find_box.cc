@@ -44,13 +44,13 @@ class BoxSearch {
     seen_.resize(edges_.size());
   }
 
-  // The best box with this normal; odds of minus infinity where there is none.
   struct Box {
     Matrix3d axes;
     std::array<std::vector<int>, 3> edges;  // Indices into edges_.
     double log_odds = -std::numeric_limits<double>::infinity();
   };
 
+  // The best box with this normal; odds of minus infinity where there is none.
   Box Find(const Vector3d& normal) {
     Box best;
     const Matrix3d axes = Axes(normal.unitOrthogonal(), normal);
@@ -71,6 +71,7 @@ class BoxSearch {
   FoundBox Finish(const Box& box) const {
     FoundBox found;
     found.log_odds = box.log_odds;
+    found.axes = box.axes;
     for (std::size_t k = 0; k < 3; ++k) {
       std::vector<int> members;
       std::vector<LineFit> fits;
@@ -78,7 +79,6 @@ class BoxSearch {
         members.push_back(edges_[static_cast<std::size_t>(e)].line);
         fits.push_back(edges_[static_cast<std::size_t>(e)].fit);
       }
-      found.axes.col(static_cast<Eigen::Index>(k)) = box.axes.col(static_cast<Eigen::Index>(k));
       found.pencils[k] =
           MakePencil(lines_, members, fits, box.axes.col(static_cast<Eigen::Index>(k)));
     }

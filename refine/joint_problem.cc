@@ -132,4 +132,5 @@ Status JointProblem::Refine(const Approach& start, Refined* refined) const {
   refined->hypothesis.cost = Cost(e, approach);
   return FillRefined(evidence_, approach.log_focal, e, approach.pose, std::move(state), refined);
 }
+
 }  // namespace circline

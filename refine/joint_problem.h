@@ -64,7 +64,7 @@ class JointProblem {
   double InlierShare(const Approach& approach) const;
 
   // Runs an approach to its end; fills everything that a hypothesis holds but the probability. Not
-  // ok: degenerate evidence, or no convergence.
+  // ok: degenerate evidence, or numbers that are not finite.
   Status Refine(const Approach& approach, Refined* refined) const;
 
   // What the observations say that has no part in the problem, and why, a sentence each.

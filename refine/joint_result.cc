@@ -41,11 +41,12 @@ void CountInliers(const JointEvidence& e, JointState* state, PoseHypothesis* h) 
                });
   for (const PointSet& set : e.sets) h->num_observations += static_cast<int>(set.points.size());
   for (std::size_t i = 0; i < e.points.size(); ++i) {
+    ++h->num_observations;
+    if (state->point_left_out[i] != 0) continue;  // From the start: the end of a length left out.
     const PointTerm& t = e.points[i];
     const double* xy = state->At(t.point);
     const double miss = PointMissPx(t.measured, state->rotation, state->facing, xy[0], xy[1]);
     state->point_left_out[i] = miss <= kInlierSigmas * t.measured.sigma_px ? 0 : 1;
-    ++h->num_observations;
     if (state->point_left_out[i] != 0) continue;
     ++h->num_inliers;
     squares += miss * miss;
@@ -67,7 +68,11 @@ Eigen::Vector3d OriginInPlane(const JointEvidence& e, const JointState& state,
 
 // Whether a known radius or length that has not been left out says how large all is.
 bool IsMetric(const JointEvidence& e, const JointState& state) {
-  return e.scale >= 0 && state.At(e.scale)[0] > 0.0;
+  if (e.scale < 0 || !(state.At(e.scale)[0] > 0.0)) return false;
+  for (std::size_t i = 0; i < e.circles.size(); ++i) {
+    if (e.circles[i].radius == e.scale && state.circle_left_out[i] == 0) return true;
+  }
+  return std::count(state.length_left_out.begin(), state.length_left_out.end(), 0) > 0;
 }
 
 void FillPose(const JointEvidence& e, const JointState& state, const Eigen::Vector3d& origin,

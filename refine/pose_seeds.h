@@ -13,8 +13,8 @@
 namespace circline {
 
 // Poses that the closed forms propose for the same world plane, and those of its circles, the
-// cheapest first. `reasons` receives why closed forms refused, and
-// first what their poses contradict where all of them do.
+// cheapest first. `reasons` receives why closed forms refused, and first what their poses
+// contradict where all of them do.
 std::vector<CameraPose> CollectSeeds(const Observations& observations,
                                      const std::vector<std::shared_ptr<const Solver>>& seeders,
                                      const EstimationOptions& options, const JointProblem& problem,

@@ -52,6 +52,12 @@ RobustFitOptions PixelOptions() {
 
 Status CheckFlags() {
   if (FLAGS_trials < 1) return Status::Invalid("--trials: must be 1 or more");
+  if (FLAGS_peer_max_iterations < 1) {
+    return Status::Invalid("--peer_max_iterations: must be 1 or more");
+  }
+  if (!(FLAGS_direction_sigma_deg >= 0.0 && FLAGS_direction_sigma_deg <= 180.0)) {
+    return Status::Invalid("--direction_sigma_deg: must be from 0 to 180");
+  }
   if (FLAGS_score != "msac" && FLAGS_score != "magsac") {
     return Status::Invalid("--score: '" + FLAGS_score + "' is not msac or magsac");
   }

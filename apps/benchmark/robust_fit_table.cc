@@ -52,7 +52,6 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// Milliseconds of processor time that `work` takes.
 double Timed(const std::function<void()>& work) {
   const std::clock_t start = std::clock();
   work();

@@ -174,6 +174,21 @@ TEST(EstimatePoseTest, KnowledgeThatHasNoPartIsNamed) {
   EXPECT_TRUE(has_note("a known length of the plane 'p1': not used"));
 }
 
+// A length says nothing of which of the two poses of a circle is right.
+TEST(EstimatePoseTest, ACircleAndALengthLeaveTwoEquallyLikelyPoses) {
+  for (const double tilt : {0.5, 0.7, 0.9}) {
+    PlaneScene scene(tilt, 0.3);
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+    observations.known_lengths = {
+        KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(1, 0)}, "p0", 1.0}};
+    const PoseEstimate estimate = EstimatePose(observations);
+    ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
+    EXPECT_NEAR(estimate.hypotheses[0].probability, 0.5, 0.05) << tilt;
+    EXPECT_TRUE(estimate.hypotheses[0].metric);
+  }
+}
+
 // One end of a known length is in the sky: that turns no pose over, it is left out and named.
 TEST(EstimatePoseTest, ALengthBeyondTheHorizonIsLeftOut) {
   PlaneScene scene(1.1, 0.1);
