@@ -30,6 +30,8 @@ Status ValidateCircle(const CircleObservation& circle) {
   if (!Finite(circle.normals)) return Status::Invalid(name + ": a normal is not finite");
   if (!NonNegative(circle.sigma_px)) return Status::Invalid(name + ": sigma_px must be 0 or more");
   if (!NonNegative(circle.radius)) return Status::Invalid(name + ": radius must be 0 or more");
+  if (!NonNegative(circle.radius_sigma))
+    return Status::Invalid(name + ": radius_sigma must be 0 or more");
   if (circle.center && !circle.center->allFinite())
     return Status::Invalid(name + ": center is not finite");
   for (const Segment& s : circle.diameters) {
@@ -110,6 +112,7 @@ Status ValidateKnown(const Observations& observations) {
     if (!Finite(length.points) || !(length.value > 0.0) || !std::isfinite(length.value)) {
       return Status::Invalid("known length: points must be finite and value positive");
     }
+    if (!NonNegative(length.sigma)) return Status::Invalid("known length: sigma must be 0 or more");
     if (!length.plane.empty() && !NamesPlane(observations, length.plane)) {
       return Status::Invalid("known length: there is no plane '" + length.plane + "'");
     }

@@ -1,0 +1,64 @@
+#include "circline/estimators/noise_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace circline {
+namespace {
+
+using Field = std::pair<const char*, double>;
+
+template <std::size_t kSize>
+Status NonNegative(const Field (&fields)[kSize]) {
+  for (const auto& [name, value] : fields) {
+    if (!(value >= 0.0) || !std::isfinite(value))
+      return Status::Invalid(std::string(name) + " must be 0 or more");
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status CameraSigma::Validate() const {
+  return NonNegative({{"camera.log_focal", log_focal},
+                      {"camera.log_aspect", log_aspect},
+                      {"camera.principal_point_px", principal_point_px},
+                      {"camera.k1", k1}});
+}
+
+NoiseModel NoiseModel::Exact() {
+  NoiseModel m;
+  m.contour_px = m.line_px = m.contour_offset_px = 0.0;
+  m.circle_tilt_rad = m.circle_height = m.line_direction_rad = m.pencil_axis_rad = 0.0;
+  m.radius = m.length = 0.0;
+  m.camera = CameraSigma::Exact();
+  return m;
+}
+
+Status NoiseModel::Validate() const {
+  if (!(correlation_px > 0.0) || !std::isfinite(correlation_px))
+    return Status::Invalid("correlation_px must be positive");
+  const Status status = NonNegative({{"contour_px", contour_px},
+                                     {"line_px", line_px},
+                                     {"contour_offset_px", contour_offset_px},
+                                     {"circle_tilt_rad", circle_tilt_rad},
+                                     {"circle_height", circle_height},
+                                     {"line_direction_rad", line_direction_rad},
+                                     {"pencil_axis_rad", pencil_axis_rad},
+                                     {"radius", radius},
+                                     {"length", length}});
+  return status.ok() ? camera.Validate() : status;
+}
+
+double NoiseModel::Weight(double shared_px, double sigma_px, double num_points,
+                          double length_px) const {
+  const double independent =
+      std::min(std::max(1.0, length_px / correlation_px), std::max(1.0, num_points));
+  const double variance = sigma_px * sigma_px;
+  const double shared = num_points / independent * shared_px * shared_px;
+  return variance > 0.0 ? variance / (variance + shared) : 0.0;
+}
+
+}  // namespace circline

@@ -1,0 +1,63 @@
+// What is not exact beside the noise of single points: one struct of standard deviations, which
+// everything that weighs, tests or reports uses (fits, gates, closed forms, refinement).
+//
+// Simulated evidence has point noise and nothing else: NoiseModel::Exact(). Photographs have more:
+// prints bleed, sheets bend, walls lean, calibrations are a little off. The defaults are those of
+// photographs; the sets that each was measured on are named beside it.
+#ifndef CIRCLINE_ESTIMATORS_NOISE_MODEL_H_
+#define CIRCLINE_ESTIMATORS_NOISE_MODEL_H_
+
+#include "circline/estimators/status.h"
+
+namespace circline {
+
+// How well a camera is known. Standard deviations; 0 = exact. The defaults are those of a good
+// calibration.
+struct CameraSigma {
+  double log_focal = 0.002;         // Of log f, f the common factor of fx and fy.
+  double log_aspect = 0.001;        // Of log (fy / fx).
+  double principal_point_px = 1.0;  // Of each coordinate, pixels.
+  double k1 = 0.0;                  // Of the first distortion coefficient.
+
+  static CameraSigma Exact() { return {0.0, 0.0, 0.0, 0.0}; }
+  Status Validate() const;
+};
+
+// Standard deviations, all >= 0; 0 = exact.
+struct NoiseModel {
+  // Error that neighbouring points of one contour or line share (blur, edge bias), pixels, and over
+  // which length it stays the same, pixels: n points on a length L are worth no more than L /
+  // correlation_px (and no less than one) that have this error.
+  double contour_px = 0.04;
+  double line_px = 0.1;
+  double correlation_px = 50.0;
+  // Offset that all contours of one contrast share (print bleed, exposure), pixels.
+  double contour_offset_px = 0.15;
+  // A circle's plane against the world's plane: tilt about each of two axes, radians, and height,
+  // a share of the circle's radius.
+  double circle_tilt_rad = 0.002;
+  double circle_height = 0.002;
+  // A line against the direction of its pencil, and a pencil's direction against the axis that it
+  // is taken for (each of two components), radians.
+  double line_direction_rad = 0.001;
+  double pencil_axis_rad = 0.003;
+  // A known radius or length that states no sigma of its own, relative.
+  double radius = 0.001;
+  double length = 0.001;
+  CameraSigma camera;
+
+  // Nothing but the noise of points: for simulated evidence, and for bounds.
+  static NoiseModel Exact();
+  // Ok, or a sentence that names the field that is negative or not finite, or a correlation length
+  // that is not positive.
+  Status Validate() const;
+
+  // What a feature of `num_points` points over a length of `length_px` counts, from 0 to 1, beside
+  // one whose points share no error: sigma^2 / (sigma^2 + (n / m) shared^2), m = length /
+  // correlation. Multiplies the sum of its squared residuals.
+  double Weight(double shared_px, double sigma_px, double num_points, double length_px) const;
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_NOISE_MODEL_H_
