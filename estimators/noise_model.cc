@@ -1,5 +1,6 @@
 #include "circline/estimators/noise_model.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -18,6 +19,21 @@ Status NonNegative(const Field (&fields)[kSize]) {
   }
   return Status::Ok();
 }
+
+struct Extent {
+  double num_points = 0.0;
+  Eigen::Vector2d size = Eigen::Vector2d::Zero();  // Of the box of the points.
+
+  Extent(const std::vector<Eigen::Vector2d>& points, const std::vector<std::uint8_t>& inliers) {
+    Eigen::AlignedBox2d box;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!inliers.empty() && inliers[i] == 0) continue;
+      box.extend(points[i]);
+      num_points += 1.0;
+    }
+    if (num_points > 0.0) size = box.sizes();
+  }
+};
 
 }  // namespace
 
@@ -59,6 +75,21 @@ double NoiseModel::Weight(double shared_px, double sigma_px, double num_points,
   const double variance = sigma_px * sigma_px;
   const double shared = num_points / independent * shared_px * shared_px;
   return variance > 0.0 ? variance / (variance + shared) : 0.0;
+}
+
+double NoiseModel::ContourWeight(double sigma_px, const std::vector<Eigen::Vector2d>& points,
+                                 const std::vector<std::uint8_t>& inliers) const {
+  if (contour_px == 0.0) return 1.0;
+  constexpr double kHalfPi = 1.5707963267948966;
+  const Extent extent(points, inliers);
+  return Weight(contour_px, sigma_px, extent.num_points, kHalfPi * extent.size.sum());
+}
+
+double NoiseModel::LineWeight(double sigma_px, const std::vector<Eigen::Vector2d>& points,
+                              const std::vector<std::uint8_t>& inliers) const {
+  if (line_px == 0.0) return 1.0;
+  const Extent extent(points, inliers);
+  return Weight(line_px, sigma_px, extent.num_points, extent.size.norm());
 }
 
 }  // namespace circline

@@ -3,13 +3,22 @@
 //
 // Simulated evidence has point noise and nothing else: NoiseModel::Exact(). Photographs have more:
 // prints bleed, sheets bend, walls lean, calibrations are a little off. The defaults are those of
-// photographs; the sets that each was measured on are named beside it.
+// photographs, chosen between what discs (rgb), dots, a street, a box and chessboards ask for;
+// other photographs of discs (infrared), of dots (robot), of boards (ChArUco) and of a turntable,
+// and the harder halves of street and box had no part in it (apps/benchmark/coverage.py).
 #ifndef CIRCLINE_ESTIMATORS_NOISE_MODEL_H_
 #define CIRCLINE_ESTIMATORS_NOISE_MODEL_H_
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
 
 #include "circline/estimators/status.h"
 
 namespace circline {
+
+// Residuals within this many standard deviations are inliers: 99.8 % of a Gaussian's.
+constexpr double kInlierSigmas = 3.09;
 
 // How well a camera is known. Standard deviations; 0 = exact. The defaults are those of a good
 // calibration.
@@ -28,11 +37,11 @@ struct NoiseModel {
   // Error that neighbouring points of one contour or line share (blur, edge bias), pixels, and over
   // which length it stays the same, pixels: n points on a length L are worth no more than L /
   // correlation_px (and no less than one) that have this error.
-  double contour_px = 0.04;
+  double contour_px = 0.08;
   double line_px = 0.1;
   double correlation_px = 50.0;
   // Offset that all contours of one contrast share (print bleed, exposure), pixels.
-  double contour_offset_px = 0.15;
+  double contour_offset_px = 0.1;
   // A circle's plane against the world's plane: tilt about each of two axes, radians, and height,
   // a share of the circle's radius.
   double circle_tilt_rad = 0.002;
@@ -56,6 +65,13 @@ struct NoiseModel {
   // one whose points share no error: sigma^2 / (sigma^2 + (n / m) shared^2), m = length /
   // correlation. Multiplies the sum of its squared residuals.
   double Weight(double shared_px, double sigma_px, double num_points, double length_px) const;
+  // That of a contour, of a line: of those of their points, pixels, that are inliers (no mask:
+  // all). The length is that of an ellipse with the points' box, which is right within a factor of
+  // 2 for arcs, and the distance of the ends.
+  double ContourWeight(double sigma_px, const std::vector<Eigen::Vector2d>& points,
+                       const std::vector<std::uint8_t>& inliers) const;
+  double LineWeight(double sigma_px, const std::vector<Eigen::Vector2d>& points,
+                    const std::vector<std::uint8_t>& inliers) const;
 };
 
 }  // namespace circline

@@ -13,6 +13,7 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/line.h"
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/status.h"
 #include "circline/estimators/vanishing_point.h"
 
@@ -150,9 +151,12 @@ int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& p
 
 // Fills every fit that is absent by the direct (non-robust) maximum-likelihood fits, taking
 // `default_sigma_px` where a feature states no sigma of its own. What cannot be fitted stays
-// without a fit; `problems` (optional) receives one sentence for each.
+// without a fit; `problems` (optional) receives one sentence for each. Covariances include the
+// errors of the noise model that the points of one feature share, and that of a line against its
+// pencil's direction.
 void FitDirect(double default_sigma_px, Observations* observations,
-               std::vector<std::string>* problems = nullptr);
+               std::vector<std::string>* problems = nullptr,
+               const NoiseModel& noise = NoiseModel::Exact());
 
 }  // namespace circline
 

@@ -1,0 +1,399 @@
+#include "circline/refine/image_points.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <type_traits>
+
+#include "circline/estimators/geometric_residuals.h"
+#include "circline/estimators/line.h"
+
+namespace circline {
+namespace {
+
+// Where a loss bends back, that much of its slope stands for the curvature, so that the model has a
+// minimum. With less, a line's two points on either side of the bend throw it far off (0.1: three
+// times the iterations on many short lines); with more, the last steps creep.
+constexpr double kLeastCurvature = 0.4;
+constexpr std::size_t kChunk = 32;  // Points at a time: their rows stay in the fastest memory.
+
+// sum rho over squared residuals s, each one's slope rho' and curvature of rho(r^2)/2, not below
+// kLeastCurvature of the slope.
+template <LossType kLoss>
+double ApplyLoss(std::size_t n, const double* s, double* slope, double* curvature) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if constexpr (kLoss == LossType::kCauchy) {
+      sum = i == 0 ? 1.0 : sum;  // One logarithm of a product instead of many.
+      constexpr double kInverse = 1.0 / (LossTuningConstant(kLoss) * LossTuningConstant(kLoss));
+      sum *= 1.0 + std::min(s[i], 1e8) * kInverse;
+    } else {
+      sum += LossRho(kLoss, s[i]);
+    }
+    const LossSlopes loss = LossSlopesAt(kLoss, s[i]);
+    slope[i] = loss.first;
+    curvature[i] = std::max(loss.first + 2.0 * s[i] * loss.second, kLeastCurvature * loss.first);
+  }
+  if constexpr (kLoss == LossType::kCauchy) {
+    constexpr double kC2 = LossTuningConstant(kLoss) * LossTuningConstant(kLoss);
+    return n == 0 ? 0.0 : kC2 * std::log(sum);
+  }
+  return sum;
+}
+
+double ApplyLoss(LossType type, std::size_t n, const double* s, double* slope, double* curvature) {
+  switch (type) {
+    case LossType::kTrivial:
+      break;
+    case LossType::kHuber:
+      return ApplyLoss<LossType::kHuber>(n, s, slope, curvature);
+    case LossType::kSoftLOne:
+      return ApplyLoss<LossType::kSoftLOne>(n, s, slope, curvature);
+    case LossType::kCauchy:
+      return ApplyLoss<LossType::kCauchy>(n, s, slope, curvature);
+    case LossType::kArctan:
+      return ApplyLoss<LossType::kArctan>(n, s, slope, curvature);
+    case LossType::kTukey:
+      return ApplyLoss<LossType::kTukey>(n, s, slope, curvature);
+    case LossType::kGemanMcClure:
+      return ApplyLoss<LossType::kGemanMcClure>(n, s, slope, curvature);
+  }
+  return ApplyLoss<LossType::kTrivial>(n, s, slope, curvature);
+}
+
+double ApplyGate(double gate, std::size_t n, double* s, double* slope, double* curvature) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double inlier = s[i] <= gate * gate ? 1.0 : 0.0;
+    slope[i] = curvature[i] = inlier;
+    sum += inlier * s[i];
+  }
+  return sum;
+}
+
+// Sums over n points; distance(i, row) is the signed distance in pixels of the i-th and, where row
+// is not null, writes its derivatives by kSize local variables.
+template <int kSize, typename Distance>
+double SumPoints(std::size_t n, const ImagePoints::Options& options, const Weighing& weighing,
+                 const Distance& distance, CurveModel* model) {
+  using Row = Eigen::Matrix<double, kSize, 1>;
+  // Residuals in stretched standard deviations: twice_cost grows by stretch^2, its model does not.
+  const double stretch = weighing.inliers_only ? 1.0 : weighing.stretch;
+  const double inverse_sigma = 1.0 / (options.sigma_px * stretch);
+  const double weight = options.weight * weighing.scale * stretch * stretch;
+  double d[kChunk], s[kChunk], slope[kChunk], curvature[kChunk], total = 0.0;
+  Row rows[kChunk];
+  Row g = Row::Zero();
+  Eigen::Matrix<double, kSize, kSize> h = Eigen::Matrix<double, kSize, kSize>::Zero();
+  for (std::size_t first = 0; first < n; first += kChunk) {
+    const std::size_t m = std::min(kChunk, n - first);
+    for (std::size_t i = 0; i < m; ++i) {
+      d[i] = inverse_sigma * distance(first + i, model != nullptr ? &rows[i] : nullptr);
+      s[i] = d[i] * d[i];
+    }
+    total += weighing.inliers_only ? ApplyGate(weighing.gate, m, s, slope, curvature)
+                                   : ApplyLoss(options.loss, m, s, slope, curvature);
+    if (model == nullptr) continue;
+    for (std::size_t i = 0; i < m; ++i) {
+      g += (slope[i] * d[i]) * rows[i];
+      for (int c = 0; c < kSize; ++c) {
+        const double scaled = curvature[i] * rows[i][c];
+        for (int r = c; r < kSize; ++r) h(r, c) += scaled * rows[i][r];
+      }
+    }
+  }
+  if (model != nullptr) {
+    h.template triangularView<Eigen::StrictlyUpper>() = h.transpose();
+    model->g = (weight * inverse_sigma) * g;
+    model->h = (weight * inverse_sigma * inverse_sigma) * h;
+    model->twice_cost = weight * total;
+  }
+  return weight * total;
+}
+
+}  // namespace
+
+Camera ShiftedCamera(const Camera& camera, const double* shifts) {
+  Camera shifted = camera;
+  shifted.fx *= std::exp(shifts[0]);
+  shifted.fy *= std::exp(shifts[0] + shifts[1]);
+  shifted.cx += shifts[2];
+  shifted.cy += shifts[3];
+  for (std::size_t k = 0; k < camera.distortion.size(); ++k) shifted.distortion[k] += shifts[4 + k];
+  return shifted;
+}
+
+LensSlope::LensSlope(const Camera& camera, int k) {
+  lens_.model = camera.model;
+  lens_.fx = lens_.fy = 1.0;
+  lens_.distortion[static_cast<std::size_t>(k)] = 1.0;
+}
+
+Eigen::Vector2d LensSlope::At(const Camera& camera, const Eigen::Vector2d& x,
+                              Eigen::Matrix2d* pixel_from_x) const {
+  Eigen::Vector2d bent;
+  std::array<double, 4> J;
+  DistortWithJacobian(lens_, x, &bent, &J);
+  // A fisheye's own bending is there without coefficients, too.
+  Eigen::Vector2d straight = x;
+  std::array<double, 4> I = {1.0, 0.0, 0.0, 1.0};
+  if (lens_.model == CameraModel::kFisheye) {
+    Camera none = lens_;
+    none.distortion = {};
+    DistortWithJacobian(none, x, &straight, &I);
+  }
+  const Eigen::Vector2d f(camera.fx, camera.fy);
+  if (pixel_from_x != nullptr) {
+    *pixel_from_x << J[0] - I[0], J[1] - I[1], J[2] - I[2], J[3] - I[3];
+    *pixel_from_x = f.asDiagonal() * *pixel_from_x;
+  }
+  return f.cwiseProduct(bent - straight);
+}
+
+ImagePoints::ImagePoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
+                         const std::vector<std::uint8_t>& inliers, const Options& options)
+    : camera_(camera), options_(options) {
+  if (camera.model == CameraModel::kPinhole) options_.num_distortion = 0;
+  for (int k = 0; k < options_.num_distortion; ++k) lens_.emplace_back(camera, k);
+  points_.reserve(pixels.size());
+  pixels_.reserve(pixels.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  CalibratedPoint p;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (!inliers.empty() && inliers[i] == 0) continue;
+    if (!PixelToCalibrated(camera, pixels[i], &p)) continue;
+    points_.push_back(p);
+    pixels_.push_back(pixels[i]);
+    mean += p.x;
+  }
+  if (points_.empty()) return;
+  mean /= static_cast<double>(points_.size());
+  double spread = 0.0;
+  for (const CalibratedPoint& q : points_) spread += (q.x - mean).norm();
+  spread /= static_cast<double>(points_.size());
+  if (!(spread > 0.0)) return;
+  normalization_ << spread, 0.0, mean.x(), 0.0, spread, mean.y(), 0.0, 0.0, 1.0;
+}
+
+namespace {
+
+bool IsShifted(const double* shifts) {
+  return shifts != nullptr &&
+         std::any_of(shifts, shifts + kCameraSize, [](double v) { return v != 0.0; });
+}
+
+}  // namespace
+
+// Newton's method from the undistorted point of the camera as given: two steps leave a rounding
+// error even where the focal length is a third off.
+CalibratedPoint ImagePoints::At(std::size_t i, const Camera* shifted) const {
+  CalibratedPoint p = points_[i];
+  if (shifted == nullptr) return p;
+  if (shifted->model == CameraModel::kPinhole) {
+    p.x = (pixels_[i] - Eigen::Vector2d(shifted->cx, shifted->cy))
+              .cwiseQuotient(Eigen::Vector2d(shifted->fx, shifted->fy));
+    p.x_from_pixel = {1.0 / shifted->fx, 0.0, 0.0, 1.0 / shifted->fy};
+    return p;
+  }
+  p.x *= std::sqrt(camera_.fx * camera_.fy / (shifted->fx * shifted->fy));
+  constexpr int kMaxSteps = 20;
+  constexpr double kConverged = 1e-9;  // Pixels.
+  for (int step = 0; step < kMaxSteps; ++step) {
+    Eigen::Vector2d pixel;
+    std::array<double, 4> J;
+    DistortWithJacobian(*shifted, p.x, &pixel, &J);
+    const double inverse = 1.0 / (J[0] * J[3] - J[1] * J[2]);
+    p.x_from_pixel = {J[3] * inverse, -J[1] * inverse, -J[2] * inverse, J[0] * inverse};
+    const Eigen::Vector2d miss = pixels_[i] - pixel;
+    p.x += Eigen::Vector2d(p.x_from_pixel[0] * miss.x() + p.x_from_pixel[1] * miss.y(),
+                           p.x_from_pixel[2] * miss.x() + p.x_from_pixel[3] * miss.y());
+    if (miss.squaredNorm() < kConverged * kConverged) return p;
+    if (!p.x.allFinite()) break;
+  }
+  p.x.setConstant(std::numeric_limits<double>::quiet_NaN());  // No such camera took this photo.
+  return p;
+}
+
+CalibratedPoint ImagePoints::NormalizedAt(std::size_t i, const Camera* shifted) const {
+  CalibratedPoint p = At(i, shifted);
+  const double inverse = 1.0 / normalization_(0, 0);
+  p.x = inverse * (p.x - normalization_.topRightCorner<2, 1>());
+  for (double& v : p.x_from_pixel) v *= inverse;
+  return p;
+}
+
+// Distance r to a curve that stays while the camera shifts: the same as if the pixel moved the
+// other way (`by_pixel`, d r / d pixel), but for the size of a pixel, by which r itself changes.
+// That a lens is bent between the point and the curve is left out.
+template <typename Row>
+void ImagePoints::FillCameraColumns(std::size_t i, const CalibratedPoint& p, const Camera& camera,
+                                    double r, const Eigen::Vector2d& by_pixel, Row* row,
+                                    int first) const {
+  const Eigen::Vector2d offset = pixels_[i] - Eigen::Vector2d(camera.cx, camera.cy);
+  const Eigen::Vector2d across = by_pixel.normalized();
+  row->template segment<kCameraSize>(first).setZero();
+  (*row)[first] = r - by_pixel.dot(offset);
+  (*row)[first + 1] = r * across.y() * across.y() - by_pixel.y() * offset.y();
+  (*row)[first + 2] = -by_pixel.x();
+  (*row)[first + 3] = -by_pixel.y();
+  Eigen::Matrix2d pixel_from_x;
+  for (int k = 0; k < options_.num_distortion; ++k) {
+    const Eigen::Vector2d pixel = lens_[static_cast<std::size_t>(k)].At(camera, p.x, &pixel_from_x);
+    (*row)[first + 4 + k] =
+        r * across.dot(pixel_from_x * NormGradient(p, across)) - by_pixel.dot(pixel);
+  }
+}
+
+// The distance is wanted orthogonally, and defined. The smallest radius of curvature of an ellipse
+// of semi-axes a >= b is b^2 / a.
+bool ImagePoints::IsOrthogonal(const Eigen::Matrix3d& conic, double* level) const {
+  if (options_.distance == ConicDistanceType::kSampson) return false;
+  *level = EllipseLevel(conic);
+  if (!(conic.topLeftCorner<2, 2>().determinant() > 0.0 && *level > 0.0)) return false;
+  if (options_.distance == ConicDistanceType::kOrthogonal) return true;
+  constexpr double kSmallRadii = 20.0;  // Standard deviations of a point.
+  const double trace = conic(0, 0) + conic(1, 1);
+  const double root = std::hypot(conic(0, 0) - conic(1, 1), 2.0 * conic(0, 1));
+  const double b2 = 2.0 * *level / (trace + root), a2 = 2.0 * *level / (trace - root);
+  const std::array<double, 4>& J = points_.front().x_from_pixel;
+  const double per_pixel = std::sqrt(std::abs(J[0] * J[3] - J[1] * J[2])) / normalization_(0, 0);
+  return b2 / std::sqrt(a2) < kSmallRadii * options_.sigma_px * per_pixel;
+}
+
+double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, const double* camera,
+                             const Weighing& weighing, const Variables& variables,
+                             CurveModel* model) const {
+  const Eigen::Matrix3d C = Normalized(conic);
+  std::optional<Camera> shifted;
+  if (IsShifted(camera)) shifted = ShiftedCamera(camera_, camera);
+  const Camera* changed = shifted ? &*shifted : nullptr;
+  const Camera& seen_by = shifted ? *shifted : camera_;
+  double level = 0.0;
+  const bool orthogonal = IsOrthogonal(C, &level);
+  const auto distance = [&](std::size_t i, auto* row) {
+    const CalibratedPoint p = NormalizedAt(i, changed);
+    if (row == nullptr) {
+      const double d =
+          orthogonal ? OrthogonalDistance(p, C, level, nullptr)
+                     : 0.5 * p.Homogeneous().dot(C * p.Homogeneous()) /
+                           p.GradientPerPixel((C * p.Homogeneous()).template head<2>()).norm();
+      return d - offset_px;
+    }
+    Vector6d by_conic;
+    const double d =
+        orthogonal ? OrthogonalDistance(p, C, level, &by_conic) : ConicDistance(p, C, &by_conic);
+    row->template head<6>() = by_conic;
+    constexpr int kSize = std::remove_pointer_t<decltype(row)>::RowsAtCompileTime;
+    if constexpr (kSize > 6) (*row)[6] = -1.0;
+    if constexpr (kSize > 7) {
+      const Eigen::Vector2d g = (C * p.Homogeneous()).template head<2>();
+      const Eigen::Vector2d G = p.GradientPerPixel(g);
+      Eigen::Vector2d by_pixel = G.normalized();
+      if (!orthogonal) {  // Sampson's denominator moves with the point, too.
+        const double norm = G.norm();
+        const Eigen::Vector2d by_x =
+            (g - d * C.topLeftCorner<2, 2>() * NormGradient(p, by_pixel)) / norm;
+        by_pixel = p.GradientPerPixel(by_x);
+      }
+      FillCameraColumns(i, At(i, changed), seen_by, d, by_pixel, row, 7);
+    }
+    return d - offset_px;
+  };
+  if (model == nullptr || variables.size(6) == 6)
+    return SumPoints<6>(size(), options_, weighing, distance, model);
+  if (!variables.camera) return SumPoints<7>(size(), options_, weighing, distance, model);
+  const double cost = SumPoints<7 + kCameraSize>(size(), options_, weighing, distance, model);
+  if (!variables.offset) {  // Its column, the seventh, is dropped.
+    const int n = 6 + kCameraSize;
+    model->g.segment(6, kCameraSize) = model->g.tail(kCameraSize).eval();
+    model->h.middleCols(6, kCameraSize) = model->h.rightCols(kCameraSize).eval();
+    model->h.middleRows(6, kCameraSize) = model->h.bottomRows(kCameraSize).eval();
+    model->g.conservativeResize(n);
+    model->h.conservativeResize(n, n);
+  }
+  return cost;
+}
+
+double ImagePoints::SumLine(const Eigen::Vector3d& line, const double* camera,
+                            const Weighing& weighing, const Variables& variables,
+                            CurveModel* model) const {
+  std::optional<Camera> shifted;
+  if (IsShifted(camera)) shifted = ShiftedCamera(camera_, camera);
+  const Camera* changed = shifted ? &*shifted : nullptr;
+  const Camera& seen_by = shifted ? *shifted : camera_;
+  const auto distance = [&](std::size_t i, auto* row) {
+    const CalibratedPoint p = At(i, changed);
+    if (row == nullptr) return LineDistancePx(p, line);
+    Eigen::Vector3d by_line;
+    const double d = LineDistance(p, line, &by_line);
+    row->template head<3>() = by_line;
+    if constexpr (std::remove_pointer_t<decltype(row)>::RowsAtCompileTime > 3) {
+      FillCameraColumns(i, p, seen_by, d, p.GradientPerPixel(line.head<2>()).normalized(), row, 3);
+    }
+    return d;
+  };
+  if (model == nullptr || !variables.camera)
+    return SumPoints<3>(size(), options_, weighing, distance, model);
+  return SumPoints<3 + kCameraSize>(size(), options_, weighing, distance, model);
+}
+
+void ImagePoints::ConicDistances(const Eigen::Matrix3d& conic, double offset_px,
+                                 const double* camera, std::vector<double>* distances) const {
+  const Eigen::Matrix3d C = Normalized(conic);
+  std::optional<Camera> shifted;
+  if (IsShifted(camera)) shifted = ShiftedCamera(camera_, camera);
+  const Camera* changed = shifted ? &*shifted : nullptr;
+  double level = 0.0;
+  const bool orthogonal = IsOrthogonal(C, &level);
+  distances->clear();
+  Vector6d unused;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const CalibratedPoint p = NormalizedAt(i, changed);
+    distances->push_back(
+        (orthogonal ? OrthogonalDistance(p, C, level, nullptr) : ConicDistance(p, C, &unused)) -
+        offset_px);
+  }
+}
+
+bool ImagePoints::LineThrough(const double* camera, const Eigen::Vector3d& line,
+                              Eigen::Vector3d* shifted) const {
+  const double norm = line.head<2>().norm();
+  if (points_.empty() || !(norm > 0.0)) return false;
+  const Eigen::Vector2d normal = line.head<2>() / norm, along(-normal.y(), normal.x());
+  const Eigen::Vector2d foot = -line.z() / norm * normal;
+  double first = std::numeric_limits<double>::infinity(), last = -first;
+  for (const CalibratedPoint& p : points_) {
+    const double at = along.dot(p.x);
+    first = std::min(first, at);
+    last = std::max(last, at);
+  }
+  const Camera other = ShiftedCamera(camera_, camera);
+  CalibratedPoint ends[2];
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::Vector2d end = foot + (k == 0 ? first : last) * along;
+    Eigen::Vector2d pixel;
+    if (!CameraToPixel(camera_, end.homogeneous(), &pixel) ||
+        !PixelToCalibrated(other, pixel, &ends[k])) {
+      return false;
+    }
+  }
+  *shifted = ends[0].Homogeneous().cross(ends[1].Homogeneous());
+  const double length = shifted->norm();
+  if (!(length > 0.0)) return false;
+  *shifted *= (shifted->dot(line) < 0.0 ? -1.0 : 1.0) / length;
+  return true;
+}
+
+void ImagePoints::LineDistances(const Eigen::Vector3d& line, const double* camera,
+                                std::vector<double>* distances) const {
+  std::optional<Camera> shifted;
+  if (IsShifted(camera)) shifted = ShiftedCamera(camera_, camera);
+  const Camera* changed = shifted ? &*shifted : nullptr;
+  distances->clear();
+  for (std::size_t i = 0; i < size(); ++i)
+    distances->push_back(LineDistancePx(At(i, changed), line));
+}
+
+}  // namespace circline

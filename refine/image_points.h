@@ -1,0 +1,140 @@
+// Points of one contour or one line in a photo, prepared once for all evaluations: undistorted,
+// with their noise and robust loss; and the sums over them that a curve through them costs.
+//
+// The residual of a point is its distance from the curve in pixels of the photo as taken, over its
+// standard deviation, under the loss. Curves are conics and lines in calibrated coordinates of the
+// camera. Allocates when it is made and never after.
+#ifndef CIRCLINE_REFINE_IMAGE_POINTS_H_
+#define CIRCLINE_REFINE_IMAGE_POINTS_H_
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "circline/estimators/camera.h"
+#include "circline/estimators/conic.h"
+#include "circline/estimators/noise_model.h"
+#include "circline/estimators/robust_loss.h"
+
+namespace circline {
+
+// A camera as unknowns: shifts against the camera as given, so that zeros are that camera. 0: of
+// log f (both focal lengths); 1: of log (fy / fx); 2, 3: of the principal point, pixels; from 4 on:
+// of the distortion coefficients.
+constexpr int kCameraSize = 12;
+Camera ShiftedCamera(const Camera& camera, const double* shifts);
+// What one distortion coefficient does to a pixel. The models are linear in their coefficients but
+// for the rational ones of kOpenCV (k4 to k6), for which it holds at 0.
+class LensSlope {
+ public:
+  LensSlope(const Camera& camera, int k);
+  // d pixel / d coefficient of a point at calibrated x, and of d pixel / d x (may be null).
+  Eigen::Vector2d At(const Camera& camera, const Eigen::Vector2d& x,
+                     Eigen::Matrix2d* pixel_from_x) const;
+
+ private:
+  Camera lens_;  // Of unit focal length, with this coefficient alone.
+};
+
+// How far a contour point is from a circle's image: to first order (Sampson), or orthogonally, in
+// twice the time. By itself: orthogonally where the first order does not suffice, that is where the
+// ellipse's smallest radius of curvature is below 20 standard deviations of a point.
+enum class ConicDistanceType { kAuto, kSampson, kOrthogonal };
+
+// How residuals count. All of them under their loss, its tuning constant `stretch` times as wide
+// (graduated refinement lowers it to 1); or, for covariances, inliers only, without loss, all times
+// `scale`.
+struct Weighing {
+  bool inliers_only = false;
+  double gate = kInlierSigmas;  // Standard deviations.
+  double scale = 1.0;
+  double stretch = 1.0;
+};
+
+// A sum of robust costs about the present place in the local variables of a curve: `twice_cost` =
+// sum rho, g its gradient (of the half), h the Hessian, never indefinite: the losses' curvature is
+// exact or bounded from below, that of the curve is left out.
+struct CurveModel {
+  static constexpr int kMaxSize = 6 + 1 + kCameraSize;
+  using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxSize, 1>;
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxSize, kMaxSize>;
+
+  double twice_cost = 0.0;
+  Vector g;
+  Matrix h;
+};
+
+class ImagePoints {
+ public:
+  struct Options {
+    double sigma_px = 1.0;  // Standard deviation of each coordinate, pixels; > 0.
+    double weight = 1.0;    // What all points together count (NoiseModel::Weight).
+    LossType loss = LossType::kTrivial;
+    ConicDistanceType distance = ConicDistanceType::kAuto;
+    int num_distortion = 1;  // Distortion coefficients with derivatives; the others are constant.
+  };
+
+  // Points with inliers[i] == 0 are left out (`inliers` may be empty), and so are those that the
+  // camera cannot undistort.
+  ImagePoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
+              const std::vector<std::uint8_t>& inliers, const Options& options);
+
+  std::size_t size() const { return points_.size(); }
+  const std::vector<CalibratedPoint>& points() const { return points_; }
+  const Options& options() const { return options_; }
+  void set_weight(double weight) { options_.weight = weight; }
+
+  // Sum over the points' distances from `conic` (3x3, negative inside an ellipse; its scale has no
+  // meaning), moved outwards by `offset_px`. `camera`: kCameraSize shifts, or null for none. Local
+  // variables: ConicToVector of Normalized(conic) (6), the offset (1; with offset_variable), the
+  // camera's shifts (with camera_variable). `model` may be null. Returns sum rho; not finite where
+  // a residual is not.
+  struct Variables {
+    bool offset = false, camera = false;
+    int size(int curve) const { return curve + (offset ? 1 : 0) + (camera ? kCameraSize : 0); }
+  };
+  double SumConic(const Eigen::Matrix3d& conic, double offset_px, const double* camera,
+                  const Weighing& weighing, const Variables& variables, CurveModel* model) const;
+
+  // The same for a line (3). Local variables: the line (3), the camera's shifts.
+  double SumLine(const Eigen::Vector3d& line, const double* camera, const Weighing& weighing,
+                 const Variables& variables, CurveModel* model) const;
+
+  // A line of the camera as given, as the shifted camera sees the same pixels; not ok where that
+  // cannot undistort them.
+  bool LineThrough(const double* camera, const Eigen::Vector3d& line,
+                   Eigen::Vector3d* shifted) const;
+
+  // Signed distances, pixels.
+  void ConicDistances(const Eigen::Matrix3d& conic, double offset_px, const double* camera,
+                      std::vector<double>* distances) const;
+  void LineDistances(const Eigen::Vector3d& line, const double* camera,
+                     std::vector<double>* distances) const;
+
+  // The conic in coordinates about the points' middle, in which its shape is large against
+  // rounding.
+  Eigen::Matrix3d Normalized(const Eigen::Matrix3d& conic) const {
+    return normalization_.transpose() * conic * normalization_;
+  }
+
+ private:
+  CalibratedPoint At(std::size_t i, const Camera* shifted) const;
+  CalibratedPoint NormalizedAt(std::size_t i, const Camera* shifted) const;
+  bool IsOrthogonal(const Eigen::Matrix3d& conic, double* level) const;
+  template <typename Row>
+  void FillCameraColumns(std::size_t i, const CalibratedPoint& p, const Camera& camera, double r,
+                         const Eigen::Vector2d& by_pixel, Row* row, int first) const;
+
+  Camera camera_;
+  Options options_;
+  std::vector<Eigen::Vector2d> pixels_;
+  std::vector<CalibratedPoint> points_;
+  std::vector<LensSlope> lens_;                                  // By distortion coefficient.
+  Eigen::Matrix3d normalization_ = Eigen::Matrix3d::Identity();  // Calibrated from normalised.
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_IMAGE_POINTS_H_
