@@ -8,9 +8,8 @@
 namespace circline {
 
 Status ClosedFormOptions::Validate() const {
-  if (!(sigma_px > 0.0) || !std::isfinite(sigma_px))
-    return Status::Invalid("sigma_px must be positive");
-  return noise_model.Validate();
+  return sigma_px > 0.0 && std::isfinite(sigma_px) ? Status::Ok()
+                                                   : Status::Invalid("sigma_px must be positive");
 }
 
 bool WorldRotation(const Observations& observations, const Eigen::Vector3d& normal,

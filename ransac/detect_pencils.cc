@@ -31,6 +31,8 @@ constexpr std::size_t kMaxSearchedAround = 3;
 constexpr int kFoundAround = 2;
 // A line so nearly orthogonal to an axis (a sine) has no direction orthogonal to that axis.
 constexpr double kMinCross = 0.05;
+// Standard deviations within which a line belongs to a pencil.
+constexpr double kGate = 3.03;
 // The two sides of a thin line are so near to each other, pixels.
 constexpr double kTwinPx = 4.0;
 // What all points of a line share, pixels: no number of them averages it out. It turns short lines
@@ -75,7 +77,7 @@ class PencilFitter {
       *spread = EstimateSpread(near, direction);
       pencil->lines = Near(near, direction, *spread);
       std::vector<LineFit> members;
-      for (const int i : pencil->lines) members.push_back(WithDirectionError(Line(i), *spread));
+      for (const int i : pencil->lines) members.push_back(WithModelError(Line(i), *spread));
       VanishingPointFit fit;
       if (!FitVanishingPoint(members, &fit).ok()) return false;
       pencil->fit = fit;
@@ -107,8 +109,7 @@ class PencilFitter {
     std::vector<int> near;
     for (const int i : candidates) {
       const double miss = Line(i).line.dot(direction);
-      if (miss * miss <= kInlierSigmas * kInlierSigmas * Variance(i, direction, spread))
-        near.push_back(i);
+      if (miss * miss <= kGate * kGate * Variance(i, direction, spread)) near.push_back(i);
     }
     return near;
   }
@@ -145,7 +146,7 @@ class PencilFitter {
 DetectedPencil MakePencil(const FoundPencil& found, const LineSet& set, double spread) {
   std::vector<LineFit> fits;
   for (const int i : found.lines) {
-    fits.push_back(WithDirectionError(set.fits[static_cast<std::size_t>(i)], spread));
+    fits.push_back(WithModelError(set.fits[static_cast<std::size_t>(i)], spread));
   }
   DetectedPencil pencil = MakePencil(set.lines, found.lines, fits, found.fit.direction);
   pencil.observation.fit = found.fit;
@@ -227,7 +228,7 @@ std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::ve
   std::vector<LineFit> pool;
   for (const int i : subset) {
     if (set.IsTwin(i)) continue;
-    pool.push_back(WithDirectionError(set.fits[static_cast<std::size_t>(i)], kSearchSigmaRad));
+    pool.push_back(WithModelError(set.fits[static_cast<std::size_t>(i)], kSearchSigmaRad));
   }
   FoundPencil best;
   best.log_false_alarms = std::log(options.max_false_alarms);
@@ -239,10 +240,9 @@ std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::ve
     double expected = 0.0;
     std::size_t members = 0;
     for (const LineFit& line : pool) {
-      // A direction uniform on the sphere comes within kInlierSigmas sigma with this probability.
-      expected +=
-          std::min(1.0, kInlierSigmas * std::sqrt(direction.dot(line.covariance * direction)));
-      members += std::abs(VanishingPointResidual(line, direction)) <= kInlierSigmas ? 1 : 0;
+      // A direction uniform on the sphere comes within kGate sigma with this probability.
+      expected += std::min(1.0, kGate * std::sqrt(direction.dot(line.covariance * direction)));
+      members += std::abs(VanishingPointResidual(line, direction)) <= kGate ? 1 : 0;
     }
     const double log_false_alarms = LogFalseAlarms(pool.size(), expected, members);
     if (log_false_alarms >= best.log_false_alarms) continue;

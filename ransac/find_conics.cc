@@ -13,6 +13,7 @@ namespace circline {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
+constexpr double kSigmas = 3.03;  // 99.8 % of a Gaussian's points.
 
 // Points chosen from the caller's.
 struct Subset {
@@ -110,7 +111,7 @@ class Finder {
     expected = std::max(expected, 0.5 * beside);
     const int sample = directions_ != nullptr ? 3 : 5;
     if (directions_ != nullptr) {
-      expected *= std::min(1.0, 2.0 * kInlierSigmas * directions_->sigma_rad / kPi);
+      expected *= std::min(1.0, 2.0 * kSigmas * directions_->sigma_rad / kPi);
     }
     found->log_false_alarms = LogFalseAlarms(n, expected, found->points.size(), sample);
     return !*is_blob && static_cast<int>(found->points.size()) >= options_.min_points &&
@@ -152,7 +153,7 @@ class Finder {
     const Eigen::Vector3d gradient = conic * points_[i].Homogeneous();
     const Eigen::Vector2d across = points_[i].GradientPerPixel(gradient.head<2>());
     const double sine = across.x() * normal.y() - across.y() * normal.x();
-    const double largest = kInlierSigmas * directions_->sigma_rad * across.norm() * normal.norm();
+    const double largest = kSigmas * directions_->sigma_rad * across.norm() * normal.norm();
     return std::abs(sine) <= largest;
   }
 

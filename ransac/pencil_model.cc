@@ -38,7 +38,7 @@ struct Pool {
       : all(UsableLines(input)), threshold(options.ransac.threshold) {
     lines.reserve(input.size());
     for (const LineFit& line : input) {
-      lines.push_back(WithDirectionError(line, options.model_sigma_rad));
+      lines.push_back(WithModelError(line, options.model_sigma_rad));
     }
   }
 
@@ -90,17 +90,6 @@ Status FitFinal(const Pool& pool, const std::vector<int>& candidates,
     if (!status.ok()) return status;
   }
   return Status::Ok();
-}
-
-// What an outlier costs, as a residual: the square root of twice the logarithm of how much likelier
-// a parallel line without miss is than any line, l . v of which is uniform on [-1, 1]. At the
-// threshold's cost three lines that happen to meet beat four that are parallel.
-double OutlierCostSigmas(const Pool& pool) {
-  constexpr double kOdds = 4.0;  // Four of five lines of a pencil are parallel.
-  double sum = 0.0;
-  for (const int i : pool.all) sum += std::sqrt(0.5 * pool[i].covariance.trace());
-  const double sigma = std::max(sum / static_cast<double>(pool.all.size()), kCoincident);
-  return std::sqrt(2.0 * std::log(std::max(1.0, kOdds * 2.0 * 0.3989422804014327 / sigma)));
 }
 
 // log of the number of directions with so many members expected among unrelated lines: the pairs of
@@ -175,6 +164,14 @@ std::vector<int> UsableLines(const std::vector<LineFit>& lines) {
     if (Usable(lines[i])) indices.push_back(static_cast<int>(i));
   }
   return indices;
+}
+
+LineFit WithModelError(const LineFit& line, double model_sigma_rad) {
+  LineFit result = line;
+  result.covariance +=
+      model_sigma_rad * model_sigma_rad *
+      (Eigen::Matrix3d::Identity() - line.line * line.line.transpose() / line.line.squaredNorm());
+  return result;
 }
 
 PencilModel::PencilModel(const std::vector<LineFit>& lines, const std::vector<int>& indices,
@@ -276,79 +273,6 @@ bool DirectionStep::Move(Eigen::Vector3d* direction) const {
   return true;
 }
 
-Status FitTrimmedDirection(const std::vector<LineFit>& lines, std::size_t num_kept,
-                           VanishingPointFit* fit, std::vector<std::uint8_t>* kept) {
-  const std::size_t n = lines.size();
-  if (num_kept < 2 || n < num_kept) return Status::Refused("too few lines for a direction");
-  std::vector<std::pair<double, std::size_t>> squares(n);
-  // Sum of the smallest squares; brings those to the front.
-  const auto trimmed_sum = [&](const Eigen::Vector3d& direction) {
-    for (std::size_t i = 0; i < n; ++i) {
-      const double r = VanishingPointResidual(lines[i], direction);
-      squares[i] = {r * r, i};
-    }
-    const auto end = squares.begin() + static_cast<std::ptrdiff_t>(num_kept);
-    std::nth_element(squares.begin(), end - 1, squares.end());
-    double sum = 0.0;
-    for (auto s = squares.begin(); s != end; ++s) sum += s->first;
-    return sum;
-  };
-  constexpr std::size_t kMostPairs = 200;
-  const std::size_t stride = n * (n - 1) / 2 / kMostPairs + 1;
-  double best = std::numeric_limits<double>::infinity();
-  std::size_t pair = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = i + 1; j < n; ++j) {
-      if (pair++ % stride != 0) continue;
-      const Eigen::Vector3d crossing = lines[i].line.cross(lines[j].line);
-      if (!(crossing.norm() > kCoincident)) continue;
-      const double sum = trimmed_sum(crossing.normalized());
-      if (!(sum < best)) continue;
-      best = sum;
-      fit->direction = crossing.normalized();
-    }
-  }
-  if (!std::isfinite(best)) return Coincide();
-  constexpr int kSteps = 2;
-  for (int step = 0; step <= kSteps; ++step) {
-    trimmed_sum(fit->direction);
-    kept->assign(n, 0);
-    std::vector<LineFit> chosen;
-    for (std::size_t k = 0; k < num_kept; ++k) {
-      (*kept)[squares[k].second] = 1;
-      chosen.push_back(lines[squares[k].second]);
-    }
-    const Status status = FitVanishingPoint(chosen, fit);
-    if (!status.ok()) return status;
-  }
-  return Status::Ok();
-}
-
-namespace {
-
-// From the seven tenths of the lines that agree best.
-Status FitTrimmed(const Pool& pool, VanishingPointFit* fit, std::vector<int>* members) {
-  std::vector<LineFit> usable;
-  for (const int i : pool.all) usable.push_back(pool[i]);
-  std::vector<std::uint8_t> kept;
-  const Status status =
-      FitTrimmedDirection(usable, usable.size() - 3 * usable.size() / 10, fit, &kept);
-  if (!status.ok()) return status;
-  const Eigen::Vector3d direction = fit->direction;
-  return FitFinal(pool, pool.all, direction, fit, members);
-}
-
-double TruncatedCost(const Pool& pool, const Eigen::Vector3d& direction, double threshold) {
-  double cost = 0.0;
-  for (const int i : pool.all) {
-    const double r = std::min(std::abs(VanishingPointResidual(pool[i], direction)), threshold);
-    cost += r * r;
-  }
-  return cost;
-}
-
-}  // namespace
-
 Status FitVanishingPointRobust(const std::vector<LineFit>& lines, const PencilOptions& options,
                                VanishingPointFit* fit, std::vector<std::uint8_t>* mask) {
   Status status = options.Validate();
@@ -363,20 +287,7 @@ Status FitVanishingPointRobust(const std::vector<LineFit>& lines, const PencilOp
     }
     status = FitVanishingPoint({pool[pool.all[0]], pool[pool.all[1]]}, &result);
   } else {
-    PencilOptions search = options;
-    search.ransac.threshold = std::max(search.ransac.threshold, OutlierCostSigmas(pool));
-    status = FindOne(lines, pool, pool.all, search, &result, &members);
-    // Two of few lines may cross too far from the truth for the search to reach it.
-    constexpr std::size_t kFew = 20;
-    VanishingPointFit other;
-    std::vector<int> of_other;
-    if (pool.all.size() <= kFew && FitTrimmed(pool, &other, &of_other).ok() &&
-        (!status.ok() || TruncatedCost(pool, other.direction, search.ransac.threshold) <
-                             TruncatedCost(pool, result.direction, search.ransac.threshold))) {
-      status = Status::Ok();
-      result = other;
-      members = of_other;
-    }
+    status = FindOne(lines, pool, pool.all, options, &result, &members);
   }
   if (!status.ok()) return status;
   *fit = result;

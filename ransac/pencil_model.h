@@ -35,7 +35,7 @@ struct PencilOptions {
   // unrelated lines (number of false alarms; Desolneux, Moisan, Morel, IJCV 2000); > 0.
   double max_false_alarms = 0.01;
 
-  PencilOptions() { ransac.threshold = kInlierSigmas; }
+  PencilOptions() { ransac.threshold = 3.03; }
   Status Validate() const;
 };
 
@@ -53,13 +53,6 @@ struct FoundPencil {
 Status FitVanishingPointRobust(const std::vector<LineFit>& lines, const PencilOptions& options,
                                VanishingPointFit* fit, std::vector<std::uint8_t>* mask = nullptr);
 
-// Direction of least trimmed squares (Rousseeuw 1984): the one whose `num_kept` smallest residuals
-// have the smallest sum of squares, whatever the scale of the covariances. `kept` receives 1 for
-// those lines. From the crossings of pairs, at most 200, and two steps of concentration. Refuses
-// fewer than num_kept lines, num_kept < 2, and lines that coincide.
-Status FitTrimmedDirection(const std::vector<LineFit>& lines, std::size_t num_kept,
-                           VanishingPointFit* fit, std::vector<std::uint8_t>* kept);
-
 // Several pencils from one set of lines, the best supported first. One direction after the other is
 // found among the lines that are left; the search stops at max_pencils, or when the best direction
 // left has fewer than min_lines lines or more than max_false_alarms. Then every line goes to the
@@ -70,6 +63,10 @@ Status FindPencils(const std::vector<LineFit>& lines, const PencilOptions& optio
 
 // Indices of the lines with a finite, unit normal.
 std::vector<int> UsableLines(const std::vector<LineFit>& lines);
+
+// The line with the model's error in its covariance, so that the fits of estimators/ weigh it as
+// the search does.
+LineFit WithModelError(const LineFit& line, double model_sigma_rad);
 
 // Gauss-Newton for a direction in the tangent plane of the sphere, the variances of the lines held
 // at the current direction.

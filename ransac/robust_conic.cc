@@ -222,15 +222,11 @@ Status ConicSearch::Finish(const Candidate& candidate, ConicFit* fit,
     return NoEllipse();
   }
   mask->assign(points_.size(), 0);
-  std::vector<double> distances;
-  distances.reserve(points_.size());
   for (int i = 0; i < model_.NumData(); ++i) {
-    if (!model_.DirectionFits(value, i)) continue;
     const std::size_t point = static_cast<std::size_t>(model_.PointIndex(i));
-    distances.push_back(ConicDistancePx(points_[point], fit->conic));
-    (*mask)[point] = std::abs(distances.back()) <= threshold ? 1 : 0;
+    const bool near = std::abs(ConicDistancePx(points_[point], fit->conic)) <= threshold;
+    (*mask)[point] = near && model_.DirectionFits(value, i) ? 1 : 0;
   }
-  fit->rms_px = InlierRms(distances, threshold);
   return Status::Ok();
 }
 

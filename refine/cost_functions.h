@@ -1,6 +1,5 @@
 // Circles and lines for anybody's ceres::Problem: each cost function is one feature of one photo,
-// all its points at once. docs/examples/ceres_graph.cc is a pose graph made of these; EstimatePose
-// is built of nothing else.
+// all its points at once. docs/examples/ceres_graph.cc is a pose graph made of these.
 //
 // Parameter blocks
 //   rotation     4  unit quaternion (x, y, z, w) of cam_from_world; ceres::EigenQuaternionManifold
@@ -15,8 +14,9 @@
 //
 // Residuals. A feature of many points is one block of few residuals whose squares sum up to the
 // robust cost of all points, sum rho((distance / sigma)^2), and whose Jacobian has its gradient and
-// its Gauss-Newton Hessian (METHOD: U, f and a rest without derivative). So the robust loss acts on
-// each point, inside (ImagePoints::Options::loss): add these blocks with a null LossFunction. The
+// its Gauss-Newton Hessian: the square root of that, and a rest without derivative. So the robust
+// loss acts on each point, inside (ImagePoints::Options::loss): add these blocks with a null
+// LossFunction. The
 // reported Jacobian is not the derivative of the reported residuals: ceres::GradientChecker does
 // not apply; tests/refine/cost_functions_test.cc compares costs and gradients. Where nothing can be
 // evaluated (a point behind the camera), Evaluate returns false and ceres shortens the step.

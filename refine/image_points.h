@@ -15,10 +15,12 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
-#include "circline/estimators/noise_model.h"
 #include "circline/estimators/robust_loss.h"
 
 namespace circline {
+
+// Residuals within this many standard deviations are inliers: 99.8 % of a Gaussian's.
+constexpr double kInlierSigmas = 3.09;
 
 // A camera as unknowns: shifts against the camera as given, so that zeros are that camera. 0: of
 // log f (both focal lengths); 1: of log (fy / fx); 2, 3: of the principal point, pixels; from 4 on:
@@ -41,7 +43,7 @@ class LensSlope {
 // How far a contour point is from a circle's image: to first order (Sampson), or orthogonally, in
 // twice the time. By itself: orthogonally where the first order does not suffice, that is where the
 // ellipse's smallest radius of curvature is below 20 standard deviations of a point.
-enum class ConicDistanceType { kAuto, kSampson, kOrthogonal };
+enum class ConicDistanceType { kSampson, kOrthogonal, kAuto };
 
 // How residuals count. All of them under their loss, its tuning constant `stretch` times as wide
 // (graduated refinement lowers it to 1); or, for covariances, inliers only, without loss, all times
@@ -70,7 +72,7 @@ class ImagePoints {
  public:
   struct Options {
     double sigma_px = 1.0;  // Standard deviation of each coordinate, pixels; > 0.
-    double weight = 1.0;    // What all points together count (NoiseModel::Weight).
+    double weight = 1.0;    // What all points together count: below 1 where they share an error.
     LossType loss = LossType::kTrivial;
     ConicDistanceType distance = ConicDistanceType::kAuto;
     int num_distortion = 1;  // Distortion coefficients with derivatives; the others are constant.

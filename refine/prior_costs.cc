@@ -87,7 +87,7 @@ struct GaussianResidual {
   template <typename T>
   bool operator()(const T* const* x, T* residual) const {
     for (std::size_t k = 0; k < sigmas.size(); ++k)
-      residual[k] = sigmas[k] > 0.0 ? x[0][k] / sigmas[k] : T(0.0);
+      residual[k] = sigmas[k] > 0.0 ? x[0][k] / sigmas[k] : static_cast<T>(0.0);
     return true;
   }
 };
@@ -101,14 +101,14 @@ struct PoseResidual {
   bool operator()(const T* q, const T* t, T* residual) const {
     // ceres' order of a quaternion is w first.
     const T rotation[4] = {q[3], q[0], q[1], q[2]};
-    const T mean[4] = {T(inverse_mean.w()), T(inverse_mean.x()), T(inverse_mean.y()),
-                       T(inverse_mean.z())};
+    const T mean[4] = {static_cast<T>(inverse_mean.w()), static_cast<T>(inverse_mean.x()),
+                       static_cast<T>(inverse_mean.y()), static_cast<T>(inverse_mean.z())};
     T difference[4], delta[6];
     ceres::QuaternionProduct(rotation, mean, difference);
     ceres::QuaternionToAngleAxis(difference, delta);
     for (int k = 0; k < 3; ++k) delta[3 + k] = t[k] - translation[k];
     for (int k = 0; k < 6; ++k) {
-      residual[k] = T(0.0);
+      residual[k] = static_cast<T>(0.0);
       for (int i = 0; i < 6; ++i) residual[k] += square_root(k, i) * delta[i];
     }
     return true;
@@ -122,7 +122,8 @@ struct MeasuredDirectionResidual {
   template <typename T>
   bool operator()(const T* q, T* residual) const {
     const T rotation[4] = {q[3], q[0], q[1], q[2]};
-    const T world[3] = {T(in_world.x()), T(in_world.y()), T(in_world.z())};
+    const T world[3] = {static_cast<T>(in_world.x()), static_cast<T>(in_world.y()),
+                        static_cast<T>(in_world.z())};
     T camera[3];
     ceres::UnitQuaternionRotatePoint(rotation, world, camera);
     // All three, so that the opposite direction is no solution.

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "circline/refine/readings.h"
+#include "circline/refine/seeded_refinement.h"
 
 namespace circline {
 namespace {

@@ -10,7 +10,6 @@
 #include "circline/estimators/random.h"
 #include "circline/refine/estimate_pose.h"
 #include "circline/refine/joint_problem.h"
-#include "circline/refine/joint_result.h"
 
 namespace circline {
 namespace {
@@ -149,16 +148,13 @@ void RefineOneSeed(benchmark::State& state, void (*add)(Scene*), const Estimatio
     scene.observations = ResolveWorld(scene.observations);
   }
   RunInTurn(state, scenes, [&](std::size_t i) {
-    const PointNoise noise = MeasurePointNoise(scenes[i].observations);
-    const JointProblem problem(scenes[i].observations, options, noise);
+    const JointProblem problem(scenes[i].observations, options, {kNoisePx, kNoisePx});
     CameraPose seed = scenes[i].pose;
     seed.rotation = ExpRotation({error, -error, error}) * seed.rotation;
     seed.translation.x() += 10.0 * error;
-    State at;
+    Approach approach;
     Refined refined;
-    return problem.Start(seed, 0.0, problem.FirstReading(), &at).ok() &&
-           problem.Solve(options.max_iterations, &at).ok() &&
-           FillRefined(problem, at, &refined).ok();
+    return problem.ApproachFrom(seed, &approach).ok() && problem.Refine(approach, &refined).ok();
   });
 }
 
@@ -189,8 +185,7 @@ BENCHMARK_CAPTURE(BM_RefineOrthogonalDistances, cold_cauchy, LossType::kCauchy, 
 
 void BM_RefineFocalLength(benchmark::State& state, LossType loss, double error) {
   EstimationOptions options = WithLoss(loss);
-  options.camera_sigma = CameraSigma();
-  options.camera_sigma->log_focal = 0.03;
+  options.focal_sigma = 0.03;
   RefineOneSeed(state, AddPaperLike, options, error);
 }
 BENCHMARK_CAPTURE(BM_RefineFocalLength, cold_cauchy, LossType::kCauchy, kCold);

@@ -4,12 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <iomanip>
 #include <optional>
 #include <sstream>
 
-#include "apps/common/noise_file.h"
 #include "apps/common/text.h"
 #include "apps/compare/peers.h"
 #include "circline/estimators/robust_loss.h"
@@ -32,20 +30,12 @@ DEFINE_string(line_loss, "", "Loss of points of lines, where it differs from --r
 DEFINE_string(line_loss_scale_px, "", "Scale of points of lines, where it differs.");
 DEFINE_string(conic_distance,
               circline::ConicDistanceName(circline::EstimationOptions().conic_distance),
-              "Distance of contour points in the refinement: sampson (first order), orthogonal, or "
-              "auto: orthogonal where the first order does not suffice.");
-DEFINE_double(focal_sigma, -1.0,
-              "Standard deviation of the logarithm of the camera's focal length (0.03: 3 %); from "
-              "0.01 on it is refined too; 0 = exact, -1 = that of the noise model.");
-DEFINE_string(noise, "photo",
-              "What is not exact beside the points' noise: photo (prints bleed, sheets bend, walls "
-              "lean) or exact (nothing, for simulated evidence).");
-DEFINE_string(noise_model, "",
-              "A YAML or JSON file with standard deviations that differ from those of --noise; its "
-              "keys are the fields of NoiseModel.");
-DEFINE_double(
-    inlier_threshold_px, circline::FitOptions().inlier_threshold_px,
-    "A point farther than this from its curve is an outlier, pixels; 0 = from the noise.");
+              "Distance of contour points in the refinement: sampson (first order) or orthogonal.");
+DEFINE_double(focal_sigma, circline::EstimationOptions().focal_sigma,
+              "Relative standard deviation of the camera's focal length (0.03: 3 %), which is then "
+              "refined too; 0 = fixed.");
+DEFINE_double(inlier_threshold_px, circline::FitOptions().inlier_threshold_px,
+              "A point farther than this from its curve is an outlier, pixels; positive.");
 DEFINE_double(ransac_confidence, circline::FitOptions().confidence,
               "Probability that the best model was among those drawn; between 0 and 1.");
 DEFINE_int32(ransac_max_iterations, circline::FitOptions().max_iterations,
@@ -131,39 +121,20 @@ Status SetOption(const std::string& flag, Field Options::*field, const Value& va
   return CheckFlag(flag, alone.Validate());
 }
 
-Status ReadNoise(NoiseModel* model) {
-  if (FLAGS_noise != "exact" && FLAGS_noise != "photo") {
-    return Status::Invalid("--noise: '" + FLAGS_noise + "' is not one of photo, exact" +
-                           DidYouMean(FLAGS_noise, {"photo", "exact"}));
-  }
-  *model = FLAGS_noise == "exact" ? NoiseModel::Exact() : NoiseModel();
-  if (FLAGS_noise_model.empty()) return Status::Ok();
-  const Status status = ReadNoiseModel(FLAGS_noise_model, model);
-  return status.ok() ? status : Status::Invalid("--noise_model: " + status.message);
-}
-
-// What --focal_sigma says; absent where it leaves that to the noise model and the scene file.
-Status ReadCameraSigma(const NoiseModel& noise, std::optional<CameraSigma>* sigma) {
-  if (FLAGS_focal_sigma == -1.0) return Status::Ok();
-  if (!(FLAGS_focal_sigma >= 0.0) || !std::isfinite(FLAGS_focal_sigma))
-    return Status::Invalid("--focal_sigma must be 0 or more, or -1 for the noise model's");
-  *sigma = noise.camera;
-  (*sigma)->log_focal = FLAGS_focal_sigma;
-  return Status::Ok();
-}
-
-Status ReadLosses(const NoiseModel& noise, std::vector<LossSetting>* losses) {
+Status ReadLosses(std::vector<LossSetting>* losses) {
   LossOverride conic, line;
   Status status = conic.Read("conic_loss", FLAGS_conic_loss, FLAGS_conic_loss_scale_px);
   if (status.ok()) status = line.Read("line_loss", FLAGS_line_loss, FLAGS_line_loss_scale_px);
   EstimationOptions common_options;
   if (status.ok() && !ConicDistanceFromName(FLAGS_conic_distance, &common_options.conic_distance)) {
     status = Status::Invalid("--conic_distance: '" + FLAGS_conic_distance +
-                             "' is not one of auto, sampson, orthogonal" +
-                             DidYouMean(FLAGS_conic_distance, {"auto", "sampson", "orthogonal"}));
+                             "' is not one of sampson, orthogonal" +
+                             DidYouMean(FLAGS_conic_distance, {"sampson", "orthogonal"}));
   }
-  common_options.noise_model = noise;
-  if (status.ok()) status = ReadCameraSigma(noise, &common_options.camera_sigma);
+  if (status.ok()) {
+    status = SetOption("focal_sigma", &EstimationOptions::focal_sigma, FLAGS_focal_sigma,
+                       &common_options);
+  }
   if (!status.ok()) return status;
   losses->clear();
   for (const std::string& loss : SplitList(FLAGS_robust_loss)) {
@@ -258,23 +229,11 @@ SolverRegistry AllSolvers() {
 // The flags beside solvers and losses that shape what is found in a photo; and those that say how
 // to see photos without a scene file.
 std::vector<std::string> TuningFlags() {
-  return {"conic_loss",
-          "conic_loss_scale_px",
-          "line_loss",
-          "line_loss_scale_px",
-          "conic_distance",
-          "focal_sigma",
-          "noise",
-          "noise_model",
-          "inlier_threshold_px",
-          "ransac_confidence",
-          "ransac_max_iterations",
-          "min_ellipse_axis_px",
-          "min_arc_deg",
-          "min_segment_length_px",
-          "max_circles",
-          "max_pencils",
-          "seed"};
+  return {"conic_loss",          "conic_loss_scale_px", "line_loss",
+          "line_loss_scale_px",  "conic_distance",      "focal_sigma",
+          "inlier_threshold_px", "ransac_confidence",   "ransac_max_iterations",
+          "min_ellipse_axis_px", "min_arc_deg",         "min_segment_length_px",
+          "max_circles",         "max_pencils",         "seed"};
 }
 std::vector<std::string> InputFlags() { return {"fov_deg", "focal_px", "roi", "circle_radius"}; }
 
@@ -302,16 +261,9 @@ std::string Lines(const std::vector<std::string>& texts) {
 }  // namespace
 
 Status OptionsFromFlags(CompareOptions* options) {
-  NoiseModel noise;
-  Status status = ReadNoise(&noise);
-  options->fit.noise_model = options->closed_form.noise_model = noise;
-  if (status.ok()) status = ReadFitOptions(&options->fit);
+  Status status = ReadFitOptions(&options->fit);
   if (status.ok()) status = ReadDetectionOptions(&options->detection);
-  if (status.ok()) status = ReadLosses(noise, &options->losses);
-  if (status.ok()) {
-    const EstimationOptions& first = options->losses.front().estimation;
-    options->closed_form.noise_model.camera = first.camera_sigma.value_or(noise.camera);
-  }
+  if (status.ok()) status = ReadLosses(&options->losses);
   if (status.ok()) status = ReadSolvers(&options->solvers);
   if (!status.ok()) return status;
   if (FLAGS_threads < 0 || FLAGS_threads > 1024) {

@@ -40,8 +40,7 @@ struct CompareOptions {
   std::vector<std::string> unusual_flags;
 };
 
-// From the flags; not ok: one line that names the flag. Nothing but the file of --noise_model is
-// read.
+// From the flags; not ok: one line that names the flag. Nothing is read from disk.
 Status OptionsFromFlags(CompareOptions* options);
 
 // Names of all solvers, closed form and refined, in the order of the registry.

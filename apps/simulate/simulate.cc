@@ -73,9 +73,7 @@ class Solvers {
   explicit Solvers(LossType loss) {
     EstimationOptions estimation;
     estimation.conic_loss.type = estimation.line_loss.type = loss;
-    ClosedFormOptions closed_form;
-    estimation.noise_model = closed_form.noise_model = NoiseModel::Exact();
-    AddClosedFormSolvers(&registry_, closed_form);
+    AddClosedFormSolvers(&registry_);
     AddRefinedSolvers(&registry_, estimation);
   }
   const Solver& Get(const Method& method) const {
@@ -93,7 +91,6 @@ Trial RunTrial(const PaperScene& scene, const Disturbance& disturbance, const So
   Observations observations = scene.Observe(disturbance, &random, &masks);
   if (disturbance.outlier_ratio > 0.0) {
     FitOptions fit;
-    fit.noise_model = NoiseModel::Exact();
     fit.inlier_threshold_px = std::max(inlier_sigmas * disturbance.noise_px, kMinThresholdPx);
     fit.seed = random.Next();
     FitObservations(fit, &observations);

@@ -59,7 +59,7 @@ ImagePoints See(const Camera& camera, const Photo& photo, const std::vector<Vect
   ImagePoints::Options options;
   options.sigma_px = kSigmaPx;
   options.loss = LossType::kCauchy;  // Of each point, inside the block.
-  // Points of photographs share errors: options.weight = NoiseModel().ContourWeight(...).
+  // Points of photographs share errors: options.weight below 1 says how much less they count.
   return ImagePoints(camera, pixels, /*inliers=*/{}, options);
 }
 ImagePoints SeeCircle(const Camera& camera, const Photo& photo, const Circle& c) {

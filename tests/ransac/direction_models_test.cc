@@ -113,12 +113,11 @@ TEST_F(DirectionModels, AcceptAsksForTwoDirections) {
   const OrthogonalTripletModel triplet(pencil);
   OrthogonalTripletModel::Value value;
   Eigen::Map<Matrix3d>(value.data()) = R_;
-  EXPECT_FALSE(triplet.Accept(value, kInlierSigmas));
+  EXPECT_FALSE(triplet.Accept(value, 3.03));
   const DirectionPairModel pair(pencil);
-  EXPECT_FALSE(
-      pair.Accept({R_(0, 0), R_(1, 0), R_(2, 0), R_(0, 1), R_(1, 1), R_(2, 1)}, kInlierSigmas));
+  EXPECT_FALSE(pair.Accept({R_(0, 0), R_(1, 0), R_(2, 0), R_(0, 1), R_(1, 1), R_(2, 1)}, 3.03));
   const PencilModel every(lines_, all_, 0.0);
-  EXPECT_TRUE(OrthogonalTripletModel(every).Accept(value, kInlierSigmas));
+  EXPECT_TRUE(OrthogonalTripletModel(every).Accept(value, 3.03));
 }
 
 TEST_F(DirectionModels, PairFitsAndRefines) {

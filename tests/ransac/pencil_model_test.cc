@@ -208,36 +208,6 @@ TEST(FitVanishingPointRobust, RefusesWhatHasNoDirection) {
   EXPECT_EQ(FitVanishingPointRobust(same, PencilOptions(), &fit).code, StatusCode::kRefused);
 }
 
-TEST(FitTrimmedDirection, KeepsTheLinesThatAgreeWhateverTheirScale) {
-  int right = 0;
-  for (std::uint64_t trial = 0; trial < 50; ++trial) {
-    Random random(trial);
-    const Eigen::Vector3d direction = RandomRotation(&random).col(0);
-    std::vector<LineFit> lines;
-    for (int i = 0; i < 14; ++i) AddSegment(&direction, &random, &lines);
-    for (int i = 0; i < 6; ++i) AddSegment(nullptr, &random, &lines);
-    ASSERT_EQ(lines.size(), 20u);
-    for (LineFit& line : lines) line.covariance *= 1e4;
-    VanishingPointFit fit;
-    std::vector<std::uint8_t> kept;
-    ASSERT_TRUE(FitTrimmedDirection(lines, 14, &fit, &kept).ok());
-    EXPECT_EQ(std::count(kept.begin(), kept.end(), 1), 14);
-    right += AngleBetween(direction, fit.direction) < 0.1 ? 1 : 0;
-  }
-  EXPECT_GE(right, 47);
-}
-
-TEST(FitTrimmedDirection, RefusesTooFewLines) {
-  Random random(1);
-  std::vector<LineFit> lines;
-  for (int i = 0; i < 3; ++i) AddSegment(nullptr, &random, &lines);
-  VanishingPointFit fit;
-  std::vector<std::uint8_t> kept;
-  EXPECT_EQ(FitTrimmedDirection(lines, 4, &fit, &kept).code, StatusCode::kRefused);
-  EXPECT_EQ(FitTrimmedDirection(lines, 1, &fit, &kept).code, StatusCode::kRefused);
-  EXPECT_EQ(FitTrimmedDirection({lines[0], lines[0]}, 2, &fit, &kept).code, StatusCode::kRefused);
-}
-
 TEST(PencilModel, ResidualsAreThoseOfTheFit) {
   Random random(7);
   std::vector<LineFit> lines;

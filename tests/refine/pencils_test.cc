@@ -143,7 +143,6 @@ Matrix3d Bound(const Scene& scene, Angle angle, double angle_sigma) {
 
 EstimationOptions LeastSquares() {
   EstimationOptions options;
-  options.noise_model = NoiseModel::Exact();
   options.line_loss.type = LossType::kTrivial;
   return options;
 }

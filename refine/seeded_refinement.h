@@ -1,8 +1,7 @@
-// From seeds to ranked hypotheses: every reading of the evidence (which features take part) that
-// competes, refined from every start. What EstimatePose and the refined solvers share. Internal:
-// not installed.
-#ifndef CIRCLINE_REFINE_READINGS_H_
-#define CIRCLINE_REFINE_READINGS_H_
+// Seeds from closed forms, refined, ranked: what EstimatePose and the refined solvers share.
+// Internal.
+#ifndef CIRCLINE_REFINE_SEEDED_REFINEMENT_H_
+#define CIRCLINE_REFINE_SEEDED_REFINEMENT_H_
 
 #include <memory>
 #include <string>
@@ -21,4 +20,4 @@ PoseEstimate RefineSeeds(const std::string& name,
 
 }  // namespace circline
 
-#endif  // CIRCLINE_REFINE_READINGS_H_
+#endif  // CIRCLINE_REFINE_SEEDED_REFINEMENT_H_
