@@ -86,7 +86,6 @@ class ImagePoints {
   std::size_t size() const { return points_.size(); }
   const std::vector<CalibratedPoint>& points() const { return points_; }
   const Options& options() const { return options_; }
-  void set_weight(double weight) { options_.weight = weight; }
 
   // Sum over the points' distances from `conic` (3x3, negative inside an ellipse; its scale has no
   // meaning), moved outwards by `offset_px`. `camera`: kCameraSize shifts, or null for none. Local
