@@ -217,8 +217,7 @@ Status GatherCircles(const Observations& evidence, double sigma_px, Inputs* inpu
   GatherCircle(evidence, evidence.circles.front(), sigma_px, inputs);
   GatherDrawnAxes(evidence, sigma_px, inputs);
   for (std::size_t i = 1; i < evidence.circles.size(); ++i) {
-    const ConicFit& fit = *evidence.circles[i].fit;
-    inputs->more_conics.emplace_back(ConicToVector(fit.conic), fit.Covariance());
+    GatherConic(evidence.circles[i], &inputs->more_conics.emplace_back(), inputs);
   }
   constexpr double kRounding = 1e-18;
   inputs->normal_weights = {1.0 / (NormalVariance(inputs->conic) + kRounding)};

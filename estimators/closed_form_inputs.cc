@@ -27,7 +27,7 @@ Measured BestLine(const Observations& observations, PencilDirection role) {
   for (const PencilObservation& pencil : observations.pencils) {
     if (pencil.direction != role) continue;
     for (const LineObservation& line : pencil.lines) {
-      if (line.fit &&
+      if (line.fit && line.is_parallel &&
           (best == nullptr || line.fit->covariance.trace() < best->covariance.trace())) {
         best = &*line.fit;
       }
@@ -36,37 +36,26 @@ Measured BestLine(const Observations& observations, PencilDirection role) {
   return best == nullptr ? Measured() : FromLine(*best);
 }
 
-// The given angle between two pencils, radians, from 0 to pi.
-std::optional<double> KnownAngleBetween(const std::string& a, const std::string& b,
-                                        const Observations& observations) {
+// The angle between two pencils, from 0 to pi, and its standard deviation; radians.
+struct Angle {
+  double value, sigma;
+};
+std::optional<Angle> KnownAngleBetween(const std::string& a, const std::string& b,
+                                       const Observations& observations) {
   for (const KnownAngle& known : observations.known_angles) {
-    if (IsBetween(known, a, b)) return std::acos(std::cos(known.value));
+    if (IsBetween(known, a, b)) return Angle{std::acos(std::cos(known.value)), known.sigma};
   }
   return {};
 }
 
 using Directions = std::array<Eigen::Vector3d, 2>;
 
-// Both vanishing points, turned in their plane to be `angle` apart, each by its variance.
-Directions SplitByVariance(const VanishingPointFit& a, const VanishingPointFit& b, double angle) {
-  const Eigen::Vector3d n = a.direction.cross(b.direction).normalized();
-  const Eigen::Vector3d ta = n.cross(a.direction), tb = n.cross(b.direction);
-  const double va = ta.dot(a.covariance * ta), vb = tb.dot(b.covariance * tb);
-  double excess = std::atan2(a.direction.cross(b.direction).norm(), a.direction.dot(b.direction));
-  // Directions have no sense: `angle` or its supplement, whichever is nearer.
-  constexpr double kPi = 3.14159265358979323846;
-  excess -= std::abs(excess - angle) < std::abs(excess - (kPi - angle)) ? angle : kPi - angle;
-  const double ea = excess * va / (va + vb), eb = excess - ea;
-  return {std::cos(ea) * a.direction + std::sin(ea) * ta,
-          std::cos(eb) * b.direction - std::sin(eb) * tb};
-}
-
 // Cost of two directions: of all lines of both pencils, 1/2 chi^2.
 double LineCost(const std::array<PencilObservation, 2>& pencils, const Directions& directions) {
   double cost = 0.0;
   for (std::size_t k = 0; k < 2; ++k) {
     for (const LineObservation& line : pencils[k].lines) {
-      if (!line.fit) continue;
+      if (!line.fit || !line.is_parallel) continue;
       const double r = VanishingPointResidual(*line.fit, directions[k]);
       cost += 0.5 * r * r;
     }
@@ -78,7 +67,7 @@ double LineCost(const std::array<PencilObservation, 2>& pencils, const Direction
 std::vector<LineFit> BestLines(const PencilObservation& pencil) {
   std::vector<LineFit> lines;
   for (const LineObservation& line : pencil.lines) {
-    if (line.fit) lines.push_back(*line.fit);
+    if (line.fit && line.is_parallel) lines.push_back(*line.fit);
   }
   std::sort(lines.begin(), lines.end(), [](const LineFit& a, const LineFit& b) {
     return a.covariance.trace() < b.covariance.trace();
@@ -97,6 +86,71 @@ std::vector<Eigen::Vector3d> OnConeAndPlane(const Eigen::Vector3d& d, double ang
   if (!(std::abs(along) < 1.0)) return {};
   const Eigen::Vector3d u = p / norm, q = std::sqrt(1.0 - along * along) * line.cross(u);
   return {along * u + q, along * u - q};
+}
+
+// Two directions that make a known angle: both from their vanishing points, or one of them,
+// directions[on_line], from a line and the angle.
+struct Reading {
+  Directions directions;
+  double cost = 0.0;      // Of all lines.
+  double variance = 0.0;  // Of their rotation, the sum about three axes, rad^2.
+  std::optional<LineFit> line;
+  std::size_t on_line = 0;
+};
+
+// One direction from its vanishing point, the other where a line's plane meets the cone about it,
+// if it does: of two such directions the one that the lines favour.
+std::optional<Reading> ReadOnLine(const std::array<PencilObservation, 2>& pencils,
+                                  std::size_t on_line, double angle, const LineFit& line) {
+  const VanishingPointFit& fit = *pencils[1 - on_line].fit;
+  const Eigen::Vector3d d = fit.direction;
+  std::optional<Reading> reading;
+  for (const Eigen::Vector3d& other : OnConeAndPlane(d, angle, line.line)) {
+    Reading r;
+    r.directions[1 - on_line] = d;
+    r.directions[on_line] = other;
+    r.cost = LineCost(pencils, r.directions);
+    const Eigen::Vector3d across = d.cross(other).normalized(), along = across.cross(d);
+    // `other` stays in the line's plane: it moves across where d moves along, or the line tilts.
+    const double leverage = 1.0 / line.line.dot(across), follows = leverage * line.line.dot(d);
+    const double of_d = along.dot(fit.covariance * along);
+    r.variance = across.dot(fit.covariance * across) + (1.0 + follows * follows) * of_d +
+                 leverage * leverage * other.dot(line.covariance * other);
+    r.line = line;
+    r.on_line = on_line;
+    if (std::isfinite(r.variance) && (!reading || r.cost < reading->cost)) reading = r;
+  }
+  return reading;
+}
+
+// Both vanishing points, turned in their plane to be `angle` apart, each by its variance.
+Reading ReadVanishingPoints(const std::array<PencilObservation, 2>& pencils, double angle) {
+  const VanishingPointFit &a = *pencils[0].fit, &b = *pencils[1].fit;
+  const Eigen::Vector3d n = a.direction.cross(b.direction).normalized();
+  const Eigen::Vector3d ta = n.cross(a.direction), tb = n.cross(b.direction);
+  const double va = ta.dot(a.covariance * ta), vb = tb.dot(b.covariance * tb);
+  double excess = std::atan2(a.direction.cross(b.direction).norm(), a.direction.dot(b.direction));
+  // Directions have no sense: `angle` or its supplement, whichever is nearer.
+  constexpr double kPi = 3.14159265358979323846;
+  excess -= std::abs(excess - angle) < std::abs(excess - (kPi - angle)) ? angle : kPi - angle;
+  const double ea = excess * va / (va + vb), eb = excess - ea;
+  Reading r;
+  r.directions = {std::cos(ea) * a.direction + std::sin(ea) * ta,
+                  std::cos(eb) * b.direction - std::sin(eb) * tb};
+  r.cost = LineCost(pencils, r.directions);
+  r.variance = n.dot((a.covariance + b.covariance) * n) + va * vb / (va + vb);
+  return r;
+}
+
+std::vector<Reading> ReadDirections(const std::array<PencilObservation, 2>& pencils, double angle) {
+  std::vector<Reading> readings = {ReadVanishingPoints(pencils, angle)};
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (const LineFit& line : BestLines(pencils[k])) {
+      const std::optional<Reading> reading = ReadOnLine(pencils, k, angle, line);
+      if (reading) readings.push_back(*reading);
+    }
+  }
+  return readings;
 }
 
 // The fitted line of an axis: the pencil's line that it is a part of, or its own two points.
@@ -126,39 +180,44 @@ void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, In
     inputs->directions[k] = Measured(pencils[k].fit->direction, pencils[k].fit->covariance);
     inputs->roles[k] = pencils[k].direction;
   }
-  std::optional<double> angle = KnownAngleBetween(pencils[0].id, pencils[1].id, evidence);
+  std::optional<Angle> angle = KnownAngleBetween(pencils[0].id, pencils[1].id, evidence);
   const PencilDirection free = PencilDirection::kFree;
   if (axes_are_orthogonal && inputs->roles[0] != free && inputs->roles[1] != free) {
-    angle = 1.5707963267948966;
+    angle = Angle{1.5707963267948966, 0.0};
   }
   if (!angle) return;
 
-  constexpr double kGate = 2.0;  // Of cost: two standard deviations.
-  double best =
-      LineCost(pencils, SplitByVariance(*pencils[0].fit, *pencils[1].fit, *angle)) - kGate;
-  const double both = pencils[0].fit->covariance.trace() + pencils[1].fit->covariance.trace();
-  constexpr double kFollows = 100.0;
-  for (std::size_t k = 0; k < 2; ++k) {
-    // One direction from its vanishing point, the other from a line and the angle: the error of the
-    // latter's own is across both. It follows the former: its variance along that is made the far
-    // larger one, so that nobody weighs the two against each other.
-    const Eigen::Vector3d d = pencils[k].fit->direction;
-    for (const LineFit& line : BestLines(pencils[1 - k])) {
-      for (const Eigen::Vector3d& other : OnConeAndPlane(d, *angle, line.line)) {
-        Directions directions;
-        directions[k] = d;
-        directions[1 - k] = other;
-        const double cost = LineCost(pencils, directions);
-        if (!(cost < best)) continue;
-        best = cost;
-        inputs->directions[k] = Measured(d, pencils[k].fit->covariance);
-        const Eigen::Vector3d across = d.cross(other).normalized();
-        inputs->directions[1 - k] =
-            Measured(other, other.dot(line.covariance * other) * across * across.transpose() +
-                                kFollows * both * d * d.transpose());
-      }
-    }
+  inputs->angle = angle->value;
+  inputs->angle_sigma = angle->sigma;
+  const std::vector<Reading> readings = ReadDirections(pencils, angle->value);
+  double lowest = readings.front().cost;
+  for (const Reading& r : readings) lowest = std::min(lowest, r.cost);
+  // Among what the lines allow, by what is expected: the lowest cost alone would make whichever is
+  // chosen better than its covariance.
+  constexpr double kCostGate = 2.0;  // 1/2 chi^2: two standard deviations.
+  const Reading* best = nullptr;
+  for (const Reading& r : readings) {
+    if (r.cost <= lowest + kCostGate && (best == nullptr || r.variance < best->variance)) best = &r;
   }
+  if (best == nullptr || !best->line) return;
+  const std::size_t k = best->on_line;
+  inputs->directions[k] = Measured(best->directions[k], Eigen::MatrixXd::Zero(3, 3));
+  inputs->rough = best->directions[k];
+  inputs->line = FromLine(*best->line);
+  inputs->on_line = k;
+}
+
+bool DirectionsOf(const Inputs& inputs, Directions* directions) {
+  for (std::size_t k = 0; k < 2; ++k) (*directions)[k] = inputs.directions[k].value.normalized();
+  if (!inputs.line.present()) return true;
+  const std::vector<Eigen::Vector3d> both = OnConeAndPlane(
+      (*directions)[1 - inputs.on_line], inputs.angle, inputs.line.value.normalized());
+  if (both.empty()) return false;
+  const Eigen::Vector3d& exact =
+      both[both[1].dot(inputs.rough) > both[0].dot(inputs.rough) ? 1 : 0];
+  const Eigen::Vector3d difference = inputs.directions[inputs.on_line].value - inputs.rough;
+  (*directions)[inputs.on_line] = (exact + difference).normalized();
+  return true;
 }
 
 Measured::Measured(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) : value(mean) {
@@ -168,8 +227,9 @@ Measured::Measured(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covarianc
 
 std::vector<Measured*> Inputs::All() {
   std::vector<Measured*> all = {&conic,         &center,        &x_line, &y_line,
-                                &directions[0], &directions[1], &origin};
+                                &directions[0], &directions[1], &line,   &origin};
   for (Measured& more : more_conics) all.push_back(&more);
+  for (Measured& tilt : tilts) all.push_back(&tilt);
   return all;
 }
 
@@ -206,14 +266,22 @@ void GatherFrame(const Observations& observations, double sigma_px, Inputs* inpu
     if (!IsInWorldPlane(known, observations)) continue;
     inputs->length_points = CalibrateSegment(camera, known.points);
     inputs->length = inputs->length_points ? known.value : 0.0;
+    inputs->length_sigma = known.sigma;
     break;
   }
 }
 
+void GatherConic(const CircleObservation& circle, Measured* conic, Inputs* inputs) {
+  *conic = Measured(ConicToVector(circle.fit->conic), circle.fit->Covariance());
+  inputs->tilts.emplace_back(Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero());
+  inputs->contrasts.push_back(circle.contrast);
+}
+
 void GatherCircle(const Observations& observations, const CircleObservation& circle,
                   double sigma_px, Inputs* inputs) {
-  inputs->conic = Measured(ConicToVector(circle.fit->conic), circle.fit->Covariance());
+  GatherConic(circle, &inputs->conic, inputs);
   inputs->radius = circle.radius;
+  inputs->radius_sigma = circle.radius_sigma;
   const FrameObservation& frame = observations.frame;
   const bool is_origin = !frame.origin_is_center.empty() && frame.origin_is_center == circle.id;
   const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : sigma_px;

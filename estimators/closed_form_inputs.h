@@ -29,18 +29,28 @@ using RayPair = std::array<Eigen::Vector3d, 2>;
 struct Inputs {
   Measured conic;                     // ConicToVector, 6.
   std::vector<Measured> more_conics;  // Further circles of the same plane.
+  // Of `conic` and `more_conics`: what their planes are tilted by against the world's, about two
+  // axes of them, 2, 0 as far as is known; and CircleObservation::contrast.
+  std::vector<Measured> tilts;
+  std::vector<int> contrasts;
   std::vector<double>
       normal_weights;       // Inverse variances of the normals of `conic`, `more_conics`.
   Measured center;          // Image of the circle's centre, homogeneous, 3.
   Measured x_line, y_line;  // Images of the axes or of lines parallel to them, 3.
   std::array<Measured, 2> directions;  // Vanishing points of two pencils, 3.
-  Measured origin;                     // Image of the world origin, homogeneous, 3.
+  // Where present, directions[on_line] lies in the plane of this line, 3, and makes `angle`,
+  // radians, with the other direction, but for what it differs from `rough` by, near which it is.
+  Measured line;
+  std::size_t on_line = 0;
+  Eigen::Vector3d rough = Eigen::Vector3d::Zero();
+  double angle = 0.0, angle_sigma = 0.0;
+  Measured origin;  // Image of the world origin, homogeneous, 3.
   std::array<PencilDirection, 2> roles{PencilDirection::kFree, PencilDirection::kFree};
   std::optional<RayPair> x_sense, y_sense;  // Oriented axes, homogeneous.
   bool origin_at_center = false;            // The origin is the circle's centre.
-  double radius = 0.0;                      // Metric scale from the circle, or 0.
+  double radius = 0.0, radius_sigma = 0.0;  // Metric scale from the circle, or 0; relative.
   std::optional<RayPair> length_points;     // Metric scale from two points ...
-  double length = 0.0;                      // ... of the plane, or 0.
+  double length = 0.0, length_sigma = 0.0;  // ... of the plane, or 0; relative.
 
   // Every perturbable input.
   std::vector<Measured*> All();
@@ -62,14 +72,21 @@ void GatherDrawnAxes(const Observations& observations, double sigma_px, Inputs* 
 // the plane to have the axis' direction.
 void GatherAxisLines(const Observations& observations, double sigma_px, Inputs* inputs);
 
+// The two directions, unit; false where a line of known angle has none.
+bool DirectionsOf(const Inputs& inputs, std::array<Eigen::Vector3d, 2>* directions);
+
 // Senses of the axes, the origin, a known length.
 void GatherFrame(const Observations& observations, double sigma_px, Inputs* inputs);
 
-// The directions of the evidence's two pencils: their vanishing points, unless the angle between
-// them is known and the lines favour directions elsewhere. Lines that nearly coincide have a
-// vanishing point that may be anywhere along them, whatever its covariance says. The angle is known
-// where it is given or, with `axes_are_orthogonal`, where the pencils run along two of the axes.
+// The directions of the evidence's two pencils: their vanishing points, or, where the angle between
+// them is known, one of these and a line of the other pencil: of what agrees with all lines, the
+// one with the least expected error. Lines that nearly coincide have a vanishing point that may be
+// anywhere along them, whatever its covariance says. The angle is known where it is given or, with
+// `axes_are_orthogonal`, where the pencils run along two of the axes.
 void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, Inputs* inputs);
+
+// A further circle of the world plane.
+void GatherConic(const CircleObservation& circle, Measured* conic, Inputs* inputs);
 
 // A circle of the world plane, its centre if known, its radius.
 void GatherCircle(const Observations& observations, const CircleObservation& circle,

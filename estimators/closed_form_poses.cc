@@ -69,15 +69,32 @@ Eigen::Vector3d OriginRay(const Inputs& inputs, const CirclePose& circle) {
   return circle.center;
 }
 
+// The poses of a circle, none to two.
+struct PosePair {
+  std::array<CirclePose, 2> poses;
+  int count;
+};
+
+// Those of the world's plane that a circle with this tilt against it may lie in.
+PosePair TiltedPoses(const Measured& conic, const Measured& tilt) {
+  PosePair pair;
+  pair.count = CirclePoses(VectorToConic(conic.value), &pair.poses);
+  if (tilt.value.isZero(0.0)) return pair;
+  for (CirclePose& pose : pair.poses) {
+    const Eigen::Vector3d a = pose.normal.unitOrthogonal(), b = pose.normal.cross(a);
+    pose.normal = (pose.normal + tilt.value[0] * a + tilt.value[1] * b).normalized();
+  }
+  return pair;
+}
+
 // One candidate per circle plane; `contradict` says how far other evidence speaks against it.
 std::vector<Candidate> CircleCandidates(
     const Inputs& inputs,
     const std::function<Eigen::VectorXd(const CirclePose&, const Inputs&)>& contradict) {
   std::vector<Candidate> candidates;
-  std::array<CirclePose, 2> poses;
-  const int count = CirclePoses(VectorToConic(inputs.conic.value), &poses);
-  for (int i = 0; i < count; ++i) {
-    const CirclePose& circle = poses[static_cast<std::size_t>(i)];
+  const PosePair pair = TiltedPoses(inputs.conic, inputs.tilts[0]);
+  for (int i = 0; i < pair.count; ++i) {
+    const CirclePose& circle = pair.poses[static_cast<std::size_t>(i)];
     Candidate c;
     if (!RotationOfPlane(circle.normal, circle.center, inputs, &c.pose.rotation)) continue;
     c.pose.translation =
@@ -92,12 +109,6 @@ std::vector<Candidate> CircleCandidates(
 Eigen::Vector2d CenterMiss(const CirclePose& circle, const Eigen::VectorXd& measured) {
   return (circle.center / circle.center.z()).head<2>() - measured.head<2>() / measured[2];
 }
-
-// The poses of a circle, none to two.
-struct PosePair {
-  std::array<CirclePose, 2> poses;
-  int count;
-};
 
 // The weighted mean of the circles' normals, each nearest to the candidate's; and how far they miss
 // it. `more`: the poses of Inputs::more_conics.
@@ -136,10 +147,9 @@ Candidate CommonPlane(const Candidate& seed, const std::vector<PosePair>& more,
 }
 
 std::vector<Candidate> CommonPlanes(const Inputs& inputs, bool concentric) {
-  std::vector<PosePair> more(inputs.more_conics.size());
-  for (std::size_t i = 0; i < more.size(); ++i) {
-    more[i].count = CirclePoses(VectorToConic(inputs.more_conics[i].value), &more[i].poses);
-  }
+  std::vector<PosePair> more;
+  for (std::size_t i = 0; i < inputs.more_conics.size(); ++i)
+    more.push_back(TiltedPoses(inputs.more_conics[i], inputs.tilts[i + 1]));
   std::vector<Candidate> common;
   for (const Candidate& seed : SingleCirclePoses(inputs)) {
     bool valid;
@@ -152,7 +162,9 @@ std::vector<Candidate> CommonPlanes(const Inputs& inputs, bool concentric) {
 // Proposition 1, where the roles say that the directions are orthogonal: the excess over 90 degrees
 // is split by variance.
 bool RotationOfAxes(const Inputs& inputs, Eigen::Matrix3d* rotation) {
-  const Eigen::Vector3d a = inputs.directions[0].value, b = inputs.directions[1].value;
+  std::array<Eigen::Vector3d, 2> directions;
+  if (!DirectionsOf(inputs, &directions)) return false;
+  const auto& [a, b] = directions;
   const Eigen::Vector3d normal = a.cross(b).normalized();
   const auto variance = [&normal](const Measured& m) {
     const Eigen::Vector3d tangent = normal.cross(Eigen::Vector3d(m.value));
@@ -182,7 +194,9 @@ bool RotationOfPair(const Inputs& inputs, const Eigen::Vector3d& plane_ray,
     anchored.directions[first_is_better ? 0 : 1].columns.setZero();
     return RotationOfAxes(anchored, rotation);
   }
-  const Eigen::Vector3d a = inputs.directions[0].value, b = inputs.directions[1].value;
+  std::array<Eigen::Vector3d, 2> directions;
+  if (!DirectionsOf(inputs, &directions)) return false;
+  const auto& [a, b] = directions;
   if (first == PencilDirection::kZ) {
     // The normal itself; the turn about it from the axes, else X is the other direction's
     // projection.

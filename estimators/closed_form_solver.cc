@@ -7,86 +7,10 @@
 #include <limits>
 #include <utility>
 
-#include "circline/estimators/line_pose.h"
+#include "circline/estimators/closed_form_errors.h"
 
 namespace circline {
 namespace {
-
-// Of one candidate or more.
-const Candidate& Nearest(const std::vector<Candidate>& candidates, const Candidate& reference) {
-  const Candidate* best = &candidates.front();
-  double best_angle = std::numeric_limits<double>::infinity();
-  for (const Candidate& c : candidates) {
-    const double angle = RotationAngle(c.pose.rotation, reference.pose.rotation);
-    if (angle < best_angle) {
-      best_angle = angle;
-      best = &c;
-    }
-  }
-  return *best;
-}
-
-// A perturbation may tip the convention that settles the senses of the axes; that is no error.
-Eigen::Matrix3d SameSenses(const Candidate& perturbed, const Candidate& reference) {
-  Eigen::Matrix3d best = perturbed.pose.rotation;
-  for (const Eigen::Matrix3d& R : SignChoices(perturbed.pose.rotation)) {
-    if (RotationAngle(R, reference.pose.rotation) < RotationAngle(best, reference.pose.rotation))
-      best = R;
-  }
-  return best;
-}
-
-// Half the difference of two perturbed candidates, in rows [delta, delta_t, contradiction].
-Eigen::VectorXd HalfDifference(const Candidate& plus, const Candidate& minus,
-                               const Candidate& reference) {
-  Eigen::VectorXd half(6 + reference.contradiction.size());
-  half.head<3>() =
-      0.5 * LogRotation(SameSenses(plus, reference) * SameSenses(minus, reference).transpose());
-  half.segment<3>(3) = 0.5 * (plus.pose.translation - minus.pose.translation);
-  half.tail(half.size() - 6) = 0.5 * (plus.contradiction - minus.contradiction);
-  return half;
-}
-
-Eigen::MatrixXd FromColumns(const std::vector<Eigen::VectorXd>& columns, Eigen::Index rows) {
-  Eigen::MatrixXd matrix(rows, static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t k = 0; k < columns.size(); ++k)
-    matrix.col(static_cast<Eigen::Index>(k)) = columns[k];
-  return matrix;
-}
-
-// Statistical linearisation: every independent error of the inputs, one standard deviation up and
-// down, through the closed form itself; a part of that where it would lead to no pose (beyond the
-// ellipses). Returns for each candidate columns of [delta, delta_t, contradiction].
-std::vector<Eigen::MatrixXd> Sensitivities(const Evaluate& evaluate, const Inputs& inputs,
-                                           const std::vector<Candidate>& candidates) {
-  constexpr double kShrink = 0.1, kSmallestPart = 1e-4;
-  std::vector<std::vector<Eigen::VectorXd>> columns(candidates.size());
-  Inputs perturbed = inputs;
-  for (Measured* m : perturbed.All()) {
-    const Eigen::VectorXd value = m->value;
-    for (Eigen::Index k = 0; k < m->columns.cols(); ++k) {
-      if (m->columns.col(k).isZero(0.0)) continue;
-      for (double part = 1.0; part > kSmallestPart; part *= kShrink) {
-        m->value = value + part * m->columns.col(k);
-        const std::vector<Candidate> plus_all = evaluate(perturbed);
-        m->value = value - part * m->columns.col(k);
-        const std::vector<Candidate> minus_all = evaluate(perturbed);
-        if (plus_all.empty() || minus_all.empty()) continue;
-        for (std::size_t i = 0; i < candidates.size(); ++i) {
-          columns[i].push_back(HalfDifference(Nearest(plus_all, candidates[i]),
-                                              Nearest(minus_all, candidates[i]), candidates[i]) /
-                               part);
-        }
-        break;
-      }
-      m->value = value;
-    }
-  }
-  std::vector<Eigen::MatrixXd> matrices;
-  for (std::size_t i = 0; i < candidates.size(); ++i)
-    matrices.push_back(FromColumns(columns[i], 6 + candidates[i].contradiction.size()));
-  return matrices;
-}
 
 // The pose; where neither an axis nor a direction is known, the spin about the normal is free.
 PoseHypothesis HypothesisOf(const Candidate& candidate, const Inputs& inputs) {
@@ -104,11 +28,15 @@ PoseHypothesis HypothesisOf(const Candidate& candidate, const Inputs& inputs) {
 // `S`: the candidate's sensitivity.
 void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseHypothesis* h) {
   Matrix6d covariance = S.topRows<6>() * S.topRows<6>().transpose();
-  for (const std::array<double, 6>& direction : h->free_directions) {
-    const Eigen::Map<const Vector6d> free(direction.data());
+  const auto leave_out = [&covariance](const Vector6d& free) {
     const Matrix6d project = Matrix6d::Identity() - free * free.transpose();
     covariance = project * covariance * project;
-  }
+  };
+  for (const std::array<double, 6>& direction : h->free_directions)
+    leave_out(Eigen::Map<const Vector6d>(direction.data()));
+  Vector6d length = Vector6d::Zero();
+  length.tail<3>() = h->cam_from_world.translation;
+  if (!h->metric) leave_out(length);
   Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
   h->rank = CovarianceRank(covariance);
   if (candidate.contradiction.size() > 0) {
@@ -135,21 +63,19 @@ std::string Because(const std::vector<std::string>& problems) {
 void FillSupport(const Observations& evidence, PoseHypothesis* h) {
   double squares = 0.0;
   const auto add = [&](double rms, const std::vector<Eigen::Vector2d>& points,
-                       const std::vector<std::uint8_t>& mask) {
-    const int inliers = mask.empty()
-                            ? static_cast<int>(points.size())
-                            : static_cast<int>(mask.size()) -
-                                  static_cast<int>(std::count(mask.begin(), mask.end(), 0));
+                       const std::vector<std::uint8_t>& mask, bool counts) {
+    const int outliers = static_cast<int>(std::count(mask.begin(), mask.end(), 0));
+    const int inliers = counts ? static_cast<int>(points.size()) - outliers : 0;
     squares += rms * rms * inliers;
     h->num_inliers += inliers;
     h->num_observations += static_cast<int>(points.size());
   };
   for (const CircleObservation& c : evidence.circles) {
-    if (c.fit) add(c.fit->rms_px, c.points, c.inliers);
+    if (c.fit) add(c.fit->rms_px, c.points, c.inliers, true);
   }
   for (const PencilObservation& pencil : evidence.pencils) {
     for (const LineObservation& line : pencil.lines) {
-      if (line.fit) add(line.fit->rms_px, line.points, line.inliers);
+      if (line.fit) add(line.fit->rms_px, line.points, line.inliers, line.is_parallel);
     }
     if (!pencil.fit) continue;
     PencilEstimate estimate;
@@ -214,12 +140,13 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   // What could not be fitted may be what is missing.
   if (!estimate.status.ok()) estimate.status.message += Because(estimate.notes);
   Inputs inputs;
-  if (estimate.status.ok()) estimate.status = recipe_.gather(evidence, options_.sigma_px, &inputs);
+  if (estimate.status.ok()) estimate.status = Gather(evidence, &inputs);
   if (!estimate.status.ok()) return estimate;
 
   const std::vector<Candidate> candidates = recipe_.evaluate(inputs);
   const std::vector<Eigen::MatrixXd> sensitivities =
-      Sensitivities(recipe_.evaluate, inputs, candidates);
+      Sensitivities(recipe_.evaluate, inputs,
+                    Perturbations(inputs, options_.noise_model, evidence.camera), candidates);
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Candidate& candidate = candidates[i];
     PoseHypothesis h = HypothesisOf(candidate, inputs);
@@ -251,7 +178,7 @@ PoseEstimate ClosedFormSolver::Seeds(const Observations& resolved) const {
   estimate.status = recipe_.select(resolved, &evidence);
   if (estimate.status.ok() && evidence.frame.plane != resolved.frame.plane)
     estimate.status = Status::Refused("nothing ties its evidence to the world's plane");
-  if (estimate.status.ok()) estimate.status = recipe_.gather(evidence, options_.sigma_px, &inputs);
+  if (estimate.status.ok()) estimate.status = Gather(evidence, &inputs);
   if (!estimate.status.ok()) return estimate;
   for (const Candidate& candidate : recipe_.evaluate(inputs))
     estimate.hypotheses.push_back(HypothesisOf(candidate, inputs));
@@ -263,8 +190,22 @@ PoseEstimate ClosedFormSolver::Seeds(const Observations& resolved) const {
 Observations ClosedFormSolver::Resolved(const Observations& observations,
                                         std::vector<std::string>* problems) const {
   Observations fitted = observations;
-  FitDirect(options_.sigma_px, &fitted, problems);
+  FitDirect(options_.sigma_px, &fitted, problems, options_.noise_model);
   return ResolveWorld(fitted);
+}
+
+Status ClosedFormSolver::Gather(const Observations& evidence, Inputs* inputs) const {
+  Observations weakened = evidence;
+  for (PencilObservation& pencil : weakened.pencils) {
+    if (pencil.lines.size() == 1) continue;  // An axis.
+    for (LineObservation& line : pencil.lines) {
+      if (line.fit)
+        line.fit = WithDirectionError(*line.fit, options_.noise_model.line_direction_rad);
+    }
+  }
+  const Status status = recipe_.gather(weakened, options_.sigma_px, inputs);
+  if (status.ok()) AddModelErrors(options_.noise_model, inputs);
+  return status;
 }
 
 }  // namespace circline

@@ -8,8 +8,9 @@
 namespace circline {
 
 Status ClosedFormOptions::Validate() const {
-  return sigma_px > 0.0 && std::isfinite(sigma_px) ? Status::Ok()
-                                                   : Status::Invalid("sigma_px must be positive");
+  if (!(sigma_px > 0.0) || !std::isfinite(sigma_px))
+    return Status::Invalid("sigma_px must be positive");
+  return noise_model.Validate();
 }
 
 bool WorldRotation(const Observations& observations, const Eigen::Vector3d& normal,

@@ -3,6 +3,7 @@
 #ifndef CIRCLINE_ESTIMATORS_CLOSED_FORM_SOLVERS_H_
 #define CIRCLINE_ESTIMATORS_CLOSED_FORM_SOLVERS_H_
 
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/solver_registry.h"
 
 namespace circline {
@@ -10,6 +11,9 @@ namespace circline {
 struct ClosedFormOptions {
   // Standard deviation of a point where a feature states none, pixels; > 0.
   double sigma_px = 1.0;
+  // Beside the noise of points. Its part of the covariance of fits that are already there is in
+  // them (FitOptions::noise_model); a circle's height and k1 are left out.
+  NoiseModel noise_model;
   Status Validate() const;
 };
 
@@ -22,9 +26,10 @@ struct ClosedFormOptions {
 // parallel_circles             prop. 3   two or more circles of one plane
 // circle_frame                 prop. 4   a circle and the images of the X and Y axes
 //
-// Hypotheses carry a covariance by statistical linearisation: each independent error of the fits,
-// one standard deviation up and down (or as much of it as leads to a pose), through the closed form
-// itself. Senses of axes that nothing decides follow the conventions of WorldRotation.
+// Hypotheses carry a covariance by statistical linearisation: each independent error of the fits
+// and of the noise model, one standard deviation up and down (or as much of it as leads to a pose),
+// through the closed form itself. Senses of axes that nothing decides follow the conventions of
+// WorldRotation.
 void AddClosedFormSolvers(SolverRegistry* registry, const ClosedFormOptions& options = {});
 
 // Rotation of the world frame whose plane has the unit normal +-`normal`: the in-plane angle from

@@ -21,6 +21,9 @@ struct ConicFit {
   Eigen::Map<const Matrix6d> Covariance() const {
     return Eigen::Map<const Matrix6d>(covariance.data());
   }
+  void ScaleCovariance(double factor) {
+    for (double& entry : covariance) entry *= factor;
+  }
 };
 
 // Maximum-likelihood ellipse: starts from FitConicDirect and minimises the orthogonal distances to

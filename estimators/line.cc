@@ -45,6 +45,14 @@ Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& unit) {
 
 }  // namespace
 
+LineFit WithDirectionError(const LineFit& fit, double sigma_rad) {
+  LineFit result = fit;
+  result.covariance +=
+      sigma_rad * sigma_rad *
+      (Eigen::Matrix3d::Identity() - fit.line * fit.line.transpose() / fit.line.squaredNorm());
+  return result;
+}
+
 Status FitLine(const std::vector<CalibratedPoint>& points, double sigma_px, LineFit* fit,
                const std::vector<double>* weights) {
   if (points.size() < 2) return Status::Refused("a line needs two points");

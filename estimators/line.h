@@ -18,6 +18,10 @@ struct LineFit {
   double rms_px = 0.0;  // Of the points about the line, pixels of the photo; 0 for two points.
 };
 
+// The line with a further error, isotropic, of its normal: as of a line that misses the direction
+// of its pencil.
+LineFit WithDirectionError(const LineFit& fit, double sigma_rad);
+
 // Maximum-likelihood line through two or more points: least squares of the distances in pixels of
 // the photo, each with standard deviation `sigma_px`. Reweighted with the camera's local scale
 // (two passes), so that lens distortion costs no accuracy. `weights` (optional, one per point)

@@ -30,6 +30,8 @@ Status ValidateCircle(const CircleObservation& circle) {
   if (!Finite(circle.normals)) return Status::Invalid(name + ": a normal is not finite");
   if (!NonNegative(circle.sigma_px)) return Status::Invalid(name + ": sigma_px must be 0 or more");
   if (!NonNegative(circle.radius)) return Status::Invalid(name + ": radius must be 0 or more");
+  if (!NonNegative(circle.radius_sigma))
+    return Status::Invalid(name + ": radius_sigma must be 0 or more");
   if (circle.center && !circle.center->allFinite())
     return Status::Invalid(name + ": center is not finite");
   for (const Segment& s : circle.diameters) {
@@ -110,6 +112,7 @@ Status ValidateKnown(const Observations& observations) {
     if (!Finite(length.points) || !(length.value > 0.0) || !std::isfinite(length.value)) {
       return Status::Invalid("known length: points must be finite and value positive");
     }
+    if (!NonNegative(length.sigma)) return Status::Invalid("known length: sigma must be 0 or more");
     if (!length.plane.empty() && !NamesPlane(observations, length.plane)) {
       return Status::Invalid("known length: there is no plane '" + length.plane + "'");
     }
@@ -291,7 +294,7 @@ int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& p
 }
 
 void FitDirect(double default_sigma_px, Observations* observations,
-               std::vector<std::string>* problems) {
+               std::vector<std::string>* problems, const NoiseModel& noise) {
   const auto report = [problems](const std::string& what, const Status& status) {
     if (problems != nullptr && !status.ok()) problems->push_back(what + ": " + status.message);
   };
@@ -302,8 +305,12 @@ void FitDirect(double default_sigma_px, Observations* observations,
     observations->num_dropped_points +=
         CalibrateInliers(observations->camera, circle.points, circle.inliers, &points);
     ConicFit fit;
-    const Status status = FitConic(points, sigma(circle.sigma_px), &fit);
-    if (status.ok()) circle.fit = fit;
+    const double sigma_px = sigma(circle.sigma_px);
+    const Status status = FitConic(points, sigma_px, &fit);
+    if (status.ok()) {
+      fit.ScaleCovariance(1.0 / noise.ContourWeight(sigma_px, circle.points, circle.inliers));
+      circle.fit = fit;
+    }
     report("circle '" + circle.id + "'", status);
   }
   for (PencilObservation& pencil : observations->pencils) {
@@ -314,11 +321,16 @@ void FitDirect(double default_sigma_px, Observations* observations,
         observations->num_dropped_points +=
             CalibrateInliers(observations->camera, line.points, line.inliers, &points);
         LineFit fit;
-        const Status status = FitLine(points, sigma(LineSigma(pencil, line)), &fit);
-        if (status.ok()) line.fit = fit;
+        const double sigma_px = sigma(LineSigma(pencil, line));
+        const Status status = FitLine(points, sigma_px, &fit);
+        if (status.ok()) {
+          fit.covariance /= noise.LineWeight(sigma_px, line.points, line.inliers);
+          line.fit = fit;
+        }
         report("pencil '" + pencil.id + "', line " + std::to_string(i), status);
       }
-      if (line.fit) fits.push_back(*line.fit);
+      if (line.fit && line.is_parallel)
+        fits.push_back(WithDirectionError(*line.fit, noise.line_direction_rad));
     }
     if (pencil.fit) continue;
     VanishingPointFit fit;

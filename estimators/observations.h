@@ -13,6 +13,7 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/line.h"
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/status.h"
 #include "circline/estimators/vanishing_point.h"
 
@@ -30,10 +31,14 @@ struct CircleObservation {
   std::vector<Eigen::Vector2d> normals;
   double sigma_px = 0.0;  // Standard deviation of each coordinate; 0 = not known.
   std::optional<Eigen::Vector2d>
-      center;              // Image of the circle's centre (NOT the ellipse's), pixels.
-  double radius = 0.0;     // In the world's unit; 0 = not known.
+      center;                 // Image of the circle's centre (NOT the ellipse's), pixels.
+  double radius = 0.0;        // In the world's unit; 0 = not known.
+  double radius_sigma = 0.0;  // Of that radius, relative; 0 = that of the noise model.
   std::string plane;       // Circles and pencils with the same id share a plane; empty = with none.
   std::string concentric;  // Circles with the same id share their centre; empty = with none.
+  // +1: brighter inside than outside, -1: darker, 0: not known. Contours of one contrast share an
+  // offset (NoiseModel::contour_offset_px).
+  int contrast = 0;
   // Circles with the same id have equal radii, known or not; empty = with none.
   std::string radius_group;
   std::vector<Segment> diameters;  // Chords through the centre, pixels.
@@ -47,8 +52,10 @@ struct CircleObservation {
 struct LineObservation {
   std::vector<Eigen::Vector2d> points;  // Pixels; 2 or more.
 
+  // Added by a fit.
   std::optional<LineFit> fit;
   std::vector<std::uint8_t> inliers;
+  bool is_parallel = true;  // To the others of its pencil: else an outlier of the pencil's fit.
 
   double sigma_px = 0.0;  // Of each point's coordinates; 0 = that of the pencil.
 };
@@ -90,6 +97,7 @@ struct KnownLength {
   Segment points;     // Pixels.
   std::string plane;  // Empty = the frame's plane; of another plane it is not used.
   double value = 0.0;
+  double sigma = 0.0;  // Of value, relative; 0 = that of the noise model.
 };
 
 struct Observations {
@@ -143,9 +151,12 @@ int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& p
 
 // Fills every fit that is absent by the direct (non-robust) maximum-likelihood fits, taking
 // `default_sigma_px` where a feature states no sigma of its own. What cannot be fitted stays
-// without a fit; `problems` (optional) receives one sentence for each.
+// without a fit; `problems` (optional) receives one sentence for each. Covariances include the
+// errors of the noise model that the points of one feature share, and that of a line against its
+// pencil's direction.
 void FitDirect(double default_sigma_px, Observations* observations,
-               std::vector<std::string>* problems = nullptr);
+               std::vector<std::string>* problems = nullptr,
+               const NoiseModel& noise = NoiseModel::Exact());
 
 }  // namespace circline
 

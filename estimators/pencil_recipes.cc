@@ -84,7 +84,7 @@ Status GatherPencils(const Observations& evidence, bool axes_are_orthogonal, dou
   const auto line = [&](const Measured& axis, std::size_t i) -> Eigen::Vector3d {
     if (axis.present()) return axis.value;
     for (const LineObservation& l : evidence.pencils[i].lines) {
-      if (l.fit) return l.fit->line;
+      if (l.fit && l.is_parallel) return l.fit->line;
     }
     return Eigen::Vector3d::Zero();
   };

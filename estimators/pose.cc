@@ -61,11 +61,17 @@ int CovarianceRank(const Matrix6d& covariance) {
 void RankHypotheses(std::vector<PoseHypothesis>* hypotheses) {
   if (hypotheses->empty()) return;
   const auto log_posterior = [](const PoseHypothesis& h) { return -h.cost + 0.5 * h.log_det; };
+  double best = log_posterior(hypotheses->front());
+  for (const PoseHypothesis& h : *hypotheses) best = std::max(best, log_posterior(h));
+  // Less than this tells no pose from another: the order stays, lest noise turn it from photo to
+  // photo.
+  constexpr double kTie = 0.1;
   std::stable_sort(hypotheses->begin(), hypotheses->end(),
                    [&](const PoseHypothesis& a, const PoseHypothesis& b) {
-                     return log_posterior(a) > log_posterior(b);
+                     const double pa = log_posterior(a), pb = log_posterior(b);
+                     const bool ta = pa > best - kTie, tb = pb > best - kTie;
+                     return ta != tb ? ta : !ta && pa > pb;
                    });
-  const double best = log_posterior(hypotheses->front());
   double sum = 0.0;
   for (PoseHypothesis& h : *hypotheses) {
     h.probability = std::exp(log_posterior(h) - best);

@@ -52,7 +52,11 @@ struct PoseHypothesis {
   // deviation of that, and its covariance with [delta, delta_t]. Else 1 and 0.
   double focal_scale = 1.0, focal_sigma = 0.0;
   std::array<double, 6> focal_covariance{};
-  double rms_px = 0.0;  // Of the inlier residuals of all evidence, pixels of the photo.
+  // Features that contradict the rest and have no part in it: "c1", "kerbs[3]" for the fourth line
+  // of a pencil, "c1.center", "length[0]"; a pencil's id: its tie to its axis.
+  std::vector<std::string> left_out;
+  std::string structure;  // Which plane and reading of the evidence; equal where two share it.
+  double rms_px = 0.0;    // Of the inlier residuals of all evidence, pixels of the photo.
   int num_inliers = 0, num_observations = 0;  // Scalar residuals.
   bool origin_observed =
       false;  // Whether evidence fixes the world origin (else it is a convention).
@@ -77,6 +81,7 @@ struct PoseEstimate {
 };
 
 // Sorts by posterior, proportional to exp(-cost) sqrt(det covariance), and fills the probabilities.
+// Those that tie with the best (odds below 5 to 3) keep the order in which they came.
 void RankHypotheses(std::vector<PoseHypothesis>* hypotheses);
 
 // Rank of a covariance of [delta, delta_t] whatever the units of the two.

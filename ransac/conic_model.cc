@@ -91,7 +91,7 @@ ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLi
                        const EdgeDirections* directions, double threshold)
     : limits_(limits),
       index_(RandomOrder(static_cast<int>(points.size()), 1)),
-      sigma_px_(threshold / kConicSigmas) {
+      sigma_px_(threshold / kInlierSigmas) {
   const std::size_t n = points.size();
   if (n == 0) return;
   Eigen::Vector2d low = points[0].x, high = points[0].x;
@@ -320,7 +320,7 @@ double ConicModel::DirectionMiss(const Value& value, int i) const {
 }
 
 bool ConicModel::DirectionFits(const Value& value, int i) const {
-  return DirectionMiss(value, i) < kConicSigmas * kConicSigmas;
+  return DirectionMiss(value, i) < kInlierSigmas * kInlierSigmas;
 }
 
 bool ConicModel::FromConic(const Eigen::Matrix3d& conic, Value* value) const {

@@ -9,6 +9,7 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/ransac.h"
 
@@ -39,14 +40,11 @@ struct EdgeDirections {
   Status Validate(std::size_t num_points) const;
 };
 
-// Residuals within so many standard deviations are inliers: 99.8 % of a Gaussian's points.
-constexpr double kConicSigmas = 3.03;
-
 // The model for the engine. Coordinates are shifted and scaled so that the points fill [-1, 1];
 // residuals are first-order (Sampson) distances in pixels of the photo. Where directions are given,
 // the sine of the angle between a point's normal and the ellipse's is a second residual, squared
 // and added, such that sigma_rad counts as much as one standard deviation of the distance does
-// (threshold / kConicSigmas). Directions choose the points; they do not pull at the ellipse.
+// (threshold / kInlierSigmas). Directions choose the points; they do not pull at the ellipse.
 class ConicModel {
  public:
   // a x^2 + 2 b x y + c y^2 + 2 d x + 2 e y + f, unit norm, an ellipse that is negative inside.
@@ -55,7 +53,7 @@ class ConicModel {
 
   // `directions` (optional), one for each point, are read here only; `threshold` as the engine's.
   ConicModel(const std::vector<CalibratedPoint>& points, const ConicLimits& limits,
-             const EdgeDirections* directions = nullptr, double threshold = kConicSigmas);
+             const EdgeDirections* directions = nullptr, double threshold = kInlierSigmas);
 
   int NumData() const { return static_cast<int>(index_.size()); }
   // Index into the constructor's points of the datum at position i.
@@ -95,7 +93,7 @@ class ConicModel {
   }
   // Squared sine residual of datum i, in standard deviations; 0 where its direction is not known.
   double DirectionMiss(const Value& value, int i) const;
-  // Whether it is within kConicSigmas of them.
+  // Whether it is within kInlierSigmas of them.
   bool DirectionFits(const Value& value, int i) const;
 
  private:
@@ -116,7 +114,7 @@ class ConicModel {
   std::vector<std::array<double, 4>> x_from_pixel_;
   std::vector<Eigen::Vector2d> normals_;  // On the photo; empty without directions.
   double sigma_rad_ = 0.0;
-  double sigma_px_ = 1.0;  // threshold / kConicSigmas.
+  double sigma_px_ = 1.0;  // threshold / kInlierSigmas.
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
   double scale_ = 1.0;
   double box_area_ = 0.0;  // Of the points, in the model's coordinates.

@@ -56,7 +56,7 @@ SectorCounts CountSectors(const ConicModel& model, const ConicModel::Value& valu
       continue;
     }
     result->misses[i] = model.DirectionMiss(value, datum);
-    if (result->misses[i] < kConicSigmas * kConicSigmas) counts.inside[k] += 1.0;
+    if (result->misses[i] < kInlierSigmas * kInlierSigmas) counts.inside[k] += 1.0;
   }
   return counts;
 }
@@ -93,12 +93,12 @@ SectorDensities Densities(const SectorCounts& counts, double threshold, double c
 void WeighConic(const ConicModel& model, const ConicModel::Value& value, double threshold,
                 ConicWeights* result) {
   const std::size_t n = static_cast<std::size_t>(model.NumData());
-  const double s = result->sigma > 0.0 ? result->sigma : threshold / kConicSigmas;
+  const double s = result->sigma > 0.0 ? result->sigma : threshold / kInlierSigmas;
   const bool oriented = model.sigma_rad() > 0.0;
   // A stray point's direction is anything: how many of them look right, and the density of their
   // sine where it is small, over that of the curve's own points.
   const double chance =
-      oriented ? std::min(1.0, 2.0 * kConicSigmas * model.sigma_rad() / kPi) : 1.0;
+      oriented ? std::min(1.0, 2.0 * kInlierSigmas * model.sigma_rad() / kPi) : 1.0;
   const double sharpness = oriented ? std::sqrt(0.5 * kPi) / model.sigma_rad() : 1.0;
   const SectorDensities densities =
       Densities(CountSectors(model, value, threshold, result), threshold, chance, s);

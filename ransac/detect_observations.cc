@@ -26,9 +26,6 @@ constexpr std::size_t kThinFrom = 60;  // Points from which every second one is 
 constexpr double kCorrelationDense = 1.9;
 // No contour lies farther than this from the edges it was fitted to, pixels.
 constexpr double kMaxBiasPx = 1.0;
-// What the shape of a whole contour may be off by, whatever its points scatter, pixels: prints,
-// lenses and sensors bend edges by about that.
-constexpr double kShapeErrorPx = 0.1;
 // Directions looked for beyond those wanted, so that the choice is made by the length of their
 // lines and by the circles rather than by the number of lines.
 constexpr int kExtraPencils = 3;
@@ -42,8 +39,9 @@ struct Evidence {
 };
 
 // Points of an ellipse as an observation: thinned, and the fit's covariance widened by the
-// correlation of dense points.
-void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, CircleObservation* circle) {
+// correlation of dense points and by what they all share.
+void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const NoiseModel& noise,
+                CircleObservation* circle) {
   const bool thin = ellipse.contour.size() >= kThinFrom;
   // The contour of a second look is not that of the edges.
   const bool has_normals = ellipse.contour.size() == ellipse.points.size();
@@ -61,31 +59,24 @@ void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, CircleObse
   circle->sigma_px = 0.0;
   circle->fit = ellipse.fit;
   // The fit used every point: their correlation is that of dense points.
-  for (double& c : circle->fit->covariance) c *= kCorrelationDense * kCorrelationDense;
+  circle->fit->ScaleCovariance(
+      kCorrelationDense * kCorrelationDense /
+      noise.ContourWeight(kCorrelationDense * ellipse.sigma_px, ellipse.contour, {}));
   circle->inliers.clear();
 }
 
-// By how much the variances of an ellipse grow when its whole contour, not only each point, may be
-// off by kShapeErrorPx: n points of noise sigma determine each of its five parameters as well as
-// about n / 5 points do one.
-double ShapeInflation(const DetectedEllipse& ellipse) {
-  const double sigma = ellipse.sigma_px * kCorrelationDense;
-  const double n = static_cast<double>(ellipse.points.size());
-  return 1.0 + kShapeErrorPx * kShapeErrorPx * n / (5.0 * sigma * sigma);
-}
-
 std::vector<CircleEvidence> MakeCircles(const EdgeMap& edges,
-                                        const std::vector<DetectedEllipse>& ellipses) {
+                                        const std::vector<DetectedEllipse>& ellipses,
+                                        const NoiseModel& noise) {
   std::vector<CircleEvidence> circles;
   for (const DetectedEllipse& ellipse : ellipses) {
     CircleEvidence circle;
-    FillCircle(edges, ellipse, &circle.observation);
+    FillCircle(edges, ellipse, noise, &circle.observation);
     if (ellipse.concentric >= 0) {
       circle.observation.concentric = "g" + std::to_string(ellipse.concentric);
     }
     circle.support_px = ellipse.length_px;
-    circle.num_normals =
-        CircleNormals(*circle.observation.fit, ShapeInflation(ellipse), &circle.normals);
+    circle.num_normals = CircleNormals(*circle.observation.fit, &circle.normals);
     if (circle.num_normals > 0) circles.push_back(std::move(circle));
   }
   return circles;
@@ -120,7 +111,7 @@ Status CollectEvidence(const cv::Mat& image, const Camera& camera, const Detecti
   std::vector<DetectedEllipse> ellipses;
   status = DetectEllipses(edges, camera, ToEllipseOptions(options), &ellipses);
   if (!status.ok()) return status;
-  evidence->circles = MakeCircles(edges, ellipses);
+  evidence->circles = MakeCircles(edges, ellipses, options.noise_model);
   if (options.max_pencils == 0) return Status::Ok();
   LineOptions line_options;
   line_options.min_length_px = options.min_segment_length_px;
@@ -181,7 +172,7 @@ Status DetectionOptions::Validate() const {
   if (!(max_shared_plane_deg > 0.0)) {
     return Status::Invalid("max_shared_plane_deg must be positive");
   }
-  return Status::Ok();
+  return noise_model.Validate();
 }
 
 Status DetectObservations(const cv::Mat& image, const Camera& camera,
@@ -226,7 +217,7 @@ Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::R
   status = DetectEllipses(edges, shifted, ToEllipseOptions(options), &ellipses);
   if (!status.ok()) return status;
   if (ellipses.empty()) return Status::Refused("no ellipse found inside the rectangle");
-  FillCircle(edges, ellipses.front(), circle);
+  FillCircle(edges, ellipses.front(), options.noise_model, circle);
   for (Vector2d& p : circle->points) p += Vector2d(inside.x, inside.y);
   return Status::Ok();
 }

@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/status.h"
 
@@ -35,6 +36,9 @@ struct DetectionOptions {
   double max_shared_plane_deg =
       5.0;  // Two planes nearer than this may be one (a statistical test decides); > 0.
   std::uint64_t seed = 1;  // Same photo, options and seed: same bits out.
+  // What the points of one contour share: in the covariances of ellipses, and so in which planes
+  // they may lie. By how much lines miss their pencil's direction is measured.
+  NoiseModel noise_model;
 
   Status Validate() const;
 };

@@ -9,7 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include "circline/ransac/pencil_model.h"
+#include "circline/ransac/false_alarms.h"
+#include "circline/ransac/robust_pencils.h"
 #include "circline/ransac/segment_meetings.h"
 
 namespace circline {
@@ -31,8 +32,6 @@ constexpr std::size_t kMaxSearchedAround = 3;
 constexpr int kFoundAround = 2;
 // A line so nearly orthogonal to an axis (a sine) has no direction orthogonal to that axis.
 constexpr double kMinCross = 0.05;
-// Standard deviations within which a line belongs to a pencil.
-constexpr double kGate = 3.03;
 // The two sides of a thin line are so near to each other, pixels.
 constexpr double kTwinPx = 4.0;
 // What all points of a line share, pixels: no number of them averages it out. It turns short lines
@@ -77,7 +76,7 @@ class PencilFitter {
       *spread = EstimateSpread(near, direction);
       pencil->lines = Near(near, direction, *spread);
       std::vector<LineFit> members;
-      for (const int i : pencil->lines) members.push_back(WithModelError(Line(i), *spread));
+      for (const int i : pencil->lines) members.push_back(WithDirectionError(Line(i), *spread));
       VanishingPointFit fit;
       if (!FitVanishingPoint(members, &fit).ok()) return false;
       pencil->fit = fit;
@@ -93,8 +92,11 @@ class PencilFitter {
     PencilOptions exact;
     exact.ransac.seed = seed;
     exact.model_sigma_rad = kExactSigmaRad;
-    VanishingPointFit fit;
-    if (FitVanishingPointRobust(members, exact, &fit).ok()) pencil->fit = fit;
+    exact.max_pencils = 1;
+    exact.max_false_alarms = 1e300;  // However few they are.
+    std::vector<FoundPencil> densest;
+    if (FindPencils(members, exact, &densest).ok() && !densest.empty())
+      pencil->fit = densest.front().fit;
   }
 
  private:
@@ -109,7 +111,8 @@ class PencilFitter {
     std::vector<int> near;
     for (const int i : candidates) {
       const double miss = Line(i).line.dot(direction);
-      if (miss * miss <= kGate * kGate * Variance(i, direction, spread)) near.push_back(i);
+      if (miss * miss <= kInlierSigmas * kInlierSigmas * Variance(i, direction, spread))
+        near.push_back(i);
     }
     return near;
   }
@@ -146,7 +149,7 @@ class PencilFitter {
 DetectedPencil MakePencil(const FoundPencil& found, const LineSet& set, double spread) {
   std::vector<LineFit> fits;
   for (const int i : found.lines) {
-    fits.push_back(WithModelError(set.fits[static_cast<std::size_t>(i)], spread));
+    fits.push_back(WithDirectionError(set.fits[static_cast<std::size_t>(i)], spread));
   }
   DetectedPencil pencil = MakePencil(set.lines, found.lines, fits, found.fit.direction);
   pencil.observation.fit = found.fit;
@@ -210,16 +213,6 @@ std::vector<int> LinesAround(const std::vector<DetectedLine>& lines, const Detec
   return around;
 }
 
-// log of the number of directions with so many members expected among unrelated lines: the tests,
-// times the tail of the Poisson distribution (Chernoff's bound) for all members but the one that
-// proposed the direction.
-double LogFalseAlarms(std::size_t num_lines, double expected, std::size_t num_members) {
-  const double log_tests = std::log(std::max<double>(1.0, static_cast<double>(num_lines)));
-  const double k = static_cast<double>(num_members) - 1.0;
-  if (!(k > expected)) return log_tests;
-  return log_tests + k - expected - k * std::log(k / expected);
-}
-
 // Boxes, boards and rooms have right angles: each of lines[subset] proposes the direction that it
 // then has if it is orthogonal to `axis`, and that with the fewest false alarms is fitted.
 std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::vector<int>& subset,
@@ -228,7 +221,7 @@ std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::ve
   std::vector<LineFit> pool;
   for (const int i : subset) {
     if (set.IsTwin(i)) continue;
-    pool.push_back(WithModelError(set.fits[static_cast<std::size_t>(i)], kSearchSigmaRad));
+    pool.push_back(WithDirectionError(set.fits[static_cast<std::size_t>(i)], kSearchSigmaRad));
   }
   FoundPencil best;
   best.log_false_alarms = std::log(options.max_false_alarms);
@@ -240,11 +233,12 @@ std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::ve
     double expected = 0.0;
     std::size_t members = 0;
     for (const LineFit& line : pool) {
-      // A direction uniform on the sphere comes within kGate sigma with this probability.
-      expected += std::min(1.0, kGate * std::sqrt(direction.dot(line.covariance * direction)));
-      members += std::abs(VanishingPointResidual(line, direction)) <= kGate ? 1 : 0;
+      // A direction uniform on the sphere comes within kInlierSigmas sigma with this probability.
+      expected +=
+          std::min(1.0, kInlierSigmas * std::sqrt(direction.dot(line.covariance * direction)));
+      members += std::abs(VanishingPointResidual(line, direction)) <= kInlierSigmas ? 1 : 0;
     }
-    const double log_false_alarms = LogFalseAlarms(pool.size(), expected, members);
+    const double log_false_alarms = LogFalseAlarms(pool.size(), 1, expected, members);
     if (log_false_alarms >= best.log_false_alarms) continue;
     best.log_false_alarms = log_false_alarms;
     best.fit.direction = direction;

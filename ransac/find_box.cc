@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "circline/ransac/pencil_model.h"
+#include "circline/estimators/line.h"
 #include "circline/ransac/segment_meetings.h"
 
 namespace circline {
@@ -112,7 +112,7 @@ class BoxSearch {
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       if (corners[i].empty()) continue;
       edge_of[i] = static_cast<int>(edges_.size());
-      const LineFit fit = WithModelError(WithSharedError(lines_[i], kWornPx), kModelSigmaRad);
+      const LineFit fit = WithDirectionError(WithSharedError(lines_[i], kWornPx), kModelSigmaRad);
       edges_.push_back({static_cast<int>(i), fit, std::move(corners[i])});
     }
     for (Edge& edge : edges_) {

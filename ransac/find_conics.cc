@@ -2,18 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
 #include "circline/estimators/conic.h"
+#include "circline/ransac/false_alarms.h"
 #include "circline/ransac/robust_conic.h"
 
 namespace circline {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kSigmas = 3.03;  // 99.8 % of a Gaussian's points.
 
 // Points chosen from the caller's.
 struct Subset {
@@ -111,24 +110,12 @@ class Finder {
     expected = std::max(expected, 0.5 * beside);
     const int sample = directions_ != nullptr ? 3 : 5;
     if (directions_ != nullptr) {
-      expected *= std::min(1.0, 2.0 * kSigmas * directions_->sigma_rad / kPi);
+      expected *= std::min(1.0, 2.0 * kInlierSigmas * directions_->sigma_rad / kPi);
     }
-    found->log_false_alarms = LogFalseAlarms(n, expected, found->points.size(), sample);
+    found->log_false_alarms =
+        LogFalseAlarms(subset.points.size(), sample, expected, found->points.size());
     return !*is_blob && static_cast<int>(found->points.size()) >= options_.min_points &&
            found->log_false_alarms <= std::log(options_.max_false_alarms);
-  }
-
-  // log of the number of ellipses with so many inliers expected among stray points: the samples
-  // that propose one, times the tail of the Poisson distribution (Chernoff's bound) for all inliers
-  // but those of the sample.
-  static double LogFalseAlarms(double num_points, double expected, std::size_t num_inliers,
-                               int sample) {
-    const double log_tests = std::lgamma(num_points + 1.0) - std::lgamma(sample + 1.0) -
-                             std::lgamma(num_points - sample + 1.0);
-    const double k = static_cast<double>(num_inliers) - sample;
-    if (!(k > expected)) return log_tests;
-    if (!(expected > 0.0)) return -std::numeric_limits<double>::max();
-    return log_tests + k - expected - k * std::log(k / expected);
   }
 
   // Every point to the ellipse that it misses least, within the threshold.
@@ -153,7 +140,7 @@ class Finder {
     const Eigen::Vector3d gradient = conic * points_[i].Homogeneous();
     const Eigen::Vector2d across = points_[i].GradientPerPixel(gradient.head<2>());
     const double sine = across.x() * normal.y() - across.y() * normal.x();
-    const double largest = kSigmas * directions_->sigma_rad * across.norm() * normal.norm();
+    const double largest = kInlierSigmas * directions_->sigma_rad * across.norm() * normal.norm();
     return std::abs(sine) <= largest;
   }
 

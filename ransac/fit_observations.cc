@@ -2,143 +2,184 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/line.h"
-#include "circline/estimators/random.h"
-#include "circline/estimators/vanishing_point.h"
+#include "circline/estimators/point_noise.h"
+#include "circline/ransac/crowds.h"
+#include "circline/ransac/fit_directions.h"
 #include "circline/ransac/line_model.h"
-#include "circline/ransac/pencil_model.h"
 #include "circline/ransac/robust_conic.h"
 
 namespace circline {
 namespace {
 
-// 99.8 % of a Gaussian's points.
-constexpr double kInlierSigmas = 3.03;
-
-class Fitter {
+class PointFitter {
  public:
-  Fitter(const FitOptions& options, Observations* observations, std::vector<std::string>* problems)
-      : options_(options), observations_(*observations), problems_(problems) {}
+  explicit PointFitter(FitRun* run) : run_(*run) {}
 
   void FitAll() {
-    observations_.num_dropped_points = 0;
-    for (CircleObservation& circle : observations_.circles) FitCircle(&circle);
-    for (PencilObservation& pencil : observations_.pencils) FitPencil(&pencil);
+    run_.observations.num_dropped_points = 0;
+    for (CircleObservation& circle : run_.observations.circles) {
+      circles_.push_back(Prepare(circle.points, circle.sigma_px));
+      circle.fit.reset();
+      circle.inliers.clear();
+      Status status = FitCircle(circles_.back(), nullptr, &circle);
+      if (LeaveCrowdsOut(circle.points, circle.inliers, &circles_.back()))
+        status = FitCircle(circles_.back(), nullptr, &circle);
+      if (!status.ok()) run_.Report("circle '" + circle.id + "'", status.message);
+    }
+    for (PencilObservation& pencil : run_.observations.pencils) {
+      pencil.fit.reset();
+      std::vector<FittedFeature>& features = lines_.emplace_back();
+      for (std::size_t i = 0; i < pencil.lines.size(); ++i) {
+        LineObservation& line = pencil.lines[i];
+        features.push_back(Prepare(line.points, LineSigma(pencil, line)));
+        line.fit.reset();
+        line.inliers.clear();
+        line.is_parallel = true;
+        Status status = FitLine(features.back(), &line);
+        if (LeaveCrowdsOut(line.points, line.inliers, &features.back()))
+          status = FitLine(features.back(), &line);
+        if (!status.ok()) run_.Report(pencil, i, status.message);
+      }
+    }
+    for (int round = 0; round < FitRun::kMaxRounds && FollowNoise(); ++round) continue;
+    for (std::size_t i = 0; i < circles_.size(); ++i) {
+      SetCovariance(circles_[i], &run_.observations.circles[i]);
+    }
+    FitDirections(&lines_, &run_);
   }
 
  private:
-  void Report(const std::string& what, const std::string& problem) {
-    if (problems_ != nullptr) problems_->push_back(what + ": " + problem);
+  FittedFeature Prepare(const std::vector<Eigen::Vector2d>& pixels, double stated_px) {
+    FittedFeature f;
+    run_.observations.num_dropped_points +=
+        PixelsToCalibrated(run_.observations.camera, pixels, &f.points, &f.indices);
+    f.is_stated = stated_px > 0.0;
+    f.sigma_px = f.is_stated ? stated_px : run_.options.sigma_px;
+    return f;
   }
 
-  // A feature that states its noise is held to it; the next feature gets a seed of its own.
-  RobustFitOptions FeatureOptions(double feature_sigma_px) {
+  double Gate(const FittedFeature& f) const {
+    const double gate = kInlierSigmas * f.sigma_px, cap = run_.options.inlier_threshold_px;
+    return cap > 0.0 ? std::min(cap, gate) : gate;
+  }
+
+  RobustFitOptions NextOptions(const FittedFeature& f) {
     RobustFitOptions result;
-    result.sigma_px = feature_sigma_px > 0.0 ? feature_sigma_px : options_.sigma_px;
-    result.ransac.threshold = feature_sigma_px > 0.0 ? std::min(options_.inlier_threshold_px,
-                                                                kInlierSigmas * feature_sigma_px)
-                                                     : options_.inlier_threshold_px;
-    result.ransac.confidence = options_.confidence;
-    result.ransac.max_iterations = options_.max_iterations;
-    result.ransac.seed = Random(options_.seed + num_fits_++).Next();
+    result.ransac = run_.NextRansac(Gate(f));
     return result;
   }
 
-  void Calibrate(const std::vector<Eigen::Vector2d>& pixels) {
-    observations_.num_dropped_points +=
-        PixelsToCalibrated(observations_.camera, pixels, &points_, &indices_);
-  }
-
-  // The mask of points_ as one of all pixels: what the camera cannot undistort is an outlier.
-  std::vector<std::uint8_t> PixelMask(std::size_t num_pixels) const {
+  // mask_ as one of all pixels: what the camera cannot undistort is an outlier.
+  std::vector<std::uint8_t> PixelMask(const FittedFeature& f, std::size_t num_pixels) const {
     std::vector<std::uint8_t> result(num_pixels, 0);
     for (std::size_t i = 0; i < mask_.size(); ++i) {
-      result[static_cast<std::size_t>(indices_[i])] = mask_[i];
+      result[static_cast<std::size_t>(f.indices[i])] = mask_[i];
     }
     return result;
   }
 
-  void FitCircle(CircleObservation* circle) {
-    circle->fit.reset();
-    circle->inliers.clear();
-    Calibrate(circle->points);
+  // Where a fit has found many outliers, it may itself have followed some, or have found nothing:
+  // leaves out what crowds. False where there is nothing to leave out.
+  bool LeaveCrowdsOut(const std::vector<Eigen::Vector2d>& pixels,
+                      const std::vector<std::uint8_t>& inliers, FittedFeature* f) const {
+    constexpr double kMany = 0.15;  // Of all points.
+    const auto outliers = std::count(inliers.begin(), inliers.end(), 0);
+    const bool is_clean = !inliers.empty() && static_cast<double>(outliers) <=
+                                                  kMany * static_cast<double>(inliers.size());
+    if (is_clean) return false;
+    const auto pixel = [&](int i) -> const Eigen::Vector2d& {
+      return pixels[static_cast<std::size_t>(f->indices[static_cast<std::size_t>(i)])];
+    };
+    const double radius = kCrowdThresholds * Gate(*f);
+    const int n = static_cast<int>(f->points.size());
+    const std::vector<int> strung = Uncrowded(
+        n, n, [&](int i, int j) { return (pixel(i) - pixel(j)).squaredNorm() < radius * radius; });
+    if (strung.size() == f->points.size()) return false;
+    FittedFeature rest = *f;
+    rest.points.clear();
+    rest.indices.clear();
+    for (const int i : strung) {
+      rest.points.push_back(f->points[static_cast<std::size_t>(i)]);
+      rest.indices.push_back(f->indices[static_cast<std::size_t>(i)]);
+    }
+    *f = std::move(rest);
+    return true;
+  }
+
+  // From `initial`, or by a search.
+  Status FitCircle(const FittedFeature& f, const ConicFit* initial, CircleObservation* circle) {
     EdgeDirections directions;
-    directions.sigma_rad = options_.direction_sigma_rad;
-    if (!circle->normals.empty()) {
-      for (const int i : indices_) {
+    directions.sigma_rad = run_.options.direction_sigma_rad;
+    const bool has_normals = !circle->normals.empty();
+    if (has_normals) {
+      for (const int i : f.indices) {
         directions.normals.push_back(circle->normals[static_cast<std::size_t>(i)]);
       }
     }
+    const EdgeDirections* given = has_normals ? &directions : nullptr;
+    const RobustFitOptions options = NextOptions(f);
     ConicFit fit;
     const Status status =
-        FitConicRobust(points_, FeatureOptions(circle->sigma_px), &fit, &mask_, ConicLimits(),
-                       circle->normals.empty() ? nullptr : &directions);
-    if (!status.ok()) return Report("circle '" + circle->id + "'", status.message);
+        initial == nullptr ? FitConicRobust(f.points, options, &fit, &mask_, ConicLimits(), given)
+                           : RefitConicRobust(f.points, options, initial->conic, &fit, &mask_,
+                                              ConicLimits(), given);
+    if (!status.ok()) return status;
     circle->fit = fit;
-    circle->inliers = PixelMask(circle->points.size());
+    circle->inliers = PixelMask(f, circle->points.size());
+    return status;
   }
 
-  void FitPencil(PencilObservation* pencil) {
-    pencil->fit.reset();
-    std::vector<LineFit> fits;
-    std::vector<std::size_t> positions;
-    for (std::size_t i = 0; i < pencil->lines.size(); ++i) {
-      LineObservation& line = pencil->lines[i];
-      line.fit.reset();
-      line.inliers.clear();
-      Calibrate(line.points);
-      LineFit fit;
-      const Status status =
-          FitLineRobust(points_, FeatureOptions(LineSigma(*pencil, line)), &fit, &mask_);
-      if (!status.ok()) {
-        Report(LineName(*pencil, i), status.message);
-        continue;
+  Status FitLine(const FittedFeature& f, LineObservation* line) {
+    LineFit fit;
+    const Status status = FitLineRobust(f.points, NextOptions(f), &fit, &mask_);
+    if (!status.ok()) return status;
+    line->fit = fit;
+    line->inliers = PixelMask(f, line->points.size());
+    return status;
+  }
+
+  // Fits again what has another noise than its gate was made for; false if there is nothing.
+  bool FollowNoise() {
+    const PointNoise noise = MeasurePointNoise(run_.observations, run_.options.noise_model);
+    bool moved = false;
+    for (std::size_t i = 0; i < circles_.size(); ++i) {
+      CircleObservation& circle = run_.observations.circles[i];
+      if (!circles_[i].TakeNoise(noise.circles[i]) || !circle.fit) continue;
+      const ConicFit initial = *circle.fit;
+      moved |= FitCircle(circles_[i], &initial, &circle).ok();
+    }
+    for (std::size_t k = 0; k < lines_.size(); ++k) {
+      for (std::size_t i = 0; i < lines_[k].size(); ++i) {
+        LineObservation& line = run_.observations.pencils[k].lines[i];
+        if (!lines_[k][i].TakeNoise(noise.lines[k][i]) || !line.fit) continue;
+        moved |= FitLine(lines_[k][i], &line).ok();
       }
-      line.fit = fit;
-      line.inliers = PixelMask(line.points.size());
-      fits.push_back(fit);
-      positions.push_back(i);
     }
-    FitDirection(fits, positions, pencil);
+    return moved;
   }
 
-  void FitDirection(const std::vector<LineFit>& fits, const std::vector<std::size_t>& positions,
-                    PencilObservation* pencil) {
-    // A single line along an axis is evidence of its own.
-    if (pencil->direction != PencilDirection::kFree && fits.size() == 1) return;
-    PencilOptions pencil_options;
-    pencil_options.ransac = FeatureOptions(pencil->sigma_px).ransac;
-    pencil_options.ransac.threshold = kInlierSigmas;
-    VanishingPointFit fit;
-    const Status status = FitVanishingPointRobust(fits, pencil_options, &fit, &mask_);
-    if (!status.ok()) return Report("pencil '" + pencil->id + "'", status.message);
-    pencil->fit = fit;
-    for (std::size_t i = 0; i < mask_.size(); ++i) {
-      if (mask_[i] != 0) continue;
-      Report(LineName(*pencil, positions[i]), "it is not parallel to the others of its pencil");
-    }
+  void SetCovariance(const FittedFeature& f, CircleObservation* circle) const {
+    if (!circle->fit) return;
+    const double weight =
+        run_.options.noise_model.ContourWeight(f.sigma_px, circle->points, circle->inliers);
+    circle->fit->ScaleCovariance(f.sigma_px * f.sigma_px / weight);
   }
 
-  static std::string LineName(const PencilObservation& pencil, std::size_t i) {
-    return "pencil '" + pencil.id + "', line " + std::to_string(i);
-  }
-
-  const FitOptions& options_;
-  Observations& observations_;
-  std::vector<std::string>* problems_;
-  std::uint64_t num_fits_ = 0;
-  std::vector<CalibratedPoint> points_;
-  std::vector<int> indices_;
+  FitRun& run_;
+  std::vector<FittedFeature> circles_;
+  std::vector<std::vector<FittedFeature>> lines_;  // By pencil, by line.
   std::vector<std::uint8_t> mask_;
 };
 
 }  // namespace
 
 Status FitOptions::Validate() const {
-  if (!(inlier_threshold_px > 0.0) || !std::isfinite(inlier_threshold_px)) {
-    return Status::Invalid("inlier_threshold_px must be positive");
+  if (!(inlier_threshold_px >= 0.0) || !std::isfinite(inlier_threshold_px)) {
+    return Status::Invalid("inlier_threshold_px must be 0 or more");
   }
   if (!(confidence > 0.0 && confidence < 1.0)) {
     return Status::Invalid("confidence must be between 0 and 1, both excluded");
@@ -150,7 +191,7 @@ Status FitOptions::Validate() const {
   if (!(direction_sigma_rad > 0.0 && direction_sigma_rad <= 0.5)) {
     return Status::Invalid("direction_sigma_rad must be positive and 0.5 at most");
   }
-  return Status::Ok();
+  return noise_model.Validate();
 }
 
 Status FitObservations(const FitOptions& options, Observations* observations,
@@ -158,7 +199,8 @@ Status FitObservations(const FitOptions& options, Observations* observations,
   Status status = options.Validate();
   if (status.ok()) status = observations->Validate();
   if (!status.ok()) return status;
-  Fitter(options, observations, problems).FitAll();
+  FitRun run{options, *observations, problems};
+  PointFitter(&run).FitAll();
   return Status::Ok();
 }
 

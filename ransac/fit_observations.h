@@ -7,29 +7,35 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/status.h"
 
 namespace circline {
 
 struct FitOptions {
-  // A point farther than this from its curve is an outlier, pixels of the photo; > 0. Where a
-  // feature states sigma_px, the smaller of this and 3.03 sigma_px (99.8 % of a Gaussian's points)
-  // is taken.
-  double inlier_threshold_px = 2.0;
+  // A point farther than kInlierSigmas standard deviations of its noise from its curve is an
+  // outlier, and one farther than this, pixels of the photo; 0 = no cap.
+  double inlier_threshold_px = 0.0;
   double confidence = 0.999;    // That the best model was among those drawn; in (0, 1).
   int max_iterations = 200000;  // Draws for each model; 1 or more.
   std::uint64_t seed = 1;       // Same input and seed, same bits out.
-  double sigma_px = 1.0;        // Of a point where the feature states none; > 0.
+  // Of a point where the feature states none, pixels, to start with; > 0. The fit then follows the
+  // scatter of the inliers (MeasurePointNoise), up to several times more and to any less.
+  double sigma_px = 1.0;
   // Standard deviation of the angle of a contour's normals, where it has any, radians; in (0, 0.5].
   double direction_sigma_rad = 0.1;
+  // What the points of one contour or line share, and what a line may miss the direction of its
+  // pencil by: in the covariances, and in what an outlier of a pencil is.
+  NoiseModel noise_model;
 
   Status Validate() const;
 };
 
-// Fills the fits of all circles, lines and pencils. What cannot be fitted stays without a fit;
-// `problems` (optional) receives one sentence for each, naming it. The returned status is not ok
-// only for invalid options or observations.
+// Fills the fits of all circles, lines and pencils, and what of them are outliers: points, and
+// lines that are not parallel to the others of their pencil. What cannot be fitted stays without a
+// fit; `problems` (optional) receives one sentence for each, and for each such line, naming it. The
+// returned status is not ok only for invalid options or observations.
 Status FitObservations(const FitOptions& options, Observations* observations,
                        std::vector<std::string>* problems = nullptr);
 

@@ -120,8 +120,10 @@ Status FitFinal(const std::vector<CalibratedPoint>& points, const LineModel& mod
   if (!status.ok()) return status;
   mask->assign(points.size(), 0);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    (*mask)[i] = std::abs(LineDistancePx(points[i], fit->line)) <= threshold ? 1 : 0;
+    residuals[i] = LineDistancePx(points[i], fit->line);
+    (*mask)[i] = std::abs(residuals[i]) <= threshold ? 1 : 0;
   }
+  fit->rms_px = InlierRms(residuals, threshold);
   return Status::Ok();
 }
 

@@ -4,159 +4,17 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <limits>
-#include <utility>
+
+#include "circline/ransac/sampler.h"
 
 namespace circline {
 namespace {
-
-// Radians: far below any noise, far above rounding.
-constexpr double kCoincident = 1e-9;
-
-Status Coincide() { return Status::Refused("the lines of the pencil coincide"); }
 
 bool Usable(const LineFit& line) {
   return line.line.allFinite() && line.covariance.allFinite() && line.line.norm() > 0.5;
 }
 
-// Chance that an unrelated line is within the threshold of the direction: for a direction uniform
-// on the sphere, l . v is uniform on [-1, 1] (Archimedes), so it is T sigma. `line` has the model's
-// error.
-double ChanceOfInlier(const LineFit& line, const Eigen::Vector3d& direction, double threshold) {
-  const double variance = std::max(0.0, direction.dot(line.covariance * direction));
-  return std::min(1.0, threshold * std::sqrt(variance));
-}
-
-// Lines with the model's error in their covariances, and which of them are in play.
-struct Pool {
-  std::vector<LineFit> lines;
-  std::vector<int> all;  // Usable ones.
-  double threshold = 0.0;
-
-  Pool(const std::vector<LineFit>& input, const PencilOptions& options)
-      : all(UsableLines(input)), threshold(options.ransac.threshold) {
-    lines.reserve(input.size());
-    for (const LineFit& line : input) {
-      lines.push_back(WithModelError(line, options.model_sigma_rad));
-    }
-  }
-
-  const LineFit& operator[](int i) const { return lines[static_cast<std::size_t>(i)]; }
-
-  // Number of unrelated lines among `indices` that are expected within the threshold.
-  double Expected(const std::vector<int>& indices, const Eigen::Vector3d& direction) const {
-    double sum = 0.0;
-    for (const int i : indices) sum += ChanceOfInlier((*this)[i], direction, threshold);
-    return sum;
-  }
-};
-
-// The final estimate: reweighted maximum likelihood on the lines `candidates`, from the engine's
-// direction. Each line weighs as the posterior probability that it belongs: a short segment points
-// near any direction by chance, a long one does not. `members` receives the candidates within the
-// threshold of the answer.
-Status FitFinal(const Pool& pool, const std::vector<int>& candidates,
-                const Eigen::Vector3d& initial, VanishingPointFit* fit, std::vector<int>* members) {
-  const double num_all = static_cast<double>(pool.all.size());
-  std::vector<LineFit> chosen;
-  std::vector<double> weights;
-  fit->direction = initial;
-  constexpr int kPasses = 4;
-  for (int pass = 0; pass <= kPasses; ++pass) {
-    members->clear();
-    for (const int i : candidates) {
-      if (std::abs(VanishingPointResidual(pool[i], fit->direction)) <= pool.threshold) {
-        members->push_back(i);
-      }
-    }
-    if (members->size() < 2) return Status::Refused("fewer than two lines share a direction");
-    if (pass == kPasses) break;
-    const double share = static_cast<double>(members->size()) / num_all;
-    const double chance = pool.Expected(pool.all, fit->direction) / num_all;
-    const double prior = std::max(0.5 * share, share - (1.0 - share) * chance);
-    chosen.clear();
-    weights.clear();
-    for (const int i : *members) {
-      const double r = VanishingPointResidual(pool[i], fit->direction);
-      const double belongs = prior * 0.3989422804014327 * std::exp(-0.5 * r * r);
-      // Uniform over 2 T, together the chance of being within the threshold.
-      const double stray = (1.0 - prior) * ChanceOfInlier(pool[i], fit->direction, pool.threshold) /
-                           (2.0 * pool.threshold);
-      chosen.push_back(pool[i]);
-      weights.push_back(belongs / (belongs + stray));
-    }
-    const Status status = FitVanishingPoint(chosen, fit, &weights);
-    if (!status.ok()) return status;
-  }
-  return Status::Ok();
-}
-
-// log of the number of directions with so many members expected among unrelated lines: the pairs of
-// lines that propose one, times the tail of the Poisson distribution (Chernoff's bound) for all
-// members but the two that proposed it.
-double LogFalseAlarms(double num_lines, double expected, std::size_t num_members) {
-  const double log_tests = std::log(std::max(1.0, 0.5 * num_lines * (num_lines - 1.0)));
-  const double k = static_cast<double>(num_members) - 2.0;
-  if (!(k > expected)) return log_tests;
-  if (!(expected > 0.0)) return -std::numeric_limits<double>::max();
-  return log_tests + k - expected - k * std::log(k / expected);
-}
-
-// One direction among lines[indices], or a status that says why there is none.
-Status FindOne(const std::vector<LineFit>& lines, const Pool& pool, const std::vector<int>& indices,
-               const PencilOptions& options, VanishingPointFit* fit, std::vector<int>* members) {
-  const PencilModel model(lines, indices, options.model_sigma_rad);
-  Ransac<PencilModel> engine(options.ransac);
-  RansacReport<PencilModel::Value> report;
-  engine.Run(model, &report);
-  if (!report.success) return Coincide();
-  return FitFinal(pool, indices, Eigen::Vector3d(report.model.data()), fit, members);
-}
-
-// Gives every line to the direction that it misses least, within the threshold.
-void Assign(const Pool& pool, std::vector<FoundPencil>* pencils) {
-  for (FoundPencil& pencil : *pencils) pencil.lines.clear();
-  for (const int i : pool.all) {
-    double smallest = pool.threshold;
-    FoundPencil* nearest = nullptr;
-    for (FoundPencil& pencil : *pencils) {
-      const double r = std::abs(VanishingPointResidual(pool[i], pencil.fit.direction));
-      if (r <= smallest) {
-        smallest = r;
-        nearest = &pencil;
-      }
-    }
-    if (nearest != nullptr) nearest->lines.push_back(i);
-  }
-}
-
-// Fits the pencil to its members; true if it stands on them, among the lines `indices`.
-bool Refit(const Pool& pool, const std::vector<int>& indices, const PencilOptions& options,
-           FoundPencil* pencil) {
-  if (static_cast<int>(pencil->lines.size()) < options.min_lines) return false;
-  std::vector<int> members;
-  VanishingPointFit fit;
-  const Status status = FitFinal(pool, pencil->lines, pencil->fit.direction, &fit, &members);
-  if (!status.ok() || static_cast<int>(members.size()) < options.min_lines) return false;
-  pencil->fit = fit;
-  pencil->lines = members;
-  pencil->log_false_alarms = LogFalseAlarms(static_cast<double>(indices.size()),
-                                            pool.Expected(indices, fit.direction), members.size());
-  return pencil->log_false_alarms <= std::log(options.max_false_alarms);
-}
-
 }  // namespace
-
-Status PencilOptions::Validate() const {
-  if (!(model_sigma_rad >= 0.0) || !std::isfinite(model_sigma_rad)) {
-    return Status::Invalid("model_sigma_rad must not be negative");
-  }
-  if (max_pencils < 0) return Status::Invalid("max_pencils must not be negative");
-  if (min_lines < 3) return Status::Invalid("min_lines must be 3 or more");
-  if (!(max_false_alarms > 0.0)) return Status::Invalid("max_false_alarms must be positive");
-  return ransac.Validate();
-}
 
 std::vector<int> UsableLines(const std::vector<LineFit>& lines) {
   std::vector<int> indices;
@@ -164,14 +22,6 @@ std::vector<int> UsableLines(const std::vector<LineFit>& lines) {
     if (Usable(lines[i])) indices.push_back(static_cast<int>(i));
   }
   return indices;
-}
-
-LineFit WithModelError(const LineFit& line, double model_sigma_rad) {
-  LineFit result = line;
-  result.covariance +=
-      model_sigma_rad * model_sigma_rad *
-      (Eigen::Matrix3d::Identity() - line.line * line.line.transpose() / line.line.squaredNorm());
-  return result;
 }
 
 PencilModel::PencilModel(const std::vector<LineFit>& lines, const std::vector<int>& indices,
@@ -205,7 +55,7 @@ bool PencilModel::Fit(const int* sample, Value* direction) const {
   const Eigen::Vector3d cross = lines_[static_cast<std::size_t>(sample[0])].cross(
       lines_[static_cast<std::size_t>(sample[1])]);
   const double norm = cross.norm();
-  if (!(norm > kCoincident)) return false;
+  if (!(norm > kCoincidentRad)) return false;
   *direction = {cross.x() / norm, cross.y() / norm, cross.z() / norm};
   return true;
 }
@@ -271,58 +121,6 @@ bool DirectionStep::Move(Eigen::Vector3d* direction) const {
   if (!(norm < 10.0)) return false;  // Not a small step: the start was no good, or is not finite.
   *direction = moved / norm;
   return true;
-}
-
-Status FitVanishingPointRobust(const std::vector<LineFit>& lines, const PencilOptions& options,
-                               VanishingPointFit* fit, std::vector<std::uint8_t>* mask) {
-  Status status = options.Validate();
-  if (!status.ok()) return status;
-  const Pool pool(lines, options);
-  if (pool.all.size() < 2) return Status::Refused("a vanishing point needs two lines or more");
-  VanishingPointFit result;
-  std::vector<int> members = pool.all;
-  if (pool.all.size() == 2) {
-    if (!(pool[pool.all[0]].line.cross(pool[pool.all[1]].line).norm() > kCoincident)) {
-      return Coincide();
-    }
-    status = FitVanishingPoint({pool[pool.all[0]], pool[pool.all[1]]}, &result);
-  } else {
-    status = FindOne(lines, pool, pool.all, options, &result, &members);
-  }
-  if (!status.ok()) return status;
-  *fit = result;
-  if (mask != nullptr) {
-    mask->assign(lines.size(), 0);
-    for (const int i : members) (*mask)[static_cast<std::size_t>(i)] = 1;
-  }
-  return Status::Ok();
-}
-
-Status FindPencils(const std::vector<LineFit>& lines, const PencilOptions& options,
-                   std::vector<FoundPencil>* pencils) {
-  pencils->clear();
-  const Status status = options.Validate();
-  if (!status.ok()) return status;
-  const Pool pool(lines, options);
-  std::vector<int> left = pool.all;
-  while (static_cast<int>(pencils->size()) < options.max_pencils &&
-         static_cast<int>(left.size()) >= options.min_lines) {
-    FoundPencil found;
-    if (!FindOne(lines, pool, left, options, &found.fit, &found.lines).ok()) break;
-    if (!Refit(pool, left, options, &found)) break;
-    std::vector<int> rest;
-    std::set_difference(left.begin(), left.end(), found.lines.begin(), found.lines.end(),
-                        std::back_inserter(rest));
-    left = rest;
-    pencils->push_back(std::move(found));
-  }
-  Assign(pool, pencils);
-  std::vector<FoundPencil> kept;
-  for (FoundPencil& pencil : *pencils) {
-    if (Refit(pool, pool.all, options, &pencil)) kept.push_back(std::move(pencil));
-  }
-  *pencils = std::move(kept);
-  return Status::Ok();
 }
 
 }  // namespace circline

@@ -1,5 +1,4 @@
-// Robust vanishing points: the direction that most of a set of lines share, and the several
-// directions that one set of lines shares out among them.
+// The model of a vanishing point for the engine: the direction that lines share.
 //
 // A line misses a direction by l . v radians. Its residual is that in standard deviations,
 //   r = l . v / sqrt(v^T Cov(l) v + model_sigma_rad^2),
@@ -10,63 +9,17 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstdint>
 #include <vector>
 
 #include "circline/estimators/line.h"
-#include "circline/estimators/status.h"
-#include "circline/estimators/vanishing_point.h"
-#include "circline/ransac/ransac.h"
 
 namespace circline {
 
-struct PencilOptions {
-  // A line farther than `ransac.threshold` standard deviations from the direction is an outlier.
-  RansacOptions ransac;
-  // What a line that is truly parallel may miss the direction by beyond its own noise (lens,
-  // edges that bend, walls not quite parallel), radians; 0 or more. 0.4 px at a focal length of
-  // 800 px is 5e-4.
-  double model_sigma_rad = 5e-4;
-  // FindPencils: directions to look for; 0 or more.
-  int max_pencils = 3;
-  // FindPencils: fewest lines of a pencil; 3 or more (two lines always meet).
-  int min_lines = 3;
-  // FindPencils: a pencil is kept if fewer than this many as good are expected among as many
-  // unrelated lines (number of false alarms; Desolneux, Moisan, Morel, IJCV 2000); > 0.
-  double max_false_alarms = 0.01;
-
-  PencilOptions() { ransac.threshold = 3.03; }
-  Status Validate() const;
-};
-
-struct FoundPencil {
-  VanishingPointFit fit;
-  std::vector<int> lines;  // Indices of its members, ascending.
-  // Natural logarithm of the number of pencils this good expected by chance; very negative = sure.
-  double log_false_alarms = 0.0;
-};
-
-// The direction with the most support and its covariance, fitted to the inliers (which `mask`,
-// optional, receives, one per line). Refuses fewer than two usable lines, and lines that all
-// coincide. Two lines are fitted as they are. Lines with a zero or non-finite normal are outliers.
-// `fit` and `mask` are written only if the status is ok.
-Status FitVanishingPointRobust(const std::vector<LineFit>& lines, const PencilOptions& options,
-                               VanishingPointFit* fit, std::vector<std::uint8_t>* mask = nullptr);
-
-// Several pencils from one set of lines, the best supported first. One direction after the other is
-// found among the lines that are left; the search stops at max_pencils, or when the best direction
-// left has fewer than min_lines lines or more than max_false_alarms. Then every line goes to the
-// pencil that it misses least (within the threshold), each direction is fitted again, and pencils
-// that no longer meet the conditions are dropped. No line is in two pencils. An empty answer is ok.
-Status FindPencils(const std::vector<LineFit>& lines, const PencilOptions& options,
-                   std::vector<FoundPencil>* pencils);
+// Lines at a smaller angle are one line, radians: far below any noise, far above rounding.
+constexpr double kCoincidentRad = 1e-9;
 
 // Indices of the lines with a finite, unit normal.
 std::vector<int> UsableLines(const std::vector<LineFit>& lines);
-
-// The line with the model's error in its covariance, so that the fits of estimators/ weigh it as
-// the search does.
-LineFit WithModelError(const LineFit& line, double model_sigma_rad);
 
 // Gauss-Newton for a direction in the tangent plane of the sphere, the variances of the lines held
 // at the current direction.

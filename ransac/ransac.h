@@ -49,6 +49,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/random.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/ransac_loss.h"
@@ -79,7 +80,7 @@ struct RobustFitOptions {
   RansacOptions ransac;   // Its threshold in the unit that the function states.
   double sigma_px = 1.0;  // Standard deviation of a point, for the covariance; > 0.
 
-  RobustFitOptions() { ransac.threshold = 3.03; }  // 99.8 % of a Gaussian's points.
+  RobustFitOptions() { ransac.threshold = kInlierSigmas; }
   Status Validate() const;
 };
 

@@ -5,12 +5,11 @@
 #include <cmath>
 #include <cstddef>
 
+#include "circline/estimators/noise_model.h"
+
 namespace circline {
 namespace {
 
-// The noise levels of the marginalised loss are uniform on (0, T / kSigmas]: T is 99.8 % of the
-// largest one's points.
-constexpr double kSigmas = 3.03;
 constexpr int kTableSize = 256;
 
 // Exponential integral E1 (Abramowitz and Stegun 5.1.11); the series serves 0 < t <= 5.
@@ -25,13 +24,14 @@ double ExponentialIntegral(double t) {
   return sum;
 }
 
-// MAGSAC++ for residuals of one degree of freedom. With t = r^2 / (2 sigma_max^2) the weight is
+// MAGSAC++ for residuals of one degree of freedom, noise levels uniform on (0, T / kInlierSigmas].
+// With t = r^2 / (2 sigma_max^2) the weight is
 // proportional to E1(t) - E1(t_max) (equation 4 of the paper with n = 1), the loss to its integral.
 struct MarginalTables {
   std::array<float, kTableSize + 1> loss, weight;
 
   MarginalTables() {
-    const double t_max = kSigmas * kSigmas / 2.0;
+    const double t_max = kInlierSigmas * kInlierSigmas / 2.0;
     const double at_max = ExponentialIntegral(t_max);
     const double total = t_max * at_max + 1.0 - std::exp(-t_max) - t_max * at_max;
     // The weight has a (logarithmic) pole at 0: it is capped at half a step of the table.
@@ -82,7 +82,7 @@ double InlierWeights(const std::vector<double>& residuals, double threshold, int
   // keeps a trace of doubt where none was seen.
   const double background = (beside + 0.5) / (4.0 * threshold);
   const double num_inliers = std::max(1.0, inside - 2.0 * threshold * background);
-  const double s = *sigma > 0.0 ? *sigma : threshold / kSigmas;
+  const double s = *sigma > 0.0 ? *sigma : threshold / kInlierSigmas;
   const double peak = num_inliers * 0.3989422804014327 / s;
   double sum = 0.0, sum_squares = 0.0;
   weights->resize(residuals.size());
@@ -102,6 +102,40 @@ double InlierWeights(const std::vector<double>& residuals, double threshold, int
     *sigma = std::min(std::max(std::sqrt(sum_squares / dof), 1e-3 * threshold), threshold / 2.0);
   }
   return sum;
+}
+
+double InlierRms(const std::vector<double>& residuals, double threshold) {
+  double inside = 0.0, beside = 0.0, squares = 0.0;
+  for (const double r : residuals) {
+    const double size = std::abs(r);
+    inside += size <= threshold ? 1.0 : 0.0;
+    squares += size <= threshold ? r * r : 0.0;
+    beside += size > 2.0 * threshold && size <= 4.0 * threshold ? 1.0 : 0.0;
+  }
+  if (!(squares > 0.0)) return 0.0;
+  double variance = squares / inside;
+  // Per pixel. The half keeps a trace of doubt where none was seen.
+  const double clutter = (beside + 0.5) / (4.0 * threshold);
+  constexpr int kPasses = 10;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const double peak = inside * 0.3989422804014327 / std::sqrt(variance);
+    double sum = 0.0;
+    squares = 0.0;
+    for (const double r : residuals) {
+      if (!(std::abs(r) <= 2.0 * threshold)) continue;
+      const double density = peak * std::exp(-0.5 * r * r / variance);
+      const double w = density / (density + clutter);
+      sum += w;
+      squares += w * r * r;
+    }
+    if (!(squares > 0.0)) break;
+    constexpr double kConverged = 1e-3;  // Of the variance.
+    const double before = variance;
+    variance = squares / sum;
+    inside = sum;
+    if (std::abs(variance - before) < kConverged * before) break;
+  }
+  return std::sqrt(variance);
 }
 
 }  // namespace circline

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "circline/ransac/conic_weights.h"
+#include "circline/ransac/crowds.h"
 #include "circline/ransac/oriented_conic_model.h"
 
 namespace circline {
@@ -153,24 +154,12 @@ std::vector<int> ConicSearch::FarFrom(const Candidate& candidate) const {
   return indices;
 }
 
-// Points without far more neighbours, in three thresholds around, than the loneliest fifth has.
 std::vector<int> ConicSearch::Uncrowded() const {
   constexpr int kSome = 300;  // Points, in random order, that stand for all.
-  const int n = model_.NumData();
-  std::vector<int> neighbors(static_cast<std::size_t>(n), 0);
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < std::min(n, kSome); ++j) {
-      const bool near = model_.PixelsBetween(i, j) < 3.0 * options_.ransac.threshold;
-      neighbors[static_cast<std::size_t>(i)] += near ? 1 : 0;
-    }
-  }
-  std::vector<int> sorted = neighbors;
-  std::nth_element(sorted.begin(), sorted.begin() + n / 5, sorted.end());
-  const int limit = 4 * (sorted[static_cast<std::size_t>(n / 5)] + 1);
-  std::vector<int> indices;
-  for (int i = 0; i < n; ++i) {
-    if (neighbors[static_cast<std::size_t>(i)] <= limit) indices.push_back(model_.PointIndex(i));
-  }
+  std::vector<int> indices = circline::Uncrowded(model_.NumData(), kSome, [this](int i, int j) {
+    return model_.PixelsBetween(i, j) < kCrowdThresholds * options_.ransac.threshold;
+  });
+  for (int& i : indices) i = model_.PointIndex(i);
   return indices;
 }
 
@@ -222,11 +211,15 @@ Status ConicSearch::Finish(const Candidate& candidate, ConicFit* fit,
     return NoEllipse();
   }
   mask->assign(points_.size(), 0);
+  std::vector<double> distances;
+  distances.reserve(points_.size());
   for (int i = 0; i < model_.NumData(); ++i) {
+    if (!model_.DirectionFits(value, i)) continue;
     const std::size_t point = static_cast<std::size_t>(model_.PointIndex(i));
-    const bool near = std::abs(ConicDistancePx(points_[point], fit->conic)) <= threshold;
-    (*mask)[point] = near && model_.DirectionFits(value, i) ? 1 : 0;
+    distances.push_back(ConicDistancePx(points_[point], fit->conic));
+    (*mask)[point] = std::abs(distances.back()) <= threshold ? 1 : 0;
   }
+  fit->rms_px = InlierRms(distances, threshold);
   return Status::Ok();
 }
 

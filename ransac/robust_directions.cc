@@ -35,7 +35,7 @@ struct Mixture {
   Mixture(const std::vector<LineFit>& input, const PencilOptions& options)
       : indices(UsableLines(input)), threshold(options.ransac.threshold) {
     for (const int i : indices) {
-      lines.push_back(WithModelError(input[static_cast<std::size_t>(i)], ModelSigma(options)));
+      lines.push_back(WithDirectionError(input[static_cast<std::size_t>(i)], ModelSigma(options)));
     }
     weights.resize(lines.size());
     shares.fill(0.5 / K);

@@ -10,7 +10,7 @@
 #include "circline/estimators/line.h"
 #include "circline/estimators/status.h"
 #include "circline/estimators/vanishing_point.h"
-#include "circline/ransac/pencil_model.h"
+#include "circline/ransac/robust_pencils.h"
 
 namespace circline {
 

@@ -134,8 +134,7 @@ UncertainDirection MeanDirection(const UncertainDirection& about,
   return mean;
 }
 
-int CircleNormals(const ConicFit& fit, double inflation,
-                  std::array<UncertainDirection, 2>* normals) {
+int CircleNormals(const ConicFit& fit, std::array<UncertainDirection, 2>* normals) {
   std::array<CirclePose, 2> poses;
   const int count = CirclePoses(fit.conic, &poses);
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(fit.Covariance());
@@ -159,7 +158,7 @@ int CircleNormals(const ConicFit& fit, double inflation,
           change = d / kStep;
         }
       }
-      normal.covariance += inflation * change * change.transpose();
+      normal.covariance += change * change.transpose();
     }
   }
   return count;

@@ -43,9 +43,8 @@ UncertainDirection MeanDirection(const UncertainDirection& about,
                                  const std::vector<const UncertainDirection*>& directions);
 
 // The normals of the planes that a circle can lie in, with covariances: those of the conic's own
-// covariance times `inflation`, by differences. Returns how many: 0, 1 or 2.
-int CircleNormals(const ConicFit& fit, double inflation,
-                  std::array<UncertainDirection, 2>* normals);
+// covariance, by differences. Returns how many: 0, 1 or 2.
+int CircleNormals(const ConicFit& fit, std::array<UncertainDirection, 2>* normals);
 
 }  // namespace circline
 

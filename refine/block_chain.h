@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "circline/estimators/pose.h"
+#include "circline/refine/image_points.h"
 
 namespace circline {
 
@@ -33,6 +34,17 @@ void WriteJacobian(const Eigen::MatrixBase<Derived>& J, int num_residuals, int b
       jacobians[block], num_residuals, J.cols());
   out.topRows(J.rows()) = J;
   out.bottomRows(num_residuals - J.rows()).setZero();
+}
+
+// The camera's block where the derivatives of its last shifts are zero.
+template <typename Derived>
+void WriteCameraJacobian(const Eigen::MatrixBase<Derived>& J, int num_residuals, int block,
+                         double** jacobians) {
+  if (jacobians[block] == nullptr) return;
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, kCameraSize, Eigen::RowMajor>> out(
+      jacobians[block], num_residuals, kCameraSize);
+  out.setZero();
+  out.topLeftCorner(J.rows(), J.cols()) = J;
 }
 
 // Without derivatives the whole cost is one residual.

@@ -55,10 +55,8 @@ struct ContourResiduals {
 };
 
 ContourResiduals EvaluateContour(const ImagePoints& points, const CircleInCamera& circle,
-                                 const CurveModel& model) {
-  // One direction, the scale of the conic, is without information.
-  const int rank = static_cast<int>(model.g.size()) - 1;
-  ContourResiduals out{ContourRoot(model.h, model.g, model.twice_cost, rank), {}};
+                                 const CurveModel& model, int rank) {
+  ContourResiduals out{ContourRoot(model.h, model.g, model.twice_cost, rank, 6, 5), {}};
   out.by_circle = out.root.U.leftCols(6) * ImageJacobian(circle, points);
   return out;
 }
@@ -72,10 +70,14 @@ void WriteContour(const ContourRoot& root, const ImagePoints::Variables& variabl
   int column = 6;
   if (variables.offset) WriteJacobian(root.U.col(column++), num_residuals, block++, jacobians);
   if (variables.camera)
-    WriteJacobian(root.U.middleCols(column, kCameraSize), num_residuals, block, jacobians);
+    WriteCameraJacobian(root.U.rightCols(root.U.cols() - column), num_residuals, block, jacobians);
 }
 
-int NumResiduals(const ImagePoints::Variables& variables) { return variables.size(6); }
+// The offset and a variable lens can do what no conic can; the camera's other shifts cannot, but
+// for what the lens bends.
+int RankOf(const ImagePoints& points, bool offset, bool camera) {
+  return 5 + (offset ? 1 : 0) + (camera ? points.options().num_distortion : 0);
+}
 
 }  // namespace
 
@@ -84,7 +86,17 @@ CircleContourCost::CircleContourCost(ImagePoints points, Blocks blocks)
   for (const int size : {4, 3, 3, 3, 1}) mutable_parameter_block_sizes()->push_back(size);
   if (blocks.offset) mutable_parameter_block_sizes()->push_back(1);
   if (blocks.camera) mutable_parameter_block_sizes()->push_back(kCameraSize);
-  set_num_residuals(NumResiduals({blocks.offset, blocks.camera}));
+  set_num_residuals(RankOf(points_, blocks.offset, blocks.camera) + 1);
+}
+
+void CircleContourCost::Distances(const double* const* parameters,
+                                  std::vector<double>* distances) const {
+  const Eigen::Matrix3d R = RotationFromBlock(parameters[0]);
+  const CircleInCamera circle{R * Eigen::Vector3d(parameters[2]) + Eigen::Vector3d(parameters[1]),
+                              R * Eigen::Vector3d(parameters[3]), parameters[4][0]};
+  points_.ConicDistances(ImageOfCircle(circle), blocks_.offset ? parameters[5][0] : 0.0,
+                         blocks_.camera ? parameters[5 + (blocks_.offset ? 1 : 0)] : nullptr,
+                         distances);
 }
 
 bool CircleContourCost::EvaluateWith(const Weighing& weighing, const double* const* parameters,
@@ -104,7 +116,8 @@ bool CircleContourCost::EvaluateWith(const Weighing& weighing, const double* con
     CostOnly(twice_cost, num_residuals(), residuals);
     return true;
   }
-  const ContourResiduals out = EvaluateContour(points_, circle, model);
+  const ContourResiduals out =
+      EvaluateContour(points_, circle, model, RankOf(points_, variables.offset, variables.camera));
   const auto by_p = out.by_circle.leftCols<3>(), by_m = out.by_circle.middleCols<3>(3);
   WriteContour(out.root, variables, num_residuals(), num_residuals(), 5, residuals, jacobians);
   WriteJacobian((by_p * (-R * CrossMatrix(center)) + by_m * (-R * CrossMatrix(normal))) *
@@ -145,22 +158,19 @@ PlaneCircleContourCost::PlaneCircleContourCost(ImagePoints points, Blocks blocks
   if (blocks.tilt_and_height) mutable_parameter_block_sizes()->push_back(3);
   if (blocks.offset) mutable_parameter_block_sizes()->push_back(1);
   if (blocks.camera) mutable_parameter_block_sizes()->push_back(kCameraSize);
-  set_num_residuals(NumResiduals({blocks.offset, blocks.camera}) +
+  set_num_residuals(RankOf(points_, blocks.offset, blocks.camera) + 1 +
                     (blocks.tilt_and_height ? kPriorRows : 0));
 }
 
-Eigen::Matrix3d PlaneCircleContourCost::ImageOf(const double* const* parameters) const {
+void PlaneCircleContourCost::Distances(const double* const* parameters,
+                                       std::vector<double>* distances) const {
   const PlaneCircle circle(parameters, blocks_.tilt_and_height);
-  return ImageOfCircle(circle.InCamera(RotationFromBlock(parameters[0]), parameters[1]));
-}
-
-double PlaneCircleContourCost::OffsetPx(const double* const* parameters) const {
-  return blocks_.offset ? parameters[blocks_.tilt_and_height ? 5 : 4][0] : 0.0;
-}
-
-const double* PlaneCircleContourCost::CameraShifts(const double* const* parameters) const {
-  if (!blocks_.camera) return nullptr;
-  return parameters[4 + (blocks_.tilt_and_height ? 1 : 0) + (blocks_.offset ? 1 : 0)];
+  const int offset = 4 + (blocks_.tilt_and_height ? 1 : 0),
+            camera = offset + (blocks_.offset ? 1 : 0);
+  points_.ConicDistances(
+      ImageOfCircle(circle.InCamera(RotationFromBlock(parameters[0]), parameters[1])),
+      blocks_.offset ? parameters[offset][0] : 0.0, blocks_.camera ? parameters[camera] : nullptr,
+      distances);
 }
 
 bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double* const* parameters,
@@ -175,8 +185,9 @@ bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double
       blocks_.offset, blocks_.camera && jacobians != nullptr && jacobians[camera_block] != nullptr};
   CurveModel model;
   const double twice_cost =
-      points_.SumConic(ImageOfCircle(circle), OffsetPx(parameters), CameraShifts(parameters),
-                       weighing, variables, jacobians != nullptr ? &model : nullptr);
+      points_.SumConic(ImageOfCircle(circle), blocks_.offset ? parameters[first][0] : 0.0,
+                       blocks_.camera ? parameters[camera_block] : nullptr, weighing, variables,
+                       jacobians != nullptr ? &model : nullptr);
   if (!(circle.p.z() > 0.0) || !(circle.r > 0.0) || !std::isfinite(twice_cost)) return false;
 
   const double tilt_sigma = std::max(blocks_.tilt_sigma, kHeld),
@@ -189,7 +200,8 @@ bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double
     CostOnly(twice_cost, curve_rows, residuals);
     return true;
   }
-  const ContourResiduals out = EvaluateContour(points_, circle, model);
+  const ContourResiduals out =
+      EvaluateContour(points_, circle, model, RankOf(points_, variables.offset, variables.camera));
   const auto by_p = out.by_circle.leftCols<3>(), by_m = out.by_circle.middleCols<3>(3);
   const int rows = num_residuals();
   WriteContour(out.root, variables, curve_rows, rows, first, residuals, jacobians);

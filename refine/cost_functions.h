@@ -1,10 +1,11 @@
 // Circles and lines for anybody's ceres::Problem: each cost function is one feature of one photo,
-// all its points at once. docs/examples/ceres_graph.cc is a pose graph made of these.
+// all its points at once. docs/examples/ceres_graph.cc is a pose graph made of these; EstimatePose
+// is built of nothing else.
 //
 // Parameter blocks
 //   rotation     4  unit quaternion (x, y, z, w) of cam_from_world; ceres::EigenQuaternionManifold
-//   translation  3  of cam_from_world, in the world's unit: X_cam = rotation * X_world +
-//   translation direction    3  unit vector, world frame, without sense; ceres::SphereManifold<3>
+//   translation  3  of cam_from_world, in the world's unit: X_cam = R X_world + t
+//   direction    3  unit vector, world frame, without sense; ceres::SphereManifold<3>
 //   camera      12  shifts against the camera that the points were made with: log f, log (fy / fx),
 //                   principal point (2, pixels), distortion coefficients (8); zeros are that camera
 //   others          as said at each class; no manifold unless one is named
@@ -16,10 +17,10 @@
 // robust cost of all points, sum rho((distance / sigma)^2), and whose Jacobian has its gradient and
 // its Gauss-Newton Hessian: the square root of that, and a rest without derivative. So the robust
 // loss acts on each point, inside (ImagePoints::Options::loss): add these blocks with a null
-// LossFunction. The
-// reported Jacobian is not the derivative of the reported residuals: ceres::GradientChecker does
-// not apply; tests/refine/cost_functions_test.cc compares costs and gradients. Where nothing can be
-// evaluated (a point behind the camera), Evaluate returns false and ceres shortens the step.
+// LossFunction. The reported Jacobian is not the derivative of the reported residuals:
+// ceres::GradientChecker does not apply; tests/refine/cost_functions_test.cc compares costs and
+// gradients. Where nothing can be evaluated (a point behind the camera), Evaluate returns false and
+// ceres shortens the step.
 //
 // Thread-safe: Evaluate is const and keeps nothing. The problem takes ownership, as ceres does.
 // Needs Ceres 2.1 or later.
@@ -29,8 +30,6 @@
 #include <ceres/cost_function.h>
 
 #include <Eigen/Core>
-#include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "circline/estimators/conic.h"
@@ -38,8 +37,8 @@
 
 namespace circline {
 
-// A feature whose residuals may be weighed anew: by their losses as ceres calls it, or as inliers
-// alone, for covariances.
+// A feature of a photo. Its residuals may be weighed anew: by their losses as ceres calls it, or as
+// inliers alone, for covariances.
 class FeatureCost : public ceres::CostFunction {
  public:
   bool Evaluate(const double* const* parameters, double* residuals,
@@ -50,6 +49,14 @@ class FeatureCost : public ceres::CostFunction {
   void set_weighing(const Weighing& weighing) { weighing_ = weighing; }
   virtual bool EvaluateWith(const Weighing& weighing, const double* const* parameters,
                             double* residuals, double** jacobians) const = 0;
+
+  // Points of a contour or a line, and their signed distances from its image, pixels; null and
+  // nothing for a single point.
+  virtual const ImagePoints* points() const { return nullptr; }
+  virtual void Distances(const double* const* /*parameters*/,
+                         std::vector<double>* distances) const {
+    distances->clear();
+  }
 
  private:
   Weighing weighing_;
@@ -66,6 +73,8 @@ class CircleContourCost : public FeatureCost {
   CircleContourCost(ImagePoints points, Blocks blocks);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
+  const ImagePoints* points() const override { return &points_; }
+  void Distances(const double* const* parameters, std::vector<double>* distances) const override;
 
  private:
   ImagePoints points_;
@@ -85,59 +94,41 @@ class PlaneCircleContourCost : public FeatureCost {
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
 
-  const ImagePoints& points() const { return points_; }
-  Eigen::Matrix3d ImageOf(const double* const* parameters) const;  // Calibrated coordinates.
-  double OffsetPx(const double* const* parameters) const;
-  const double* CameraShifts(const double* const* parameters) const;
+  const ImagePoints* points() const override { return &points_; }
+  void Distances(const double* const* parameters, std::vector<double>* distances) const override;
 
  private:
   ImagePoints points_;
   Blocks blocks_;
 };
 
-// Lines of one direction: rotation, direction, [camera]. Where each line lies beside its direction
-// is nobody else's business: it is found inside, from the line's own points (one or two steps of
-// Newton's method), and costs no unknown.
-class ParallelLinesCost : public FeatureCost {
+// Line of a direction: rotation, direction, line (1 or 2), [camera]. `line`: where it lies across
+// the direction, an angle about it, radians, from where it is nearest to `fit`; and, unless
+// direction_sigma is 0, by how much its own direction deviates from the common one, radians, which
+// has a prior here of that standard deviation, with long tails: most lines are more exact.
+class DirectionLineCost : public FeatureCost {
  public:
-  struct Line {
-    ImagePoints points;
-    Eigen::Vector3d fit;  // Line through them, calibrated coordinates (FitLine), to start from.
-  };
   struct Options {
-    // Standard deviation of a line's own direction about the common one, radians; 0 = exact.
-    double direction_sigma = 0.0;
+    double direction_sigma = 0.0;  // Of a line's own direction, radians; 0 = exact.
     bool camera = false;
   };
-  ParallelLinesCost(std::vector<Line> lines, Options options);
+  // `fit`: any line near, calibrated coordinates of the camera of the points (FitLine).
+  DirectionLineCost(ImagePoints points, const Eigen::Vector3d& fit, Options options);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
+  const ImagePoints* points() const override { return &points_; }
+  void Distances(const double* const* parameters, std::vector<double>* distances) const override;
 
-  // Leaves a line out, or takes it in again.
-  void SetActive(std::size_t line, bool active) { active_[line] = active ? 1 : 0; }
-
-  // One line under a direction of the camera frame: where it then lies, its robust cost with the
-  // prior of its deviation, and what it says: the cost left by its own unknowns is, to second
-  // order, g + h v . d delta about d, v the unit vector across d.
-  struct Placed {
-    Eigen::Vector3d line, across;
-    double twice_cost = 0.0, g = 0.0, h = 0.0;
-    // The same for the camera's shifts, beside the direction: (across, camera).
-    CurveModel::Vector gradient;
-    CurveModel::Matrix hessian;
-  };
-  bool Place(std::size_t line, const Eigen::Vector3d& direction, const double* camera,
-             const Weighing& weighing, bool camera_variable, Placed* placed,
-             bool with_model = true) const;
-  const std::vector<Line>& lines() const { return lines_; }
+  // The block `line` that its points ask for, where all else is as in `parameters`: to start from.
+  // False where the points run straight across the direction.
+  bool Start(const double* const* parameters, double* line) const;
 
  private:
-  bool Eliminate(const CurveModel& model, const Eigen::Matrix3d& J, double e, int n,
-                 Placed* placed) const;
+  struct Placed;
+  bool Place(const double* const* parameters, Placed* placed) const;
 
-  std::vector<Line> lines_;
-  std::vector<Eigen::Matrix3d> information_;  // By line, about its own fit.
-  std::vector<std::uint8_t> active_;
+  ImagePoints points_;
+  Eigen::Vector3d fit_;  // Unit.
   Options options_;
 };
 
@@ -150,8 +141,8 @@ class PlaneLineCost : public FeatureCost {
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
 
-  const ImagePoints& points() const { return points_; }
-  static Eigen::Vector3d ImageOf(const double* const* parameters);
+  const ImagePoints* points() const override { return &points_; }
+  void Distances(const double* const* parameters, std::vector<double>* distances) const override;
 
  private:
   ImagePoints points_;

@@ -1,28 +1,53 @@
 #include "circline/refine/estimate_pose.h"
 
-#include <Eigen/LU>
+#include <Eigen/Dense>
 #include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "circline/estimators/closed_form_solvers.h"
-#include "circline/refine/seeded_refinement.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 
 const char* ConicDistanceName(ConicDistanceType type) {
-  return type == ConicDistanceType::kSampson ? "sampson" : "orthogonal";
+  switch (type) {
+    case ConicDistanceType::kAuto:
+      return "auto";
+    case ConicDistanceType::kSampson:
+      return "sampson";
+    case ConicDistanceType::kOrthogonal:
+      return "orthogonal";
+  }
+  return "auto";
 }
 
 bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type) {
-  for (const auto known : {ConicDistanceType::kSampson, ConicDistanceType::kOrthogonal}) {
+  for (const auto known :
+       {ConicDistanceType::kAuto, ConicDistanceType::kSampson, ConicDistanceType::kOrthogonal}) {
     if (name != ConicDistanceName(known)) continue;
     *type = known;
     return true;
   }
   return false;
 }
+
+namespace {
+
+bool IsPose(const CameraPose& pose) {
+  constexpr double kTolerance = 1e-6;
+  return (pose.rotation * pose.rotation.transpose()).isIdentity(kTolerance) &&
+         pose.rotation.determinant() > 0.0 && pose.translation.allFinite() &&
+         pose.translation.norm() > 0.0;
+}
+
+bool IsUnit(const Eigen::Vector3d& v) {
+  constexpr double kTolerance = 1e-6;
+  return std::abs(v.norm() - 1.0) < kTolerance;
+}
+
+}  // namespace
 
 Status EstimationOptions::Validate() const {
   for (const auto& [loss, name] :
@@ -31,21 +56,24 @@ Status EstimationOptions::Validate() const {
       return Status::Invalid(std::string(name) + ".scale_px must be positive, or 0 for auto");
     }
   }
-  if (!(contour_bias_px >= 0.0) || !std::isfinite(contour_bias_px))
-    return Status::Invalid("contour_bias_px must be 0 or more");
-  if (!(line_bias_px >= 0.0) || !std::isfinite(line_bias_px))
-    return Status::Invalid("line_bias_px must be 0 or more");
-  if (!(focal_sigma >= 0.0) || !(focal_sigma <= 0.5))
-    return Status::Invalid("focal_sigma must be between 0 and 0.5");
+  Status status = noise_model.Validate();
+  if (status.ok() && camera_sigma) status = camera_sigma->Validate();
+  if (!status.ok()) return status;
   if (max_iterations < 1) return Status::Invalid("max_iterations must be 1 or more");
   if (!(max_cost_gap > 0.0)) return Status::Invalid("max_cost_gap must be positive");
-  if (prior) {
-    const Eigen::Matrix3d product = prior->rotation * prior->rotation.transpose();
-    constexpr double kTolerance = 1e-6;
-    if (!product.isIdentity(kTolerance) || !(prior->rotation.determinant() > 0.0) ||
-        !prior->translation.allFinite() || !(prior->translation.norm() > 0.0)) {
-      return Status::Invalid("prior must be a rotation and a translation that is not zero");
+  if (prior && !IsPose(*prior))
+    return Status::Invalid("prior must be a rotation and a translation that is not zero");
+  if (pose_prior) {
+    const Eigen::LLT<Matrix6d> llt(Eigen::Map<const Matrix6d>(pose_prior->covariance.data()));
+    if (!IsPose(pose_prior->mean) || llt.info() != Eigen::Success) {
+      return Status::Invalid(
+          "pose_prior must be a rotation, a translation that is not zero and a positive definite "
+          "covariance");
     }
+  }
+  if (gravity_prior && (!IsUnit(gravity_prior->in_world) || !IsUnit(gravity_prior->in_camera) ||
+                        !(gravity_prior->sigma_rad > 0.0))) {
+    return Status::Invalid("gravity_prior must be two unit vectors and a positive sigma_rad");
   }
   return Status::Ok();
 }

@@ -2,9 +2,11 @@
 #ifndef CIRCLINE_REFINE_ESTIMATE_POSE_H_
 #define CIRCLINE_REFINE_ESTIMATE_POSE_H_
 
+#include <array>
 #include <optional>
 #include <string>
 
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/robust_loss.h"
@@ -14,51 +16,63 @@
 
 namespace circline {
 
-// How one kind of residual is weighed.
+// How one kind of residual is weighed. Points that a robust fit has marked as outliers take no
+// part.
 struct LossOptions {
-  // Tukey's and Geman and McClure's losses judge all points of a feature, whatever a robust fit has
-  // marked, and leave out crowds of outliers in one place: take one of them where half of the
-  // points may be wrong. The others see the points marked as inliers.
   LossType type = LossType::kCauchy;
   // Standard deviation of a point, pixels of the photo, for features that state no sigma_px of
-  // their own. The loss multiplies it by its own tuning constant. 0 = "auto": estimated from the
-  // residuals of the direct fits (1.4826 x median absolute residual).
+  // their own. The loss multiplies it by its own tuning constant. 0 = "auto": each feature's from
+  // the scatter of its points (MeasurePointNoise).
   double scale_px = 0.0;
 };
 
-// "sampson", "orthogonal". (Measured: equally accurate where the noise is below a twentieth of the
-// ellipse's shorter semi-axis, as on all photographs; at a tenth the exact one's bias of the tilt
-// is a quarter.)
-const char* ConicDistanceName(ConicDistanceType type);
+const char* ConicDistanceName(ConicDistanceType type);  // "auto", "sampson", "orthogonal".
 bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type);
+
+// A pose that is known from elsewhere (odometry, the filter's prediction), in the same world frame:
+// evidence like any other, in the estimate, in its covariance and in the ranking.
+struct PosePrior {
+  CameraPose mean;
+  // Of [delta, delta_t], 6x6 row-major, as PoseHypothesis::covariance; positive definite. Where the
+  // scale or the origin of the world are not observed, t has no part in it.
+  std::array<double, 36> covariance{};
+};
+
+// A direction of the world that is known in the camera: gravity from an accelerometer.
+struct GravityPrior {
+  Eigen::Vector3d in_world = Eigen::Vector3d::UnitZ();   // Unit.
+  Eigen::Vector3d in_camera = Eigen::Vector3d::UnitY();  // Unit.
+  double sigma_rad = 0.01;                               // Of each of two components; > 0.
+};
 
 struct EstimationOptions {
   LossOptions conic_loss;  // Contour points of circles.
   LossOptions line_loss;   // Points of lines.
-  ConicDistanceType conic_distance = ConicDistanceType::kSampson;
-  // Under "auto": the smooth error that all points of one contour or line share, pixels, so that
-  // more points do not make it ever more certain. 0.04 px covers the photographs of circles that
-  // this was measured on; a board that is not flat, or a rim with thickness, wants more. >= 0.
-  double contour_bias_px = 0.04;
-  double line_bias_px = 0.1;
-  // Standard deviation of the camera's focal lengths, relative (0.03: 3 %), where they are not
-  // known well: above 0 one scale on fx and fy is refined too, with the camera's own ones as prior.
-  // 0 = fixed.
-  double focal_sigma = 0.0;
-  int max_iterations = 50;  // Of each refinement; 1 or more.
-  // Seeds whose refined cost exceeds the best by more than this are dropped from the answer, in
-  // units of cost (1/2 chi^2); their probability is below exp(-max_cost_gap).
-  double max_cost_gap = 30.0;
-  // A pose near the one to find, in the same world frame: that of the frame before. Where it leads
-  // to a pose under which four fifths of the points are inliers, that one is the answer, alone; the
-  // closed forms are asked only where it does not. The unit of its translation does not matter.
+  ConicDistanceType conic_distance = ConicDistanceType::kAuto;
+  // What is not exact beside the points; NoiseModel::Exact() for simulated evidence.
+  NoiseModel noise_model;
+  // How well the camera is known; none = noise_model.camera. Where log_focal is 0.01 or more the
+  // camera is estimated too (focal length and whatever else has a sigma), from several starts where
+  // it is 0.1 or more; below, it stays as given and its uncertainty is counted in the pose's.
+  std::optional<CameraSigma> camera_sigma;
+  std::optional<PosePrior> pose_prior;
+  std::optional<GravityPrior> gravity_prior;
+  // A pose near the one to find, in the same world frame: that of the frame before. A start and no
+  // evidence: where four fifths of the points are inliers under it, circles propose their planes
+  // besides, and the other closed forms are not asked. The unit of its translation does not matter.
   std::optional<CameraPose> prior;
+  int max_iterations = 50;  // Of each refinement; 1 or more.
+  // Hypotheses whose cost exceeds the best by more than this are dropped from the answer, in units
+  // of cost (1/2 chi^2); their probability is below exp(-max_cost_gap).
+  double max_cost_gap = 30.0;
 
   Status Validate() const;
 };
 
-// Refines every hypothesis of the closed forms on all evidence. `registry` null means the built-in
-// solvers; else its closed forms give the seeds. Never throws, never returns NaN.
+// Refines every hypothesis of the closed forms on all evidence, in one ceres::Problem. Features
+// that contradict the rest as a whole are left out and named (PoseHypothesis::left_out, `notes`);
+// the readings that keep them stay among the hypotheses. `registry` null means the built-in
+// solvers; else its closed forms give the seeds. Never throws, never returns NaN. Thread-safe.
 PoseEstimate EstimatePose(const Observations& observations, const EstimationOptions& options = {},
                           const SolverRegistry* registry = nullptr);
 

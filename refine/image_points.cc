@@ -113,6 +113,22 @@ double SumPoints(std::size_t n, const ImagePoints::Options& options, const Weigh
   return weight * total;
 }
 
+// The same with the camera's shifts behind the curve's kCurve variables: mostly none or one of the
+// distortion coefficients has derivatives.
+template <int kCurve, typename Distance>
+double SumWithCamera(std::size_t n, const ImagePoints::Options& options, const Weighing& weighing,
+                     const Distance& distance, CurveModel* model) {
+  if (options.num_distortion == 0)
+    return SumPoints<kCurve + 4>(n, options, weighing, distance, model);
+  if (options.num_distortion == 1)
+    return SumPoints<kCurve + 5>(n, options, weighing, distance, model);
+  const double cost = SumPoints<kCurve + kCameraSize>(n, options, weighing, distance, model);
+  const int size = kCurve + 4 + options.num_distortion;
+  model->g.conservativeResize(size);
+  model->h.conservativeResize(size, size);
+  return cost;
+}
+
 }  // namespace
 
 Camera ShiftedCamera(const Camera& camera, const double* shifts) {
@@ -186,20 +202,25 @@ bool IsShifted(const double* shifts) {
 
 }  // namespace
 
-// Newton's method from the undistorted point of the camera as given: two steps leave a rounding
-// error even where the focal length is a third off.
+// Newton's method, from where a camera without a lens would move the undistorted point.
 CalibratedPoint ImagePoints::At(std::size_t i, const Camera* shifted) const {
   CalibratedPoint p = points_[i];
   if (shifted == nullptr) return p;
+  const Eigen::Vector2d focal(shifted->fx, shifted->fy), middle(shifted->cx, shifted->cy),
+      straight = (pixels_[i] - middle).cwiseQuotient(focal);
   if (shifted->model == CameraModel::kPinhole) {
-    p.x = (pixels_[i] - Eigen::Vector2d(shifted->cx, shifted->cy))
-              .cwiseQuotient(Eigen::Vector2d(shifted->fx, shifted->fy));
-    p.x_from_pixel = {1.0 / shifted->fx, 0.0, 0.0, 1.0 / shifted->fy};
+    p.x = straight;
+    p.x_from_pixel = {1.0 / focal.x(), 0.0, 0.0, 1.0 / focal.y()};
     return p;
   }
-  p.x *= std::sqrt(camera_.fx * camera_.fy / (shifted->fx * shifted->fy));
+  const auto move = [&p](const Eigen::Vector2d& pixels) {
+    p.x += Eigen::Vector2d(p.x_from_pixel[0] * pixels.x() + p.x_from_pixel[1] * pixels.y(),
+                           p.x_from_pixel[2] * pixels.x() + p.x_from_pixel[3] * pixels.y());
+  };
+  const Eigen::Vector2d given(camera_.fx, camera_.fy);
+  move(given.cwiseProduct(straight) + Eigen::Vector2d(camera_.cx, camera_.cy) - pixels_[i]);
   constexpr int kMaxSteps = 20;
-  constexpr double kConverged = 1e-9;  // Pixels.
+  constexpr double kConverged = 1e-5;  // Pixels, before the last step, which squares the error.
   for (int step = 0; step < kMaxSteps; ++step) {
     Eigen::Vector2d pixel;
     std::array<double, 4> J;
@@ -207,8 +228,7 @@ CalibratedPoint ImagePoints::At(std::size_t i, const Camera* shifted) const {
     const double inverse = 1.0 / (J[0] * J[3] - J[1] * J[2]);
     p.x_from_pixel = {J[3] * inverse, -J[1] * inverse, -J[2] * inverse, J[0] * inverse};
     const Eigen::Vector2d miss = pixels_[i] - pixel;
-    p.x += Eigen::Vector2d(p.x_from_pixel[0] * miss.x() + p.x_from_pixel[1] * miss.y(),
-                           p.x_from_pixel[2] * miss.x() + p.x_from_pixel[3] * miss.y());
+    move(miss);
     if (miss.squaredNorm() < kConverged * kConverged) return p;
     if (!p.x.allFinite()) break;
   }
@@ -216,13 +236,28 @@ CalibratedPoint ImagePoints::At(std::size_t i, const Camera* shifted) const {
   return p;
 }
 
-CalibratedPoint ImagePoints::NormalizedAt(std::size_t i, const Camera* shifted) const {
-  CalibratedPoint p = At(i, shifted);
+// In coordinates about the points' middle.
+CalibratedPoint ImagePoints::Normalize(CalibratedPoint p) const {
   const double inverse = 1.0 / normalization_(0, 0);
   p.x = inverse * (p.x - normalization_.topRightCorner<2, 1>());
   for (double& v : p.x_from_pixel) v *= inverse;
   return p;
 }
+
+namespace {
+
+// A contour that lies outwards by so much is moved back, not its distance from the conic lowered by
+// as much: a distance to first order is right near the conic only. Returns the unit step, pixels.
+Eigen::Vector2d MoveInwards(const Eigen::Matrix3d& conic, double pixels, CalibratedPoint* p) {
+  const Eigen::Vector2d inwards =
+      -p->GradientPerPixel((conic * p->Homogeneous()).head<2>()).normalized();
+  const std::array<double, 4>& J = p->x_from_pixel;
+  p->x += pixels * Eigen::Vector2d(J[0] * inwards.x() + J[1] * inwards.y(),
+                                   J[2] * inwards.x() + J[3] * inwards.y());
+  return inwards;
+}
+
+}  // namespace
 
 // Distance r to a curve that stays while the camera shifts: the same as if the pixel moved the
 // other way (`by_pixel`, d r / d pixel), but for the size of a pixel, by which r itself changes.
@@ -233,7 +268,7 @@ void ImagePoints::FillCameraColumns(std::size_t i, const CalibratedPoint& p, con
                                     int first) const {
   const Eigen::Vector2d offset = pixels_[i] - Eigen::Vector2d(camera.cx, camera.cy);
   const Eigen::Vector2d across = by_pixel.normalized();
-  row->template segment<kCameraSize>(first).setZero();
+  row->tail(row->size() - first).setZero();
   (*row)[first] = r - by_pixel.dot(offset);
   (*row)[first + 1] = r * across.y() * across.y() - by_pixel.y() * offset.y();
   (*row)[first + 2] = -by_pixel.x();
@@ -273,51 +308,51 @@ double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, con
   double level = 0.0;
   const bool orthogonal = IsOrthogonal(C, &level);
   const auto distance = [&](std::size_t i, auto* row) {
-    const CalibratedPoint p = NormalizedAt(i, changed);
+    const CalibratedPoint at = At(i, changed);
+    CalibratedPoint p = Normalize(at);
+    Eigen::Vector2d inwards = Eigen::Vector2d::Zero();
+    if (offset_px != 0.0 || variables.offset) inwards = MoveInwards(C, offset_px, &p);
     if (row == nullptr) {
-      const double d =
-          orthogonal ? OrthogonalDistance(p, C, level, nullptr)
-                     : 0.5 * p.Homogeneous().dot(C * p.Homogeneous()) /
-                           p.GradientPerPixel((C * p.Homogeneous()).template head<2>()).norm();
-      return d - offset_px;
+      return orthogonal ? OrthogonalDistance(p, C, level, nullptr)
+                        : 0.5 * p.Homogeneous().dot(C * p.Homogeneous()) /
+                              p.GradientPerPixel((C * p.Homogeneous()).template head<2>()).norm();
     }
     Vector6d by_conic;
     const double d =
         orthogonal ? OrthogonalDistance(p, C, level, &by_conic) : ConicDistance(p, C, &by_conic);
     row->template head<6>() = by_conic;
     constexpr int kSize = std::remove_pointer_t<decltype(row)>::RowsAtCompileTime;
-    if constexpr (kSize > 6) (*row)[6] = -1.0;
-    if constexpr (kSize > 7) {
+    if constexpr (kSize > 6) {
       const Eigen::Vector2d g = (C * p.Homogeneous()).template head<2>();
       const Eigen::Vector2d G = p.GradientPerPixel(g);
       Eigen::Vector2d by_pixel = G.normalized();
       if (!orthogonal) {  // Sampson's denominator moves with the point, too.
-        const double norm = G.norm();
         const Eigen::Vector2d by_x =
-            (g - d * C.topLeftCorner<2, 2>() * NormGradient(p, by_pixel)) / norm;
+            (g - d * C.topLeftCorner<2, 2>() * NormGradient(p, by_pixel)) / G.norm();
         by_pixel = p.GradientPerPixel(by_x);
       }
-      FillCameraColumns(i, At(i, changed), seen_by, d, by_pixel, row, 7);
+      (*row)[6] = variables.offset ? by_pixel.dot(inwards) : 0.0;
+      if constexpr (kSize > 7) FillCameraColumns(i, at, seen_by, d, by_pixel, row, 7);
     }
-    return d - offset_px;
+    return d;
   };
-  if (model == nullptr || variables.size(6) == 6)
+  if (model == nullptr || (!variables.offset && !variables.camera))
     return SumPoints<6>(size(), options_, weighing, distance, model);
   if (!variables.camera) return SumPoints<7>(size(), options_, weighing, distance, model);
-  const double cost = SumPoints<7 + kCameraSize>(size(), options_, weighing, distance, model);
+  const double cost = SumWithCamera<7>(size(), options_, weighing, distance, model);
   if (!variables.offset) {  // Its column, the seventh, is dropped.
-    const int n = 6 + kCameraSize;
-    model->g.segment(6, kCameraSize) = model->g.tail(kCameraSize).eval();
-    model->h.middleCols(6, kCameraSize) = model->h.rightCols(kCameraSize).eval();
-    model->h.middleRows(6, kCameraSize) = model->h.bottomRows(kCameraSize).eval();
-    model->g.conservativeResize(n);
-    model->h.conservativeResize(n, n);
+    const int n = num_camera();
+    model->g.segment(6, n) = model->g.tail(n).eval();
+    model->h.middleCols(6, n) = model->h.rightCols(n).eval();
+    model->h.middleRows(6, n) = model->h.bottomRows(n).eval();
+    model->g.conservativeResize(6 + n);
+    model->h.conservativeResize(6 + n, 6 + n);
   }
   return cost;
 }
 
 double ImagePoints::SumLine(const Eigen::Vector3d& line, const double* camera,
-                            const Weighing& weighing, const Variables& variables,
+                            const Weighing& weighing, bool camera_variable,
                             CurveModel* model) const {
   std::optional<Camera> shifted;
   if (IsShifted(camera)) shifted = ShiftedCamera(camera_, camera);
@@ -334,9 +369,9 @@ double ImagePoints::SumLine(const Eigen::Vector3d& line, const double* camera,
     }
     return d;
   };
-  if (model == nullptr || !variables.camera)
+  if (model == nullptr || !camera_variable)
     return SumPoints<3>(size(), options_, weighing, distance, model);
-  return SumPoints<3 + kCameraSize>(size(), options_, weighing, distance, model);
+  return SumWithCamera<3>(size(), options_, weighing, distance, model);
 }
 
 void ImagePoints::ConicDistances(const Eigen::Matrix3d& conic, double offset_px,
@@ -350,40 +385,11 @@ void ImagePoints::ConicDistances(const Eigen::Matrix3d& conic, double offset_px,
   distances->clear();
   Vector6d unused;
   for (std::size_t i = 0; i < size(); ++i) {
-    const CalibratedPoint p = NormalizedAt(i, changed);
-    distances->push_back(
-        (orthogonal ? OrthogonalDistance(p, C, level, nullptr) : ConicDistance(p, C, &unused)) -
-        offset_px);
+    CalibratedPoint p = Normalize(At(i, changed));
+    if (offset_px != 0.0) MoveInwards(C, offset_px, &p);
+    distances->push_back(orthogonal ? OrthogonalDistance(p, C, level, nullptr)
+                                    : ConicDistance(p, C, &unused));
   }
-}
-
-bool ImagePoints::LineThrough(const double* camera, const Eigen::Vector3d& line,
-                              Eigen::Vector3d* shifted) const {
-  const double norm = line.head<2>().norm();
-  if (points_.empty() || !(norm > 0.0)) return false;
-  const Eigen::Vector2d normal = line.head<2>() / norm, along(-normal.y(), normal.x());
-  const Eigen::Vector2d foot = -line.z() / norm * normal;
-  double first = std::numeric_limits<double>::infinity(), last = -first;
-  for (const CalibratedPoint& p : points_) {
-    const double at = along.dot(p.x);
-    first = std::min(first, at);
-    last = std::max(last, at);
-  }
-  const Camera other = ShiftedCamera(camera_, camera);
-  CalibratedPoint ends[2];
-  for (int k = 0; k < 2; ++k) {
-    const Eigen::Vector2d end = foot + (k == 0 ? first : last) * along;
-    Eigen::Vector2d pixel;
-    if (!CameraToPixel(camera_, end.homogeneous(), &pixel) ||
-        !PixelToCalibrated(other, pixel, &ends[k])) {
-      return false;
-    }
-  }
-  *shifted = ends[0].Homogeneous().cross(ends[1].Homogeneous());
-  const double length = shifted->norm();
-  if (!(length > 0.0)) return false;
-  *shifted *= (shifted->dot(line) < 0.0 ? -1.0 : 1.0) / length;
-  return true;
 }
 
 void ImagePoints::LineDistances(const Eigen::Vector3d& line, const double* camera,

@@ -15,12 +15,10 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/robust_loss.h"
 
 namespace circline {
-
-// Residuals within this many standard deviations are inliers: 99.8 % of a Gaussian's.
-constexpr double kInlierSigmas = 3.09;
 
 // A camera as unknowns: shifts against the camera as given, so that zeros are that camera. 0: of
 // log f (both focal lengths); 1: of log (fy / fx); 2, 3: of the principal point, pixels; from 4 on:
@@ -43,7 +41,7 @@ class LensSlope {
 // How far a contour point is from a circle's image: to first order (Sampson), or orthogonally, in
 // twice the time. By itself: orthogonally where the first order does not suffice, that is where the
 // ellipse's smallest radius of curvature is below 20 standard deviations of a point.
-enum class ConicDistanceType { kSampson, kOrthogonal, kAuto };
+enum class ConicDistanceType { kAuto, kSampson, kOrthogonal };
 
 // How residuals count. All of them under their loss, its tuning constant `stretch` times as wide
 // (graduated refinement lowers it to 1); or, for covariances, inliers only, without loss, all times
@@ -72,7 +70,7 @@ class ImagePoints {
  public:
   struct Options {
     double sigma_px = 1.0;  // Standard deviation of each coordinate, pixels; > 0.
-    double weight = 1.0;    // What all points together count: below 1 where they share an error.
+    double weight = 1.0;    // What all points together count (NoiseModel::Weight).
     LossType loss = LossType::kTrivial;
     ConicDistanceType distance = ConicDistanceType::kAuto;
     int num_distortion = 1;  // Distortion coefficients with derivatives; the others are constant.
@@ -86,27 +84,24 @@ class ImagePoints {
   std::size_t size() const { return points_.size(); }
   const std::vector<CalibratedPoint>& points() const { return points_; }
   const Options& options() const { return options_; }
+  void set_weight(double weight) { options_.weight = weight; }
+  // Of the kCameraSize shifts these come first and have derivatives; those of the others are zero.
+  int num_camera() const { return 4 + options_.num_distortion; }
 
   // Sum over the points' distances from `conic` (3x3, negative inside an ellipse; its scale has no
   // meaning), moved outwards by `offset_px`. `camera`: kCameraSize shifts, or null for none. Local
   // variables: ConicToVector of Normalized(conic) (6), the offset (1; with offset_variable), the
-  // camera's shifts (with camera_variable). `model` may be null. Returns sum rho; not finite where
-  // a residual is not.
+  // camera's first num_camera() shifts (with camera). `model` may be null. Returns sum rho; not
+  // finite where a residual is not.
   struct Variables {
     bool offset = false, camera = false;
-    int size(int curve) const { return curve + (offset ? 1 : 0) + (camera ? kCameraSize : 0); }
   };
   double SumConic(const Eigen::Matrix3d& conic, double offset_px, const double* camera,
                   const Weighing& weighing, const Variables& variables, CurveModel* model) const;
 
   // The same for a line (3). Local variables: the line (3), the camera's shifts.
   double SumLine(const Eigen::Vector3d& line, const double* camera, const Weighing& weighing,
-                 const Variables& variables, CurveModel* model) const;
-
-  // A line of the camera as given, as the shifted camera sees the same pixels; not ok where that
-  // cannot undistort them.
-  bool LineThrough(const double* camera, const Eigen::Vector3d& line,
-                   Eigen::Vector3d* shifted) const;
+                 bool camera_variable, CurveModel* model) const;
 
   // Signed distances, pixels.
   void ConicDistances(const Eigen::Matrix3d& conic, double offset_px, const double* camera,
@@ -122,7 +117,7 @@ class ImagePoints {
 
  private:
   CalibratedPoint At(std::size_t i, const Camera* shifted) const;
-  CalibratedPoint NormalizedAt(std::size_t i, const Camera* shifted) const;
+  CalibratedPoint Normalize(CalibratedPoint p) const;
   bool IsOrthogonal(const Eigen::Matrix3d& conic, double* level) const;
   template <typename Row>
   void FillCameraColumns(std::size_t i, const CalibratedPoint& p, const Camera& camera, double r,

@@ -1,88 +1,193 @@
-// One least-squares problem over everything that is known of the world plane: circles, lines,
-// centres, axes, known angles and lengths, minimised in Ceres from one seed pose.
+// Everything that is known of the world plane as one ceres::Problem: circles, lines, centres, axes,
+// known angles and lengths, priors. Made once for a photo; solved for each reading (which features
+// take part) from each start. Internal: not installed.
 //
-// Parameters. The plane's distance from the camera is the unit of length, and the plane's own frame
-// has its origin at the foot of the perpendicular, so that a plane point (X, Y) is R (X, Y, facing)
-// in the camera frame, facing = sign(r3 . t). Unknown are the rotation R, the world origin (where
-// evidence fixes it), for each circle its centre and radius, for each line one angle about its
-// pencil's direction, for each in-plane pencil of unknown direction one angle. A line's
-// interpretation plane contains its direction whatever its offset: lines need not lie in the plane,
-// and nothing is special at infinity.
-//
-// Residuals are distances in pixels of the photo over the standard deviation, each under its robust
-// loss. The solver sees the shared unknowns alone (reduced_problem.h). Internal: not installed.
+// Unknowns. The pose (R, t), t being the image of the world origin: free where the world is metric
+// and the origin is observed or, by convention, a circle's centre; a unit vector where the world
+// has no scale; held where its direction is a convention. Each circle's centre, radius, tilt and
+// height, each pencil's direction, each line's place and deviation, the contours' common offset,
+// the camera. What has no prior width is held.
 #ifndef CIRCLINE_REFINE_JOINT_PROBLEM_H_
 #define CIRCLINE_REFINE_JOINT_PROBLEM_H_
 
+#include <ceres/loss_function.h>
+#include <ceres/manifold.h>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "circline/estimators/observations.h"
+#include "circline/estimators/point_noise.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
+#include "circline/refine/cost_functions.h"
 #include "circline/refine/estimate_pose.h"
-#include "circline/refine/focal.h"
-#include "circline/refine/joint_evidence.h"
-#include "circline/refine/joint_result.h"
-#include "circline/refine/reduced_problem.h"
 
 namespace circline {
 
-// Where a few iterations lead from a seed.
-struct Approach {
-  CameraPose pose;
-  double cost = 0.0;  // Robust, as PoseHypothesis::cost.
-  // Scatter of the points whose noise is automatic, pixels: 1.4826 x median absolute residual,
-  // degrees of freedom counted in; 0 where too few are redundant to tell.
-  NoiseScales scales;
-  JointState state;
-  double log_focal = 0.0;  // Of the focal lengths' scale, where that is refined too.
+// One parameter block.
+struct Block {
+  int offset, size;                           // In State::x.
+  const ceres::Manifold* manifold = nullptr;  // Null: Euclidean.
+  bool is_constant = false;
+  int group = -1;  // The feature group that alone has it; -1: shared.
+
+  int tangent_size() const {
+    return is_constant ? 0 : manifold != nullptr ? manifold->TangentSize() : size;
+  }
+};
+
+// What can be left out as a whole.
+struct Feature {
+  enum class Kind { kCircle, kCenterMark, kLine, kPlaneLine, kPoint, kLength, kAxis };
+  Kind kind;
+  std::string id;                   // PoseHypothesis::left_out: "c1", "kerbs[3]", "length[0]".
+  std::string name;                 // For people: "circle 'c1'".
+  int parent = -1;                  // A feature without which this one says nothing.
+  int dof = 1;                      // Parameters of its free fit less unknowns of its own.
+  int observation = -1, line = -1;  // Index of circle, pencil or length; line within its pencil.
+  // Twice the cost of its own free fit, under the loss.
+  double free_twice_cost = 0.0;
+};
+
+// One residual block.
+struct Term {
+  std::unique_ptr<ceres::CostFunction> cost;
+  std::vector<int> blocks;
+  int feature = -1;                // -1: always there.
+  int group = -1;                  // Of the blocks that are nobody else's.
+  FeatureCost* weighed = nullptr;  // The same, where it can be weighed anew.
+  // Of a prior with long tails; its covariance is that of the residuals without it.
+  std::unique_ptr<ceres::LossFunction> loss;
+};
+
+// Where a refinement stands.
+struct State {
+  std::vector<double> x;             // All parameter blocks.
+  std::vector<std::uint8_t> active;  // By feature.
+  double cost = 0.0;                 // Of the active terms, priors included.
 };
 
 class JointProblem {
  public:
-  // `observations` fitted and resolved (FitObservations or FitDirect, then ResolveWorld); they and
-  // the options outlive this. Features without a fit, of other planes, or without any tie to the
-  // world frame take no part. `scales`: positive.
+  // `observations` fitted and resolved (ResolveWorld); they and the options outlive this. Features
+  // without a fit, of other planes, or without any tie to the world frame take no part.
   JointProblem(const Observations& observations, const EstimationOptions& options,
-               const NoiseScales& scales)
-      : evidence_(observations, options, scales) {}
+               const PointNoise& noise);
 
-  void SetScales(const NoiseScales& scales) { evidence_.SetScales(scales); }
+  // All unknowns at a seed: its rotation and plane, circles by their points in that plane, the rest
+  // by its own fits. Features that cannot lie in that plane in front of the camera are made
+  // inactive. Refused where no circle of several can, or the origin lies beyond the horizon.
+  Status Start(const CameraPose& seed, double log_focal, const std::vector<std::uint8_t>& reading,
+               State* state) const;
+  // Runs ceres on it. Not ok where the evidence cannot be evaluated.
+  Status Solve(int max_iterations, State* state, bool* converged = nullptr) const;
+  // The same from a start that may be far off, where much lies in the tails of the losses: under
+  // wide ones first, which narrow to their own width (graduated non-convexity; Black and Rangarajan
+  // 1996).
+  Status SolveGraduated(int max_iterations, State* state) const;
 
-  // Robust cost at the seed with every other parameter at its closed-form value: ranks seeds
-  // cheaply. Refused where the seed contradicts the evidence.
-  Status SeedCost(const CameraPose& seed, double* cost) const;
+  // Infinity where it cannot be evaluated.
+  double Cost(const State& state, const Weighing& weighing = Weighing()) const;
+  CameraPose PoseAt(const State& state) const;
+  // Share of the contours' and lines' points within their gate.
+  double InlierShare(const State& state) const;
 
-  // The first iterations from a seed (its rotation and, where the origin is known, its
-  // translation), or further ones: enough to see which basin it lies in.
-  Status ApproachFrom(const CameraPose& seed, Approach* approach) const;
-  Status Continue(Approach* approach) const;
-
-  // Share of the points of contours and lines that are inliers there.
-  double InlierShare(const Approach& approach) const;
-
-  // Runs an approach to its end; fills everything that a hypothesis holds but the probability. Not
-  // ok: degenerate evidence, or numbers that are not finite.
-  Status Refine(const Approach& approach, Refined* refined) const;
-
+  const Observations& observations() const { return observations_; }
+  const EstimationOptions& options() const { return options_; }
+  const std::vector<Block>& blocks() const { return blocks_; }
+  const std::vector<Term>& terms() const { return terms_; }
+  const std::vector<Feature>& features() const { return features_; }
+  // Features that a fit has not found to contradict their like.
+  std::vector<std::uint8_t> FirstReading() const;
   // What the observations say that has no part in the problem, and why, a sentence each.
-  const std::vector<std::string>& unused() const { return evidence_.unused; }
+  const std::vector<std::string>& unused() const { return unused_; }
 
-  // True if so many points are doubted that some features' fits may be wrong.
-  bool is_contaminated() const;
+  bool IsActive(const Term& term, const State& state) const;
+  void Parameters(const Term& term, const State& state, const double** out) const;
+  bool IsMetric(const State& state) const;
+  // Whether anything that takes part says where the origin is.
+  bool OriginIsPlaced(const State& state) const;
+  bool origin_observed() const { return origin_observed_; }
+  bool spin_is_free() const { return !x_is_fixed_; }
+  bool camera_is_estimated() const { return camera_is_estimated_; }
+  const CameraSigma& camera_sigma() const { return camera_sigma_; }
 
-  // True if nothing fixes the rotation about the plane's normal.
-  bool spin_is_free() const { return !evidence_.x_is_fixed; }
+  // Blocks and terms by what they are; -1 where there is none.
+  struct CircleBlocks {
+    int observation, feature, term, center, radius, tilt, group;
+  };
+  // Pencil of a direction (observation -1: an axis drawn alone), and its lines.
+  struct PencilBlocks {
+    int observation, direction, axis_feature;
+  };
+  struct LineBlocks {
+    int term, line, feature;
+  };
+  struct PlaneLineBlocks {
+    int term, point, angle, feature;
+    Eigen::Vector3d fit;
+  };
+  struct PointBlocks {
+    int term, point, feature;
+    Eigen::Vector2d pixel;
+  };
+  struct LengthBlocks {
+    int term, a, b, feature;
+    double length;
+  };
+  const std::vector<CircleBlocks>& circles() const { return circles_; }
+  const std::vector<PencilBlocks>& pencils() const { return pencils_; }
+  const std::vector<LineBlocks>& lines() const { return lines_; }
+  const std::vector<PointBlocks>& points() const { return points_; }
+  const std::vector<LengthBlocks>& lengths() const { return lengths_; }
+  enum { kRotation = 0, kTranslation = 1, kCamera = 2 };  // Blocks that are always there.
+  // Shared offset's block by CircleObservation::contrast + 1, or -1.
+  const int* offsets() const { return offsets_; }
 
  private:
-  // The evidence through the camera of an approach; `refocused` holds it where need be.
-  const JointEvidence& At(const Approach& approach,
-                          std::optional<RefocusedEvidence>* refocused) const;
-  double Cost(const JointEvidence& evidence, const Approach& approach) const;
+  friend class JointProblemBuilder;
 
-  JointEvidence evidence_;
+  void SetWeighing(const Weighing& weighing) const;
+  Eigen::Matrix3d SenseOfPriors(const CameraPose& seed) const;
+  int PlaceCircles(const CameraPose& seed, const double* camera, State* state) const;
+  void PlaceScale(const double* camera, State* state) const;
+  bool PlaceOrigin(const double* camera, State* state) const;
+  void PlaceLines(const double* camera, State* state) const;
+  bool PlanePoint(const State& state, const Eigen::Vector3d& ray, double* xy) const;
+  bool Ray(const Eigen::Vector2d& pixel, const double* camera, Eigen::Vector3d* ray) const;
+
+  const Observations& observations_;
+  const EstimationOptions& options_;
+  std::vector<Block> blocks_;
+  std::vector<Term> terms_;
+  std::vector<Feature> features_;
+  std::vector<CircleBlocks> circles_;
+  std::vector<PencilBlocks> pencils_;
+  std::vector<LineBlocks> lines_;
+  std::vector<PlaneLineBlocks> plane_lines_;
+  std::vector<PointBlocks> points_;
+  std::vector<LengthBlocks> lengths_;
+  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
+  std::vector<std::string> unused_;
+  std::vector<double> defaults_;  // Of State::x.
+  int offsets_[3] = {-1, -1, -1};
+  int num_groups_ = 0;
+  std::vector<int> pose_priors_;  // Terms.
+  // Of Start, from PlaceCircles to those after it.
+  mutable std::vector<double> scales_, placed_origin_;
+  int center_at_origin_ = -1;  // Circle (index in circles_) whose centre the origin is, or -1.
+  CameraSigma camera_sigma_;
+  bool origin_observed_ = false, x_is_fixed_ = false, camera_is_estimated_ = false;
+  bool x_is_seen_ = false;  // Fixed by lines, up to its sense, not by a prior alone.
+
+ public:
+  int num_groups() const { return num_groups_; }
 };
 
 }  // namespace circline

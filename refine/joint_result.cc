@@ -5,177 +5,91 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
-#include "circline/refine/covariance.h"
-#include "circline/refine/focal.h"
-#include "circline/refine/graduated.h"
-#include "circline/refine/joint_start.h"
+#include "circline/estimators/circle_pose.h"
+#include "circline/refine/block_chain.h"
+#include "circline/refine/linearization.h"
 
 namespace circline {
 namespace {
 
 constexpr double kRadToDeg = 57.29577951308232;
+constexpr double kPi = 3.14159265358979323846;
 
-// Counts and rms of the inliers; features and points that are outliers as a whole are marked in the
-// state as left out.
-void CountInliers(const JointEvidence& e, JointState* state, PoseHypothesis* h) {
+// Calls visit(feature, points, distances) for each contour and line that takes part.
+template <typename Visit>
+void ForEachCurve(const JointProblem& problem, const State& state, const Visit& visit) {
+  std::vector<double> distances;
+  const double* parameters[8];
+  for (const Term& term : problem.terms()) {
+    const ImagePoints* points = term.weighed != nullptr ? term.weighed->points() : nullptr;
+    if (points == nullptr || !problem.IsActive(term, state)) continue;
+    problem.Parameters(term, state, parameters);
+    term.weighed->Distances(parameters, &distances);
+    visit(term.feature, *points, distances);
+  }
+}
+
+// Calls visit(feature, cost, miss) for each single point that takes part.
+template <typename Visit>
+void ForEachPoint(const JointProblem& problem, const State& state, const Visit& visit) {
+  const double* parameters[8];
+  for (const JointProblem::PointBlocks& p : problem.points()) {
+    const Term& term = problem.terms()[static_cast<std::size_t>(p.term)];
+    if (!problem.IsActive(term, state)) continue;
+    problem.Parameters(term, state, parameters);
+    const auto& cost = static_cast<const PlanePointCost&>(*term.cost);
+    visit(p.feature, cost, cost.MissPx(parameters));
+  }
+}
+
+// Within the gate of its own noise.
+bool IsInlier(double distance, const ImagePoints& points) {
+  return std::abs(distance) <= kInlierSigmas * points.options().sigma_px;
+}
+
+// Counts and rms of the inliers.
+void CountInliers(const JointProblem& problem, const State& state, PoseHypothesis* h) {
   double squares = 0.0;
-  const JointState before = *state;
-  ForEachCurve(e, before,
-               [&](const PointSet& set, bool is_circle, std::size_t term,
-                   const std::vector<double>& distances) {
-                 const std::size_t minimum = is_circle ? 5 : 2;
-                 std::size_t inliers = 0;
-                 double sum = 0.0;
+  ForEachCurve(problem, state,
+               [&](int, const ImagePoints& points, const std::vector<double>& distances) {
+                 h->num_observations += static_cast<int>(distances.size());
                  for (const double d : distances) {
-                   if (!(std::abs(d) <= kInlierSigmas * set.sigma_px)) continue;
-                   ++inliers;
-                   sum += d * d;
+                   if (!IsInlier(d, points)) continue;
+                   ++h->num_inliers;
+                   squares += d * d;
                  }
-                 if (inliers < minimum) {
-                   (is_circle ? state->circle_left_out : state->line_left_out)[term] = 1;
-                   return;
-                 }
-                 h->num_inliers += static_cast<int>(inliers);
-                 squares += sum;
                });
-  for (const PointSet& set : e.sets) h->num_observations += static_cast<int>(set.points.size());
-  for (std::size_t i = 0; i < e.points.size(); ++i) {
-    const PointTerm& t = e.points[i];
-    const double* xy = state->At(t.point);
-    const double miss = PointMissPx(t.measured, state->rotation, state->facing, xy[0], xy[1]);
-    state->point_left_out[i] = miss <= kInlierSigmas * t.measured.sigma_px ? 0 : 1;
+  ForEachPoint(problem, state, [&](int, const PlanePointCost& cost, double miss) {
     ++h->num_observations;
-    if (state->point_left_out[i] != 0) continue;
+    if (!(miss <= kInlierSigmas * cost.sigma_px())) return;
     ++h->num_inliers;
     squares += miss * miss;
-  }
+  });
   h->rms_px = h->num_inliers > 0 ? std::sqrt(squares / h->num_inliers) : 0.0;
-}
-
-// Origin of the world in units of the plane's distance, camera frame.
-Eigen::Vector3d OriginInPlane(const JointEvidence& e, const JointState& state,
-                              const CameraPose& seed) {
-  if (e.origin >= 0) {
-    const double* o = state.At(e.origin);
-    return {o[0], o[1], state.facing};
-  }
-  double o[2] = {0.0, 0.0};
-  PlanePoint(state.rotation, state.facing, seed.translation, o);
-  return {o[0], o[1], state.facing};
-}
-
-// Whether a known radius or length that has not been left out says how large all is.
-bool IsMetric(const JointEvidence& e, const JointState& state) {
-  return e.scale >= 0 && state.At(e.scale)[0] > 0.0;
-}
-
-void FillPose(const JointEvidence& e, const JointState& state, const Eigen::Vector3d& origin,
-              PoseHypothesis* h) {
-  h->cam_from_world.rotation = state.rotation;
-  const Eigen::Vector3d t = state.rotation * origin;
-  h->metric = IsMetric(e, state);
-  h->origin_observed = e.origin_observed;
-  h->cam_from_world.translation =
-      h->metric ? Eigen::Vector3d(t / state.At(e.scale)[0]) : t.normalized();
-}
-
-// Columns: how the shared unknowns move [delta, delta_t].
-Eigen::MatrixXd PoseFromShared(const JointEvidence& e, const JointState& state,
-                               const Eigen::Vector3d& origin, const SharedCovariance& shared) {
-  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(6, shared.covariance.cols());
-  const Eigen::Matrix3d& R = state.rotation;
-  const Eigen::Vector3d P = R * origin;
-  // d t / d P: a direction's length does not vary.
-  Eigen::Matrix3d by_P =
-      (Eigen::Matrix3d::Identity() - P * P.transpose() / P.squaredNorm()) / P.norm();
-  if (IsMetric(e, state)) {
-    const double scale = state.At(e.scale)[0];
-    by_P = Eigen::Matrix3d::Identity() / scale;
-    T.block<3, 1>(3, shared.offsets[static_cast<std::size_t>(e.scale)]) = -P / (scale * scale);
-  }
-  T.topLeftCorner<3, 3>() = R;
-  T.block<3, 3>(3, 0) = -by_P * R * CrossMatrix(origin);
-  // A spin that nothing fixes is one about the origin, wherever that is.
-  if (!e.x_is_fixed) T.block<3, 1>(3, 2).setZero();
-  if (e.origin >= 0) {
-    T.block<3, 2>(3, shared.offsets[static_cast<std::size_t>(e.origin)]) = by_P * R.leftCols<2>();
-  }
-  return T;
-}
-
-// Orthonormal basis of the free directions among [delta, delta_t].
-void FillFreeDirections(const Eigen::MatrixXd& T, const Eigen::MatrixXd& null_space,
-                        PoseHypothesis* h) {
-  if (null_space.cols() == 0) return;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(T * null_space);
-  qr.setThreshold(1e-6);
-  const Eigen::MatrixXd Q = Eigen::MatrixXd(qr.householderQ());
-  for (Eigen::Index k = 0; k < qr.rank(); ++k) {
-    std::array<double, 6> direction;
-    Eigen::Map<Vector6d>(direction.data()) = Q.col(k);
-    h->free_directions.push_back(direction);
-  }
-}
-
-void FillFeatures(const JointEvidence& e, const JointState& state, double unit, PoseHypothesis* h) {
-  const Eigen::Matrix3d& R = state.rotation;
-  for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    const CircleTerm& t = e.circles[i];
-    if (state.circle_left_out[i] != 0) continue;
-    const double* c = state.At(t.center);
-    CircleEstimate estimate;
-    estimate.id = e.observations.circles[static_cast<std::size_t>(t.observation)].id;
-    estimate.normal = -state.facing * R.col(2);
-    const Eigen::Vector3d center = R * Eigen::Vector3d(c[0], c[1], state.facing);
-    estimate.center = unit * center;
-    estimate.radius = unit * std::abs(t.radius < 0 ? c[2] : t.factor * state.At(t.radius)[0]);
-    CameraToPixel(e.camera, center, &estimate.center_px);
-    h->circles.push_back(estimate);
-  }
-  const Eigen::Matrix3d rotation_covariance = h->Covariance().topLeftCorner<3, 3>();
-  for (const PencilObservation& pencil : e.observations.pencils) {
-    PencilEstimate estimate;
-    estimate.id = pencil.id;
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-    if (pencil.direction != PencilDirection::kFree) {
-      estimate.direction = R.col(static_cast<int>(pencil.direction));
-      const Eigen::Matrix3d cross = CrossMatrix(estimate.direction);
-      covariance = cross * rotation_covariance * cross.transpose();
-    } else if (pencil.fit) {
-      estimate.direction = pencil.fit->direction;
-      covariance = pencil.fit->covariance;
-      const auto theta = e.thetas.find(pencil.id);
-      if (theta != e.thetas.end()) {
-        const double angle = state.At(theta->second)[0];
-        estimate.direction = R * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0);
-      }
-    } else {
-      continue;
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-    estimate.sigma_deg = kRadToDeg * std::sqrt(std::max(0.0, eigen.eigenvalues()[2]));
-    h->pencils.push_back(estimate);
-  }
 }
 
 // How much wider the estimate scatters than least squares on the inliers would: the variance of an
 // M-estimate, E[psi^2] / E[psi']^2 over residuals in standard deviations (Huber 1964), where enough
 // of them are redundant to measure it, and never less than what every loss is tuned to.
-double Inflation(const JointEvidence& e, const JointState& state) {
+double Inflation(const JointProblem& problem, const State& state) {
   constexpr double kTuned = 1.0 / 0.95;
-  const bool is_robust = e.options.conic_loss.type != LossType::kTrivial ||
-                         e.options.line_loss.type != LossType::kTrivial;
-  if (!is_robust) return 1.0;
+  const EstimationOptions& options = problem.options();
+  if (options.conic_loss.type == LossType::kTrivial &&
+      options.line_loss.type == LossType::kTrivial) {
+    return 1.0;
+  }
   double squares = 0.0, slopes = 0.0, inliers = 0.0, points = 0.0, unknowns = 3.0;
   ForEachCurve(
-      e, state,
-      [&](const PointSet& set, bool is_circle, std::size_t, const std::vector<double>& distances) {
-        unknowns += is_circle ? 3.0 : 1.0;
+      problem, state, [&](int f, const ImagePoints& set, const std::vector<double>& distances) {
+        unknowns += problem.features()[static_cast<std::size_t>(f)].kind == Feature::Kind::kCircle
+                        ? 3.0
+                        : 1.0;
         points += static_cast<double>(distances.size());
         for (const double d : distances) {
-          const double r = d / set.sigma_px, r2 = r * r;
-          const LossSlopes loss = LossSlopesAt(set.loss, r2);
+          const double r = d / set.options().sigma_px, r2 = r * r;
+          const LossSlopes loss = LossSlopesAt(set.options().loss, r2);
           squares += loss.first * loss.first * r2;
           slopes += loss.first + 2.0 * r2 * loss.second;
           inliers += std::abs(r) <= kInlierSigmas ? 1.0 : 0.0;
@@ -187,134 +101,344 @@ double Inflation(const JointEvidence& e, const JointState& state) {
   return std::max(kTuned, redundancy * squares * inliers / (slopes * slopes));
 }
 
-// In words, what a hypothesis leaves out.
-void FillNotes(const JointEvidence& e, const JointState& state, std::vector<std::string>* notes) {
-  for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    if (state.circle_left_out[i] == 0) continue;
-    const auto index = static_cast<std::size_t>(e.circles[i].observation);
-    notes->push_back("circle '" + e.observations.circles[index].id +
-                     "': left out, it cannot be a circle of the plane found");
+// [delta, delta_t] by the shared unknowns: delta in the camera frame.
+Eigen::MatrixXd PoseFromShared(const JointProblem& problem, const State& state,
+                               const Linearization& at) {
+  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(6, at.num_columns());
+  const std::vector<Block>& blocks = problem.blocks();
+  const CameraPose pose = problem.PoseAt(state);
+  const int turns = blocks[JointProblem::kRotation].tangent_size();
+  T.block(0, at.column(JointProblem::kRotation), 3, turns) = pose.rotation.leftCols(turns);
+  const Block& t = blocks[JointProblem::kTranslation];
+  if (t.tangent_size() == 0) return T;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> J =
+      Eigen::Matrix3d::Identity();
+  if (t.manifold != nullptr) {
+    J.resize(3, t.tangent_size());
+    t.manifold->PlusJacobian(state.x.data() + t.offset, J.data());
   }
-  for (std::size_t i = 0; i < e.lines.size(); ++i) {
-    if (state.line_left_out[i] == 0) continue;
-    notes->push_back(e.lines[i].name + ": left out, it contradicts the pose found");
-  }
-  for (std::size_t i = 0; i < e.points.size(); ++i) {
-    if (state.point_left_out[i] == 0) continue;
-    notes->push_back(e.points[i].name + ": left out, it contradicts the pose found");
+  // A direction has no length.
+  const Eigen::Vector3d direction = pose.translation.normalized();
+  Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
+  if (!problem.IsMetric(state))
+    unit = (unit - direction * direction.transpose()) / pose.translation.norm();
+  T.block(3, at.column(JointProblem::kTranslation), 3, t.tangent_size()) = unit * J;
+  return T;
+}
+
+// Orthonormal basis of the free directions among [delta, delta_t]; a spin about the normal is one
+// about the origin, wherever that is.
+void FillFreeDirections(const JointProblem& problem, const Eigen::MatrixXd& T,
+                        const Linearization& at, PoseHypothesis* h) {
+  const Eigen::MatrixXd& nulls = at.null_space();
+  Eigen::MatrixXd free(6, nulls.cols() + (problem.spin_is_free() ? 1 : 0));
+  free.leftCols(nulls.cols()) = T.leftCols(nulls.rows()) * nulls;
+  if (problem.spin_is_free())
+    free.rightCols(1) << h->cam_from_world.rotation.col(2), Eigen::Vector3d::Zero();
+  if (free.cols() == 0) return;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(free);
+  qr.setThreshold(1e-6);
+  const Eigen::MatrixXd Q = Eigen::MatrixXd(qr.householderQ());
+  for (Eigen::Index k = 0; k < qr.rank(); ++k) {
+    std::array<double, 6> direction;
+    Eigen::Map<Vector6d>(direction.data()) = Q.col(k);
+    h->free_directions.push_back(direction);
   }
 }
 
-// The focal length's own variance, and what it adds to that of the pose: the pose follows it.
-void FillFocal(const FocalModel& focal, double log_focal, double inflation, double prior_sigma,
-               const Eigen::MatrixXd& T, PoseHypothesis* h, Matrix6d* covariance) {
-  const double variance = 1.0 / (focal.information / inflation + 1.0 / (prior_sigma * prior_sigma));
-  const Vector6d by_focal = T * focal.by_focal;
-  *covariance += variance * by_focal * by_focal.transpose();
-  h->focal_scale = std::exp(log_focal);
-  h->focal_sigma = h->focal_scale * std::sqrt(variance);
-  Eigen::Map<Vector6d>(h->focal_covariance.data()) = h->focal_scale * variance * by_focal;
+// Unit length of the hypothesis over that of the state.
+double UnitOf(const JointProblem& problem, const State& state) {
+  return problem.IsMetric(state) ? 1.0 : 1.0 / problem.PoseAt(state).translation.norm();
 }
 
-std::string FocalNote(const PoseHypothesis& h, double prior_sigma) {
+void FillCircles(const JointProblem& problem, const State& state, Refined* refined) {
+  const double unit = UnitOf(problem, state);
+  const CameraPose pose = problem.PoseAt(state);
+  const double* camera = state.x.data() + problem.blocks()[JointProblem::kCamera].offset;
+  const Camera shifted = ShiftedCamera(problem.observations().camera, camera);
+  const auto at = [&](int block) {
+    return state.x.data() + problem.blocks()[static_cast<std::size_t>(block)].offset;
+  };
+  for (const JointProblem::CircleBlocks& c : problem.circles()) {
+    const double radius = at(c.radius)[0];
+    if (state.active[static_cast<std::size_t>(c.feature)] == 0) continue;
+    CircleEstimate estimate;
+    estimate.id = problem.observations().circles[static_cast<std::size_t>(c.observation)].id;
+    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ(),
+                    center(at(c.center)[0], at(c.center)[1], 0.0);
+    if (c.tilt >= 0) {
+      normal.head<2>() = Eigen::Vector2d(at(c.tilt)[0], at(c.tilt)[1]);
+      center.z() = at(c.tilt)[2] * radius;
+    }
+    const Eigen::Vector3d in_camera = pose.rotation * center + pose.translation;
+    estimate.normal = (pose.rotation * normal).normalized();
+    if (estimate.normal.dot(in_camera) > 0.0) estimate.normal = -estimate.normal;
+    estimate.center = unit * in_camera;
+    estimate.radius = unit * std::abs(radius);
+    CameraToPixel(shifted, in_camera, &estimate.center_px);
+    refined->hypothesis.circles.push_back(estimate);
+  }
+}
+
+// Each pencil's own direction, which leans from its axis as far as the evidence says.
+void FillPencils(const JointProblem& problem, const State& state, const Linearization& at,
+                 const Eigen::MatrixXd& T, PoseHypothesis* h) {
+  const Eigen::Matrix3d R = problem.PoseAt(state).rotation;
+  for (std::size_t i = 0; i < problem.observations().pencils.size(); ++i) {
+    const PencilObservation& pencil = problem.observations().pencils[i];
+    const auto blocks = std::find_if(
+        problem.pencils().begin(), problem.pencils().end(),
+        [i](const JointProblem::PencilBlocks& p) { return p.observation == static_cast<int>(i); });
+    PencilEstimate estimate;
+    estimate.id = pencil.id;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    if (blocks != problem.pencils().end()) {
+      const Block& block = problem.blocks()[static_cast<std::size_t>(blocks->direction)];
+      estimate.direction =
+          R * Eigen::Map<const Eigen::Vector3d>(state.x.data() + block.offset).normalized();
+      Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * T.topRows<3>();
+      if (block.tangent_size() > 0) {
+        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> plus(
+            3, block.tangent_size());
+        block.manifold->PlusJacobian(state.x.data() + block.offset, plus.data());
+        J.middleCols(at.column(blocks->direction), block.tangent_size()) += R * plus;
+      }
+      covariance = J * at.covariance() * J.transpose();
+    } else if (pencil.direction != PencilDirection::kFree) {
+      estimate.direction = R.col(static_cast<int>(pencil.direction));
+      const Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * T.topRows<3>();
+      covariance = J * at.covariance() * J.transpose();
+    } else if (pencil.fit) {
+      estimate.direction = pencil.fit->direction;
+      covariance = pencil.fit->covariance;
+    } else {
+      continue;
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+    estimate.sigma_deg = kRadToDeg * std::sqrt(std::max(0.0, eigen.eigenvalues()[2]));
+    h->pencils.push_back(estimate);
+  }
+}
+
+void FillFocal(const JointProblem& problem, const State& state, const Linearization& at,
+               const Eigen::MatrixXd& T, Refined* refined) {
+  if (!problem.camera_is_estimated()) return;
+  PoseHypothesis* h = &refined->hypothesis;
+  // The manifold leaves out what is held; the focal length comes first.
+  const int column = at.column(JointProblem::kCamera);
+  h->focal_scale =
+      std::exp(state.x[static_cast<std::size_t>(problem.blocks()[JointProblem::kCamera].offset)]);
+  h->focal_sigma = h->focal_scale * std::sqrt(std::max(0.0, at.covariance()(column, column)));
+  Eigen::Map<Vector6d>(h->focal_covariance.data()) =
+      h->focal_scale * T * at.covariance().col(column);
   // Then the evidence alone tells it no better than three times as badly as the prior does.
   constexpr double kPriorDecides = 0.95;
+  const double prior = problem.camera_sigma().log_focal;
   const char* remark = "";
-  if (!(h.focal_sigma < kPriorDecides * prior_sigma * h.focal_scale)) {
-    remark = std::abs(std::log(h.focal_scale)) < prior_sigma
+  if (!(h->focal_sigma < kPriorDecides * prior * h->focal_scale)) {
+    remark = std::abs(std::log(h->focal_scale)) < prior
                  ? "; the evidence cannot tell, the prior alone decides"
                  : "; the evidence contradicts the prior but does not fix it";
   }
   char text[160];
   std::snprintf(text, sizeof(text), "focal length: %.4f times the camera's, +- %.4f%s",
-                h.focal_scale, h.focal_sigma, remark);
-  return text;
+                h->focal_scale, h->focal_sigma, remark);
+  refined->notes.push_back(text);
 }
 
-// Term by term, what it takes to compare the hypothesis with others.
-void FillTerms(const JointEvidence& e, const JointState& state, const SharedCovariance& shared,
-               Refined* refined) {
-  refined->own_log_det = shared.circle_log_det;
-  refined->own_log_det.insert(refined->own_log_det.end(), shared.line_log_det.begin(),
-                              shared.line_log_det.end());
-  refined->left_out = state.circle_left_out;
-  refined->left_out.insert(refined->left_out.end(), state.line_left_out.begin(),
-                           state.line_left_out.end());
-  for (const CircleTerm& t : e.circles) {
-    refined->radii.push_back(
-        std::abs(t.radius < 0 ? state.At(t.center)[2] : t.factor * state.At(t.radius)[0]));
-    refined->radius_blocks.push_back(t.radius == e.scale ? -1 : t.radius);
+// In words, what a hypothesis leaves out.
+void FillLeftOut(const JointProblem& problem, const State& state, Refined* refined) {
+  for (std::size_t i = 0; i < problem.features().size(); ++i) {
+    const Feature& f = problem.features()[i];
+    const bool parent_is_out =
+        f.parent >= 0 && state.active[static_cast<std::size_t>(f.parent)] == 0;
+    if (state.active[i] != 0 || parent_is_out) continue;
+    refined->hypothesis.left_out.push_back(f.id);
+    refined->notes.push_back(f.name + ": left out, it contradicts the pose found");
   }
+  std::string& structure = refined->hypothesis.structure;
+  structure = problem.observations().frame.plane;
+  for (const std::string& id : refined->hypothesis.left_out) structure += " - " + id;
+}
+
+// Log determinant of the covariance of rotation and, where it is estimated, focal length; a turn
+// that the evidence says nothing of has a variance of one, and no other has more.
+double LogDet(const JointProblem& problem, const Linearization& at) {
+  std::vector<int> columns;
+  for (int k = 0; k < problem.blocks()[JointProblem::kRotation].tangent_size(); ++k)
+    columns.push_back(at.column(JointProblem::kRotation) + k);
+  if (problem.camera_is_estimated()) columns.push_back(at.column(JointProblem::kCamera));
+  Eigen::MatrixXd covariance = at.covariance()(columns, columns);
+  const Eigen::MatrixXd nulls = at.null_space()(columns, Eigen::all);
+  covariance += nulls * nulls.transpose();
+  double log_det = 0.0;
+  constexpr double kNone = 1e-20;  // Rounding: nothing is known, or all is a prior's.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance, Eigen::EigenvaluesOnly);
+  for (const double v : eigen.eigenvalues()) log_det += v > kNone && v < 1.0 ? std::log(v) : 0.0;
+  return log_det;
+}
+
+// A probability that a feature is none of what it is said to be.
+constexpr double kClutter = 0.02;
+
+// Log of the information, the inverse of the covariance's determinant, that a circle's own fit has
+// of its normal: two degrees of freedom, of the better known of its two planes.
+double LogNormalInformation(const CircleObservation& circle) {
+  constexpr double kUnknown = 2.0 * 2.0 * 6.9;  // Two milliradians.
+  if (!circle.fit) return kUnknown;
+  std::array<CirclePose, 2> poses, moved;
+  const int count = CirclePoses(circle.fit->conic, &poses);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(circle.fit->Covariance());
+  Eigen::Matrix3d covariance[2] = {Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
+  const Vector6d conic = ConicToVector(circle.fit->conic);
+  for (int k = 1; k < 6; ++k) {  // The first has no variance.
+    const Vector6d step =
+        std::sqrt(std::max(0.0, eigen.eigenvalues()[k])) * eigen.eigenvectors().col(k);
+    if (CirclePoses(VectorToConic(conic + step), &moved) != count) return kUnknown;
+    for (int i = 0; i < count; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      const Eigen::Vector3d turn = moved[at].normal.cross(poses[at].normal);
+      covariance[i] += turn * turn.transpose();
+    }
+  }
+  double most = 0.0;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(covariance[i],
+                                                               Eigen::EigenvaluesOnly);
+    most = std::max(most, -std::log(turns.eigenvalues()[1] * turns.eigenvalues()[2]));
+  }
+  return std::isfinite(most) ? most : kUnknown;
+}
+
+// The same of a line's fit, of where its direction may be seen: one degree of freedom.
+double LogDirectionInformation(const LineFit& fit) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(fit.covariance,
+                                                             Eigen::EigenvaluesOnly);
+  return -std::log(std::clamp(eigen.eigenvalues()[2], 1e-16, 1.0));
+}
+
+// -log of the density of clutter over that of a feature at its mode, whatever the pose.
+double ClutterCost(const JointProblem& problem, const Feature& f) {
+  const Observations& observations = problem.observations();
+  double log_information = 2.0 * std::log(1e3);  // Of a milliradian, a thousandth.
+  int dimensions = 1;
+  double volume = kPi;  // Directions across a line; 2 pi: normals that face the camera.
+  switch (f.kind) {
+    case Feature::Kind::kCircle:
+      dimensions = 2;
+      volume = 2.0 * kPi;
+      log_information =
+          LogNormalInformation(observations.circles[static_cast<std::size_t>(f.observation)]);
+      break;
+    case Feature::Kind::kLine:
+      if (f.observation < 0) break;
+      log_information =
+          LogDirectionInformation(*observations.pencils[static_cast<std::size_t>(f.observation)]
+                                       .lines[static_cast<std::size_t>(f.line)]
+                                       .fit);
+      break;
+    case Feature::Kind::kPlaneLine:
+      break;
+    case Feature::Kind::kAxis:
+      dimensions = f.dof;
+      volume = f.dof == 2 ? 2.0 * kPi : kPi;
+      log_information = -2.0 * f.dof * std::log(problem.options().noise_model.pencil_axis_rad);
+      break;
+    case Feature::Kind::kCenterMark:
+    case Feature::Kind::kPoint: {
+      constexpr double kAbout = 100.0;  // Standard deviations: where else it might have been.
+      dimensions = 2;
+      volume = kAbout * kAbout;
+      log_information = 0.0;
+      break;
+    }
+    case Feature::Kind::kLength:
+      volume = 1.0;  // Of its logarithm.
+      break;
+  }
+  double cost = -std::log(kClutter) + 0.5 * log_information -
+                0.5 * dimensions * std::log(2.0 * kPi) + std::log(volume);
+  if (f.kind == Feature::Kind::kCircle && f.dof > 2) {
+    constexpr double kRadiusSigma = 0.003;  // Relative; the radius might have been any other.
+    cost -= std::log(std::sqrt(2.0 * kPi) * kRadiusSigma);
+  }
+  return std::max(0.0, cost);
 }
 
 }  // namespace
 
-double LogDet(const Refined& refined, const std::vector<std::uint8_t>& left_out) {
-  double log_det = refined.shared_log_det, log_measure = 0.0, first_radius = 0.0;
-  // True if a circle before has the same radius by definition.
-  const auto is_counted = [&](std::size_t i) {
-    for (std::size_t k = 0; k < i; ++k) {
-      if (left_out[k] == 0 && refined.radius_blocks[i] >= 0 &&
-          refined.radius_blocks[k] == refined.radius_blocks[i]) {
-        return true;
-      }
-    }
-    return false;
-  };
-  for (std::size_t i = 0; i < left_out.size(); ++i) {
-    if (left_out[i] != 0) continue;
-    log_det += refined.own_log_det[i];
-    if (i >= refined.radii.size()) continue;  // A line.
-    if (first_radius == 0.0) {
-      first_radius = refined.radii[i];
-      log_measure -= 4.0 * std::log(first_radius);
-    } else {
-      log_measure -= 2.0 * std::log(first_radius);
-      if (!is_counted(i)) log_measure -= std::log(refined.radii[i]);
-    }
+double LeftOutCost(const JointProblem& problem, const State& state) {
+  double cost = 0.0;
+  for (std::size_t i = 0; i < problem.features().size(); ++i) {
+    const Feature& f = problem.features()[i];
+    const bool parent_is_out =
+        f.parent >= 0 && state.active[static_cast<std::size_t>(f.parent)] == 0;
+    if (state.active[i] != 0 && !parent_is_out) continue;
+    cost += 0.5 * f.free_twice_cost;
+    if (!parent_is_out) cost += ClutterCost(problem, f);
   }
-  return log_det + 2.0 * log_measure;
+  return cost;
 }
 
-CameraPose PoseAt(const JointEvidence& e, const JointState& state, const CameraPose& convention) {
-  PoseHypothesis h;
-  FillPose(e, state, OriginInPlane(e, state, convention), &h);
-  return h.cam_from_world;
+bool DropOutliers(const JointProblem& problem, State* state) {
+  std::vector<int> dropped;
+  ForEachCurve(problem, *state,
+               [&](int f, const ImagePoints& points, const std::vector<double>& distances) {
+                 const auto inliers = std::count_if(distances.begin(), distances.end(),
+                                                    [&](double d) { return IsInlier(d, points); });
+                 const bool is_circle =
+                     problem.features()[static_cast<std::size_t>(f)].kind == Feature::Kind::kCircle;
+                 // One end of a segment may well be off.
+                 const bool has_half = 2 * inliers >= static_cast<std::ptrdiff_t>(distances.size());
+                 if (inliers < (is_circle ? 5 : 2) && (is_circle || inliers == 0 || !has_half))
+                   dropped.push_back(f);
+               });
+  ForEachPoint(problem, *state, [&](int f, const PlanePointCost& cost, double miss) {
+    constexpr double kFar = 5.0;  // Standard deviations: no single point is so far off by chance.
+    if (!(miss <= kFar * cost.sigma_px())) dropped.push_back(f);
+  });
+  for (const int f : dropped) state->active[static_cast<std::size_t>(f)] = 0;
+  return !dropped.empty();
 }
 
-Status FillRefined(const JointEvidence& base, double log_focal, const JointEvidence& e,
-                   const CameraPose& convention, JointState state, Refined* refined) {
+double JointProblem::InlierShare(const State& state) const {
+  std::size_t inliers = 0, points = 0;
+  ForEachCurve(*this, state,
+               [&](int, const ImagePoints& set, const std::vector<double>& distances) {
+                 points += distances.size();
+                 for (const double d : distances)
+                   inliers += std::abs(d) <= kInlierSigmas * set.options().sigma_px ? 1 : 0;
+               });
+  return points > 0 ? static_cast<double>(inliers) / static_cast<double>(points) : 0.0;
+}
+
+Status FillRefined(const JointProblem& problem, State state, Refined* refined) {
+  *refined = Refined();
   PoseHypothesis* h = &refined->hypothesis;
-  const double prior_sigma = base.options.focal_sigma;
-  const double inflation = Inflation(e, state);
-  CountInliers(e, &state, h);
-
-  SharedCovariance shared;
-  if (!std::isfinite(h->cost) || !ComputeCovariance(e, state, &shared))
+  CountInliers(problem, state, h);
+  const double inflation = Inflation(problem, state);
+  h->cost = problem.Cost(state) + LeftOutCost(problem, state);
+  Linearization at(problem, state, Weighing{true, kInlierSigmas, 1.0 / inflation});
+  if (!std::isfinite(h->cost) || !at.ComputeCovariance())
     return Status::Failed("the refined pose leaves some circle or line without inliers");
-  const Eigen::Vector3d origin = OriginInPlane(e, state, convention);
-  FillPose(e, state, origin, h);
-  const Eigen::MatrixXd T = PoseFromShared(e, state, origin, shared);
-  Matrix6d covariance = inflation * T * shared.covariance * T.transpose();
-  refined->shared_log_det = shared.log_det;
-  if (prior_sigma > 0.0) {
-    FocalModel focal;
-    if (!ComputeFocalModel(base, state, log_focal, 1.0, shared.covariance, &focal)) {
-      return Status::Failed("the evidence cannot be evaluated at other focal lengths");
-    }
-    FillFocal(focal, log_focal, inflation, prior_sigma, T, h, &covariance);
-    refined->notes.push_back(FocalNote(*h, prior_sigma));
-    refined->shared_log_det += 2.0 * std::log(h->focal_sigma / h->focal_scale);
-  }
+  const CameraPose pose = problem.PoseAt(state);
+  h->metric = problem.IsMetric(state);
+  h->origin_observed = problem.origin_observed();
+  h->cam_from_world.rotation = pose.rotation;
+  h->cam_from_world.translation = h->metric ? pose.translation : pose.translation.normalized();
+  const Eigen::MatrixXd T = PoseFromShared(problem, state, at);
+  const Matrix6d covariance = T * at.covariance() * T.transpose();
   Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
-  FillFreeDirections(T, shared.null_space, h);
+  FillFreeDirections(problem, T, at, h);
   h->rank = CovarianceRank(covariance);
-  FillFeatures(e, state, h->cam_from_world.translation.norm() / origin.norm(), h);
-  FillNotes(e, state, &refined->notes);
-  FillTerms(e, state, shared, refined);
-  h->log_det = LogDet(*refined, refined->left_out);
-  const bool is_finite = covariance.allFinite() && h->cam_from_world.rotation.allFinite() &&
-                         h->cam_from_world.translation.allFinite() && std::isfinite(h->log_det);
+  FillCircles(problem, state, refined);
+  FillPencils(problem, state, at, T, h);
+  FillFocal(problem, state, at, T, refined);
+  FillLeftOut(problem, state, refined);
+  h->log_det = LogDet(problem, at);
+  const bool is_finite = covariance.allFinite() && pose.rotation.allFinite() &&
+                         pose.translation.allFinite() && std::isfinite(h->log_det);
+  refined->state = std::move(state);
   return is_finite ? Status::Ok() : Status::Failed("the refinement left the range of numbers");
 }
 

@@ -1,4 +1,4 @@
-// What the joint problem says at its minimum: a hypothesis with its uncertainty, and in words.
+// What the joint problem says at a minimum: a hypothesis with its uncertainty, and in words.
 // Internal: not installed.
 #ifndef CIRCLINE_REFINE_JOINT_RESULT_H_
 #define CIRCLINE_REFINE_JOINT_RESULT_H_
@@ -9,41 +9,30 @@
 
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
-#include "circline/refine/joint_evidence.h"
-#include "circline/refine/reduced_problem.h"
+#include "circline/refine/joint_problem.h"
 
 namespace circline {
 
-// A hypothesis without probability, and what it takes to compare it with others.
+// A hypothesis without probability. Its log_det is that of the covariance of the rotation (and of
+// the focal length, where that is estimated): volumes of all else, measured on the photo, are alike
+// whatever the pose, and what a feature left out would have said of the rotation is in its
+// LeftOutCost.
 struct Refined {
   PoseHypothesis hypothesis;
-  // Log determinants of the covariance of the shared unknowns and of what each circle, then each
-  // line, has of its own; the same features that the hypothesis does not explain; circles' radii.
-  double shared_log_det = 0.0;
-  std::vector<double> own_log_det;
-  std::vector<std::uint8_t> left_out;
-  std::vector<double> radii;
-  std::vector<int> radius_blocks;  // Circles with the same one share their radius; -1: its own.
+  State state;
   std::vector<std::string> notes;  // What was left out, and why.
 };
 
-// Log determinant of the covariance of all unknowns but those of the features left out, in
-// parameters in which a scene is as likely anywhere: rotations by their invariant measure, the
-// first circle's centre uniform in space in units of its radius, the others in the plane in the
-// same unit, radii (a shared one once) by their logarithm. Hypotheses compare on the features that
-// all of them explain.
-double LogDet(const Refined& refined, const std::vector<std::uint8_t>& left_out);
+// Fills everything but the probability from a minimum. Not ok: no feature has inliers, or some
+// number is not finite.
+Status FillRefined(const JointProblem& problem, State state, Refined* refined);
 
-// The pose of a state. Where evidence does not fix the origin, it is the point of the plane that
-// `convention` has there.
-CameraPose PoseAt(const JointEvidence& evidence, const JointState& state,
-                  const CameraPose& convention);
+// Makes features inactive that are outliers as a whole; true where there were any.
+bool DropOutliers(const JointProblem& problem, State* state);
 
-// Fills everything but the hypothesis' cost, which `refined` has already, at the minimum `state` of
-// `evidence`: that of `base`, seen with focal lengths exp(log_focal) times as long. Not ok: some
-// number is not finite, or some feature has no inliers.
-Status FillRefined(const JointEvidence& base, double log_focal, const JointEvidence& evidence,
-                   const CameraPose& convention, JointState state, Refined* refined);
+// What all features left out cost together: their own free fits, and what clutter would cost. A
+// feature is clutter with a probability of one in fifty; clutter may have any direction.
+double LeftOutCost(const JointProblem& problem, const State& state);
 
 }  // namespace circline
 

@@ -1,244 +1,279 @@
-#include "circline/refine/joint_start.h"
-
+// Where a refinement starts: every unknown at a seed's plane, from the points themselves. (A free
+// conic of a short arc says nothing of its circle; its points in the plane do.)
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
 
-#include "circline/estimators/random.h"
+#include "circline/refine/block_chain.h"
+#include "circline/refine/joint_problem.h"
 
 namespace circline {
 namespace {
 
-const PointSet& SetOf(const JointEvidence& e, int index) {
-  return e.sets[static_cast<std::size_t>(index)];
+// Circle of least squares of x^2 + y^2 + .. (Kasa 1976): (cx, cy, r). False for points in line.
+bool FitPlaneCircle(const std::vector<Eigen::Vector2d>& points, Eigen::Vector3d* circle) {
+  const double n = static_cast<double>(points.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& p : points) mean += p / n;
+  Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d b = Eigen::Vector2d::Zero();
+  double squared = 0.0;
+  for (const Eigen::Vector2d& p : points) {
+    const Eigen::Vector2d d = p - mean;
+    A += d * d.transpose();
+    b += 0.5 * d.squaredNorm() * d;
+    squared += d.squaredNorm() / n;
+  }
+  constexpr double kInLine = 1e-12;
+  if (!(A.determinant() > kInLine * A.trace() * A.trace())) return false;
+  const Eigen::Vector2d center = A.inverse() * b;
+  *circle << mean + center, std::sqrt(squared + center.squaredNorm());
+  return circle->allFinite();
 }
 
-// Circle of the plane like a fitted conic: seen in the plane this is an ellipse, and a circle where
-// the plane's normal is one of the conic's.
-bool PlaneCircle(const Eigen::Matrix3d& R, double facing, const Eigen::Matrix3d& conic,
-                 double* cx_cy_radius) {
-  const Eigen::Vector3d d(1.0, 1.0, facing);
-  const Eigen::Matrix3d in_plane = d.asDiagonal() * R.transpose() * conic * R * d.asDiagonal();
-  Ellipse ellipse;
-  if (!ConicToEllipse(in_plane, &ellipse)) return false;
-  cx_cy_radius[0] = ellipse.center.x();
-  cx_cy_radius[1] = ellipse.center.y();
-  cx_cy_radius[2] = std::sqrt(ellipse.a * ellipse.b);
-  return true;
-}
-
-// An ellipse that the plane cannot explain (across or beyond the horizon) is an outlier of this
-// seed; the seed is refused only where that leaves no circle.
-bool InitializeCircles(const JointEvidence& e, JointState* state) {
-  std::size_t left_out = 0;
-  for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    const CircleTerm& t = e.circles[i];
-    double circle[3];
-    const ConicFit& fit = *e.observations.circles[static_cast<std::size_t>(t.observation)].fit;
-    if (!PlaneCircle(state->rotation, state->facing, fit.conic, circle) ||
-        !((state->rotation * Eigen::Vector3d(circle[0], circle[1], state->facing)).z() > 0.0)) {
-      state->circle_left_out[i] = 1;
-      left_out += SetOf(e, t.set).is_contaminated ? 0 : 1;  // Else it has another chance.
-      continue;
-    }
-    double* center = state->At(t.center);
-    std::copy(circle, circle + 2, center);
-    (t.radius < 0 ? center[2] : state->At(t.radius)[0]) = circle[2] / t.factor;
-  }
-  return e.circles.empty() || left_out < e.circles.size();
-}
-
-// The angle of the line whose interpretation plane has (about) the normal m in the world frame.
-void SetAngle(const LineTerm& t, const Eigen::Vector3d& m, JointState* state) {
-  double* angle = state->At(t.angle);
-  if (t.kind == LineKind::kFixedDirection) {
-    angle[0] = std::atan2(m.dot(t.b), m.dot(t.a));
-  } else if (t.kind == LineKind::kInPlane) {
-    const double theta = state->At(t.shared)[0];
-    angle[0] = std::atan2(m.z(), -std::sin(theta) * m.x() + std::cos(theta) * m.y());
-  } else {
-    angle[0] = std::atan2(-m.x(), m.y());  // A diameter.
-  }
-}
-
-// The ends of the known lengths. One that does not lie in the plane in front of the camera is an
-// outlier of this seed, with both its ends.
-void InitializeLengths(const JointEvidence& e, JointState* state) {
-  for (std::size_t i = 0; i < e.lengths.size(); ++i) {
-    bool is_placed = true;
-    for (const int block : {e.lengths[i].a, e.lengths[i].b}) {
-      const auto point = std::find_if(e.points.begin(), e.points.end(),
-                                      [block](const PointTerm& p) { return p.point == block; });
-      is_placed = PlanePoint(state->rotation, state->facing, point->measured.x.Homogeneous(),
-                             state->At(block)) &&
-                  is_placed;
-    }
-    if (is_placed) continue;
-    state->length_left_out[i] = 1;
-    for (std::size_t k = 0; k < e.points.size(); ++k) {
-      if (e.points[k].point == e.lengths[i].a || e.points[k].point == e.lengths[i].b)
-        state->point_left_out[k] = 1;
-    }
-  }
-}
-
-// Plane distances per world unit, where no circle of known radius has set it already; 0 where
-// nothing does.
-void InitializeScale(const JointEvidence& e, JointState* state) {
-  if (e.scale < 0) return;
-  double* scale = state->At(e.scale);
-  for (std::size_t i = 0; i < e.lengths.size() && !(scale[0] > 0.0); ++i) {
-    if (state->length_left_out[i] != 0) continue;
-    const double* a = state->At(e.lengths[i].a);
-    const double* b = state->At(e.lengths[i].b);
-    scale[0] = std::hypot(a[0] - b[0], a[1] - b[1]) / e.lengths[i].length;
-  }
-}
-
-// --- Where a fit may have followed outliers ---
-
-// The position of a line, tried at points of it one after the other: the one that explains most.
-void ReconsiderLine(const JointEvidence& e, const LineTerm& t, JointState* state) {
-  const PointSet& set = SetOf(e, t.set);
-  // Something that every line of the pencil contains, in the world frame.
-  Eigen::Vector3d common = t.a.cross(t.b);
-  if (t.kind == LineKind::kInPlane) {
-    const double theta = state->At(t.shared)[0];
-    common = Eigen::Vector3d(std::cos(theta), std::sin(theta), 0.0);
-  } else if (t.kind == LineKind::kDiameter) {
-    common = Eigen::Vector3d(state->At(t.shared)[0], state->At(t.shared)[1], state->facing);
-  }
-  const bool is_axis = t.angle < 0;
-  double* value =
-      is_axis ? state->At(t.shared) + (t.kind == LineKind::kXAxis ? 1 : 0) : state->At(t.angle);
-  const auto cost = [&] {
-    Eigen::Matrix3d dm;
-    const Eigen::Vector3d m = LineNormal(t, *state, &dm);
-    return EvaluateLine(set, SetWeighing(), state->rotation, m, dm, nullptr);
-  };
-  double best = *value, least = cost();
-  constexpr std::size_t kTrials = 24;
-  const std::size_t stride = 1 + (set.points.size() - 1) / kTrials;
-  for (std::size_t i = 0; i < set.points.size(); i += stride) {
-    const Eigen::Vector3d ray = set.points[i].Homogeneous();
-    if (is_axis) {
-      double xy[2];
-      if (!PlanePoint(state->rotation, state->facing, ray, xy)) continue;
-      *value = xy[t.kind == LineKind::kXAxis ? 1 : 0];
-    } else {
-      SetAngle(t, common.cross(state->rotation.transpose() * ray), state);
-    }
-    const double trial = cost();
-    if (trial < least) {
-      least = trial;
-      best = *value;
-    }
-  }
-  *value = best;
-}
-
-// Circle through three points of the plane; false where they are in line.
-bool CircleThrough(const std::array<Eigen::Vector2d, 3>& p, double* cx_cy_radius) {
-  const Eigen::Vector2d a = p[1] - p[0], b = p[2] - p[0];
-  const double cross = a.x() * b.y() - a.y() * b.x();
-  if (!(std::abs(cross) > 1e-9 * a.norm() * b.norm())) return false;
-  const Eigen::Vector2d from_first =
-      Eigen::Vector2d(b.y() * a.squaredNorm() - a.y() * b.squaredNorm(),
-                      a.x() * b.squaredNorm() - b.x() * a.squaredNorm()) /
-      (2.0 * cross);
-  cx_cy_radius[0] = p[0].x() + from_first.x();
-  cx_cy_radius[1] = p[0].y() + from_first.y();
-  cx_cy_radius[2] = from_first.norm();
-  return true;
-}
-
-// A circle of its own in the plane, tried through triples of its points.
-void ReconsiderCircle(const JointEvidence& e, std::size_t index, JointState* state) {
-  const CircleTerm& t = e.circles[index];
-  if (t.radius >= 0) return;  // Its centre or radius is not its own.
-  const PointSet& set = SetOf(e, t.set);
-  std::vector<Eigen::Vector2d> in_plane;
-  for (const CalibratedPoint& p : set.points) {
-    const Eigen::Vector2d x = set.scale * p.x + set.shift;
-    double xy[2];
-    if (PlanePoint(state->rotation, state->facing, x.homogeneous(), xy))
-      in_plane.emplace_back(xy[0], xy[1]);
-  }
-  if (in_plane.size() < 5) return;
-  double* circle = state->At(t.center);
-  const auto cost = [&](const double* c) {
-    return EvaluateCircle(set, SetWeighing(), state->rotation, state->facing, c[0], c[1], c[2],
-                          nullptr);
-  };
-  double least =
-      state->circle_left_out[index] != 0 ? std::numeric_limits<double>::infinity() : cost(circle);
-  Random random(1);
-  constexpr int kTrials = 60;
-  for (int i = 0; i < kTrials; ++i) {
-    std::array<Eigen::Vector2d, 3> sample;
-    for (Eigen::Vector2d& p : sample)
-      p = in_plane[static_cast<std::size_t>(random.UniformInt(static_cast<int>(in_plane.size())))];
-    double trial[3];
-    if (!CircleThrough(sample, trial)) continue;
-    const double value = cost(trial);
-    if (!(value < least)) continue;
-    least = value;
-    std::copy(trial, trial + 3, circle);
-    state->circle_left_out[index] = 0;
-  }
-}
-
-void Reconsider(const JointEvidence& e, JointState* state) {
-  for (const LineTerm& t : e.lines) {
-    if (SetOf(e, t.set).is_contaminated) ReconsiderLine(e, t, state);
-  }
-  for (std::size_t i = 0; i < e.circles.size(); ++i) {
-    if (SetOf(e, e.circles[i].set).is_contaminated) ReconsiderCircle(e, i, state);
-  }
+// A ray of the camera as given, seen through one with another focal length (distortion left out).
+Eigen::Vector3d Refocused(const Eigen::Vector3d& ray, double log_focal) {
+  const double shrink = std::exp(-log_focal);
+  return {shrink * ray.x(), shrink * ray.y(), ray.z()};
 }
 
 }  // namespace
 
-bool PlanePoint(const Eigen::Matrix3d& R, double facing, const Eigen::Vector3d& ray, double* xy) {
-  const Eigen::Vector3d y = R.transpose() * ray;
-  const double depth = facing * y.z();
-  if (!(depth > 1e-9 * y.norm())) return false;
-  xy[0] = y.x() / depth;
-  xy[1] = y.y() / depth;
+bool JointProblem::PlanePoint(const State& state, const Eigen::Vector3d& ray, double* xy) const {
+  const CameraPose pose = PoseAt(state);
+  const Eigen::Vector3d n = pose.rotation.col(2);
+  const double along = n.dot(ray), distance = n.dot(pose.translation);
+  constexpr double kHorizon = 1e-9;
+  if (!(along * distance > kHorizon * std::abs(distance) * ray.norm())) return false;
+  const Eigen::Vector3d X = pose.rotation.transpose() * (distance / along * ray - pose.translation);
+  xy[0] = X.x();
+  xy[1] = X.y();
   return true;
 }
 
-Status InitializeState(const JointEvidence& e, const CameraPose& seed, JointState* state) {
-  state->rotation = seed.rotation;
-  state->facing = seed.rotation.col(2).dot(seed.translation) > 0.0 ? 1.0 : -1.0;
-  state->values.assign(e.parameters.size(), {0.0, 0.0, 0.0});
-  state->circle_left_out.assign(e.circles.size(), 0);
-  state->line_left_out.assign(e.lines.size(), 0);
-  state->point_left_out.assign(e.points.size(), 0);
-  state->length_left_out.assign(e.lengths.size(), 0);
-  const auto place = [&](const Eigen::Vector3d& ray, int block) {
-    return PlanePoint(state->rotation, state->facing, ray, state->At(block));
+bool JointProblem::Ray(const Eigen::Vector2d& pixel, const double* camera,
+                       Eigen::Vector3d* ray) const {
+  CalibratedPoint p;
+  if (!PixelToCalibrated(observations_.camera, pixel, &p)) return false;
+  *ray = Refocused(p.Homogeneous(), camera[0]);
+  return true;
+}
+
+// Returns how many circles could be placed; the others are inactive.
+int JointProblem::PlaceCircles(const CameraPose& seed, const double* camera, State* state) const {
+  const Eigen::Vector3d n = seed.rotation.col(2);
+  const double distance = n.dot(seed.translation);
+  int placed = 0;
+  std::vector<Eigen::Vector2d> in_plane;
+  for (const CircleBlocks& c : circles_) {
+    const auto f = static_cast<std::size_t>(c.feature);
+    if (state->active[f] == 0) continue;
+    const auto& cost =
+        static_cast<const PlaneCircleContourCost&>(*terms_[static_cast<std::size_t>(c.term)].cost);
+    in_plane.clear();
+    bool in_front = true;
+    for (const CalibratedPoint& p : cost.points()->points()) {
+      const Eigen::Vector3d ray = Refocused(p.Homogeneous(), camera[0]);
+      const double depth = distance / n.dot(ray);
+      in_front = in_front && depth > 0.0 && std::isfinite(depth);
+      const Eigen::Vector3d X = seed.rotation.transpose() * (depth * ray - seed.translation);
+      in_plane.emplace_back(X.x(), X.y());
+    }
+    Eigen::Vector3d circle;
+    if (!in_front || !FitPlaneCircle(in_plane, &circle) ||
+        !((seed.rotation * Eigen::Vector3d(circle.x(), circle.y(), 0.0) + seed.translation).z() >
+          0.0)) {
+      state->active[f] = 0;
+      continue;
+    }
+    ++placed;
+    double* center = state->x.data() + blocks_[static_cast<std::size_t>(c.center)].offset;
+    double* radius = state->x.data() + blocks_[static_cast<std::size_t>(c.radius)].offset;
+    if (!blocks_[static_cast<std::size_t>(c.center)].is_constant)
+      std::copy(circle.data(), circle.data() + 2, center);
+    const bool is_at_origin =
+        center_at_origin_ >= 0 &&
+        c.center == circles_[static_cast<std::size_t>(center_at_origin_)].center;
+    if (is_at_origin && placed_origin_.empty()) placed_origin_.assign({circle.x(), circle.y()});
+    const double known = observations_.circles[static_cast<std::size_t>(c.observation)].radius;
+    if (known > 0.0) {
+      scales_.push_back(known / circle.z());
+    } else {
+      radius[0] = circle.z();
+    }
+  }
+  return placed;
+}
+
+// Moves the world origin to where the evidence has it. False where that lies beyond the horizon.
+bool JointProblem::PlaceOrigin(const double* camera, State* state) const {
+  double xy[2] = {0.0, 0.0};
+  const FrameObservation& frame = observations_.frame;
+  Eigen::Vector3d ray;
+  if (!placed_origin_.empty()) {
+    std::copy(placed_origin_.begin(), placed_origin_.end(), xy);
+  } else if (frame.origin && center_at_origin_ < 0) {
+    if (!Ray(*frame.origin, camera, &ray) || !PlanePoint(*state, ray, xy)) return false;
+  } else if (frame.x_axis && frame.y_axis && center_at_origin_ < 0) {
+    Eigen::Vector3d ends[4];
+    const bool seen =
+        Ray((*frame.x_axis)[0], camera, &ends[0]) && Ray((*frame.x_axis)[1], camera, &ends[1]) &&
+        Ray((*frame.y_axis)[0], camera, &ends[2]) && Ray((*frame.y_axis)[1], camera, &ends[3]);
+    ray = ends[0].cross(ends[1]).cross(ends[2].cross(ends[3]));
+    if (ray.z() < 0.0) ray = -ray;
+    if (!seen || !PlanePoint(*state, ray, xy)) return false;
+  }
+  const Eigen::Matrix3d R = PoseAt(*state).rotation;
+  Eigen::Map<Eigen::Vector3d> t(state->x.data() + blocks_[kTranslation].offset);
+  t += R * Eigen::Vector3d(xy[0], xy[1], 0.0);
+  std::vector<std::uint8_t> moved(blocks_.size(), 0);
+  for (const CircleBlocks& c : circles_) {
+    const auto block = static_cast<std::size_t>(c.center);
+    if (blocks_[block].is_constant || moved[block] != 0) continue;
+    moved[block] = 1;
+    double* center = state->x.data() + blocks_[block].offset;
+    center[0] -= xy[0];
+    center[1] -= xy[1];
+  }
+  return t.z() > 0.0 || !frame.origin;
+}
+
+// The ends of known lengths, then the unit of all: metric, or such that t is a unit vector.
+void JointProblem::PlaceScale(const double* camera, State* state) const {
+  for (const LengthBlocks& l : lengths_) {
+    Eigen::Vector3d ray;
+    bool placed = true;
+    double* ends[2] = {state->x.data() + blocks_[static_cast<std::size_t>(l.a)].offset,
+                       state->x.data() + blocks_[static_cast<std::size_t>(l.b)].offset};
+    const Segment& pixels = observations_
+                                .known_lengths[static_cast<std::size_t>(
+                                    features_[static_cast<std::size_t>(l.feature)].observation)]
+                                .points;
+    for (std::size_t k = 0; k < 2; ++k)
+      placed = Ray(pixels[k], camera, &ray) && PlanePoint(*state, ray, ends[k]) && placed;
+    const double length = std::hypot(ends[0][0] - ends[1][0], ends[0][1] - ends[1][1]);
+    if (!placed || !(length > 0.0)) {
+      state->active[static_cast<std::size_t>(l.feature)] = 0;
+    } else if (state->active[static_cast<std::size_t>(l.feature)] != 0) {
+      scales_.push_back(l.length / length);
+    }
+  }
+  Eigen::Map<Eigen::Vector3d> t(state->x.data() + blocks_[kTranslation].offset);
+  double scale = 1.0 / t.norm();
+  if (!scales_.empty()) {
+    const auto middle = scales_.begin() + static_cast<std::ptrdiff_t>(scales_.size() / 2);
+    std::nth_element(scales_.begin(), middle, scales_.end());
+    scale = *middle;
+  }
+  t *= scale;
+  std::vector<std::uint8_t> scaled(blocks_.size(), 0);
+  const auto apply = [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    if (blocks_[i].is_constant || scaled[i] != 0) return;
+    scaled[i] = 1;
+    double* values = state->x.data() + blocks_[i].offset;
+    for (int k = 0; k < blocks_[i].size; ++k) values[k] *= scale;
   };
-  if (e.origin >= 0 && !place(seed.translation, e.origin))
-    return Status::Refused("the origin lies beyond the horizon of the plane");
-  if (!InitializeCircles(e, state))
+  for (const CircleBlocks& c : circles_) {
+    apply(c.center);
+    if (!(observations_.circles[static_cast<std::size_t>(c.observation)].radius > 0.0))
+      apply(c.radius);
+  }
+  for (const LengthBlocks& l : lengths_) {
+    apply(l.a);
+    apply(l.b);
+  }
+}
+
+void JointProblem::PlaceLines(const double* camera, State* state) const {
+  const Eigen::Matrix3d R = PoseAt(*state).rotation;
+  for (const PencilBlocks& p : pencils_) {
+    if (p.observation < 0) continue;
+    const PencilObservation& pencil =
+        observations_.pencils[static_cast<std::size_t>(p.observation)];
+    if (pencil.direction != PencilDirection::kFree) continue;
+    Eigen::Vector3d d = R.transpose() * Refocused(pencil.fit->direction, camera[0]);
+    d.z() = 0.0;
+    if (!(d.norm() > 0.0)) continue;
+    d.normalize();
+    std::copy(d.data(), d.data() + 3,
+              state->x.data() + blocks_[static_cast<std::size_t>(p.direction)].offset);
+  }
+  const double* parameters[8];
+  for (const LineBlocks& l : lines_) {
+    std::uint8_t& is_active = state->active[static_cast<std::size_t>(l.feature)];
+    if (is_active == 0) continue;
+    const Term& term = terms_[static_cast<std::size_t>(l.term)];
+    Parameters(term, *state, parameters);
+    double* line = state->x.data() + blocks_[static_cast<std::size_t>(l.line)].offset;
+    if (!static_cast<const DirectionLineCost&>(*term.cost).Start(parameters, line)) is_active = 0;
+  }
+  for (const PlaneLineBlocks& l : plane_lines_) {
+    const Block& angle = blocks_[static_cast<std::size_t>(l.angle)];
+    if (angle.is_constant) continue;
+    const double grow = std::exp(camera[0]);
+    const Eigen::Vector3d line(grow * l.fit.x(), grow * l.fit.y(), l.fit.z());
+    const Eigen::Vector3d d = R.transpose() * R.col(2).cross(line);
+    state->x[static_cast<std::size_t>(angle.offset)] = std::atan2(d.y(), d.x());
+  }
+}
+
+// Lines and circles do not tell the senses of the axes, and circles alone no axes: seeds take them
+// by convention. What a prior says of them is more than that.
+Eigen::Matrix3d JointProblem::SenseOfPriors(const CameraPose& seed) const {
+  const FrameObservation& frame = observations_.frame;
+  if (pose_priors_.empty() || frame.x_axis || frame.y_axis) return seed.rotation;
+  constexpr int kSpins = 16;
+  constexpr double kTurn = 6.283185307179586 / kSpins;
+  Eigen::Matrix3d best = seed.rotation;
+  double least = std::numeric_limits<double>::infinity();
+  for (const double face : {0.0, 0.5 * kSpins * kTurn}) {
+    for (int spin = 0; spin < kSpins; spin += x_is_seen_ ? kSpins / 2 : 1) {
+      const Eigen::Matrix3d R = seed.rotation *
+                                Eigen::AngleAxisd(spin * kTurn, Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(face, Eigen::Vector3d::UnitX());
+      const Eigen::Quaterniond q(R);
+      const double* parameters[2] = {q.coeffs().data(), seed.translation.data()};
+      double cost = 0.0, r[6];
+      for (const int index : pose_priors_) {
+        const ceres::CostFunction& prior = *terms_[static_cast<std::size_t>(index)].cost;
+        if (!prior.Evaluate(parameters, r, nullptr)) return seed.rotation;
+        cost += Eigen::Map<const Eigen::VectorXd>(r, prior.num_residuals()).squaredNorm();
+      }
+      // Nothing but a clear word of the prior's turns the plane's normal round.
+      constexpr double kClear = 25.0;
+      if (!(cost + (face > 0.0 ? kClear : 0.0) < least)) continue;
+      least = cost;
+      best = R;
+    }
+  }
+  return best;
+}
+
+Status JointProblem::Start(const CameraPose& given, double log_focal,
+                           const std::vector<std::uint8_t>& reading, State* state) const {
+  CameraPose seed = given;
+  seed.rotation = SenseOfPriors(given);
+  state->x = defaults_;
+  state->active = reading;
+  scales_.clear();
+  placed_origin_.clear();
+  if (camera_is_estimated_) state->x[static_cast<std::size_t>(blocks_[kCamera].offset)] = log_focal;
+  Eigen::Map<Eigen::Quaterniond>(state->x.data() + blocks_[kRotation].offset) =
+      Eigen::Quaterniond(seed.rotation).normalized();
+  Eigen::Map<Eigen::Vector3d>(state->x.data() + blocks_[kTranslation].offset) = seed.translation;
+  const double* camera = state->x.data() + blocks_[kCamera].offset;
+  const int placed = PlaceCircles(seed, camera, state);
+  if (!circles_.empty() && placed == 0) {
     return Status::Refused(
         "no circle can lie in the plane: each crosses its horizon or lies beyond");
-  for (const auto& [id, theta] : e.thetas) {
-    const PencilObservation& pencil =
-        e.observations.pencils[static_cast<std::size_t>(FindPencil(e.observations, id))];
-    const Eigen::Vector3d v = state->rotation.transpose() * pencil.fit->direction;
-    state->At(theta)[0] = std::atan2(v.y(), v.x());
   }
-  for (const LineTerm& term : e.lines) {
-    if (term.angle >= 0) SetAngle(term, state->rotation.transpose() * term.line, state);
-  }
-  InitializeLengths(e, state);
-  InitializeScale(e, state);
-  Reconsider(e, state);
+  if (!PlaceOrigin(camera, state))
+    return Status::Refused("the origin lies beyond the horizon of the plane");
+  PlaceScale(camera, state);
+  PlaceLines(camera, state);
   return Status::Ok();
 }
 

@@ -7,222 +7,159 @@
 
 #include "circline/refine/block_chain.h"
 #include "circline/refine/cost_functions.h"
+#include "circline/refine/long_tails.h"
 #include "circline/refine/square_root.h"
 
 namespace circline {
-
-// --- Lines of one direction ---
-
 namespace {
-constexpr int kDirectionRows = 2;  // A direction has two degrees of freedom.
+
+using LineRoot = SquareRoot<CurveModel::kMaxSize>;
+
+// A variable lens can do what no line can; the camera's other shifts cannot, but for what the lens
+// bends.
+int RankOf(const ImagePoints& points, bool camera) {
+  return 2 + (camera ? points.options().num_distortion : 0);
+}
+
+// A residual under LongTails, as one that is squared: its value, and that by the residual.
+struct LongTailed {
+  double value, slope;
+
+  explicit LongTailed(double r) {
+    double rho[3];
+    LongTails().Evaluate(r * r, rho);
+    slope = std::sqrt(rho[1]);
+    value = slope * r;
+    constexpr double kNone = 1e-6;  // There they are the limits.
+    if (std::abs(r) < kNone) return;
+    value = std::copysign(std::sqrt(rho[0]), r);
+    slope = rho[1] * r / value;
+  }
+};
+
+LineRoot WriteLine(const CurveModel& model, int rank, int num_rows, double* residuals) {
+  const LineRoot root(model.h, model.g, model.twice_cost, rank, 3, 2);
+  std::fill(residuals, residuals + num_rows, 0.0);
+  Eigen::Map<Eigen::VectorXd>(residuals, root.f.size()) = root.f;
+  residuals[num_rows - 1] = root.rest;
+  return root;
+}
+
 }  // namespace
 
-ParallelLinesCost::ParallelLinesCost(std::vector<Line> lines, Options options)
-    : lines_(std::move(lines)), active_(lines_.size(), 1), options_(options) {
-  CurveModel model;
-  for (const Line& line : lines_) {
-    line.points.SumLine(line.fit, nullptr, Weighing(), {}, &model);
-    information_.push_back(model.h);
-  }
-  for (const int size : {4, 3}) mutable_parameter_block_sizes()->push_back(size);
+// --- A line of a direction ---
+
+// In the camera frame, with d the direction, the line is m + e d: m is what of the fit lies across
+// d, a unit vector, turned about d by the angle.
+struct DirectionLineCost::Placed {
+  Eigen::Matrix3d R;
+  Eigen::Vector3d in_world, line, by_angle, d;
+  Eigen::Matrix3d by_direction;  // d line / d d.
+  double e;
+};
+
+DirectionLineCost::DirectionLineCost(ImagePoints points, const Eigen::Vector3d& fit,
+                                     Options options)
+    : points_(std::move(points)), fit_(fit.normalized()), options_(options) {
+  for (const int size : {4, 3, options.direction_sigma > 0.0 ? 2 : 1})
+    mutable_parameter_block_sizes()->push_back(size);
   if (options.camera) mutable_parameter_block_sizes()->push_back(kCameraSize);
-  set_num_residuals(kDirectionRows + (options.camera ? kCameraSize : 0) + 1);
+  set_num_residuals(RankOf(points_, options.camera) + 1 + (options.direction_sigma > 0.0 ? 1 : 0));
 }
 
-// In the camera frame, with m and m' orthonormal across the direction d, a line is m + e d, m
-// turned by an angle towards m': two unknowns, of which e has a Gaussian prior, or is 0. If d moves
-// by x (across d), m becomes m - (m . x) d and e d becomes e d + e x: the direction acts through m
-// . x, against e.
-bool ParallelLinesCost::Place(std::size_t index, const Eigen::Vector3d& d, const double* camera,
-                              const Weighing& weighing, bool camera_variable, Placed* placed,
-                              bool with_model) const {
-  const Line& line = lines_[index];
-  const double sigma = options_.direction_sigma;
-  const double information = sigma > 0.0 ? 1.0 / (sigma * sigma) : 0.0;
-  // Own unknowns: the angle, and e where it is not 0.
-  const auto system = [&](const Eigen::Vector3d& turned, const Eigen::Matrix3d& h,
-                          const Eigen::Vector3d& by_line, double along, Eigen::Matrix2d* H,
-                          Eigen::Vector2d* g) {
-    Eigen::Matrix<double, 3, 2> J;
-    J << turned, d;
-    *H = J.transpose() * h * J;
-    *g = J.transpose() * by_line;
-    (*H)(1, 1) += information;
-    (*g)[1] += information * along;
-    if (!(sigma > 0.0)) {
-      (*H)(0, 1) = (*H)(1, 0) = (*g)[1] = 0.0;
-      (*H)(1, 1) = 1.0;
-    }
-    constexpr double kAnyInformation = 1e-6;  // Where all points are outliers of a bent loss.
-    (*H)(0, 0) += kAnyInformation;
-  };
-  // The quadratic model about its own fit says where to start: the fit as this camera sees it.
-  Eigen::Vector3d fit = line.fit;
-  Eigen::Matrix3d h_fit = information_[index];
-  const bool is_shifted = camera != nullptr && std::any_of(camera, camera + kCameraSize,
-                                                           [](double s) { return s != 0.0; });
-  if (is_shifted && line.points.LineThrough(camera, line.fit, &fit)) {
-    // Lines of this camera to those of the one as given, where the lens does not bend.
-    const Eigen::Vector3d back(std::exp(-camera[0]), std::exp(-camera[0] - camera[1]), 1.0);
-    const double length = back.cwiseProduct(fit).norm();
-    h_fit = back.asDiagonal() * h_fit * back.asDiagonal() / (length * length);
-  }
-  Eigen::Vector3d m = fit - d * d.dot(fit);
+bool DirectionLineCost::Place(const double* const* parameters, Placed* placed) const {
+  Placed& p = *placed;
+  p.R = RotationFromBlock(parameters[0]);
+  p.in_world = Eigen::Vector3d(parameters[1]).normalized();
+  const Eigen::Vector3d d = p.d = p.R * p.in_world;
+  const double angle = parameters[2][0], along = d.dot(fit_);
+  p.e = options_.direction_sigma > 0.0 ? parameters[2][1] : 0.0;
+  Eigen::Vector3d m = fit_ - along * d;
   const double norm = m.norm();
   constexpr double kAcross = 1e-6;  // The fit runs straight across the direction.
-  if (!(norm > kAcross * fit.norm())) return false;
+  if (!(norm > kAcross)) return false;
   m /= norm;
-  const Eigen::Vector3d own_fit = fit / norm;
-  double e = sigma > 0.0 ? d.dot(own_fit) : 0.0;
-  Eigen::Vector3d turned = d.cross(m);
-  Eigen::Matrix2d H;
-  Eigen::Vector2d g;
-  const auto move = [&](const Eigen::Vector2d& x) {
-    m = (std::cos(x[0]) * m + std::sin(x[0]) * turned).normalized();
-    e += x[1];
-    turned = d.cross(m);
-  };
-  system(turned, h_fit, h_fit * (m + e * d - own_fit), e, &H, &g);
-  constexpr double kMostTurn = 0.3;  // Radians; the model is no good for more.
-  const Eigen::Vector2d first = -(H.inverse() * g);
-  if (H.determinant() > 0.0 && std::abs(first[0]) < kMostTurn) move(first);
-
-  // Newton steps, as long as the last one has shown the loss's true curvature to allow, halved
-  // where one overshoots.
-  CurveModel model;
-  constexpr int kMaxSteps = 30;
-  constexpr double kConverged = 1e-8;  // Of cost.
-  const auto cost_at = [&](const Eigen::Vector3d& across, double along, CurveModel* out) {
-    return line.points.SumLine(across + along * d, camera, weighing, {}, out) +
-           information * along * along;
-  };
-  double twice_cost = cost_at(m, e, &model);
-  Eigen::Vector2d last_step = Eigen::Vector2d::Zero(), last_g = Eigen::Vector2d::Zero();
-  double last_curvature = 0.0;  // Of the model, along the last step.
-  for (int step = 0; step < kMaxSteps; ++step) {
-    if (!std::isfinite(twice_cost)) return false;
-    system(turned, model.h, model.g, e, &H, &g);
-    if (!(H.determinant() > 0.0)) break;
-    Eigen::Vector2d x = -(H.inverse() * g);
-    if (!(-g.dot(x) > kConverged)) break;
-    if (last_curvature > 0.0) {
-      constexpr double kLongest = 10.0;
-      const double measured = (g - last_g).dot(last_step) / last_curvature;
-      x *= std::clamp(1.0 / std::max(measured, 1.0 / kLongest), 0.2, kLongest);
-    }
-    last_g = g;
-    bool lower = false;
-    for (int half = 0; half < 6 && !lower; ++half, x *= 0.5) {
-      const Eigen::Vector3d tried = (std::cos(x[0]) * m + std::sin(x[0]) * turned).normalized();
-      const double cost = cost_at(tried, e + x[1], &model);
-      if (!(cost < twice_cost)) continue;
-      lower = true;
-      last_step = x;
-      last_curvature = x.dot(H * x);
-      move(x);
-      twice_cost = cost;
-    }
-    if (!lower) {
-      cost_at(m, e, &model);
-      break;
-    }
-  }
-  if (camera_variable) {
-    line.points.SumLine(m + e * d, camera, weighing, {false, true}, &model);
-  }
-  placed->line = m + e * d;
-  placed->across = m;
-  placed->twice_cost = twice_cost;
-  if (!with_model) return true;
-
-  // Own unknowns (angle, e), then the direction's m . x, which is -e, then the camera.
-  const int n = 1 + (camera_variable ? kCameraSize : 0);
-  Eigen::Matrix3d J;
-  J << turned, d, -(1.0 + e * e) * d;
-  return Eliminate(model, J, e, n, placed);
+  const Eigen::Vector3d turned = d.cross(m);
+  const double c = std::cos(angle), s = std::sin(angle);
+  p.line = c * m + s * turned + p.e * d;
+  p.by_angle = c * turned - s * m;
+  const Eigen::Matrix3d m_by_d = (m * m.transpose() - Eigen::Matrix3d::Identity()) / norm *
+                                 (along * Eigen::Matrix3d::Identity() + d * fit_.transpose());
+  p.by_direction = c * m_by_d + s * (CrossMatrix(d) * m_by_d - CrossMatrix(m)) +
+                   p.e * Eigen::Matrix3d::Identity();
+  return true;
 }
 
-// Chains a line's model to its own unknowns, the direction and the camera, and eliminates the
-// first.
-bool ParallelLinesCost::Eliminate(const CurveModel& model, const Eigen::Matrix3d& J, double e,
-                                  int n, Placed* placed) const {
-  const double sigma = options_.direction_sigma;
-  const double information = sigma > 0.0 ? 1.0 / (sigma * sigma) : 0.0;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3 + kCameraSize, 3 + kCameraSize> H =
-      model.h;
-  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3 + kCameraSize, 1> g = model.g;
-  H.topRows(3) = (J.transpose() * H.topRows(3)).eval();
-  H.leftCols(3) = (H.leftCols(3) * J).eval();
-  g.head(3) = (J.transpose() * g.head(3)).eval();
-  H(1, 1) += information;
-  g[1] += information * e;
-  if (!(sigma > 0.0)) {
-    H.row(1).setZero();
-    H.col(1).setZero();
-    H(1, 1) = 1.0;
-    g[1] = 0.0;
-  }
-  const Eigen::LLT<Eigen::Matrix2d> own(H.topLeftCorner<2, 2>());
-  if (own.info() != Eigen::Success) {  // Nothing known of it: all points far out.
-    placed->gradient.setZero(n);
-    placed->hessian.setZero(n, n);
-  } else {
-    const auto cross = H.topRightCorner(2, n);
-    Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 1 + kCameraSize> gain = cross;
-    own.solveInPlace(gain);
-    placed->hessian = H.bottomRightCorner(n, n) - cross.transpose() * gain;
-    placed->gradient = g.tail(n) - gain.transpose() * g.head(2);
-  }
-  placed->g = placed->gradient[0];
-  placed->h = std::max(0.0, placed->hessian(0, 0));
-  return std::isfinite(placed->g) && std::isfinite(placed->h);
-}
-
-bool ParallelLinesCost::EvaluateWith(const Weighing& weighing, const double* const* parameters,
-                                     double* residuals, double** jacobians) const {
-  const Eigen::Matrix3d R = RotationFromBlock(parameters[0]);
-  const Eigen::Vector3d in_world = Eigen::Vector3d(parameters[1]).normalized();
-  const Eigen::Vector3d d = R * in_world;
-  const double* camera = options_.camera ? parameters[2] : nullptr;
-  const bool camera_variable = options_.camera && jacobians != nullptr && jacobians[2] != nullptr;
-  const int n = 3 + (camera_variable ? kCameraSize : 0);
-  constexpr int kMax = 3 + kCameraSize;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMax, kMax> H;
-  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMax, 1> g;
-  H.setZero(n, n);
-  g.setZero(n);
-  double twice_cost = 0.0;
+void DirectionLineCost::Distances(const double* const* parameters,
+                                  std::vector<double>* distances) const {
   Placed placed;
-  for (std::size_t i = 0; i < lines_.size(); ++i) {
-    if (active_[i] == 0) continue;
-    if (!Place(i, d, camera, weighing, camera_variable, &placed, jacobians != nullptr))
-      return false;
-    twice_cost += placed.twice_cost;
-    if (jacobians == nullptr) continue;
-    const Eigen::Vector3d& m = placed.across;
-    H.topLeftCorner<3, 3>() += placed.h * m * m.transpose();
-    g.head<3>() += placed.g * m;
-    if (!camera_variable) continue;
-    const auto by_camera = placed.hessian.row(0).tail(kCameraSize);
-    H.topRightCorner(3, kCameraSize) += m * by_camera;
-    H.bottomLeftCorner(kCameraSize, 3) += by_camera.transpose() * m.transpose();
-    H.bottomRightCorner(kCameraSize, kCameraSize) +=
-        placed.hessian.bottomRightCorner(kCameraSize, kCameraSize);
-    g.tail(kCameraSize) += placed.gradient.tail(kCameraSize);
+  distances->clear();
+  if (Place(parameters, &placed))
+    points_.LineDistances(placed.line, options_.camera ? parameters[3] : nullptr, distances);
+}
+
+bool DirectionLineCost::Start(const double* const* parameters, double* line) const {
+  const int own = parameter_block_sizes()[2];
+  const double* with[4] = {parameters[0], parameters[1], line,
+                           options_.camera ? parameters[3] : nullptr};
+  // Two steps without loss.
+  constexpr double kAll = 1e12;  // Standard deviations.
+  const Weighing wide{true, kAll, 1.0, 1.0};
+  constexpr int kSteps = 2;
+  constexpr int kMaxRows = CurveModel::kMaxSize + 2;
+  std::fill(line, line + own, 0.0);
+  for (int step = 0; step < kSteps; ++step) {
+    double residuals[kMaxRows], by_line[2 * kMaxRows];
+    double* jacobians[4] = {nullptr, nullptr, by_line, nullptr};
+    if (!EvaluateWith(wide, with, residuals, jacobians)) return false;
+    // By the angle alone: the deviation starts where its prior is narrow.
+    double h = 0.0, g = 0.0;
+    for (int row = 0; row < num_residuals(); ++row) {
+      h += by_line[own * row] * by_line[own * row];
+      g += by_line[own * row] * residuals[row];
+    }
+    if (!(h > 0.0)) return false;
+    constexpr double kMostTurn = 0.3;  // Radians; the model is no good for more.
+    if (!(std::abs(g / h) < kMostTurn)) return true;
+    line[0] -= g / h;
   }
+  return true;
+}
+
+bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* const* parameters,
+                                     double* residuals, double** jacobians) const {
+  Placed p;
+  if (!Place(parameters, &p)) return false;
+  const bool soft = options_.direction_sigma > 0.0;
+  const bool camera_variable = options_.camera && jacobians != nullptr && jacobians[3] != nullptr;
+  CurveModel model;
+  const double twice_cost =
+      points_.SumLine(p.line, options_.camera ? parameters[3] : nullptr, weighing, camera_variable,
+                      jacobians != nullptr ? &model : nullptr);
+  if (!std::isfinite(twice_cost)) return false;
+  const int rows = num_residuals(), line_rows = rows - (soft ? 1 : 0);
+  const double deviation = soft ? p.e / options_.direction_sigma : 0.0;
+  const LongTailed prior(deviation);
+  if (soft) residuals[line_rows] = weighing.inliers_only ? deviation : prior.value;
   if (jacobians == nullptr) {
-    CostOnly(twice_cost, num_residuals(), residuals);
+    CostOnly(twice_cost, line_rows, residuals);
     return true;
   }
-  const SquareRoot<kMax> root(H, g, twice_cost, n - 1);
-  std::fill(residuals, residuals + num_residuals(), 0.0);
-  Eigen::Map<Eigen::VectorXd>(residuals, root.f.size()) = root.f;
-  residuals[num_residuals() - 1] = root.rest;
-  const auto by_direction = root.U.leftCols(3);
-  WriteJacobian(by_direction * (-R * CrossMatrix(in_world)) * DeltaFromQuaternion(parameters[0]),
-                num_residuals(), 0, jacobians);
-  WriteJacobian(by_direction * R, num_residuals(), 1, jacobians);
-  if (camera_variable) WriteJacobian(root.U.rightCols(kCameraSize), num_residuals(), 2, jacobians);
+  const LineRoot root = WriteLine(model, RankOf(points_, camera_variable), line_rows, residuals);
+  const auto U = root.U.leftCols(3);
+  WriteJacobian(
+      U * (p.by_direction * (-p.R * CrossMatrix(p.in_world))) * DeltaFromQuaternion(parameters[0]),
+      rows, 0, jacobians);
+  WriteJacobian(U * (p.by_direction * p.R), rows, 1, jacobians);
+  if (camera_variable) WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, 3, jacobians);
+  if (jacobians[2] == nullptr) return true;
+  Eigen::Matrix<double, 3, 2> by_own;
+  by_own << p.by_angle, p.d;
+  WriteJacobian(U * by_own.leftCols(soft ? 2 : 1), rows, 2, jacobians);
+  if (soft) {
+    jacobians[2][2 * line_rows + 1] =
+        (weighing.inliers_only ? 1.0 : prior.slope) / options_.direction_sigma;
+  }
   return true;
 }
 
@@ -232,7 +169,7 @@ PlaneLineCost::PlaneLineCost(ImagePoints points, bool camera)
     : points_(std::move(points)), has_camera_(camera) {
   for (const int size : {4, 3, 2, 1}) mutable_parameter_block_sizes()->push_back(size);
   if (camera) mutable_parameter_block_sizes()->push_back(kCameraSize);
-  set_num_residuals(2 + (camera ? kCameraSize : 0) + 1);
+  set_num_residuals(RankOf(points_, camera) + 1);
 }
 
 namespace {
@@ -252,33 +189,29 @@ struct PlaneLine {
 
 }  // namespace
 
-Eigen::Vector3d PlaneLineCost::ImageOf(const double* const* parameters) {
+void PlaneLineCost::Distances(const double* const* parameters,
+                              std::vector<double>* distances) const {
   const PlaneLine line(parameters);
-  return line.p.cross(line.d);
+  points_.LineDistances(line.p.cross(line.d), has_camera_ ? parameters[4] : nullptr, distances);
 }
 
 bool PlaneLineCost::EvaluateWith(const Weighing& weighing, const double* const* parameters,
                                  double* residuals, double** jacobians) const {
   const PlaneLine line(parameters);
-  const ImagePoints::Variables variables{
-      false, has_camera_ && jacobians != nullptr && jacobians[4] != nullptr};
+  const bool camera_variable = has_camera_ && jacobians != nullptr && jacobians[4] != nullptr;
   CurveModel model;
   const double twice_cost =
       points_.SumLine(line.p.cross(line.d), has_camera_ ? parameters[4] : nullptr, weighing,
-                      variables, jacobians != nullptr ? &model : nullptr);
+                      camera_variable, jacobians != nullptr ? &model : nullptr);
   if (!std::isfinite(twice_cost)) return false;
+  const int rows = num_residuals();
   if (jacobians == nullptr) {
-    CostOnly(twice_cost, num_residuals(), residuals);
+    CostOnly(twice_cost, rows, residuals);
     return true;
   }
-  const int rank = static_cast<int>(model.g.size()) - 1;
-  const SquareRoot<CurveModel::kMaxSize> root(model.h, model.g, twice_cost, rank);
-  std::fill(residuals, residuals + num_residuals(), 0.0);
-  Eigen::Map<Eigen::VectorXd>(residuals, root.f.size()) = root.f;
-  residuals[num_residuals() - 1] = root.rest;
+  const LineRoot root = WriteLine(model, RankOf(points_, camera_variable), rows, residuals);
   const auto U = root.U.leftCols(3);
   const Eigen::Matrix3d by_p = -CrossMatrix(line.d), by_d = CrossMatrix(line.p);
-  const int rows = num_residuals();
   WriteJacobian(
       U * (by_p * (-line.R * CrossMatrix(line.X)) + by_d * (-line.R * CrossMatrix(line.D))) *
           DeltaFromQuaternion(parameters[0]),
@@ -287,7 +220,7 @@ bool PlaneLineCost::EvaluateWith(const Weighing& weighing, const double* const* 
   WriteJacobian(U * by_p * line.R.leftCols<2>(), rows, 2, jacobians);
   const Eigen::Vector3d turned(-line.D.y(), line.D.x(), 0.0);
   WriteJacobian(U * (by_d * (line.R * turned)), rows, 3, jacobians);
-  if (variables.camera) WriteJacobian(root.U.rightCols(kCameraSize), rows, 4, jacobians);
+  if (camera_variable) WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, 4, jacobians);
   return true;
 }
 
@@ -340,7 +273,8 @@ bool PlanePointCost::EvaluateWith(const Weighing& weighing, const double* const*
     const double along = std::max(loss.first + 2.0 * s * loss.second, kLeastCurvature * loss.first);
     W += (along - loss.first) / r.squaredNorm() * r * r.transpose();
   }
-  const SquareRoot<2> root(weighing.scale * W, weighing.scale * loss.first * r, twice_cost, 2);
+  const SquareRoot<2> root(weighing.scale * W, weighing.scale * loss.first * r, twice_cost, 2, 2,
+                           2);
   residuals[0] = root.f[0];
   residuals[1] = root.f[1];
   residuals[2] = root.rest;

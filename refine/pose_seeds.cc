@@ -7,73 +7,32 @@
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/closed_form_solvers.h"
-#include "circline/refine/noise_scales.h"
 
 namespace circline {
 namespace {
 
-// Seeds closer than this are one; far inside the basin of convergence of each other.
-constexpr double kSameSeed = 0.02;  // Radians.
-constexpr std::size_t kMaxSeeds = 8;
 constexpr std::size_t kMaxCircleSeeds = 6;  // Circles that propose both their planes.
+constexpr double kAnySigmaPx = 0.5;         // Every feature has its own; this is never taken.
 
-struct Seed {
-  CameraPose pose;
-  double cost;
-  int source;  // The two poses of one circle, however close, are two seeds.
-};
-
-struct SeedList {
-  const JointProblem& problem;
-  std::vector<Seed> seeds = {};
-  Status refusal = {};  // Why the last one that was refused was.
-
-  void Add(const CameraPose& pose, int source) {
-    const auto same = std::find_if(seeds.begin(), seeds.end(), [&](const Seed& seed) {
-      return seed.source != source && RotationAngle(seed.pose.rotation, pose.rotation) <= kSameSeed;
-    });
-    // The better of the two matters only where outliers make the way to the minimum hard.
-    if (same != seeds.end() && !problem.is_contaminated()) return;
-    double cost;
-    const Status status = problem.SeedCost(pose, &cost);
-    if (!status.ok()) {
-      refusal = status;
-    } else if (same == seeds.end()) {
-      seeds.push_back({pose, cost, source});
-    } else if (cost < same->cost) {
-      *same = {pose, cost, source};
-    }
-  }
-};
-
-// The rotations about the plane's normal under which one line or another of a pencil along an axis
-// has its direction: some of these lines may be wrong. The senses of the axes are those of
-// `rotation`.
-void AddSpinSeeds(const Observations& observations, const CameraPose& pose, int source,
-                  SeedList* list) {
-  constexpr int kMaxLines = 8;
-  int lines = 0;
-  const Eigen::Vector3d n = pose.rotation.col(2);
-  for (const PencilObservation& pencil : observations.pencils) {
-    if (pencil.direction != PencilDirection::kX && pencil.direction != PencilDirection::kY)
-      continue;
-    const Eigen::Vector3d axis = pose.rotation.col(static_cast<int>(pencil.direction));
-    for (const LineObservation& line : pencil.lines) {
-      if (!line.fit || ++lines > kMaxLines) continue;
-      Eigen::Vector3d direction = n.cross(line.fit->line);
-      if (direction.dot(axis) < 0.0) direction = -direction;
-      const double angle = std::atan2(axis.cross(direction).dot(n), axis.dot(direction));
-      list->Add({ExpRotation(angle * n) * pose.rotation, pose.translation}, source);
-    }
-  }
+void Add(const Seed& added, std::vector<Seed>* seeds) {
+  const bool known = std::any_of(seeds->begin(), seeds->end(), [&](const Seed& seed) {
+    return seed.source != added.source && (seed.source < 0) == (added.source < 0) &&
+           IsSameSeed(seed, added);
+  });
+  if (!known) seeds->push_back(added);
 }
 
-// Both planes of the largest circles of the world plane, turned in the plane as the other evidence
-// says.
-void AddCircleSeeds(const Observations& observations, SeedList* list) {
+}  // namespace
+
+bool IsSameSeed(const Seed& a, const Seed& b) {
+  constexpr double kSame = 0.02;  // Radians.
+  return a.log_focal == b.log_focal && RotationAngle(a.pose.rotation, b.pose.rotation) <= kSame;
+}
+
+void AddCircleSeeds(const Observations& resolved, double log_focal, std::vector<Seed>* seeds) {
   std::vector<const CircleObservation*> circles;
-  for (const CircleObservation& circle : observations.circles) {
-    if (circle.fit && circle.plane == observations.frame.plane) circles.push_back(&circle);
+  for (const CircleObservation& circle : resolved.circles) {
+    if (circle.fit && circle.plane == resolved.frame.plane) circles.push_back(&circle);
   }
   std::stable_sort(circles.begin(), circles.end(),
                    [](const CircleObservation* a, const CircleObservation* b) {
@@ -88,25 +47,21 @@ void AddCircleSeeds(const Observations& observations, SeedList* list) {
     for (int i = 0; i < count; ++i) {
       const CirclePose& p = poses[static_cast<std::size_t>(i)];
       CameraPose pose;
-      if (!WorldRotation(observations, p.normal, p.center, kDefaultLineSigmaPx, &pose.rotation))
-        continue;
+      if (!WorldRotation(resolved, p.normal, p.center, kAnySigmaPx, &pose.rotation)) continue;
       pose.translation = p.center;
-      list->Add(pose, source);
-      if (list->problem.is_contaminated()) AddSpinSeeds(observations, pose, source, list);
+      const auto index = static_cast<int>(circle - resolved.circles.data());
+      Add({pose, log_focal, source, index}, seeds);
     }
   }
 }
 
-}  // namespace
-
-std::vector<CameraPose> CollectSeeds(const Observations& observations,
-                                     const std::vector<std::shared_ptr<const Solver>>& seeders,
-                                     const EstimationOptions& options, const JointProblem& problem,
-                                     std::vector<std::string>* reasons) {
-  SeedList list{problem};
+std::vector<Seed> CollectSeeds(const Observations& resolved,
+                               const std::vector<std::shared_ptr<const Solver>>& seeders,
+                               double log_focal, std::vector<std::string>* reasons) {
+  std::vector<Seed> seeds;
   int source = 0;
   for (const std::shared_ptr<const Solver>& seeder : seeders) {
-    const PoseEstimate estimate = seeder->Seeds(observations);
+    const PoseEstimate estimate = seeder->Seeds(resolved);
     if (!estimate.status.ok()) {
       reasons->push_back(seeder->name() + ": " + estimate.status.message);
       continue;
@@ -116,28 +71,46 @@ std::vector<CameraPose> CollectSeeds(const Observations& observations,
       CameraPose pose = h.cam_from_world;
       // A solver that leaves the spin about the normal open has chosen it by convention; the other
       // evidence knows better.
-      if (h.RotationIsFree() && !WorldRotation(observations, pose.rotation.col(2), pose.translation,
-                                               kDefaultLineSigmaPx, &pose.rotation)) {
+      if (h.RotationIsFree() && !WorldRotation(resolved, pose.rotation.col(2), pose.translation,
+                                               kAnySigmaPx, &pose.rotation)) {
         continue;
       }
-      list.Add(pose, source);
+      Add({pose, log_focal, source, -1}, &seeds);
     }
   }
-  AddCircleSeeds(observations, &list);
-  std::vector<Seed>& seeds = list.seeds;
-  if (seeds.empty() && !list.refusal.ok())
-    reasons->insert(reasons->begin(), "no pose agrees with all evidence: " + list.refusal.message);
-  std::stable_sort(seeds.begin(), seeds.end(),
-                   [](const Seed& a, const Seed& b) { return a.cost < b.cost; });
-  seeds.resize(std::min(seeds.size(), kMaxSeeds));
-  // A closed form lies so near its minimum that one that costs far more leads to none that counts.
-  constexpr double kMargin = 4.0;
-  std::vector<CameraPose> poses;
-  for (const Seed& seed : seeds) {
-    if (seed.cost <= kMargin * (seeds.front().cost + options.max_cost_gap))
-      poses.push_back(seed.pose);
+  AddCircleSeeds(resolved, log_focal, &seeds);
+  return seeds;
+}
+
+// Calibrated coordinates shrink: x' = A x, A = diag(s, s, 1), s = exp(-log_focal) (the lens bends
+// the same rays, which is right at the middle of the photo). Covariances follow to first order.
+Observations Refocused(const Observations& resolved, double log_focal) {
+  Observations out = resolved;
+  out.camera.fx *= std::exp(log_focal);
+  out.camera.fy *= std::exp(log_focal);
+  const double s = std::exp(-log_focal);
+  const Eigen::Vector3d a(s, s, 1.0), inverse(1.0 / s, 1.0 / s, 1.0);
+  const auto turn = [](Eigen::Vector3d* v, Eigen::Matrix3d* covariance, const Eigen::Vector3d& by) {
+    *v = by.cwiseProduct(*v);
+    const double norm = v->norm();
+    *v /= norm;
+    const Eigen::Matrix3d J =
+        (Eigen::Matrix3d::Identity() - *v * v->transpose()) * by.asDiagonal() / norm;
+    *covariance = J * *covariance * J.transpose();
+  };
+  for (CircleObservation& circle : out.circles) {
+    if (!circle.fit) continue;
+    Eigen::Matrix3d conic;
+    if (NormalizeEllipse(inverse.asDiagonal() * circle.fit->conic * inverse.asDiagonal(), &conic))
+      circle.fit->conic = conic;
   }
-  return poses;
+  for (PencilObservation& pencil : out.pencils) {
+    if (pencil.fit) turn(&pencil.fit->direction, &pencil.fit->covariance, a);
+    for (LineObservation& line : pencil.lines) {
+      if (line.fit) turn(&line.fit->line, &line.fit->covariance, inverse);
+    }
+  }
+  return out;
 }
 
 }  // namespace circline

@@ -6,19 +6,36 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/pose.h"
 #include "circline/estimators/solver_registry.h"
-#include "circline/refine/estimate_pose.h"
-#include "circline/refine/joint_problem.h"
 
 namespace circline {
 
-// Poses that the closed forms propose for the same world plane, and those of its circles, the
-// cheapest first. `reasons` receives why closed forms refused, and first what their poses
-// contradict where all of them do.
-std::vector<CameraPose> CollectSeeds(const Observations& observations,
-                                     const std::vector<std::shared_ptr<const Solver>>& seeders,
-                                     const EstimationOptions& options, const JointProblem& problem,
-                                     std::vector<std::string>* reasons);
+struct Seed {
+  CameraPose pose;
+  double log_focal = 0.0;  // Of the camera that it was found with against the one given.
+  // Who proposed it, from 1 up the closed forms, from -1 down the circles, the best known first.
+  // The two poses of one circle, however close, are two seeds.
+  int source = 0;
+  int circle = -1;  // Index of the circle that proposed it.
+};
+
+// Close enough to lead to one minimum where the evidence agrees; where it does not, one may be
+// stuck where some of it is an outlier.
+bool IsSameSeed(const Seed& a, const Seed& b);
+
+// Poses that the closed forms propose for the same world plane, in their order, and those of its
+// circles. `resolved`: fitted, with a world (ResolveWorld) and a noise for every feature. `reasons`
+// receives why closed forms refused.
+std::vector<Seed> CollectSeeds(const Observations& resolved,
+                               const std::vector<std::shared_ptr<const Solver>>& seeders,
+                               double log_focal, std::vector<std::string>* reasons);
+
+// Of the largest circles alone: both planes of each.
+void AddCircleSeeds(const Observations& resolved, double log_focal, std::vector<Seed>* seeds);
+
+// The same observations, fits included, through a camera of another focal length.
+Observations Refocused(const Observations& resolved, double log_focal);
 
 }  // namespace circline
 

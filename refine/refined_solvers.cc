@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "circline/refine/seeded_refinement.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 namespace {

@@ -19,9 +19,11 @@ struct SquareRoot {
 
   // Cholesky's factors with pivots, of h scaled to a unit diagonal. At most `max_rank` rows: what
   // is known to be without information (the scale of a conic) would else be rounding. Rows without
-  // information are zero.
+  // information are zero. Of the first `lead` columns, which have a rank of `lead_rank`, nothing is
+  // lost, whatever the others would need.
   template <typename Matrix, typename Vector>
-  SquareRoot(const Matrix& h, const Vector& g, double twice_cost, int max_rank) {
+  SquareRoot(const Matrix& h, const Vector& g, double twice_cost, int max_rank, int lead,
+             int lead_rank) {
     constexpr double kNoInformation = 1e-13;
     const Eigen::Index n = h.rows();
     U.setZero(max_rank, n);
@@ -33,7 +35,9 @@ struct SquareRoot {
     b = scale.cwiseProduct(g);
     for (Eigen::Index k = 0; k < max_rank; ++k) {
       Eigen::Index pivot;
-      if (!(A.diagonal().maxCoeff(&pivot) > kNoInformation)) break;
+      if (k >= lead_rank || !(A.diagonal().head(lead).maxCoeff(&pivot) > kNoInformation)) {
+        if (!(A.diagonal().maxCoeff(&pivot) > kNoInformation)) break;
+      }
       const double inverse = 1.0 / std::sqrt(A(pivot, pivot));
       const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMax, 1> u = inverse * A.col(pivot);
       f[k] = inverse * b[pivot];
@@ -46,9 +50,10 @@ struct SquareRoot {
     }
     // Far from a minimum a bent loss may promise more than there is: a stiffer Hessian, same
     // gradient.
+    constexpr double kNothing = 1e-9;  // Of cost: what rounding leaves of a perfect fit.
     const double promised = f.squaredNorm();
-    if (promised > twice_cost && promised > 0.0) {
-      const double stiffer = std::sqrt(promised / std::max(twice_cost, 1e-300));
+    if (promised > twice_cost + kNothing) {
+      const double stiffer = std::sqrt(promised / (twice_cost + kNothing));
       U *= stiffer;
       f /= stiffer;
     }

@@ -10,6 +10,7 @@
 #include "circline/estimators/random.h"
 #include "circline/refine/estimate_pose.h"
 #include "circline/refine/joint_problem.h"
+#include "circline/refine/joint_result.h"
 
 namespace circline {
 namespace {
@@ -148,13 +149,16 @@ void RefineOneSeed(benchmark::State& state, void (*add)(Scene*), const Estimatio
     scene.observations = ResolveWorld(scene.observations);
   }
   RunInTurn(state, scenes, [&](std::size_t i) {
-    const JointProblem problem(scenes[i].observations, options, {kNoisePx, kNoisePx});
+    const PointNoise noise = MeasurePointNoise(scenes[i].observations);
+    const JointProblem problem(scenes[i].observations, options, noise);
     CameraPose seed = scenes[i].pose;
     seed.rotation = ExpRotation({error, -error, error}) * seed.rotation;
     seed.translation.x() += 10.0 * error;
-    Approach approach;
+    State at;
     Refined refined;
-    return problem.ApproachFrom(seed, &approach).ok() && problem.Refine(approach, &refined).ok();
+    return problem.Start(seed, 0.0, problem.FirstReading(), &at).ok() &&
+           problem.SolveGraduated(options.max_iterations, &at).ok() &&
+           FillRefined(problem, at, &refined).ok();
   });
 }
 
@@ -185,7 +189,8 @@ BENCHMARK_CAPTURE(BM_RefineOrthogonalDistances, cold_cauchy, LossType::kCauchy, 
 
 void BM_RefineFocalLength(benchmark::State& state, LossType loss, double error) {
   EstimationOptions options = WithLoss(loss);
-  options.focal_sigma = 0.03;
+  options.camera_sigma = CameraSigma();
+  options.camera_sigma->log_focal = 0.03;
   RefineOneSeed(state, AddPaperLike, options, error);
 }
 BENCHMARK_CAPTURE(BM_RefineFocalLength, cold_cauchy, LossType::kCauchy, kCold);

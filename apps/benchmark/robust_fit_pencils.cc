@@ -10,8 +10,8 @@
 #include "apps/benchmark/robust_fit_rows.h"
 #include "apps/benchmark/robust_fit_scenes.h"
 #include "apps/benchmark/robust_fit_table.h"
-#include "circline/ransac/pencil_model.h"
 #include "circline/ransac/robust_directions.h"
+#include "circline/ransac/robust_pencils.h"
 
 namespace circline::apps {
 namespace {

@@ -166,6 +166,12 @@ int ReadSize(const StorageNode& node) {
   return value;
 }
 
+void ReadSigma(const StorageNode& node, std::optional<double>* sigma) {
+  if (!node.Exists()) return;
+  *sigma = node.Number();
+  if (!(**sigma >= 0.0) || !std::isfinite(**sigma)) node.Fail("must be 0 (exact) or more");
+}
+
 // The first of the names that exists, else the first: files of older OpenCV samples spell
 // differently.
 StorageNode GetAny(const StorageNode& node, const std::vector<std::string>& names) {
@@ -221,8 +227,16 @@ Status ReadCameraFile(const std::string& path, std::vector<Camera>* cameras) {
   return parsed;
 }
 
-Camera ReadSceneCamera(const StorageNode& node) {
-  node.AllowKeys({"id", "model", "width", "height", "camera_matrix", "distortion"});
+CameraSigma StatedCameraSigma::Over(CameraSigma sigma) const {
+  sigma.log_focal = log_focal.value_or(sigma.log_focal);
+  sigma.principal_point_px = principal_point_px.value_or(sigma.principal_point_px);
+  sigma.k1 = k1.value_or(sigma.k1);
+  return sigma;
+}
+
+Camera ReadSceneCamera(const StorageNode& node, StatedCameraSigma* sigma) {
+  node.AllowKeys({"id", "model", "width", "height", "camera_matrix", "distortion", "focal_sigma",
+                  "principal_point_sigma_px", "k1_sigma"});
   Camera camera;
   camera.id = node.Require("id").Text();
   StorageNode named = node;
@@ -247,6 +261,9 @@ Camera ReadSceneCamera(const StorageNode& node) {
   }
   SetIntrinsics(matrix, &camera);
   SetDistortion(named.Get("distortion"), &camera);
+  ReadSigma(named.Get("focal_sigma"), &sigma->log_focal);
+  ReadSigma(named.Get("principal_point_sigma_px"), &sigma->principal_point_px);
+  ReadSigma(named.Get("k1_sigma"), &sigma->k1);
   CheckCamera(named, camera);
   return camera;
 }

@@ -2,11 +2,13 @@
 #ifndef CIRCLINE_APPS_COMMON_CAMERA_FILE_H_
 #define CIRCLINE_APPS_COMMON_CAMERA_FILE_H_
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/common/storage_node.h"
 #include "circline/estimators/camera.h"
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/status.h"
 
 namespace circline::apps {
@@ -17,8 +19,18 @@ namespace circline::apps {
 // one line that names the file and what is wrong in it.
 Status ReadCameraFile(const std::string& path, std::vector<Camera>* cameras);
 
-// A camera of a scene file: id, model, width, height, camera_matrix, distortion.
-Camera ReadSceneCamera(const StorageNode& node);
+// How well a scene file says that a camera is known; what it does not say is left to others.
+struct StatedCameraSigma {
+  std::optional<double> log_focal, principal_point_px, k1;
+
+  bool IsAny() const { return log_focal || principal_point_px || k1; }
+  // `sigma` with what is stated in its place.
+  CameraSigma Over(CameraSigma sigma) const;
+};
+
+// A camera of a scene file: id, model, width, height, camera_matrix, distortion; focal_sigma,
+// principal_point_sigma_px, k1_sigma.
+Camera ReadSceneCamera(const StorageNode& node, StatedCameraSigma* sigma);
 
 }  // namespace circline::apps
 

@@ -78,8 +78,8 @@ std::array<int, 4> ReadRectangle(const StorageNode& node) {
 }
 
 void ReadCircle(const StorageNode& node, SceneImage* image) {
-  node.AllowKeys({"id", "contour", "roi", "center", "radius", "plane", "concentric", "radius_group",
-                  "sigma_px", "diameters"});
+  node.AllowKeys({"id", "contour", "roi", "center", "radius", "radius_sigma", "plane", "concentric",
+                  "radius_group", "sigma_px", "diameters"});
   CircleObservation circle;
   circle.id = node.Require("id").Text();
   if (FindCircle(image->observations, circle.id) >= 0) {
@@ -87,6 +87,9 @@ void ReadCircle(const StorageNode& node, SceneImage* image) {
   }
   circle.sigma_px = ReadPositive(node.Get("sigma_px"));
   circle.radius = ReadPositive(node.Get("radius"));
+  circle.radius_sigma = ReadPositive(node.Get("radius_sigma"));
+  if (circle.radius_sigma > 0.0 && !(circle.radius > 0.0))
+    node.Get("radius_sigma").Fail("there is no radius that it could be of");
   circle.plane = ReadOptionalText(node.Get("plane"));
   circle.concentric = ReadOptionalText(node.Get("concentric"));
   circle.radius_group = ReadOptionalText(node.Get("radius_group"));
@@ -185,13 +188,14 @@ void ReadKnown(const StorageNode& node, bool detect_everything, Observations* ob
   node.AllowKeys({"angle_deg", "length"});
   for (const StorageNode& item : node.Get("angle_deg").Items()) ReadKnownAngle(item, observations);
   for (const StorageNode& item : node.Get("length").Items()) {
-    item.AllowKeys({"points", "plane", "value"});
+    item.AllowKeys({"points", "plane", "value", "sigma"});
     KnownLength length;
     length.points = ReadSegment(item.Require("points"));
     length.plane = ReadOptionalText(item.Get("plane"));
     CheckPlane(item.Get("plane"), length.plane, *observations, detect_everything);
     length.value = item.Require("value").Number();
     if (!(length.value > 0.0)) item.Get("value").Fail("must be positive");
+    length.sigma = ReadPositive(item.Get("sigma"));
     observations->known_lengths.push_back(length);
   }
 }
@@ -255,7 +259,13 @@ void ReadPoints(const StorageNode& node, SceneImage* image) {
   }
 }
 
-const Camera* ChooseCamera(const StorageNode& image_node, const std::vector<Camera>& cameras) {
+struct SceneCamera {
+  Camera camera;
+  StatedCameraSigma sigma;
+};
+
+const SceneCamera* ChooseCamera(const StorageNode& image_node,
+                                const std::vector<SceneCamera>& cameras) {
   const StorageNode node = image_node.Get("camera");
   if (!node.Exists()) {
     if (cameras.size() == 1) return &cameras.front();
@@ -265,16 +275,16 @@ const Camera* ChooseCamera(const StorageNode& image_node, const std::vector<Came
   }
   const std::string id = node.Text();
   std::vector<std::string> ids;
-  for (const Camera& camera : cameras) {
-    if (camera.id == id) return &camera;
-    ids.push_back(camera.id);
+  for (const SceneCamera& candidate : cameras) {
+    if (candidate.camera.id == id) return &candidate;
+    ids.push_back(candidate.camera.id);
   }
   node.Fail("there is no camera '" + id + "'" + DidYouMean(id, ids));
   return nullptr;
 }
 
 SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
-                     const std::vector<Camera>& cameras) {
+                     const std::vector<SceneCamera>& cameras) {
   SceneImage image;
   const std::string place = node.place();
   if (node.Get("file").Exists()) {
@@ -284,8 +294,11 @@ SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
   node.AllowKeys({"file", "camera", "circles", "pencils", "frame", "known", "truth", "points"});
   if (node.Require("file").Exists() && image.name.empty()) node.Get("file").Fail("is empty");
   image.path = (folder / image.name).lexically_normal().string();
-  const Camera* camera = ChooseCamera(node, cameras);
-  if (camera != nullptr) image.observations.camera = *camera;
+  const SceneCamera* camera = ChooseCamera(node, cameras);
+  if (camera != nullptr) {
+    image.observations.camera = camera->camera;
+    image.camera_sigma = camera->sigma;
+  }
   for (const StorageNode& item : node.Get("circles").Items()) ReadCircle(item, &image);
   for (const StorageNode& item : node.Get("pencils").Items()) ReadPencil(item, &image.observations);
   image.detect_everything =
@@ -360,13 +373,16 @@ Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
   if (!status.ok()) return status;
   const StorageNode root(document.root(), "", &status);
   root.AllowKeys({"cameras", "images"});
-  std::vector<Camera> all = cameras;
+  std::vector<SceneCamera> all;
+  for (const Camera& camera : cameras) all.push_back({camera, {}});
   for (const StorageNode& item : root.Get("cameras").Items()) {
-    Camera camera = ReadSceneCamera(item);
+    SceneCamera read;
+    read.camera = ReadSceneCamera(item, &read.sigma);
+    const std::string& id = read.camera.id;
     const bool twice = std::any_of(all.begin(), all.end(),
-                                   [&](const Camera& other) { return other.id == camera.id; });
-    if (twice) item.Fail("camera '" + camera.id + "' is there twice");
-    all.push_back(std::move(camera));
+                                   [&](const SceneCamera& other) { return other.camera.id == id; });
+    if (twice) item.Fail("camera '" + id + "' is there twice");
+    all.push_back(std::move(read));
   }
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   for (const StorageNode& item : root.Require("images").Items()) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/common/camera_file.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/status.h"
@@ -56,6 +57,7 @@ struct SceneImage {
   std::size_t set_size = 0;        // Images in the whole set.
   std::string stem;                // Of file names that belong to it, unique in the whole set.
   Observations observations;       // Camera, and what is annotated; nothing fitted or detected yet.
+  StatedCameraSigma camera_sigma;  // Of that camera.
   bool detect_everything = false;  // No circle and no pencil is annotated.
   std::vector<CircleRoi> rois;
   std::optional<Truth> truth;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 
 #include "apps/common/photo_file.h"
 #include "apps/compare/pixel_ellipse.h"
@@ -148,6 +149,15 @@ SolverRun RunSolver(const SolverSet::Task& task, const CompareOptions& options,
   return run;
 }
 
+// The options with what the scene file says of the image's camera.
+CompareOptions WithCamera(CompareOptions options, const SceneImage& image) {
+  for (LossSetting& loss : options.losses) {
+    loss.estimation.camera_sigma = CameraSigmaOf(loss.estimation, image);
+    options.closed_form.noise_model.camera = *loss.estimation.camera_sigma;
+  }
+  return options;
+}
+
 void RunAll(const CompareOptions& options, const SolverSet& solvers, SceneImage* scene_image,
             ImageRun* run) {
   const SceneImage& image = *scene_image;
@@ -165,12 +175,21 @@ void RunAll(const CompareOptions& options, const SolverSet& solvers, SceneImage*
   if (run->read_error.empty()) Observe(options, run);
   if (!run->read_error.empty()) return;
   LossEvidence evidence(*run);
-  for (const SolverSet::Task& task : solvers.tasks()) {
+  std::optional<SolverSet> own_solvers;
+  if (image.camera_sigma.IsAny()) own_solvers.emplace(WithCamera(options, image));
+  for (const SolverSet::Task& task : (own_solvers ? *own_solvers : solvers).tasks()) {
     run->solvers.push_back(RunSolver(task, options, *run, &evidence));
   }
 }
 
 }  // namespace
+
+CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image) {
+  const CameraSigma common = options.camera_sigma.value_or(options.noise_model.camera);
+  CameraSigma sigma = image.camera_sigma.Over(common);
+  if (options.camera_sigma) sigma.log_focal = common.log_focal;
+  return sigma;
+}
 
 SolverSet::SolverSet(const CompareOptions& options) {
   for (const LossSetting& loss : options.losses) {

@@ -58,6 +58,10 @@ struct ImageRun {
   std::vector<std::pair<std::string, double>> stages;  // "read", "detect", "fit"; microseconds.
 };
 
+// How well an image's camera is known: as --focal_sigma says, else the scene file, else the noise
+// model.
+CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image);
+
 // Never throws. Image, options and solvers outlive the result. A camera that is only guessed gets
 // its focal length from the size of the photo.
 ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image);

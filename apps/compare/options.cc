@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "apps/common/text.h"
+#include "apps/compare/noise_flags.h"
 #include "apps/compare/peers.h"
 #include "circline/estimators/robust_loss.h"
 #include "circline/estimators/solver_registry.h"
@@ -30,12 +31,11 @@ DEFINE_string(line_loss, "", "Loss of points of lines, where it differs from --r
 DEFINE_string(line_loss_scale_px, "", "Scale of points of lines, where it differs.");
 DEFINE_string(conic_distance,
               circline::ConicDistanceName(circline::EstimationOptions().conic_distance),
-              "Distance of contour points in the refinement: sampson (first order) or orthogonal.");
-DEFINE_double(focal_sigma, circline::EstimationOptions().focal_sigma,
-              "Relative standard deviation of the camera's focal length (0.03: 3 %), which is then "
-              "refined too; 0 = fixed.");
-DEFINE_double(inlier_threshold_px, circline::FitOptions().inlier_threshold_px,
-              "A point farther than this from its curve is an outlier, pixels; positive.");
+              "Distance of contour points in the refinement: sampson (first order), orthogonal, or "
+              "auto: orthogonal where the first order does not suffice.");
+DEFINE_double(
+    inlier_threshold_px, circline::FitOptions().inlier_threshold_px,
+    "A point farther than this from its curve is an outlier, pixels; 0 = from the noise.");
 DEFINE_double(ransac_confidence, circline::FitOptions().confidence,
               "Probability that the best model was among those drawn; between 0 and 1.");
 DEFINE_int32(ransac_max_iterations, circline::FitOptions().max_iterations,
@@ -121,20 +121,18 @@ Status SetOption(const std::string& flag, Field Options::*field, const Value& va
   return CheckFlag(flag, alone.Validate());
 }
 
-Status ReadLosses(std::vector<LossSetting>* losses) {
+Status ReadLosses(const NoiseModel& noise, std::vector<LossSetting>* losses) {
   LossOverride conic, line;
   Status status = conic.Read("conic_loss", FLAGS_conic_loss, FLAGS_conic_loss_scale_px);
   if (status.ok()) status = line.Read("line_loss", FLAGS_line_loss, FLAGS_line_loss_scale_px);
   EstimationOptions common_options;
   if (status.ok() && !ConicDistanceFromName(FLAGS_conic_distance, &common_options.conic_distance)) {
     status = Status::Invalid("--conic_distance: '" + FLAGS_conic_distance +
-                             "' is not one of sampson, orthogonal" +
-                             DidYouMean(FLAGS_conic_distance, {"sampson", "orthogonal"}));
+                             "' is not one of auto, sampson, orthogonal" +
+                             DidYouMean(FLAGS_conic_distance, {"auto", "sampson", "orthogonal"}));
   }
-  if (status.ok()) {
-    status = SetOption("focal_sigma", &EstimationOptions::focal_sigma, FLAGS_focal_sigma,
-                       &common_options);
-  }
+  common_options.noise_model = noise;
+  if (status.ok()) status = CameraSigmaFromFlags(noise, &common_options.camera_sigma);
   if (!status.ok()) return status;
   losses->clear();
   for (const std::string& loss : SplitList(FLAGS_robust_loss)) {
@@ -229,11 +227,23 @@ SolverRegistry AllSolvers() {
 // The flags beside solvers and losses that shape what is found in a photo; and those that say how
 // to see photos without a scene file.
 std::vector<std::string> TuningFlags() {
-  return {"conic_loss",          "conic_loss_scale_px", "line_loss",
-          "line_loss_scale_px",  "conic_distance",      "focal_sigma",
-          "inlier_threshold_px", "ransac_confidence",   "ransac_max_iterations",
-          "min_ellipse_axis_px", "min_arc_deg",         "min_segment_length_px",
-          "max_circles",         "max_pencils",         "seed"};
+  return {"conic_loss",
+          "conic_loss_scale_px",
+          "line_loss",
+          "line_loss_scale_px",
+          "conic_distance",
+          "focal_sigma",
+          "noise",
+          "noise_model",
+          "inlier_threshold_px",
+          "ransac_confidence",
+          "ransac_max_iterations",
+          "min_ellipse_axis_px",
+          "min_arc_deg",
+          "min_segment_length_px",
+          "max_circles",
+          "max_pencils",
+          "seed"};
 }
 std::vector<std::string> InputFlags() { return {"fov_deg", "focal_px", "roi", "circle_radius"}; }
 
@@ -261,9 +271,17 @@ std::string Lines(const std::vector<std::string>& texts) {
 }  // namespace
 
 Status OptionsFromFlags(CompareOptions* options) {
-  Status status = ReadFitOptions(&options->fit);
+  NoiseModel noise;
+  Status status = NoiseFromFlags(&noise);
+  options->detection.noise_model = options->fit.noise_model = options->closed_form.noise_model =
+      noise;
+  if (status.ok()) status = ReadFitOptions(&options->fit);
   if (status.ok()) status = ReadDetectionOptions(&options->detection);
-  if (status.ok()) status = ReadLosses(&options->losses);
+  if (status.ok()) status = ReadLosses(noise, &options->losses);
+  if (status.ok()) {
+    const EstimationOptions& first = options->losses.front().estimation;
+    options->closed_form.noise_model.camera = first.camera_sigma.value_or(noise.camera);
+  }
   if (status.ok()) status = ReadSolvers(&options->solvers);
   if (!status.ok()) return status;
   if (FLAGS_threads < 0 || FLAGS_threads > 1024) {

@@ -40,7 +40,8 @@ struct CompareOptions {
   std::vector<std::string> unusual_flags;
 };
 
-// From the flags; not ok: one line that names the flag. Nothing is read from disk.
+// From the flags; not ok: one line that names the flag. Nothing but the file of --noise_model is
+// read.
 Status OptionsFromFlags(CompareOptions* options);
 
 // Names of all solvers, closed form and refined, in the order of the registry.

@@ -91,9 +91,14 @@ Json HypothesisLine(const ImageRun& image, const SolverRun& run, std::size_t ind
     line["free_directions"].push_back(direction);
   }
   line["origin_observed"] = h.origin_observed;
+  line["left_out"] = h.left_out;
+  line["structure"] = h.structure;
   if (h.focal_sigma > 0.0) {
     line["focal_scale"] = Number(h.focal_scale);
     line["focal_sigma"] = Number(h.focal_sigma);
+    const Camera& camera = image.observations.camera;
+    line["focal_px"] = Number(h.focal_scale * camera.fx);
+    line["focal_sigma_px"] = Number(h.focal_sigma * camera.fx);
   }
   line["decided_by"] = run.estimate.decided_by;
   line["notes"] = run.estimate.notes;
@@ -110,6 +115,7 @@ Json RefusalLine(const ImageRun& image, const SolverRun& run) {
         "num_observations", "sigma_rotation_deg", "sigma_normal_deg", "free_directions"}) {
     line[key] = nullptr;
   }
+  line["left_out"] = Json::array();
   line["notes"] = run.estimate.notes;
   return line;
 }

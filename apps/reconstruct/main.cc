@@ -128,6 +128,15 @@ Status ChoosePose(const ImageRun& run, const PoseHypothesis** hypothesis) {
   return Status::Ok();
 }
 
+// From this on the focal length is refined (EstimationOptions::camera_sigma).
+constexpr double kEstimatedFocal = 0.01;
+
+Status CheckFocalLength(const CompareOptions& options, const SceneImage& image) {
+  const CameraSigma sigma = CameraSigmaOf(options.losses.front().estimation, image);
+  if (sigma.log_focal < kEstimatedFocal) return Status::Ok();
+  return Status::Invalid("--focal_sigma: a model needs the focal length as the camera says it");
+}
+
 int Refuse(const Status& status) {
   SayOnStderr("circline_reconstruct: " + status.message);
   return status.code == StatusCode::kInvalidArgument ? kExitUsage : kExitUnreadable;
@@ -140,11 +149,9 @@ int Reconstruct() {
   SceneImage image;
   Status status = OptionsFromFlags(&options);
   if (status.ok()) status = ModelFromFlags(&model_options);
-  if (status.ok() && options.losses.front().estimation.focal_sigma > 0.0) {
-    status = Status::Invalid("--focal_sigma: a model needs the focal length as the camera says it");
-  }
   if (status.ok()) status = ImagesFromFlags(options.inputs, &images);
   if (status.ok()) status = FindImage(images, &image);
+  if (status.ok()) status = CheckFocalLength(options, image);
   if (!status.ok()) return Refuse(status);
   options.overlays = true;  // The photo is needed.
   const SolverSet solvers(options);

@@ -73,7 +73,9 @@ class Solvers {
   explicit Solvers(LossType loss) {
     EstimationOptions estimation;
     estimation.conic_loss.type = estimation.line_loss.type = loss;
-    AddClosedFormSolvers(&registry_);
+    ClosedFormOptions closed_form;
+    estimation.noise_model = closed_form.noise_model = NoiseModel::Exact();
+    AddClosedFormSolvers(&registry_, closed_form);
     AddRefinedSolvers(&registry_, estimation);
   }
   const Solver& Get(const Method& method) const {
@@ -91,6 +93,7 @@ Trial RunTrial(const PaperScene& scene, const Disturbance& disturbance, const So
   Observations observations = scene.Observe(disturbance, &random, &masks);
   if (disturbance.outlier_ratio > 0.0) {
     FitOptions fit;
+    fit.noise_model = NoiseModel::Exact();
     fit.inlier_threshold_px = std::max(inlier_sigmas * disturbance.noise_px, kMinThresholdPx);
     fit.seed = random.Next();
     FitObservations(fit, &observations);

@@ -30,9 +30,11 @@ struct Circle {
 };
 struct Graph {
   Photo photos[3];
-  Circle circles[2];  // Cover, sign.
-  Vector3d kerbs;     // Their direction.
+  Circle circles[2];         // Cover, sign.
+  Vector3d kerbs;            // Their direction.
+  double across[3][3] = {};  // Of kerb k in photo i.
 };
+const Vector3d kKerbs[] = {{0, 0.6, 0}, {0, 0.6, 0.15}, {0, -1, 0}};
 
 constexpr double kSigmaPx = 0.3;
 Random rng(1);
@@ -69,16 +71,10 @@ ImagePoints SeeCircle(const Camera& camera, const Photo& photo, const Circle& c)
     points.push_back(c.center + c.radius * (std::cos(a) * u + std::sin(a) * v));
   return See(camera, photo, points);
 }
-std::vector<ParallelLinesCost::Line> SeeKerbs(const Camera& camera, const Photo& photo) {
-  std::vector<ParallelLinesCost::Line> lines;
-  for (const Vector3d& at : {Vector3d(0, 0.6, 0), Vector3d(0, 0.6, 0.15), Vector3d(0, -1, 0)}) {
-    std::vector<Vector3d> points;
-    for (double x = -1.0; x < 1.5; x += 0.05) points.push_back(at + x * Vector3d::UnitX());
-    ImagePoints seen = See(camera, photo, points);
-    LineFit fit;  // Where the cost starts to look for this line; it finds it by itself.
-    if (FitLine(seen.points(), kSigmaPx, &fit).ok()) lines.push_back({std::move(seen), fit.line});
-  }
-  return lines;
+ImagePoints SeeKerb(const Camera& camera, const Photo& photo, const Vector3d& at) {
+  std::vector<Vector3d> points;
+  for (double x = -1.0; x < 1.5; x += 0.05) points.push_back(at + x * Vector3d::UnitX());
+  return See(camera, photo, points);
 }
 
 int main() {
@@ -89,7 +85,7 @@ int main() {
   const Circle cover = {Vector3d::Zero(), Vector3d::UnitZ(), 0.3};
   const Circle sign = {{0.8, 0.9, 0.7}, Vector3d(-0.4, -1.0, 0.2).normalized(), 0.25};
   const Photo a = LookFrom({0.2, -3, 1.6}, 0.1), b = LookFrom({1.7, -2.6, 1.5}, -0.4);
-  const Graph truth = {{a, b, LookFrom({-1.5, -2, 2}, 0.6)}, {cover, sign}, Vector3d::UnitX()};
+  const Graph truth = {{a, b, LookFrom({-1.5, -2, 2}, 0.6)}, {cover, sign}, Vector3d::UnitX(), {}};
 
   // Where you start from: odometry, or EstimatePose on each photo. Here the truth, a little off.
   Graph graph = truth;
@@ -111,8 +107,16 @@ int main() {
       problem.AddResidualBlock(features.back(), nullptr, q, t, c.center.data(), c.normal.data(),
                                &c.radius);
     }
-    features.push_back(new ParallelLinesCost(SeeKerbs(camera, truth.photos[i]), {}));
-    problem.AddResidualBlock(features.back(), nullptr, q, graph.kerbs.data());
+    for (int k = 0; k < 3; ++k) {  // A line lies where it likes across the common direction.
+      ImagePoints kerb = SeeKerb(camera, truth.photos[i], kKerbs[k]);
+      LineFit fit;
+      if (!FitLine(kerb.points(), kSigmaPx, &fit).ok()) return 1;
+      auto* cost = new DirectionLineCost(std::move(kerb), fit.line, {});
+      const double* at[] = {q, graph.kerbs.data()};
+      if (!cost->Start(at, &graph.across[i][k])) return 1;
+      problem.AddResidualBlock(cost, nullptr, q, graph.kerbs.data(), &graph.across[i][k]);
+      features.push_back(cost);
+    }
     problem.SetManifold(q, new ceres::EigenQuaternionManifold);
   }
   for (Vector3d* unit : {&graph.circles[0].normal, &graph.circles[1].normal, &graph.kerbs})

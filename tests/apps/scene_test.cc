@@ -47,6 +47,33 @@ std::vector<SceneImage> Read(const std::string& content) {
   return images;
 }
 
+TEST(Scene, ReadsHowWellThingsAreKnown) {
+  const std::string contour = "contour: [1,2, 3,4.5, 5,6, 7,8, 9,10]";
+  const std::string circle =
+      "circles: [ { id: \"c0\", radius: 0.03, radius_sigma: 0.02, " + contour +
+      " } ], known: { length: [ { points: [0,0,1,1], value: 2., sigma: 0.1 } ] }";
+  const std::string camera =
+      "cameras: [ { id: \"cam0\", model: \"pinhole\", camera_matrix: [500, 0, 320., 0., 500., 240, "
+      "0, 0, 1], focal_sigma: 0.05, k1_sigma: 0 } ]\n";
+  const std::vector<SceneImage> images =
+      Read("%YAML:1.0\n---\n" + camera + "images:\n  - { file: \"a.jpg\", " + circle + " }\n");
+  ASSERT_EQ(images.size(), 1u);
+  EXPECT_EQ(images[0].observations.circles[0].radius_sigma, 0.02);
+  EXPECT_EQ(images[0].observations.known_lengths[0].sigma, 0.1);
+  EXPECT_TRUE(images[0].camera_sigma.IsAny());
+  const CameraSigma sigma = images[0].camera_sigma.Over({0.3, 0.4, 5.0, 0.6});
+  EXPECT_EQ(sigma.log_focal, 0.05);
+  EXPECT_EQ(sigma.log_aspect, 0.4);
+  EXPECT_EQ(sigma.principal_point_px, 5.0);
+  EXPECT_EQ(sigma.k1, 0.0);
+  EXPECT_CONTAINS(ErrorOfImage("circles: [ { id: \"c\", radius_sigma: 0.1, " + contour + " } ]"),
+                  "radius_sigma: there is no radius");
+  EXPECT_CONTAINS(
+      ErrorOf("cameras: [ { id: \"a\", model: \"pinhole\", camera_matrix: [5,0,3,0,5,2,0,0,1], "
+              "principal_point_sigma_px: -1 } ]\nimages: [ { file: \"a.jpg\" } ]\n"),
+      "principal_point_sigma_px: must be 0");
+}
+
 TEST(Scene, ReadsEverything) {
   const TestFolder folder;
   const std::string path = folder.Write("set/scene.yaml", Scene(R"(

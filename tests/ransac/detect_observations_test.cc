@@ -124,6 +124,25 @@ TEST(DetectObservations, ACircleOfAnotherPlaneStaysOut) {
   EXPECT_LT(BetterNormalDeg(found.circles[0], disc.rotation.col(2)), 0.5);
 }
 
+TEST(DetectObservations, WhatAContourSharesIsInItsCovariance) {
+  const Camera camera = TestCamera();
+  const cv::Mat image =
+      Develop(RenderPlane(camera, LookAt(30.0, 0.0, 0.0, 8.0), 220.0, [](double x, double y) {
+        return std::hypot(x, y) < 1.2 ? 40.0 : 220.0;
+      }));
+  const auto variance = [&](double contour_px) {
+    DetectionOptions options;
+    options.noise_model.contour_px = contour_px;
+    Observations found;
+    EXPECT_TRUE(DetectObservations(image, camera, options, &found).ok());
+    EXPECT_EQ(found.circles.size(), 1U);
+    return found.circles.empty() ? 0.0 : found.circles[0].fit->Covariance().trace();
+  };
+  const double points_alone = variance(0.0), shared = variance(0.1);
+  EXPECT_GT(shared, 2.0 * points_alone);
+  EXPECT_NEAR((variance(0.2) - points_alone) / (shared - points_alone), 4.0, 1e-6);
+}
+
 TEST(DetectObservations, AGridOfDotsIsOnePlane) {
   const Camera camera = DistortedCamera();
   const CameraPose pose = LookAt(35.0, 12.0, 10.0, 14.0);
@@ -233,6 +252,9 @@ TEST(DetectObservations, SaysWhatIsWrongWithTheInput) {
   options = DetectionOptions();
   options.max_shared_plane_deg = 0.0;
   EXPECT_NE(message(image, camera, options).find("max_shared_plane_deg"), std::string::npos);
+  options = DetectionOptions();
+  options.noise_model.contour_px = -0.1;
+  EXPECT_NE(message(image, camera, options).find("contour_px"), std::string::npos);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "circline/estimators/random.h"
+#include "circline/estimators/vanishing_point.h"
 #include "circline/ransac/ransac.h"
 #include "tests/ransac/segment_scene.h"
 
@@ -113,11 +114,12 @@ TEST_F(DirectionModels, AcceptAsksForTwoDirections) {
   const OrthogonalTripletModel triplet(pencil);
   OrthogonalTripletModel::Value value;
   Eigen::Map<Matrix3d>(value.data()) = R_;
-  EXPECT_FALSE(triplet.Accept(value, 3.03));
+  EXPECT_FALSE(triplet.Accept(value, kInlierSigmas));
   const DirectionPairModel pair(pencil);
-  EXPECT_FALSE(pair.Accept({R_(0, 0), R_(1, 0), R_(2, 0), R_(0, 1), R_(1, 1), R_(2, 1)}, 3.03));
+  EXPECT_FALSE(
+      pair.Accept({R_(0, 0), R_(1, 0), R_(2, 0), R_(0, 1), R_(1, 1), R_(2, 1)}, kInlierSigmas));
   const PencilModel every(lines_, all_, 0.0);
-  EXPECT_TRUE(OrthogonalTripletModel(every).Accept(value, 3.03));
+  EXPECT_TRUE(OrthogonalTripletModel(every).Accept(value, kInlierSigmas));
 }
 
 TEST_F(DirectionModels, PairFitsAndRefines) {

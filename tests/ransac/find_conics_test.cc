@@ -91,7 +91,7 @@ Scene MakeScene(std::uint64_t seed, int clutter = 320) {
 FindConicsOptions HalfPixelOptions() {
   FindConicsOptions options;
   options.fit.sigma_px = 0.5;
-  options.fit.ransac.threshold = 3.03 * 0.5;
+  options.fit.ransac.threshold = kInlierSigmas * 0.5;
   return options;
 }
 

@@ -112,7 +112,7 @@ TEST(OrientedConicModel, ResidualsHoldDistanceAndDirection) {
     const Eigen::Vector2d& given = scene.directions.normals[point];
     const double sine = normal.x() * given.y() - normal.y() * given.x();
     const double distance = ConicDistancePx(p, truth.conic);
-    const double scaled = sine / scene.directions.sigma_rad * threshold / 3.03;
+    const double scaled = sine / scene.directions.sigma_rad * threshold / kInlierSigmas;
     const double expected = distance * distance + scaled * scaled;
     EXPECT_NEAR(static_cast<double>(r2[static_cast<std::size_t>(i)]), expected,
                 2e-3 * (1.0 + expected));
@@ -124,7 +124,7 @@ TEST(OrientedConicModel, NeedsFarFewerDraws) {
   const ConicModel points(scene.points, ConicLimits(), &scene.directions);
   const ConicModel plain(scene.points, ConicLimits());
   RansacOptions options;
-  options.threshold = 3.03;
+  options.threshold = kInlierSigmas;
   RansacReport<ConicModel::Value> oriented, five;
   Ransac<OrientedConicModel>(options).Run(OrientedConicModel(points), &oriented);
   Ransac<ConicModel>(options).Run(plain, &five);

@@ -94,9 +94,9 @@ TEST(Ransac, TheModelsAllocateNothingInTheLoop) {
   const conic_scene::Scene contour = conic_scene::MakeScene(1, 0.5);
   const ConicModel conic(contour.points, ConicLimits());
   const ConicModel oriented(contour.points, ConicLimits(), &contour.directions);
-  ExpectNoAllocations(conic, 3.03);
-  ExpectNoAllocations(OrientedConicModel(oriented), 3.03);
-  ExpectNoAllocations(LineModel(contour.points), 3.03);
+  ExpectNoAllocations(conic, kInlierSigmas);
+  ExpectNoAllocations(OrientedConicModel(oriented), kInlierSigmas);
+  ExpectNoAllocations(LineModel(contour.points), kInlierSigmas);
   Random random(1);
   const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
   std::vector<LineFit> lines;
@@ -107,9 +107,9 @@ TEST(Ransac, TheModelsAllocateNothingInTheLoop) {
     indices.push_back(i);
   }
   const PencilModel pencil(lines, indices, 0.0);
-  ExpectNoAllocations(pencil, 3.03);
-  ExpectNoAllocations(OrthogonalTripletModel(pencil), 3.03);
-  ExpectNoAllocations(DirectionPairModel(pencil), 3.03);
+  ExpectNoAllocations(pencil, kInlierSigmas);
+  ExpectNoAllocations(OrthogonalTripletModel(pencil), kInlierSigmas);
+  ExpectNoAllocations(DirectionPairModel(pencil), kInlierSigmas);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/random.h"
 
 namespace circline {
@@ -14,7 +15,7 @@ namespace {
 // The loss of MAGSAC++ by its definition: the likelihoods of the residual under Gaussians of every
 // standard deviation up to T / k that holds it, integrated numerically.
 double MarginalWeight(double r) {
-  constexpr double k = 3.03;
+  constexpr double k = kInlierSigmas;
   const double from = r / k, to = 1.0 / k;
   constexpr int steps = 4000;
   double sum = 0.0;

@@ -234,52 +234,58 @@ TEST(CostFunctionsTest, ContourOfACircleAnywhere) {
   ExpectGradientByDifferences(cost, blocks, 3 + 3 + 3 + 2 + 1 + 1, 3 + 3 + 3 + 2 + 1 + 1 + 9);
 }
 
-std::vector<ParallelLinesCost::Line> LinesAlongX(LossType loss, int points) {
-  std::vector<ParallelLinesCost::Line> lines;
-  for (int i = 0; i < 4; ++i) {
-    const double y = -1.0 + 0.6 * i;
-    const auto pixels = Line({-1.5, y, 0.1 * i}, {1.5, y + 0.01 * i, 0.1 * i}, points,
-                             static_cast<std::uint64_t>(i));
-    ImagePoints prepared = Points(pixels, loss);
-    LineFit fit;
-    EXPECT_TRUE(FitLine(prepared.points(), 0.4, &fit).ok());
-    lines.push_back({std::move(prepared), fit.line});
-  }
-  return lines;
-}
-
-TEST(CostFunctionsTest, LinesOfOneDirection) {
+TEST(CostFunctionsTest, ALineOfADirection) {
   for (const LossType loss : kLosses) {
     for (const double sigma : {0.0, 0.002}) {
       for (const int points : {2, 30}) {
-        ParallelLinesCost::Options options;
-        options.direction_sigma = sigma;
-        options.camera = true;
-        const ParallelLinesCost cost(LinesAlongX(loss, points), options);
-        Blocks blocks;
-        blocks.AddPose({0.001, 0.0005, -0.001});
-        blocks.values.pop_back();  // No translation.
-        blocks.manifolds.pop_back();
-        const Eigen::Vector3d d = Eigen::Vector3d(1.0, -0.003, -0.001).normalized();
-        blocks.Add({d.x(), d.y(), d.z()}, std::make_shared<ceres::SphereManifold<3>>());
-        blocks.Add(CameraShifts());
-        SCOPED_TRACE(LossName(loss) + std::string(sigma > 0.0 ? " soft " : " hard ") +
-                     std::to_string(points));
-        ExpectGradientByDifferences(cost, blocks, 3 + 2, 3 + 2 + 9);
+        for (const double y : {-1.0, 0.2}) {
+          const auto pixels = Line({-1.5, y, 0.1}, {1.5, y + 0.01, 0.1}, points, 7);
+          ImagePoints prepared = Points(pixels, loss);
+          LineFit fit;
+          ASSERT_TRUE(FitLine(prepared.points(), 0.4, &fit).ok());
+          DirectionLineCost::Options options;
+          options.direction_sigma = sigma;
+          options.camera = true;
+          const DirectionLineCost cost(std::move(prepared), fit.line, options);
+          Blocks blocks;
+          blocks.AddPose({0.001, 0.0005, -0.001});
+          blocks.values.pop_back();  // No translation.
+          blocks.manifolds.pop_back();
+          const Eigen::Vector3d d = Eigen::Vector3d(1.0, -0.003, -0.001).normalized();
+          blocks.Add({d.x(), d.y(), d.z()}, std::make_shared<ceres::SphereManifold<3>>());
+          blocks.Add({0.002, -0.001});
+          if (sigma == 0.0) blocks.values.back().pop_back();
+          const auto own = static_cast<Eigen::Index>(blocks.values.back().size());
+          blocks.Add(CameraShifts());
+          SCOPED_TRACE(LossName(loss) + std::string(sigma > 0.0 ? " soft " : " hard ") +
+                       std::to_string(points));
+          ExpectGradientByDifferences(cost, blocks, 3 + 2 + own, 3 + 2 + own + 9);
+        }
       }
     }
   }
 }
 
-TEST(CostFunctionsTest, ALineLeftOutCostsNothing) {
-  ParallelLinesCost cost(LinesAlongX(LossType::kTrivial, 20), {});
-  for (std::size_t i = 0; i < 4; ++i) cost.SetActive(i, i == 2);
-  const ParallelLinesCost alone({LinesAlongX(LossType::kTrivial, 20)[2]}, {});
+// Where it starts no other place across the direction costs less.
+TEST(CostFunctionsTest, ALineStartsWhereItsPointsAskFor) {
+  ImagePoints prepared =
+      Points(Line({-1.5, 0.4, 0.1}, {1.5, 0.43, 0.1}, 30, 7), LossType::kTrivial);
+  LineFit fit;
+  ASSERT_TRUE(FitLine(prepared.points(), 0.4, &fit).ok());
+  DirectionLineCost::Options options;
+  options.camera = true;
+  const DirectionLineCost cost(std::move(prepared), fit.line, options);
   Blocks blocks;
   blocks.AddPose();
-  blocks.values[1] = {1.0, 0.0, 0.0};
-  EXPECT_GT(CostOf(cost, blocks), 0.0);
-  EXPECT_EQ(CostOf(cost, blocks), CostOf(alone, blocks));
+  blocks.values.pop_back();
+  blocks.manifolds.pop_back();
+  blocks.Add({1.0, 0.0, 0.0}, std::make_shared<ceres::SphereManifold<3>>());
+  blocks.Add({0.0});
+  blocks.Add(CameraShifts());
+  ASSERT_TRUE(cost.Start(blocks.Pointers().data(), blocks.values[2].data()));
+  const double least = CostOf(cost, blocks);
+  EXPECT_LT(least, CostOf(cost, Moved(blocks, 5, 1e-4)));
+  EXPECT_LT(least, CostOf(cost, Moved(blocks, 5, -1e-4)));
 }
 
 TEST(CostFunctionsTest, ALineOfThePlane) {
@@ -387,8 +393,7 @@ TEST(CostFunctionsTest, GaussNewtonHessianIsThatOfThePoints) {
   Linearize(cost, blocks, &r, &J);
   const auto distances = [&](const Blocks& at) {
     std::vector<double> d;
-    const auto pointers = at.Pointers();
-    cost.points().ConicDistances(cost.ImageOf(pointers.data()), 0.0, nullptr, &d);
+    cost.Distances(at.Pointers().data(), &d);
     return Eigen::VectorXd(
         Eigen::Map<Eigen::VectorXd>(d.data(), static_cast<Eigen::Index>(d.size())) *
         std::sqrt(0.7) / 0.4);

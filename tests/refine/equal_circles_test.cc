@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <vector>
 
+#include "circline/estimators/circle_pose.h"
 #include "circline/refine/estimate_pose.h"
-#include "circline/refine/quadratic_models.h"
 #include "tests/plane_scene.h"
 #include "tests/trials.h"
 
@@ -33,37 +33,35 @@ Observations Dots(PlaneScene* scene, bool equal) {
 }
 
 // Signed distances of the exact contours' points to the images of the circles after a step: the
-// plane turned by two angles, each centre moved, the radii changed (together or each). The plane is
-// Z = 1 in units of its distance.
-Eigen::VectorXd Distances(const PlaneScene& exact, const std::vector<PointSet>& sets, bool equal,
+// plane turned by two angles, each centre moved, the radii changed (together or each).
+Eigen::VectorXd Distances(const PlaneScene& exact,
+                          const std::vector<std::vector<CalibratedPoint>>& contours, bool equal,
                           const Eigen::VectorXd& step) {
-  const Eigen::Matrix3d& R = exact.pose.rotation;
-  const Eigen::Vector3d foot = R.transpose() * exact.pose.translation;
-  const double distance = std::abs(foot.z()), facing = foot.z() > 0.0 ? 1.0 : -1.0;
-  const Eigen::Matrix3d turned = R * ExpRotation({step[0], step[1], 0.0});
-  std::vector<double> all, distances;
-  for (std::size_t i = 0; i < sets.size(); ++i) {
+  CameraPose turned = exact.pose;
+  turned.rotation = exact.pose.rotation * ExpRotation({step[0], step[1], 0.0});
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < contours.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(2 + 2 * i);
-    const Eigen::Index radius = static_cast<Eigen::Index>(2 + 2 * sets.size() + (equal ? 0 : i));
-    const Eigen::Vector2d center = (Centers()[i] + foot.head<2>()) / distance + step.segment<2>(at);
-    ConicDistances(sets[i],
-                   ImageOfPlaneCircle(turned, facing, center.x(), center.y(),
-                                      kRadius / distance + step[radius]),
-                   &distances);
-    all.insert(all.end(), distances.begin(), distances.end());
+    const auto radius = static_cast<Eigen::Index>(2 + 2 * contours.size() + (equal ? 0 : i));
+    const Eigen::Vector2d center = Centers()[i] + step.segment<2>(at);
+    CirclePose circle;
+    circle.normal = turned.rotation.col(2);
+    circle.center =
+        turned.rotation * Eigen::Vector3d(center.x(), center.y(), 0.0) + turned.translation;
+    circle.center /= kRadius + step[radius];
+    const Eigen::Matrix3d image = ProjectCircle(circle);
+    for (const CalibratedPoint& p : contours[i]) distances.push_back(ConicDistancePx(p, image));
   }
-  return Eigen::Map<Eigen::VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
+  return Eigen::Map<Eigen::VectorXd>(distances.data(), static_cast<Eigen::Index>(distances.size()));
 }
 
 // Cramer-Rao bound of the normal: root of the variances of its two angles.
 double Bound(bool equal) {
   PlaneScene exact(0.6, 0.0);
   const Observations observations = Dots(&exact, equal);
-  std::vector<PointSet> sets(observations.circles.size());
-  for (std::size_t i = 0; i < sets.size(); ++i) {
-    PixelsToCalibrated(exact.camera, observations.circles[i].points, &sets[i].points);
-    sets[i].Normalize();
-  }
+  std::vector<std::vector<CalibratedPoint>> sets(observations.circles.size());
+  for (std::size_t i = 0; i < sets.size(); ++i)
+    PixelsToCalibrated(exact.camera, observations.circles[i].points, &sets[i]);
   const auto unknowns = static_cast<Eigen::Index>(2 + 2 * sets.size() + (equal ? 1 : sets.size()));
   Eigen::MatrixXd J(static_cast<Eigen::Index>(60 * sets.size()), unknowns);
   for (Eigen::Index k = 0; k < unknowns; ++k) {
@@ -74,6 +72,12 @@ double Bound(bool equal) {
   }
   const Eigen::MatrixXd covariance = (J.transpose() * J).inverse();
   return std::sqrt(covariance.topLeftCorner<2, 2>().trace());
+}
+
+EstimationOptions Exact() {
+  EstimationOptions options;
+  options.noise_model = NoiseModel::Exact();
+  return options;
 }
 
 double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
@@ -87,7 +91,7 @@ TEST(EqualCirclesTest, NormalSitsOnItsBound) {
     bound[equal ? 1 : 0] = Bound(equal);
     for (int i = 0; i < kTrials; ++i) {
       PlaneScene scene(0.6, kSigmaPx, static_cast<std::uint64_t>(i + 1));
-      EstimationOptions options;
+      EstimationOptions options = Exact();
       options.conic_loss.type = LossType::kTrivial;
       const PoseEstimate estimate = EstimatePose(Dots(&scene, equal), options);
       ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
@@ -123,7 +127,7 @@ TEST(EqualCirclesTest, TheSizesTellThePlane) {
   for (int i = 0; i < 20; ++i) {
     PlaneScene scene(0.5, 0.3, static_cast<std::uint64_t>(i + 1));
     scene.pose.translation.z() = 30.0;
-    const PoseEstimate estimate = EstimatePose(Dots(&scene, true));
+    const PoseEstimate estimate = EstimatePose(Dots(&scene, true), Exact());
     ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
     EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.1);
     ASSERT_EQ(estimate.hypotheses[0].circles.size(), 5U);
@@ -136,7 +140,7 @@ TEST(EqualCirclesTest, OneKnownRadiusIsThatOfTheGroup) {
   PlaneScene scene(0.6, 0.0);
   Observations observations = Dots(&scene, true);
   observations.circles[3].radius = kRadius;
-  const PoseEstimate estimate = EstimatePose(observations);
+  const PoseEstimate estimate = EstimatePose(observations, Exact());
   ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
   EXPECT_TRUE(estimate.hypotheses[0].metric);
   EXPECT_NEAR(estimate.hypotheses[0].circles[0].radius, kRadius, 1e-9);

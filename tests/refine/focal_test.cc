@@ -19,10 +19,17 @@ using Vector4d = Eigen::Vector4d;
 
 constexpr double kPrior = 0.03;
 
+CameraSigma FocalSigma(double log_focal) {
+  CameraSigma sigma = CameraSigma::Exact();
+  sigma.log_focal = log_focal;
+  return sigma;
+}
+
 EstimationOptions WithFocal() {
   EstimationOptions options;
   options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
-  options.focal_sigma = kPrior;
+  options.noise_model = NoiseModel::Exact();
+  options.camera_sigma = FocalSigma(kPrior);
   return options;
 }
 
@@ -150,7 +157,7 @@ class WrongFocalTest : public ::testing::TestWithParam<CameraModel> {
       sigma += best.focal_sigma / kTrials;
       angle += NormalError(best, scene) / kTrials;
       EstimationOptions fixed = WithFocal();
-      fixed.focal_sigma = 0.0;
+      fixed.camera_sigma = CameraSigma::Exact();
       const PoseEstimate stubborn = EstimatePose(observations, fixed);
       fixed_angle += NormalError(stubborn.hypotheses[0], scene) / kTrials;
       ASSERT_FALSE(estimate.notes.empty());
@@ -202,7 +209,7 @@ TEST(FocalTest, OneCircleLeavesItToThePrior) {
   EXPECT_NE(estimate.notes.back().find("the prior alone decides"), std::string::npos);
   // What the focal length leaves open is in the pose's covariance.
   EstimationOptions fixed = WithFocal();
-  fixed.focal_sigma = 0.0;
+  fixed.camera_sigma = CameraSigma::Exact();
   const PoseEstimate known = EstimatePose(observations, fixed);
   EXPECT_EQ(known.hypotheses[0].focal_scale, 1.0);
   EXPECT_EQ(known.hypotheses[0].focal_sigma, 0.0);
@@ -225,7 +232,8 @@ TEST(FocalTest, RobustLossesFindIt) {
     }
     EstimationOptions options;
     options.conic_loss.type = options.line_loss.type = loss;
-    options.focal_sigma = kPrior;
+    options.noise_model = NoiseModel::Exact();
+    options.camera_sigma = FocalSigma(kPrior);
     const PoseEstimate estimate = EstimatePose(observations, options);
     ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
     const PoseHypothesis& best = estimate.hypotheses[0];
@@ -263,7 +271,8 @@ TEST(FocalTest, PoorEvidenceStaysFinite) {
     EstimationOptions options;
     options.conic_loss.type = options.line_loss.type =
         i % 5 < 3 ? LossType::kCauchy : LossType::kTukey;
-    options.focal_sigma = kPrior;
+    options.noise_model = NoiseModel::Exact();
+    options.camera_sigma = FocalSigma(kPrior);
     const PoseEstimate estimate = EstimatePose(observations, options);
     ASSERT_TRUE(estimate.status.ok()) << i << ": " << estimate.status.message;
     for (const PoseHypothesis& h : estimate.hypotheses) {
@@ -287,7 +296,8 @@ TEST(FocalTest, PointsAtTheLensRimAreKept) {
                             scene.Circle("middle", 0.3, 0.2, 1.0)};
     Mistake(1.03, &observations);
     EstimationOptions options;
-    options.focal_sigma = 0.1;
+    options.noise_model = NoiseModel::Exact();
+    options.camera_sigma = FocalSigma(0.1);
     const PoseEstimate estimate = EstimatePose(observations, options);
     ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
     const PoseHypothesis& best = estimate.hypotheses[0];
@@ -300,8 +310,10 @@ TEST(FocalTest, PointsAtTheLensRimAreKept) {
 
 TEST(FocalTest, SigmaIsChecked) {
   EstimationOptions options;
-  options.focal_sigma = -0.1;
-  EXPECT_NE(options.Validate().message.find("focal_sigma"), std::string::npos);
+  options.camera_sigma = FocalSigma(-0.1);
+  EXPECT_NE(options.Validate().message.find("log_focal"), std::string::npos);
+  options.camera_sigma = FocalSigma(2.0);  // As wide as anybody likes.
+  EXPECT_TRUE(options.Validate().ok());
 }
 
 }  // namespace

@@ -1,0 +1,42 @@
+// What the points of a scene can tell at best: the Cramer-Rao bound.
+#ifndef CIRCLINE_APPS_BENCHMARK_SCENES_BOUND_H_
+#define CIRCLINE_APPS_BENCHMARK_SCENES_BOUND_H_
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "apps/benchmark/scenes_world.h"
+
+namespace circline::apps {
+
+// Which evidence counts, and what besides pose and structure is unknown.
+struct BoundRequest {
+  double noise_px = 1.0;
+  std::vector<std::uint8_t> circles;  // 1: used; empty: all.
+  bool pencils = true;                // Their odd lines never count.
+  const Masks* masks = nullptr;       // Points that count.
+  double log_focal_sigma = 0.0;       // Prior of log f; 0: known.
+  int tilted = -1;                    // This circle's plane may have a tilt of its own.
+  int resized = -1;                   // This circle's stated radius does not count.
+};
+
+// Structure (centres, radii, lines, free directions) is unknown, and eliminated.
+struct Bound {
+  bool finite = false;
+  bool spin_is_free = false;
+  // Of delta, camera frame, rotation = exp([delta]x) truth, radians^2; where the spin is free, of
+  // its components across the normal alone.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  double rotation_rad = 0.0;                       // Root of its trace.
+  double log_focal = 0.0;                          // Standard deviations.
+  double log_distance = 0.0;                       // Of the plane; of a scene with a stated radius.
+  Eigen::Matrix2d tilt = Eigen::Matrix2d::Zero();  // Covariance of the tilted circle's own.
+  double log_radius = 0.0;                         // Standard deviation of the resized circle's.
+};
+
+Bound ComputeBound(const World& world, const BoundRequest& request);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_BENCHMARK_SCENES_BOUND_H_

@@ -1,0 +1,63 @@
+#include "apps/common/noise_file.h"
+
+#include <utility>
+#include <vector>
+
+#include "apps/common/storage_node.h"
+
+namespace circline::apps {
+namespace {
+
+using Fields = std::vector<std::pair<std::string, double*>>;
+
+void ReadFields(const StorageNode& node, const Fields& fields,
+                const std::vector<std::string>& other_keys) {
+  std::vector<std::string> keys = other_keys;
+  for (const auto& field : fields) keys.push_back(field.first);
+  node.AllowKeys(keys);
+  for (const auto& [key, value] : fields) {
+    const StorageNode item = node.Get(key);
+    if (item.Exists()) *value = item.Number();
+  }
+}
+
+}  // namespace
+
+Status ReadNoiseModel(const std::string& path, NoiseModel* model) {
+  StorageDocument document;
+  Status status = document.Open(path);
+  if (!status.ok()) return status;
+  NoiseModel read = *model;
+  const StorageNode root(document.root(), "", &status);
+  ReadFields(root,
+             {{"contour_px", &read.contour_px},
+              {"line_px", &read.line_px},
+              {"correlation_px", &read.correlation_px},
+              {"contour_offset_px", &read.contour_offset_px},
+              {"circle_tilt_rad", &read.circle_tilt_rad},
+              {"circle_height", &read.circle_height},
+              {"line_direction_rad", &read.line_direction_rad},
+              {"pencil_axis_rad", &read.pencil_axis_rad},
+              {"radius", &read.radius},
+              {"length", &read.length},
+              {"spread", &read.spread}},
+             {"camera"});
+  const StorageNode camera = root.Get("camera");
+  if (camera.Exists()) {
+    ReadFields(camera,
+               {{"log_focal", &read.camera.log_focal},
+                {"log_aspect", &read.camera.log_aspect},
+                {"principal_point_px", &read.camera.principal_point_px},
+                {"k1", &read.camera.k1}},
+               {});
+  }
+  if (status.ok()) status = read.Validate();
+  if (!status.ok()) {
+    const std::string separator = status.message.compare(0, 2, ": ") == 0 ? "" : ": ";
+    return Status::Invalid(path + separator + status.message);
+  }
+  *model = read;
+  return status;
+}
+
+}  // namespace circline::apps

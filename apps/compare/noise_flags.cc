@@ -1,0 +1,43 @@
+#include "apps/compare/noise_flags.h"
+
+#include <gflags/gflags.h>
+
+#include <cmath>
+#include <string>
+
+#include "apps/common/noise_file.h"
+#include "apps/common/text.h"
+
+DEFINE_double(focal_sigma, -1.0,
+              "Standard deviation of the logarithm of the camera's focal length (0.03: 3 %); from "
+              "0.01 on it is refined too; 0 = exact, -1 = that of the noise model.");
+DEFINE_string(noise, "photo",
+              "What is not exact beside the points' noise: photo (prints bleed, sheets bend, walls "
+              "lean) or exact (nothing, for simulated evidence).");
+DEFINE_string(noise_model, "",
+              "A YAML or JSON file with standard deviations that differ from those of --noise; its "
+              "keys are the fields of NoiseModel.");
+
+namespace circline::apps {
+
+Status NoiseFromFlags(NoiseModel* model) {
+  if (FLAGS_noise != "exact" && FLAGS_noise != "photo") {
+    return Status::Invalid("--noise: '" + FLAGS_noise + "' is not one of photo, exact" +
+                           DidYouMean(FLAGS_noise, {"photo", "exact"}));
+  }
+  *model = FLAGS_noise == "exact" ? NoiseModel::Exact() : NoiseModel();
+  if (FLAGS_noise_model.empty()) return Status::Ok();
+  const Status status = ReadNoiseModel(FLAGS_noise_model, model);
+  return status.ok() ? status : Status::Invalid("--noise_model: " + status.message);
+}
+
+Status CameraSigmaFromFlags(const NoiseModel& noise, std::optional<CameraSigma>* sigma) {
+  if (FLAGS_focal_sigma == -1.0) return Status::Ok();
+  if (!(FLAGS_focal_sigma >= 0.0) || !std::isfinite(FLAGS_focal_sigma))
+    return Status::Invalid("--focal_sigma must be 0 or more, or -1 for the noise model's");
+  *sigma = noise.camera;
+  (*sigma)->log_focal = FLAGS_focal_sigma;
+  return Status::Ok();
+}
+
+}  // namespace circline::apps

@@ -1,0 +1,204 @@
+#include "circline/estimators/closed_form_errors.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "circline/estimators/line_pose.h"
+
+namespace circline {
+namespace {
+
+// Adds an isotropic error of a unit vector, or of a line's normal.
+void AddAngularError(double sigma_rad, Measured* m) {
+  if (!m->present() || sigma_rad == 0.0) return;
+  const Eigen::Vector3d v = m->value, a = v.unitOrthogonal();
+  const Eigen::Index old = m->columns.cols();
+  m->columns.conservativeResize(3, old + 2);
+  m->columns.col(old) = sigma_rad * v.norm() * a;
+  m->columns.col(old + 1) = sigma_rad * v.cross(a);
+}
+
+// All inputs after the change of calibrated coordinates x' = A x.
+void ChangeCoordinates(const Eigen::Matrix3d& A, Inputs* inputs) {
+  const Eigen::Matrix3d inverse = A.inverse();
+  const auto conic = [&](Measured* m) {
+    if (m->present()) {
+      m->value = ConicToVector(TransformConic(VectorToConic(Vector6d(m->value)), inverse));
+    }
+  };
+  conic(&inputs->conic);
+  for (Measured& more : inputs->more_conics) conic(&more);
+  for (Measured* m :
+       {&inputs->center, &inputs->origin, &inputs->directions[0], &inputs->directions[1]}) {
+    if (m->present()) m->value = (A * m->value).eval();
+  }
+  for (Measured* m : {&inputs->x_line, &inputs->y_line, &inputs->line}) {
+    if (m->present()) m->value = (inverse.transpose() * m->value).eval();
+  }
+  for (auto* pair : {&inputs->x_sense, &inputs->y_sense, &inputs->length_points}) {
+    if (!*pair) continue;
+    for (Eigen::Vector3d& ray : **pair) ray = (A * ray).eval();
+  }
+  inputs->rough = (A * inputs->rough).eval();
+}
+
+// The errors of focal length, aspect and principal point.
+void AddCamera(const CameraSigma& sigma, const Camera& camera, std::vector<Perturbation>* all) {
+  const auto add = [all](double deviation, double x_scale, double y_scale, double x, double y) {
+    if (deviation == 0.0) return;
+    all->push_back([=](double part, Inputs* inputs) {
+      const double s = part * deviation;
+      Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
+      A(0, 0) = std::exp(s * x_scale);
+      A(1, 1) = std::exp(s * y_scale);
+      A(0, 2) = s * x;
+      A(1, 2) = s * y;
+      ChangeCoordinates(A, inputs);
+    });
+  };
+  add(sigma.log_focal, 1.0, 1.0, 0.0, 0.0);
+  add(sigma.log_aspect, 0.0, 1.0, 0.0, 0.0);
+  add(sigma.principal_point_px, 0.0, 0.0, 1.0 / camera.fx, 0.0);
+  add(sigma.principal_point_px, 0.0, 0.0, 0.0, 1.0 / camera.fy);
+}
+
+// Both semi-axes grow alike: of the curve at a distance from an ellipse, the ellipse nearest to it.
+void Grow(double by, Measured* conic) {
+  Ellipse ellipse;
+  if (!ConicToEllipse(VectorToConic(Vector6d(conic->value)), &ellipse) || !(ellipse.b + by > 0.0))
+    return;
+  ellipse.a += by;
+  ellipse.b += by;
+  conic->value = ConicToVector(EllipseToConic(ellipse));
+}
+
+void AddOffsets(double sigma_px, const Camera& camera, const Inputs& inputs,
+                std::vector<Perturbation>* all) {
+  const double sigma = sigma_px / std::sqrt(camera.fx * camera.fy);
+  for (const int contrast : {-1, 0, 1}) {
+    const std::vector<int>& of = inputs.contrasts;
+    if (sigma == 0.0 || std::find(of.begin(), of.end(), contrast) == of.end()) continue;
+    all->push_back([=](double part, Inputs* in) {
+      if (in->contrasts[0] == contrast) Grow(part * sigma, &in->conic);
+      for (std::size_t i = 0; i < in->more_conics.size(); ++i) {
+        if (in->contrasts[i + 1] == contrast) Grow(part * sigma, &in->more_conics[i]);
+      }
+    });
+  }
+}
+
+// Of one candidate or more.
+const Candidate& Nearest(const std::vector<Candidate>& candidates, const Candidate& reference) {
+  const Candidate* best = &candidates.front();
+  double best_angle = std::numeric_limits<double>::infinity();
+  for (const Candidate& c : candidates) {
+    const double angle = RotationAngle(c.pose.rotation, reference.pose.rotation);
+    if (angle < best_angle) {
+      best_angle = angle;
+      best = &c;
+    }
+  }
+  return *best;
+}
+
+// A perturbation may tip the convention that settles the senses of the axes; that is no error.
+Eigen::Matrix3d SameSenses(const Candidate& perturbed, const Candidate& reference) {
+  Eigen::Matrix3d best = perturbed.pose.rotation;
+  for (const Eigen::Matrix3d& R : SignChoices(perturbed.pose.rotation)) {
+    if (RotationAngle(R, reference.pose.rotation) < RotationAngle(best, reference.pose.rotation))
+      best = R;
+  }
+  return best;
+}
+
+// Half the difference of two perturbed candidates, in rows [delta, delta_t, contradiction].
+Eigen::VectorXd HalfDifference(const Candidate& plus, const Candidate& minus,
+                               const Candidate& reference) {
+  Eigen::VectorXd half(6 + reference.contradiction.size());
+  half.head<3>() =
+      0.5 * LogRotation(SameSenses(plus, reference) * SameSenses(minus, reference).transpose());
+  half.segment<3>(3) = 0.5 * (plus.pose.translation - minus.pose.translation);
+  half.tail(half.size() - 6) = 0.5 * (plus.contradiction - minus.contradiction);
+  return half;
+}
+
+Eigen::MatrixXd FromColumns(const std::vector<Eigen::VectorXd>& columns, Eigen::Index rows) {
+  Eigen::MatrixXd matrix(rows, static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    matrix.col(static_cast<Eigen::Index>(k)) = columns[k];
+  return matrix;
+}
+
+}  // namespace
+
+void AddModelErrors(const NoiseModel& noise, Inputs* inputs) {
+  for (Measured& direction : inputs->directions) AddAngularError(noise.pencil_axis_rad, &direction);
+  // A line that an axis is drawn on is that axis.
+  if (!inputs->x_sense) AddAngularError(noise.pencil_axis_rad, &inputs->x_line);
+  if (!inputs->y_sense) AddAngularError(noise.pencil_axis_rad, &inputs->y_line);
+  const double tilt_variance = noise.circle_tilt_rad * noise.circle_tilt_rad;
+  for (Measured& tilt : inputs->tilts)
+    tilt.columns = noise.circle_tilt_rad * Eigen::Matrix2d::Identity();
+  for (double& weight : inputs->normal_weights) weight = 1.0 / (1.0 / weight + 2.0 * tilt_variance);
+  if (inputs->radius_sigma == 0.0) inputs->radius_sigma = noise.radius;
+  if (inputs->length_sigma == 0.0) inputs->length_sigma = noise.length;
+}
+
+std::vector<Perturbation> Perturbations(const Inputs& inputs, const NoiseModel& noise,
+                                        const Camera& camera) {
+  std::vector<Perturbation> all;
+  Inputs copy = inputs;
+  const std::vector<Measured*> measured = copy.All();
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    for (Eigen::Index k = 0; k < measured[i]->columns.cols(); ++k) {
+      if (measured[i]->columns.col(k).isZero(0.0)) continue;
+      all.push_back([i, k](double part, Inputs* in) {
+        Measured* m = in->All()[i];
+        m->value += part * m->columns.col(k);
+      });
+    }
+  }
+  if (inputs.line.present() && inputs.angle_sigma > 0.0)
+    all.push_back([](double part, Inputs* in) { in->angle += part * in->angle_sigma; });
+  if (inputs.radius > 0.0 && inputs.radius_sigma > 0.0)
+    all.push_back([](double part, Inputs* in) { in->radius *= 1.0 + part * in->radius_sigma; });
+  if (inputs.length > 0.0 && inputs.length_sigma > 0.0)
+    all.push_back([](double part, Inputs* in) { in->length *= 1.0 + part * in->length_sigma; });
+  AddCamera(noise.camera, camera, &all);
+  AddOffsets(noise.contour_offset_px, camera, inputs, &all);
+  return all;
+}
+
+std::vector<Eigen::MatrixXd> Sensitivities(const Evaluate& evaluate, const Inputs& inputs,
+                                           const std::vector<Perturbation>& perturbations,
+                                           const std::vector<Candidate>& candidates) {
+  constexpr double kShrink = 0.1, kSmallestPart = 1e-4;
+  std::vector<std::vector<Eigen::VectorXd>> columns(candidates.size());
+  Inputs perturbed;
+  const auto evaluate_at = [&](const Perturbation& perturb, double part) {
+    perturbed = inputs;
+    perturb(part, &perturbed);
+    return evaluate(perturbed);
+  };
+  for (const Perturbation& perturb : perturbations) {
+    for (double part = 1.0; part > kSmallestPart; part *= kShrink) {
+      const std::vector<Candidate> plus = evaluate_at(perturb, part);
+      const std::vector<Candidate> minus = evaluate_at(perturb, -part);
+      if (plus.empty() || minus.empty()) continue;
+      for (std::size_t i = 0; i < candidates.size(); ++i) {
+        columns[i].push_back(HalfDifference(Nearest(plus, candidates[i]),
+                                            Nearest(minus, candidates[i]), candidates[i]) /
+                             part);
+      }
+      break;
+    }
+  }
+  std::vector<Eigen::MatrixXd> matrices;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    matrices.push_back(FromColumns(columns[i], 6 + candidates[i].contradiction.size()));
+  return matrices;
+}
+
+}  // namespace circline

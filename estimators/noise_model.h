@@ -1,0 +1,91 @@
+// What is not exact beside the noise of single points: one struct of standard deviations, which
+// everything that weighs, tests or reports uses (fits, gates, closed forms, refinement).
+//
+// Simulated evidence has point noise and nothing else: NoiseModel::Exact(). Photographs have more:
+// prints bleed, sheets bend, walls lean, calibrations are a little off. The defaults are those of
+// photographs, chosen between what discs (rgb), dots (visp36), a large circle, a street, a box and
+// chessboards ask for; photographs of infrared discs, of a robot's dots, of ChArUco boards and of a
+// turntable, and the harder halves of street and box had no part in it
+// (apps/benchmark/coverage.py).
+#ifndef CIRCLINE_ESTIMATORS_NOISE_MODEL_H_
+#define CIRCLINE_ESTIMATORS_NOISE_MODEL_H_
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "circline/estimators/status.h"
+
+namespace circline {
+
+// Residuals within this many standard deviations are inliers: 99.8 % of a Gaussian's.
+constexpr double kInlierSigmas = 3.09;
+
+// How well a camera is known. Standard deviations; 0 = exact. The defaults are those of a good
+// calibration.
+struct CameraSigma {
+  double log_focal = 0.002;         // Of log f, f the common factor of fx and fy.
+  double log_aspect = 0.001;        // Of log (fy / fx).
+  double principal_point_px = 1.0;  // Of each coordinate, pixels.
+  double k1 = 0.0;                  // Of the first distortion coefficient.
+
+  static CameraSigma Exact() { return {0.0, 0.0, 0.0, 0.0}; }
+  Status Validate() const;
+};
+
+// Standard deviations, all >= 0; 0 = exact.
+struct NoiseModel {
+  // Error that neighbouring points of one contour or line share (blur, edge bias), pixels, and over
+  // which length it stays the same, pixels: n points on a length L are worth no more than L /
+  // correlation_px (and no less than one) that have this error.
+  double contour_px = 0.12;
+  double line_px = 0.1;
+  double correlation_px = 50.0;
+  // Offset that all contours of one contrast share (print bleed, exposure), pixels.
+  double contour_offset_px = 0.1;
+  // A circle's plane against the world's plane: tilt about each of two axes, radians, and height,
+  // a share of the circle's radius.
+  double circle_tilt_rad = 0.003;
+  double circle_height = 0.003;
+  // A line against the direction of its pencil, and a pencil's direction against the axis that it
+  // is taken for (each of two components), radians.
+  double line_direction_rad = 0.003;
+  double pencil_axis_rad = 0.004;
+  // A known radius or length that states no sigma of its own, relative.
+  double radius = 0.001;
+  double length = 0.001;
+  CameraSigma camera;
+  // Standard deviation, from photo to photo, of the logarithm of the figures of contours, and of
+  // those of lines (shared error, tilt, height, deviation): some worlds are more exact than others,
+  // and where a photo has many features they tell. 0: the figures are believed as they are.
+  double spread = 1.0;
+
+  // Nothing but the noise of points: for simulated evidence, and for bounds.
+  static NoiseModel Exact();
+  // Ok, or a sentence that names the field that is negative or not finite, or a correlation length
+  // that is not positive.
+  Status Validate() const;
+
+  // What a feature of `num_points` points over a length of `length_px` counts, from 0 to 1, beside
+  // one whose points share no error: sigma^2 / (sigma^2 + (n / m) shared^2), m = length /
+  // correlation. Multiplies the sum of its squared residuals.
+  double Weight(double shared_px, double sigma_px, double num_points, double length_px) const;
+  // What residuals of this root mean square are worth as an estimate of their variance: so many
+  // that share no error (Satterthwaite 1946).
+  double Freedom(double shared_px, double rms_px, double num_points, double length_px) const;
+  // Those of a contour, of a line: of those of their points, pixels, that are inliers (no mask:
+  // all). The length is that of an ellipse with the points' box, which is right within a factor of
+  // 2 for arcs, and the distance of the ends.
+  double ContourWeight(double sigma_px, const std::vector<Eigen::Vector2d>& points,
+                       const std::vector<std::uint8_t>& inliers) const;
+  double LineWeight(double sigma_px, const std::vector<Eigen::Vector2d>& points,
+                    const std::vector<std::uint8_t>& inliers) const;
+  double ContourFreedom(double rms_px, const std::vector<Eigen::Vector2d>& points,
+                        const std::vector<std::uint8_t>& inliers) const;
+  double LineFreedom(double rms_px, const std::vector<Eigen::Vector2d>& points,
+                     const std::vector<std::uint8_t>& inliers) const;
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_NOISE_MODEL_H_

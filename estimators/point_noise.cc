@@ -1,0 +1,197 @@
+#include "circline/estimators/point_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace circline {
+namespace {
+
+// An estimate of a variance, and what it is worth: Gaussian residuals that would say as much.
+struct Scatter {
+  double variance = 0.0;  // px^2.
+  double freedom = 0.0;   // Degrees of freedom; 0 = nothing is redundant.
+};
+
+// Posterior mean of a variance with a scaled inverse chi-square prior of `worth` degrees of
+// freedom: (worth prior + sum of squares) / (freedom + worth - 2), which is finite from two degrees
+// on.
+double Shrink(const Scatter& scatter, double prior_px, double worth = 1.0) {
+  return std::sqrt((worth * prior_px * prior_px + scatter.freedom * scatter.variance) /
+                   std::max(worth, scatter.freedom + worth - 2.0));
+}
+
+Scatter FromSquares(double mean_square, double n, double parameters) {
+  const double freedom = n - parameters;
+  if (!(freedom > 0.0) || !std::isfinite(mean_square)) return {};
+  return {mean_square * n / freedom, freedom};
+}
+
+// Of the residuals within three standard deviations, these from the median absolute residual.
+Scatter FromMost(const std::vector<double>& residuals, std::vector<double>* sizes,
+                 double parameters) {
+  if (residuals.empty()) return {};
+  sizes->clear();
+  for (const double r : residuals) sizes->push_back(std::abs(r));
+  const auto middle = sizes->begin() + static_cast<std::ptrdiff_t>(sizes->size() / 2);
+  std::nth_element(sizes->begin(), middle, sizes->end());
+  const double gate = 3.0 * 1.4826 * *middle;
+  double n = 0.0, squares = 0.0;
+  for (const double r : *sizes) {
+    if (r > gate) continue;
+    n += 1.0;
+    squares += r * r;
+  }
+  constexpr double kVarianceWithinGate = 0.9733;  // Of a unit Gaussian cut off at three.
+  return FromSquares(squares / (n * kVarianceWithinGate), n, parameters);
+}
+
+class NoiseMeter {
+ public:
+  NoiseMeter(const Observations& fitted, const NoiseModel& model)
+      : fitted_(fitted), model_(model) {}
+
+  Scatter OfCircle(const CircleObservation& circle) {
+    if (circle.sigma_px > 0.0 || !circle.fit) return {};
+    constexpr double kParameters = 5.0;
+    const double rms = circle.fit->rms_px;
+    const auto shared = [&](Scatter scatter) {
+      const double worth =
+          model_.ContourFreedom(std::sqrt(scatter.variance), circle.points, circle.inliers);
+      scatter.freedom = std::min(scatter.freedom, worth);
+      return scatter;
+    };
+    if (!circle.inliers.empty())
+      return shared(FromSquares(rms * rms, Count(circle.inliers), kParameters));
+    CalibrateInliers(fitted_.camera, circle.points, circle.inliers, &points_);
+    residuals_.clear();
+    for (const CalibratedPoint& p : points_)
+      residuals_.push_back(ConicDistancePx(p, circle.fit->conic));
+    return shared(FromMost(residuals_, &sizes_, kParameters));
+  }
+
+  Scatter OfLine(const PencilObservation& pencil, const LineObservation& line) {
+    if (LineSigma(pencil, line) > 0.0 || !line.fit || IsSegment(line)) return {};
+    constexpr double kParameters = 2.0;
+    const double rms = line.fit->rms_px;
+    const auto shared = [&](Scatter scatter) {
+      const double worth =
+          model_.LineFreedom(std::sqrt(scatter.variance), line.points, line.inliers);
+      scatter.freedom = std::min(scatter.freedom, worth);
+      return scatter;
+    };
+    if (!line.inliers.empty())
+      return shared(FromSquares(rms * rms, Count(line.inliers), kParameters));
+    CalibrateInliers(fitted_.camera, line.points, line.inliers, &points_);
+    residuals_.clear();
+    for (const CalibratedPoint& p : points_)
+      residuals_.push_back(LineDistancePx(p, line.fit->line));
+    return shared(FromMost(residuals_, &sizes_, kParameters));
+  }
+
+  // All segments of two points together: their misses of the vanishing point in standard
+  // deviations, if the end points' were 1 px.
+  Scatter OfSegments(const PencilObservation& pencil) {
+    if (!pencil.fit) return {};
+    residuals_.clear();
+    double num_lines = 0.0, squares = 0.0;
+    bool has_masks = true;
+    for (const LineObservation& line : pencil.lines) {
+      if (!line.fit || !line.is_parallel) continue;
+      num_lines += 1.0;
+      if (LineSigma(pencil, line) > 0.0 || !IsSegment(line)) continue;
+      has_masks = has_masks && !line.inliers.empty();
+      CalibrateInliers(fitted_.camera, line.points, line.inliers, &points_);
+      LineFit unit;
+      if (!FitLine(points_, 1.0, &unit).ok()) continue;
+      residuals_.push_back(VanishingPointResidual(unit, pencil.fit->direction));
+      squares += residuals_.back() * residuals_.back();
+    }
+    if (residuals_.empty()) return {};
+    // The two parameters of the vanishing point, shared out among all lines.
+    const double n = static_cast<double>(residuals_.size()), parameters = 2.0 * n / num_lines;
+    return has_masks ? FromSquares(squares / n, n, parameters)
+                     : FromMost(residuals_, &sizes_, parameters);
+  }
+
+  static bool IsSegment(const LineObservation& line) {
+    return line.inliers.empty() ? line.points.size() == 2 : Count(line.inliers) == 2.0;
+  }
+
+ private:
+  static double Count(const std::vector<std::uint8_t>& mask) {
+    return static_cast<double>(mask.size()) -
+           static_cast<double>(std::count(mask.begin(), mask.end(), 0));
+  }
+
+  const Observations& fitted_;
+  const NoiseModel& model_;
+  std::vector<CalibratedPoint> points_;
+  std::vector<double> residuals_, sizes_;
+};
+
+// The noise that half of the degrees of freedom exceed.
+double Common(std::vector<Scatter> scatters, double default_px, double worth = 1.0) {
+  double freedom = 0.0;
+  for (Scatter& s : scatters) {
+    freedom += s.freedom;
+    // The median of chi-square over its mean (Wilson and Hilferty 1931), so that few degrees of
+    // freedom each do not pull the median down.
+    const double cube_root = 1.0 - 2.0 / (9.0 * std::max(1.0, s.freedom));
+    s.variance /= cube_root * cube_root * cube_root;
+  }
+  if (!(freedom > 0.0)) return default_px;
+  std::sort(scatters.begin(), scatters.end(),
+            [](const Scatter& a, const Scatter& b) { return a.variance < b.variance; });
+  double below = 0.0;
+  std::size_t i = 0;
+  while (below + scatters[i].freedom < 0.5 * freedom) below += scatters[i++].freedom;
+  return Shrink({scatters[i].variance, freedom}, default_px, worth);
+}
+
+}  // namespace
+
+PointNoise MeasurePointNoise(const Observations& fitted, const NoiseModel& model,
+                             double conic_default_px, double line_default_px) {
+  NoiseMeter meter(fitted, model);
+  PointNoise noise;
+  std::vector<Scatter> circles, lines;
+  for (const CircleObservation& circle : fitted.circles) circles.push_back(meter.OfCircle(circle));
+  noise.conic_px = Common(circles, conic_default_px);
+  for (std::size_t i = 0; i < circles.size(); ++i) {
+    const double stated = fitted.circles[i].sigma_px;
+    noise.circles.push_back(stated > 0.0 ? stated : Shrink(circles[i], noise.conic_px));
+  }
+
+  // One for each pencil's segments, then one for each of its lines.
+  for (const PencilObservation& pencil : fitted.pencils) {
+    lines.push_back(meter.OfSegments(pencil));
+    for (const LineObservation& line : pencil.lines) lines.push_back(meter.OfLine(pencil, line));
+  }
+  // A photo is about as sharp along its lines as along its contours. Where many contour points say
+  // how sharp, that counts as ten residuals of lines would: segments have few of their own.
+  constexpr double kMany = 20.0, kWorth = 10.0;
+  double freedom = 0.0;
+  for (const Scatter& s : circles) freedom += s.freedom;
+  const double worth = freedom >= kMany ? kWorth : 1.0;
+  const double prior =
+      freedom >= kMany ? noise.conic_px * line_default_px / conic_default_px : line_default_px;
+  noise.line_worth = worth;
+  noise.line_px = Common(lines, prior, worth);
+  std::size_t next = 0;
+  for (const PencilObservation& pencil : fitted.pencils) {
+    const Scatter segments = lines[next++];
+    std::vector<double>& sigmas = noise.lines.emplace_back();
+    for (const LineObservation& line : pencil.lines) {
+      const Scatter own = lines[next++];
+      const double stated = LineSigma(pencil, line);
+      const bool of_pencil = NoiseMeter::IsSegment(line) && line.is_parallel;
+      sigmas.push_back(stated > 0.0 ? stated
+                       : of_pencil  ? Shrink(segments, noise.line_px, worth)
+                                    : Shrink(own, noise.line_px));
+    }
+  }
+  return noise;
+}
+
+}  // namespace circline

@@ -1,0 +1,37 @@
+// Outliers that lie in one place may look like a piece of a curve to a robust fit. What gives them
+// away is that they crowd: the points of a contour or a line are strung along it. Internal: not
+// installed.
+#ifndef CIRCLINE_RANSAC_CROWDS_H_
+#define CIRCLINE_RANSAC_CROWDS_H_
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace circline {
+
+// Those of n points without far more neighbours than the loneliest fifth has. near(i, j): whether
+// two are neighbours, within three thresholds of an inlier. `stand_ins`: so many, the first, count
+// for all; put them in random order where they are fewer than n.
+template <typename Near>
+std::vector<int> Uncrowded(int n, int stand_ins, const Near& near) {
+  std::vector<int> neighbors(static_cast<std::size_t>(n), 0);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < std::min(n, stand_ins); ++j)
+      neighbors[static_cast<std::size_t>(i)] += near(i, j) ? 1 : 0;
+  }
+  std::vector<int> sorted = neighbors;
+  std::nth_element(sorted.begin(), sorted.begin() + n / 5, sorted.end());
+  const int limit = 4 * (sorted[static_cast<std::size_t>(n / 5)] + 1);
+  std::vector<int> indices;
+  for (int i = 0; i < n; ++i) {
+    if (neighbors[static_cast<std::size_t>(i)] <= limit) indices.push_back(i);
+  }
+  return indices;
+}
+
+constexpr double kCrowdThresholds = 3.0;
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_CROWDS_H_

@@ -1,0 +1,23 @@
+#include "circline/ransac/false_alarms.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace circline {
+
+double LogFalseAlarms(std::size_t num_data, int sample_size, double expected,
+                      std::size_t num_inliers) {
+  double log_samples = 0.0;
+  for (int i = 0; i < sample_size; ++i) {
+    const double left = static_cast<double>(num_data) - i;
+    log_samples += std::log(std::max(1.0, left) / (i + 1.0));
+  }
+  log_samples = std::max(0.0, log_samples);
+  const double k = static_cast<double>(num_inliers) - sample_size;
+  if (!(k > expected)) return log_samples;
+  if (!(expected > 0.0)) return -std::numeric_limits<double>::max();
+  return log_samples + k - expected - k * std::log(k / expected);
+}
+
+}  // namespace circline

@@ -1,0 +1,104 @@
+#include "circline/refine/imperfection_scales.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "circline/refine/linearization.h"
+
+namespace circline {
+namespace {
+
+constexpr std::size_t kFewCircles = 2, kFewLines = 4;  // So few hardly contradict each other.
+
+// One feature's misfit, its degrees of freedom, and the share of imperfections: their variance over
+// that of the points' own noise.
+struct Misfit {
+  double d2, dof, share;
+};
+
+// The scale s of the standard deviations of all imperfections: d^2 (1 + share) / (1 + s^2 share) is
+// chi-square with dof degrees of freedom; log s has a Gaussian prior of deviation `spread`. The
+// root of the posterior mean of s^2, which few features leave above its mode.
+double ExpectedScale(const std::vector<Misfit>& misfits, double spread) {
+  constexpr double kLeast = 0.1, kMost = 2.0;
+  constexpr int kSteps = 40;
+  double costs[kSteps + 1], scales[kSteps + 1];
+  for (int k = 0; k <= kSteps; ++k) {
+    const double s = scales[k] = kLeast * std::pow(kMost / kLeast, static_cast<double>(k) / kSteps);
+    costs[k] = std::pow(std::log(s) / spread, 2.0);
+    for (const Misfit& m : misfits) {
+      const double variance = 1.0 + s * s * m.share;
+      costs[k] += m.d2 * (1.0 + m.share) / variance + m.dof * std::log(variance);
+    }
+  }
+  const double least = *std::min_element(costs, costs + kSteps + 1);
+  double sum = 0.0, squares = 0.0;
+  for (int k = 0; k <= kSteps; ++k) {
+    const double probability = std::exp(0.5 * (least - costs[k]));
+    sum += probability;
+    squares += probability * scales[k] * scales[k];
+  }
+  return std::sqrt(squares / sum);
+}
+
+// Variance of what the points alone say of an own unknown with a Gaussian prior, from that with it.
+double PriorShare(double variance, double sigma) {
+  if (!(sigma > 0.0) || !(variance > 0.0)) return 0.0;
+  const double prior = sigma * sigma;
+  const double information = std::max(0.0, 1.0 / variance - 1.0 / prior);
+  return information * prior;
+}
+
+}  // namespace
+
+bool HasManyFeatures(const JointProblem& problem) {
+  const NoiseModel& m = problem.options().noise_model;
+  const bool circles_differ = m.contour_px > 0.0 || m.circle_tilt_rad > 0.0,
+             lines_differ = m.line_px > 0.0 || m.line_direction_rad > 0.0;
+  return m.spread > 0.0 && ((circles_differ && problem.circles().size() > kFewCircles) ||
+                            (lines_differ && problem.lines().size() > kFewLines));
+}
+
+NoiseModel ScaledNoiseModel(const JointProblem& problem, const State& minimum) {
+  NoiseModel model = problem.options().noise_model;
+  Linearization at(problem, minimum, Weighing());
+  if (!at.ok() || !at.ComputeCovariance()) return model;
+  const std::vector<Linearization::Misfit> found = at.Misfits();
+  // An outlier counts for no more than a feature that is kept.
+  constexpr double kMost = 9.0;
+  const auto add = [&](int feature, int term, double deviations, std::vector<Misfit>* out) {
+    const auto f = static_cast<std::size_t>(feature);
+    if (minimum.active[f] == 0) return;
+    const double weight =
+        problem.terms()[static_cast<std::size_t>(term)].weighed->points()->options().weight;
+    const double dof = found[f].dof;
+    out->push_back({std::min(found[f].d2, kMost * dof), dof, (1.0 + deviations) / weight - 1.0});
+  };
+  std::vector<Misfit> circles, lines;
+  for (const JointProblem::CircleBlocks& c : problem.circles()) {
+    double deviations = 0.0;
+    for (int k = 0; c.tilt >= 0 && k < 2; ++k)
+      deviations += 0.5 * PriorShare(at.OwnVariance(c.tilt, k), model.circle_tilt_rad);
+    add(c.feature, c.term, deviations, &circles);
+  }
+  for (const JointProblem::LineBlocks& l : problem.lines()) {
+    const bool is_soft = problem.blocks()[static_cast<std::size_t>(l.line)].size > 1;
+    add(l.feature, l.term,
+        is_soft ? PriorShare(at.OwnVariance(l.line, 1), model.line_direction_rad) : 0.0, &lines);
+  }
+  if (circles.size() > kFewCircles) {
+    const double s = ExpectedScale(circles, model.spread);
+    model.contour_px *= s;
+    model.circle_tilt_rad *= s;
+    model.circle_height *= s;
+  }
+  if (lines.size() > kFewLines) {
+    const double s = ExpectedScale(lines, model.spread);
+    model.line_px *= s;
+    model.line_direction_rad *= s;
+  }
+  return model;
+}
+
+}  // namespace circline

@@ -1,0 +1,125 @@
+// One ceres::Problem for a reading, solved from a start.
+#include <ceres/ceres.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "circline/refine/joint_problem.h"
+
+namespace circline {
+namespace {
+
+// Ends where a step, taken or not, changes the cost by little against half a standard deviation
+// squared, however large the cost of all points is.
+class StopAtSmallChange : public ceres::IterationCallback {
+ public:
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    constexpr double kLittle = 1e-6;
+    const bool is_step = summary.iteration > 0 && summary.step_is_valid;
+    return is_step && std::abs(summary.cost_change) < kLittle ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+                                                              : ceres::SOLVER_CONTINUE;
+  }
+};
+
+}  // namespace
+
+Status JointProblem::Solve(int max_iterations, State* state, bool* converged) const {
+  ceres::Problem::Options ownership;
+  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ownership.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ownership.disable_all_safety_checks = true;
+  ceres::Problem problem(ownership);
+  std::vector<double*> blocks;
+  std::vector<std::uint8_t> added(blocks_.size(), 0);
+  int unknowns = 0;
+  for (const Term& term : terms_) {
+    if (!IsActive(term, *state)) continue;
+    blocks.clear();
+    for (const int index : term.blocks) {
+      const auto i = static_cast<std::size_t>(index);
+      const Block& block = blocks_[i];
+      double* values = state->x.data() + block.offset;
+      blocks.push_back(values);
+      if (added[i] != 0) continue;
+      added[i] = 1;
+      unknowns += block.tangent_size();
+      problem.AddParameterBlock(values, block.size,
+                                const_cast<ceres::Manifold*>(block.manifold));  // Not owned.
+      if (block.is_constant) problem.SetParameterBlockConstant(values);
+    }
+    problem.AddResidualBlock(term.cost.get(), term.loss.get(), blocks);
+  }
+  if (unknowns == 0) return Status::Refused("nothing of the evidence ties the pose");
+
+  ceres::Solver::Options options;
+  // Beyond so many unknowns most of them are features' own, and the normal equations are sparse.
+  constexpr int kDense = 60;
+  options.linear_solver_type =
+      unknowns <= kDense ? ceres::DENSE_NORMAL_CHOLESKY : ceres::SPARSE_NORMAL_CHOLESKY;
+  options.max_num_iterations = max_iterations;
+  StopAtSmallChange stop;
+  options.callbacks.push_back(&stop);
+  options.function_tolerance = 0.0;
+  options.gradient_tolerance = 1e-9;
+  options.parameter_tolerance = 1e-10;
+  options.initial_trust_region_radius = 1e6;  // Starts are near, and the model is good.
+  // What is known too badly to be estimated stays where it is.
+  options.max_trust_region_radius = 1e8;
+  options.max_consecutive_nonmonotonic_steps = 0;
+  options.logging_type = ceres::SILENT;
+  options.num_threads = 1;  // Same bits out.
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  if (!summary.IsSolutionUsable() && summary.termination_type != ceres::NO_CONVERGENCE)
+    return Status::Failed("the evidence cannot be evaluated at the seed");
+  state->cost = summary.final_cost;
+  if (converged != nullptr) *converged = summary.termination_type != ceres::NO_CONVERGENCE;
+  for (const double v : state->x) {
+    if (!std::isfinite(v)) return Status::Failed("the refinement left the range of numbers");
+  }
+  return std::isfinite(state->cost) ? Status::Ok()
+                                    : Status::Failed("the refinement left the range of numbers");
+}
+
+void JointProblem::SetWeighing(const Weighing& weighing) const {
+  for (const Term& term : terms_) {
+    if (term.weighed != nullptr) term.weighed->set_weighing(weighing);
+  }
+}
+
+Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
+  // Under a loss so wide that it is none, residuals are so many standard deviations, root mean
+  // square.
+  constexpr double kNoLoss = 1e4;
+  Weighing weighing;
+  weighing.stretch = kNoLoss;
+  double num_points = 0.0;
+  for (const Term& term : terms_) {
+    if (term.weighed == nullptr || !IsActive(term, *state)) continue;
+    const ImagePoints* points = term.weighed->points();
+    num_points +=
+        points != nullptr ? points->options().weight * static_cast<double>(points->size()) : 1.0;
+  }
+  const double rms = std::sqrt(2.0 * Cost(*state, weighing) / std::max(1.0, num_points));
+  constexpr double kWidest = 300.0, kNarrower = 0.25;
+  const auto is_bounded = [](LossType loss) {
+    return loss == LossType::kTukey || loss == LossType::kGemanMcClure || loss == LossType::kArctan;
+  };
+  // A loss that is bounded soon has no slope to follow.
+  const double near =
+      is_bounded(options_.conic_loss.type) || is_bounded(options_.line_loss.type) ? 1.5 : 3.0;
+  constexpr int kIterations = 2;  // Of each width: near enough for the next.
+  for (double width = std::min(rms, kWidest); width > near; width *= kNarrower) {
+    weighing.stretch = width;
+    SetWeighing(weighing);
+    const Status status = Solve(kIterations, state);
+    SetWeighing(Weighing());
+    if (!status.ok()) return status;
+  }
+  return Solve(max_iterations, state);
+}
+
+}  // namespace circline

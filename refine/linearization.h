@@ -1,0 +1,83 @@
+// The joint problem at a place as one linear system: information, covariance, volumes, and how far
+// each feature contradicts the others. From the Jacobians of the same cost functions that ceres
+// solves for. Internal: not installed.
+#ifndef CIRCLINE_REFINE_LINEARIZATION_H_
+#define CIRCLINE_REFINE_LINEARIZATION_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "circline/refine/joint_problem.h"
+
+namespace circline {
+
+class Linearization {
+ public:
+  // The active terms at `state`. Not ok() where some cannot be evaluated.
+  Linearization(const JointProblem& problem, const State& state, const Weighing& weighing);
+  bool ok() const { return ok_; }
+
+  // First column of a block in the shared unknowns, tangent space; -1 for constants and for what a
+  // feature has of its own. The camera's come last, whether it is estimated or not.
+  int column(int block) const { return columns_[static_cast<std::size_t>(block)]; }
+  int num_columns() const { return static_cast<int>(gradient_.size()); }
+
+  // Covariance of the shared unknowns, pseudo-inverse on the observed subspace. A camera that is
+  // not estimated is counted by its prior: Sigma_x + S Sigma_camera S^T, S how the others follow it
+  // ("consider" covariance). Also fills null_space(). False where a feature's own unknowns carry no
+  // information.
+  bool ComputeCovariance();
+  const Eigen::MatrixXd& covariance() const { return covariance_; }
+  const Eigen::MatrixXd& null_space() const { return null_space_; }
+
+  // By feature: d^2 = 2 (C(all) - C(without it) - C(its own free fit)), to second order, and its
+  // degrees of freedom; 0 for what is inactive or has no test. Needs ComputeCovariance.
+  struct Misfit {
+    double d2 = 0.0;
+    int dof = 1;
+  };
+  std::vector<Misfit> Misfits() const;
+  // Variance of one coordinate of a block that a feature has of its own, all shared unknowns held.
+  double OwnVariance(int block, int coordinate) const;
+
+ private:
+  // Residuals of one feature or prior, by own columns of the group first, then shared ones.
+  struct Rows {
+    int feature, group;
+    Eigen::MatrixXd J;         // Rows by local columns.
+    std::vector<int> columns;  // Of J: >= 0 shared, < 0: own column -1 - k of the group.
+    Eigen::VectorXd f;
+    double twice_cost = 0.0;
+  };
+  struct Group {
+    int size = 0;                 // Own columns.
+    std::vector<int> shared;      // Columns.
+    Eigen::MatrixXd information;  // Own, then shared.
+    Eigen::VectorXd gradient;
+    Eigen::MatrixXd inverse;  // Of the own part.
+    bool used = false;
+  };
+
+  void LayOut();
+  bool AddTerm(const Term& term, const Weighing& weighing);
+  void TakeLoss(const ceres::LossFunction& loss, Rows* rows);
+  void AddRows(Rows rows);
+  bool EliminateGroups();
+  Eigen::MatrixXd PlusJacobian(int block) const;
+  Eigen::MatrixXd LocalCovariance(const Rows& rows) const;
+  std::vector<const Rows*> RowsOf(int feature) const;
+
+  const JointProblem& problem_;
+  const State& state_;
+  bool ok_ = true;
+  std::vector<int> columns_, own_columns_;
+  int num_estimated_ = 0;
+  std::vector<Group> groups_;
+  std::vector<Rows> rows_;
+  Eigen::MatrixXd information_, overcounted_, covariance_, null_space_;
+  Eigen::VectorXd gradient_;
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_LINEARIZATION_H_

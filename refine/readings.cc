@@ -1,0 +1,461 @@
+#include "circline/refine/readings.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "circline/estimators/closed_form_solvers.h"
+#include "circline/estimators/point_noise.h"
+#include "circline/refine/imperfection_scales.h"
+#include "circline/refine/joint_problem.h"
+#include "circline/refine/joint_result.h"
+#include "circline/refine/linearization.h"
+#include "circline/refine/pose_seeds.h"
+
+namespace circline {
+namespace {
+
+// Refined poses closer than this are one: radians. Solutions stop within a hundredth of a standard
+// deviation, and those of hopeless evidence have a tenth of a radian.
+constexpr double kSamePose = 1e-3;
+// Wide priors of the focal length are searched at these, in standard deviations.
+constexpr double kWideFocal = 0.1;
+constexpr double kFocalStarts[] = {-1.6, -0.8, 0.8, 1.6};
+constexpr std::size_t kMaxReadings = 16;
+
+using Reading = std::vector<std::uint8_t>;  // By feature: takes part.
+
+// What tells the best hypothesis from the next, in words.
+std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
+  if (hypotheses.size() < 2) return "only one pose fits the evidence";
+  const double gap = hypotheses[1].cost - hypotheses[0].cost;
+  char text[120];
+  // Below 0.5, negative included, the determinants decide, not the residuals.
+  if (gap < 0.5) return "nothing decides: both poses explain the evidence equally well";
+  std::snprintf(text, sizeof(text),
+                "residuals: chi-square lower by %.3g than that of the second pose", 2.0 * gap);
+  return text;
+}
+
+std::string Join(const std::vector<std::string>& parts) {
+  std::string out;
+  for (const std::string& part : parts) out += (out.empty() ? "" : "; ") + part;
+  return out;
+}
+
+// One pose, up to what the evidence cannot tell: the spin about the normal where that is free, and
+// the senses of the axes, which are settled by convention and may tip over.
+bool IsSamePose(const JointProblem& problem, const State& a, const State& b) {
+  if (a.active != b.active) return false;
+  const CameraPose p = problem.PoseAt(a), q = problem.PoseAt(b);
+  const Eigen::Matrix3d &A = p.rotation, &B = q.rotation;
+  const Eigen::Vector3d &s = p.translation, &t = q.translation;
+  if (problem.OriginIsPlaced(a) && s.cross(t).norm() > kSamePose * s.norm() * t.norm())
+    return false;
+  if (A.col(2).cross(B.col(2)).norm() > kSamePose) return false;
+  return problem.spin_is_free() || A.col(0).cross(B.col(0)).norm() < kSamePose;
+}
+
+// A chi-square variable of `dof` degrees of freedom exceeds this with probability p (Wilson and
+// Hilferty 1931; p by the tail of a Gaussian, good to 1 % from 1e-3 to 1e-9).
+double ChiSquareLimit(int dof, double p) {
+  const double t = std::sqrt(-2.0 * std::log(p));
+  const double z = t - (2.515517 + 0.802853 * t + 0.010328 * t * t) /
+                           (1.0 + 1.432788 * t + 0.189269 * t * t + 0.001308 * t * t * t);
+  const double n = dof, h = 2.0 / (9.0 * n);
+  const double root = 1.0 - h + z * std::sqrt(h);
+  return n * root * root * root;
+}
+
+class ReadingSearch {
+ public:
+  ReadingSearch(const JointProblem& problem, std::vector<Seed> seeds)
+      : problem_(problem), seeds_(std::move(seeds)) {}
+
+  // All minima of all readings that compete. Not ok: no seed could be refined.
+  Status Run() {
+    // Lines that a fit has found odd are left out first, and then all are taken in: the fit knew
+    // one pencil only.
+    std::vector<Reading> queue = {problem_.FirstReading()};
+    const Reading everything(problem_.features().size(), 1);
+    if (queue.front() != everything) queue.push_back(everything);
+    for (std::size_t next = 0; next < queue.size() && next < kMaxReadings; ++next) {
+      const Reading reading = queue[next];
+      std::vector<State> minima = RefineAll(reading);
+      std::stable_sort(minima.begin(), minima.end(),
+                       [](const State& a, const State& b) { return a.cost < b.cost; });
+      // A minimum that costs too much may do so because of what contradicts it.
+      constexpr std::size_t kMostMinima = 4;
+      minima.resize(std::min(minima.size(), kMostMinima));
+      for (const State& minimum : minima) {
+        for (const Reading& other : Rivals(minimum)) {
+          if (std::find(queue.begin(), queue.end(), other) == queue.end()) queue.push_back(other);
+        }
+      }
+    }
+    return minima_.empty() ? last_ : Status::Ok();
+  }
+
+  // With what is left out counted in their cost, in the order of the seeds.
+  std::vector<State>& minima() { return minima_; }
+
+ private:
+  // The minima that the seeds lead to, in the order of the seeds.
+  std::vector<State> RefineAll(const Reading& reading) {
+    struct Start {
+      State state;
+      double cost;  // With what is left out.
+      std::size_t seed;
+    };
+    std::vector<Start> starts;
+    for (std::size_t i = 0; i < seeds_.size(); ++i) {
+      State state;
+      last_ = problem_.Start(seeds_[i].pose, seeds_[i].log_focal, reading, &state);
+      if (!last_.ok()) continue;
+      const double cost = problem_.Cost(state) + LeftOutCost(problem_, state);
+      starts.push_back({std::move(state), cost, i});
+    }
+    std::stable_sort(starts.begin(), starts.end(),
+                     [](const Start& a, const Start& b) { return a.cost < b.cost; });
+    std::vector<std::pair<std::size_t, State>> found;
+    std::vector<std::size_t> tried;
+    const int best_circle = BestCircle(reading);
+    double best = std::numeric_limits<double>::infinity();
+    bool is_consistent = false;  // The best one explains all that is to take part.
+    for (Start& start : starts) {
+      State& state = start.state;
+      // Where all evidence agrees, one circle's planes are those of all.
+      const int source = seeds_[start.seed].source;
+      if (is_consistent && source < 0 && source != best_circle) continue;
+      const bool is_near = std::any_of(tried.begin(), tried.end(), [&](std::size_t other) {
+        return IsSameSeed(seeds_[start.seed], seeds_[other]) && seeds_[other].source != source;
+      });
+      if (is_consistent && is_near) continue;
+      tried.push_back(start.seed);
+      if (!SolveFrom(is_consistent, best, &state)) continue;
+      if (std::any_of(found.begin(), found.end(), [&](const auto& other) {
+            return IsSamePose(problem_, state, other.second);
+          })) {
+        continue;
+      }
+      if (state.cost < best) {
+        best = state.cost;
+        is_consistent = state.active == reading && IsConsistent(state);
+      }
+      found.emplace_back(FirstLike(start.seed), std::move(state));
+    }
+    std::stable_sort(found.begin(), found.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::vector<State> minima;
+    for (auto& [seed, state] : found) {
+      minima.push_back(state);
+      if (!HasOutliers(state) && !IsKnown(state, minima_)) minima_.push_back(std::move(state));
+    }
+    return minima;
+  }
+
+  // The first seed that is as near to the same minimum.
+  std::size_t FirstLike(std::size_t seed) const {
+    std::size_t first = 0;
+    while (!IsSameSeed(seeds_[first], seeds_[seed])) ++first;
+    return first;
+  }
+
+  // Source of the seeds of the best known circle that takes part; 0 where none does.
+  int BestCircle(const Reading& reading) const {
+    for (const Seed& seed : seeds_) {
+      for (const JointProblem::CircleBlocks& c : problem_.circles()) {
+        if (seed.circle == c.observation && reading[static_cast<std::size_t>(c.feature)] != 0)
+          return seed.source;
+      }
+    }
+    return 0;
+  }
+
+  // Refines a start, its cost then with what is left out. False where that fails or leads to
+  // nothing that can compete: where another minimum explains all evidence, a rival lies near its
+  // own start; where none does yet, one is looked for from far off.
+  bool SolveFrom(bool is_consistent, double best, State* state) {
+    const EstimationOptions& options = problem_.options();
+    // Iterations, after which what costs so many gaps more than the best cannot come down to it.
+    constexpr int kRounds[] = {2, 4};
+    constexpr double kTooMuch[] = {30.0, 3.0};
+    const double left_out = LeftOutCost(problem_, *state);
+    int done = 0;
+    bool converged = false;
+    for (int round = 0; is_consistent && round < 2 && !converged; ++round) {
+      const int iterations = std::min(kRounds[round], options.max_iterations - done);
+      if (iterations <= 0) break;
+      last_ = problem_.Solve(iterations, state, &converged);
+      if (!last_.ok()) return false;
+      done += iterations;
+      if (state->cost + left_out > best + kTooMuch[round] * options.max_cost_gap) return false;
+    }
+    if (!converged && done < options.max_iterations) {
+      last_ = done > 0 ? problem_.Solve(options.max_iterations - done, state)
+                       : problem_.SolveGraduated(options.max_iterations, state);
+      if (!last_.ok()) return false;
+    }
+    state->cost += left_out;
+    return true;
+  }
+
+  // Twice what all features together miss their own free fits by: none contradicts the others by
+  // more.
+  double TotalMisfit(const State& state) const {
+    double misfit = 2.0 * problem_.Cost(state);
+    for (std::size_t i = 0; i < state.active.size(); ++i)
+      misfit -= state.active[i] != 0 ? problem_.features()[i].free_twice_cost : 0.0;
+    return misfit;
+  }
+
+  bool IsConsistent(const State& state) const {
+    int dof = 0;
+    for (std::size_t i = 0; i < state.active.size(); ++i)
+      dof += state.active[i] != 0 ? problem_.features()[i].dof : 0;
+    return TotalMisfit(state) <= ChiSquareLimit(std::max(1, dof), FalseAlarms(state));
+  }
+
+  // Of each feature, that all of a photo raise one in 10 000.
+  static double FalseAlarms(const State& state) {
+    const auto active = std::count(state.active.begin(), state.active.end(), 1);
+    return 1e-4 / static_cast<double>(std::max<std::ptrdiff_t>(1, active));
+  }
+
+  bool IsKnown(const State& state, const std::vector<State>& others) const {
+    return std::any_of(others.begin(), others.end(),
+                       [&](const State& other) { return IsSamePose(problem_, state, other); });
+  }
+
+  // What has no inliers has no say: the minimum without it is that of another reading.
+  bool HasOutliers(State state) const { return DropOutliers(problem_, &state); }
+
+  // Readings without what contradicts this minimum, and with what was left out but agrees.
+  std::vector<Reading> Rivals(const State& minimum) const {
+    const std::vector<Feature>& features = problem_.features();
+    std::vector<Reading> rivals;
+    State without = minimum;
+    if (DropOutliers(problem_, &without)) rivals.push_back(without.active);
+    if (TotalMisfit(minimum) > ChiSquareLimit(1, FalseAlarms(minimum))) {
+      Linearization at(problem_, minimum, Weighing());
+      if (at.ok() && at.ComputeCovariance())
+        AddWithout(minimum, at.Misfits(), FalseAlarms(minimum), &rivals);
+    }
+    // A feature that the first reading left out takes part again where it fits this pose.
+    for (std::size_t i = 0; i < features.size(); ++i) {
+      if (minimum.active[i] != 0 || features[i].kind != Feature::Kind::kLine) continue;
+      State with = minimum;
+      with.active[i] = 1;
+      const double gain = minimum.cost - problem_.Cost(with) - LeftOutCost(problem_, with);
+      if (!(gain > 0.0)) continue;
+      Reading reading = minimum.active;
+      reading[i] = 1;
+      rivals.push_back(std::move(reading));
+      break;
+    }
+    return rivals;
+  }
+
+  void AddWithout(const State& minimum, const std::vector<Linearization::Misfit>& misfits, double p,
+                  std::vector<Reading>* rivals) const {
+    std::vector<std::pair<double, std::size_t>> excess;
+    for (std::size_t i = 0; i < misfits.size(); ++i) {
+      const double limit = ChiSquareLimit(misfits[i].dof, p);
+      if (misfits[i].d2 > limit) excess.emplace_back(misfits[i].d2 - limit, i);
+    }
+    std::sort(excess.begin(), excess.end(), [](const auto& a, const auto& b) {
+      return a.first != b.first ? a.first > b.first : a.second < b.second;
+    });
+    // Of few features it may be any, whatever the misfits at a compromise of all; of many the
+    // worst.
+    constexpr std::size_t kFew = 6, kMost = 3;
+    const bool few = misfits.size() <= kFew;
+    for (std::size_t k = 0; k < (few ? excess.size() : std::min(kMost, excess.size())); ++k) {
+      constexpr double kComparable = 0.3;  // Of the worst.
+      if (!few && excess[k].first < kComparable * excess.front().first) break;
+      Reading without = minimum.active;
+      without[excess[k].second] = 0;
+      rivals->push_back(std::move(without));
+    }
+  }
+
+  const JointProblem& problem_;
+  std::vector<Seed> seeds_;
+  std::vector<State> minima_;
+  Status last_ = Status::Failed("no seed pose could be refined");
+};
+
+// What the closed forms missed, led by the one thing where all of them miss it.
+Status NoSeed(const Observations& fitted, const std::vector<std::string>& reasons) {
+  const auto has_fit = [](const auto& feature) { return feature.fit.has_value(); };
+  const auto circles = std::count_if(fitted.circles.begin(), fitted.circles.end(), has_fit);
+  const auto pencils = std::count_if(fitted.pencils.begin(), fitted.pencils.end(), has_fit);
+  if (circles > 0 || pencils > 1) return Status::Refused(Join(reasons));
+  const std::string lead = "a pose takes a circle or two pencils of parallel lines; there is " +
+                           std::string(pencils == 0 ? "neither" : "one pencil only");
+  return Status::Refused(reasons.empty() ? lead : lead + " (" + Join(reasons) + ")");
+}
+
+// The prior pose and the circles' planes, where the prior leads to a pose that explains the points.
+std::vector<Seed> SeedsFromPrior(const JointProblem& problem, const Observations& resolved) {
+  constexpr double kExplained = 0.8;
+  constexpr int kIterations = 6;
+  if (!problem.options().prior) return {};
+  std::vector<Seed> seeds = {{*problem.options().prior, 0.0, 0}};
+  State state;
+  if (!problem.Start(seeds[0].pose, 0.0, problem.FirstReading(), &state).ok() ||
+      !problem.Solve(kIterations, &state).ok() || !(problem.InlierShare(state) >= kExplained)) {
+    return {};
+  }
+  AddCircleSeeds(resolved, 0.0, &seeds);
+  return seeds;
+}
+
+std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& resolved,
+                           const std::vector<std::shared_ptr<const Solver>>& seeders,
+                           std::vector<std::string>* reasons) {
+  std::vector<Seed> seeds = CollectSeeds(resolved, seeders, 0.0, reasons);
+  const double sigma = problem.camera_sigma().log_focal;
+  if (problem.camera_is_estimated() && sigma >= kWideFocal) {
+    for (const double start : kFocalStarts) {
+      std::vector<std::string> unused;
+      const std::vector<Seed> more =
+          CollectSeeds(Refocused(resolved, start * sigma), seeders, start * sigma, &unused);
+      seeds.insert(seeds.end(), more.begin(), more.end());
+    }
+  }
+  return seeds;
+}
+
+// The noise model as the photo's own features have it, at the minimum that the best seed leads to.
+NoiseModel ScaledToFirstMinimum(const JointProblem& problem, const std::vector<Seed>& seeds) {
+  const Reading reading = problem.FirstReading();
+  State state, best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Seed& seed : seeds) {
+    if (!problem.Start(seed.pose, seed.log_focal, reading, &state).ok()) continue;
+    const double cost = problem.Cost(state) + LeftOutCost(problem, state);
+    if (!(cost < least)) continue;
+    least = cost;
+    best = state;
+  }
+  if (!std::isfinite(least) ||
+      !problem.SolveGraduated(problem.options().max_iterations, &best).ok())
+    return problem.options().noise_model;
+  return ScaledNoiseModel(problem, best);
+}
+
+// Every feature with the noise that it has in the refinement, for the closed forms.
+void FillNoise(const EstimationOptions& options, const PointNoise& noise, Observations* resolved) {
+  for (std::size_t i = 0; i < resolved->circles.size(); ++i) {
+    double& sigma = resolved->circles[i].sigma_px;
+    if (!(sigma > 0.0)) sigma = options.conic_loss.scale_px;
+    if (!(sigma > 0.0)) sigma = noise.circles[i];
+  }
+  for (std::size_t i = 0; i < resolved->pencils.size(); ++i) {
+    PencilObservation& pencil = resolved->pencils[i];
+    for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
+      double& sigma = pencil.lines[j].sigma_px;
+      if (!(sigma > 0.0)) sigma = pencil.sigma_px;
+      if (!(sigma > 0.0)) sigma = options.line_loss.scale_px;
+      if (!(sigma > 0.0)) sigma = noise.lines[i][j];
+    }
+  }
+}
+
+// Hypotheses of all minima that compete, ranked.
+Status FillHypotheses(const JointProblem& problem, const std::vector<State>& minima,
+                      PoseEstimate* estimate) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const State& minimum : minima) best = std::min(best, minimum.cost);
+  const double most = best + problem.options().max_cost_gap;
+  std::vector<Refined> all;
+  Status last = Status::Failed("no seed pose could be refined");
+  for (const State& minimum : minima) {
+    if (minimum.cost > most) continue;
+    Refined refined;
+    const Status status = FillRefined(problem, minimum, &refined);
+    if (!status.ok()) {
+      last = status;
+      continue;
+    }
+    const bool known = std::any_of(all.begin(), all.end(), [&](const Refined& r) {
+      return IsSamePose(problem, r.state, refined.state);
+    });
+    if (!known) all.push_back(std::move(refined));
+  }
+  if (all.empty()) return last;
+  const auto cheapest = std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
+    return a.hypothesis.cost < b.hypothesis.cost;
+  });
+  estimate->notes.insert(estimate->notes.end(), cheapest->notes.begin(), cheapest->notes.end());
+  constexpr double kAnySigmaPx = 0.5;  // Every feature has its own.
+  for (Refined& refined : all) {
+    CameraPose& pose = refined.hypothesis.cam_from_world;
+    // A spin that nothing fixes is settled by convention, whatever the seed's was.
+    if (problem.spin_is_free()) {
+      WorldRotation(problem.observations(), pose.rotation.col(2), pose.translation, kAnySigmaPx,
+                    &pose.rotation);
+    }
+    estimate->hypotheses.push_back(std::move(refined.hypothesis));
+  }
+  RankHypotheses(&estimate->hypotheses);
+  return Status::Ok();
+}
+
+Status RefineResolved(const Observations& resolved, const PointNoise& noise,
+                      const std::vector<std::shared_ptr<const Solver>>& seeders,
+                      const EstimationOptions& options, PoseEstimate* estimate) {
+  const JointProblem as_stated(resolved, options, noise);
+  estimate->notes.insert(estimate->notes.end(), as_stated.unused().begin(),
+                         as_stated.unused().end());
+  std::vector<std::string> reasons;
+  std::vector<Seed> seeds = SeedsFromPrior(as_stated, resolved);
+  if (seeds.empty()) seeds = AllSeeds(as_stated, resolved, seeders, &reasons);
+  if (seeds.empty()) return NoSeed(resolved, reasons);
+  EstimationOptions scaled_options = options;
+  std::optional<JointProblem> scaled;
+  if (HasManyFeatures(as_stated)) {
+    scaled_options.noise_model = ScaledToFirstMinimum(as_stated, seeds);
+    scaled.emplace(resolved, scaled_options, noise);
+  }
+  const JointProblem& problem = scaled ? *scaled : as_stated;
+  ReadingSearch search(problem, std::move(seeds));
+  const Status status = search.Run();
+  if (!status.ok()) {
+    reasons.insert(reasons.begin(), "no pose agrees with all evidence: " + status.message);
+    return NoSeed(resolved, reasons);
+  }
+  return FillHypotheses(problem, search.minima(), estimate);
+}
+
+}  // namespace
+
+PoseEstimate RefineSeeds(const std::string& name,
+                         const std::vector<std::shared_ptr<const Solver>>& seeders,
+                         const Observations& observations, const EstimationOptions& options) {
+  PoseEstimate estimate;
+  estimate.solver = name;
+  estimate.status = options.Validate();
+  if (estimate.status.ok()) estimate.status = observations.Validate();
+  if (!estimate.status.ok()) return estimate;
+
+  constexpr double kDefaultSigmaPx = 0.4;  // For fits that nobody has made yet.
+  Observations resolved = ResolveWorld(observations);
+  FitDirect(options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDefaultSigmaPx,
+            &resolved, &estimate.notes);
+  resolved = ResolveWorld(resolved);
+  const PointNoise noise = MeasurePointNoise(resolved, options.noise_model);
+  FillNoise(options, noise, &resolved);
+  estimate.status = RefineResolved(resolved, noise, seeders, options, &estimate);
+  if (estimate.status.ok()) estimate.decided_by = DecidedBy(estimate.hypotheses);
+  return estimate;
+}
+
+}  // namespace circline

@@ -1,0 +1,41 @@
+// A long run keeps its memory.
+#include <gtest/gtest.h>
+
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
+#include <cstddef>
+
+#include "circline/refine/estimate_pose.h"
+#include "tests/plane_scene.h"
+#include "tests/trials.h"
+
+namespace circline {
+namespace {
+
+#if defined(__GLIBC__) && (__GLIBC__ > 2 || __GLIBC_MINOR__ >= 33)
+
+TEST(HeapTest, TenThousandCallsDoNotGrowIt) {
+  if (kSanitized) GTEST_SKIP() << "a sanitizer has a heap of its own";
+  PlaneScene scene(0.7, 0.2);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0, 12)};
+  EstimationOptions options;
+  options.noise_model = NoiseModel::Exact();
+  const auto run = [&](int calls) {
+    for (int i = 0; i < calls; ++i) ASSERT_TRUE(EstimatePose(observations, options).status.ok());
+  };
+  run(100);  // What libraries allocate once.
+  const std::size_t before = mallinfo2().uordblks;
+  constexpr int kCalls = 10000;
+  run(kCalls);
+  const std::size_t after = mallinfo2().uordblks;
+  // Less than a byte a call.
+  EXPECT_LT(after, before + kCalls);
+}
+
+#endif
+
+}  // namespace
+}  // namespace circline

@@ -1,0 +1,282 @@
+// What is not exact beside the points: unknowns with priors, counted in the covariance by as much
+// as they are worth; and the noise of points where nobody states it.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "circline/refine/estimate_pose.h"
+#include "tests/plane_scene.h"
+#include "tests/trials.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+EstimationOptions LeastSquares(const NoiseModel& model) {
+  EstimationOptions options;
+  options.noise_model = model;
+  options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
+  return options;
+}
+
+// Of the normal, two components.
+struct NormalErrors {
+  Vector2d error;
+  Matrix2d covariance;
+
+  NormalErrors(const PoseHypothesis& h, const PlaneScene& scene) {
+    const Eigen::Matrix3d& R = h.cam_from_world.rotation;
+    const Eigen::Matrix<double, 3, 2> tangents = R.leftCols<2>();
+    error = tangents.transpose() * R.col(2).cross(scene.pose.rotation.col(2));
+    covariance = tangents.transpose() * h.Covariance().topLeftCorner<3, 3>() * tangents;
+  }
+  double Nees() const { return error.dot(covariance.inverse() * error); }
+};
+
+// A circle off its plane: tilted about X and Y, and raised by a share of its radius.
+CircleObservation OffPlane(PlaneScene* scene, const char* id, const Vector2d& center, double radius,
+                           double tilt_sigma, double height_sigma) {
+  CircleObservation circle;
+  circle.id = id;
+  circle.plane = "p0";
+  circle.sigma_px = scene->sigma();
+  const double about_x = tilt_sigma * scene->random.Normal(),
+               about_y = tilt_sigma * scene->random.Normal(),
+               height = height_sigma * scene->random.Normal();
+  const Eigen::Matrix3d turn = ExpRotation({about_x, about_y, 0.0});
+  constexpr int kPoints = 60;
+  for (int i = 0; i < kPoints; ++i) {
+    const double a = 6.283185307179586 * i / kPoints;
+    const Vector3d on = Vector3d(center.x(), center.y(), height * radius) +
+                        turn * (radius * Vector3d(std::cos(a), std::sin(a), 0.0));
+    circle.points.push_back(scene->Pixel(on.x(), on.y(), on.z()));
+  }
+  return circle;
+}
+
+TEST(ImperfectionsTest, CirclesOffTheirPlaneAreCountedHonestly) {
+  constexpr int kTrials = Trials(300);
+  NoiseModel model = NoiseModel::Exact();
+  model.circle_tilt_rad = 0.015;
+  model.circle_height = 0.01;
+  double nees = 0.0, nees_exact = 0.0;
+  int left_out = 0;
+  for (int i = 0; i < kTrials; ++i) {
+    PlaneScene scene(0.7, 0.2, static_cast<std::uint64_t>(i + 1));
+    Observations observations = scene.Empty();
+    const auto add = [&](const char* id, double x, double y, double radius) {
+      observations.circles.push_back(
+          OffPlane(&scene, id, {x, y}, radius, model.circle_tilt_rad, model.circle_height));
+    };
+    add("c0", -1.8, -0.8, 1.0);
+    add("c1", 1.6, -0.5, 0.9);
+    add("c2", 0.2, 1.6, 0.8);
+    const PoseEstimate estimate = EstimatePose(observations, LeastSquares(model)),
+                       exact = EstimatePose(observations, LeastSquares(NoiseModel::Exact()));
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    ASSERT_TRUE(exact.status.ok()) << exact.status.message;
+    left_out += estimate.hypotheses[0].left_out.empty() ? 0 : 1;
+    nees += NormalErrors(estimate.hypotheses[0], scene).Nees() / kTrials;
+    nees_exact += NormalErrors(exact.hypotheses[0], scene).Nees() / kTrials;
+  }
+  if (kSanitized) return;
+  std::printf("circles off their plane: NEES a dimension %.2f, taken for exact %.2f\n", 0.5 * nees,
+              0.5 * nees_exact);
+  EXPECT_GT(0.5 * nees, 0.8);
+  EXPECT_LT(0.5 * nees, 1.25);
+  EXPECT_GT(nees_exact, 1.5 * nees);
+  EXPECT_LE(left_out, 1);  // By chance one of 10 000 photos.
+}
+
+// Walls lean: pencils off the axes that they are taken for.
+TEST(ImperfectionsTest, PencilsOffTheirAxesAreCountedHonestly) {
+  constexpr int kTrials = Trials(300);
+  NoiseModel model = NoiseModel::Exact();
+  model.pencil_axis_rad = 0.01;
+  double nees = 0.0;
+  for (int i = 0; i < kTrials; ++i) {
+    PlaneScene scene(0.8, 0.1, static_cast<std::uint64_t>(i + 1));
+    const auto leaning = [&](const Vector3d& axis) {
+      const Vector3d a = axis.unitOrthogonal(), b = axis.cross(a);
+      const double along_a = scene.random.Normal(), along_b = scene.random.Normal();
+      return Vector3d((axis + model.pencil_axis_rad * (along_a * a + along_b * b)).normalized());
+    };
+    Observations observations = scene.Empty();
+    observations.pencils = {
+        scene.Pencil("L1", PencilDirection::kX, leaning(Vector3d::UnitX()), 5, 9),
+        scene.Pencil("L2", PencilDirection::kY, leaning(Vector3d::UnitY()), 5, 9),
+        scene.Pencil("L3", PencilDirection::kZ, leaning(Vector3d::UnitZ()), 5, 9)};
+    for (PencilObservation& pencil : observations.pencils) pencil.plane.clear();
+    observations.pencils[0].plane = observations.pencils[1].plane = "p0";
+    const PoseEstimate estimate = EstimatePose(observations, LeastSquares(model));
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    const Vector3d error = LogRotation(scene.pose.rotation * h.cam_from_world.rotation.transpose());
+    const Eigen::Matrix3d covariance = h.Covariance().topLeftCorner<3, 3>();
+    nees += error.dot(covariance.inverse() * error) / kTrials;
+  }
+  if (kSanitized) return;
+  std::printf("pencils off their axes: NEES a dimension %.2f\n", nees / 3.0);
+  EXPECT_GT(nees / 3.0, 0.8);
+  EXPECT_LT(nees / 3.0, 1.25);
+}
+
+// All prints bleed alike: one offset for all contours.
+TEST(ImperfectionsTest, ContoursThatShareAnOffsetAreCountedHonestly) {
+  constexpr int kTrials = Trials(300);
+  NoiseModel model = NoiseModel::Exact();
+  model.contour_offset_px = 0.4;
+  double nees = 0.0;
+  for (int i = 0; i < kTrials; ++i) {
+    PlaneScene scene(0.7, 0.1, static_cast<std::uint64_t>(i + 1));
+    Observations observations = scene.Empty();
+    const double offset = model.contour_offset_px * scene.random.Normal();
+    for (int k = 0; k < 6; ++k) {
+      const double x = 1.7 * (k % 3 - 1), y = 1.8 * (k / 3) - 0.9;
+      CircleObservation circle = scene.Circle("c" + std::to_string(k), x, y, 0.4, 40);
+      circle.radius = 0.4;
+      // Outwards along the contour's normal, from the neighbours on it.
+      const std::vector<Vector2d> exact = circle.points;
+      const std::size_t n = exact.size();
+      for (std::size_t j = 0; j < n; ++j) {
+        const double a = 6.283185307179586 * static_cast<double>(j) / static_cast<double>(n);
+        PlaneScene still(0.7, 0.0);
+        const auto on = [&](double angle) -> Vector2d {
+          Vector2d pixel;
+          CameraToPixel(still.camera,
+                        still.pose.rotation * Vector3d(x + 0.4 * std::cos(angle),
+                                                       y + 0.4 * std::sin(angle), 0.0) +
+                            still.pose.translation,
+                        &pixel);
+          return pixel;
+        };
+        const Vector2d along = (on(a + 1e-4) - on(a - 1e-4)).normalized();
+        Vector2d out(along.y(), -along.x());
+        if (out.dot(on(a) - on(a + 3.14159265358979)) < 0.0) out = -out;
+        circle.points[j] += offset * out;
+      }
+      observations.circles.push_back(circle);
+    }
+    const PoseEstimate estimate = EstimatePose(observations, LeastSquares(model));
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_TRUE(h.left_out.empty()) << i;
+    nees += NormalErrors(h, scene).Nees() / kTrials;
+  }
+  if (kSanitized) return;
+  std::printf("contours of one offset: NEES a dimension %.2f\n", 0.5 * nees);
+  EXPECT_GT(0.5 * nees, 0.8);
+  EXPECT_LT(0.5 * nees, 1.25);
+}
+
+// A camera that is known well is not estimated but counted; one that is known a hair less is
+// estimated. Where the photo says nothing of it both give the same covariance.
+TEST(ImperfectionsTest, ACameraCountedIsWorthACameraEstimated) {
+  for (const double tilt : {0.4, 0.7, 1.0}) {
+    PlaneScene scene(tilt, 0.3);
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", 1.5, 0.8, 0.8)};
+    observations.circles[0].radius = 0.8;
+    observations.frame.origin_is_center = "c0";
+    EstimationOptions counted = LeastSquares(NoiseModel::Exact()),
+                      estimated = LeastSquares(NoiseModel::Exact());
+    CameraSigma sigma;
+    sigma.log_aspect = 0.002;
+    sigma.principal_point_px = 4.0;
+    sigma.k1 = 0.005;
+    sigma.log_focal = 0.00999;  // On either side of where it is estimated.
+    counted.camera_sigma = sigma;
+    sigma.log_focal = 0.01;
+    estimated.camera_sigma = sigma;
+    const PoseEstimate a = EstimatePose(observations, counted),
+                       b = EstimatePose(observations, estimated),
+                       exact = EstimatePose(observations, LeastSquares(NoiseModel::Exact()));
+    ASSERT_TRUE(a.status.ok() && b.status.ok() && exact.status.ok());
+    ASSERT_EQ(a.hypotheses.size(), b.hypotheses.size());
+    EXPECT_EQ(a.hypotheses[0].focal_sigma, 0.0);
+    EXPECT_GT(b.hypotheses[0].focal_sigma, 0.0);
+    for (std::size_t k = 0; k < a.hypotheses.size(); ++k) {
+      const Eigen::VectorXd p = a.hypotheses[k].Covariance().diagonal().cwiseSqrt(),
+                            q = b.hypotheses[k].Covariance().diagonal().cwiseSqrt();
+      EXPECT_LT((p - q).cwiseQuotient(q).cwiseAbs().maxCoeff(), 0.03)
+          << tilt << ", hypothesis " << k << ": " << p.transpose() << " and " << q.transpose();
+      EXPECT_NEAR(a.hypotheses[k].probability, b.hypotheses[k].probability, 0.02);
+    }
+    EXPECT_GT(a.hypotheses[0].Covariance().trace(), 1.2 * exact.hypotheses[0].Covariance().trace());
+  }
+}
+
+// A camera off by what its sigma says: the pose's covariance knows it.
+TEST(ImperfectionsTest, ACameraThatIsALittleOffIsCountedHonestly) {
+  constexpr int kTrials = Trials(300);
+  CameraSigma sigma = CameraSigma::Exact();
+  sigma.log_focal = 0.008;
+  sigma.principal_point_px = 5.0;
+  double nees = 0.0;
+  for (int i = 0; i < kTrials; ++i) {
+    PlaneScene scene(0.7, 0.2, static_cast<std::uint64_t>(i + 1));
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", -1.0, 0.3, 1.2), scene.Circle("c1", 1.5, 0.5, 1.0)};
+    Camera& camera = observations.camera;
+    const double f = std::exp(sigma.log_focal * scene.random.Normal());
+    camera.fx *= f;
+    camera.fy *= f;
+    camera.cx += sigma.principal_point_px * scene.random.Normal();
+    camera.cy += sigma.principal_point_px * scene.random.Normal();
+    EstimationOptions options = LeastSquares(NoiseModel::Exact());
+    options.camera_sigma = sigma;
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    nees += NormalErrors(estimate.hypotheses[0], scene).Nees() / kTrials;
+  }
+  if (kSanitized) return;
+  std::printf("a camera a little off: NEES a dimension %.2f\n", 0.5 * nees);
+  EXPECT_GT(0.5 * nees, 0.8);
+  EXPECT_LT(0.5 * nees, 1.25);
+}
+
+// Three circles, two of which are four times as noisy: unstated, as good as with the right ones.
+TEST(ImperfectionsTest, NoiseThatNobodyStatesIsThatOfEachFeature) {
+  constexpr int kTrials = Trials(200);
+  double rms = 0.0, rms_stated = 0.0, nees = 0.0;
+  for (int i = 0; i < kTrials; ++i) {
+    PlaneScene scene(0.7, 0.2, static_cast<std::uint64_t>(i + 1));
+    Observations stated = scene.Empty();
+    stated.circles = {scene.Circle("c0", -1.5, -0.3, 1.2, 100),
+                      scene.Circle("c1", 1.6, -0.5, 0.9, 100),
+                      scene.Circle("c2", 0.8, 1.4, 0.8, 100)};
+    for (std::size_t k = 1; k < 3; ++k) {
+      stated.circles[k].sigma_px = 0.8;
+      for (Vector2d& p : stated.circles[k].points) {
+        const double dx = scene.random.Normal(), dy = scene.random.Normal();
+        p += std::sqrt(0.8 * 0.8 - 0.2 * 0.2) * Vector2d(dx, dy);
+      }
+    }
+    Observations unstated = stated;
+    for (CircleObservation& circle : unstated.circles) circle.sigma_px = 0.0;
+    const EstimationOptions options = LeastSquares(NoiseModel::Exact());
+    const PoseEstimate known = EstimatePose(stated, options),
+                       found = EstimatePose(unstated, options);
+    ASSERT_TRUE(known.status.ok() && found.status.ok());
+    const NormalErrors errors(found.hypotheses[0], scene);
+    rms += errors.error.squaredNorm() / kTrials;
+    rms_stated += NormalErrors(known.hypotheses[0], scene).error.squaredNorm() / kTrials;
+    nees += errors.Nees() / kTrials;
+  }
+  if (kSanitized) return;
+  std::printf("noise 1, 4, 4 unstated: rms %.3f of that with it stated, NEES a dimension %.2f\n",
+              std::sqrt(rms / rms_stated), 0.5 * nees);
+  EXPECT_LT(std::sqrt(rms / rms_stated), 1.05);
+  EXPECT_GT(0.5 * nees, 0.8);
+  EXPECT_LT(0.5 * nees, 1.25);
+}
+
+}  // namespace
+}  // namespace circline

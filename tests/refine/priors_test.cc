@@ -1,0 +1,339 @@
+// What is known beside the photo: a pose to start from, which is no evidence; a pose with its
+// covariance and a direction of gravity, which are evidence like any other.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "circline/refine/estimate_pose.h"
+#include "tests/plane_scene.h"
+#include "tests/trials.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+EstimationOptions LeastSquares() {
+  EstimationOptions options;
+  options.noise_model = NoiseModel::Exact();
+  options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
+  return options;
+}
+
+Observations OneCircle(PlaneScene* scene) {
+  Observations observations = scene->Empty();
+  observations.circles = {scene->Circle("c0", 0.0, 0.0, 1.0)};
+  observations.frame.origin_is_center = "c0";
+  return observations;
+}
+
+double Between(const Vector3d& a, const Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
+  return Between(h.cam_from_world.rotation.col(2), scene.pose.rotation.col(2));
+}
+
+PosePrior Around(const CameraPose& mean, double sigma_rad, double sigma_t) {
+  PosePrior prior;
+  prior.mean = mean;
+  Eigen::Map<Matrix6d> covariance(prior.covariance.data());
+  covariance.setZero();
+  covariance.diagonal().head<3>().setConstant(sigma_rad * sigma_rad);
+  covariance.diagonal().tail<3>().setConstant(sigma_t * sigma_t);
+  return prior;
+}
+
+// The hypothesis whose normal is nearest.
+const PoseHypothesis& Nearest(const PoseEstimate& estimate, const Vector3d& normal) {
+  return *std::min_element(estimate.hypotheses.begin(), estimate.hypotheses.end(),
+                           [&](const PoseHypothesis& a, const PoseHypothesis& b) {
+                             return Between(a.cam_from_world.rotation.col(2), normal) <
+                                    Between(b.cam_from_world.rotation.col(2), normal);
+                           });
+}
+
+TEST(PriorTest, APoseToStartFromKeepsBothPosesOfACircle) {
+  PlaneScene scene(0.7, 0.2);
+  const Observations observations = OneCircle(&scene);
+  const PoseEstimate both = EstimatePose(observations, LeastSquares());
+  ASSERT_EQ(both.hypotheses.size(), 2U);
+  EstimationOptions options = LeastSquares();
+  for (const PoseHypothesis& start : both.hypotheses) {
+    options.prior = start.cam_from_world;
+    options.prior->rotation = ExpRotation({0.01, -0.02, 0.01}) * options.prior->rotation;
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
+    for (const PoseHypothesis& expected : both.hypotheses) {
+      const Vector3d normal = expected.cam_from_world.rotation.col(2);
+      const PoseHypothesis& h = Nearest(estimate, normal);
+      EXPECT_LT(Between(h.cam_from_world.rotation.col(2), normal), 1e-5);
+      EXPECT_NEAR(h.probability, expected.probability, 1e-3);
+      EXPECT_LT((h.Covariance() - expected.Covariance()).norm(), 1e-3 * h.Covariance().norm());
+    }
+  }
+}
+
+TEST(PriorTest, APoseToStartFromIsNoEvidence) {
+  PlaneScene scene(0.7, 0.3);
+  Observations observations = OneCircle(&scene);
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX()),
+                          scene.Pencil("L2", PencilDirection::kY, Vector3d::UnitY())};
+  EstimationOptions options = LeastSquares();
+  const PoseEstimate without = EstimatePose(observations, options);
+  ASSERT_TRUE(without.status.ok()) << without.status.message;
+  const PoseHypothesis& expected = without.hypotheses[0];
+  // Near, and far off: a plane seen from behind its edge.
+  for (const Vector3d& off : {Vector3d(0.05, -0.04, 0.02), Vector3d(1.5, 0.0, 0.0)}) {
+    options.prior = scene.pose;
+    options.prior->rotation = ExpRotation(off) * scene.pose.rotation;
+    options.prior->translation *= 3.0;  // Its unit has no meaning.
+    const PoseEstimate with = EstimatePose(observations, options);
+    ASSERT_TRUE(with.status.ok()) << with.status.message;
+    const PoseHypothesis& h = with.hypotheses[0];
+    EXPECT_LT(RotationAngle(h.cam_from_world.rotation, expected.cam_from_world.rotation), 1e-6);
+    EXPECT_NEAR(h.probability, expected.probability, 1e-3);
+    EXPECT_LT((h.Covariance() - expected.Covariance()).norm(), 1e-3 * h.Covariance().norm());
+  }
+}
+
+TEST(PriorTest, BadPriorsAreNamed) {
+  PlaneScene scene(0.7, 0.2);
+  const Observations observations = OneCircle(&scene);
+  const auto message = [&](const EstimationOptions& options) {
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    EXPECT_EQ(estimate.status.code, StatusCode::kInvalidArgument);
+    return estimate.status.message;
+  };
+  for (const double scale : {0.0, -1.0}) {  // No rotation; a reflection.
+    EstimationOptions start = LeastSquares(), evidence = LeastSquares();
+    start.prior = scene.pose;
+    start.prior->rotation *= scale;
+    EXPECT_EQ(message(start).find("prior must be"), 0U);
+    evidence.pose_prior = Around(scene.pose, 0.1, 1.0);
+    evidence.pose_prior->mean.rotation *= scale;
+    EXPECT_NE(message(evidence).find("pose_prior"), std::string::npos);
+  }
+  EstimationOptions options = LeastSquares();
+  options.pose_prior = Around(scene.pose, 0.0, 1.0);
+  EXPECT_NE(message(options).find("pose_prior"), std::string::npos);
+  options = LeastSquares();
+  options.gravity_prior = GravityPrior{};
+  options.gravity_prior->sigma_rad = 0.0;
+  EXPECT_NE(message(options).find("gravity_prior"), std::string::npos);
+  options.gravity_prior = GravityPrior{};
+  options.gravity_prior->in_camera *= 2.0;
+  EXPECT_NE(message(options).find("gravity_prior"), std::string::npos);
+}
+
+// A prediction and a photo, each with its covariance: the estimate is their mean by information,
+// and so is its covariance.
+TEST(PosePriorTest, EntersTheEstimateAndItsCovariance) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    PlaneScene scene(0.7, 0.3, seed);
+    Observations observations = OneCircle(&scene);
+    observations.circles[0].radius = 1.0;
+    observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX()),
+                            scene.Pencil("L2", PencilDirection::kY, Vector3d::UnitY())};
+    EstimationOptions options = LeastSquares();
+    const PoseEstimate photo = EstimatePose(observations, options);
+    ASSERT_TRUE(photo.status.ok()) << photo.status.message;
+    const PoseHypothesis& alone = photo.hypotheses[0];
+    ASSERT_EQ(alone.rank, 6);
+    const Matrix6d C1 = alone.Covariance();
+    // As sure as the photo, in other directions.
+    Matrix6d C2 = 2.0 * Matrix6d(C1.diagonal().asDiagonal());
+    const Eigen::LLT<Matrix6d> llt(C2);
+    Vector6d unit;
+    for (int k = 0; k < 6; ++k) unit[k] = scene.random.Normal();
+    const Vector6d off = llt.matrixL() * unit;
+    PosePrior prior;
+    prior.mean.rotation = ExpRotation(off.head<3>()) * alone.cam_from_world.rotation;
+    prior.mean.translation = alone.cam_from_world.translation + off.tail<3>();
+    Eigen::Map<Matrix6d>(prior.covariance.data()) = C2;
+    options.pose_prior = prior;
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+
+    const Matrix6d C = (C1.inverse() + C2.inverse()).inverse();
+    const Vector6d expected = C * C2.inverse() * off;
+    Vector6d moved;
+    moved << LogRotation(h.cam_from_world.rotation * alone.cam_from_world.rotation.transpose()),
+        h.cam_from_world.translation - alone.cam_from_world.translation;
+    // Both in standard deviations of the result: linear to a few hundredths.
+    const Eigen::LLT<Matrix6d> scale(C);
+    EXPECT_LT(scale.matrixL().solve(moved - expected).norm(), 0.05) << seed;
+    const Matrix6d relative =
+        scale.matrixL().solve(scale.matrixL().solve(h.Covariance()).transpose());
+    EXPECT_LT((relative - Matrix6d::Identity()).norm(), 0.05) << seed;
+  }
+}
+
+// Between the two poses of a circle it decides by how far it is from each.
+TEST(PosePriorTest, EntersTheRanking) {
+  PlaneScene scene(0.7, 0.2);
+  const Observations observations = OneCircle(&scene);
+  const PoseEstimate both = EstimatePose(observations, LeastSquares());
+  ASSERT_EQ(both.hypotheses.size(), 2U);
+  const double apart = Between(both.hypotheses[0].cam_from_world.rotation.col(2),
+                               both.hypotheses[1].cam_from_world.rotation.col(2));
+  for (int mean : {0, 1}) {
+    const CameraPose& pose = both.hypotheses[static_cast<std::size_t>(mean)].cam_from_world;
+    const Vector3d normal = pose.rotation.col(2);
+    EstimationOptions options = LeastSquares();
+    options.pose_prior = Around(pose, 0.05, 10.0);
+    PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    EXPECT_GT(estimate.hypotheses[0].probability, 0.9999);
+    EXPECT_LT(Between(estimate.hypotheses[0].cam_from_world.rotation.col(2), normal), 0.01);
+    EXPECT_FALSE(estimate.hypotheses[0].RotationIsFree());  // The prior tells the spin.
+
+    const double sigma = 0.4 * apart;
+    options.pose_prior = Around(pose, sigma, 10.0);
+    estimate = EstimatePose(observations, options);
+    ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
+    const PoseHypothesis& near = Nearest(estimate, normal);
+    const double odds = std::log(near.probability / (1.0 - near.probability));
+    // 3.1 but for the prior's own bend over such an angle.
+    EXPECT_NEAR(odds, 0.5 * apart * apart / (sigma * sigma), 0.4);
+  }
+}
+
+// Where scale and origin are not observed there is no translation to compare with.
+TEST(PosePriorTest, TheLengthOfTheTranslationHasNoPartWithoutAScale) {
+  PlaneScene scene(0.7, 0.2);
+  Observations observations = OneCircle(&scene);
+  EstimationOptions options = LeastSquares();
+  options.pose_prior = Around(scene.pose, 0.05, 0.5);
+  const PoseEstimate estimate = EstimatePose(observations, options);
+  options.pose_prior->mean.translation *= 7.0;
+  Eigen::Map<Matrix6d>(options.pose_prior->covariance.data()).bottomRightCorner<3, 3>() *= 49.0;
+  const PoseEstimate other_unit = EstimatePose(observations, options);
+  ASSERT_TRUE(estimate.status.ok() && other_unit.status.ok());
+  EXPECT_LT(RotationAngle(estimate.hypotheses[0].cam_from_world.rotation,
+                          other_unit.hypotheses[0].cam_from_world.rotation),
+            1e-6);
+  EXPECT_LT((estimate.hypotheses[0].Covariance() - other_unit.hypotheses[0].Covariance()).norm(),
+            1e-6);
+}
+
+GravityPrior Measured(const Vector3d& in_world, double sigma_rad, PlaneScene* scene) {
+  GravityPrior gravity;
+  gravity.in_world = in_world;
+  const Vector3d exact = scene->pose.rotation * in_world, a = exact.unitOrthogonal();
+  const double along_a = scene->random.Normal(), along_b = scene->random.Normal();
+  gravity.in_camera = (exact + sigma_rad * (along_a * a + along_b * exact.cross(a))).normalized();
+  gravity.sigma_rad = sigma_rad;
+  return gravity;
+}
+
+// A round thing on the ground: gravity tells which of its two planes is level.
+TEST(GravityPriorTest, DecidesBetweenThePosesOfACircle) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlaneScene scene(0.6, 0.3, seed);
+    const Observations observations = OneCircle(&scene);
+    EstimationOptions options = LeastSquares();
+    options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.02, &scene);
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_GT(h.probability, 0.999) << seed;
+    EXPECT_LT(NormalError(h, scene), 0.06) << seed;
+    EXPECT_TRUE(h.RotationIsFree());  // Along the normal it does not tell the spin.
+    // One that is known no better than by the hand says little.
+    options.gravity_prior->sigma_rad = 1.5;
+    const PoseEstimate vague = EstimatePose(observations, options);
+    ASSERT_EQ(vague.hypotheses.size(), 2U) << seed;
+    EXPECT_LT(vague.hypotheses[0].probability, 0.8) << seed;
+  }
+}
+
+TEST(GravityPriorTest, CannotDecideWhereBothPosesAgreeWithIt) {
+  PlaneScene scene(0.6, 0.2);
+  const Observations observations = OneCircle(&scene);
+  const PoseEstimate both = EstimatePose(observations, LeastSquares());
+  ASSERT_EQ(both.hypotheses.size(), 2U);
+  EstimationOptions options = LeastSquares();
+  options.gravity_prior = GravityPrior{};
+  options.gravity_prior->in_world = Vector3d::UnitZ();
+  options.gravity_prior->in_camera = (both.hypotheses[0].cam_from_world.rotation.col(2) +
+                                      both.hypotheses[1].cam_from_world.rotation.col(2))
+                                         .normalized();
+  options.gravity_prior->sigma_rad = 0.3;
+  const PoseEstimate estimate = EstimatePose(observations, options);
+  ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
+  EXPECT_NEAR(estimate.hypotheses[0].probability, 0.5, 0.05);
+}
+
+// The normal from a circle and from gravity: honest together.
+TEST(GravityPriorTest, EntersTheCovariance) {
+  constexpr int kTrials = Trials(400);
+  double nees = 0.0, with = 0.0, without = 0.0;
+  for (int i = 0; i < kTrials; ++i) {
+    PlaneScene scene(0.6, 0.4, static_cast<std::uint64_t>(i + 1));
+    const Observations observations = OneCircle(&scene);
+    EstimationOptions options = LeastSquares();
+    const PoseEstimate alone = EstimatePose(observations, options);
+    options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.003, &scene);
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    const Matrix3d& R = h.cam_from_world.rotation;
+    const Eigen::Matrix<double, 3, 2> tangents = R.leftCols<2>();
+    const Eigen::Matrix2d covariance =
+        tangents.transpose() * h.Covariance().topLeftCorner<3, 3>() * tangents;
+    const Eigen::Vector2d error = tangents.transpose() * R.col(2).cross(scene.pose.rotation.col(2));
+    nees += error.dot(covariance.inverse() * error) / kTrials;
+    with += covariance.trace() / kTrials;
+    without += alone.hypotheses[0].Covariance().topLeftCorner<3, 3>().trace() / kTrials;
+  }
+  if (kSanitized) return;
+  EXPECT_NEAR(nees, 2.0, 0.4);  // 400 trials: +- 0.1.
+  EXPECT_LT(with, 0.8 * without);
+  EXPECT_LT(with, 2.0 * 0.003 * 0.003);
+}
+
+// A circle on a wall: gravity lies in its plane and tells the spin, whichever way the axes point in
+// the photo.
+TEST(GravityPriorTest, TellsTheSpinOfACircleOnAWall) {
+  for (const double turn : {0.0, 1.5, 3.1, -2.0}) {
+    PlaneScene scene(0.7, 0.2);
+    scene.pose.rotation = scene.pose.rotation * ExpRotation({0.0, 0.0, turn});
+    Observations observations = OneCircle(&scene);
+    observations.circles[0].center = scene.Pixel(0.0, 0.0);
+    EstimationOptions options = LeastSquares();
+    options.gravity_prior = Measured(-Vector3d::UnitY(), 0.01, &scene);
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_FALSE(h.RotationIsFree());
+    EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.05) << turn;
+    EXPECT_LT(h.SigmaRotation().maxCoeff(), 0.02) << turn;
+  }
+}
+
+// It has a sense: of lines alone it tells which way an axis points.
+TEST(GravityPriorTest, TellsTheSenseOfAnAxis) {
+  for (const double turn : {0.0, 3.1}) {
+    PlaneScene scene(0.7, 0.2);
+    scene.pose.rotation = scene.pose.rotation * ExpRotation({0.0, 0.0, turn});
+    Observations observations = scene.Empty();
+    observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX()),
+                            scene.Pencil("L2", PencilDirection::kY, Vector3d::UnitY())};
+    EstimationOptions options = LeastSquares();
+    options.gravity_prior = Measured(-Vector3d::UnitY(), 0.01, &scene);
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.05) << turn;
+  }
+}
+
+}  // namespace
+}  // namespace circline

@@ -1,0 +1,286 @@
+// Features that contradict the rest: which of them are left out, what the others then say, and that
+// nothing that agrees is.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/closed_form_solvers.h"
+#include "circline/refine/refined_solvers.h"
+#include "tests/plane_scene.h"
+#include "tests/trials.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Ids = std::vector<std::string>;
+
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+
+EstimationOptions Exact() {
+  EstimationOptions options;
+  options.noise_model = NoiseModel::Exact();
+  return options;
+}
+
+double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
+  return std::asin(h.cam_from_world.rotation.col(2).cross(scene.pose.rotation.col(2)).norm());
+}
+
+double SigmaNormal(const PoseHypothesis& h) {
+  const Eigen::Matrix<double, 3, 2> tangents = h.cam_from_world.rotation.leftCols<2>();
+  return std::sqrt(
+      (tangents.transpose() * h.Covariance().topLeftCorner<3, 3>() * tangents).trace());
+}
+
+bool HasNote(const PoseEstimate& estimate, const std::string& words) {
+  return std::any_of(estimate.notes.begin(), estimate.notes.end(), [&](const std::string& note) {
+    return note.find(words) != std::string::npos;
+  });
+}
+
+// About an axis of the plane, from the X axis by `about`; from angle 0 to `arc`.
+CircleObservation Tilted(PlaneScene* scene, const std::string& id, const Vector2d& center,
+                         double radius, double tilt, double about, double arc = 360.0 * kDegree,
+                         int points = 60) {
+  const Eigen::Matrix3d turn = ExpRotation(tilt * Vector3d(std::cos(about), std::sin(about), 0.0));
+  CircleObservation circle;
+  circle.id = id;
+  circle.plane = "p0";
+  circle.sigma_px = scene->sigma();
+  for (int i = 0; i < points; ++i) {
+    const double a = about + arc * i / points;
+    const Vector3d on = Vector3d(center.x(), center.y(), 0.0) +
+                        turn * (radius * Vector3d(std::cos(a), std::sin(a), 0.0));
+    circle.points.push_back(scene->Pixel(on.x(), on.y(), on.z()));
+  }
+  return circle;
+}
+
+// The two others say what they say without it.
+void ExpectPoseOfTheOthers(const PoseHypothesis& h, const PoseEstimate& others) {
+  double nearest = 4.0;
+  for (const PoseHypothesis& other : others.hypotheses) {
+    nearest = std::min(
+        nearest, (h.cam_from_world.rotation.col(2) - other.cam_from_world.rotation.col(2)).norm());
+  }
+  EXPECT_LT(nearest, 0.01 * SigmaNormal(h));
+}
+
+class TiltedCircleTest : public ::testing::TestWithParam<double> {};
+
+TEST_P(TiltedCircleTest, OneOfThreeIsNamedAndTheOthersKeepTheirPose) {
+  constexpr int kScenes = Trials(60);
+  int named = 0, right = 0;
+  for (int i = 0; i < kScenes; ++i) {
+    PlaneScene scene(0.7, 0.2, static_cast<std::uint64_t>(i + 1));
+    Observations observations = scene.Empty();
+    observations.circles = {
+        scene.Circle("c0", -1.8, -0.8, 1.0),
+        Tilted(&scene, "c1", {1.6, -0.5}, 0.9, GetParam(), scene.random.Uniform(0.0, 6.28)),
+        scene.Circle("c2", 0.2, 1.6, 0.8)};
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    right += NormalError(h, scene) < 3.5 * SigmaNormal(h) ? 1 : 0;
+    if (h.left_out != Ids{"c1"}) continue;
+    ++named;
+    EXPECT_TRUE(HasNote(estimate, "circle 'c1'"));
+    Observations others = observations;
+    others.circles.erase(others.circles.begin() + 1);
+    ExpectPoseOfTheOthers(h, EstimatePose(others, Exact()));
+  }
+  std::printf("tilted by %.0f degrees: named in %d of %d, the pose right in %d\n",
+              GetParam() / kDegree, named, kScenes, right);
+  EXPECT_GE(named, 0.95 * kScenes);
+  EXPECT_GE(right, 0.95 * kScenes);
+}
+
+INSTANTIATE_TEST_SUITE_P(Tilts, TiltedCircleTest,
+                         ::testing::Values(5.0 * kDegree, 10.0 * kDegree, 15.0 * kDegree));
+
+TEST(ReadingsTest, AWrongRadiusIsNamed) {
+  constexpr int kScenes = Trials(60);
+  int named = 0;
+  for (int i = 0; i < kScenes; ++i) {
+    PlaneScene scene(0.7, 0.2, static_cast<std::uint64_t>(i + 1));
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", -1.8, -0.8, 1.0), scene.Circle("c1", 1.6, -0.5, 0.9),
+                            scene.Circle("c2", 0.2, 1.6, 0.8)};
+    observations.circles[0].radius = 1.0;
+    observations.circles[1].radius = 0.9 * 1.05;
+    observations.circles[2].radius = 0.8;
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    if (h.left_out != Ids{"c1"}) continue;
+    ++named;
+    EXPECT_TRUE(h.metric);
+    Observations others = observations;
+    others.circles.erase(others.circles.begin() + 1);
+    ExpectPoseOfTheOthers(h, EstimatePose(others, Exact()));
+    ASSERT_EQ(h.circles.size(), 2U);
+    EXPECT_LT((h.circles[0].center - scene.pose.rotation * Vector3d(-1.8, -0.8, 0.0) -
+               scene.pose.translation)
+                  .norm(),
+              0.05);
+  }
+  EXPECT_GE(named, 0.95 * kScenes);
+}
+
+// Of two nothing says which is right.
+TEST(ReadingsTest, TwoContradictingCirclesGiveBothReadings) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    PlaneScene scene(0.7, 0.2, seed);
+    Observations observations = scene.Empty();
+    observations.circles = {
+        scene.Circle("c0", -1.5, -0.5, 1.0),
+        Tilted(&scene, "c1", {1.5, 0.5}, 1.0, 15.0 * kDegree, scene.random.Uniform(0.0, 6.28))};
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    double without_first = 0.0, without_second = 0.0, nearest = 4.0;
+    for (const PoseHypothesis& h : estimate.hypotheses) {
+      without_first += h.left_out == Ids{"c0"} ? h.probability : 0.0;
+      without_second += h.left_out == Ids{"c1"} ? h.probability : 0.0;
+      if (h.left_out == Ids{"c1"}) nearest = std::min(nearest, NormalError(h, scene));
+    }
+    EXPECT_GT(without_first, 0.1) << seed;
+    EXPECT_GT(without_second, 0.1) << seed;
+    EXPECT_LT(nearest, 0.03) << seed;
+    EXPECT_LT(estimate.hypotheses[0].probability, 0.9) << seed;
+  }
+}
+
+// The free conic of a short arc says nothing of its centre and radius; all four agree.
+TEST(ReadingsTest, ThreeCirclesAndAShortArcAgree) {
+  constexpr int kScenes = Trials(100);
+  int gross = 0, left_out = 0;
+  for (int i = 0; i < kScenes; ++i) {
+    PlaneScene scene(0.7, 0.3, static_cast<std::uint64_t>(i + 1));
+    const double arc = scene.random.Uniform(45.0, 60.0) * kDegree;
+    Observations observations = scene.Empty();
+    observations.circles = {
+        Tilted(&scene, "arc", {1.5, 1.2}, 1.0, 0.0, scene.random.Uniform(0.0, 6.28), arc, 40),
+        scene.Circle("c0", -1.8, -0.8, 1.0), scene.Circle("c1", 1.6, -1.3, 0.9),
+        scene.Circle("c2", -0.8, 1.6, 0.8)};
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    gross += NormalError(h, scene) > 5.0 * SigmaNormal(h) ? 1 : 0;
+    left_out += h.left_out.empty() ? 0 : 1;
+  }
+  EXPECT_EQ(gross, 0);
+  EXPECT_LE(left_out, kScenes / 100);
+}
+
+// A rim and five kerbs along X, of which the third is turned.
+Observations Kerbs(double turned, PlaneScene* scene) {
+  Observations observations = scene->Empty();
+  observations.circles = {scene->Circle("rim", 0.0, 0.0, 1.5, 100)};
+  PencilObservation kerbs = scene->Pencil("kerbs", PencilDirection::kFree, Vector3d::UnitX(), 5);
+  const Vector3d middle(0.0, 0.4, 0.0), half(1.5 * std::cos(turned), 1.5 * std::sin(turned), 0.0);
+  kerbs.lines[2] = scene->Line(middle - half, middle + half);
+  observations.pencils = {kerbs};
+  return observations;
+}
+
+TEST(ReadingsTest, AnOddKerbIsLeftOutWhetherAFitFlaggedItOrNot) {
+  constexpr int kScenes = Trials(60);
+  int found = 0, found_unflagged = 0;
+  for (int i = 0; i < kScenes; ++i) {
+    PlaneScene scene(0.9, 0.3, static_cast<std::uint64_t>(i + 1));
+    Observations observations = Kerbs(i % 2 == 0 ? 0.15 : -0.15, &scene);
+    const PoseEstimate unflagged = EstimatePose(observations, Exact());
+    ASSERT_TRUE(unflagged.status.ok()) << unflagged.status.message;
+    found_unflagged += unflagged.hypotheses[0].left_out == Ids{"kerbs[2]"} ? 1 : 0;
+
+    observations.pencils[0].lines[2].is_parallel = false;
+    const PoseEstimate flagged = EstimatePose(observations, Exact());
+    ASSERT_TRUE(flagged.status.ok()) << flagged.status.message;
+    const PoseHypothesis& h = flagged.hypotheses[0];
+    if (h.left_out != Ids{"kerbs[2]"}) continue;
+    ++found;
+    EXPECT_TRUE(HasNote(flagged, "pencil 'kerbs', line 2"));
+    EXPECT_LT(NormalError(h, scene), 5.0 * SigmaNormal(h)) << i;
+    if (unflagged.hypotheses[0].left_out == h.left_out) {
+      EXPECT_LT(
+          RotationAngle(h.cam_from_world.rotation, unflagged.hypotheses[0].cam_from_world.rotation),
+          0.01 * SigmaNormal(h));
+      EXPECT_NEAR(h.probability, unflagged.hypotheses[0].probability, 0.01);
+    }
+  }
+  EXPECT_EQ(found, kScenes);
+  EXPECT_GE(found_unflagged, 0.95 * kScenes);
+}
+
+// A fit of one pencil alone may be mistaken: the other evidence takes the line in again.
+TEST(ReadingsTest, AKerbFlaggedByMistakeTakesPart) {
+  int taken_in = 0;
+  constexpr int kScenes = Trials(40);
+  for (int i = 0; i < kScenes; ++i) {
+    PlaneScene scene(0.9, 0.3, static_cast<std::uint64_t>(i + 1));
+    Observations observations = Kerbs(0.0, &scene);
+    observations.pencils[0].lines[1].is_parallel = false;
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    taken_in += estimate.hypotheses[0].left_out.empty() ? 1 : 0;
+  }
+  EXPECT_GE(taken_in, 0.95 * kScenes);
+}
+
+TEST(ReadingsTest, NothingIsLeftOutOfWhatAgrees) {
+  constexpr int kScenes = Trials(150);
+  int left_out = 0;
+  for (int i = 0; i < kScenes; ++i) {
+    PlaneScene scene(0.7, 0.5, static_cast<std::uint64_t>(i + 1));
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", -1.8, -0.8, 1.0), scene.Circle("c1", 1.6, -0.5, 0.9),
+                            scene.Circle("c2", 0.2, 1.6, 0.8)};
+    observations.circles[0].center = scene.Pixel(-1.8, -0.8);
+    observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX()),
+                            scene.Pencil("L2", PencilDirection::kY, Vector3d::UnitY())};
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    left_out += estimate.hypotheses[0].left_out.empty() ? 0 : 1;
+    EXPECT_LT(NormalError(estimate.hypotheses[0], scene),
+              5.0 * SigmaNormal(estimate.hypotheses[0]));
+  }
+  // One of the centre's gate in 120 by chance, of features as a whole none.
+  EXPECT_LE(left_out, kScenes / 25);
+}
+
+// One circle alone: nothing tells its two poses apart, and noise must not order them either.
+TEST(ReadingsTest, TiesKeepTheOrderOfTheClosedForm) {
+  SolverRegistry registry;
+  ClosedFormOptions closed_form;
+  closed_form.noise_model = NoiseModel::Exact();
+  AddClosedFormSolvers(&registry, closed_form);
+  AddRefinedSolvers(&registry, Exact());
+  const auto closed = registry.Find("single_circle", SolverStage::kClosedForm),
+             refined = registry.Find("single_circle", SolverStage::kRefined),
+             joint = registry.Find("joint", SolverStage::kRefined);
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    PlaneScene scene(0.2 + 0.01 * static_cast<double>(seed), 0.3, seed);
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+    const PoseEstimate expected = closed->Solve(observations);
+    ASSERT_EQ(expected.hypotheses.size(), 2U);
+    const Vector3d first = expected.hypotheses[0].cam_from_world.rotation.col(2),
+                   second = expected.hypotheses[1].cam_from_world.rotation.col(2);
+    for (const auto& solver : {refined, joint}) {
+      const PoseEstimate estimate = solver->Solve(observations);
+      ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
+      const Vector3d normal = estimate.hypotheses[0].cam_from_world.rotation.col(2);
+      EXPECT_GT(normal.dot(first), normal.dot(second)) << solver->name() << ", seed " << seed;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace circline
