@@ -140,7 +140,7 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   // What could not be fitted may be what is missing.
   if (!estimate.status.ok()) estimate.status.message += Because(estimate.notes);
   Inputs inputs;
-  if (estimate.status.ok()) estimate.status = Gather(evidence, &inputs);
+  if (estimate.status.ok()) estimate.status = Gather(&evidence, &inputs);
   if (!estimate.status.ok()) return estimate;
 
   const std::vector<Candidate> candidates = recipe_.evaluate(inputs);
@@ -178,7 +178,7 @@ PoseEstimate ClosedFormSolver::Seeds(const Observations& resolved) const {
   estimate.status = recipe_.select(resolved, &evidence);
   if (estimate.status.ok() && evidence.frame.plane != resolved.frame.plane)
     estimate.status = Status::Refused("nothing ties its evidence to the world's plane");
-  if (estimate.status.ok()) estimate.status = Gather(evidence, &inputs);
+  if (estimate.status.ok()) estimate.status = Gather(&evidence, &inputs);
   if (!estimate.status.ok()) return estimate;
   for (const Candidate& candidate : recipe_.evaluate(inputs))
     estimate.hypotheses.push_back(HypothesisOf(candidate, inputs));
@@ -194,16 +194,15 @@ Observations ClosedFormSolver::Resolved(const Observations& observations,
   return ResolveWorld(fitted);
 }
 
-Status ClosedFormSolver::Gather(const Observations& evidence, Inputs* inputs) const {
-  Observations weakened = evidence;
-  for (PencilObservation& pencil : weakened.pencils) {
+Status ClosedFormSolver::Gather(Observations* evidence, Inputs* inputs) const {
+  for (PencilObservation& pencil : evidence->pencils) {
     if (pencil.lines.size() == 1) continue;  // An axis.
     for (LineObservation& line : pencil.lines) {
       if (line.fit)
         line.fit = WithDirectionError(*line.fit, options_.noise_model.line_direction_rad);
     }
   }
-  const Status status = recipe_.gather(weakened, options_.sigma_px, inputs);
+  const Status status = recipe_.gather(*evidence, options_.sigma_px, inputs);
   if (status.ok()) AddModelErrors(options_.noise_model, inputs);
   return status;
 }

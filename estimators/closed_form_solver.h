@@ -28,8 +28,9 @@ class ClosedFormSolver : public Solver {
   // Fitted and with a world frame; `problems`: see FitDirect.
   Observations Resolved(const Observations& observations,
                         std::vector<std::string>* problems = nullptr) const;
-  // The recipe's inputs with the errors of the noise model.
-  Status Gather(const Observations& evidence, Inputs* inputs) const;
+  // The recipe's inputs with the errors of the noise model; that of a line against its pencil's
+  // direction goes into the covariances of the evidence's lines.
+  Status Gather(Observations* evidence, Inputs* inputs) const;
 
   Recipe recipe_;
   ClosedFormOptions options_;

@@ -81,7 +81,7 @@ struct PoseEstimate {
 };
 
 // Sorts by posterior, proportional to exp(-cost) sqrt(det covariance), and fills the probabilities.
-// Those that tie with the best (odds below 5 to 3) keep the order in which they came.
+// Those that tie with the best (odds below 11 to 10) keep the order in which they came.
 void RankHypotheses(std::vector<PoseHypothesis>* hypotheses);
 
 // Rank of a covariance of [delta, delta_t] whatever the units of the two.

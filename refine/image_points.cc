@@ -185,12 +185,14 @@ ImagePoints::ImagePoints(const Camera& camera, const std::vector<Eigen::Vector2d
     mean += p.x;
   }
   if (points_.empty()) return;
+  normalized_.reserve(points_.size());
   mean /= static_cast<double>(points_.size());
   double spread = 0.0;
   for (const CalibratedPoint& q : points_) spread += (q.x - mean).norm();
   spread /= static_cast<double>(points_.size());
-  if (!(spread > 0.0)) return;
+  if (!(spread > 0.0)) spread = 1.0;
   normalization_ << spread, 0.0, mean.x(), 0.0, spread, mean.y(), 0.0, 0.0, 1.0;
+  for (const CalibratedPoint& q : points_) normalized_.push_back(Normalize(q));
 }
 
 namespace {
@@ -236,7 +238,10 @@ CalibratedPoint ImagePoints::At(std::size_t i, const Camera* shifted) const {
   return p;
 }
 
-// In coordinates about the points' middle.
+CalibratedPoint ImagePoints::NormalizedAt(std::size_t i, const Camera* shifted) const {
+  return shifted == nullptr ? normalized_[i] : Normalize(At(i, shifted));
+}
+
 CalibratedPoint ImagePoints::Normalize(CalibratedPoint p) const {
   const double inverse = 1.0 / normalization_(0, 0);
   p.x = inverse * (p.x - normalization_.topRightCorner<2, 1>());
@@ -308,10 +313,10 @@ double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, con
   double level = 0.0;
   const bool orthogonal = IsOrthogonal(C, &level);
   const auto distance = [&](std::size_t i, auto* row) {
-    const CalibratedPoint at = At(i, changed);
-    CalibratedPoint p = Normalize(at);
+    CalibratedPoint p = NormalizedAt(i, changed);
     Eigen::Vector2d inwards = Eigen::Vector2d::Zero();
-    if (offset_px != 0.0 || variables.offset) inwards = MoveInwards(C, offset_px, &p);
+    if (offset_px != 0.0 || (row != nullptr && variables.offset))
+      inwards = MoveInwards(C, offset_px, &p);
     if (row == nullptr) {
       return orthogonal ? OrthogonalDistance(p, C, level, nullptr)
                         : 0.5 * p.Homogeneous().dot(C * p.Homogeneous()) /
@@ -332,7 +337,7 @@ double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, con
         by_pixel = p.GradientPerPixel(by_x);
       }
       (*row)[6] = variables.offset ? by_pixel.dot(inwards) : 0.0;
-      if constexpr (kSize > 7) FillCameraColumns(i, at, seen_by, d, by_pixel, row, 7);
+      if constexpr (kSize > 7) FillCameraColumns(i, At(i, changed), seen_by, d, by_pixel, row, 7);
     }
     return d;
   };
@@ -385,7 +390,7 @@ void ImagePoints::ConicDistances(const Eigen::Matrix3d& conic, double offset_px,
   distances->clear();
   Vector6d unused;
   for (std::size_t i = 0; i < size(); ++i) {
-    CalibratedPoint p = Normalize(At(i, changed));
+    CalibratedPoint p = NormalizedAt(i, changed);
     if (offset_px != 0.0) MoveInwards(C, offset_px, &p);
     distances->push_back(orthogonal ? OrthogonalDistance(p, C, level, nullptr)
                                     : ConicDistance(p, C, &unused));

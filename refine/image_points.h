@@ -118,6 +118,7 @@ class ImagePoints {
  private:
   CalibratedPoint At(std::size_t i, const Camera* shifted) const;
   CalibratedPoint Normalize(CalibratedPoint p) const;
+  CalibratedPoint NormalizedAt(std::size_t i, const Camera* shifted) const;
   bool IsOrthogonal(const Eigen::Matrix3d& conic, double* level) const;
   template <typename Row>
   void FillCameraColumns(std::size_t i, const CalibratedPoint& p, const Camera& camera, double r,
@@ -126,8 +127,8 @@ class ImagePoints {
   Camera camera_;
   Options options_;
   std::vector<Eigen::Vector2d> pixels_;
-  std::vector<CalibratedPoint> points_;
-  std::vector<LensSlope> lens_;                                  // By distortion coefficient.
+  std::vector<CalibratedPoint> points_, normalized_;  // The latter about the points' middle.
+  std::vector<LensSlope> lens_;                       // By distortion coefficient.
   Eigen::Matrix3d normalization_ = Eigen::Matrix3d::Identity();  // Calibrated from normalised.
 };
 

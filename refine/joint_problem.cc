@@ -67,7 +67,7 @@ class JointProblemBuilder {
   void AddPencil(std::size_t index);
   void AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,
                double direction_sigma, Feature feature);
-  int DirectionBlock(const PencilObservation& pencil, int* axis_feature);
+  int DirectionBlock(const PencilObservation& pencil);
   int AxisOfLine(std::size_t pencil, std::size_t line) const;
   void AddAxisLine(const LineObservation& line, double sigma_px, int axis, const std::string& id,
                    const std::string& name);
@@ -265,7 +265,7 @@ void JointProblemBuilder::AddPoint(const Eigen::Vector2d& pixel, double sigma_px
       AddFeatureTerm(std::make_unique<PlanePointCost>(obs_.camera, pixel, sigma_px,
                                                       p_.options_.line_loss.type, has_camera_),
                      {JointProblem::kRotation, JointProblem::kTranslation, block}, feature, group);
-  p_.points_.push_back({term, block, feature, pixel});
+  p_.points_.push_back({term, feature});
 }
 
 // --- Circles ---
@@ -346,7 +346,7 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   const ImagePoints kept = *points;
   const int term = AddFeatureTerm(
       std::make_unique<PlaneCircleContourCost>(std::move(*points), blocks), used, f, group);
-  p_.circles_.push_back({static_cast<int>(index), f, term, center, radius, tilt, group});
+  p_.circles_.push_back({static_cast<int>(index), f, term, center, radius, tilt});
   if (circle.center) AddMark(circle, kept, center, group, f);
   for (std::size_t k = 0; k < circle.diameters.size(); ++k)
     AddDiameter(circle, k, center, group, f);
@@ -377,10 +377,9 @@ void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size
   diameter.parent = feature;
   const int f = AddFeature(diameter);
   const int angle = AddBlock(1, {0.0}, {}, false, group);
-  const int term = AddFeatureTerm(
-      std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
-      {JointProblem::kRotation, JointProblem::kTranslation, center, angle}, f, group);
-  p_.plane_lines_.push_back({term, center, angle, f, fit.line});
+  AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
+                 {JointProblem::kRotation, JointProblem::kTranslation, center, angle}, f, group);
+  p_.plane_lines_.push_back({angle, fit.line});
 }
 
 // --- Lines ---
@@ -398,8 +397,7 @@ int JointProblemBuilder::AxisOfLine(std::size_t pencil, std::size_t line) const 
 }
 
 // A pencil's direction: tied to its axis or to the plane, as closely as the noise model says.
-int JointProblemBuilder::DirectionBlock(const PencilObservation& pencil, int* axis_feature) {
-  *axis_feature = -1;
+int JointProblemBuilder::DirectionBlock(const PencilObservation& pencil) {
   const double sigma = model_.pencil_axis_rad;
   const bool is_free = pencil.direction == PencilDirection::kFree;
   const Eigen::Vector3d axis = is_free ? Eigen::Vector3d::UnitX()
@@ -412,11 +410,11 @@ int JointProblemBuilder::DirectionBlock(const PencilObservation& pencil, int* ax
   Feature tie{Feature::Kind::kAxis, pencil.id, "the direction of pencil '" + pencil.id + "'"};
   tie.dof = is_free ? 1 : 2;
   tie.observation = FindPencil(obs_, pencil.id);
-  *axis_feature = AddFeature(tie);
+  const int feature = AddFeature(tie);
   AddTerm(std::unique_ptr<ceres::CostFunction>(
               is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma)
                       : NewDirectionPrior(axis, sigma)),
-          {block}, *axis_feature);
+          {block}, feature);
   p_.terms_.back().loss = std::make_unique<LongTails>();
   return block;
 }
@@ -447,9 +445,8 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
     std::optional<ImagePoints> points = Points(line.points, line.inliers, sigma, false);
     if (!points) continue;
     if (direction < 0) {
-      JointProblem::PencilBlocks blocks{static_cast<int>(index), -1, -1};
-      direction = blocks.direction = DirectionBlock(pencil, &blocks.axis_feature);
-      p_.pencils_.push_back(blocks);
+      direction = DirectionBlock(pencil);
+      p_.pencils_.push_back({static_cast<int>(index), direction});
     }
     AddLine(std::move(*points), line.fit->line, direction, model_.line_direction_rad, feature);
   }
@@ -480,10 +477,9 @@ void JointProblemBuilder::AddAxisLine(const LineObservation& line, double sigma_
   feature.dof = 2;
   feature.free_twice_cost = FreeCost(*points, line.fit->line);
   const int f = AddFeature(feature), angle = AddConstant({axis * kHalfPi});
-  const int term = AddFeatureTerm(
-      std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
-      {JointProblem::kRotation, JointProblem::kTranslation, origin_point_, angle}, f, -1);
-  p_.plane_lines_.push_back({term, origin_point_, angle, f, line.fit->line});
+  AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
+                 {JointProblem::kRotation, JointProblem::kTranslation, origin_point_, angle}, f,
+                 -1);
 }
 
 // An axis drawn apart from the pencils is a line of its own: through the origin where that is
@@ -506,7 +502,7 @@ void JointProblemBuilder::AddDrawnAxis(const std::optional<Segment>& axis, int w
   p_.x_is_fixed_ = true;
   const Eigen::Vector3d direction = Eigen::Vector3d::Unit(which);
   const int along = AddConstant({direction.x(), direction.y(), direction.z()});
-  p_.pencils_.push_back({-1, along, -1});
+  p_.pencils_.push_back({-1, along});
   AddLine(std::move(*points), fit.line, along, 0.0, {Feature::Kind::kLine, id, name});
 }
 
@@ -558,10 +554,10 @@ void JointProblemBuilder::AddLength(std::size_t index) {
   AddPoint(known.points[0], DrawnSigma(), a, f, group);
   AddPoint(known.points[1], DrawnSigma(), b, f, group);
   const double sigma = known.sigma > 0.0 ? known.sigma : model_.length;
-  const int term = AddTerm(std::unique_ptr<ceres::CostFunction>(
-                               NewLengthCost(known.value, std::max(sigma, kExactLength))),
-                           {a, b}, f, group);
-  p_.lengths_.push_back({term, a, b, f, known.value});
+  AddTerm(std::unique_ptr<ceres::CostFunction>(
+              NewLengthCost(known.value, std::max(sigma, kExactLength))),
+          {a, b}, f, group);
+  p_.lengths_.push_back({a, b, f, known.value});
   is_metric_ = true;
 }
 
@@ -671,23 +667,26 @@ bool JointProblem::OriginIsPlaced(const State& state) const {
          });
 }
 
-double JointProblem::Cost(const State& state, const Weighing& weighing) const {
+double JointProblem::TwiceCost(const Term& term, const State& state,
+                               const Weighing& weighing) const {
   constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
-  double cost = 0.0, residuals[kMaxResiduals];
+  double residuals[kMaxResiduals];
   const double* parameters[8];
+  Parameters(term, state, parameters);
+  const bool evaluated = term.weighed != nullptr
+                             ? term.weighed->EvaluateWith(weighing, parameters, residuals, nullptr)
+                             : term.cost->Evaluate(parameters, residuals, nullptr);
+  if (!evaluated) return std::numeric_limits<double>::infinity();
+  double rho[3] = {0.0, 0.0, 0.0};
+  for (int i = 0; i < term.cost->num_residuals(); ++i) rho[0] += residuals[i] * residuals[i];
+  if (term.loss != nullptr) term.loss->Evaluate(rho[0], rho);
+  return rho[0];
+}
+
+double JointProblem::Cost(const State& state, const Weighing& weighing) const {
+  double cost = 0.0;
   for (const Term& term : terms_) {
-    if (!IsActive(term, state)) continue;
-    Parameters(term, state, parameters);
-    const bool evaluated =
-        term.weighed != nullptr
-            ? term.weighed->EvaluateWith(weighing, parameters, residuals, nullptr)
-            : term.cost->Evaluate(parameters, residuals, nullptr);
-    if (!evaluated) return std::numeric_limits<double>::infinity();
-    double twice_cost[3] = {0.0, 0.0, 0.0};
-    for (int i = 0; i < term.cost->num_residuals(); ++i)
-      twice_cost[0] += residuals[i] * residuals[i];
-    if (term.loss != nullptr) term.loss->Evaluate(twice_cost[0], twice_cost);
-    cost += 0.5 * twice_cost[0];
+    if (IsActive(term, state)) cost += 0.5 * TwiceCost(term, state, weighing);
   }
   return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
 }

@@ -15,6 +15,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -73,6 +74,15 @@ struct State {
   double cost = 0.0;                 // Of the active terms, priors included.
 };
 
+// A minimum that has been found: what costs so many gaps more after some iterations cannot come
+// down to it.
+struct Rival {
+  double cost = std::numeric_limits<double>::infinity();
+  double gap = 0.0;
+
+  double Most(int iteration) const;
+};
+
 class JointProblem {
  public:
   // `observations` fitted and resolved (ResolveWorld); they and the options outlive this. Features
@@ -85,8 +95,11 @@ class JointProblem {
   // inactive. Refused where no circle of several can, or the origin lies beyond the horizon.
   Status Start(const CameraPose& seed, double log_focal, const std::vector<std::uint8_t>& reading,
                State* state) const;
-  // Runs ceres on it. Not ok where the evidence cannot be evaluated.
-  Status Solve(int max_iterations, State* state, bool* converged = nullptr) const;
+  // Makes an inactive line or circle active, at the state's pose. False for other features, and
+  // where it cannot lie there.
+  bool Admit(std::size_t feature, State* state) const;
+  // Runs ceres on it. Not ok where the evidence cannot be evaluated, or the rival is far better.
+  Status Solve(int max_iterations, State* state, const Rival& rival = Rival()) const;
   // The same from a start that may be far off, where much lies in the tails of the losses: under
   // wide ones first, which narrow to their own width (graduated non-convexity; Black and Rangarajan
   // 1996).
@@ -95,6 +108,9 @@ class JointProblem {
   // Infinity where it cannot be evaluated.
   double Cost(const State& state, const Weighing& weighing = Weighing()) const;
   CameraPose PoseAt(const State& state) const;
+  double LogFocalAt(const State& state) const {
+    return state.x[static_cast<std::size_t>(blocks_[kCamera].offset)];
+  }
   // Share of the contours' and lines' points within their gate.
   double InlierShare(const State& state) const;
 
@@ -117,28 +133,28 @@ class JointProblem {
   bool spin_is_free() const { return !x_is_fixed_; }
   bool camera_is_estimated() const { return camera_is_estimated_; }
   const CameraSigma& camera_sigma() const { return camera_sigma_; }
+  int num_groups() const { return num_groups_; }
 
   // Blocks and terms by what they are; -1 where there is none.
   struct CircleBlocks {
-    int observation, feature, term, center, radius, tilt, group;
+    int observation, feature, term, center, radius, tilt;
   };
   // Pencil of a direction (observation -1: an axis drawn alone), and its lines.
   struct PencilBlocks {
-    int observation, direction, axis_feature;
+    int observation, direction;
   };
   struct LineBlocks {
     int term, line, feature;
   };
   struct PlaneLineBlocks {
-    int term, point, angle, feature;
+    int angle;
     Eigen::Vector3d fit;
   };
   struct PointBlocks {
-    int term, point, feature;
-    Eigen::Vector2d pixel;
+    int term, feature;
   };
   struct LengthBlocks {
-    int term, a, b, feature;
+    int a, b, feature;
     double length;
   };
   const std::vector<CircleBlocks>& circles() const { return circles_; }
@@ -147,17 +163,26 @@ class JointProblem {
   const std::vector<PointBlocks>& points() const { return points_; }
   const std::vector<LengthBlocks>& lengths() const { return lengths_; }
   enum { kRotation = 0, kTranslation = 1, kCamera = 2 };  // Blocks that are always there.
-  // Shared offset's block by CircleObservation::contrast + 1, or -1.
-  const int* offsets() const { return offsets_; }
 
  private:
   friend class JointProblemBuilder;
 
+  double TwiceCost(const Term& term, const State& state, const Weighing& weighing) const;
+  double LargestMiss(const State& state) const;
   void SetWeighing(const Weighing& weighing) const;
   Eigen::Matrix3d SenseOfPriors(const CameraPose& seed) const;
-  int PlaceCircles(const CameraPose& seed, const double* camera, State* state) const;
-  void PlaceScale(const double* camera, State* state) const;
-  bool PlaceOrigin(const double* camera, State* state) const;
+  // What Start has found of the circles.
+  struct Placed {
+    int num_circles = 0;
+    std::vector<double> scales;  // Known radii over those in the seed's unit.
+    std::optional<Eigen::Vector2d> origin;
+  };
+  bool PlaceCircle(const CircleBlocks& circle, const double* camera, State* state,
+                   Eigen::Vector3d* in_plane) const;
+  Placed PlaceCircles(const double* camera, State* state) const;
+  bool PlaceOrigin(const Placed& placed, const double* camera, State* state) const;
+  void PlaceScale(Placed placed, const double* camera, State* state) const;
+  bool PlaceLine(const LineBlocks& line, State* state) const;
   void PlaceLines(const double* camera, State* state) const;
   bool PlanePoint(const State& state, const Eigen::Vector3d& ray, double* xy) const;
   bool Ray(const Eigen::Vector2d& pixel, const double* camera, Eigen::Vector3d* ray) const;
@@ -175,19 +200,14 @@ class JointProblem {
   std::vector<LengthBlocks> lengths_;
   std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
   std::vector<std::string> unused_;
-  std::vector<double> defaults_;  // Of State::x.
-  int offsets_[3] = {-1, -1, -1};
+  std::vector<double> defaults_;   // Of State::x.
+  int offsets_[3] = {-1, -1, -1};  // Blocks, by CircleObservation::contrast + 1.
   int num_groups_ = 0;
   std::vector<int> pose_priors_;  // Terms.
-  // Of Start, from PlaceCircles to those after it.
-  mutable std::vector<double> scales_, placed_origin_;
-  int center_at_origin_ = -1;  // Circle (index in circles_) whose centre the origin is, or -1.
+  int center_at_origin_ = -1;     // Circle (index in circles_) whose centre the origin is, or -1.
   CameraSigma camera_sigma_;
   bool origin_observed_ = false, x_is_fixed_ = false, camera_is_estimated_ = false;
   bool x_is_seen_ = false;  // Fixed by lines, up to its sense, not by a prior alone.
-
- public:
-  int num_groups() const { return num_groups_; }
 };
 
 }  // namespace circline

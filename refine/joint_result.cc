@@ -388,10 +388,7 @@ bool DropOutliers(const JointProblem& problem, State* state) {
                                                     [&](double d) { return IsInlier(d, points); });
                  const bool is_circle =
                      problem.features()[static_cast<std::size_t>(f)].kind == Feature::Kind::kCircle;
-                 // One end of a segment may well be off.
-                 const bool has_half = 2 * inliers >= static_cast<std::ptrdiff_t>(distances.size());
-                 if (inliers < (is_circle ? 5 : 2) && (is_circle || inliers == 0 || !has_half))
-                   dropped.push_back(f);
+                 if (inliers < (is_circle ? 5 : 2)) dropped.push_back(f);
                });
   ForEachPoint(problem, *state, [&](int f, const PlanePointCost& cost, double miss) {
     constexpr double kFar = 5.0;  // Standard deviations: no single point is so far off by chance.

@@ -12,20 +12,31 @@ namespace circline {
 namespace {
 
 // Ends where a step, taken or not, changes the cost by little against half a standard deviation
-// squared, however large the cost of all points is.
-class StopAtSmallChange : public ceres::IterationCallback {
+// squared, however large the cost of all points is; and where it cannot compete.
+class Watch : public ceres::IterationCallback {
  public:
+  explicit Watch(const Rival& rival) : rival_(rival) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    constexpr double kLittle = 1e-6;
+    constexpr double kLittle = 1e-5;
     const bool is_step = summary.iteration > 0 && summary.step_is_valid;
-    return is_step && std::abs(summary.cost_change) < kLittle ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
-                                                              : ceres::SOLVER_CONTINUE;
+    if (is_step && std::abs(summary.cost_change) < kLittle)
+      return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+    return summary.cost > rival_.Most(summary.iteration) ? ceres::SOLVER_ABORT
+                                                         : ceres::SOLVER_CONTINUE;
   }
+
+ private:
+  const Rival& rival_;
 };
 
 }  // namespace
 
-Status JointProblem::Solve(int max_iterations, State* state, bool* converged) const {
+double Rival::Most(int iteration) const {
+  constexpr double kGaps[] = {300.0, 30.0, 3.0};
+  return cost + kGaps[iteration < 2 ? 0 : iteration < 6 ? 1 : 2] * gap;
+}
+
+Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival) const {
   ceres::Problem::Options ownership;
   ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -60,8 +71,8 @@ Status JointProblem::Solve(int max_iterations, State* state, bool* converged) co
   options.linear_solver_type =
       unknowns <= kDense ? ceres::DENSE_NORMAL_CHOLESKY : ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = max_iterations;
-  StopAtSmallChange stop;
-  options.callbacks.push_back(&stop);
+  Watch watch(rival);
+  options.callbacks.push_back(&watch);
   options.function_tolerance = 0.0;
   options.gradient_tolerance = 1e-9;
   options.parameter_tolerance = 1e-10;
@@ -73,10 +84,11 @@ Status JointProblem::Solve(int max_iterations, State* state, bool* converged) co
   options.num_threads = 1;  // Same bits out.
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
+  if (summary.termination_type == ceres::USER_FAILURE)
+    return Status::Refused("another pose explains the evidence far better");
   if (!summary.IsSolutionUsable() && summary.termination_type != ceres::NO_CONVERGENCE)
     return Status::Failed("the evidence cannot be evaluated at the seed");
   state->cost = summary.final_cost;
-  if (converged != nullptr) *converged = summary.termination_type != ceres::NO_CONVERGENCE;
   for (const double v : state->x) {
     if (!std::isfinite(v)) return Status::Failed("the refinement left the range of numbers");
   }
@@ -90,20 +102,28 @@ void JointProblem::SetWeighing(const Weighing& weighing) const {
   }
 }
 
-Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
-  // Under a loss so wide that it is none, residuals are so many standard deviations, root mean
-  // square.
-  constexpr double kNoLoss = 1e4;
+// Of all features, root mean square over its points, standard deviations.
+double JointProblem::LargestMiss(const State& state) const {
+  constexpr double kNoLoss = 1e4;  // So wide a loss is none.
   Weighing weighing;
   weighing.stretch = kNoLoss;
-  double num_points = 0.0;
+  double most = 0.0;
   for (const Term& term : terms_) {
-    if (term.weighed == nullptr || !IsActive(term, *state)) continue;
+    if (term.weighed == nullptr || !IsActive(term, state)) continue;
     const ImagePoints* points = term.weighed->points();
-    num_points +=
+    const double num_points =
         points != nullptr ? points->options().weight * static_cast<double>(points->size()) : 1.0;
+    most = std::max(most, TwiceCost(term, state, weighing) / std::max(1.0, num_points));
   }
-  const double rms = std::sqrt(2.0 * Cost(*state, weighing) / std::max(1.0, num_points));
+  return std::sqrt(most);
+}
+
+Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
+  if (options_.conic_loss.type == LossType::kTrivial &&
+      options_.line_loss.type == LossType::kTrivial) {
+    return Solve(max_iterations, state);
+  }
+  Weighing weighing;
   constexpr double kWidest = 300.0, kNarrower = 0.25;
   const auto is_bounded = [](LossType loss) {
     return loss == LossType::kTukey || loss == LossType::kGemanMcClure || loss == LossType::kArctan;
@@ -112,7 +132,7 @@ Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
   const double near =
       is_bounded(options_.conic_loss.type) || is_bounded(options_.line_loss.type) ? 1.5 : 3.0;
   constexpr int kIterations = 2;  // Of each width: near enough for the next.
-  for (double width = std::min(rms, kWidest); width > near; width *= kNarrower) {
+  for (double width = std::min(LargestMiss(*state), kWidest); width > near; width *= kNarrower) {
     weighing.stretch = width;
     SetWeighing(weighing);
     const Status status = Solve(kIterations, state);

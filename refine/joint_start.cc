@@ -61,59 +61,64 @@ bool JointProblem::Ray(const Eigen::Vector2d& pixel, const double* camera,
   return true;
 }
 
-// Returns how many circles could be placed; the others are inactive.
-int JointProblem::PlaceCircles(const CameraPose& seed, const double* camera, State* state) const {
-  const Eigen::Vector3d n = seed.rotation.col(2);
-  const double distance = n.dot(seed.translation);
-  int placed = 0;
+// A circle by its points in the state's plane: its centre, its radius where that is not known.
+// `circle`: (cx, cy, r) as the points have it. False where it cannot lie there in front of the
+// camera.
+bool JointProblem::PlaceCircle(const CircleBlocks& c, const double* camera, State* state,
+                               Eigen::Vector3d* circle) const {
+  const CameraPose pose = PoseAt(*state);
+  const Eigen::Vector3d n = pose.rotation.col(2);
+  const double distance = n.dot(pose.translation);
   std::vector<Eigen::Vector2d> in_plane;
+  const ImagePoints& points = *terms_[static_cast<std::size_t>(c.term)].weighed->points();
+  for (const CalibratedPoint& p : points.points()) {
+    const Eigen::Vector3d ray = Refocused(p.Homogeneous(), camera[0]);
+    const double depth = distance / n.dot(ray);
+    if (!(depth > 0.0) || !std::isfinite(depth)) return false;
+    const Eigen::Vector3d X = pose.rotation.transpose() * (depth * ray - pose.translation);
+    in_plane.emplace_back(X.x(), X.y());
+  }
+  if (!FitPlaneCircle(in_plane, circle)) return false;
+  const Eigen::Vector3d center(circle->x(), circle->y(), 0.0);
+  if (!((pose.rotation * center + pose.translation).z() > 0.0)) return false;
+  const Block& center_block = blocks_[static_cast<std::size_t>(c.center)];
+  if (!center_block.is_constant)
+    std::copy(circle->data(), circle->data() + 2, state->x.data() + center_block.offset);
+  if (!(observations_.circles[static_cast<std::size_t>(c.observation)].radius > 0.0))
+    state->x[static_cast<std::size_t>(blocks_[static_cast<std::size_t>(c.radius)].offset)] =
+        circle->z();
+  return true;
+}
+
+// Circles that cannot be placed are made inactive.
+JointProblem::Placed JointProblem::PlaceCircles(const double* camera, State* state) const {
+  Placed placed;
   for (const CircleBlocks& c : circles_) {
-    const auto f = static_cast<std::size_t>(c.feature);
-    if (state->active[f] == 0) continue;
-    const auto& cost =
-        static_cast<const PlaneCircleContourCost&>(*terms_[static_cast<std::size_t>(c.term)].cost);
-    in_plane.clear();
-    bool in_front = true;
-    for (const CalibratedPoint& p : cost.points()->points()) {
-      const Eigen::Vector3d ray = Refocused(p.Homogeneous(), camera[0]);
-      const double depth = distance / n.dot(ray);
-      in_front = in_front && depth > 0.0 && std::isfinite(depth);
-      const Eigen::Vector3d X = seed.rotation.transpose() * (depth * ray - seed.translation);
-      in_plane.emplace_back(X.x(), X.y());
-    }
+    std::uint8_t& is_active = state->active[static_cast<std::size_t>(c.feature)];
     Eigen::Vector3d circle;
-    if (!in_front || !FitPlaneCircle(in_plane, &circle) ||
-        !((seed.rotation * Eigen::Vector3d(circle.x(), circle.y(), 0.0) + seed.translation).z() >
-          0.0)) {
-      state->active[f] = 0;
+    if (is_active == 0) continue;
+    if (!PlaceCircle(c, camera, state, &circle)) {
+      is_active = 0;
       continue;
     }
-    ++placed;
-    double* center = state->x.data() + blocks_[static_cast<std::size_t>(c.center)].offset;
-    double* radius = state->x.data() + blocks_[static_cast<std::size_t>(c.radius)].offset;
-    if (!blocks_[static_cast<std::size_t>(c.center)].is_constant)
-      std::copy(circle.data(), circle.data() + 2, center);
+    ++placed.num_circles;
     const bool is_at_origin =
         center_at_origin_ >= 0 &&
         c.center == circles_[static_cast<std::size_t>(center_at_origin_)].center;
-    if (is_at_origin && placed_origin_.empty()) placed_origin_.assign({circle.x(), circle.y()});
+    if (is_at_origin && !placed.origin) placed.origin = circle.head<2>();
     const double known = observations_.circles[static_cast<std::size_t>(c.observation)].radius;
-    if (known > 0.0) {
-      scales_.push_back(known / circle.z());
-    } else {
-      radius[0] = circle.z();
-    }
+    if (known > 0.0) placed.scales.push_back(known / circle.z());
   }
   return placed;
 }
 
 // Moves the world origin to where the evidence has it. False where that lies beyond the horizon.
-bool JointProblem::PlaceOrigin(const double* camera, State* state) const {
+bool JointProblem::PlaceOrigin(const Placed& placed, const double* camera, State* state) const {
   double xy[2] = {0.0, 0.0};
   const FrameObservation& frame = observations_.frame;
   Eigen::Vector3d ray;
-  if (!placed_origin_.empty()) {
-    std::copy(placed_origin_.begin(), placed_origin_.end(), xy);
+  if (placed.origin) {
+    std::copy(placed.origin->data(), placed.origin->data() + 2, xy);
   } else if (frame.origin && center_at_origin_ < 0) {
     if (!Ray(*frame.origin, camera, &ray) || !PlanePoint(*state, ray, xy)) return false;
   } else if (frame.x_axis && frame.y_axis && center_at_origin_ < 0) {
@@ -141,10 +146,10 @@ bool JointProblem::PlaceOrigin(const double* camera, State* state) const {
 }
 
 // The ends of known lengths, then the unit of all: metric, or such that t is a unit vector.
-void JointProblem::PlaceScale(const double* camera, State* state) const {
+void JointProblem::PlaceScale(Placed placed, const double* camera, State* state) const {
   for (const LengthBlocks& l : lengths_) {
     Eigen::Vector3d ray;
-    bool placed = true;
+    bool is_seen = true;
     double* ends[2] = {state->x.data() + blocks_[static_cast<std::size_t>(l.a)].offset,
                        state->x.data() + blocks_[static_cast<std::size_t>(l.b)].offset};
     const Segment& pixels = observations_
@@ -152,19 +157,20 @@ void JointProblem::PlaceScale(const double* camera, State* state) const {
                                     features_[static_cast<std::size_t>(l.feature)].observation)]
                                 .points;
     for (std::size_t k = 0; k < 2; ++k)
-      placed = Ray(pixels[k], camera, &ray) && PlanePoint(*state, ray, ends[k]) && placed;
+      is_seen = Ray(pixels[k], camera, &ray) && PlanePoint(*state, ray, ends[k]) && is_seen;
     const double length = std::hypot(ends[0][0] - ends[1][0], ends[0][1] - ends[1][1]);
-    if (!placed || !(length > 0.0)) {
+    if (!is_seen || !(length > 0.0)) {
       state->active[static_cast<std::size_t>(l.feature)] = 0;
     } else if (state->active[static_cast<std::size_t>(l.feature)] != 0) {
-      scales_.push_back(l.length / length);
+      placed.scales.push_back(l.length / length);
     }
   }
   Eigen::Map<Eigen::Vector3d> t(state->x.data() + blocks_[kTranslation].offset);
   double scale = 1.0 / t.norm();
-  if (!scales_.empty()) {
-    const auto middle = scales_.begin() + static_cast<std::ptrdiff_t>(scales_.size() / 2);
-    std::nth_element(scales_.begin(), middle, scales_.end());
+  if (!placed.scales.empty()) {
+    const auto middle =
+        placed.scales.begin() + static_cast<std::ptrdiff_t>(placed.scales.size() / 2);
+    std::nth_element(placed.scales.begin(), middle, placed.scales.end());
     scale = *middle;
   }
   t *= scale;
@@ -187,6 +193,27 @@ void JointProblem::PlaceScale(const double* camera, State* state) const {
   }
 }
 
+bool JointProblem::PlaceLine(const LineBlocks& l, State* state) const {
+  const Term& term = terms_[static_cast<std::size_t>(l.term)];
+  const double* parameters[8];
+  Parameters(term, *state, parameters);
+  double* line = state->x.data() + blocks_[static_cast<std::size_t>(l.line)].offset;
+  return static_cast<const DirectionLineCost&>(*term.cost).Start(parameters, line);
+}
+
+bool JointProblem::Admit(std::size_t feature, State* state) const {
+  const auto is_it = [feature](const auto& blocks) {
+    return blocks.feature == static_cast<int>(feature);
+  };
+  state->active[feature] = 1;
+  const auto line = std::find_if(lines_.begin(), lines_.end(), is_it);
+  if (line != lines_.end()) return PlaceLine(*line, state);
+  const auto circle = std::find_if(circles_.begin(), circles_.end(), is_it);
+  const double* camera = state->x.data() + blocks_[kCamera].offset;
+  Eigen::Vector3d unused;
+  return circle != circles_.end() && PlaceCircle(*circle, camera, state, &unused);
+}
+
 void JointProblem::PlaceLines(const double* camera, State* state) const {
   const Eigen::Matrix3d R = PoseAt(*state).rotation;
   for (const PencilBlocks& p : pencils_) {
@@ -201,14 +228,9 @@ void JointProblem::PlaceLines(const double* camera, State* state) const {
     std::copy(d.data(), d.data() + 3,
               state->x.data() + blocks_[static_cast<std::size_t>(p.direction)].offset);
   }
-  const double* parameters[8];
   for (const LineBlocks& l : lines_) {
     std::uint8_t& is_active = state->active[static_cast<std::size_t>(l.feature)];
-    if (is_active == 0) continue;
-    const Term& term = terms_[static_cast<std::size_t>(l.term)];
-    Parameters(term, *state, parameters);
-    double* line = state->x.data() + blocks_[static_cast<std::size_t>(l.line)].offset;
-    if (!static_cast<const DirectionLineCost&>(*term.cost).Start(parameters, line)) is_active = 0;
+    if (is_active != 0 && !PlaceLine(l, state)) is_active = 0;
   }
   for (const PlaneLineBlocks& l : plane_lines_) {
     const Block& angle = blocks_[static_cast<std::size_t>(l.angle)];
@@ -258,21 +280,19 @@ Status JointProblem::Start(const CameraPose& given, double log_focal,
   seed.rotation = SenseOfPriors(given);
   state->x = defaults_;
   state->active = reading;
-  scales_.clear();
-  placed_origin_.clear();
   if (camera_is_estimated_) state->x[static_cast<std::size_t>(blocks_[kCamera].offset)] = log_focal;
   Eigen::Map<Eigen::Quaterniond>(state->x.data() + blocks_[kRotation].offset) =
       Eigen::Quaterniond(seed.rotation).normalized();
   Eigen::Map<Eigen::Vector3d>(state->x.data() + blocks_[kTranslation].offset) = seed.translation;
   const double* camera = state->x.data() + blocks_[kCamera].offset;
-  const int placed = PlaceCircles(seed, camera, state);
-  if (!circles_.empty() && placed == 0) {
+  const Placed placed = PlaceCircles(camera, state);
+  if (!circles_.empty() && placed.num_circles == 0) {
     return Status::Refused(
         "no circle can lie in the plane: each crosses its horizon or lies beyond");
   }
-  if (!PlaceOrigin(camera, state))
+  if (!PlaceOrigin(placed, camera, state))
     return Status::Refused("the origin lies beyond the horizon of the plane");
-  PlaceScale(camera, state);
+  PlaceScale(placed, camera, state);
   PlaceLines(camera, state);
   return Status::Ok();
 }

@@ -136,7 +136,7 @@ class ReadingSearch {
       const bool is_near = std::any_of(tried.begin(), tried.end(), [&](std::size_t other) {
         return IsSameSeed(seeds_[start.seed], seeds_[other]) && seeds_[other].source != source;
       });
-      if (is_consistent && is_near) continue;
+      if (is_consistent && (is_near || start.cost > Rival{best, MaxGap()}.Most(0))) continue;
       tried.push_back(start.seed);
       if (!SolveFrom(is_consistent, best, &state)) continue;
       if (std::any_of(found.begin(), found.end(), [&](const auto& other) {
@@ -155,7 +155,9 @@ class ReadingSearch {
     std::vector<State> minima;
     for (auto& [seed, state] : found) {
       minima.push_back(state);
-      if (!HasOutliers(state) && !IsKnown(state, minima_)) minima_.push_back(std::move(state));
+      if (HasOutliers(state)) continue;
+      Grow(&state);
+      if (!IsKnown(state, minima_)) minima_.push_back(std::move(state));
     }
     return minima;
   }
@@ -182,26 +184,11 @@ class ReadingSearch {
   // nothing that can compete: where another minimum explains all evidence, a rival lies near its
   // own start; where none does yet, one is looked for from far off.
   bool SolveFrom(bool is_consistent, double best, State* state) {
-    const EstimationOptions& options = problem_.options();
-    // Iterations, after which what costs so many gaps more than the best cannot come down to it.
-    constexpr int kRounds[] = {2, 4};
-    constexpr double kTooMuch[] = {30.0, 3.0};
+    const int max_iterations = problem_.options().max_iterations;
     const double left_out = LeftOutCost(problem_, *state);
-    int done = 0;
-    bool converged = false;
-    for (int round = 0; is_consistent && round < 2 && !converged; ++round) {
-      const int iterations = std::min(kRounds[round], options.max_iterations - done);
-      if (iterations <= 0) break;
-      last_ = problem_.Solve(iterations, state, &converged);
-      if (!last_.ok()) return false;
-      done += iterations;
-      if (state->cost + left_out > best + kTooMuch[round] * options.max_cost_gap) return false;
-    }
-    if (!converged && done < options.max_iterations) {
-      last_ = done > 0 ? problem_.Solve(options.max_iterations - done, state)
-                       : problem_.SolveGraduated(options.max_iterations, state);
-      if (!last_.ok()) return false;
-    }
+    last_ = is_consistent ? problem_.Solve(max_iterations, state, {best - left_out, MaxGap()})
+                          : problem_.SolveGraduated(max_iterations, state);
+    if (!last_.ok()) return false;
     state->cost += left_out;
     return true;
   }
@@ -236,9 +223,29 @@ class ReadingSearch {
   // What has no inliers has no say: the minimum without it is that of another reading.
   bool HasOutliers(State state) const { return DropOutliers(problem_, &state); }
 
-  // Readings without what contradicts this minimum, and with what was left out but agrees.
+  // With a line or circle that is left out but agrees with this pose, so that leaving it out costs
+  // more than keeping it; none where there is no such feature.
+  std::optional<State> WithWhatFits(const State& minimum) const {
+    for (std::size_t i = 0; i < minimum.active.size(); ++i) {
+      State with = minimum;
+      if (minimum.active[i] != 0 || !problem_.Admit(i, &with) || HasOutliers(with)) continue;
+      if (problem_.Cost(with) + LeftOutCost(problem_, with) < minimum.cost) return with;
+    }
+    return {};
+  }
+
+  // Takes in what agrees with a minimum: the same pose on more evidence.
+  void Grow(State* minimum) const {
+    while (std::optional<State> with = WithWhatFits(*minimum)) {
+      if (!problem_.Solve(problem_.options().max_iterations, &*with).ok()) return;
+      with->cost += LeftOutCost(problem_, *with);
+      if (!(with->cost < minimum->cost)) return;
+      *minimum = std::move(*with);
+    }
+  }
+
+  // Readings without what contradicts this minimum.
   std::vector<Reading> Rivals(const State& minimum) const {
-    const std::vector<Feature>& features = problem_.features();
     std::vector<Reading> rivals;
     State without = minimum;
     if (DropOutliers(problem_, &without)) rivals.push_back(without.active);
@@ -246,18 +253,6 @@ class ReadingSearch {
       Linearization at(problem_, minimum, Weighing());
       if (at.ok() && at.ComputeCovariance())
         AddWithout(minimum, at.Misfits(), FalseAlarms(minimum), &rivals);
-    }
-    // A feature that the first reading left out takes part again where it fits this pose.
-    for (std::size_t i = 0; i < features.size(); ++i) {
-      if (minimum.active[i] != 0 || features[i].kind != Feature::Kind::kLine) continue;
-      State with = minimum;
-      with.active[i] = 1;
-      const double gain = minimum.cost - problem_.Cost(with) - LeftOutCost(problem_, with);
-      if (!(gain > 0.0)) continue;
-      Reading reading = minimum.active;
-      reading[i] = 1;
-      rivals.push_back(std::move(reading));
-      break;
     }
     return rivals;
   }
@@ -284,6 +279,8 @@ class ReadingSearch {
       rivals->push_back(std::move(without));
     }
   }
+
+  double MaxGap() const { return problem_.options().max_cost_gap; }
 
   const JointProblem& problem_;
   std::vector<Seed> seeds_;
@@ -313,6 +310,8 @@ std::vector<Seed> SeedsFromPrior(const JointProblem& problem, const Observations
       !problem.Solve(kIterations, &state).ok() || !(problem.InlierShare(state) >= kExplained)) {
     return {};
   }
+  seeds[0].pose = problem.PoseAt(state);
+  seeds[0].log_focal = problem.LogFocalAt(state);
   AddCircleSeeds(resolved, 0.0, &seeds);
   return seeds;
 }
@@ -333,21 +332,25 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
   return seeds;
 }
 
-// The noise model as the photo's own features have it, at the minimum that the best seed leads to.
-NoiseModel ScaledToFirstMinimum(const JointProblem& problem, const std::vector<Seed>& seeds) {
+// The noise model as the photo's own features have it, at the minimum that the best seed leads to;
+// the seed then starts there.
+NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* seeds) {
   const Reading reading = problem.FirstReading();
   State state, best;
+  Seed* best_seed = nullptr;
   double least = std::numeric_limits<double>::infinity();
-  for (const Seed& seed : seeds) {
+  for (Seed& seed : *seeds) {
     if (!problem.Start(seed.pose, seed.log_focal, reading, &state).ok()) continue;
     const double cost = problem.Cost(state) + LeftOutCost(problem, state);
     if (!(cost < least)) continue;
     least = cost;
     best = state;
+    best_seed = &seed;
   }
-  if (!std::isfinite(least) ||
-      !problem.SolveGraduated(problem.options().max_iterations, &best).ok())
+  if (best_seed == nullptr || !problem.SolveGraduated(problem.options().max_iterations, &best).ok())
     return problem.options().noise_model;
+  best_seed->pose = problem.PoseAt(best);
+  best_seed->log_focal = problem.LogFocalAt(best);
   return ScaledNoiseModel(problem, best);
 }
 
@@ -422,7 +425,7 @@ Status RefineResolved(const Observations& resolved, const PointNoise& noise,
   EstimationOptions scaled_options = options;
   std::optional<JointProblem> scaled;
   if (HasManyFeatures(as_stated)) {
-    scaled_options.noise_model = ScaledToFirstMinimum(as_stated, seeds);
+    scaled_options.noise_model = ScaledToFirstMinimum(as_stated, &seeds);
     scaled.emplace(resolved, scaled_options, noise);
   }
   const JointProblem& problem = scaled ? *scaled : as_stated;
