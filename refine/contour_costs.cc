@@ -56,7 +56,7 @@ struct ContourResiduals {
 
 ContourResiduals EvaluateContour(const ImagePoints& points, const CircleInCamera& circle,
                                  const CurveModel& model, int rank) {
-  ContourResiduals out{ContourRoot(model.h, model.g, model.twice_cost, rank, 6, 5), {}};
+  ContourResiduals out{SquareRootOf<CurveModel::kMaxSize>(model, rank, 6, 5), {}};
   out.by_circle = out.root.U.leftCols(6) * ImageJacobian(circle, points);
   return out;
 }

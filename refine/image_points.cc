@@ -238,6 +238,14 @@ CalibratedPoint ImagePoints::At(std::size_t i, const Camera* shifted) const {
   return p;
 }
 
+Eigen::Vector3d ImagePoints::Middle(const double* camera) const {
+  if (!IsShifted(camera)) return normalization_.col(2);
+  const Camera shifted = ShiftedCamera(camera_, camera);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < size(); ++i) middle += At(i, &shifted).Homogeneous();
+  return middle / middle.z();
+}
+
 CalibratedPoint ImagePoints::NormalizedAt(std::size_t i, const Camera* shifted) const {
   return shifted == nullptr ? normalized_[i] : Normalize(At(i, shifted));
 }

@@ -109,6 +109,9 @@ class ImagePoints {
   void LineDistances(const Eigen::Vector3d& line, const double* camera,
                      std::vector<double>* distances) const;
 
+  // Mean of the points as the camera with these shifts has them; z is 1.
+  Eigen::Vector3d Middle(const double* camera) const;
+
   // The conic in coordinates about the points' middle, in which its shape is large against
   // rounding.
   Eigen::Matrix3d Normalized(const Eigen::Matrix3d& conic) const {

@@ -11,13 +11,15 @@
 namespace circline {
 namespace {
 
+// Of cost: half of a fiftieth of a standard deviation, squared.
+constexpr double kLittle = 2e-4;
+
 // Ends where a step, taken or not, changes the cost by little against half a standard deviation
 // squared, however large the cost of all points is; and where it cannot compete.
 class Watch : public ceres::IterationCallback {
  public:
   explicit Watch(const Rival& rival) : rival_(rival) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    constexpr double kLittle = 1e-5;
     const bool is_step = summary.iteration > 0 && summary.step_is_valid;
     if (is_step && std::abs(summary.cost_change) < kLittle)
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
@@ -73,7 +75,9 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
   options.max_num_iterations = max_iterations;
   Watch watch(rival);
   options.callbacks.push_back(&watch);
-  options.function_tolerance = 0.0;
+  // A step that does less is not worth its derivatives.
+  constexpr double kNothing = 0.1 * kLittle;
+  options.function_tolerance = kNothing / std::max(1.0, state->cost);
   options.gradient_tolerance = 1e-9;
   options.parameter_tolerance = 1e-10;
   options.initial_trust_region_radius = 1e6;  // Starts are near, and the model is good.

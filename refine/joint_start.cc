@@ -294,6 +294,7 @@ Status JointProblem::Start(const CameraPose& given, double log_focal,
     return Status::Refused("the origin lies beyond the horizon of the plane");
   PlaceScale(placed, camera, state);
   PlaceLines(camera, state);
+  state->cost = Cost(*state);
   return Status::Ok();
 }
 

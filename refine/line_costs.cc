@@ -13,6 +13,7 @@
 namespace circline {
 namespace {
 
+constexpr double kPi = 3.14159265358979323846;
 using LineRoot = SquareRoot<CurveModel::kMaxSize>;
 
 // A variable lens can do what no line can; the camera's other shifts cannot, but for what the lens
@@ -38,7 +39,7 @@ struct LongTailed {
 };
 
 LineRoot WriteLine(const CurveModel& model, int rank, int num_rows, double* residuals) {
-  const LineRoot root(model.h, model.g, model.twice_cost, rank, 3, 2);
+  const LineRoot root = SquareRootOf<CurveModel::kMaxSize>(model, rank, 3, 2);
   std::fill(residuals, residuals + num_rows, 0.0);
   Eigen::Map<Eigen::VectorXd>(residuals, root.f.size()) = root.f;
   residuals[num_rows - 1] = root.rest;
@@ -98,31 +99,16 @@ void DirectionLineCost::Distances(const double* const* parameters,
     points_.LineDistances(placed.line, options_.camera ? parameters[3] : nullptr, distances);
 }
 
+// The line through the vanishing point and the middle of the points.
 bool DirectionLineCost::Start(const double* const* parameters, double* line) const {
-  const int own = parameter_block_sizes()[2];
-  const double* with[4] = {parameters[0], parameters[1], line,
-                           options_.camera ? parameters[3] : nullptr};
-  // Two steps without loss.
-  constexpr double kAll = 1e12;  // Standard deviations.
-  const Weighing wide{true, kAll, 1.0, 1.0};
-  constexpr int kSteps = 2;
-  constexpr int kMaxRows = CurveModel::kMaxSize + 2;
-  std::fill(line, line + own, 0.0);
-  for (int step = 0; step < kSteps; ++step) {
-    double residuals[kMaxRows], by_line[2 * kMaxRows];
-    double* jacobians[4] = {nullptr, nullptr, by_line, nullptr};
-    if (!EvaluateWith(wide, with, residuals, jacobians)) return false;
-    // By the angle alone: the deviation starts where its prior is narrow.
-    double h = 0.0, g = 0.0;
-    for (int row = 0; row < num_residuals(); ++row) {
-      h += by_line[own * row] * by_line[own * row];
-      g += by_line[own * row] * residuals[row];
-    }
-    if (!(h > 0.0)) return false;
-    constexpr double kMostTurn = 0.3;  // Radians; the model is no good for more.
-    if (!(std::abs(g / h) < kMostTurn)) return true;
-    line[0] -= g / h;
-  }
+  std::fill(line, line + parameter_block_sizes()[2], 0.0);
+  const double* with[4] = {parameters[0], parameters[1], line, nullptr};
+  Placed placed;
+  if (!Place(with, &placed)) return false;
+  const Eigen::Vector3d middle = points_.Middle(options_.camera ? parameters[3] : nullptr);
+  const double along = placed.line.dot(middle), across = placed.by_angle.dot(middle);
+  if (!(std::hypot(along, across) > 0.0)) return false;
+  line[0] = across != 0.0 ? std::atan(-along / across) : 0.5 * kPi;
   return true;
 }
 

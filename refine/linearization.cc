@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -56,6 +57,7 @@ void Linearization::LayOut() {
   columns_.assign(blocks.size(), -1);
   own_columns_.assign(blocks.size(), -1);
   groups_.resize(static_cast<std::size_t>(problem_.num_groups()));
+  plus_.resize(blocks.size());
   int next = 0;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (i == JointProblem::kCamera) continue;
@@ -88,42 +90,46 @@ void Linearization::LayOut() {
   }
 }
 
-Eigen::MatrixXd Linearization::PlusJacobian(int index) const {
+const Eigen::MatrixXd& Linearization::PlusJacobian(int index) {
+  Eigen::MatrixXd& plus = plus_[static_cast<std::size_t>(index)];
+  if (plus.size() > 0) return plus;
   const Block& block = problem_.blocks()[static_cast<std::size_t>(index)];
-  if (block.manifold == nullptr) return Eigen::MatrixXd::Identity(block.size, block.size);
+  if (block.manifold == nullptr) return plus = Eigen::MatrixXd::Identity(block.size, block.size);
   RowMajor J(block.size, block.manifold->TangentSize());
   block.manifold->PlusJacobian(state_.x.data() + block.offset, J.data());
-  return J;
+  return plus = J;
 }
 
 bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
   constexpr std::size_t kMaxBlocks = 8;
   const double* parameters[kMaxBlocks];
   double* jacobians[kMaxBlocks];
-  std::vector<RowMajor> ambient(term.blocks.size());
+  std::array<RowMajor, kMaxBlocks> ambient;
   problem_.Parameters(term, state_, parameters);
   Rows rows{term.feature, term.group, {}, {}, Eigen::VectorXd(term.cost->num_residuals()), 0.0};
+  Eigen::Index num_local = 0;
   for (std::size_t k = 0; k < term.blocks.size(); ++k) {
     const auto block = static_cast<std::size_t>(term.blocks[k]);
     jacobians[k] = nullptr;
     if (columns_[block] < 0 && own_columns_[block] < 0) continue;
     ambient[k].resize(rows.f.size(), problem_.blocks()[block].size);
     jacobians[k] = ambient[k].data();
+    num_local += PlusJacobian(term.blocks[k]).cols();
   }
   const bool evaluated =
       term.weighed != nullptr
           ? term.weighed->EvaluateWith(weighing, parameters, rows.f.data(), jacobians)
           : term.cost->Evaluate(parameters, rows.f.data(), jacobians);
   if (!evaluated) return false;
-  rows.J.resize(rows.f.size(), 0);
+  rows.J.resize(rows.f.size(), num_local);
+  Eigen::Index first = 0;
   for (std::size_t k = 0; k < term.blocks.size(); ++k) {
     if (jacobians[k] == nullptr) continue;
     const auto block = static_cast<std::size_t>(term.blocks[k]);
-    const Eigen::MatrixXd tangent = ambient[k] * PlusJacobian(term.blocks[k]);
-    const Eigen::Index first = rows.J.cols();
-    rows.J.conservativeResize(Eigen::NoChange, first + tangent.cols());
-    rows.J.rightCols(tangent.cols()) = tangent;
-    for (int c = 0; c < tangent.cols(); ++c)
+    const Eigen::MatrixXd& plus = PlusJacobian(term.blocks[k]);
+    rows.J.middleCols(first, plus.cols()).noalias() = ambient[k] * plus;
+    first += plus.cols();
+    for (int c = 0; c < plus.cols(); ++c)
       rows.columns.push_back(columns_[block] >= 0 ? columns_[block] + c
                                                   : -1 - (own_columns_[block] + c));
   }

@@ -63,7 +63,7 @@ class Linearization {
   void TakeLoss(const ceres::LossFunction& loss, Rows* rows);
   void AddRows(Rows rows);
   bool EliminateGroups();
-  Eigen::MatrixXd PlusJacobian(int block) const;
+  const Eigen::MatrixXd& PlusJacobian(int block);  // Of the block's manifold, worked out once.
   Eigen::MatrixXd LocalCovariance(const Rows& rows) const;
   std::vector<const Rows*> RowsOf(int feature) const;
 
@@ -74,6 +74,7 @@ class Linearization {
   int num_estimated_ = 0;
   std::vector<Group> groups_;
   std::vector<Rows> rows_;
+  std::vector<Eigen::MatrixXd> plus_;  // By block.
   Eigen::MatrixXd information_, overcounted_, covariance_, null_space_;
   Eigen::VectorXd gradient_;
 };

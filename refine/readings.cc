@@ -118,7 +118,7 @@ class ReadingSearch {
       State state;
       last_ = problem_.Start(seeds_[i].pose, seeds_[i].log_focal, reading, &state);
       if (!last_.ok()) continue;
-      const double cost = problem_.Cost(state) + LeftOutCost(problem_, state);
+      const double cost = state.cost + LeftOutCost(problem_, state);
       starts.push_back({std::move(state), cost, i});
     }
     std::stable_sort(starts.begin(), starts.end(),
@@ -341,7 +341,7 @@ NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* 
   double least = std::numeric_limits<double>::infinity();
   for (Seed& seed : *seeds) {
     if (!problem.Start(seed.pose, seed.log_focal, reading, &state).ok()) continue;
-    const double cost = problem.Cost(state) + LeftOutCost(problem, state);
+    const double cost = state.cost + LeftOutCost(problem, state);
     if (!(cost < least)) continue;
     least = cost;
     best = state;

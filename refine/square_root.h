@@ -5,6 +5,9 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
+
+#include "circline/refine/image_points.h"
 
 namespace circline {
 
@@ -28,10 +31,13 @@ struct SquareRoot {
     const Eigen::Index n = h.rows();
     U.setZero(max_rank, n);
     f.setZero(max_rank);
-    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMax, 1> scale(n), b(n);
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMax, kMax> A(n, n);
+    // As fixed in size as h.
+    constexpr int kSize = Matrix::ColsAtCompileTime, kMaxSize = Matrix::MaxColsAtCompileTime;
+    using Column = Eigen::Matrix<double, kSize, 1, 0, kMaxSize, 1>;
+    Column scale(n), b(n);
+    Eigen::Matrix<double, kSize, kSize, 0, kMaxSize, kMaxSize> A(n, n);
     for (Eigen::Index i = 0; i < n; ++i) scale[i] = h(i, i) > 0.0 ? 1.0 / std::sqrt(h(i, i)) : 0.0;
-    A.noalias() = scale.asDiagonal() * h * scale.asDiagonal();
+    A = scale.asDiagonal() * h * scale.asDiagonal();
     b = scale.cwiseProduct(g);
     for (Eigen::Index k = 0; k < max_rank; ++k) {
       Eigen::Index pivot;
@@ -39,9 +45,9 @@ struct SquareRoot {
         if (!(A.diagonal().maxCoeff(&pivot) > kNoInformation)) break;
       }
       const double inverse = 1.0 / std::sqrt(A(pivot, pivot));
-      const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMax, 1> u = inverse * A.col(pivot);
+      const Column u = inverse * A.col(pivot);
       f[k] = inverse * b[pivot];
-      A.noalias() -= u * u.transpose();
+      for (Eigen::Index j = 0; j < n; ++j) A.col(j) -= u[j] * u;
       b -= f[k] * u;
       A.row(pivot).setZero();
       A.col(pivot).setZero();
@@ -60,6 +66,27 @@ struct SquareRoot {
     rest = std::sqrt(std::max(0.0, twice_cost - f.squaredNorm()));
   }
 };
+
+// Of a curve's model; most have no more variables than their curve.
+template <int kMax>
+SquareRoot<kMax> SquareRootOf(const CurveModel& model, int max_rank, int lead, int lead_rank) {
+  const auto of_size = [&](const auto& size) {
+    constexpr int kSize = std::decay_t<decltype(size)>::value;
+    return SquareRoot<kMax>(Eigen::Matrix<double, kSize, kSize>(model.h),
+                            Eigen::Matrix<double, kSize, 1>(model.g), model.twice_cost, max_rank,
+                            lead, lead_rank);
+  };
+  switch (model.g.size()) {
+    case 3:
+      return of_size(std::integral_constant<int, 3>());
+    case 6:
+      return of_size(std::integral_constant<int, 6>());
+    case 7:
+      return of_size(std::integral_constant<int, 7>());
+    default:
+      return SquareRoot<kMax>(model.h, model.g, model.twice_cost, max_rank, lead, lead_rank);
+  }
+}
 
 }  // namespace circline
 
