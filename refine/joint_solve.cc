@@ -11,8 +11,8 @@
 namespace circline {
 namespace {
 
-// Of cost: half of a fiftieth of a standard deviation, squared.
-constexpr double kLittle = 2e-4;
+// Of cost: half of a thirtieth of a standard deviation, squared.
+constexpr double kLittle = 5e-4;
 
 // Ends where a step, taken or not, changes the cost by little against half a standard deviation
 // squared, however large the cost of all points is; and where it cannot compete.

@@ -54,9 +54,16 @@ LineRoot WriteLine(const CurveModel& model, int rank, int num_rows, double* resi
 // d, a unit vector, turned about d by the angle.
 struct DirectionLineCost::Placed {
   Eigen::Matrix3d R;
-  Eigen::Vector3d in_world, line, by_angle, d;
-  Eigen::Matrix3d by_direction;  // d line / d d.
-  double e;
+  Eigen::Vector3d in_world, d, m, turned, line, by_angle;
+  double c, s, e, along, norm;
+
+  // d line / d d.
+  Eigen::Matrix3d ByDirection(const Eigen::Vector3d& fit) const {
+    const Eigen::Matrix3d m_by_d = (m * m.transpose() - Eigen::Matrix3d::Identity()) / norm *
+                                   (along * Eigen::Matrix3d::Identity() + d * fit.transpose());
+    return c * m_by_d + s * (CrossMatrix(d) * m_by_d - CrossMatrix(m)) +
+           e * Eigen::Matrix3d::Identity();
+  }
 };
 
 DirectionLineCost::DirectionLineCost(ImagePoints points, const Eigen::Vector3d& fit,
@@ -72,22 +79,19 @@ bool DirectionLineCost::Place(const double* const* parameters, Placed* placed) c
   Placed& p = *placed;
   p.R = RotationFromBlock(parameters[0]);
   p.in_world = Eigen::Vector3d(parameters[1]).normalized();
-  const Eigen::Vector3d d = p.d = p.R * p.in_world;
-  const double angle = parameters[2][0], along = d.dot(fit_);
+  p.d = p.R * p.in_world;
   p.e = options_.direction_sigma > 0.0 ? parameters[2][1] : 0.0;
-  Eigen::Vector3d m = fit_ - along * d;
-  const double norm = m.norm();
+  p.along = p.d.dot(fit_);
+  p.m = fit_ - p.along * p.d;
+  p.norm = p.m.norm();
   constexpr double kAcross = 1e-6;  // The fit runs straight across the direction.
-  if (!(norm > kAcross)) return false;
-  m /= norm;
-  const Eigen::Vector3d turned = d.cross(m);
-  const double c = std::cos(angle), s = std::sin(angle);
-  p.line = c * m + s * turned + p.e * d;
-  p.by_angle = c * turned - s * m;
-  const Eigen::Matrix3d m_by_d = (m * m.transpose() - Eigen::Matrix3d::Identity()) / norm *
-                                 (along * Eigen::Matrix3d::Identity() + d * fit_.transpose());
-  p.by_direction = c * m_by_d + s * (CrossMatrix(d) * m_by_d - CrossMatrix(m)) +
-                   p.e * Eigen::Matrix3d::Identity();
+  if (!(p.norm > kAcross)) return false;
+  p.m /= p.norm;
+  p.turned = p.d.cross(p.m);
+  p.c = std::cos(parameters[2][0]);
+  p.s = std::sin(parameters[2][0]);
+  p.line = p.c * p.m + p.s * p.turned + p.e * p.d;
+  p.by_angle = p.c * p.turned - p.s * p.m;
   return true;
 }
 
@@ -133,10 +137,11 @@ bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* con
   }
   const LineRoot root = WriteLine(model, RankOf(points_, camera_variable), line_rows, residuals);
   const auto U = root.U.leftCols(3);
+  const Eigen::Matrix3d by_direction = p.ByDirection(fit_);
   WriteJacobian(
-      U * (p.by_direction * (-p.R * CrossMatrix(p.in_world))) * DeltaFromQuaternion(parameters[0]),
+      U * (by_direction * (-p.R * CrossMatrix(p.in_world))) * DeltaFromQuaternion(parameters[0]),
       rows, 0, jacobians);
-  WriteJacobian(U * (p.by_direction * p.R), rows, 1, jacobians);
+  WriteJacobian(U * (by_direction * p.R), rows, 1, jacobians);
   if (camera_variable) WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, 3, jacobians);
   if (jacobians[2] == nullptr) return true;
   Eigen::Matrix<double, 3, 2> by_own;

@@ -28,6 +28,7 @@ constexpr double kSamePose = 1e-3;
 constexpr double kWideFocal = 0.1;
 constexpr double kFocalStarts[] = {-1.6, -0.8, 0.8, 1.6};
 constexpr std::size_t kMaxReadings = 16;
+constexpr int kForScales = 4;  // Iterations: near enough to see how far features miss each other.
 
 using Reading = std::vector<std::uint8_t>;  // By feature: takes part.
 
@@ -347,7 +348,8 @@ NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* 
     best = state;
     best_seed = &seed;
   }
-  if (best_seed == nullptr || !problem.SolveGraduated(problem.options().max_iterations, &best).ok())
+  const int max_iterations = std::min(kForScales, problem.options().max_iterations);
+  if (best_seed == nullptr || !problem.SolveGraduated(max_iterations, &best).ok())
     return problem.options().noise_model;
   best_seed->pose = problem.PoseAt(best);
   best_seed->log_focal = problem.LogFocalAt(best);
