@@ -1,13 +1,11 @@
 #include "circline/refine/readings.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <limits>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include "circline/estimators/closed_form_solvers.h"
@@ -15,22 +13,16 @@
 #include "circline/refine/imperfection_scales.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
-#include "circline/refine/linearization.h"
 #include "circline/refine/pose_seeds.h"
+#include "circline/refine/reading_search.h"
 
 namespace circline {
 namespace {
 
-// Refined poses closer than this are one: radians. Solutions stop within a hundredth of a standard
-// deviation, and those of hopeless evidence have a tenth of a radian.
-constexpr double kSamePose = 1e-3;
 // Wide priors of the focal length are searched at these, in standard deviations.
 constexpr double kWideFocal = 0.1;
 constexpr double kFocalStarts[] = {-1.6, -0.8, 0.8, 1.6};
-constexpr std::size_t kMaxReadings = 16;
 constexpr int kForScales = 4;  // Iterations: near enough to see how far features miss each other.
-
-using Reading = std::vector<std::uint8_t>;  // By feature: takes part.
 
 // What tells the best hypothesis from the next, in words.
 std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
@@ -49,245 +41,6 @@ std::string Join(const std::vector<std::string>& parts) {
   for (const std::string& part : parts) out += (out.empty() ? "" : "; ") + part;
   return out;
 }
-
-// One pose, up to what the evidence cannot tell: the spin about the normal where that is free, and
-// the senses of the axes, which are settled by convention and may tip over.
-bool IsSamePose(const JointProblem& problem, const State& a, const State& b) {
-  if (a.active != b.active) return false;
-  const CameraPose p = problem.PoseAt(a), q = problem.PoseAt(b);
-  const Eigen::Matrix3d &A = p.rotation, &B = q.rotation;
-  const Eigen::Vector3d &s = p.translation, &t = q.translation;
-  if (problem.OriginIsPlaced(a) && s.cross(t).norm() > kSamePose * s.norm() * t.norm())
-    return false;
-  if (A.col(2).cross(B.col(2)).norm() > kSamePose) return false;
-  return problem.spin_is_free() || A.col(0).cross(B.col(0)).norm() < kSamePose;
-}
-
-// A chi-square variable of `dof` degrees of freedom exceeds this with probability p (Wilson and
-// Hilferty 1931; p by the tail of a Gaussian, good to 1 % from 1e-3 to 1e-9).
-double ChiSquareLimit(int dof, double p) {
-  const double t = std::sqrt(-2.0 * std::log(p));
-  const double z = t - (2.515517 + 0.802853 * t + 0.010328 * t * t) /
-                           (1.0 + 1.432788 * t + 0.189269 * t * t + 0.001308 * t * t * t);
-  const double n = dof, h = 2.0 / (9.0 * n);
-  const double root = 1.0 - h + z * std::sqrt(h);
-  return n * root * root * root;
-}
-
-class ReadingSearch {
- public:
-  ReadingSearch(const JointProblem& problem, std::vector<Seed> seeds)
-      : problem_(problem), seeds_(std::move(seeds)) {}
-
-  // All minima of all readings that compete. Not ok: no seed could be refined.
-  Status Run() {
-    // Lines that a fit has found odd are left out first, and then all are taken in: the fit knew
-    // one pencil only.
-    std::vector<Reading> queue = {problem_.FirstReading()};
-    const Reading everything(problem_.features().size(), 1);
-    if (queue.front() != everything) queue.push_back(everything);
-    for (std::size_t next = 0; next < queue.size() && next < kMaxReadings; ++next) {
-      const Reading reading = queue[next];
-      std::vector<State> minima = RefineAll(reading);
-      std::stable_sort(minima.begin(), minima.end(),
-                       [](const State& a, const State& b) { return a.cost < b.cost; });
-      // A minimum that costs too much may do so because of what contradicts it.
-      constexpr std::size_t kMostMinima = 4;
-      minima.resize(std::min(minima.size(), kMostMinima));
-      for (const State& minimum : minima) {
-        for (const Reading& other : Rivals(minimum)) {
-          if (std::find(queue.begin(), queue.end(), other) == queue.end()) queue.push_back(other);
-        }
-      }
-    }
-    return minima_.empty() ? last_ : Status::Ok();
-  }
-
-  // With what is left out counted in their cost, in the order of the seeds.
-  std::vector<State>& minima() { return minima_; }
-
- private:
-  // The minima that the seeds lead to, in the order of the seeds.
-  std::vector<State> RefineAll(const Reading& reading) {
-    struct Start {
-      State state;
-      double cost;  // With what is left out.
-      std::size_t seed;
-    };
-    std::vector<Start> starts;
-    for (std::size_t i = 0; i < seeds_.size(); ++i) {
-      State state;
-      last_ = problem_.Start(seeds_[i].pose, seeds_[i].log_focal, reading, &state);
-      if (!last_.ok()) continue;
-      const double cost = state.cost + LeftOutCost(problem_, state);
-      starts.push_back({std::move(state), cost, i});
-    }
-    std::stable_sort(starts.begin(), starts.end(),
-                     [](const Start& a, const Start& b) { return a.cost < b.cost; });
-    std::vector<std::pair<std::size_t, State>> found;
-    std::vector<std::size_t> tried;
-    const int best_circle = BestCircle(reading);
-    double best = std::numeric_limits<double>::infinity();
-    bool is_consistent = false;  // The best one explains all that is to take part.
-    for (Start& start : starts) {
-      State& state = start.state;
-      // Where all evidence agrees, one circle's planes are those of all.
-      const int source = seeds_[start.seed].source;
-      if (is_consistent && source < 0 && source != best_circle) continue;
-      const bool is_near = std::any_of(tried.begin(), tried.end(), [&](std::size_t other) {
-        return IsSameSeed(seeds_[start.seed], seeds_[other]) && seeds_[other].source != source;
-      });
-      if (is_consistent && (is_near || start.cost > Rival{best, MaxGap()}.Most(0))) continue;
-      tried.push_back(start.seed);
-      if (!SolveFrom(is_consistent, best, &state)) continue;
-      if (std::any_of(found.begin(), found.end(), [&](const auto& other) {
-            return IsSamePose(problem_, state, other.second);
-          })) {
-        continue;
-      }
-      if (state.cost < best) {
-        best = state.cost;
-        is_consistent = state.active == reading && IsConsistent(state);
-      }
-      found.emplace_back(FirstLike(start.seed), std::move(state));
-    }
-    std::stable_sort(found.begin(), found.end(),
-                     [](const auto& a, const auto& b) { return a.first < b.first; });
-    std::vector<State> minima;
-    for (auto& [seed, state] : found) {
-      minima.push_back(state);
-      if (HasOutliers(state)) continue;
-      Grow(&state);
-      if (!IsKnown(state, minima_)) minima_.push_back(std::move(state));
-    }
-    return minima;
-  }
-
-  // The first seed that is as near to the same minimum.
-  std::size_t FirstLike(std::size_t seed) const {
-    std::size_t first = 0;
-    while (!IsSameSeed(seeds_[first], seeds_[seed])) ++first;
-    return first;
-  }
-
-  // Source of the seeds of the best known circle that takes part; 0 where none does.
-  int BestCircle(const Reading& reading) const {
-    for (const Seed& seed : seeds_) {
-      for (const JointProblem::CircleBlocks& c : problem_.circles()) {
-        if (seed.circle == c.observation && reading[static_cast<std::size_t>(c.feature)] != 0)
-          return seed.source;
-      }
-    }
-    return 0;
-  }
-
-  // Refines a start, its cost then with what is left out. False where that fails or leads to
-  // nothing that can compete: where another minimum explains all evidence, a rival lies near its
-  // own start; where none does yet, one is looked for from far off.
-  bool SolveFrom(bool is_consistent, double best, State* state) {
-    const int max_iterations = problem_.options().max_iterations;
-    const double left_out = LeftOutCost(problem_, *state);
-    last_ = is_consistent ? problem_.Solve(max_iterations, state, {best - left_out, MaxGap()})
-                          : problem_.SolveGraduated(max_iterations, state);
-    if (!last_.ok()) return false;
-    state->cost += left_out;
-    return true;
-  }
-
-  // Twice what all features together miss their own free fits by: none contradicts the others by
-  // more.
-  double TotalMisfit(const State& state) const {
-    double misfit = 2.0 * problem_.Cost(state);
-    for (std::size_t i = 0; i < state.active.size(); ++i)
-      misfit -= state.active[i] != 0 ? problem_.features()[i].free_twice_cost : 0.0;
-    return misfit;
-  }
-
-  bool IsConsistent(const State& state) const {
-    int dof = 0;
-    for (std::size_t i = 0; i < state.active.size(); ++i)
-      dof += state.active[i] != 0 ? problem_.features()[i].dof : 0;
-    return TotalMisfit(state) <= ChiSquareLimit(std::max(1, dof), FalseAlarms(state));
-  }
-
-  // Of each feature, that all of a photo raise one in 10 000.
-  static double FalseAlarms(const State& state) {
-    const auto active = std::count(state.active.begin(), state.active.end(), 1);
-    return 1e-4 / static_cast<double>(std::max<std::ptrdiff_t>(1, active));
-  }
-
-  bool IsKnown(const State& state, const std::vector<State>& others) const {
-    return std::any_of(others.begin(), others.end(),
-                       [&](const State& other) { return IsSamePose(problem_, state, other); });
-  }
-
-  // What has no inliers has no say: the minimum without it is that of another reading.
-  bool HasOutliers(State state) const { return DropOutliers(problem_, &state); }
-
-  // With a line or circle that is left out but agrees with this pose, so that leaving it out costs
-  // more than keeping it; none where there is no such feature.
-  std::optional<State> WithWhatFits(const State& minimum) const {
-    for (std::size_t i = 0; i < minimum.active.size(); ++i) {
-      State with = minimum;
-      if (minimum.active[i] != 0 || !problem_.Admit(i, &with) || HasOutliers(with)) continue;
-      if (problem_.Cost(with) + LeftOutCost(problem_, with) < minimum.cost) return with;
-    }
-    return {};
-  }
-
-  // Takes in what agrees with a minimum: the same pose on more evidence.
-  void Grow(State* minimum) const {
-    while (std::optional<State> with = WithWhatFits(*minimum)) {
-      if (!problem_.Solve(problem_.options().max_iterations, &*with).ok()) return;
-      with->cost += LeftOutCost(problem_, *with);
-      if (!(with->cost < minimum->cost)) return;
-      *minimum = std::move(*with);
-    }
-  }
-
-  // Readings without what contradicts this minimum.
-  std::vector<Reading> Rivals(const State& minimum) const {
-    std::vector<Reading> rivals;
-    State without = minimum;
-    if (DropOutliers(problem_, &without)) rivals.push_back(without.active);
-    if (TotalMisfit(minimum) > ChiSquareLimit(1, FalseAlarms(minimum))) {
-      Linearization at(problem_, minimum, Weighing());
-      if (at.ok() && at.ComputeCovariance())
-        AddWithout(minimum, at.Misfits(), FalseAlarms(minimum), &rivals);
-    }
-    return rivals;
-  }
-
-  void AddWithout(const State& minimum, const std::vector<Linearization::Misfit>& misfits, double p,
-                  std::vector<Reading>* rivals) const {
-    std::vector<std::pair<double, std::size_t>> excess;
-    for (std::size_t i = 0; i < misfits.size(); ++i) {
-      const double limit = ChiSquareLimit(misfits[i].dof, p);
-      if (misfits[i].d2 > limit) excess.emplace_back(misfits[i].d2 - limit, i);
-    }
-    std::sort(excess.begin(), excess.end(), [](const auto& a, const auto& b) {
-      return a.first != b.first ? a.first > b.first : a.second < b.second;
-    });
-    // Of few features it may be any, whatever the misfits at a compromise of all; of many the
-    // worst.
-    constexpr std::size_t kFew = 6, kMost = 3;
-    const bool few = misfits.size() <= kFew;
-    for (std::size_t k = 0; k < (few ? excess.size() : std::min(kMost, excess.size())); ++k) {
-      constexpr double kComparable = 0.3;  // Of the worst.
-      if (!few && excess[k].first < kComparable * excess.front().first) break;
-      Reading without = minimum.active;
-      without[excess[k].second] = 0;
-      rivals->push_back(std::move(without));
-    }
-  }
-
-  double MaxGap() const { return problem_.options().max_cost_gap; }
-
-  const JointProblem& problem_;
-  std::vector<Seed> seeds_;
-  std::vector<State> minima_;
-  Status last_ = Status::Failed("no seed pose could be refined");
-};
 
 // What the closed forms missed, led by the one thing where all of them miss it.
 Status NoSeed(const Observations& fitted, const std::vector<std::string>& reasons) {
@@ -336,7 +89,7 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
 // The noise model as the photo's own features have it, at the minimum that the best seed leads to;
 // the seed then starts there.
 NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* seeds) {
-  const Reading reading = problem.FirstReading();
+  const std::vector<std::uint8_t> reading = problem.FirstReading();
   State state, best;
   Seed* best_seed = nullptr;
   double least = std::numeric_limits<double>::infinity();
@@ -431,13 +184,13 @@ Status RefineResolved(const Observations& resolved, const PointNoise& noise,
     scaled.emplace(resolved, scaled_options, noise);
   }
   const JointProblem& problem = scaled ? *scaled : as_stated;
-  ReadingSearch search(problem, std::move(seeds));
-  const Status status = search.Run();
+  std::vector<State> minima;
+  const Status status = FindMinima(problem, seeds, &minima);
   if (!status.ok()) {
     reasons.insert(reasons.begin(), "no pose agrees with all evidence: " + status.message);
     return NoSeed(resolved, reasons);
   }
-  return FillHypotheses(problem, search.minima(), estimate);
+  return FillHypotheses(problem, minima, estimate);
 }
 
 }  // namespace

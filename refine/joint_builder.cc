@@ -1,0 +1,256 @@
+#include "circline/refine/joint_builder.h"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "circline/refine/manifolds.h"
+#include "circline/refine/square_root.h"
+
+namespace circline {
+namespace {
+
+constexpr double kExactAngle = 1e-6;   // Radians: stands for an angle that is known exactly.
+constexpr double kExactLength = 1e-6;  // Relative: the same for a length.
+// From here on a camera is estimated, below it is only counted in the covariance.
+constexpr double kEstimatedFocal = 0.01;
+
+}  // namespace
+
+int JointProblemBuilder::AddBlock(int size, std::vector<double> value,
+                                  std::unique_ptr<ceres::Manifold> manifold, bool is_constant,
+                                  int group) {
+  Block block;
+  block.offset = static_cast<int>(p_.defaults_.size());
+  block.size = size;
+  block.manifold = manifold.get();
+  block.is_constant = is_constant;
+  block.group = group;
+  if (manifold != nullptr) p_.manifolds_.push_back(std::move(manifold));
+  value.resize(static_cast<std::size_t>(size));
+  p_.defaults_.insert(p_.defaults_.end(), value.begin(), value.end());
+  p_.blocks_.push_back(block);
+  return static_cast<int>(p_.blocks_.size()) - 1;
+}
+
+int JointProblemBuilder::AddTerm(std::unique_ptr<ceres::CostFunction> cost, std::vector<int> blocks,
+                                 int feature, int group) {
+  p_.terms_.push_back({std::move(cost), std::move(blocks), feature, group, nullptr, nullptr});
+  return static_cast<int>(p_.terms_.size()) - 1;
+}
+
+int JointProblemBuilder::AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks,
+                                        int feature, int group) {
+  FeatureCost* weighed = cost.get();
+  const int term = AddTerm(std::unique_ptr<ceres::CostFunction>(std::move(cost)),
+                           WithCamera(std::move(blocks)), feature, group);
+  p_.terms_.back().weighed = weighed;
+  return term;
+}
+
+int JointProblemBuilder::AddFeature(Feature feature) {
+  p_.features_.push_back(std::move(feature));
+  return static_cast<int>(p_.features_.size()) - 1;
+}
+
+std::vector<int> JointProblemBuilder::WithCamera(std::vector<int> blocks) const {
+  if (has_camera_) blocks.push_back(JointProblem::kCamera);
+  return blocks;
+}
+
+ImagePoints::Options JointProblemBuilder::PointOptions(double sigma_px, bool is_circle) const {
+  const LossOptions& loss = is_circle ? p_.options_.conic_loss : p_.options_.line_loss;
+  ImagePoints::Options options;
+  options.sigma_px = sigma_px;
+  options.loss = loss.type;
+  options.distance = p_.options_.conic_distance;
+  options.num_distortion = p_.camera_sigma_.k1 > 0.0 ? 1 : 0;
+  return options;
+}
+
+std::optional<ImagePoints> JointProblemBuilder::Points(const std::vector<Eigen::Vector2d>& pixels,
+                                                       const std::vector<std::uint8_t>& inliers,
+                                                       double sigma_px, bool is_circle) const {
+  if (pixels.empty()) return {};
+  // A point is off by its own noise and by what it shares with its neighbours.
+  const double shared = is_circle ? model_.contour_px : model_.line_px,
+               sigma = std::hypot(sigma_px, shared);
+  ImagePoints points(obs_.camera, pixels, inliers, PointOptions(sigma, is_circle));
+  if (points.size() < (is_circle ? 5U : 2U)) return {};
+  const double weight = is_circle ? model_.ContourWeight(sigma_px, pixels, inliers)
+                                  : model_.LineWeight(sigma_px, pixels, inliers);
+  points.set_weight(weight * (sigma * sigma) / (sigma_px * sigma_px));
+  return points;
+}
+
+double JointProblemBuilder::FreeCost(const ImagePoints& points,
+                                     const Eigen::Matrix3d& conic) const {
+  CurveModel model;
+  points.SumConic(conic, 0.0, nullptr, Weighing(), {}, &model);
+  const SquareRoot<6> root = SquareRootOf<6>(model, 5, 6, 5);
+  return std::max(0.0, model.twice_cost - root.f.squaredNorm());
+}
+
+double JointProblemBuilder::FreeCost(const ImagePoints& points, const Eigen::Vector3d& line) const {
+  CurveModel model;
+  points.SumLine(line, nullptr, Weighing(), false, &model);
+  const SquareRoot<3> root = SquareRootOf<3>(model, 2, 3, 2);
+  return std::max(0.0, model.twice_cost - root.f.squaredNorm());
+}
+
+void JointProblemBuilder::Build() {
+  const CameraSigma& sigma = p_.camera_sigma_;
+  const bool has_distortion = obs_.camera.model != CameraModel::kPinhole;
+  std::vector<double> sigmas(kCameraSize, 0.0);
+  sigmas[0] = sigma.log_focal;
+  sigmas[1] = sigma.log_aspect;
+  sigmas[2] = sigmas[3] = sigma.principal_point_px;
+  sigmas[4] = has_distortion ? sigma.k1 : 0.0;
+  has_camera_ = std::any_of(sigmas.begin(), sigmas.end(), [](double s) { return s > 0.0; });
+  p_.camera_is_estimated_ = sigma.log_focal >= kEstimatedFocal;
+
+  AddBlock(4, {0.0, 0.0, 0.0, 1.0});
+  AddBlock(3, {0.0, 0.0, 1.0});
+  std::vector<int> held;
+  for (int k = 0; k < kCameraSize; ++k) {
+    if (!(sigmas[static_cast<std::size_t>(k)] > 0.0)) held.push_back(k);
+  }
+  std::unique_ptr<ceres::Manifold> manifold;
+  if (!held.empty() && has_camera_)
+    manifold = std::make_unique<ceres::SubsetManifold>(kCameraSize, held);
+  AddBlock(kCameraSize, std::vector<double>(kCameraSize, 0.0), std::move(manifold),
+           !p_.camera_is_estimated_);
+  if (p_.camera_is_estimated_) {
+    AddTerm(std::unique_ptr<ceres::CostFunction>(NewGaussianPrior(sigmas)),
+            {JointProblem::kCamera});
+  }
+  AddOrigin();
+  for (std::size_t i = 0; i < obs_.circles.size(); ++i) AddCircle(i);
+  for (std::size_t i = 0; i < obs_.pencils.size(); ++i) AddPencil(i);
+  AddDrawnAxis(obs_.frame.x_axis, 0);
+  AddDrawnAxis(obs_.frame.y_axis, 1);
+  for (std::size_t i = 0; i < obs_.known_angles.size(); ++i) AddAngle(i);
+  for (std::size_t i = 0; i < obs_.known_lengths.size(); ++i) AddLength(i);
+  AddTranslation();
+  AddPriors();
+  p_.blocks_[JointProblem::kRotation].manifold =
+      p_.manifolds_.emplace_back(std::make_unique<WorldRotationManifold>(p_.x_is_fixed_ ? 3 : 2))
+          .get();
+}
+
+void JointProblemBuilder::AddAngle(std::size_t index) {
+  const KnownAngle& known = obs_.known_angles[index];
+  const std::string name =
+      "the known angle between '" + known.pencils[0] + "' and '" + known.pencils[1] + "'";
+  int blocks[2];
+  for (std::size_t k = 0; k < 2; ++k) {
+    const auto direction = directions_.find(known.pencils[k]);
+    if (direction == directions_.end()) {
+      p_.unused_.push_back(name + ": not used, '" + known.pencils[k] +
+                           "' is no pencil of the world's plane");
+      return;
+    }
+    blocks[k] = direction->second;
+  }
+  if (p_.blocks_[static_cast<std::size_t>(blocks[0])].is_constant &&
+      p_.blocks_[static_cast<std::size_t>(blocks[1])].is_constant) {
+    p_.unused_.push_back(name + ": not used, both run along axes, which are orthogonal");
+    return;
+  }
+  AddTerm(std::unique_ptr<ceres::CostFunction>(
+              NewAngleCost(known.value, std::max(known.sigma, kExactAngle))),
+          {blocks[0], blocks[1]});
+}
+
+void JointProblemBuilder::AddLength(std::size_t index) {
+  const KnownLength& known = obs_.known_lengths[index];
+  if (!IsInWorldPlane(known, obs_)) {
+    p_.unused_.push_back("a known length of the plane '" + known.plane +
+                         "': not used, the world's is '" + obs_.frame.plane + "'");
+    return;
+  }
+  CalibratedPoint unused;
+  if (!PixelToCalibrated(obs_.camera, known.points[0], &unused) ||
+      !PixelToCalibrated(obs_.camera, known.points[1], &unused)) {
+    p_.unused_.push_back("a known length: not used, the camera model cannot undistort its ends");
+    return;
+  }
+  Feature feature{Feature::Kind::kLength, "length[" + std::to_string(index) + "]",
+                  "an end of a known length"};
+  feature.observation = static_cast<int>(index);
+  const int f = AddFeature(feature), group = p_.num_groups_++;
+  const int a = AddBlock(2, {0.0, 0.0}, {}, false, group),
+            b = AddBlock(2, {0.0, 0.0}, {}, false, group);
+  AddPoint(known.points[0], DrawnSigma(), a, f, group);
+  AddPoint(known.points[1], DrawnSigma(), b, f, group);
+  const double sigma = known.sigma > 0.0 ? known.sigma : model_.length;
+  AddTerm(std::unique_ptr<ceres::CostFunction>(
+              NewLengthCost(known.value, std::max(sigma, kExactLength))),
+          {a, b}, f, group);
+  p_.lengths_.push_back({a, b, f, known.value});
+  is_metric_ = true;
+}
+
+void JointProblemBuilder::AddTranslation() {
+  Block& t = p_.blocks_[JointProblem::kTranslation];
+  const bool has_origin = p_.origin_observed_ || p_.center_at_origin_ >= 0;
+  if (is_metric_ && has_origin) return;
+  if (!is_metric_ && !has_origin) {
+    t.is_constant = true;
+    return;
+  }
+  std::unique_ptr<ceres::Manifold> manifold;
+  if (is_metric_) {
+    manifold = std::make_unique<ScaleManifold>();
+  } else {
+    manifold = std::make_unique<ceres::SphereManifold<3>>();
+  }
+  t.manifold = p_.manifolds_.emplace_back(std::move(manifold)).get();
+}
+
+void JointProblemBuilder::AddPriors() {
+  p_.x_is_seen_ = p_.x_is_fixed_;
+  if (p_.options_.pose_prior) {
+    const PosePrior& prior = *p_.options_.pose_prior;
+    Matrix6d covariance = Eigen::Map<const Matrix6d>(prior.covariance.data());
+    Eigen::Vector3d mean = prior.mean.translation;
+    constexpr double kUnknown = 1e6;  // Standard deviation that says nothing.
+    if (!is_metric_ || !p_.origin_observed_) {
+      // A direction only, or nothing.
+      const double norm = mean.norm();
+      mean /= norm;
+      covariance.bottomRightCorner<3, 3>() /= norm * norm;
+      covariance.topRightCorner<3, 3>() /= norm;
+      covariance.bottomLeftCorner<3, 3>() /= norm;
+      const Eigen::Matrix3d more = p_.origin_observed_ ? Eigen::Matrix3d(mean * mean.transpose())
+                                                       : Eigen::Matrix3d::Identity();
+      covariance.bottomRightCorner<3, 3>() += kUnknown * kUnknown * more;
+    }
+    if (ceres::CostFunction* cost = NewPosePrior(prior.mean.rotation, mean, covariance)) {
+      p_.pose_priors_.push_back(AddTerm(std::unique_ptr<ceres::CostFunction>(cost),
+                                        {JointProblem::kRotation, JointProblem::kTranslation}));
+      p_.x_is_fixed_ = true;
+    }
+  }
+  if (p_.options_.gravity_prior) {
+    const GravityPrior& prior = *p_.options_.gravity_prior;
+    p_.pose_priors_.push_back(AddTerm(std::unique_ptr<ceres::CostFunction>(NewDirectionMeasurement(
+                                          prior.in_world, prior.in_camera, prior.sigma_rad)),
+                                      {JointProblem::kRotation}));
+    constexpr double kAlongNormal = 1e-3;  // Then it does not tell the spin about it.
+    p_.x_is_fixed_ = p_.x_is_fixed_ || prior.in_world.head<2>().norm() > kAlongNormal;
+  }
+}
+
+JointProblem::JointProblem(const Observations& observations, const EstimationOptions& options,
+                           const PointNoise& noise)
+    : observations_(observations),
+      options_(options),
+      camera_sigma_(options.camera_sigma.value_or(options.noise_model.camera)) {
+  JointProblemBuilder(noise, this).Build();
+}
+
+}  // namespace circline

@@ -1,0 +1,91 @@
+// Makes the blocks and terms of a JointProblem, one feature of the observations after the other.
+// Internal: not installed.
+#ifndef CIRCLINE_REFINE_JOINT_BUILDER_H_
+#define CIRCLINE_REFINE_JOINT_BUILDER_H_
+
+#include <ceres/manifold.h>
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "circline/refine/joint_problem.h"
+
+namespace circline {
+
+class JointProblemBuilder {
+ public:
+  JointProblemBuilder(const PointNoise& noise, JointProblem* problem)
+      : p_(*problem), obs_(p_.observations_), model_(p_.options_.noise_model), noise_(noise) {}
+
+  void Build();
+
+ private:
+  int AddBlock(int size, std::vector<double> value, std::unique_ptr<ceres::Manifold> manifold = {},
+               bool is_constant = false, int group = -1);
+  int AddConstant(std::vector<double> value) {
+    const int size = static_cast<int>(value.size());
+    return AddBlock(size, std::move(value), {}, true);
+  }
+  int AddTerm(std::unique_ptr<ceres::CostFunction> cost, std::vector<int> blocks, int feature = -1,
+              int group = -1);
+  int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature,
+                     int group);
+  int AddFeature(Feature feature);
+  std::vector<int> WithCamera(std::vector<int> blocks) const;
+
+  ImagePoints::Options PointOptions(double sigma_px, bool is_circle) const;
+  std::optional<ImagePoints> Points(const std::vector<Eigen::Vector2d>& pixels,
+                                    const std::vector<std::uint8_t>& inliers, double sigma_px,
+                                    bool is_circle) const;
+  double FreeCost(const ImagePoints& points, const Eigen::Matrix3d& conic) const;
+  double FreeCost(const ImagePoints& points, const Eigen::Vector3d& line) const;
+
+  void AddOrigin();
+  void AddCircle(std::size_t index);
+  int CenterBlock(const CircleObservation& circle, int group);
+  int RadiusBlock(const CircleObservation& circle, int feature, int group);
+  int OffsetBlock(const CircleObservation& circle);
+  void AddDiameter(const CircleObservation& circle, std::size_t index, int center, int group,
+                   int feature);
+  void AddMark(const CircleObservation& circle, const ImagePoints& points, int center, int group,
+               int feature);
+  void AddPencil(std::size_t index);
+  void AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,
+               double direction_sigma, Feature feature);
+  int DirectionBlock(const PencilObservation& pencil);
+  int AxisOfLine(std::size_t pencil, std::size_t line) const;
+  void AddAxisLine(const LineObservation& line, double sigma_px, int axis, const std::string& id,
+                   const std::string& name);
+  void AddDrawnAxis(const std::optional<Segment>& axis, int which);
+  void AddAngle(std::size_t index);
+  void AddLength(std::size_t index);
+  void AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block, int feature, int group);
+  void AddTranslation();
+  void AddPriors();
+
+  bool InPlane(const CircleObservation& circle) const {
+    return circle.fit && circle.plane == obs_.frame.plane;
+  }
+  bool IsAtOrigin(const CircleObservation& circle) const;
+  // Of points drawn by hand: axes, the origin, lengths' ends.
+  double DrawnSigma() const {
+    constexpr double kDrawnSigmaPx = 0.5;
+    return p_.options_.line_loss.scale_px > 0.0 ? p_.options_.line_loss.scale_px : kDrawnSigmaPx;
+  }
+
+  JointProblem& p_;
+  const Observations& obs_;
+  const NoiseModel& model_;
+  const PointNoise& noise_;
+  bool has_camera_ = false, is_metric_ = false;
+  int origin_point_ = -1;  // Constant block (0, 0).
+  std::string origin_circle_;
+  std::map<std::string, int> concentric_, radius_groups_, directions_;
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_JOINT_BUILDER_H_

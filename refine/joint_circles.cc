@@ -1,0 +1,176 @@
+// Circles and the origin, as blocks and terms.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "circline/refine/joint_builder.h"
+#include "circline/refine/long_tails.h"
+
+namespace circline {
+
+// --- The origin ---
+
+bool JointProblemBuilder::IsAtOrigin(const CircleObservation& circle) const {
+  if (origin_circle_.empty()) return false;
+  if (circle.id == origin_circle_) return true;
+  const int index = FindCircle(obs_, origin_circle_);
+  return index >= 0 && !circle.concentric.empty() &&
+         obs_.circles[static_cast<std::size_t>(index)].concentric == circle.concentric;
+}
+
+void JointProblemBuilder::AddOrigin() {
+  const FrameObservation& frame = obs_.frame;
+  origin_point_ = AddConstant({0.0, 0.0});
+  const bool both_axes = frame.x_axis && frame.y_axis;
+  p_.origin_observed_ = both_axes || frame.origin;
+  const int named = frame.origin_is_center.empty() ? -1 : FindCircle(obs_, frame.origin_is_center);
+  if (named >= 0 && InPlane(obs_.circles[static_cast<std::size_t>(named)])) {
+    origin_circle_ = frame.origin_is_center;
+    p_.origin_observed_ = true;
+  } else if (!p_.origin_observed_) {
+    // By convention the first circle's centre.
+    const auto first = std::find_if(obs_.circles.begin(), obs_.circles.end(),
+                                    [this](const CircleObservation& c) { return InPlane(c); });
+    if (first != obs_.circles.end()) origin_circle_ = first->id;
+  }
+  if (!frame.origin) return;
+  // An origin that is an end point of a drawn axis is no measurement of its own.
+  const auto is_end = [&](const std::optional<Segment>& axis) {
+    return axis && ((*axis)[0] == *frame.origin || (*axis)[1] == *frame.origin);
+  };
+  if (both_axes && (is_end(frame.x_axis) || is_end(frame.y_axis))) return;
+  Feature feature{Feature::Kind::kPoint, "frame.origin", "the origin of the frame"};
+  feature.dof = 2;
+  AddPoint(*frame.origin, DrawnSigma(), origin_point_, AddFeature(feature), -1);
+}
+
+void JointProblemBuilder::AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block,
+                                   int feature, int group) {
+  CalibratedPoint unused;
+  if (!PixelToCalibrated(obs_.camera, pixel, &unused)) {
+    p_.unused_.push_back(p_.features_[static_cast<std::size_t>(feature)].name +
+                         ": not used, it lies where the camera model cannot undistort it");
+    return;
+  }
+  const int term =
+      AddFeatureTerm(std::make_unique<PlanePointCost>(obs_.camera, pixel, sigma_px,
+                                                      p_.options_.line_loss.type, has_camera_),
+                     {JointProblem::kRotation, JointProblem::kTranslation, block}, feature, group);
+  p_.points_.push_back({term, feature});
+}
+
+// --- Circles ---
+
+int JointProblemBuilder::CenterBlock(const CircleObservation& circle, int group) {
+  if (IsAtOrigin(circle)) {
+    if (p_.center_at_origin_ < 0) p_.center_at_origin_ = static_cast<int>(p_.circles_.size());
+    return origin_point_;
+  }
+  if (circle.concentric.empty()) return AddBlock(2, {0.0, 0.0}, {}, false, group);
+  const auto found = concentric_.find(circle.concentric);
+  if (found != concentric_.end()) return found->second;
+  return concentric_[circle.concentric] = AddBlock(2, {0.0, 0.0});
+}
+
+int JointProblemBuilder::RadiusBlock(const CircleObservation& circle, int feature, int group) {
+  const bool grouped = !circle.radius_group.empty();
+  if (grouped) {
+    const auto found = radius_groups_.find(circle.radius_group);
+    if (found != radius_groups_.end()) return found->second;
+  }
+  const double sigma = circle.radius_sigma > 0.0 ? circle.radius_sigma : model_.radius;
+  const bool known = circle.radius > 0.0;
+  is_metric_ = is_metric_ || known;
+  const int block =
+      AddBlock(1, {known ? circle.radius : 1.0}, {}, known && !(sigma > 0.0), grouped ? -1 : group);
+  if (known && sigma > 0.0) {
+    AddTerm(std::unique_ptr<ceres::CostFunction>(NewLogPrior(circle.radius, sigma)), {block},
+            grouped ? -1 : feature, grouped ? -1 : group);
+  }
+  if (grouped) radius_groups_[circle.radius_group] = block;
+  return block;
+}
+
+// Contours of one contrast share an offset where there are several, or a radius to compare with.
+int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
+  if (!(model_.contour_offset_px > 0.0)) return -1;
+  const int contrast = std::clamp(circle.contrast, -1, 1);
+  const auto count =
+      std::count_if(obs_.circles.begin(), obs_.circles.end(), [&](const CircleObservation& c) {
+        return InPlane(c) && std::clamp(c.contrast, -1, 1) == contrast;
+      });
+  int& block = p_.offsets_[contrast + 1];
+  if (block < 0 && (count > 1 || circle.radius > 0.0)) {
+    block = AddBlock(1, {0.0});
+    AddTerm(std::unique_ptr<ceres::CostFunction>(NewGaussianPrior({model_.contour_offset_px})),
+            {block});
+    p_.terms_.back().loss = std::make_unique<LongTails>();
+  }
+  return block;
+}
+
+void JointProblemBuilder::AddCircle(std::size_t index) {
+  const CircleObservation& circle = obs_.circles[index];
+  if (!InPlane(circle)) return;
+  const double stated = circle.sigma_px > 0.0 ? circle.sigma_px : p_.options_.conic_loss.scale_px;
+  std::optional<ImagePoints> points =
+      Points(circle.points, circle.inliers, stated > 0.0 ? stated : noise_.circles[index], true);
+  if (!points) return;
+  Feature feature{Feature::Kind::kCircle, circle.id, "circle '" + circle.id + "'"};
+  feature.dof = circle.radius > 0.0 ? 3 : 2;
+  feature.observation = static_cast<int>(index);
+  feature.free_twice_cost = FreeCost(*points, circle.fit->conic);
+  const int f = AddFeature(feature), group = p_.num_groups_++;
+  const int center = CenterBlock(circle, group), radius = RadiusBlock(circle, f, group);
+
+  PlaneCircleContourCost::Blocks blocks;
+  blocks.tilt_and_height = model_.circle_tilt_rad > 0.0 || model_.circle_height > 0.0;
+  blocks.tilt_sigma = model_.circle_tilt_rad;
+  blocks.height_sigma = model_.circle_height;
+  blocks.camera = has_camera_;
+  std::vector<int> used = {JointProblem::kRotation, JointProblem::kTranslation, center, radius};
+  const int tilt = blocks.tilt_and_height ? AddBlock(3, {0.0, 0.0, 0.0}, {}, false, group) : -1;
+  if (tilt >= 0) used.push_back(tilt);
+  const int offset = OffsetBlock(circle);
+  blocks.offset = offset >= 0;
+  if (offset >= 0) used.push_back(offset);
+  const ImagePoints kept = *points;
+  const int term = AddFeatureTerm(
+      std::make_unique<PlaneCircleContourCost>(std::move(*points), blocks), used, f, group);
+  p_.circles_.push_back({static_cast<int>(index), f, term, center, radius, tilt});
+  if (circle.center) AddMark(circle, kept, center, group, f);
+  for (std::size_t k = 0; k < circle.diameters.size(); ++k)
+    AddDiameter(circle, k, center, group, f);
+}
+
+// No better than the contour as a whole.
+void JointProblemBuilder::AddMark(const CircleObservation& circle, const ImagePoints& points,
+                                  int center, int group, int feature) {
+  Feature mark{Feature::Kind::kCenterMark, circle.id + ".center",
+               "the centre of circle '" + circle.id + "'"};
+  mark.parent = feature;
+  mark.dof = 2;
+  const ImagePoints::Options& contour = points.options();
+  AddPoint(*circle.center, contour.sigma_px / std::sqrt(contour.weight), center, AddFeature(mark),
+           group);
+}
+
+void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size_t index,
+                                      int center, int group, int feature) {
+  const Segment& segment = circle.diameters[index];
+  const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : DrawnSigma();
+  std::optional<ImagePoints> points = Points({segment[0], segment[1]}, {}, sigma, false);
+  LineFit fit;
+  if (!points || !FitLine(points->points(), 1.0, &fit).ok()) return;
+  Feature diameter{Feature::Kind::kPlaneLine,
+                   circle.id + ".diameters[" + std::to_string(index) + "]",
+                   "a diameter of circle '" + circle.id + "'"};
+  diameter.parent = feature;
+  const int f = AddFeature(diameter);
+  const int angle = AddBlock(1, {0.0}, {}, false, group);
+  AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
+                 {JointProblem::kRotation, JointProblem::kTranslation, center, angle}, f, group);
+  p_.plane_lines_.push_back({angle, fit.line});
+}
+
+}  // namespace circline

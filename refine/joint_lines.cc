@@ -1,0 +1,139 @@
+// Lines, pencils and drawn axes, as blocks and terms.
+#include <ceres/ceres.h>
+
+#include <utility>
+
+#include "circline/refine/joint_builder.h"
+#include "circline/refine/long_tails.h"
+#include "circline/refine/manifolds.h"
+
+namespace circline {
+namespace {
+
+constexpr double kHalfPi = 1.57079632679489661923;
+
+}  // namespace
+
+// The drawn axis that a pencil's line carries, where the origin is observed: 0 = x, 1 = y, -1 =
+// none.
+int JointProblemBuilder::AxisOfLine(std::size_t pencil, std::size_t line) const {
+  if (!p_.origin_observed_) return -1;
+  const auto carries = [&](const std::optional<Segment>& axis) {
+    int p, l;
+    return axis && FindAxisLine(obs_, *axis, &p, &l) && p == static_cast<int>(pencil) &&
+           l == static_cast<int>(line);
+  };
+  return carries(obs_.frame.x_axis) ? 0 : carries(obs_.frame.y_axis) ? 1 : -1;
+}
+
+// A pencil's direction: tied to its axis or to the plane, as closely as the noise model says.
+int JointProblemBuilder::DirectionBlock(const PencilObservation& pencil) {
+  const double sigma = model_.pencil_axis_rad;
+  const bool is_free = pencil.direction == PencilDirection::kFree;
+  const Eigen::Vector3d axis = is_free ? Eigen::Vector3d::UnitX()
+                                       : Eigen::Vector3d::Unit(static_cast<int>(pencil.direction));
+  const std::vector<double> value(axis.data(), axis.data() + 3);
+  if (!(sigma > 0.0)) {
+    return is_free ? AddBlock(3, value, std::make_unique<InPlaneManifold>()) : AddConstant(value);
+  }
+  const int block = AddBlock(3, value, std::make_unique<ceres::SphereManifold<3>>());
+  Feature tie{Feature::Kind::kAxis, pencil.id, "the direction of pencil '" + pencil.id + "'"};
+  tie.dof = is_free ? 1 : 2;
+  tie.observation = FindPencil(obs_, pencil.id);
+  const int feature = AddFeature(tie);
+  AddTerm(std::unique_ptr<ceres::CostFunction>(
+              is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma)
+                      : NewDirectionPrior(axis, sigma)),
+          {block}, feature);
+  p_.terms_.back().loss = std::make_unique<LongTails>();
+  return block;
+}
+
+void JointProblemBuilder::AddPencil(std::size_t index) {
+  const PencilObservation& pencil = obs_.pencils[index];
+  const bool is_free = pencil.direction == PencilDirection::kFree;
+  // Outside the plane, or a single line: it fixes its own direction, no more.
+  if (is_free && (pencil.plane != obs_.frame.plane || !pencil.fit)) return;
+  p_.x_is_fixed_ = p_.x_is_fixed_ || pencil.direction == PencilDirection::kX ||
+                   pencil.direction == PencilDirection::kY;
+  int direction = -1;
+  for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
+    const LineObservation& line = pencil.lines[j];
+    if (!line.fit) continue;
+    Feature feature{Feature::Kind::kLine, pencil.id + "[" + std::to_string(j) + "]",
+                    "pencil '" + pencil.id + "', line " + std::to_string(j)};
+    feature.observation = static_cast<int>(index);
+    feature.line = static_cast<int>(j);
+    const double own = LineSigma(pencil, line);
+    const double stated = own > 0.0 ? own : p_.options_.line_loss.scale_px;
+    const double sigma = stated > 0.0 ? stated : noise_.lines[index][j];
+    const int axis = AxisOfLine(index, j);
+    if (axis >= 0) {
+      AddAxisLine(line, sigma, axis, feature.id, feature.name);
+      continue;
+    }
+    std::optional<ImagePoints> points = Points(line.points, line.inliers, sigma, false);
+    if (!points) continue;
+    if (direction < 0) {
+      direction = DirectionBlock(pencil);
+      p_.pencils_.push_back({static_cast<int>(index), direction});
+    }
+    AddLine(std::move(*points), line.fit->line, direction, model_.line_direction_rad, feature);
+  }
+  if (direction >= 0) directions_[pencil.id] = direction;
+}
+
+void JointProblemBuilder::AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,
+                                  double direction_sigma, Feature feature) {
+  feature.free_twice_cost = FreeCost(points, fit);
+  DirectionLineCost::Options options;
+  options.direction_sigma = direction_sigma;
+  options.camera = has_camera_;
+  const int f = AddFeature(std::move(feature)), group = p_.num_groups_++;
+  const int own = AddBlock(direction_sigma > 0.0 ? 2 : 1, {0.0, 0.0}, {}, false, group);
+  const int term =
+      AddFeatureTerm(std::make_unique<DirectionLineCost>(std::move(points), fit, options),
+                     {JointProblem::kRotation, direction, own}, f, group);
+  p_.lines_.push_back({term, own, f});
+}
+
+// A line through the observed origin, along X or Y.
+void JointProblemBuilder::AddAxisLine(const LineObservation& line, double sigma_px, int axis,
+                                      const std::string& id, const std::string& name) {
+  std::optional<ImagePoints> points = Points(line.points, line.inliers, sigma_px, false);
+  if (!points) return;
+  p_.x_is_fixed_ = true;
+  Feature feature{Feature::Kind::kPlaneLine, id, name};
+  feature.dof = 2;
+  feature.free_twice_cost = FreeCost(*points, line.fit->line);
+  const int f = AddFeature(feature), angle = AddConstant({axis * kHalfPi});
+  AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
+                 {JointProblem::kRotation, JointProblem::kTranslation, origin_point_, angle}, f,
+                 -1);
+}
+
+// An axis drawn apart from the pencils is a line of its own: through the origin where that is
+// observed, else just along X or Y.
+void JointProblemBuilder::AddDrawnAxis(const std::optional<Segment>& axis, int which) {
+  int pencil, index;
+  if (!axis || FindAxisLine(obs_, *axis, &pencil, &index)) return;
+  LineObservation line;
+  line.points = {(*axis)[0], (*axis)[1]};
+  const std::string id = which == 0 ? "frame.x_axis" : "frame.y_axis",
+                    name = which == 0 ? "the X axis" : "the Y axis";
+  std::optional<ImagePoints> points = Points(line.points, {}, DrawnSigma(), false);
+  LineFit fit;
+  if (!points || !FitLine(points->points(), 1.0, &fit).ok()) return;
+  line.fit = fit;
+  if (p_.origin_observed_) {
+    AddAxisLine(line, DrawnSigma(), which, id, name);
+    return;
+  }
+  p_.x_is_fixed_ = true;
+  const Eigen::Vector3d direction = Eigen::Vector3d::Unit(which);
+  const int along = AddConstant({direction.x(), direction.y(), direction.z()});
+  p_.pencils_.push_back({-1, along});
+  AddLine(std::move(*points), fit.line, along, 0.0, {Feature::Kind::kLine, id, name});
+}
+
+}  // namespace circline

@@ -1,0 +1,116 @@
+// What it costs to leave a feature out.
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/refine/joint_result.h"
+
+namespace circline {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+// A probability that a feature is none of what it is said to be.
+constexpr double kClutter = 0.02;
+
+// Log of the information, the inverse of the covariance's determinant, that a circle's own fit has
+// of its normal: two degrees of freedom, of the better known of its two planes.
+double LogNormalInformation(const CircleObservation& circle) {
+  constexpr double kUnknown = 2.0 * 2.0 * 6.9;  // Two milliradians.
+  if (!circle.fit) return kUnknown;
+  std::array<CirclePose, 2> poses, moved;
+  const int count = CirclePoses(circle.fit->conic, &poses);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(circle.fit->Covariance());
+  Eigen::Matrix3d covariance[2] = {Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
+  const Vector6d conic = ConicToVector(circle.fit->conic);
+  for (int k = 1; k < 6; ++k) {  // The first has no variance.
+    const Vector6d step =
+        std::sqrt(std::max(0.0, eigen.eigenvalues()[k])) * eigen.eigenvectors().col(k);
+    if (CirclePoses(VectorToConic(conic + step), &moved) != count) return kUnknown;
+    for (int i = 0; i < count; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      const Eigen::Vector3d turn = moved[at].normal.cross(poses[at].normal);
+      covariance[i] += turn * turn.transpose();
+    }
+  }
+  double most = 0.0;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(covariance[i],
+                                                               Eigen::EigenvaluesOnly);
+    most = std::max(most, -std::log(turns.eigenvalues()[1] * turns.eigenvalues()[2]));
+  }
+  return std::isfinite(most) ? most : kUnknown;
+}
+
+// The same of a line's fit, of where its direction may be seen: one degree of freedom.
+double LogDirectionInformation(const LineFit& fit) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(fit.covariance,
+                                                             Eigen::EigenvaluesOnly);
+  return -std::log(std::clamp(eigen.eigenvalues()[2], 1e-16, 1.0));
+}
+
+// -log of the density of clutter over that of a feature at its mode, whatever the pose.
+double ClutterCost(const JointProblem& problem, const Feature& f) {
+  const Observations& observations = problem.observations();
+  double log_information = 2.0 * std::log(1e3);  // Of a milliradian, a thousandth.
+  int dimensions = 1;
+  double volume = kPi;  // Directions across a line; 2 pi: normals that face the camera.
+  switch (f.kind) {
+    case Feature::Kind::kCircle:
+      dimensions = 2;
+      volume = 2.0 * kPi;
+      log_information =
+          LogNormalInformation(observations.circles[static_cast<std::size_t>(f.observation)]);
+      break;
+    case Feature::Kind::kLine:
+      if (f.observation < 0) break;
+      log_information =
+          LogDirectionInformation(*observations.pencils[static_cast<std::size_t>(f.observation)]
+                                       .lines[static_cast<std::size_t>(f.line)]
+                                       .fit);
+      break;
+    case Feature::Kind::kPlaneLine:
+      break;
+    case Feature::Kind::kAxis:
+      dimensions = f.dof;
+      volume = f.dof == 2 ? 2.0 * kPi : kPi;
+      log_information = -2.0 * f.dof * std::log(problem.options().noise_model.pencil_axis_rad);
+      break;
+    case Feature::Kind::kCenterMark:
+    case Feature::Kind::kPoint: {
+      constexpr double kAbout = 100.0;  // Standard deviations: where else it might have been.
+      dimensions = 2;
+      volume = kAbout * kAbout;
+      log_information = 0.0;
+      break;
+    }
+    case Feature::Kind::kLength:
+      volume = 1.0;  // Of its logarithm.
+      break;
+  }
+  double cost = -std::log(kClutter) + 0.5 * log_information -
+                0.5 * dimensions * std::log(2.0 * kPi) + std::log(volume);
+  if (f.kind == Feature::Kind::kCircle && f.dof > 2) {
+    constexpr double kRadiusSigma = 0.003;  // Relative; the radius might have been any other.
+    cost -= std::log(std::sqrt(2.0 * kPi) * kRadiusSigma);
+  }
+  return std::max(0.0, cost);
+}
+
+}  // namespace
+
+double LeftOutCost(const JointProblem& problem, const State& state) {
+  double cost = 0.0;
+  for (std::size_t i = 0; i < problem.features().size(); ++i) {
+    const Feature& f = problem.features()[i];
+    const bool parent_is_out =
+        f.parent >= 0 && state.active[static_cast<std::size_t>(f.parent)] == 0;
+    if (state.active[i] != 0 && !parent_is_out) continue;
+    cost += 0.5 * f.free_twice_cost;
+    if (!parent_is_out) cost += ClutterCost(problem, f);
+  }
+  return cost;
+}
+
+}  // namespace circline
