@@ -74,13 +74,10 @@ struct State {
   double cost = 0.0;                 // Of the active terms, priors included.
 };
 
-// A minimum that has been found: what costs so many gaps more after some iterations cannot come
-// down to it.
+// A minimum that has been found. Another competes where it costs no more than so much above it.
 struct Rival {
   double cost = std::numeric_limits<double>::infinity();
   double gap = 0.0;
-
-  double Most(int iteration) const;
 };
 
 class JointProblem {
@@ -98,7 +95,8 @@ class JointProblem {
   // Makes an inactive line or circle active, at the state's pose. False for other features, and
   // where it cannot lie there.
   bool Admit(std::size_t feature, State* state) const;
-  // Runs ceres on it. Not ok where the evidence cannot be evaluated, or the rival is far better.
+  // Runs ceres on it. Not ok where the evidence cannot be evaluated, or at the pace of a step that
+  // would not come near the rival.
   Status Solve(int max_iterations, State* state, const Rival& rival = Rival()) const;
   // The same from a start that may be far off, where much lies in the tails of the losses: under
   // wide ones first, which narrow to their own width (graduated non-convexity; Black and Rangarajan

@@ -14,29 +14,25 @@ namespace {
 // Of cost: half of a thirtieth of a standard deviation, squared.
 constexpr double kLittle = 5e-4;
 
-// Ends where a step, taken or not, changes the cost by little against half a standard deviation
-// squared, however large the cost of all points is; and where it cannot compete.
+// Ends where a step, taken or not, changes the cost by little, however large the cost of all points
+// is; and where more steps like it would not lead to what competes.
 class Watch : public ceres::IterationCallback {
  public:
-  explicit Watch(const Rival& rival) : rival_(rival) {}
+  explicit Watch(const Rival& rival) : most_(rival.cost + rival.gap) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    const bool is_step = summary.iteration > 0 && summary.step_is_valid;
-    if (is_step && std::abs(summary.cost_change) < kLittle)
-      return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
-    return summary.cost > rival_.Most(summary.iteration) ? ceres::SOLVER_ABORT
-                                                         : ceres::SOLVER_CONTINUE;
+    constexpr double kMoreSteps = 5.0;
+    if (summary.iteration == 0 || !summary.step_is_valid) return ceres::SOLVER_CONTINUE;
+    if (std::abs(summary.cost_change) < kLittle) return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+    const bool is_hopeless =
+        summary.step_is_successful && summary.cost - kMoreSteps * summary.cost_change > most_;
+    return is_hopeless ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
   }
 
  private:
-  const Rival& rival_;
+  double most_;
 };
 
 }  // namespace
-
-double Rival::Most(int iteration) const {
-  constexpr double kGaps[] = {300.0, 30.0, 3.0};
-  return cost + kGaps[iteration < 2 ? 0 : iteration < 6 ? 1 : 2] * gap;
-}
 
 Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival) const {
   ceres::Problem::Options ownership;

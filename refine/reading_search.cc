@@ -18,6 +18,7 @@ namespace {
 // standard deviation, and those of hopeless evidence have a tenth of a radian.
 constexpr double kSamePose = 1e-3;
 constexpr std::size_t kMaxReadings = 16;
+constexpr double kHopeless = 300.0;  // Gaps that no start comes down.
 
 using Reading = std::vector<std::uint8_t>;  // By feature: takes part.
 
@@ -95,7 +96,7 @@ class ReadingSearch {
       const bool is_near = std::any_of(tried.begin(), tried.end(), [&](std::size_t other) {
         return IsSameSeed(seeds_[start.seed], seeds_[other]) && seeds_[other].source != source;
       });
-      if (is_consistent && (is_near || start.cost > Rival{best, MaxGap()}.Most(0))) continue;
+      if (is_consistent && (is_near || start.cost > best + kHopeless * MaxGap())) continue;
       tried.push_back(start.seed);
       if (!SolveFrom(is_consistent, best, &state)) continue;
       if (std::any_of(found.begin(), found.end(), [&](const auto& other) {
