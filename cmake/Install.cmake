@@ -4,7 +4,7 @@ include(CMakePackageConfigHelpers)
 
 set(CIRCLINE_CMAKE_DIR "${CMAKE_INSTALL_LIBDIR}/cmake/circline")
 
-foreach(module estimators ransac refine circline)
+foreach(module estimators ransac detection refine circline)
   install(TARGETS circline_${module} EXPORT circline-${module}
           ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
           LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}"
@@ -13,13 +13,14 @@ foreach(module estimators ransac refine circline)
           DESTINATION "${CIRCLINE_CMAKE_DIR}")
 endforeach()
 
-foreach(module estimators ransac refine)
-  file(GLOB headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${module}/*.h")
+foreach(module estimators ransac detection refine)
+  get_property(folder GLOBAL PROPERTY CIRCLINE_${module}_FOLDER)
+  file(GLOB headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*.h")
   get_property(private_headers GLOBAL PROPERTY CIRCLINE_${module}_PRIVATE_HEADERS)
   foreach(header ${private_headers})
-    list(REMOVE_ITEM headers "${PROJECT_SOURCE_DIR}/${module}/${header}")
+    list(REMOVE_ITEM headers "${PROJECT_SOURCE_DIR}/${folder}/${header}")
   endforeach()
-  install(FILES ${headers} DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/circline/${module}")
+  install(FILES ${headers} DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/circline/${folder}")
 endforeach()
 
 foreach(app compare reconstruct simulate)

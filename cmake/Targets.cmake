@@ -18,18 +18,23 @@ function(circline_own_target target)
   endif()
 endfunction()
 
-# circline_module(<module> PUBLIC <targets> PRIVATE <targets> PRIVATE_HEADERS <files>): the library
-# in the folder <module>, circline_<module>, known to users as circline::<module>. Its headers are
-# public and get installed, except for PRIVATE_HEADERS.
-function(circline_module module)
+# circline_module(<folder> PUBLIC <targets> PRIVATE <targets> PRIVATE_HEADERS <files>): the library
+# of a folder, circline_<name> after the last part of its path, known to users as circline::<name>.
+# Its headers are public and get installed, except for PRIVATE_HEADERS.
+function(circline_module folder)
   cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE;PRIVATE_HEADERS" ${ARGN})
+  get_filename_component(module "${folder}" NAME)
+  set_property(GLOBAL PROPERTY CIRCLINE_${module}_FOLDER "${folder}")
   set_property(GLOBAL PROPERTY CIRCLINE_${module}_PRIVATE_HEADERS ${ARG_PRIVATE_HEADERS})
   set(target circline_${module})
   file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cc")
-  # Headers are "circline/<module>/x.h" before and after installation.
+  # Headers are "circline/<folder>/x.h" before and after installation; a folder within another is
+  # there already.
   file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/include/circline")
-  file(CREATE_LINK "${CMAKE_CURRENT_SOURCE_DIR}"
-       "${PROJECT_BINARY_DIR}/include/circline/${module}" SYMBOLIC)
+  if(NOT EXISTS "${PROJECT_BINARY_DIR}/include/circline/${folder}")
+    file(CREATE_LINK "${CMAKE_CURRENT_SOURCE_DIR}"
+         "${PROJECT_BINARY_DIR}/include/circline/${folder}" SYMBOLIC)
+  endif()
 
   add_library(${target} ${sources})
   circline_own_target(${target})
@@ -65,14 +70,16 @@ function(circline_app name)
   endif()
 endfunction()
 
-# circline_test(<folder> <targets>): all *.cc of the folder as circline_<folder>_test, one ctest
+# circline_test(<folder> <targets>): all *.cc of the folder as circline_<name>_test, after the last
+# part of its path, one ctest
 # entry per case. Test helpers are "tests/x.h".
 function(circline_test folder)
   file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cc")
   if(NOT sources)
     return()
   endif()
-  set(target circline_${folder}_test)
+  get_filename_component(name "${folder}" NAME)
+  set(target circline_${name}_test)
   add_executable(${target} ${sources})
   circline_own_target(${target})
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
@@ -81,6 +88,6 @@ function(circline_test folder)
     target_compile_definitions(${target} PRIVATE CIRCLINE_SANITIZED)
   endif()
   target_link_libraries(${target} PRIVATE ${ARGN} GTest::gtest GTest::gtest_main Threads::Threads)
-  gtest_discover_tests(${target} TEST_PREFIX ${folder}. DISCOVERY_MODE PRE_TEST
+  gtest_discover_tests(${target} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST
                        DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
 endfunction()

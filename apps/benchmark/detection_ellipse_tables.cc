@@ -15,8 +15,8 @@
 #include "apps/benchmark/ellipse_overlap.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
-#include "circline/ransac/detect_ellipses.h"
-#include "circline/ransac/edges.h"
+#include "circline/ransac/detection/detect_ellipses.h"
+#include "circline/ransac/detection/edges.h"
 
 namespace circline::benchmark {
 namespace {

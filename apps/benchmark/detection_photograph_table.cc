@@ -17,7 +17,7 @@
 #include "circline/estimators/conic.h"
 #include "circline/estimators/line_pose.h"
 #include "circline/estimators/pose.h"
-#include "circline/ransac/detect_observations.h"
+#include "circline/ransac/detection/detect_observations.h"
 
 namespace circline::benchmark {
 namespace {

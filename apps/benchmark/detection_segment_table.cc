@@ -12,8 +12,8 @@
 #include "apps/benchmark/detection_tables.h"
 #include "apps/benchmark/detection_truth.h"
 #include "circline/estimators/line.h"
-#include "circline/ransac/detect_lines.h"
-#include "circline/ransac/edges.h"
+#include "circline/ransac/detection/detect_lines.h"
+#include "circline/ransac/detection/edges.h"
 
 namespace circline::benchmark {
 namespace {

@@ -9,7 +9,7 @@
 #include "apps/compare/inputs.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/status.h"
-#include "circline/ransac/detect_observations.h"
+#include "circline/ransac/detection/detect_observations.h"
 #include "circline/ransac/fit_observations.h"
 #include "circline/refine/estimate_pose.h"
 

@@ -1,0 +1,240 @@
+#include "circline/ransac/detection/detect_ellipses.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/ransac/detection/arcs.h"
+#include "circline/ransac/detection/ellipse_fitter.h"
+
+namespace circline {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// An arc alone determines an ellipse from this turn on.
+constexpr double kMinSingleTurn = 50.0 * kPi / 180.0;
+// Arcs that take part in pairs: the most bent and longest ones. Bounds the quadratic step.
+constexpr std::size_t kMaxPairedArcs = 256;
+// Pairs tried, the most promising ones: what comes after them has not added an ellipse.
+constexpr std::size_t kMaxPairCandidates = 500;
+// Parts of an arc that are tried where the whole is no ellipse, in sixths.
+constexpr std::array<std::array<int, 2>, 4> kArcParts = {{{0, 5}, {1, 6}, {0, 3}, {3, 6}}};
+constexpr int kMinPartPoints = 12;
+// A candidate with this much of its contour is accepted before pairs are looked at.
+constexpr double kSureCoverage = 0.7;
+// Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
+constexpr double kDuplicatePx = 2.5;
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+class EllipseDetector {
+ public:
+  EllipseDetector(const EdgeMap& map, const Camera& camera, const EllipseOptions& options)
+      : map_(map), options_(options), fitter_(map, camera, options) {}
+
+  std::vector<DetectedEllipse> Detect() {
+    arcs_ = FindArcs(map_);
+    // Whole contours first: they need no partner, and what they explain need not be looked at
+    // again. (By index: arcs are split, and the parts appended, as they are looked at.)
+    for (std::size_t k = 0; k < arcs_.size(); ++k) {
+      const Arc arc = arcs_[k];
+      if (arc.turn < kMinSingleTurn || AddCandidate({&arc})) continue;
+      AddPart(arc);
+      Split(k);
+    }
+    AcceptBest(kSureCoverage);
+    AddPairs();
+    AcceptBest(0.0);
+    Rank();
+    return std::move(accepted_);
+  }
+
+ private:
+  // Fits an ellipse to the arcs and keeps it for later if edges elsewhere support it too. False if
+  // the arcs themselves are not on one ellipse.
+  bool AddCandidate(std::initializer_list<const Arc*> arcs) {
+    EllipseCandidate candidate;
+    if (!fitter_.FitArcs(arcs, &candidate)) return false;
+    if (fitter_.Improve(&candidate)) candidates_.push_back(candidate);
+    return true;
+  }
+
+  // An arc may be an ellipse's but for a stretch where something else touches the contour: the
+  // first of its parts that is one's makes a candidate.
+  void AddPart(const Arc& arc) {
+    const int n = arc.size();
+    for (const auto& [from, to] : kArcParts) {
+      Arc part = arc;
+      part.begin = arc.begin + n * from / 6;
+      part.end = arc.begin + n * to / 6;
+      part.turn = arc.turn * (to - from) / 6.0;
+      if (part.turn < kMinSingleTurn || part.size() < kMinPartPoints) continue;
+      if (AddCandidate({&part})) return;
+    }
+  }
+
+  // Replaces an arc that is no ellipse's by its parts on either side of its sharpest point.
+  void Split(std::size_t k) {
+    const std::vector<Arc> parts = SplitArc(map_, arcs_[k]);
+    arcs_[k].turn = 0.0;  // Takes no further part.
+    arcs_.insert(arcs_.end(), parts.begin(), parts.end());
+  }
+
+  void AddPairs() {
+    std::vector<const Arc*> arcs;
+    for (const Arc& arc : arcs_) {
+      if (arc.turn > 0.0 && !Explained(arc)) arcs.push_back(&arc);
+    }
+    const auto weight = [](const Arc* a) { return a->turn * a->size(); };
+    std::stable_sort(arcs.begin(), arcs.end(),
+                     [&](const Arc* a, const Arc* b) { return weight(a) > weight(b); });
+    if (arcs.size() > kMaxPairedArcs) arcs.resize(kMaxPairedArcs);
+    std::size_t tried = 0;
+    // In order of the weaker of the two, so that the limit cuts the least promising pairs.
+    for (std::size_t j = 1; j < arcs.size(); ++j) {
+      for (std::size_t i = 0; i < j && tried < kMaxPairCandidates; ++i) {
+        if (!CanShareEllipse(*arcs[i], *arcs[j])) continue;
+        ++tried;
+        AddCandidate({arcs[i], arcs[j]});
+      }
+    }
+  }
+
+  // Whether accepted ellipses took most of the arc.
+  bool Explained(const Arc& arc) const {
+    int taken = 0;
+    for (int i = arc.begin; i < arc.end; ++i) taken += fitter_.IsTaken(i) ? 1 : 0;
+    return 2 * taken > arc.size();
+  }
+
+  // Accepts candidates with at least `min_coverage`, best first; the others wait.
+  void AcceptBest(double min_coverage) {
+    std::stable_sort(
+        candidates_.begin(), candidates_.end(),
+        [](const EllipseCandidate& a, const EllipseCandidate& b) { return a.score > b.score; });
+    std::vector<EllipseCandidate> waiting;
+    for (const EllipseCandidate& candidate : candidates_) {
+      // Points taken meanwhile no longer count.
+      const double coverage = fitter_.Coverage(candidate);
+      if (!(coverage > 0.0)) continue;
+      if (coverage < min_coverage) {
+        waiting.push_back(candidate);
+      } else {
+        Accept(candidate);
+      }
+    }
+    candidates_ = std::move(waiting);
+  }
+
+  void Accept(const EllipseCandidate& candidate) {
+    DetectedEllipse e;
+    if (!fitter_.Fit(candidate, &e) || IsDuplicate(e)) return;
+    fitter_.Take(e);
+    accepted_.push_back(std::move(e));
+  }
+
+  // The same contour found again from other points.
+  bool IsDuplicate(const DetectedEllipse& e) {
+    for (const DetectedEllipse& other : accepted_) {
+      const bool same_side = other.bright == e.bright || other.bright == BrightSide::kEither ||
+                             e.bright == BrightSide::kEither;
+      if (same_side && fitter_.Farthest(e, other.fit.conic) < kDuplicatePx) return true;
+    }
+    return false;
+  }
+
+  void Rank() {
+    std::stable_sort(accepted_.begin(), accepted_.end(),
+                     [](const DetectedEllipse& a, const DetectedEllipse& b) {
+                       return a.length_px * a.coverage_deg > b.length_px * b.coverage_deg;
+                     });
+    if (accepted_.size() > static_cast<std::size_t>(options_.max_ellipses)) {
+      accepted_.resize(static_cast<std::size_t>(options_.max_ellipses));
+    }
+  }
+
+  const EdgeMap& map_;
+  const EllipseOptions& options_;
+  EllipseFitter fitter_;
+  std::vector<Arc> arcs_;
+  std::vector<EllipseCandidate> candidates_;
+  std::vector<DetectedEllipse> accepted_;
+};
+
+// A pose of an ellipse: the plane's normal, and where it puts the circle's centre on the photo.
+struct SeenPose {
+  Vector3d normal;
+  Vector2d center;
+};
+
+std::vector<SeenPose> SeenPoses(const DetectedEllipse& ellipse, const Camera& camera) {
+  std::array<CirclePose, 2> poses;
+  const int n = CirclePoses(ellipse.fit.conic, &poses);
+  std::vector<SeenPose> seen;
+  for (int i = 0; i < n; ++i) {
+    const CirclePose& pose = poses[static_cast<std::size_t>(i)];
+    Vector2d pixel;
+    if (CameraToPixel(camera, pose.center, &pixel)) seen.push_back({pose.normal, pixel});
+  }
+  return seen;
+}
+
+bool CanBeConcentric(const std::vector<SeenPose>& a, const std::vector<SeenPose>& b) {
+  // Both centres within this many pixels. The centre of a well-seen rim is good to a tenth of one.
+  constexpr double kMaxCentrePx = 1.5;
+  constexpr double kMinNormalCosineConcentric = 0.966;  // 15 degrees: normals are less certain.
+  for (const SeenPose& p : a) {
+    for (const SeenPose& q : b) {
+      if ((p.center - q.center).squaredNorm() < kMaxCentrePx * kMaxCentrePx &&
+          p.normal.dot(q.normal) >= kMinNormalCosineConcentric) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+// Numbers the groups in the order of their best members.
+void GroupConcentric(const Camera& camera, std::vector<DetectedEllipse>* ellipses) {
+  std::vector<std::vector<SeenPose>> poses;
+  for (const DetectedEllipse& e : *ellipses) poses.push_back(SeenPoses(e, camera));
+  int groups = 0;
+  for (std::size_t i = 0; i < ellipses->size(); ++i) {
+    DetectedEllipse& a = (*ellipses)[i];
+    for (std::size_t j = i + 1; j < ellipses->size(); ++j) {
+      DetectedEllipse& b = (*ellipses)[j];
+      if (b.concentric >= 0 || !CanBeConcentric(poses[i], poses[j])) continue;
+      if (a.concentric < 0) a.concentric = groups++;
+      b.concentric = a.concentric;
+    }
+  }
+}
+
+}  // namespace
+
+Status EllipseOptions::Validate() const {
+  if (!(min_axis_px > 0.0)) return Status::Invalid("min_axis_px must be positive");
+  if (!(min_arc_deg > 0.0 && min_arc_deg <= 360.0)) {
+    return Status::Invalid("min_arc_deg must be in (0, 360]");
+  }
+  if (max_ellipses < 0) return Status::Invalid("max_ellipses must not be negative");
+  if (!(max_rms_px > 0.0)) return Status::Invalid("max_rms_px must be positive");
+  return Status::Ok();
+}
+
+Status DetectEllipses(const EdgeMap& edges, const Camera& camera, const EllipseOptions& options,
+                      std::vector<DetectedEllipse>* ellipses) {
+  ellipses->clear();
+  Status status = options.Validate();
+  if (status.ok()) status = camera.Validate();
+  if (!status.ok()) return status;
+  if (options.max_ellipses == 0) return Status::Ok();
+  *ellipses = EllipseDetector(edges, camera, options).Detect();
+  GroupConcentric(camera, ellipses);
+  return Status::Ok();
+}
+
+}  // namespace circline

@@ -1,0 +1,61 @@
+// Ellipses that are images of circles, from edge chains.
+//
+// Chains are cut at corners and inflexions into convex arcs; an arc, or two arcs that can lie on
+// one convex curve, give a candidate; the candidate is confronted with all edge points along its
+// contour and fitted to those that agree in place and direction. All fits happen in calibrated
+// coordinates, so that lens distortion neither bends a candidate away from its contour nor biases
+// it, and what is fitted is always a general ellipse: nothing is ever rounded to a circle. The
+// final fit is to edge points from which the bias of a bent edge has been taken (CurvatureBias). A
+// contour too ragged for an ellipse gets a second look through a wider Gaussian.
+#ifndef CIRCLINE_RANSAC_DETECTION_DETECT_ELLIPSES_H_
+#define CIRCLINE_RANSAC_DETECTION_DETECT_ELLIPSES_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "circline/estimators/camera.h"
+#include "circline/estimators/conic_fit.h"
+#include "circline/estimators/status.h"
+#include "circline/ransac/detection/edges.h"
+
+namespace circline {
+
+struct EllipseOptions {
+  double min_axis_px = 4.0;  // Smallest semi-minor axis; > 0.
+  double min_arc_deg =
+      100.0;              // Smallest share of the contour that edges support, of 360; in (0, 360].
+  int max_ellipses = 64;  // The best supported ones; 0 or more.
+  // Largest root-mean-square distance of the supporting points, pixels; > 0. A contour that is an
+  // ellipse stays below 0.3 px in a fair photo; a blob that resembles one does not.
+  double max_rms_px = 0.6;
+  // How many times smaller than chance allows the support may be: log10 of the number of ellipses
+  // as well supported that are expected in unrelated edges (Desolneux, Moisan, Morel, IJCV 2000).
+  double max_log10_false_alarms = -1.0;
+
+  Status Validate() const;
+};
+
+struct DetectedEllipse {
+  ConicFit fit;             // Calibrated; residuals in pixels of the photo.
+  std::vector<int> points;  // Its edge points, indices into EdgeMap::points, once around.
+  // Where these (or those of a second look, more smoothed) lie once what the contour's bend did to
+  // them is undone (CurvatureBias): what the fit was made to, pixels.
+  std::vector<Eigen::Vector2d> contour;
+  double sigma_px = 0.0;      // Standard deviation of a point about the ellipse.
+  double coverage_deg = 0.0;  // Share of the contour that has edge points, times 360.
+  double turn_deg = 0.0;      // Angle through which the contour turns over that share.
+  double length_px = 0.0;     // Length of that share.
+  double normal_deg = 0.0;    // Median angle between gradients and the contour's normal.
+  double contrast = 0.0;      // Mean gradient there, grey levels per pixel.
+  BrightSide bright = BrightSide::kOutside;
+  int concentric =
+      -1;  // Ellipses with the same number can be circles about one centre; -1 = alone.
+};
+
+// Best supported first. `camera` must be valid. About 4 ms for a 640x480 photo.
+Status DetectEllipses(const EdgeMap& edges, const Camera& camera, const EllipseOptions& options,
+                      std::vector<DetectedEllipse>* ellipses);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_DETECTION_DETECT_ELLIPSES_H_

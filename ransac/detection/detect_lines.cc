@@ -1,0 +1,301 @@
+#include "circline/ransac/detection/detect_lines.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "circline/ransac/detection/line_pieces.h"
+
+namespace circline {
+namespace {
+
+// Pieces are joined if the gap between them is not longer than the shorter of the two, nor than
+// this many pixels; an overlap up to kMaxOverlapPx is what rounded corners and crossings cause.
+constexpr double kMaxGapPx = 100.0;
+constexpr double kMaxOverlapPx = 3.0;
+// A joined piece must lie within max_distance_px plus this many standard deviations of the
+// extrapolated line, but never more than kMaxJoinPx off.
+constexpr double kJoinSigmas = 2.0;
+constexpr double kMaxJoinPx = 1.5;
+// Standard deviation of one edge point in that extrapolation, pixels.
+constexpr double kPointSigmaPx = 0.3;
+// Where bright areas bleed into dark ones, edges with the bright side on one side and on the other,
+// like the sides of a row of chessboard squares, lie on either side of their line by about this.
+// Pieces of both kinds are joined up to this far off.
+constexpr double kBleedSigmaPx = 0.4;
+constexpr double kMaxAlternatingPx = 2.0;
+// Averaged points are not trusted beyond this: lenses and edges are not straight to better.
+constexpr double kMinSigmaPx = 0.1;
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// The first point of a piece, calibrated, and no less than what kMaxAlternatingPx are there.
+struct Beginning {
+  double x, y, reach;
+};
+
+// A line being joined from pieces.
+struct Joined {
+  std::vector<int> pieces;
+  Vector2d gradient;        // Of the first piece.
+  bool alternates = false;  // The bright side is not the same on all pieces.
+  LineMoments moments;
+  Vector3d line;
+  Vector2d along;
+  // The parts that the pieces cover, along the line.
+  std::vector<std::array<double, 2>> covered;
+};
+
+class LineJoiner {
+ public:
+  LineJoiner(const LineEdges& edges, const LineOptions& options)
+      : edges_(edges), options_(options) {}
+
+  std::vector<DetectedLine> Straight() {
+    CutIntoPieces(edges_, options_, &pieces_, &bent_);
+    std::stable_sort(pieces_.begin(), pieces_.end(), [](const LinePiece& a, const LinePiece& b) {
+      return a.length_px > b.length_px;
+    });
+    JoinPieces();
+    return Longest();
+  }
+
+  // After Straight().
+  std::vector<DetectedLine> Bent() {
+    pieces_ = std::move(bent_);
+    for (std::size_t k = 0; k < pieces_.size(); ++k) Finish(Start(static_cast<int>(k)));
+    return Longest();
+  }
+
+ private:
+  std::vector<DetectedLine> Longest() {
+    std::vector<DetectedLine> lines = std::move(lines_);
+    lines_.clear();
+    std::stable_sort(lines.begin(), lines.end(), [](const DetectedLine& a, const DetectedLine& b) {
+      return a.length_px > b.length_px;
+    });
+    if (lines.size() > static_cast<std::size_t>(options_.max_lines)) {
+      lines.resize(static_cast<std::size_t>(options_.max_lines));
+    }
+    return lines;
+  }
+
+  void JoinPieces() {
+    std::vector<std::uint8_t> used(pieces_.size(), 0);
+    for (const LinePiece& piece : pieces_) beginnings_.push_back(BeginningOf(piece));
+    for (std::size_t k = 0; k < pieces_.size(); ++k) {
+      if (used[k]) continue;
+      used[k] = 1;
+      Joined joined = Start(static_cast<int>(k));
+      // Joining one piece makes the line longer and may bring the next one within reach.
+      bool again = true;
+      while (again) {
+        again = false;
+        for (std::size_t j = k + 1; j < pieces_.size(); ++j) {
+          if (used[j] || IsFar(joined.line, beginnings_[j]) || !Continues(joined, pieces_[j])) {
+            continue;
+          }
+          used[j] = 1;
+          again = true;
+          Append(static_cast<int>(j), &joined);
+        }
+      }
+      Finish(joined);
+    }
+  }
+
+  Beginning BeginningOf(const LinePiece& piece) const {
+    const CalibratedPoint first = edges_.X(piece.begin);
+    const std::array<double, 4>& j = first.x_from_pixel;
+    const double square = j[0] * j[0] + j[1] * j[1] + j[2] * j[2] + j[3] * j[3];
+    return {first.x.x(), first.x.y(), kMaxAlternatingPx * std::sqrt(square)};
+  }
+
+  // Whether a piece cannot continue a line. (All pieces are asked about all lines: what is asked
+  // lies close together.)
+  static bool IsFar(const Vector3d& line, const Beginning& b) {
+    return std::abs(line.x() * b.x + line.y() * b.y + line.z()) > b.reach;
+  }
+
+  Joined Start(int piece) const {
+    const LinePiece& p = pieces_[static_cast<std::size_t>(piece)];
+    Joined joined;
+    joined.pieces = {piece};
+    joined.gradient = p.gradient;
+    joined.moments = LineMoments(edges_.X(p.begin).x);
+    AddPoints(p, &joined.moments);
+    joined.line = joined.moments.Line(&joined.along);
+    joined.covered = {{p.from, p.to}};
+    return joined;
+  }
+
+  void AddPoints(const LinePiece& p, LineMoments* moments) const {
+    for (int i = p.begin; i < p.end; ++i) {
+      if (edges_.Distance(i, p.line) <= options_.max_distance_px) moments->Add(edges_.X(i).x);
+    }
+  }
+
+  void Append(int piece, Joined* joined) const {
+    const LinePiece& p = pieces_[static_cast<std::size_t>(piece)];
+    joined->pieces.push_back(piece);
+    joined->alternates = joined->alternates || joined->gradient.dot(p.gradient) < 0.0;
+    AddPoints(p, &joined->moments);
+    joined->line = joined->moments.Line(&joined->along);
+    joined->covered.clear();
+    for (const int i : joined->pieces) {
+      std::array<double, 2> range;
+      edges_.SetRange(joined->along, pieces_[static_cast<std::size_t>(i)], &range[0], &range[1]);
+      joined->covered.push_back(range);
+    }
+  }
+
+  bool Continues(const Joined& joined, const LinePiece& p) const {
+    const CalibratedPoint first = edges_.X(p.begin), last = edges_.X(p.end - 1);
+    if (std::abs(LineDistancePx(first, joined.line)) > kMaxAlternatingPx) return false;
+    if (std::abs(LineDistancePx(last, joined.line)) > kMaxAlternatingPx) return false;
+    double from, to;
+    edges_.SetRange(joined.along, p, &from, &to);
+    double gap = std::numeric_limits<double>::infinity(), length = 0.0;
+    for (const std::array<double, 2>& c : joined.covered) {
+      gap = std::min(gap, std::max(from - c[1], c[0] - to));
+      length = std::max(length, c[1] - c[0]);
+    }
+    // Calibrated lengths to pixels by the piece's own scale.
+    const double px = p.length_px / std::max(to - from, 1e-12);
+    length *= px;
+    gap *= px;
+    if (gap < -kMaxOverlapPx) return false;
+    if (gap > std::min({p.length_px, length, kMaxGapPx})) return false;
+    return NearExtrapolation(joined, p, length, gap + p.length_px);
+  }
+
+  // Both ends within the uncertainty of the line extrapolated from `length` over `beyond` pixels.
+  bool NearExtrapolation(const Joined& joined, const LinePiece& p, double length,
+                         double beyond) const {
+    const double n = std::max(2, joined.moments.count());
+    const double u = (0.5 * length + beyond) / std::max(length, 1.0);
+    const double lever = 1.0 + 12.0 * u * u;
+    const double sigma = kPointSigmaPx * std::sqrt(lever / n);
+    double limit = std::min(kMaxJoinPx, 0.5 * options_.max_distance_px + kJoinSigmas * sigma);
+    if (joined.alternates || joined.gradient.dot(p.gradient) < 0.0) {
+      const double pieces = static_cast<double>(joined.pieces.size());
+      const double bleed = kBleedSigmaPx * std::sqrt(1.0 + (pieces > 1.0 ? lever / pieces : 1.0));
+      limit = std::min(kMaxAlternatingPx, kJoinSigmas * std::hypot(sigma, bleed));
+    }
+    return std::abs(LineDistancePx(edges_.X(p.begin), joined.line)) <= limit &&
+           std::abs(LineDistancePx(edges_.X(p.end - 1), joined.line)) <= limit;
+  }
+
+  void Finish(const Joined& joined) {
+    DetectedLine line;
+    averages_.clear();
+    for (const int k : joined.pieces) {
+      const LinePiece& p = pieces_[static_cast<std::size_t>(k)];
+      line.length_px += p.length_px;
+      AppendAverages(p, joined.line, &line.points);
+    }
+    if (line.length_px < options_.min_length_px || line.points.size() < 2) return;
+    SortAlong(joined, &line);
+    calibrated_.clear();
+    for (const auto& [position, i] : order_)
+      calibrated_.push_back(averages_[static_cast<std::size_t>(i)]);
+    if (!FitLine(calibrated_, 1.0, &line.fit).ok()) return;
+    const double n = static_cast<double>(calibrated_.size());
+    const double spread = n > 2.0 ? line.fit.rms_px * std::sqrt(n / (n - 2.0)) : 0.0;
+    line.sigma_px = std::max(kMinSigmaPx, spread);
+    line.fit.covariance *= line.sigma_px * line.sigma_px;
+    SetEnds(joined, &line);
+    lines_.push_back(std::move(line));
+  }
+
+  // Means of the points of a piece over point_spacing_px, in pixels and calibrated (averages_).
+  void AppendAverages(const LinePiece& p, const Vector3d& line, std::vector<Vector2d>* points) {
+    const int n = p.end - p.begin;  // More than two.
+    const int bins =
+        static_cast<int>(std::clamp(p.length_px / options_.point_spacing_px, 2.0, 1.0 * n));
+    for (int k = 0; k < bins; ++k) {
+      Vector2d pixel = Vector2d::Zero(), x = Vector2d::Zero();
+      int count = 0;
+      const int begin = p.begin + k * n / bins, end = p.begin + (k + 1) * n / bins;
+      for (int i = begin; i < end; ++i) {
+        if (edges_.Distance(i, line) > kMaxJoinPx) continue;
+        pixel += edges_.Pixel(i);
+        x += edges_.X(i).x;
+        ++count;
+      }
+      if (count == 0) continue;
+      points->push_back(pixel / count);
+      CalibratedPoint average = edges_.X((begin + end) / 2);
+      average.x = x / count;
+      averages_.push_back(average);
+    }
+  }
+
+  void SortAlong(const Joined& joined, DetectedLine* line) {
+    order_.clear();
+    for (std::size_t i = 0; i < averages_.size(); ++i) {
+      order_.push_back({joined.along.dot(averages_[i].x), static_cast<int>(i)});
+    }
+    std::sort(order_.begin(), order_.end());
+    std::vector<Vector2d> sorted;
+    for (const auto& [position, i] : order_)
+      sorted.push_back(line->points[static_cast<std::size_t>(i)]);
+    line->points = std::move(sorted);
+  }
+
+  void SetEnds(const Joined& joined, DetectedLine* line) const {
+    double from = std::numeric_limits<double>::infinity(), to = -from;
+    for (const int k : joined.pieces) {
+      const LinePiece& p = pieces_[static_cast<std::size_t>(k)];
+      for (const int i : {p.begin, p.end - 1}) {
+        const double s = joined.along.dot(edges_.X(i).x);
+        if (s < from) {
+          from = s;
+          line->ends[0] = edges_.Pixel(i);
+        }
+        if (s > to) {
+          to = s;
+          line->ends[1] = edges_.Pixel(i);
+        }
+      }
+    }
+  }
+
+  const LineEdges& edges_;
+  const LineOptions& options_;
+  std::vector<LinePiece> pieces_, bent_;
+  std::vector<Beginning> beginnings_;
+  std::vector<DetectedLine> lines_;
+  // Scratch.
+  std::vector<CalibratedPoint> averages_, calibrated_;
+  std::vector<std::pair<double, int>> order_;
+};
+
+}  // namespace
+
+Status LineOptions::Validate() const {
+  if (!(min_length_px > 0.0)) return Status::Invalid("min_length_px must be positive");
+  if (max_lines < 0) return Status::Invalid("max_lines must not be negative");
+  if (!(max_distance_px > 0.0)) return Status::Invalid("max_distance_px must be positive");
+  if (!(max_sagitta_px > 0.0)) return Status::Invalid("max_sagitta_px must be positive");
+  if (!(point_spacing_px > 0.0)) return Status::Invalid("point_spacing_px must be positive");
+  return Status::Ok();
+}
+
+Status DetectLines(const EdgeMap& edges, const Camera& camera, const LineOptions& options,
+                   std::vector<DetectedLine>* lines, const std::vector<std::uint8_t>* skip,
+                   std::vector<DetectedLine>* bent) {
+  lines->clear();
+  Status status = options.Validate();
+  if (status.ok()) status = camera.Validate();
+  if (!status.ok()) return status;
+  const LineEdges usable(edges, camera, skip);
+  LineJoiner joiner(usable, options);
+  *lines = joiner.Straight();
+  if (bent != nullptr) *bent = joiner.Bent();
+  return Status::Ok();
+}
+
+}  // namespace circline

@@ -1,0 +1,225 @@
+#include "circline/ransac/detection/detect_observations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "circline/ransac/detection/assemble_observations.h"
+#include "circline/ransac/detection/detect_ellipses.h"
+#include "circline/ransac/detection/detect_lines.h"
+#include "circline/ransac/detection/detect_pencils.h"
+#include "circline/ransac/detection/edge_shift.h"
+#include "circline/ransac/detection/edges.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Vector2d;
+
+// Neighbouring edge points share the noise of the pixels under the smoothing Gaussian (sigma 1 px):
+// the correlation at a distance d is exp(-d^2 / 4). Every second point carries nearly all that
+// there is to know; taking every point (1 px) for independent makes a sum of them 1.9 times too
+// sure.
+constexpr std::size_t kThinFrom = 60;  // Points from which every second one is dropped.
+constexpr double kCorrelationDense = 1.9;
+// No contour lies farther than this from the edges it was fitted to, pixels.
+constexpr double kMaxBiasPx = 1.0;
+// Directions looked for beyond those wanted, so that the choice is made by the length of their
+// lines and by the circles rather than by the number of lines.
+constexpr int kExtraPencils = 3;
+// A photo has no more directions worth telling apart.
+constexpr int kMaxPencils = 100;
+
+struct Evidence {
+  std::vector<CircleEvidence> circles;  // Best first.
+  std::vector<DetectedLine> lines, bent;
+  std::vector<DetectedPencil> pencils;
+};
+
+// Points of an ellipse as an observation: thinned, and the fit's covariance widened by the
+// correlation of dense points and by what they all share.
+void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const NoiseModel& noise,
+                CircleObservation* circle) {
+  const bool thin = ellipse.contour.size() >= kThinFrom;
+  // The contour of a second look is not that of the edges.
+  const bool has_normals = ellipse.contour.size() == ellipse.points.size();
+  circle->points.clear();
+  circle->normals.clear();
+  for (std::size_t k = 0; k < ellipse.contour.size(); k += thin ? 2 : 1) {
+    circle->points.push_back(ellipse.contour[k]);
+    if (!has_normals) continue;
+    const EdgePoint& edge = edges.points[static_cast<std::size_t>(ellipse.points[k])];
+    const bool is_near = (edge.Position() - ellipse.contour[k]).norm() < kMaxBiasPx;
+    circle->normals.push_back(is_near ? edge.Normal() : Vector2d::Zero());
+  }
+  // The scatter of a smooth contour says little of its error: the estimate measures that, on all
+  // circles.
+  circle->sigma_px = 0.0;
+  circle->fit = ellipse.fit;
+  // The fit used every point: their correlation is that of dense points.
+  circle->fit->ScaleCovariance(
+      kCorrelationDense * kCorrelationDense /
+      noise.ContourWeight(kCorrelationDense * ellipse.sigma_px, ellipse.contour, {}));
+  circle->inliers.clear();
+}
+
+std::vector<CircleEvidence> MakeCircles(const EdgeMap& edges,
+                                        const std::vector<DetectedEllipse>& ellipses,
+                                        const NoiseModel& noise) {
+  std::vector<CircleEvidence> circles;
+  for (const DetectedEllipse& ellipse : ellipses) {
+    CircleEvidence circle;
+    FillCircle(edges, ellipse, noise, &circle.observation);
+    if (ellipse.concentric >= 0) {
+      circle.observation.concentric = "g" + std::to_string(ellipse.concentric);
+    }
+    circle.support_px = ellipse.length_px;
+    circle.num_normals = CircleNormals(*circle.observation.fit, &circle.normals);
+    if (circle.num_normals > 0) circles.push_back(std::move(circle));
+  }
+  return circles;
+}
+
+// Edge points that belong to an ellipse and so to no line.
+std::vector<std::uint8_t> EllipsePoints(const EdgeMap& edges,
+                                        const std::vector<DetectedEllipse>& ellipses) {
+  std::vector<std::uint8_t> mask(edges.points.size(), 0);
+  for (const DetectedEllipse& ellipse : ellipses) {
+    for (const int i : ellipse.points) mask[static_cast<std::size_t>(i)] = 1;
+  }
+  return mask;
+}
+
+EllipseOptions ToEllipseOptions(const DetectionOptions& options) {
+  EllipseOptions result;
+  result.min_axis_px = options.min_ellipse_axis_px;
+  result.min_arc_deg = options.min_arc_deg;
+  result.max_ellipses = options.max_circles;
+  return result;
+}
+
+Status CollectEvidence(const cv::Mat& image, const Camera& camera, const DetectionOptions& options,
+                       Evidence* evidence) {
+  cv::Mat gray;
+  Status status = ToGray(image, &gray);
+  if (!status.ok()) return status;
+  EdgeMap edges;
+  status = DetectEdges(gray, EdgeOptions(), &edges);
+  if (!status.ok()) return status;
+  std::vector<DetectedEllipse> ellipses;
+  status = DetectEllipses(edges, camera, ToEllipseOptions(options), &ellipses);
+  if (!status.ok()) return status;
+  evidence->circles = MakeCircles(edges, ellipses, options.noise_model);
+  if (options.max_pencils == 0) return Status::Ok();
+  LineOptions line_options;
+  line_options.min_length_px = options.min_segment_length_px;
+  const std::vector<std::uint8_t> skip = EllipsePoints(edges, ellipses);
+  status = DetectLines(edges, camera, line_options, &evidence->lines, &skip, &evidence->bent);
+  if (!status.ok()) return status;
+  UndoEdgeShift(edges, camera, &evidence->lines);
+  return DetectPencils(evidence->lines, options.max_pencils + kExtraPencils, options.seed,
+                       &evidence->pencils);
+}
+
+std::string Describe(const Observations& observations) {
+  const std::size_t circles = observations.circles.size(), pencils = observations.pencils.size();
+  if (circles == 0 && pencils == 0) {
+    return "nothing found: neither an ellipse nor three lines that could be parallel";
+  }
+  if (circles == 0 && pencils == 1) {
+    return "one pencil of parallel lines only, and no circle: that is a direction, not a pose";
+  }
+  if (circles == 0 && observations.frame.plane.empty()) {
+    return "the pencils found span no plane, and there is no circle: that is no pose";
+  }
+  if (circles == 1 && pencils == 0) {
+    return "one circle and nothing else: two poses explain it equally well";
+  }
+  return std::string();
+}
+
+Status CheckInput(const cv::Mat& image, const Camera& camera, const DetectionOptions& options) {
+  Status status = options.Validate();
+  if (!status.ok()) return status;
+  status = camera.Validate();
+  if (!status.ok()) return status;
+  if (image.empty()) return Status::Invalid("the image is empty");
+  if ((camera.width > 0 && camera.width != image.cols) ||
+      (camera.height > 0 && camera.height != image.rows)) {
+    return Status::Invalid("the image is " + std::to_string(image.cols) + " x " +
+                           std::to_string(image.rows) + " pixels, its camera " +
+                           std::to_string(camera.width) + " x " + std::to_string(camera.height));
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status DetectionOptions::Validate() const {
+  if (!(min_ellipse_axis_px > 0.0)) return Status::Invalid("min_ellipse_axis_px must be positive");
+  if (!(min_arc_deg > 0.0 && min_arc_deg <= 360.0)) {
+    return Status::Invalid("min_arc_deg must be in (0, 360]");
+  }
+  if (!(min_segment_length_px > 0.0)) {
+    return Status::Invalid("min_segment_length_px must be positive");
+  }
+  if (max_circles < 0) return Status::Invalid("max_circles must not be negative");
+  if (max_pencils < 0 || max_pencils > kMaxPencils) {
+    return Status::Invalid("max_pencils must be from 0 to " + std::to_string(kMaxPencils));
+  }
+  if (!(max_shared_plane_deg > 0.0)) {
+    return Status::Invalid("max_shared_plane_deg must be positive");
+  }
+  return noise_model.Validate();
+}
+
+Status DetectObservations(const cv::Mat& image, const Camera& camera,
+                          const DetectionOptions& options, Observations* observations) {
+  *observations = Observations();
+  observations->camera = camera;
+  Status status = CheckInput(image, camera, options);
+  if (!status.ok()) return status;
+  Evidence evidence;
+  status = CollectEvidence(image, camera, options, &evidence);
+  if (!status.ok()) return status;
+  AssemblyOptions assembly;
+  assembly.max_pencils = options.max_pencils;
+  assembly.max_shared_plane_deg = options.max_shared_plane_deg;
+  AssembleObservations(assembly, evidence.lines, evidence.bent, &evidence.circles,
+                       &evidence.pencils, observations);
+  observations->message = Describe(*observations);
+  return Status::Ok();
+}
+
+Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::Rect& roi,
+                         const DetectionOptions& options, CircleObservation* circle) {
+  Status status = CheckInput(image, camera, options);
+  if (!status.ok()) return status;
+  const cv::Rect inside = roi & cv::Rect(0, 0, image.cols, image.rows);
+  if (inside.width < 3 || inside.height < 3) {
+    return Status::Invalid("the rectangle does not overlap the image");
+  }
+  cv::Mat gray;
+  status = ToGray(image(inside), &gray);
+  if (!status.ok()) return status;
+  // The same camera, seen from the rectangle's corner: fits are calibrated, so they stay valid.
+  Camera shifted = camera;
+  shifted.width = inside.width;
+  shifted.height = inside.height;
+  shifted.cx -= inside.x;
+  shifted.cy -= inside.y;
+  EdgeMap edges;
+  status = DetectEdges(gray, EdgeOptions(), &edges);
+  if (!status.ok()) return status;
+  std::vector<DetectedEllipse> ellipses;
+  status = DetectEllipses(edges, shifted, ToEllipseOptions(options), &ellipses);
+  if (!status.ok()) return status;
+  if (ellipses.empty()) return Status::Refused("no ellipse found inside the rectangle");
+  FillCircle(edges, ellipses.front(), options.noise_model, circle);
+  for (Vector2d& p : circle->points) p += Vector2d(inside.x, inside.y);
+  return Status::Ok();
+}
+
+}  // namespace circline

@@ -1,0 +1,53 @@
+// Pencils of parallel lines among detected lines, each with its direction and how well it is known.
+#ifndef CIRCLINE_RANSAC_DETECTION_DETECT_PENCILS_H_
+#define CIRCLINE_RANSAC_DETECTION_DETECT_PENCILS_H_
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "circline/estimators/observations.h"
+#include "circline/estimators/status.h"
+#include "circline/ransac/detection/detect_lines.h"
+
+namespace circline {
+
+struct DetectedPencil {
+  PencilObservation observation;  // Lines, sigma_px and fit; no id, role or plane yet.
+  std::vector<int> members;       // Its lines, indices into those searched, ascending.
+  std::vector<Segment> ends;      // Of its lines, pixels.
+  double support_px = 0.0;        // Length of its lines.
+};
+
+// Robust and sequential, first among all lines (`max_pencils`), then, for the longest pencils,
+// among the lines that meet theirs: the short edges of a box are few among those of a room. Lines
+// may be in several of the latter. For each pencil the scatter of its lines about their common
+// direction is estimated and the direction is fitted by maximum likelihood with it: the lines of a
+// printed board all count for what they were measured, those of an old street, each a third of a
+// degree from parallel, count alike. The longest pencil (sum of its lines) comes first. 0.5 ms for
+// 150 lines.
+Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, std::uint64_t seed,
+                     std::vector<DetectedPencil>* pencils);
+
+// Fits the pencil again, to all of lines[candidates] that share its direction within up to half a
+// degree (standard deviation, estimated): for lines that are known to be of one thing, whose sides
+// may bend or be badly printed. False, and nothing changed, where none do.
+bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
+                 DetectedPencil* pencil);
+
+// The pencil of lines[members] along `direction`, each as good as its `fits` says (one a member):
+// the line's own with a covariance that counts whatever else the line may miss the direction by.
+// No fit.
+DetectedPencil MakePencil(const std::vector<DetectedLine>& lines, const std::vector<int>& members,
+                          const std::vector<LineFit>& fits, const Eigen::Vector3d& direction);
+
+// A line's fit if all of its points share an error, pixels: no number of them averages it out.
+LineFit WithSharedError(const DetectedLine& line, double shared_px);
+
+// Of each line the longer one whose other side it is, or -1. Both sides are measurements; but that
+// they are parallel is no accident and says nothing of a pencil.
+std::vector<int> FindTwins(const std::vector<DetectedLine>& lines);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_DETECTION_DETECT_PENCILS_H_

@@ -1,0 +1,220 @@
+#include "circline/ransac/detection/edge_points.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <opencv2/core/hal/hal.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace circline {
+namespace {
+
+// Localisation is never better than this, whatever the noise says: pixels are not points.
+constexpr float kMinSigmaPx = 0.03f;
+
+// Samples of a Gaussian and of its derivative; scaled so that a constant stays, and a ramp of slope
+// one yields one.
+void GaussianKernels(double sigma, cv::Mat* smooth, cv::Mat* derivative) {
+  const int radius = static_cast<int>(std::ceil(3.0 * sigma));
+  smooth->create(1, 2 * radius + 1, CV_32F);
+  derivative->create(1, 2 * radius + 1, CV_32F);
+  double sum = 0.0, moment = 0.0;
+  for (int i = -radius; i <= radius; ++i) {
+    const double g = std::exp(-0.5 * i * i / (sigma * sigma));
+    sum += g;
+    moment += i * i * g;
+  }
+  for (int i = -radius; i <= radius; ++i) {
+    const double g = std::exp(-0.5 * i * i / (sigma * sigma));
+    smooth->at<float>(0, i + radius) = static_cast<float>(g / sum);
+    derivative->at<float>(0, i + radius) = static_cast<float>(i * g / moment);
+  }
+}
+
+// Marks (1 or 0) where the squared gradient `s` of a row of n pixels is a maximum along the axis
+// nearer to the gradient and at least `low`; the ends have no neighbours. Written without branches
+// so that the compiler works on several pixels at a time.
+void MarkMaxima(const float* gx, const float* gy, const float* above, const float* s,
+                const float* below, float low, int n, std::uint8_t* marks) {
+  marks[0] = marks[n - 1] = 0;
+  for (int x = 1; x + 1 < n; ++x) {
+    const float left = s[x - 1], right = s[x + 1], up = above[x], down = below[x];
+    const bool horizontal = std::abs(gx[x]) >= std::abs(gy[x]);
+    const float before = horizontal ? left : up, after = horizontal ? right : down;
+    const int strong = s[x] >= low, rises = s[x] > before, falls = s[x] >= after;
+    marks[x] = static_cast<std::uint8_t>(strong & rises & falls);
+  }
+}
+
+// The positions of the marks, ascending; there must be room for n.
+int ListMarks(const std::uint8_t* marks, int n, int* list) {
+  int count = 0, x = 0;
+  for (; x + 8 <= n; x += 8) {
+    std::uint64_t eight;
+    std::memcpy(&eight, marks + x, sizeof(eight));
+    if (eight == 0) continue;
+    for (int k = x; k < x + 8; ++k) {
+      list[count] = k;
+      count += marks[k];
+    }
+  }
+  for (; x < n; ++x) {
+    list[count] = x;
+    count += marks[x];
+  }
+  return count;
+}
+
+// The maxima of the gradient across itself, one a pixel at most, row by row.
+class PointFinder {
+ public:
+  PointFinder(const cv::Mat& gray, double smoothing, double low, double noise)
+      : gray_(gray),
+        low_squared_(static_cast<float>(low * low)),
+        // Noise of the gradient's slope at its peak, from that of the gradient, for white noise
+        // seen through a Gaussian: sqrt(3/2) / sigma.
+        slope_noise_(static_cast<float>(noise * std::sqrt(1.5) / smoothing)) {
+    GaussianKernels(smoothing, &smooth_, &derivative_);
+    const auto n = static_cast<std::size_t>(gray.cols);
+    for (std::vector<float>& row : squared_) row.resize(n);
+    marks_.resize(n);
+    list_.resize(n);
+    before_.resize(n);
+    after_.resize(n);
+  }
+
+  // The gradient is worked off in bands of rows, which stay in the processor's cache.
+  void Find(EdgeMap* map, std::vector<std::int32_t>* pixels) {
+    constexpr int kBandRows = 48;
+    map->index.assign(gray_.total(), -1);
+    map->points.reserve(gray_.total() / 8);  // A busy photo's.
+    pixels->reserve(gray_.total() / 8);
+    for (int y = 1; y + 1 < gray_.rows; y += kBandRows) {
+      FindInBand(y, std::min(y + kBandRows, gray_.rows - 1), map, pixels);
+    }
+  }
+
+ private:
+  // Rows [begin, end). (Filters see the pixels beyond a range of rows.)
+  void FindInBand(int begin, int end, EdgeMap* map, std::vector<std::int32_t>* pixels) {
+    top_ = begin - 1;
+    const cv::Mat band = gray_.rowRange(top_, end + 1);
+    cv::sepFilter2D(band, x_, CV_32F, derivative_, smooth_, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
+    cv::sepFilter2D(band, y_, CV_32F, smooth_, derivative_, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
+    Square(begin - 1);
+    Square(begin);
+    for (int y = begin; y < end; ++y) {
+      Square(y + 1);
+      FindInRow(y, map, pixels);
+    }
+  }
+
+  // Rows of the gradient's components, and of its squared length: the last three squared.
+  const float* X(int y) const { return x_.ptr<float>(y - top_); }
+  const float* Y(int y) const { return y_.ptr<float>(y - top_); }
+  float* Squared(int y) { return squared_[static_cast<std::size_t>(y % 3)].data(); }
+
+  void Square(int y) {
+    const float* gx = X(y);
+    const float* gy = Y(y);
+    float* out = Squared(y);
+    for (int x = 0; x < gray_.cols; ++x) out[x] = gx[x] * gx[x] + gy[x] * gy[x];
+  }
+
+  bool IsHorizontal(int x, int y) const { return std::abs(X(y)[x]) >= std::abs(Y(y)[x]); }
+
+  void FindInRow(int y, EdgeMap* map, std::vector<std::int32_t>* pixels) {
+    const float* s = Squared(y);
+    MarkMaxima(X(y), Y(y), Squared(y - 1), s, Squared(y + 1), low_squared_, gray_.cols,
+               marks_.data());
+    const int count = ListMarks(marks_.data(), gray_.cols, list_.data());
+    TakeLogarithms(y, count);
+    const std::int32_t row = y * gray_.cols;
+    for (int k = 0; k < count; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      float offset, variance;
+      if (!LocatePeak(before_[i], after_[i], &offset, &variance)) continue;
+      const int x = list_[i];
+      map->index[static_cast<std::size_t>(row + x)] = static_cast<std::int32_t>(map->points.size());
+      pixels->push_back(row + x);
+      map->points.push_back(MakePoint(x, y, offset, variance, std::sqrt(s[x])));
+    }
+  }
+
+  // Of the squared gradients before and after each listed pixel of a row, relative to its own.
+  void TakeLogarithms(int y, int count) {
+    constexpr float kTiny = 1e-6f;  // The logarithm of zero, for a step between two pixels exactly.
+    const float* s = Squared(y);
+    const float* above = Squared(y - 1);
+    const float* below = Squared(y + 1);
+    for (int k = 0; k < count; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const int x = list_[i];
+      const bool horizontal = IsHorizontal(x, y);
+      const float inverse = 1.0f / s[x];
+      before_[i] = inverse * std::max(horizontal ? s[x - 1] : above[x], kTiny);
+      after_[i] = inverse * std::max(horizontal ? s[x + 1] : below[x], kTiny);
+    }
+    cv::hal::log32f(before_.data(), before_.data(), count);
+    cv::hal::log32f(after_.data(), after_.data(), count);
+  }
+
+  // The vertex of the parabola through the logarithms of three samples of a squared gradient, those
+  // before and after relative to the middle one: its place in samples from there, and the variance
+  // of the Gaussian that it stands for.
+  static bool LocatePeak(float before, float after, float* offset, float* variance) {
+    const float curvature = before + after;
+    if (!(curvature < 0.0f)) return false;
+    *offset = 0.5f * (before - after) / curvature;
+    *variance = -2.0f / curvature;  // The squared gradient halves the variance of the gradient.
+    return std::abs(*offset) <= 0.5f + 1e-6f;
+  }
+
+  EdgePoint MakePoint(int x, int y, float offset, float variance, float length) const {
+    const bool horizontal = IsHorizontal(x, y);
+    EdgePoint point;
+    point.x = static_cast<float>(x) + (horizontal ? offset : 0.0f);
+    point.y = static_cast<float>(y) + (horizontal ? 0.0f : offset);
+    const float gx = X(y)[x], gy = Y(y)[x];
+    // The gradient at the point, between the pixel and its neighbour.
+    const int side = offset < 0.0f ? -1 : 1;
+    const int x1 = horizontal ? x + side : x, y1 = horizontal ? y : y + side;
+    const float t = std::abs(offset);
+    const float nx = (1.0f - t) * gx + t * X(y1)[x1];
+    const float ny = (1.0f - t) * gy + t * Y(y1)[x1];
+    const float norm = std::sqrt(nx * nx + ny * ny);
+    if (norm > 0.0f) {
+      point.nx = nx / norm;
+      point.ny = ny / norm;
+    }
+    point.gradient = length;
+    // Across the edge rather than along the axis.
+    const float cosine = std::max(std::abs(gx), std::abs(gy)) / length;
+    variance *= cosine * cosine;
+    point.blur_px = std::sqrt(variance);
+    point.sigma_px = std::max(kMinSigmaPx, slope_noise_ * variance / length);
+    return point;
+  }
+
+  const cv::Mat& gray_;
+  const float low_squared_;
+  const float slope_noise_;
+  cv::Mat smooth_, derivative_;
+  cv::Mat x_, y_;  // Of a band, 32-bit float, grey levels per pixel.
+  int top_ = 0;    // The photo's row that is the band's first.
+  std::array<std::vector<float>, 3> squared_;
+  // Of a row: marks of maxima, their columns, and the neighbours' logarithms.
+  std::vector<std::uint8_t> marks_;
+  std::vector<int> list_;
+  std::vector<float> before_, after_;
+};
+
+}  // namespace
+
+void FindEdgePoints(const cv::Mat& gray, double smoothing_px, double low, double noise,
+                    EdgeMap* map, std::vector<std::int32_t>* pixels) {
+  PointFinder(gray, smoothing_px, low, noise).Find(map, pixels);
+}
+
+}  // namespace circline

@@ -1,0 +1,454 @@
+#include "circline/ransac/detection/ellipse_fitter.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "circline/estimators/conic.h"
+#include "circline/estimators/conic_fit.h"
+#include "circline/ransac/detection/ellipse_shape.h"
+
+namespace circline {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Points that a candidate is fitted to, of each arc.
+constexpr int kFitPoints = 24;
+// An arc fits its candidate when the root-mean-square distance stays below this, pixels.
+constexpr double kMaxArcRmsPx = 1.0;
+// ... and on this share of its points the gradient is within 15 degrees, plus two standard
+// deviations of its noise, of the contour's normal. (A sine.)
+constexpr double kArcNormalSine = 0.26;
+constexpr double kArcNormalSigmas = 2.0;
+constexpr double kArcAgreement = 0.85;
+// Edge points support a contour within this distance, pixels: at first, and after refits.
+constexpr std::array<double, 3> kGatherPx = {2.5, 2.0, 1.5};
+// Points farther off than this many standard deviations (at least so many pixels each) are left out
+// of a candidate's refit.
+constexpr double kTrimSigmas = 2.5;
+constexpr double kTrimMinSigmaPx = 0.1;
+constexpr int kMaxTrims = 10;
+// A first look at this many samples drops candidates with less than this share of support.
+constexpr int kQuickSamples = 24;
+constexpr double kQuickPx = 2.0;
+constexpr double kQuickShare = 0.25;
+// ... or where so few of the samples near edges have them across the contour: on clutter 50 to 100
+// of 360 degrees pass for across.
+constexpr double kQuickAcross = 0.4;
+// Samples of a contour, at most, while a candidate is being improved.
+constexpr int kRoughSamples = 120;
+// The other bright side is looked at too if it adds this share.
+constexpr double kOtherSideShare = 0.15;
+// Before each refit, this share of the smallest arc must be there, and what chance may explain is
+// so many orders of magnitude more than in the end: refits add little to a contour.
+constexpr double kEarlyShare = 0.7;
+constexpr double kEarlyLog10 = 6.0;
+// ... and gradients this near to the contour's normals, degrees: of accidental ones within the 25
+// that count as support the median is 12.
+constexpr double kEarlyNormalDeg = 10.0;
+// While a candidate is still being refined, it may miss the limits by this factor.
+constexpr double kShapeSlack = 1.5;
+// What a second look needs of the contour.
+constexpr double kSecondCoverage = 0.7;
+// The second look at a ragged contour: smoothing, and the largest part of the photo, pixels.
+constexpr double kSecondSmoothingPx = 1.6;
+constexpr int kMaxSecondLookPx = 200;
+// Up to this miss of the shape the first look has the better place.
+constexpr double kSecondLookLimit = 1.2;
+// Largest ellipse, in diagonals of the photo.
+constexpr double kMaxAxisDiagonals = 2.0;
+// Points beyond this many standard deviations take no part in the final fit.
+constexpr double kOutlierSigmas = 3.5;
+// No contour is known better than this, whatever its scatter says.
+constexpr double kMinSigmaPx = 0.05;
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+double ToDegrees(double radians) { return radians * 180.0 / kPi; }
+
+Vector2d FromPixels(const CalibratedPoint& p, const Vector2d& shift) {
+  return {p.x_from_pixel[0] * shift.x() + p.x_from_pixel[1] * shift.y(),
+          p.x_from_pixel[2] * shift.x() + p.x_from_pixel[3] * shift.y()};
+}
+
+// Curvature, 1 / pixels of the photo, of the level line of a conic through a point, and the unit
+// normal that points outward: t^T H t / |g| with gradient g, Hessian H, unit tangent t.
+double CurvatureAt(const Matrix3d& conic, const CalibratedPoint& p, Vector2d* outward) {
+  const Vector2d g = p.GradientPerPixel((conic * p.Homogeneous()).head<2>());
+  const double length = g.norm();
+  if (!(length > 0.0)) {
+    outward->setZero();
+    return 0.0;
+  }
+  *outward = g / length;
+  const Vector2d along = FromPixels(p, Vector2d(-outward->y(), outward->x()));
+  return along.dot(conic.topLeftCorner<2, 2>() * along) / length;
+}
+
+BrightSide SideOf(std::initializer_list<const Arc*> arcs) {
+  const bool inside = (*arcs.begin())->bright_inside;
+  for (const Arc* arc : arcs) {
+    if (arc->bright_inside != inside) return BrightSide::kEither;
+  }
+  return inside ? BrightSide::kInside : BrightSide::kOutside;
+}
+
+}  // namespace
+
+EllipseFitter::EllipseFitter(const EdgeMap& map, const Camera& camera,
+                             const EllipseOptions& options)
+    : map_(map),
+      camera_(camera),
+      options_(options),
+      calibrated_(map, camera),
+      contour_(camera),
+      supporter_(map),
+      max_axis_px_(kMaxAxisDiagonals * std::hypot(map.width, map.height)) {}
+
+bool EllipseFitter::FitArcs(std::initializer_list<const Arc*> arcs, EllipseCandidate* candidate) {
+  fit_points_.clear();
+  fit_indices_.clear();
+  for (const Arc* arc : arcs) AppendPoints(*arc);
+  candidate->bright = SideOf(arcs);
+  if (!FitConicDirect(fit_points_, &candidate->conic).ok()) return false;
+  return ArcsAgree(*candidate);
+}
+
+bool EllipseFitter::Improve(EllipseCandidate* candidate) {
+  const EllipseCandidate rough = *candidate;
+  if (!contour_.Project(rough.conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
+  if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
+  const QuickSupport look = supporter_.QuickLook(samples_, kQuickPx);
+  const double own = look.across[static_cast<std::size_t>(rough.bright)];
+  if (own >= std::max(kQuickShare, kQuickAcross * look.any) && Refit(candidate)) return true;
+  // Before a busy ground the bright side changes along the contour.
+  const double either = look.across[static_cast<std::size_t>(BrightSide::kEither)];
+  if (either < std::max(kQuickShare, own) + kOtherSideShare) return false;
+  if (either < 2.0 * kQuickAcross * look.any) return false;
+  *candidate = rough;
+  candidate->bright = BrightSide::kEither;
+  return Refit(candidate);
+}
+
+double EllipseFitter::Coverage(const EllipseCandidate& candidate) {
+  const bool plausible = Gather(candidate, 1.5, kGatherPx.back()) && Plausible(candidate.bright);
+  return plausible ? support_.Coverage() : 0.0;
+}
+
+bool EllipseFitter::Fit(EllipseCandidate candidate, DetectedEllipse* e) {
+  EllipseCandidate smooth = candidate;
+  const double miss = FinalFit(&candidate, e);
+  if (miss > 1.0) {
+    DetectedEllipse seen;
+    if (!SecondLook(&smooth, &seen)) return false;
+    // A wide Gaussian also takes in what runs beside the contour: it confirms the ellipse, but
+    // where the first scale is not too ragged, that has the better place.
+    if (miss > kSecondLookLimit) *e = std::move(seen);
+  }
+  e->bright = candidate.bright;
+  return true;
+}
+
+void EllipseFitter::Take(const DetectedEllipse& e) {
+  EllipseCandidate candidate;
+  candidate.conic = e.fit.conic;
+  candidate.bright = e.bright;
+  // What a wider gathering finds belongs to it as well.
+  if (Gather(candidate, 0.7, kGatherPx[1])) supporter_.Take(support_.points);
+  supporter_.Take(e.points);
+}
+
+double EllipseFitter::Farthest(const DetectedEllipse& e, const Matrix3d& conic) {
+  double farthest = 0.0;
+  for (std::size_t k = 0; k < e.points.size(); k += 1 + e.points.size() / 16) {
+    CalibratedPoint p;
+    if (!calibrated_.Get(e.points[k], &p)) continue;
+    farthest = std::max(farthest, std::abs(ConicDistancePx(p, conic)));
+  }
+  return farthest;
+}
+
+void EllipseFitter::AppendPoints(const Arc& arc) {
+  const int n = std::min(arc.size(), kFitPoints);
+  for (int k = 0; k < n; ++k) {
+    const int i = arc.begin +
+                  static_cast<int>((static_cast<long>(k) * (arc.size() - 1)) / std::max(n - 1, 1));
+    CalibratedPoint p;
+    if (!calibrated_.Get(i, &p)) continue;
+    fit_points_.push_back(p);
+    fit_indices_.push_back(i);
+  }
+}
+
+// Direct fit to the points at hand, and again without those that stand out until these stay the
+// same: the ends of an arc often follow a neighbour's edge, a shadow runs beside a rim, and a few
+// such points spoil a least-squares fit.
+bool EllipseFitter::FitTrimmed(Matrix3d* conic, int max_trims) {
+  if (!FitConicDirect(fit_points_, conic).ok()) return false;
+  std::size_t before = fit_points_.size();
+  for (int round = 0; round < max_trims; ++round) {
+    Trim(*conic);
+    if (trimmed_.size() == before || trimmed_.size() < 6) break;
+    before = trimmed_.size();
+    Matrix3d better;
+    if (!FitConicDirect(trimmed_, &better).ok()) break;
+    *conic = better;
+  }
+  return true;
+}
+
+void EllipseFitter::Trim(const Matrix3d& conic) {
+  MeasureDistances(conic);
+  sorted_.clear();
+  for (const double d : distances_) sorted_.push_back(std::abs(d));
+  const double limit = kTrimSigmas * std::max(kTrimMinSigmaPx, 1.4826 * Median(&sorted_));
+  trimmed_.clear();
+  for (std::size_t k = 0; k < fit_points_.size(); ++k) {
+    if (std::abs(distances_[k]) <= limit) trimmed_.push_back(fit_points_[k]);
+  }
+}
+
+// Signed, of the points at hand, pixels.
+void EllipseFitter::MeasureDistances(const Matrix3d& conic) {
+  distances_.clear();
+  for (const CalibratedPoint& p : fit_points_) distances_.push_back(ConicDistancePx(p, conic));
+}
+
+// Whether the points of the arcs are near the contour that was fitted to them, and the gradients
+// there across it: a second opinion that costs little and is independent of the first. All in
+// squares, without roots: nothing is asked more often.
+bool EllipseFitter::ArcsAgree(const EllipseCandidate& candidate) const {
+  const double side = candidate.bright == BrightSide::kInside ? -1.0 : 1.0;
+  const bool either = candidate.bright == BrightSide::kEither;
+  const double noise = kArcNormalSigmas * map_.gradient_noise;
+  const Matrix3d& conic = candidate.conic;
+  double squares = 0.0;
+  int agree = 0;
+  for (std::size_t k = 0; k < fit_points_.size(); ++k) {
+    const CalibratedPoint& p = fit_points_[k];
+    const Vector3d g = conic * p.Homogeneous();
+    const Vector2d outward = p.GradientPerPixel(g.head<2>());
+    const double length_squared = outward.squaredNorm();
+    const double value = p.x.dot(g.head<2>()) + g.z();
+    squares += value * value / (4.0 * length_squared);
+    const EdgePoint& edge = map_.points[static_cast<std::size_t>(fit_indices_[k])];
+    const double along = outward.dot(edge.Normal());
+    const double strength = static_cast<double>(edge.gradient) * static_cast<double>(edge.gradient);
+    // sin^2 < kArcNormalSine^2 + (noise / gradient)^2, times both denominators.
+    const bool across =
+        (length_squared - along * along) * strength <
+        (kArcNormalSine * kArcNormalSine * strength + noise * noise) * length_squared;
+    agree += across && (either || side * along >= 0.0) ? 1 : 0;
+  }
+  const double n = static_cast<double>(fit_points_.size());
+  return squares <= kMaxArcRmsPx * kMaxArcRmsPx * n && agree >= kArcAgreement * n;
+}
+
+double EllipseFitter::Rms(const std::vector<CalibratedPoint>& points, const Matrix3d& conic) {
+  double sum = 0.0;
+  for (const CalibratedPoint& p : points) {
+    const double d = ConicDistancePx(p, conic);
+    sum += d * d;
+  }
+  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(points.size(), 1)));
+}
+
+// Refits a candidate to the points along its contour; false if there are too few.
+bool EllipseFitter::Refit(EllipseCandidate* candidate) {
+  for (std::size_t round = 0; round + 1 < kGatherPx.size(); ++round) {
+    if (!Gather(*candidate, 1.5, kGatherPx[round], kRoughSamples)) return false;
+    if (!Plausible(candidate->bright, kEarlyShare, kEarlyLog10)) return false;
+    if (ToDegrees(support_.normal_median) > kEarlyNormalDeg) return false;
+    CalibrateSupport(kRoughSamples);
+    if (!FitTrimmed(&candidate->conic, 1)) return false;
+  }
+  if (!Gather(*candidate, 1.5, kGatherPx.back(), 2 * kRoughSamples)) return false;
+  candidate->score = support_.length_px * support_.Coverage();
+  // One side all around explains more than either side does.
+  if (candidate->bright == BrightSide::kEither) candidate->score *= 0.5;
+  if (!Plausible(candidate->bright)) return false;
+  CalibrateSupport(kRoughSamples);
+  Trim(candidate->conic);
+  // Of rivals for one contour the one that it keeps to: what strays, of a neighbouring edge that
+  // runs together with it, counts against it.
+  const double kept =
+      static_cast<double>(trimmed_.size()) / static_cast<double>(fit_points_.size());
+  candidate->score *= kept * kept;
+  const double rms_px = Rms(trimmed_, candidate->conic);
+  return rms_px <= kShapeSlack * options_.max_rms_px &&
+         ShapeMiss(rms_px, candidate->conic, fit_indices_) <= kShapeSlack;
+}
+
+double EllipseFitter::ShapeMiss(double rms_px, const Matrix3d& conic,
+                                const std::vector<int>& points) {
+  supporter_.AverageStrength(&support_);
+  EllipseShape shape;
+  shape.rms_px = rms_px;
+  shape.slope_deg = SlopeDeg(map_, conic, points, &calibrated_);
+  shape.size_px = std::sqrt(contour_.major_px() * contour_.minor_px());
+  shape.noise = map_.gradient_noise;
+  return shape.Miss(support_);
+}
+
+bool EllipseFitter::Gather(const EllipseCandidate& candidate, double spacing, double reach,
+                           int max_samples) {
+  if (!contour_.Project(candidate.conic, 0.7 * options_.min_axis_px, max_axis_px_)) return false;
+  if (!contour_.SampleEvery(spacing, &samples_, max_samples)) return false;
+  supporter_.Collect(samples_, candidate.bright, reach, &support_);
+  return support_.points.size() >= 6;
+}
+
+// The calibrated support, or about `limit` points of it, evenly.
+void EllipseFitter::CalibrateSupport(std::size_t limit) {
+  fit_points_.clear();
+  fit_indices_.clear();
+  const std::size_t n = support_.points.size(), m = std::min(n, limit);
+  for (std::size_t k = 0; k < m; ++k) {
+    const int i = support_.points[k * n / m];
+    CalibratedPoint p;
+    if (!calibrated_.Get(i, &p)) continue;
+    fit_points_.push_back(p);
+    fit_indices_.push_back(i);
+  }
+}
+
+// Enough of the contour, and more than chance explains. Before the end `share` of the one will do,
+// and `slack` orders of magnitude less of the other.
+bool EllipseFitter::Plausible(BrightSide bright, double share, double slack) const {
+  if (support_.Coverage() * 360.0 < share * options_.min_arc_deg) return false;
+  if (ToDegrees(support_.turn) < share * options_.min_arc_deg) return false;
+  return Log10FalseAlarms(support_, bright) <= options_.max_log10_false_alarms + slack;
+}
+
+// What surrounds a contour but is too ragged for an ellipse at the first scale - a penumbra, a
+// blur by motion, the steps of a bad print - is looked at once more, through a wider Gaussian,
+// which averages over it.
+bool EllipseFitter::SecondLook(EllipseCandidate* candidate, DetectedEllipse* e) {
+  if (!Gather(*candidate, 1.5, kGatherPx.back()) || support_.Coverage() < kSecondCoverage) {
+    return false;
+  }
+  const cv::Rect box = Surroundings();
+  if (box.empty() || box.width > kMaxSecondLookPx || box.height > kMaxSecondLookPx) return false;
+  EdgeOptions edge_options;
+  edge_options.smoothing_px = kSecondSmoothingPx;
+  EdgeMap map;
+  if (!DetectEdges(map_.gray(box), edge_options, &map).ok()) return false;
+  Camera camera = camera_;  // Seen from the corner of the box; fits stay valid.
+  camera.cx -= box.x;
+  camera.cy -= box.y;
+  if (EllipseFitter(map, camera, options_).FinalFit(candidate, e) > 1.0) return false;
+  for (Vector2d& p : e->contour) p += Vector2d(box.x, box.y);
+  // The points of the first scale that it explains.
+  if (!Gather(*candidate, 0.7, kGatherPx[0])) return false;
+  e->points = support_.points;
+  return true;
+}
+
+// The samples at hand with a margin for the smoothing, within the photo.
+cv::Rect EllipseFitter::Surroundings() const {
+  Eigen::AlignedBox2d box;
+  for (const ContourSample& s : samples_) box.extend(s.pixel);
+  constexpr int kMargin = 8;
+  const cv::Point low(static_cast<int>(box.min().x()), static_cast<int>(box.min().y()));
+  const cv::Point high(static_cast<int>(box.max().x()), static_cast<int>(box.max().y()));
+  const cv::Point margin(kMargin, kMargin);
+  return cv::Rect(low - margin, high + margin) & cv::Rect({}, map_.gray.size());
+}
+
+// Maximum likelihood on all points of the contour, outliers left out; from a direct fit to all
+// points, which brings the contour near enough for the nearest points to be its own. Returns the
+// shape's miss; infinite where there is no ellipse at all.
+double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  if (!Gather(*candidate, 0.7, kGatherPx.back())) return kNone;
+  Straighten(candidate->conic, e);
+  if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic, kMaxTrims)) return kNone;
+  const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
+  if (!Gather(*candidate, 0.7, reach)) return kNone;
+  if (!FitSupport(candidate->conic, e)) return kNone;
+  candidate->conic = e->fit.conic;
+  if (!Plausible(candidate->bright) || contour_.minor_px() < options_.min_axis_px ||
+      e->fit.rms_px > options_.max_rms_px) {
+    return kNone;
+  }
+  e->coverage_deg = 360.0 * support_.Coverage();
+  e->length_px = support_.length_px;
+  e->turn_deg = ToDegrees(support_.turn);
+  e->normal_deg = ToDegrees(support_.normal_median);
+  const double miss = ShapeMiss(e->fit.rms_px, candidate->conic, e->points);
+  e->contrast = support_.gradient;
+  return miss;
+}
+
+// The edge points of the support where they would lie if the contour, `conic`, were straight.
+void EllipseFitter::Straighten(const Matrix3d& conic, DetectedEllipse* e) {
+  e->points.clear();
+  e->contour.clear();
+  fit_points_.clear();
+  const double blur = MedianBlur();
+  for (const int i : support_.points) {
+    CalibratedPoint moved;
+    if (!calibrated_.Get(i, &moved)) continue;
+    const EdgePoint& edge = map_.points[static_cast<std::size_t>(i)];
+    Vector2d outward;
+    const double curvature = CurvatureAt(conic, moved, &outward);
+    const Vector2d shift = CurvatureBias(edge, blur, curvature) * outward;
+    moved.x += FromPixels(moved, shift);
+    e->points.push_back(i);
+    e->contour.push_back(edge.Position() + shift);
+    fit_points_.push_back(moved);
+  }
+}
+
+double EllipseFitter::MedianBlur() {
+  sorted_.clear();
+  for (const int i : support_.points) {
+    sorted_.push_back(static_cast<double>(map_.points[static_cast<std::size_t>(i)].blur_px));
+  }
+  return Median(&sorted_);
+}
+
+bool EllipseFitter::FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
+  Straighten(initial, e);
+  if (fit_points_.size() < 6) return false;
+  if (!RefineConic(fit_points_, 1.0, initial, &e->fit).ok()) return false;
+  if (DropOutliers(e)) {
+    if (fit_points_.size() < 6) return false;
+    const Matrix3d conic = e->fit.conic;
+    if (!RefineConic(fit_points_, 1.0, conic, &e->fit).ok()) return false;
+  }
+  // Degrees of freedom: five go into the ellipse.
+  const double n = static_cast<double>(fit_points_.size());
+  e->sigma_px = std::max(kMinSigmaPx, e->fit.rms_px * std::sqrt(n / (n - 5.0)));
+  for (double& c : e->fit.covariance) c *= e->sigma_px * e->sigma_px;
+  return true;
+}
+
+// False if there are none.
+bool EllipseFitter::DropOutliers(DetectedEllipse* e) {
+  MeasureDistances(e->fit.conic);
+  sorted_.clear();
+  for (const double d : distances_) sorted_.push_back(std::abs(d));
+  // 1.4826: median absolute deviation to standard deviation of a Gaussian.
+  const double limit = kOutlierSigmas * std::max(kMinSigmaPx, 1.4826 * Median(&sorted_));
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < distances_.size(); ++k) {
+    if (std::abs(distances_[k]) > limit) continue;
+    fit_points_[kept] = fit_points_[k];
+    e->contour[kept] = e->contour[k];
+    e->points[kept++] = e->points[k];
+  }
+  if (kept == fit_points_.size()) return false;
+  fit_points_.resize(kept);
+  e->contour.resize(kept);
+  e->points.resize(kept);
+  return true;
+}
+
+}  // namespace circline

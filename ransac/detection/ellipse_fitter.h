@@ -1,0 +1,91 @@
+// One candidate of an ellipse against the edges of a photo: from a first fit to arcs, over what
+// edges there are along its contour, to the maximum-likelihood fit and the verdict on its shape.
+#ifndef CIRCLINE_RANSAC_DETECTION_ELLIPSE_FITTER_H_
+#define CIRCLINE_RANSAC_DETECTION_ELLIPSE_FITTER_H_
+
+#include <Eigen/Core>
+#include <initializer_list>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "circline/estimators/camera.h"
+#include "circline/ransac/detection/arcs.h"
+#include "circline/ransac/detection/calibrated_edges.h"
+#include "circline/ransac/detection/contour_support.h"
+#include "circline/ransac/detection/detect_ellipses.h"
+#include "circline/ransac/detection/edges.h"
+
+namespace circline {
+
+struct EllipseCandidate {
+  Eigen::Matrix3d conic = Eigen::Matrix3d::Zero();
+  BrightSide bright = BrightSide::kOutside;
+  // Length of the support times its share of the contour, less for what strays.
+  double score = 0.0;
+};
+
+// Keeps book of the points that accepted ellipses took.
+class EllipseFitter {
+ public:
+  // All must outlive it.
+  EllipseFitter(const EdgeMap& map, const Camera& camera, const EllipseOptions& options);
+
+  // The ellipse through one arc or two; false if they are not on one ellipse.
+  bool FitArcs(std::initializer_list<const Arc*> arcs, EllipseCandidate* candidate);
+
+  // Refits a candidate to all edges along its contour; false if these are too few or too unlike an
+  // ellipse.
+  bool Improve(EllipseCandidate* candidate);
+
+  // Share of the contour that edges support which no ellipse took; 0 where that is too little.
+  double Coverage(const EllipseCandidate& candidate);
+
+  // The final fit; false if what the edges follow is no ellipse.
+  bool Fit(EllipseCandidate candidate, DetectedEllipse* e);
+
+  // Marks the ellipse's points: they support no other.
+  void Take(const DetectedEllipse& e);
+  bool IsTaken(int i) const { return supporter_.IsTaken(i); }
+
+  // Largest distance of some of the ellipse's points to a conic, pixels.
+  double Farthest(const DetectedEllipse& e, const Eigen::Matrix3d& conic);
+
+ private:
+  void AppendPoints(const Arc& arc);
+  bool FitTrimmed(Eigen::Matrix3d* conic, int max_trims);
+  void Trim(const Eigen::Matrix3d& conic);
+  void MeasureDistances(const Eigen::Matrix3d& conic);
+  bool ArcsAgree(const EllipseCandidate& candidate) const;
+  static double Rms(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic);
+  bool Refit(EllipseCandidate* candidate);
+  double ShapeMiss(double rms_px, const Eigen::Matrix3d& conic, const std::vector<int>& points);
+  bool Gather(const EllipseCandidate& candidate, double spacing, double reach,
+              int max_samples = 20000);
+  void CalibrateSupport(std::size_t limit);
+  bool Plausible(BrightSide bright, double share = 1.0, double slack = 0.0) const;
+  bool SecondLook(EllipseCandidate* candidate, DetectedEllipse* e);
+  cv::Rect Surroundings() const;
+  double FinalFit(EllipseCandidate* candidate, DetectedEllipse* e);
+  void Straighten(const Eigen::Matrix3d& conic, DetectedEllipse* e);
+  double MedianBlur();
+  bool FitSupport(const Eigen::Matrix3d& initial, DetectedEllipse* e);
+  bool DropOutliers(DetectedEllipse* e);
+
+  const EdgeMap& map_;
+  const Camera& camera_;
+  const EllipseOptions& options_;
+  CalibratedEdges calibrated_;
+  Contour contour_;
+  Supporter supporter_;
+  const double max_axis_px_;
+  // Scratch.
+  std::vector<CalibratedPoint> fit_points_, trimmed_;
+  std::vector<int> fit_indices_;
+  std::vector<ContourSample> samples_;
+  Support support_;
+  std::vector<double> distances_, sorted_;
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_DETECTION_ELLIPSE_FITTER_H_

@@ -1,0 +1,150 @@
+#include "circline/ransac/detection/line_pieces.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace circline {
+namespace {
+
+// A piece starts from this many consecutive points on one line, and has at least this length:
+// below, any smooth curve passes for straight.
+constexpr int kSeedPoints = 9;
+constexpr double kMinPiecePx = 10.0;
+// All but straight: a sagitta of up to this many pixels, and this share of the length.
+constexpr double kMaxBentPx = 1.2;
+constexpr double kMaxBentShare = 0.018;
+// So many points in a row off the line end a piece; fewer are noise.
+constexpr int kMaxMisses = 2;
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// (cos t, sin t) for cos 2t and sin 2t given up to a factor; cos t is not negative.
+Vector2d MainAxis(double cosine, double sine) {
+  const double length = std::sqrt(cosine * cosine + sine * sine);
+  if (!(length > 0.0)) return {1.0, 0.0};
+  const double side = sine < 0.0 ? -1.0 : 1.0;
+  // Of the two forms of the half angle the one in which nothing cancels.
+  const Vector2d axis = cosine >= 0.0 ? Vector2d(length + cosine, sine)
+                                      : Vector2d(side * sine, side * (length - cosine));
+  return axis.normalized();
+}
+
+class PieceCutter {
+ public:
+  PieceCutter(const LineEdges& edges, const LineOptions& options, std::vector<LinePiece>* straight,
+              std::vector<LinePiece>* bent)
+      : edges_(edges), options_(options), straight_(straight), bent_(bent) {}
+
+  // Greedily, from the first point on: seed, grow, go on behind.
+  void CutChain(const EdgeChain& chain) {
+    int i = chain.begin;
+    while (i + kSeedPoints <= chain.end) {
+      LinePiece piece;
+      if (!Seed(i, &piece)) {
+        i += 2;
+        continue;
+      }
+      Grow(chain, &piece);
+      Keep(&piece);
+      i = piece.end;
+    }
+  }
+
+ private:
+  bool Seed(int begin, LinePiece* piece) {
+    if (!edges_.Usable(begin)) return false;
+    moments_ = LineMoments(edges_.X(begin).x);
+    for (int i = begin; i < begin + kSeedPoints; ++i) {
+      if (!edges_.Usable(i)) return false;
+      moments_.Add(edges_.X(i).x);
+    }
+    piece->begin = begin;
+    piece->end = begin + kSeedPoints;
+    piece->line = moments_.Line(&piece->along);
+    for (int i = piece->begin; i < piece->end; ++i) {
+      // Seeds are stricter than growth: they carry no average yet.
+      if (edges_.Distance(i, piece->line) > 0.75 * options_.max_distance_px) return false;
+    }
+    return true;
+  }
+
+  void Grow(const EdgeChain& chain, LinePiece* piece) {
+    int misses = 0, refit_at = kSeedPoints + 2;
+    for (int i = piece->end; i < chain.end && edges_.Usable(i) && misses <= kMaxMisses; ++i) {
+      if (edges_.Distance(i, piece->line) > options_.max_distance_px) {
+        ++misses;
+        continue;
+      }
+      misses = 0;
+      moments_.Add(edges_.X(i).x);
+      piece->end = i + 1;
+      if (moments_.count() < refit_at) continue;
+      piece->line = moments_.Line(&piece->along);
+      refit_at = moments_.count() + std::max(2, moments_.count() / 8);
+    }
+    piece->line = moments_.Line(&piece->along);
+  }
+
+  void Keep(LinePiece* piece) {
+    piece->length_px = (edges_.Pixel(piece->end - 1) - edges_.Pixel(piece->begin)).norm();
+    const int middle = (piece->begin + piece->end) / 2;
+    piece->gradient = edges_.map().points[static_cast<std::size_t>(middle)].Normal();
+    if (piece->length_px < kMinPiecePx) return;
+    const double sagitta = SagittaPx(*piece);
+    if (sagitta >
+        std::max(options_.max_sagitta_px, std::min(kMaxBentPx, kMaxBentShare * piece->length_px))) {
+      return;
+    }
+    edges_.SetRange(piece->along, *piece, &piece->from, &piece->to);
+    (sagitta <= options_.max_sagitta_px ? straight_ : bent_)->push_back(*piece);
+  }
+
+  // The middle half of the points on one side of the line and the ends on the other is a curve.
+  double SagittaPx(const LinePiece& piece) const {
+    const int n = piece.end - piece.begin;
+    double middle = 0.0, ends = 0.0;
+    int num_middle = 0, num_ends = 0;
+    for (int k = 0; k < n; ++k) {
+      const double d = LineDistancePx(edges_.X(piece.begin + k), piece.line);
+      if (std::abs(d) > options_.max_distance_px) continue;
+      if (4 * k >= n && 4 * k < 3 * n) {
+        middle += d;
+        ++num_middle;
+      } else {
+        ends += d;
+        ++num_ends;
+      }
+    }
+    if (num_middle == 0 || num_ends == 0) return std::numeric_limits<double>::infinity();
+    // For a parabola the two means differ by half its sagitta.
+    return 2.0 * std::abs(middle / num_middle - ends / num_ends);
+  }
+
+  const LineEdges& edges_;
+  const LineOptions& options_;
+  std::vector<LinePiece>* straight_;
+  std::vector<LinePiece>* bent_;
+  LineMoments moments_;
+};
+
+}  // namespace
+
+Vector3d LineMoments::Line(Vector2d* along) const {
+  const Vector2d mean = sum_ / n_;
+  const double a = xx_ / n_ - mean.x() * mean.x();
+  const double b = xy_ / n_ - mean.x() * mean.y();
+  const double c = yy_ / n_ - mean.y() * mean.y();
+  *along = MainAxis(a - c, 2.0 * b);
+  const Vector2d normal(-along->y(), along->x());
+  return {normal.x(), normal.y(), -normal.dot(mean + shift_)};
+}
+
+void CutIntoPieces(const LineEdges& edges, const LineOptions& options,
+                   std::vector<LinePiece>* straight, std::vector<LinePiece>* bent) {
+  PieceCutter cutter(edges, options, straight, bent);
+  for (const EdgeChain& chain : edges.map().chains) cutter.CutChain(chain);
+}
+
+}  // namespace circline

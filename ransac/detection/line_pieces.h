@@ -1,0 +1,99 @@
+// The straight pieces of edge chains, of which lines are joined. Internal: not installed.
+#ifndef CIRCLINE_RANSAC_DETECTION_LINE_PIECES_H_
+#define CIRCLINE_RANSAC_DETECTION_LINE_PIECES_H_
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "circline/estimators/camera.h"
+#include "circline/estimators/line.h"
+#include "circline/ransac/detection/calibrated_edges.h"
+#include "circline/ransac/detection/detect_lines.h"
+#include "circline/ransac/detection/edges.h"
+
+namespace circline {
+
+// Sums of calibrated points, about a shift near them so that nothing cancels.
+class LineMoments {
+ public:
+  explicit LineMoments(const Eigen::Vector2d& shift = Eigen::Vector2d::Zero()) : shift_(shift) {}
+
+  void Add(const Eigen::Vector2d& point) {
+    const Eigen::Vector2d p = point - shift_;
+    ++n_;
+    sum_ += p;
+    xx_ += p.x() * p.x();
+    xy_ += p.x() * p.y();
+    yy_ += p.y() * p.y();
+  }
+
+  int count() const { return n_; }
+
+  // Total least squares line, unit normal; its direction to `along`.
+  Eigen::Vector3d Line(Eigen::Vector2d* along) const;
+
+ private:
+  Eigen::Vector2d shift_;
+  int n_ = 0;
+  Eigen::Vector2d sum_ = Eigen::Vector2d::Zero();
+  double xx_ = 0.0, xy_ = 0.0, yy_ = 0.0;
+};
+
+// A run of edge points on one line.
+struct LinePiece {
+  int begin = 0, end = 0;       // Points of the map (all usable, in order).
+  Eigen::Vector3d line;         // Calibrated; unit normal.
+  Eigen::Vector2d along;        // Its direction.
+  double from = 0.0, to = 0.0;  // Positions of its ends along it, calibrated.
+  double length_px = 0.0;
+  Eigen::Vector2d gradient;  // At its middle, unit.
+};
+
+// The edge points of a photo as lines need them: calibrated, but for those that belong to something
+// else (`skip`, optional, one per point).
+class LineEdges {
+ public:
+  // All must outlive it.
+  LineEdges(const EdgeMap& map, const Camera& camera, const std::vector<std::uint8_t>* skip)
+      : map_(map), skip_(skip), calibrated_(map, camera) {}
+
+  // Of usable points.
+  CalibratedPoint X(int i) const {
+    CalibratedPoint point;
+    calibrated_.Get(i, &point);
+    return point;
+  }
+  Eigen::Vector2d Pixel(int i) const { return map_.points[static_cast<std::size_t>(i)].Position(); }
+  bool Usable(int i) const {
+    if (skip_ != nullptr && (*skip_)[static_cast<std::size_t>(i)]) return false;
+    CalibratedPoint point;
+    return calibrated_.Get(i, &point);
+  }
+  double Distance(int i, const Eigen::Vector3d& line) const {
+    return std::abs(LineDistancePx(X(i), line));
+  }
+  // Where a piece lies along a line.
+  void SetRange(const Eigen::Vector2d& along, const LinePiece& piece, double* from,
+                double* to) const {
+    const double a = along.dot(X(piece.begin).x), b = along.dot(X(piece.end - 1).x);
+    *from = std::min(a, b);
+    *to = std::max(a, b);
+  }
+  const EdgeMap& map() const { return map_; }
+
+ private:
+  const EdgeMap& map_;
+  const std::vector<std::uint8_t>* skip_;
+  mutable CalibratedEdges calibrated_;  // Remembers what it was asked.
+};
+
+// Cuts all chains into pieces that are straight, and some that are all but straight (`bent`).
+void CutIntoPieces(const LineEdges& edges, const LineOptions& options,
+                   std::vector<LinePiece>* straight, std::vector<LinePiece>* bent);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_DETECTION_LINE_PIECES_H_

@@ -1,0 +1,207 @@
+#include "circline/ransac/detection/segment_meetings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace circline {
+namespace {
+
+using Eigen::Vector2d;
+
+// The sides of chessboard squares form corners; the lines of a printed border, of a window and its
+// frame, keep a small distance. Pixels.
+constexpr double kCornerPx = 10.0;
+constexpr double kNearPx = 25.0;
+// Of FormCorner.
+constexpr double kCornerShare = 0.45;
+constexpr double kMinCornerGapPx = 9.0;
+constexpr double kMaxCornerGapPx = 21.0;
+constexpr double kMinCornerSine = 0.17;
+constexpr double kFullMeetings = 3.0;
+constexpr std::size_t kCoreMeetings = 2;
+
+double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+double PointSegmentDistance(const Vector2d& p, const Segment& s) {
+  const Vector2d d = s[1] - s[0];
+  const double t = std::clamp((p - s[0]).dot(d) / std::max(d.squaredNorm(), 1e-12), 0.0, 1.0);
+  return (p - s[0] - t * d).norm();
+}
+
+// Whether the rectangles about two segments are farther apart than `px`.
+bool FarApart(const Segment& s, const Segment& t, double px) {
+  for (int k = 0; k < 2; ++k) {
+    if (std::min(s[0][k], s[1][k]) > std::max(t[0][k], t[1][k]) + px) return true;
+    if (std::min(t[0][k], t[1][k]) > std::max(s[0][k], s[1][k]) + px) return true;
+  }
+  return false;
+}
+
+bool AreWithin(double px, const Segment& s, const Segment& t) {
+  return !FarApart(s, t, px) && SegmentDistance(s, t) < px;
+}
+
+double Length(const Segment& s) { return (s[1] - s[0]).norm(); }
+
+// Segments of two lists, and which of one meet which of the other. Nodes: first all of `a`, then
+// all of `b`.
+class Graph {
+ public:
+  Graph(const std::vector<Segment>& a, const std::vector<Segment>& b)
+      : size_a_(a.size()), neighbours_(a.size() + b.size()) {
+    for (const auto* list : {&a, &b}) {
+      for (const Segment& s : *list) length_.push_back(Length(s));
+    }
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      for (std::size_t j = 0; j < b.size(); ++j) {
+        if (!AreWithin(kCornerPx, a[i], b[j])) continue;
+        neighbours_[i].push_back(size_a_ + j);
+        neighbours_[size_a_ + j].push_back(i);
+      }
+    }
+    dropped_.assign(neighbours_.size(), 0);
+  }
+
+  // Drops nodes that meet fewer than so many, until none is left that does.
+  void DropBelow(std::size_t meetings) {
+    std::vector<std::size_t> degree, queue;
+    for (std::size_t i = 0; i < neighbours_.size(); ++i) {
+      degree.push_back(neighbours_[i].size());
+      if (degree[i] < meetings) queue.push_back(i);
+    }
+    while (!queue.empty()) {
+      const std::size_t i = queue.back();
+      queue.pop_back();
+      if (dropped_[i]) continue;
+      dropped_[i] = 1;
+      for (const std::size_t j : neighbours_[i]) {
+        if (--degree[j] < meetings) queue.push_back(j);
+      }
+    }
+  }
+
+  std::array<std::vector<int>, 2> LargestComponent() const {
+    std::vector<char> seen = dropped_;
+    std::vector<std::size_t> best;
+    double best_length = 0.0;
+    for (std::size_t start = 0; start < seen.size(); ++start) {
+      if (seen[start]) continue;
+      const std::vector<std::size_t> component = ComponentOf(start, &seen);
+      double length = 0.0;
+      for (const std::size_t i : component) length += length_[i];
+      if (length <= best_length) continue;
+      best_length = length;
+      best = component;
+    }
+    std::sort(best.begin(), best.end());
+    std::array<std::vector<int>, 2> result;
+    for (const std::size_t i : best) {
+      const std::size_t list = i < size_a_ ? 0 : 1;
+      result[list].push_back(static_cast<int>(i - list * size_a_));
+    }
+    return result;
+  }
+
+ private:
+  std::vector<std::size_t> ComponentOf(std::size_t start, std::vector<char>* seen) const {
+    std::vector<std::size_t> component = {start};
+    (*seen)[start] = 1;
+    for (std::size_t k = 0; k < component.size(); ++k) {
+      for (const std::size_t j : neighbours_[component[k]]) {
+        if ((*seen)[j]) continue;
+        (*seen)[j] = 1;
+        component.push_back(j);
+      }
+    }
+    return component;
+  }
+
+  std::size_t size_a_;
+  std::vector<double> length_;
+  std::vector<std::vector<std::size_t>> neighbours_;
+  std::vector<char> dropped_;
+};
+
+}  // namespace
+
+double SegmentDistance(const Segment& s, const Segment& t) {
+  const auto side = [](const Segment& line, const Vector2d& p) {
+    return Cross(line[1] - line[0], p - line[0]);
+  };
+  if (side(s, t[0]) * side(s, t[1]) < 0.0 && side(t, s[0]) * side(t, s[1]) < 0.0) return 0.0;
+  return std::min({PointSegmentDistance(s[0], t), PointSegmentDistance(s[1], t),
+                   PointSegmentDistance(t[0], s), PointSegmentDistance(t[1], s)});
+}
+
+bool LiesAlong(const Segment& s, const Segment& t, double px) {
+  return !FarApart(s, t, px) && PointSegmentDistance(s[0], t) < px &&
+         PointSegmentDistance(s[1], t) < px;
+}
+
+bool AreNear(const Segment& s, const Segment& t) { return AreWithin(kNearPx, s, t); }
+
+bool FormCorner(const Segment& s, const Segment& t) {
+  if (FarApart(s, t, 2.0 * kMaxCornerGapPx)) return false;
+  const Vector2d d = s[1] - s[0], e = t[1] - t[0];
+  const double sine_scaled = Cross(d, e), d_length = d.norm(), e_length = e.norm();
+  if (std::abs(sine_scaled) <= kMinCornerSine * d_length * e_length) return false;
+  const Vector2d crossing = s[0] + d * (Cross(t[0] - s[0], e) / sine_scaled);
+  const auto ends_there = [&](const Segment& segment, double length) {
+    const double gap = std::min((crossing - segment[0]).norm(), (crossing - segment[1]).norm());
+    return gap <= std::clamp(kCornerShare * length, kMinCornerGapPx, kMaxCornerGapPx);
+  };
+  return ends_there(s, d_length) && ends_there(t, e_length);
+}
+
+double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& b) {
+  double length = 0.0;
+  for (const Segment& s : a) {
+    const auto meetings =
+        std::count_if(b.begin(), b.end(), [&s](const Segment& t) { return AreNear(s, t); });
+    const double share = std::min(1.0, static_cast<double>(meetings) / kFullMeetings);
+    length += Length(s) * share;
+  }
+  return length;
+}
+
+std::array<std::vector<int>, 2> ConnectedCore(const std::vector<Segment>& a,
+                                              const std::vector<Segment>& b) {
+  Graph graph(a, b);
+  graph.DropBelow(kCoreMeetings);
+  return graph.LargestComponent();
+}
+
+// Andrew's monotone chain (Information Processing Letters 1979).
+ConvexRegion::ConvexRegion(std::vector<Vector2d> points, double grow) {
+  std::sort(points.begin(), points.end(), [](const Vector2d& p, const Vector2d& q) {
+    return p.x() < q.x() || (p.x() == q.x() && p.y() < q.y());
+  });
+  for (int half = 0; half < 2; ++half) {
+    const std::size_t floor = corners_.size();
+    for (const Vector2d& p : points) {
+      while (corners_.size() >= floor + 2 &&
+             Cross(corners_.back() - corners_[corners_.size() - 2], p - corners_.back()) <= 0.0) {
+        corners_.pop_back();
+      }
+      corners_.push_back(p);
+    }
+    if (!corners_.empty()) corners_.pop_back();  // The other half starts with it.
+    std::reverse(points.begin(), points.end());
+  }
+  Vector2d centre = Vector2d::Zero();
+  for (const Vector2d& p : corners_) centre += p / static_cast<double>(corners_.size());
+  for (Vector2d& p : corners_) p = centre + grow * (p - centre);
+}
+
+bool ConvexRegion::Contains(const Vector2d& point) const {
+  if (corners_.size() < 3) return false;
+  for (std::size_t k = 0; k < corners_.size(); ++k) {
+    const Vector2d& from = corners_[k];
+    const Vector2d& to = corners_[(k + 1) % corners_.size()];
+    if (Cross(to - from, point - from) < 0.0) return false;
+  }
+  return true;
+}
+
+}  // namespace circline

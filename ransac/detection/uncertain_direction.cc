@@ -1,0 +1,167 @@
+#include "circline/ransac/detection/uncertain_direction.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/conic.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double kRadians = 3.14159265358979323846 / 180.0;
+
+// Errors of a direction or a normal that no covariance of edge points knows: calibration, surfaces
+// that are not quite plane, prints that are not quite round. Standard deviation, degrees.
+constexpr double kModelSigmaDeg = 0.5;
+// Agreement is believed up to this many standard deviations.
+constexpr double kMaxSigmas = 3.0;
+// Two directions count as orthogonal within 2.5 standard deviations plus a quarter of a degree, and
+// never beyond 1.25 degrees: real streets and walls are off by more, and a false right angle
+// biases.
+constexpr double kOrthogonalSigmas = 2.5;
+constexpr double kOrthogonalDeg = 0.25;
+constexpr double kMaxOrthogonalDeg = 1.25;
+// Rows and columns of a sheet of circles are made at right angles; paper that bends shows them at
+// others. A lattice this near to a rectangular one is rectangular.
+constexpr double kRectangularDeg = 4.0;
+// Two pencils span a plane if they are this far from parallel.
+constexpr double kMinSpanDeg = 15.0;
+
+// Angle between two axes (no sense of sign) and its standard deviation.
+struct AngleTest {
+  double angle_deg = 0.0, sigma_deg = 0.0;
+};
+
+AngleTest Compare(const UncertainDirection& a, const UncertainDirection& b) {
+  const double sign = a.vector.dot(b.vector) < 0.0 ? -1.0 : 1.0;
+  const Vector3d difference = a.vector - sign * b.vector;
+  const double norm = difference.norm();
+  AngleTest test;
+  test.angle_deg = 2.0 * std::asin(std::min(1.0, 0.5 * norm)) / kRadians;
+  const Matrix3d covariance = a.covariance + b.covariance;
+  const double variance = norm > 1e-12 ? difference.dot(covariance * difference) / (norm * norm)
+                                       : 0.5 * covariance.trace();
+  test.sigma_deg = std::hypot(std::sqrt(std::max(0.0, variance)) / kRadians, kModelSigmaDeg);
+  return test;
+}
+
+// How far from 90 degrees.
+AngleTest CompareToRightAngle(const UncertainDirection& a, const UncertainDirection& b) {
+  AngleTest test;
+  test.angle_deg = std::asin(std::min(1.0, std::abs(a.vector.dot(b.vector)))) / kRadians;
+  const double variance =
+      a.vector.dot(b.covariance * a.vector) + b.vector.dot(a.covariance * b.vector);
+  test.sigma_deg = std::sqrt(std::max(0.0, variance)) / kRadians;
+  return test;
+}
+
+}  // namespace
+
+double AngleBetweenDeg(const UncertainDirection& a, const UncertainDirection& b) {
+  return Compare(a, b).angle_deg;
+}
+
+bool SamePlane(const UncertainDirection& a, const UncertainDirection& b, double max_deg) {
+  const AngleTest test = Compare(a, b);
+  return test.angle_deg <= std::min(max_deg, kMaxSigmas * test.sigma_deg);
+}
+
+bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal,
+             double max_deg) {
+  const AngleTest test = CompareToRightAngle(direction, normal);
+  return test.angle_deg <=
+         std::min(max_deg, kMaxSigmas * std::hypot(test.sigma_deg, kModelSigmaDeg));
+}
+
+bool Orthogonal(const UncertainDirection& a, const UncertainDirection& b) {
+  const AngleTest test = CompareToRightAngle(a, b);
+  return test.angle_deg <=
+         std::min(kMaxOrthogonalDeg, kOrthogonalSigmas * test.sigma_deg + kOrthogonalDeg);
+}
+
+bool Rectangular(const UncertainDirection& a, const UncertainDirection& b) {
+  return CompareToRightAngle(a, b).angle_deg <= kRectangularDeg;
+}
+
+// First-order propagation through the normalised cross product.
+bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
+                   UncertainDirection* normal) {
+  const Vector3d cross = a.vector.cross(b.vector);
+  const double sine = cross.norm();
+  if (sine < std::sin(kMinSpanDeg * kRadians)) return false;
+  normal->vector = cross / sine;
+  const Matrix3d tangent =
+      (Matrix3d::Identity() - normal->vector * normal->vector.transpose()) / sine;
+  Matrix3d cross_a, cross_b;
+  for (int k = 0; k < 3; ++k) {
+    cross_a.col(k) = a.vector.cross(Vector3d::Unit(k));
+    cross_b.col(k) = Vector3d::Unit(k).cross(b.vector);
+  }
+  const Matrix3d ja = tangent * cross_b, jb = tangent * cross_a;
+  normal->covariance = ja * a.covariance * ja.transpose() + jb * b.covariance * jb.transpose();
+  return true;
+}
+
+UncertainDirection MeanDirection(const UncertainDirection& about,
+                                 const std::vector<const UncertainDirection*>& directions) {
+  const double model = kModelSigmaDeg * kRadians;
+  Vector3d sum = Vector3d::Zero();
+  Matrix3d information = Matrix3d::Zero();
+  const Matrix3d along = about.vector * about.vector.transpose();
+  const Matrix3d tangent = Matrix3d::Identity() - along;
+  for (const UncertainDirection* direction : directions) {
+    // Regular across the tangent plane by the model's variance, along the direction by a nominal
+    // one.
+    const Matrix3d weight =
+        (direction->covariance + model * model * Matrix3d::Identity()).inverse();
+    const Matrix3d w = tangent * weight * tangent;
+    information += w;
+    sum += w * (direction->vector - about.vector);
+  }
+  // Invertible: what is added acts along the direction only.
+  const Matrix3d inverse = (information + information.trace() * along).inverse();
+  UncertainDirection mean;
+  mean.vector = (about.vector + tangent * (inverse * sum)).normalized();
+  mean.covariance = tangent * inverse * tangent;
+  return mean;
+}
+
+int CircleNormals(const ConicFit& fit, std::array<UncertainDirection, 2>* normals) {
+  std::array<CirclePose, 2> poses;
+  const int count = CirclePoses(fit.conic, &poses);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(fit.Covariance());
+  for (int i = 0; i < count; ++i) {
+    UncertainDirection& normal = (*normals)[static_cast<std::size_t>(i)];
+    normal.vector = poses[static_cast<std::size_t>(i)].normal;
+    normal.covariance.setZero();
+    for (int k = 0; k < 6; ++k) {
+      // Steps of a tenth of a standard deviation: small enough to be linear.
+      constexpr double kStep = 0.1;
+      const double sigma = std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
+      const Vector6d moved = ConicToVector(fit.conic) + kStep * sigma * eigen.eigenvectors().col(k);
+      std::array<CirclePose, 2> moved_poses;
+      const int moved_count = CirclePoses(VectorToConic(moved), &moved_poses);
+      Vector3d change = Vector3d::Zero();
+      double nearest = std::numeric_limits<double>::infinity();
+      for (int j = 0; j < moved_count; ++j) {
+        const Vector3d d = moved_poses[static_cast<std::size_t>(j)].normal - normal.vector;
+        if (d.norm() < nearest) {
+          nearest = d.norm();
+          change = d / kStep;
+        }
+      }
+      normal.covariance += change * change.transpose();
+    }
+  }
+  return count;
+}
+
+}  // namespace circline

@@ -1,0 +1,196 @@
+#include "circline/ransac/detection/assemble_observations.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "circline/estimators/circle_pose.h"
+#include "tests/ransac/detection/detected_line_scene.h"
+#include "tests/ransac/detection/detection_test_util.h"
+
+namespace circline {
+namespace {
+
+using detection_test::AxisDeg;
+using detection_test::kDegrees;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// A pencil whose direction is known to 0.1 degrees, of two long lines that cross all of any other.
+DetectedPencil Pencil(const Vector3d& direction, double support) {
+  DetectedPencil pencil;
+  VanishingPointFit fit;
+  fit.direction = direction.normalized();
+  const double sigma = 0.1 / kDegrees;
+  fit.covariance =
+      sigma * sigma * (Matrix3d::Identity() - fit.direction * fit.direction.transpose());
+  pencil.observation.fit = fit;
+  pencil.ends = {{Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(support, 0.0)}};
+  pencil.support_px = support;
+  return pencil;
+}
+
+// A circle of the plane with this normal, its conic known as a rim of 100 px radius would be.
+CircleEvidence Circle(const Vector3d& normal, double support,
+                      const Vector3d& center = Vector3d(0.5, 0.2, 6.0)) {
+  CirclePose pose;
+  pose.normal = normal.z() > 0.0 ? Vector3d(-normal.normalized()) : normal.normalized();
+  pose.center = center;
+  ConicFit fit;
+  fit.conic = ProjectCircle(pose);
+  const Vector6d v = ConicToVector(fit.conic);
+  const Matrix6d c = 1e-10 * (Matrix6d::Identity() - v * v.transpose());
+  for (int i = 0; i < 36; ++i) fit.covariance[static_cast<std::size_t>(i)] = c(i / 6, i % 6);
+  CircleEvidence circle;
+  circle.observation.fit = fit;
+  circle.num_normals = CircleNormals(fit, &circle.normals);
+  circle.support_px = support;
+  return circle;
+}
+
+Observations Assemble(std::vector<CircleEvidence> circles, std::vector<DetectedPencil> pencils,
+                      int max_pencils = 3, const std::vector<DetectedLine>& bent = {}) {
+  Observations observations;
+  AssemblyOptions options;
+  options.max_pencils = max_pencils;
+  AssembleObservations(options, {}, bent, &circles, &pencils, &observations);
+  return observations;
+}
+
+const Matrix3d kFrame = ExpRotation(Vector3d(0.5, -0.3, 0.4));
+
+TEST(CircleNormals, BothAndTheirSpread) {
+  const Vector3d normal = Vector3d(0.3, 0.5, -1.0).normalized();
+  const CircleEvidence circle = Circle(normal, 100.0);
+  ASSERT_EQ(circle.num_normals, 2);
+  EXPECT_LT(std::min(AxisDeg(circle.normals[0].vector, normal),
+                     AxisDeg(circle.normals[1].vector, normal)),
+            1e-6);
+  for (const UncertainDirection& n : circle.normals) {
+    EXPECT_GT(n.covariance.trace(), 0.0);
+    EXPECT_NEAR(n.vector.dot(n.covariance * n.vector), 0.0, 0.01 * n.covariance.trace());
+  }
+  ConicFit worse = *circle.observation.fit;
+  worse.ScaleCovariance(4.0);
+  std::array<UncertainDirection, 2> normals;
+  CircleNormals(worse, &normals);
+  EXPECT_NEAR(normals[0].covariance.trace(), 4.0 * circle.normals[0].covariance.trace(),
+              1e-3 * normals[0].covariance.trace());
+}
+
+TEST(AssembleObservations, OrthogonalPencilsBecomeAxes) {
+  const Observations found = Assemble(
+      {},
+      {Pencil(kFrame.col(0), 900.0), Pencil(kFrame.col(1), 700.0), Pencil(kFrame.col(2), 500.0)});
+  ASSERT_EQ(found.pencils.size(), 3U);
+  EXPECT_EQ(found.pencils[0].direction, PencilDirection::kX);
+  EXPECT_EQ(found.pencils[1].direction, PencilDirection::kY);
+  EXPECT_EQ(found.pencils[2].direction, PencilDirection::kZ);
+  EXPECT_EQ(found.pencils[0].plane, "p0");
+  EXPECT_EQ(found.pencils[1].plane, "p0");
+  EXPECT_TRUE(found.pencils[2].plane.empty());
+  EXPECT_EQ(found.pencils[2].id, "L2");
+  EXPECT_EQ(found.frame.plane, "p0");
+}
+
+TEST(AssembleObservations, ARightAngleIsATestNotAWish) {
+  for (const double off_deg : {0.3, 1.6, 5.0}) {
+    const double a = off_deg / kDegrees;
+    const Vector3d skew = std::cos(a) * kFrame.col(1) + std::sin(a) * kFrame.col(0);
+    const Observations found = Assemble({}, {Pencil(kFrame.col(0), 900.0), Pencil(skew, 700.0)});
+    const bool orthogonal = off_deg < 1.0;
+    EXPECT_EQ(found.pencils[0].direction,
+              orthogonal ? PencilDirection::kX : PencilDirection::kFree);
+    EXPECT_EQ(found.pencils[1].direction,
+              orthogonal ? PencilDirection::kY : PencilDirection::kFree);
+    EXPECT_EQ(found.pencils[1].plane, "p0");
+  }
+}
+
+TEST(AssembleObservations, ACircleChoosesThePairOfPencilsThatItAgreesWith) {
+  const std::vector<DetectedPencil> pencils = {
+      Pencil(kFrame.col(0), 500.0), Pencil(kFrame.col(1), 480.0), Pencil(kFrame.col(2), 460.0)};
+  const Observations found = Assemble({Circle(kFrame.col(1), 400.0)}, pencils);
+  ASSERT_EQ(found.circles.size(), 1U);
+  EXPECT_EQ(found.circles[0].plane, "p0");
+  ASSERT_EQ(found.pencils.size(), 3U);
+  // In the plane: the first and the third, which span it; the second is its normal.
+  EXPECT_LT(AxisDeg(found.pencils[0].fit->direction, kFrame.col(0)), 1e-6);
+  EXPECT_LT(AxisDeg(found.pencils[1].fit->direction, kFrame.col(2)), 1e-6);
+  EXPECT_EQ(found.pencils[2].direction, PencilDirection::kZ);
+}
+
+TEST(AssembleObservations, CirclesAloneAgreeOnAPlane) {
+  const Vector3d normal = Vector3d(0.3, 0.5, -1.0), other = Vector3d(-0.6, 0.1, -0.7);
+  const Observations found =
+      Assemble({Circle(other, 300.0), Circle(normal, 200.0), Circle(normal, 180.0)}, {});
+  ASSERT_EQ(found.circles.size(), 3U);
+  EXPECT_EQ(found.circles[0].id, "c0");
+  EXPECT_EQ(found.circles[0].plane, "p0");
+  EXPECT_EQ(found.circles[1].plane, "p0");
+  EXPECT_TRUE(found.circles[2].plane.empty());
+}
+
+// A lone circle leaves two normals, and nothing says where x is; a box on its plane says both.
+TEST(AssembleObservations, ABoxOnACirclesPlaneGivesTheAxes) {
+  Random random(1);
+  const Matrix3d axes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
+  const std::vector<DetectedLine> edges =
+      detection_test::BoxEdges(detection_test::TestCamera(), axes, 0.2, &random);
+  const Vector3d unrelated(1.0, 1.0, 1.0);
+  const Observations found =
+      Assemble({Circle(axes.col(2), 500.0)}, {Pencil(unrelated, 900.0)}, 3, edges);
+  ASSERT_EQ(found.circles.size(), 1U);
+  EXPECT_EQ(found.circles[0].plane, "p0");
+  EXPECT_EQ(found.frame.plane, "p0");
+  ASSERT_EQ(found.pencils.size(), 3U);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const PencilObservation& pencil = found.pencils[k];
+    EXPECT_EQ(pencil.direction, static_cast<PencilDirection>(k));
+    EXPECT_EQ(pencil.plane, k < 2 ? "p0" : "");
+    EXPECT_EQ(pencil.lines.size(), 3U);
+    for (const LineObservation& line : pencil.lines) {
+      EXPECT_LT(std::abs(line.fit->line.dot(axes.col(static_cast<Eigen::Index>(k)))), 0.02);
+      // Points of edges that may be worn count for less than they scatter.
+      EXPECT_GT(line.sigma_px, 0.3);
+    }
+  }
+}
+
+TEST(AssembleObservations, TwoPencilsOfAPlaneNeedNoBox) {
+  Random random(1);
+  const Matrix3d axes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
+  const std::vector<DetectedLine> edges =
+      detection_test::BoxEdges(detection_test::TestCamera(), axes, 0.2, &random);
+  const Observations found =
+      Assemble({}, {Pencil(kFrame.col(0), 500.0), Pencil(kFrame.col(1), 400.0)}, 3, edges);
+  ASSERT_EQ(found.pencils.size(), 2U);
+  EXPECT_LT(AxisDeg(found.pencils[0].fit->direction, kFrame.col(0)), 0.1);
+}
+
+// Of directions in their plane only those of lines among them: others are so by accident.
+TEST(AssembleObservations, LinesFarFromAPlanesCirclesAreNotInIt) {
+  for (const bool is_far : {false, true}) {
+    std::vector<CircleEvidence> circles;
+    for (int k = 0; k < 3; ++k) {
+      circles.push_back(Circle(kFrame.col(2), 300.0, Vector3d(2.0 * k - 2.0, 1.0 * k, 6.0)));
+      circles.back().observation.points = {{100.0 * k, 0.0}, {100.0 * k, 50.0}};
+    }
+    DetectedPencil pencil = Pencil(kFrame.col(0), 200.0);
+    for (Eigen::Vector2d& end : pencil.ends[0]) end.y() += is_far ? 200.0 : 25.0;
+    const Observations found = Assemble(circles, {pencil});
+    ASSERT_EQ(found.pencils.size(), 1U);
+    EXPECT_EQ(found.pencils[0].plane, is_far ? "" : "p0");
+  }
+}
+
+TEST(AssembleObservations, KeepsNoMorePencilsThanAsked) {
+  const Observations found =
+      Assemble({}, {Pencil(kFrame.col(0), 900.0), Pencil(kFrame.col(1), 700.0)}, 1);
+  EXPECT_EQ(found.pencils.size(), 1U);
+  EXPECT_TRUE(Assemble({}, {}).frame.plane.empty());
+}
+
+}  // namespace
+}  // namespace circline

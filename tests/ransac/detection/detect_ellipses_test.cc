@@ -1,0 +1,299 @@
+#include "circline/ransac/detection/detect_ellipses.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/conic.h"
+#include "tests/ransac/detection/detection_test_util.h"
+
+namespace circline {
+namespace {
+
+using detection_test::AxisDeg;
+using detection_test::DataFolder;
+using detection_test::Develop;
+using detection_test::DistortedCamera;
+using detection_test::FisheyeCamera;
+using detection_test::HasSet;
+using detection_test::kPi;
+using detection_test::LookAt;
+using detection_test::Noise;
+using detection_test::Render;
+using detection_test::RenderPlane;
+using detection_test::TestCamera;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+std::vector<DetectedEllipse> Detect(const cv::Mat& image, const Camera& camera,
+                                    const EllipseOptions& options = {}) {
+  EdgeMap edges;
+  EXPECT_TRUE(DetectEdges(image, EdgeOptions(), &edges).ok());
+  std::vector<DetectedEllipse> ellipses;
+  EXPECT_TRUE(DetectEllipses(edges, camera, options, &ellipses).ok());
+  for (const DetectedEllipse& e : ellipses) {
+    EXPECT_TRUE(e.fit.conic.allFinite());
+    EXPECT_GE(e.points.size(), 6U);
+    for (const int i : e.points) EXPECT_LT(static_cast<std::size_t>(i), edges.points.size());
+  }
+  return ellipses;
+}
+
+// A dark disc of radius 1 on the plane of `pose`, within a bright one of `outer` if that is more.
+cv::Mat Disc(const Camera& camera, const CameraPose& pose, double outer = 0.0, double noise = 0.0) {
+  return Develop(RenderPlane(camera, pose, 120.0,
+                             [outer](double x, double y) {
+                               const double r = std::hypot(x, y);
+                               return r < 1.0 ? 40.0 : r < outer ? 210.0 : 120.0;
+                             }),
+                 0.7, noise);
+}
+
+double BetterNormalDeg(const DetectedEllipse& e, const Vector3d& normal) {
+  std::array<CirclePose, 2> poses;
+  const int n = CirclePoses(e.fit.conic, &poses);
+  double best = 180.0;
+  for (int k = 0; k < n; ++k) {
+    best = std::min(best, AxisDeg(poses[static_cast<std::size_t>(k)].normal, normal));
+  }
+  return best;
+}
+
+TEST(DetectEllipses, FindsATiltedDiscThroughEveryLens) {
+  for (const Camera& camera : {TestCamera(), DistortedCamera(), FisheyeCamera()}) {
+    const double distance = camera.fx > 300.0 ? 5.0 : 2.5;
+    for (const double tilt : {20.0, 45.0, 65.0}) {
+      CameraPose pose = LookAt(tilt, 10.0, 0.0, distance);
+      pose.translation += Vector3d(0.6, -0.3, 0.0);  // Off the axis, where the lens bends.
+      const std::vector<DetectedEllipse> found = Detect(Disc(camera, pose), camera);
+      ASSERT_EQ(found.size(), 1U) << "tilt " << tilt << " focal " << camera.fx;
+      EXPECT_GT(found[0].coverage_deg, 350.0);
+      EXPECT_EQ(found[0].bright, BrightSide::kOutside);
+      EXPECT_LT(found[0].fit.rms_px, 0.1);
+      EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3) << "tilt " << tilt;
+    }
+  }
+}
+
+TEST(DetectEllipses, NeverRoundsAnEllipseToACircle) {
+  Ellipse truth;
+  truth.center = {150.3, 140.8};
+  truth.a = 80.0;
+  truth.b = 78.0;  // A tilt of 13 degrees.
+  truth.angle = 0.7;
+  const Eigen::Matrix3d conic = EllipseToConic(truth);
+  const cv::Mat image = Develop(Render(300, 280, [&conic](double u, double v) {
+    const Vector3d x(u, v, 1.0);
+    return x.dot(conic * x) * conic(0, 0) < 0.0 ? 30.0 : 170.0;
+  }));
+  Camera camera = TestCamera(300, 280, 300.0);
+  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  ASSERT_EQ(found.size(), 1U);
+  Ellipse e;
+  ASSERT_TRUE(ConicToEllipse(found[0].fit.conic, &e));
+  EXPECT_NEAR(camera.fx * e.a, truth.a, 0.1);
+  EXPECT_NEAR(camera.fx * e.b, truth.b, 0.1);
+  EXPECT_NEAR(e.angle, truth.angle, 0.03);
+}
+
+TEST(DetectEllipses, GroupsTheRimsOfARing) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(40.0, 0.0, 0.0, 6.0);
+  std::vector<DetectedEllipse> found = Detect(Disc(camera, pose, 1.6), camera);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_GE(found[0].concentric, 0);
+  EXPECT_EQ(found[0].concentric, found[1].concentric);
+  // The outer one is longer, and brighter inside; the inner one holds the dark disc.
+  EXPECT_GT(found[0].length_px, found[1].length_px);
+  EXPECT_EQ(found[0].bright, BrightSide::kInside);
+  EXPECT_EQ(found[1].bright, BrightSide::kOutside);
+}
+
+TEST(DetectEllipses, KeepsNeighboursApart) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(30.0, 5.0, 10.0, 14.0);
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [](double x, double y) {
+    if (std::abs(x) > 3.7 || std::abs(y) > 2.2) return 200.0;
+    const double u = x - 1.5 * std::round(x / 1.5), v = y - 1.5 * std::round(y / 1.5);
+    return std::hypot(u, v) < 0.4 ? 30.0 : 200.0;
+  }));
+  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  EXPECT_EQ(found.size(), 15U);  // 5 x 3.
+  for (const DetectedEllipse& e : found) EXPECT_EQ(e.concentric, -1);
+}
+
+TEST(DetectEllipses, FindsAnOccludedDisc) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(35.0, 20.0, 0.0, 5.0);
+  // A bar across the middle and a quarter cut away: three arcs of one ellipse.
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 120.0,
+                                            [](double x, double y) {
+                                              if (std::abs(y) < 0.2 || (x > 0.3 && y > 0.0))
+                                                return 120.0;
+                                              return std::hypot(x, y) < 1.0 ? 40.0 : 120.0;
+                                            }),
+                                0.7, 2.0);
+  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_GT(found[0].coverage_deg, 150.0);
+  EXPECT_LT(found[0].coverage_deg, 290.0);
+  EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 1.0);
+}
+
+TEST(DetectEllipses, FindsAGreyDiscBeforeBlackAndWhite) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(40.0, 10.0, 0.0, 6.0);
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 20.0, [](double x, double y) {
+    return std::hypot(x, y) < 1.0 ? 120.0 : x + 0.3 * y < 0.1 ? 20.0 : 220.0;
+  }));
+  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].bright, BrightSide::kEither);
+  EXPECT_GT(found[0].coverage_deg, 300.0);
+  EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3);
+}
+
+TEST(DetectEllipses, FindsADiscAmongWhatTouchesIt) {
+  // A small disc of the same colour grows out of the rim: one chain, the ellipse a part of it.
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(35.0, 10.0, 0.0, 5.0);
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [](double x, double y) {
+    return std::hypot(x, y) < 1.0 || std::hypot(x - 1.05, y - 0.2) < 0.25 ? 40.0 : 200.0;
+  }));
+  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  ASSERT_GE(found.size(), 1U);
+  EXPECT_GT(found[0].coverage_deg, 290.0);
+  EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3);
+}
+
+TEST(DetectEllipses, UndoesWhatTheBendDoesToTheRim) {
+  // The smoothing alone draws the rim inward by 0.06 px at a radius of 8 px, its ends by more.
+  for (const double blur : {0.7, 1.2}) {
+    Ellipse truth;
+    truth.center = {60.4, 50.7};
+    truth.a = 14.0;
+    truth.b = 8.0;
+    truth.angle = 0.6;
+    const Eigen::Matrix3d conic = EllipseToConic(truth);
+    const cv::Mat image = Develop(Render(120, 100,
+                                         [&conic](double u, double v) {
+                                           const Vector3d x(u, v, 1.0);
+                                           return x.dot(conic * x) < 0.0 ? 30.0 : 190.0;
+                                         }),
+                                  blur);
+    const Camera camera = TestCamera(120, 100, 300.0);
+    const std::vector<DetectedEllipse> found = Detect(image, camera);
+    ASSERT_EQ(found.size(), 1U);
+    Ellipse e;
+    ASSERT_TRUE(ConicToEllipse(found[0].fit.conic, &e));
+    EXPECT_NEAR(camera.fx * e.a, truth.a, 0.03) << blur;
+    EXPECT_NEAR(camera.fx * e.b, truth.b, 0.03) << blur;
+    ASSERT_EQ(found[0].contour.size(), found[0].points.size());
+  }
+}
+
+// Semi-axes in pixels.
+Ellipse InPixels(const DetectedEllipse& found, const Camera& camera) {
+  Ellipse e;
+  EXPECT_TRUE(ConicToEllipse(found.fit.conic, &e));
+  e.center = camera.fx * e.center + Vector2d(camera.cx, camera.cy);
+  e.a *= camera.fx;
+  e.b *= camera.fx;
+  return e;
+}
+
+// A photograph blurred by motion: grey copies of the dots lie on either side of them, and their
+// edges run beside the rims over part of these.
+TEST(DetectEllipses, KeepsToTheRimsBesideAPenumbra) {
+  if (!HasSet("ellipses-labelled")) GTEST_SKIP() << "no photographs in " << DataFolder();
+  const std::string folder = DataFolder() + "/ellipses-labelled/", file = "dots_00005.png";
+  const cv::Mat image = cv::imread(folder + file, cv::IMREAD_GRAYSCALE);
+  const Camera camera = TestCamera(image.cols, image.rows, image.cols);
+  std::vector<Ellipse> found;
+  for (const DetectedEllipse& e : Detect(image, camera)) found.push_back(InPixels(e, camera));
+  const cv::FileStorage storage(folder + "groundtruth.yml", cv::FileStorage::READ);
+  int labels = 0, hits = 0;
+  for (const cv::FileNode& node : storage["images"]) {
+    if (static_cast<std::string>(node["file"]) != file) continue;
+    for (const cv::FileNode& label : node["ellipses"]) {
+      cv::Mat truth;  // Centre, semi-axes, angle.
+      label["ellipse"] >> truth;
+      ++labels;
+      hits += std::any_of(found.begin(), found.end(), [&truth](const Ellipse& e) {
+        return std::hypot(e.center.x() - truth.at<double>(0), e.center.y() - truth.at<double>(1)) <
+                   0.5 &&
+               std::abs(e.a - truth.at<double>(2)) < 0.5 &&
+               std::abs(e.b - truth.at<double>(3)) < 0.5;
+      });
+    }
+  }
+  EXPECT_EQ(labels, 60);
+  EXPECT_GE(hits, 53);
+}
+
+TEST(DetectEllipses, RespectsItsLimits) {
+  const Camera camera = TestCamera();
+  const cv::Mat image = Disc(camera, LookAt(40.0, 0.0, 0.0, 6.0), 1.6);
+  EllipseOptions options;
+  options.max_ellipses = 1;
+  EXPECT_EQ(Detect(image, camera, options).size(), 1U);
+  options.max_ellipses = 0;
+  EXPECT_TRUE(Detect(image, camera, options).empty());
+  options = EllipseOptions();
+  options.min_axis_px = 80.0;  // The inner semi-axes are about 83 x 63, the outer ones 133 x 101.
+  EXPECT_EQ(Detect(image, camera, options).size(), 1U);
+}
+
+TEST(DetectEllipses, FindsNoneWhereThereAreNone) {
+  const Camera camera = TestCamera(320, 240);
+  EXPECT_TRUE(Detect(cv::Mat(240, 320, CV_8UC1, cv::Scalar(100)), camera).empty());
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    EXPECT_TRUE(Detect(Noise(320, 240, 30.0, seed), camera).empty()) << seed;
+  }
+  const cv::Mat squares = Develop(Render(320, 240, [](double u, double v) {
+    return std::fmod(u, 60.0) < 30.0 && std::fmod(v, 60.0) < 30.0 ? 40.0 : 190.0;
+  }));
+  EXPECT_TRUE(Detect(squares, camera).empty());
+}
+
+TEST(DetectEllipses, IsRepeatable) {
+  const Camera camera = TestCamera();
+  const cv::Mat image = Disc(camera, LookAt(40.0, 15.0, 0.0, 6.0), 1.6, 10.0);
+  const std::vector<DetectedEllipse> a = Detect(image, camera), b = Detect(image, camera);
+  ASSERT_EQ(a.size(), 2U);
+  ASSERT_EQ(b.size(), 2U);
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    EXPECT_EQ(a[k].points, b[k].points);
+    EXPECT_TRUE(a[k].fit.conic == b[k].fit.conic);
+  }
+}
+
+TEST(DetectEllipses, NamesTheOptionThatIsWrong) {
+  const EdgeMap edges;
+  std::vector<DetectedEllipse> found;
+  const auto message = [&](const EllipseOptions& options) {
+    return DetectEllipses(edges, TestCamera(), options, &found).message;
+  };
+  EllipseOptions options;
+  options.min_axis_px = 0.0;
+  EXPECT_NE(message(options).find("min_axis_px"), std::string::npos);
+  options = EllipseOptions();
+  options.min_arc_deg = 400.0;
+  EXPECT_NE(message(options).find("min_arc_deg"), std::string::npos);
+  options = EllipseOptions();
+  options.max_ellipses = -1;
+  EXPECT_NE(message(options).find("max_ellipses"), std::string::npos);
+  options = EllipseOptions();
+  options.max_rms_px = std::nan("");
+  EXPECT_NE(message(options).find("max_rms_px"), std::string::npos);
+  EXPECT_FALSE(DetectEllipses(edges, Camera(), EllipseOptions(), &found).ok());
+}
+
+}  // namespace
+}  // namespace circline

@@ -1,0 +1,126 @@
+#include "circline/ransac/detection/find_box.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "circline/estimators/pose.h"
+#include "tests/ransac/detection/detected_line_scene.h"
+#include "tests/ransac/detection/detection_test_util.h"
+
+namespace circline {
+namespace {
+
+using detection_test::AxisDeg;
+using detection_test::LineThrough;
+using detection_test::TestCamera;
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kNoisePx = 0.2;
+
+// Of a box seen from above.
+const Matrix3d kAxes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
+
+std::vector<DetectedLine> BoxEdges(const Camera& camera, Random* random) {
+  return detection_test::BoxEdges(camera, kAxes, kNoisePx, random);
+}
+
+std::vector<DetectedLine> Clutter(const Camera& camera, int count, Random* random) {
+  std::vector<DetectedLine> lines;
+  for (int i = 0; i < count; ++i) {
+    const Vector2d from(random->Uniform(20.0, 460.0), random->Uniform(20.0, 340.0));
+    const double angle = random->Uniform(0.0, 2.0 * M_PI), length = random->Uniform(20.0, 90.0);
+    const Vector2d to = from + length * Vector2d(std::cos(angle), std::sin(angle));
+    lines.push_back(LineThrough(camera, from, to, kNoisePx, random));
+  }
+  return lines;
+}
+
+// Of the first of a box's axes, whichever of its edges that is.
+double AxisErrorDeg(const Vector3d& axis) {
+  return std::min(AxisDeg(axis, kAxes.col(0)), AxisDeg(axis, kAxes.col(1)));
+}
+
+TEST(FindBox, FindsItsAxesOnTheRightOfTwoPlanes) {
+  const Camera camera = TestCamera();
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed);
+    std::vector<DetectedLine> lines = BoxEdges(camera, &random);
+    ASSERT_EQ(lines.size(), 9u);
+    const std::vector<DetectedLine> clutter = Clutter(camera, 100, &random);
+    lines.insert(lines.end(), clutter.begin(), clutter.end());
+    const Vector3d wrong = ExpRotation(Vector3d(0.9, 0.3, 0.0)) * kAxes.col(2);
+    const auto box = FindBox(lines, {wrong, kAxes.col(2)});
+    ASSERT_TRUE(box.has_value()) << seed;
+    EXPECT_EQ(box->normal, 1u) << seed;
+    // Edges of 100 pixels that may be worn by a third of a pixel: 0.7 degrees each.
+    EXPECT_LT(AxisErrorDeg(box->axes.col(0)), 1.0) << seed;
+    EXPECT_NEAR(box->axes.determinant(), 1.0, 1e-9);
+    // All three edges along each direction, and hardly anything else.
+    for (const DetectedPencil& pencil : box->pencils) {
+      EXPECT_GE(
+          std::count_if(pencil.members.begin(), pencil.members.end(), [](int i) { return i < 9; }),
+          3)
+          << seed;
+      EXPECT_LE(pencil.members.size(), 6u) << seed;
+    }
+    EXPECT_GE(box->pencils[0].support_px, box->pencils[1].support_px);
+  }
+}
+
+// A rim's normal is a degree or two off.
+TEST(FindBox, BearsANormalThatIsOff) {
+  const Camera camera = TestCamera();
+  Random random(1);
+  const std::vector<DetectedLine> lines = BoxEdges(camera, &random);
+  const Vector3d normal = ExpRotation(Vector3d(0.025, 0.01, 0.0)) * kAxes.col(2);
+  const auto box = FindBox(lines, {normal});
+  ASSERT_TRUE(box.has_value());
+  EXPECT_LT(AxisErrorDeg(box->axes.col(0)), 2.0);
+}
+
+// The same directions, but no corners: an accident.
+TEST(FindBox, NeedsCorners) {
+  const Camera camera = TestCamera();
+  Random random(1);
+  std::vector<DetectedLine> lines = BoxEdges(camera, &random);
+  for (DetectedLine& line : lines) {
+    const Vector2d middle = 0.5 * (line.ends[0] + line.ends[1]);
+    for (Vector2d& end : line.ends) end = middle + 0.3 * (end - middle);
+  }
+  EXPECT_FALSE(FindBox(lines, {kAxes.col(2)}).has_value());
+}
+
+TEST(FindBox, DoesNotChooseBetweenPlanesThatItCannotTellApart) {
+  const Camera camera = TestCamera();
+  Random random(1);
+  const std::vector<DetectedLine> lines = BoxEdges(camera, &random);
+  const Vector3d nearly = ExpRotation(Vector3d(1e-4, 0.0, 0.0)) * kAxes.col(2);
+  EXPECT_FALSE(FindBox(lines, {kAxes.col(2), nearly}).has_value());
+}
+
+TEST(FindBox, IsRareByAccident) {
+  const Camera camera = TestCamera();
+  Random random(7);
+  int found = 0;
+  constexpr int kTrials = 300;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Vector3d normal = Vector3d(random.Normal(), random.Normal(), random.Normal());
+    found += FindBox(Clutter(camera, 150, &random), {normal.normalized()}).has_value() ? 1 : 0;
+  }
+  // Fewer than on photographs, whose lines are less independent than these.
+  EXPECT_LE(found, kTrials / 50);
+}
+
+TEST(FindBox, NothingInNothingOut) {
+  EXPECT_FALSE(FindBox({}, {Vector3d::UnitZ()}).has_value());
+  Random random(1);
+  EXPECT_FALSE(FindBox(BoxEdges(TestCamera(), &random), {}).has_value());
+}
+
+}  // namespace
+}  // namespace circline

@@ -1,0 +1,96 @@
+#include "circline/ransac/detection/local_pencils.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "tests/ransac/detection/detected_line_scene.h"
+#include "tests/ransac/detection/detection_test_util.h"
+
+namespace circline {
+namespace {
+
+using detection_test::AxisDeg;
+using detection_test::MakeLine;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+const Vector3d kRow = Vector3d(0.95, 0.1, 0.3).normalized();
+const Vector3d kColumn = Vector3d(-0.1, 0.97, 0.2).normalized();
+
+// A board of 5 x 5 sides each way in the middle of the photo, each turned by noise of `bend`
+// radians; then rows and columns of something else, far from it, half a degree off.
+struct Scene {
+  std::vector<DetectedLine> lines;
+  std::array<DetectedPencil, 2> pair;
+  int num_board = 0;
+};
+
+void Add(double u, double v, const Vector3d& direction, double length, double turn, Random* random,
+         std::vector<DetectedLine>* lines) {
+  lines->push_back(
+      MakeLine(detection_test::TestCamera(), u, v, direction, length, turn, 0.1, random));
+}
+
+// What a search would find: all lines, none of them better known than another.
+DetectedPencil Found(const std::vector<DetectedLine>& lines, const Vector3d& direction) {
+  DetectedPencil pencil;
+  pencil.observation.fit = VanishingPointFit();
+  pencil.observation.fit->direction = direction;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (std::abs(lines[i].fit.line.dot(direction)) > 0.03) continue;
+    pencil.members.push_back(static_cast<int>(i));
+    pencil.ends.push_back(lines[i].ends);
+    pencil.support_px += lines[i].length_px;
+  }
+  return pencil;
+}
+
+Scene MakeScene(double bend, int num_board_rows, int num_others) {
+  Scene scene;
+  Random random(7);
+  for (int i = 0; i < num_board_rows; ++i) {
+    for (int j = 0; j < 5; ++j) {
+      const double u = 160.0 + 30.0 * j, v = 120.0 + 30.0 * i;
+      Add(u, v, kRow, 28.0, bend * random.Normal(), &random, &scene.lines);
+      Add(u - 14.0, v + 14.0, kColumn, 28.0, bend * random.Normal(), &random, &scene.lines);
+    }
+  }
+  scene.num_board = static_cast<int>(scene.lines.size());
+  for (int k = 0; k < num_others; ++k) {
+    Add(420.0, 20.0 + 30.0 * k, kRow, 60.0, 0.01, &random, &scene.lines);
+    Add(40.0, 20.0 + 70.0 * k, kColumn, 60.0, 0.01, &random, &scene.lines);
+  }
+  scene.pair = {Found(scene.lines, kRow), Found(scene.lines, kColumn)};
+  return scene;
+}
+
+TEST(LocalPencils, TakeTheLinesOfTheBoardAndNoOthers) {
+  for (const double bend : {0.001, 0.012}) {
+    Scene scene = MakeScene(bend, 5, 4);
+    ASSERT_TRUE(RefitWhereTheyMeet(scene.lines, &scene.pair)) << bend;
+    std::set<int> members;
+    for (const DetectedPencil& pencil : scene.pair) {
+      members.insert(pencil.members.begin(), pencil.members.end());
+    }
+    EXPECT_LT(*members.rbegin(), scene.num_board) << bend;
+    EXPECT_GE(members.size(), 0.8 * scene.num_board) << bend;
+    const double sigma =
+        detection_test::kDegrees * std::sqrt(scene.pair[0].observation.fit->covariance.trace());
+    EXPECT_LT(AxisDeg(scene.pair[0].observation.fit->direction, kRow), 3.0 * sigma) << bend;
+    EXPECT_LT(sigma, 3.0) << bend;
+  }
+}
+
+TEST(LocalPencils, LeaveDirectionsOfTheWholePhotoAlone) {
+  // Little of either pencil is where they meet.
+  Scene scene = MakeScene(0.001, 1, 5);
+  const std::vector<int> before = scene.pair[0].members;
+  EXPECT_FALSE(RefitWhereTheyMeet(scene.lines, &scene.pair));
+  EXPECT_EQ(scene.pair[0].members, before);
+  EXPECT_FALSE(RefitWhereTheyMeet({}, &scene.pair));
+}
+
+}  // namespace
+}  // namespace circline
