@@ -105,7 +105,7 @@ class PlaneCircleContourCost : public FeatureCost {
 // Line of a direction: rotation, direction, line (1 or 2), [camera]. `line`: where it lies across
 // the direction, an angle about it, radians, from where it is nearest to `fit`; and, unless
 // direction_sigma is 0, by how much its own direction deviates from the common one, radians, which
-// has a prior here of that standard deviation, with long tails: most lines are more exact.
+// has a prior here of that standard deviation; most lines are more exact.
 class DirectionLineCost : public FeatureCost {
  public:
   struct Options {

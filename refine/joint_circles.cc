@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "circline/refine/joint_builder.h"
-#include "circline/refine/long_tails.h"
+#include "circline/refine/mostly_exact.h"
 
 namespace circline {
 
@@ -104,7 +104,7 @@ int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
     block = AddBlock(1, {0.0});
     AddTerm(std::unique_ptr<ceres::CostFunction>(NewGaussianPrior({model_.contour_offset_px})),
             {block});
-    p_.terms_.back().loss = std::make_unique<LongTails>();
+    p_.terms_.back().loss = std::make_unique<MostlyExact>();
   }
   return block;
 }

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "circline/refine/joint_builder.h"
-#include "circline/refine/long_tails.h"
 #include "circline/refine/manifolds.h"
+#include "circline/refine/mostly_exact.h"
 
 namespace circline {
 namespace {
@@ -45,7 +45,7 @@ int JointProblemBuilder::DirectionBlock(const PencilObservation& pencil) {
               is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma)
                       : NewDirectionPrior(axis, sigma)),
           {block}, feature);
-  p_.terms_.back().loss = std::make_unique<LongTails>();
+  p_.terms_.back().loss = std::make_unique<MostlyExact>();
   return block;
 }
 

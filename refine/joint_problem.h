@@ -63,7 +63,7 @@ struct Term {
   int feature = -1;                // -1: always there.
   int group = -1;                  // Of the blocks that are nobody else's.
   FeatureCost* weighed = nullptr;  // The same, where it can be weighed anew.
-  // Of a prior with long tails; its covariance is that of the residuals without it.
+  // Of a prior that is mostly exact; its covariance is that of the residuals without it.
   std::unique_ptr<ceres::LossFunction> loss;
 };
 

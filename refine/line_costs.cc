@@ -7,7 +7,7 @@
 
 #include "circline/refine/block_chain.h"
 #include "circline/refine/cost_functions.h"
-#include "circline/refine/long_tails.h"
+#include "circline/refine/mostly_exact.h"
 #include "circline/refine/square_root.h"
 
 namespace circline {
@@ -22,13 +22,13 @@ int RankOf(const ImagePoints& points, bool camera) {
   return 2 + (camera ? points.options().num_distortion : 0);
 }
 
-// A residual under LongTails, as one that is squared: its value, and that by the residual.
-struct LongTailed {
+// A residual under MostlyExact, as one that is squared: its value, and that by the residual.
+struct AsSquare {
   double value, slope;
 
-  explicit LongTailed(double r) {
+  explicit AsSquare(double r) {
     double rho[3];
-    LongTails().Evaluate(r * r, rho);
+    MostlyExact().Evaluate(r * r, rho);
     slope = std::sqrt(rho[1]);
     value = slope * r;
     constexpr double kNone = 1e-6;  // There they are the limits.
@@ -129,7 +129,7 @@ bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* con
   if (!std::isfinite(twice_cost)) return false;
   const int rows = num_residuals(), line_rows = rows - (soft ? 1 : 0);
   const double deviation = soft ? p.e / options_.direction_sigma : 0.0;
-  const LongTailed prior(deviation);
+  const AsSquare prior(deviation);
   if (soft) residuals[line_rows] = weighing.inliers_only ? deviation : prior.value;
   if (jacobians == nullptr) {
     CostOnly(twice_cost, line_rows, residuals);

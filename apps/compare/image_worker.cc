@@ -17,7 +17,7 @@ WorkedImage ImageWorker::Work(SceneImage image) const {
     const std::vector<std::uint8_t> png = EncodePng(DrawOverlay(run));
     worked.status = WriteFile(options_.output + "/" + overlay, std::string(png.begin(), png.end()));
   }
-  worked.lines = WriteLines(run, overlay, options_.unusual_flags);
+  worked.lines = WriteLines(run, overlay, options_.unusual_flags, options_.fit.noise_model);
   worked.read_error = run.read_error;
   return worked;
 }

@@ -144,7 +144,7 @@ Json EllipseJson(const CircleObservation& circle) {
   return json;
 }
 
-Json PencilJson(const PencilObservation& pencil) {
+Json PencilJson(const PencilObservation& pencil, double pencil_axis_rad) {
   Json json;
   json["id"] = pencil.id;
   json["direction"] = pencil.fit ? Array(pencil.fit->direction) : Json();
@@ -152,8 +152,9 @@ Json PencilJson(const PencilObservation& pencil) {
   if (pencil.fit) {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(pencil.fit->covariance,
                                                                Eigen::EigenvaluesOnly);
+    const double variance = std::max(0.0, eigen.eigenvalues()[2]);
     json["sigma_deg"] =
-        Number(std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) * kDegreesPerRadian);
+        Number(std::sqrt(variance + pencil_axis_rad * pencil_axis_rad) * kDegreesPerRadian);
   } else {
     json["sigma_deg"] = nullptr;
   }
@@ -201,7 +202,8 @@ Json CameraJson(const ImageRun& run) {
 }
 
 std::string ObservationLine(const ImageRun& run, const std::string& overlay,
-                            const std::vector<std::string>& flags, const LineCounts& counts) {
+                            const std::vector<std::string>& flags, const NoiseModel& noise,
+                            const LineCounts& counts) {
   Json line;
   line["image"] = run.image->name;
   line["index"] = run.image->index;
@@ -217,7 +219,7 @@ std::string ObservationLine(const ImageRun& run, const std::string& overlay,
       const Segment s = EndPoints(observed);
       line["segments"].push_back({s[0].x(), s[0].y(), s[1].x(), s[1].y(), pencil.id});
     }
-    line["pencils"].push_back(PencilJson(pencil));
+    line["pencils"].push_back(PencilJson(pencil, noise.pencil_axis_rad));
   }
   line["problems"] = run.problems;
   line["overlay"] = TextOrNull(overlay);
@@ -252,12 +254,12 @@ std::size_t CountLines(const std::string& text) {
 }  // namespace
 
 ImageLines WriteLines(const ImageRun& run, const std::string& overlay,
-                      const std::vector<std::string>& flags) {
+                      const std::vector<std::string>& flags, const NoiseModel& noise) {
   ImageLines lines;
   lines.results = ResultLines(run);
   lines.timings = TimingLines(run);
   const LineCounts counts{run.image->index, CountLines(lines.results), CountLines(lines.timings)};
-  lines.observations = ObservationLine(run, overlay, flags, counts);
+  lines.observations = ObservationLine(run, overlay, flags, noise, counts);
   return lines;
 }
 

@@ -7,6 +7,7 @@
 
 #include "apps/compare/image_run.h"
 #include "apps/compare/record.h"
+#include "circline/estimators/noise_model.h"
 
 namespace circline::apps {
 
@@ -17,9 +18,10 @@ namespace circline::apps {
 // semi-axes; `coverage` is the share of the ellipse's full turn that has points; `index` counts the
 // images of the whole set, `lines` those of the other files that belong to this one. A photo that
 // could not be used has an `error`. `overlay` may be empty, and so may `flags`, those with which
-// the run was made where they are not the default (CompareOptions::unusual_flags).
+// the run was made where they are not the default (CompareOptions::unusual_flags). `sigma_deg` of a
+// pencil counts what walls lean and boards bend (`noise`), as the solvers do.
 ImageLines WriteLines(const ImageRun& run, const std::string& overlay,
-                      const std::vector<std::string>& flags);
+                      const std::vector<std::string>& flags, const NoiseModel& noise);
 
 }  // namespace circline::apps
 

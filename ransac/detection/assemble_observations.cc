@@ -291,7 +291,7 @@ class Assembler {
         PlacedPencil& x = pencils_[static_cast<std::size_t>(order[a])];
         PlacedPencil& y = pencils_[static_cast<std::size_t>(order[b])];
         const bool grid = x.of_grid && y.of_grid && Rectangular(x.direction, y.direction);
-        if (!grid && !Orthogonal(x.direction, y.direction)) continue;
+        if (!grid && !(LogOddsOfRightAngle(x.direction, y.direction) > 0.0)) continue;
         x.observation.direction = PencilDirection::kX;
         y.observation.direction = PencilDirection::kY;
         SetNormalRole(x.direction, y.direction);
@@ -319,7 +319,10 @@ class Assembler {
   void SetNormalRole(const UncertainDirection& x, const UncertainDirection& y) {
     for (PlacedPencil& pencil : pencils_) {
       if (!pencil.observation.plane.empty()) continue;
-      if (!Orthogonal(pencil.direction, x) || !Orthogonal(pencil.direction, y)) continue;
+      if (!(LogOddsOfRightAngle(pencil.direction, x) > 0.0) ||
+          !(LogOddsOfRightAngle(pencil.direction, y) > 0.0)) {
+        continue;
+      }
       pencil.observation.direction = PencilDirection::kZ;
       return;
     }

@@ -23,12 +23,10 @@ constexpr double kRadians = 3.14159265358979323846 / 180.0;
 constexpr double kModelSigmaDeg = 0.5;
 // Agreement is believed up to this many standard deviations.
 constexpr double kMaxSigmas = 3.0;
-// Two directions count as orthogonal within 2.5 standard deviations plus a quarter of a degree, and
-// never beyond 1.25 degrees: real streets and walls are off by more, and a false right angle
-// biases.
-constexpr double kOrthogonalSigmas = 2.5;
-constexpr double kOrthogonalDeg = 0.25;
-constexpr double kMaxOrthogonalDeg = 1.25;
+// The walls of most houses are at right angles, to about so much (each pair, standard deviation,
+// degrees); the others are at any angle.
+constexpr double kRightAngleSigmaDeg = 0.7;
+constexpr double kRightAngleShare = 0.5;
 // Rows and columns of a sheet of circles are made at right angles; paper that bends shows them at
 // others. A lattice this near to a rectangular one is rectangular.
 constexpr double kRectangularDeg = 4.0;
@@ -81,10 +79,15 @@ bool InPlane(const UncertainDirection& direction, const UncertainDirection& norm
          std::min(max_deg, kMaxSigmas * std::hypot(test.sigma_deg, kModelSigmaDeg));
 }
 
-bool Orthogonal(const UncertainDirection& a, const UncertainDirection& b) {
+// The angle between two directions without relation, from 90 degrees, has the density cos (per
+// radian, Archimedes).
+double LogOddsOfRightAngle(const UncertainDirection& a, const UncertainDirection& b) {
   const AngleTest test = CompareToRightAngle(a, b);
-  return test.angle_deg <=
-         std::min(kMaxOrthogonalDeg, kOrthogonalSigmas * test.sigma_deg + kOrthogonalDeg);
+  const double sigma = std::hypot(test.sigma_deg, kRightAngleSigmaDeg), r = test.angle_deg / sigma;
+  constexpr double kTwiceGaussian = 0.7978845608028654;  // 2 / sqrt(2 pi): no sense of sign.
+  return std::log(kRightAngleShare / (1.0 - kRightAngleShare) * kTwiceGaussian /
+                  (sigma * kRadians * std::cos(test.angle_deg * kRadians))) -
+         0.5 * r * r;
 }
 
 bool Rectangular(const UncertainDirection& a, const UncertainDirection& b) {

@@ -28,8 +28,8 @@ bool SamePlane(const UncertainDirection& a, const UncertainDirection& b, double 
 // Whether a direction can lie in the plane with a normal; never beyond `max_deg`.
 bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal, double max_deg);
 
-// Whether two directions are orthogonal as far as can be told, and to better than 1.25 degrees.
-bool Orthogonal(const UncertainDirection& a, const UncertainDirection& b);
+// Logarithm of the odds that two directions are at right angles, as houses are made, to any angle.
+double LogOddsOfRightAngle(const UncertainDirection& a, const UncertainDirection& b);
 
 // Whether two directions of a lattice are those of rows and columns, within 4 degrees.
 bool Rectangular(const UncertainDirection& a, const UncertainDirection& b);

@@ -38,13 +38,36 @@ TEST(UncertainDirection, WhatCanBeTheSameDependsOnHowWellItIsKnown) {
 }
 
 TEST(UncertainDirection, ARightAngleIsNeverFarFromOne) {
-  const UncertainDirection sharp = Make(InXy(0.0), 0.1), blunt = Make(InXy(0.0), 2.0);
-  EXPECT_TRUE(Orthogonal(sharp, Make(InXy(90.4), 0.1)));
-  EXPECT_FALSE(Orthogonal(sharp, Make(InXy(91.0), 0.1)));
-  EXPECT_TRUE(Orthogonal(blunt, Make(InXy(91.0), 0.1)));
-  EXPECT_FALSE(Orthogonal(blunt, Make(InXy(92.0), 0.1)));
+  const UncertainDirection sharp = Make(InXy(0.0), 0.1);
   EXPECT_TRUE(Rectangular(sharp, Make(InXy(93.0), 0.1)));
   EXPECT_FALSE(Rectangular(sharp, Make(InXy(95.0), 0.1)));
+}
+
+// Half of the pairs at right angles to 0.7 degrees, half at any angle: of those with odds about o,
+// o / (1 + o) are at right angles.
+TEST(UncertainDirection, TheOddsOfARightAngleAreThoseOfItsPrior) {
+  Random random(3);
+  const auto turn = [&random](double sigma_deg) { return sigma_deg * random.Normal() / kDegrees; };
+  int counts[3] = {0, 0, 0}, right[3] = {0, 0, 0};
+  for (int trial = 0; trial < 40000; ++trial) {
+    const bool is_right = random.Uniform() < 0.5;
+    const double sine = 2.0 * random.Uniform() - 1.0, sigma_deg = random.Uniform(0.1, 1.5);
+    const double angle = (is_right ? turn(0.7) : std::asin(sine)) + turn(sigma_deg);
+    const double odds = LogOddsOfRightAngle(
+        Make(Vector3d::UnitX(), 0.0),
+        Make(Vector3d(std::sin(angle), std::cos(angle), 0.0), sigma_deg));
+    if (odds < -1.5 || odds > 1.5) continue;
+    const int bin = odds < -0.5 ? 0 : odds < 0.5 ? 1 : 2;
+    ++counts[bin];
+    right[bin] += is_right ? 1 : 0;
+  }
+  const double expected[3] = {1.0 / (1.0 + std::exp(1.0)), 0.5, 1.0 / (1.0 + std::exp(-1.0))};
+  for (int bin = 0; bin < 3; ++bin) {
+    const double n = counts[bin], share = right[bin] / n;
+    const double sigma = std::sqrt(expected[bin] * (1.0 - expected[bin]) / n);
+    EXPECT_NEAR(share, expected[bin], 4.0 * sigma + 0.02) << bin;  // And the width of a bin.
+    EXPECT_GT(n, 150) << bin;
+  }
 }
 
 TEST(UncertainDirection, TheSpannedNormalHasTheSpreadOfItsSamples) {
