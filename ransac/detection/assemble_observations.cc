@@ -156,7 +156,8 @@ class Assembler {
   double JointSupport(std::size_t i, std::size_t j) const {
     const PlacedPencil& a = pencils_[i];
     const PlacedPencil& b = pencils_[j];
-    const double of_a = MeetingLength(a.ends, b.ends), of_b = MeetingLength(b.ends, a.ends);
+    const double of_a = MeetingLength(a.ends, b.ends, options_.diagonal_px),
+                 of_b = MeetingLength(b.ends, a.ends, options_.diagonal_px);
     const double share = std::min(of_a / a.support_px, of_b / b.support_px);
     const bool is_plane = share >= kMinSpanningShare ||
                           (share >= kMinRectangularShare && Rectangular(a.direction, b.direction));
@@ -194,7 +195,7 @@ class Assembler {
     PlacedPencil& second = pencils_[static_cast<std::size_t>(plane->pencils[1])];
     if (first.of_grid || second.of_grid) return;
     std::array<DetectedPencil, 2> pair = {first, second};
-    if (!RefitWhereTheyMeet(lines_, &pair)) return;
+    if (!RefitWhereTheyMeet(lines_, &pair, options_.diagonal_px)) return;
     first = PlacedPencil(std::move(pair[0]));
     second = PlacedPencil(std::move(pair[1]));
     if (!SpannedNormal(first.direction, second.direction, &plane->normal)) return;
@@ -214,7 +215,7 @@ class Assembler {
     lines.insert(lines.end(), bent_.begin(), bent_.end());
     std::vector<Vector3d> vectors;
     for (const UncertainDirection& normal : normals) vectors.push_back(normal.vector);
-    std::optional<FoundBox> box = FindBox(lines, vectors);
+    std::optional<FoundBox> box = FindBox(lines, vectors, options_.diagonal_px);
     if (!box) return false;
     plane->normal = normals[box->normal];
     for (int k = 0; k < 3; ++k) {
@@ -262,7 +263,8 @@ class Assembler {
     if (plane.pencils[0] < 0) return plane.circles.size() >= 2 && IsAmongCircles(plane, pencil);
     double meeting = 0.0;
     for (const int i : plane.pencils) {
-      meeting += MeetingLength(pencil.ends, pencils_[static_cast<std::size_t>(i)].ends);
+      meeting += MeetingLength(pencil.ends, pencils_[static_cast<std::size_t>(i)].ends,
+                               options_.diagonal_px);
     }
     return meeting >= kMinMeetingShare * pencil.support_px;
   }

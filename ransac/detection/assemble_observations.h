@@ -19,8 +19,9 @@ struct CircleEvidence {
 };
 
 struct AssemblyOptions {
-  int max_pencils = 3;                // That are kept, those with a role first.
-  double max_shared_plane_deg = 5.0;  // Normals farther apart are never one plane.
+  int max_pencils = 3;                    // That are kept, those with a role first.
+  double max_shared_plane_deg = 5.0;      // Normals farther apart are never one plane.
+  double diagonal_px = kUsualDiagonalPx;  // Of the photo (segment_meetings.h).
 };
 
 // Chooses the plane with most support, "p0": that of two pencils and the circles that agree with

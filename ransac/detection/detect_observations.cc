@@ -100,6 +100,8 @@ EllipseOptions ToEllipseOptions(const DetectionOptions& options) {
   return result;
 }
 
+double DiagonalPx(const cv::Mat& image) { return std::hypot(image.cols, image.rows); }
+
 Status CollectEvidence(const cv::Mat& image, const Camera& camera, const DetectionOptions& options,
                        Evidence* evidence) {
   cv::Mat gray;
@@ -120,7 +122,7 @@ Status CollectEvidence(const cv::Mat& image, const Camera& camera, const Detecti
   if (!status.ok()) return status;
   UndoEdgeShift(edges, camera, &evidence->lines);
   return DetectPencils(evidence->lines, options.max_pencils + kExtraPencils, options.seed,
-                       &evidence->pencils);
+                       &evidence->pencils, DiagonalPx(gray));
 }
 
 std::string Describe(const Observations& observations) {
@@ -187,6 +189,7 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   AssemblyOptions assembly;
   assembly.max_pencils = options.max_pencils;
   assembly.max_shared_plane_deg = options.max_shared_plane_deg;
+  assembly.diagonal_px = DiagonalPx(image);
   AssembleObservations(assembly, evidence.lines, evidence.bent, &evidence.circles,
                        &evidence.pencils, observations);
   observations->message = Describe(*observations);

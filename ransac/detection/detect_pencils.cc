@@ -32,16 +32,16 @@ constexpr std::size_t kMaxSearchedAround = 3;
 constexpr int kFoundAround = 2;
 // A line so nearly orthogonal to an axis (a sine) has no direction orthogonal to that axis.
 constexpr double kMinCross = 0.05;
-// The two sides of a thin line are so near to each other, pixels.
-constexpr double kTwinPx = 4.0;
+// The two sides of a thin line are so near to each other, a share of the photo's diagonal.
+constexpr double kTwinShareOfPhoto = 4.0 / kUsualDiagonalPx;
 // What all points of a line share, pixels: no number of them averages it out. It turns short lines
 // by more than long ones; measured on the sides of chessboard squares.
 constexpr double kSharedErrorPx = 0.06;
 
 // Detected lines with what the search for pencils knows of them.
 struct LineSet {
-  explicit LineSet(const std::vector<DetectedLine>& detected)
-      : lines(detected), twin_of(FindTwins(detected)) {
+  LineSet(const std::vector<DetectedLine>& detected, double photo_px)
+      : lines(detected), diagonal_px(photo_px), twin_of(FindTwins(detected, photo_px)) {
     for (const DetectedLine& line : lines) fits.push_back(WithSharedError(line, kSharedErrorPx));
   }
   bool IsTwin(int i) const { return twin_of[static_cast<std::size_t>(i)] >= 0; }
@@ -52,6 +52,7 @@ struct LineSet {
   }
 
   const std::vector<DetectedLine>& lines;
+  double diagonal_px;         // Of the photo.
   std::vector<LineFit> fits;  // With the shared error.
   std::vector<int> twin_of;
 };
@@ -201,13 +202,15 @@ std::vector<DetectedPencil> Search(const LineSet& set, const PencilOptions& opti
 }
 
 // The lines that are near one of the pencil's, and not of it.
-std::vector<int> LinesAround(const std::vector<DetectedLine>& lines, const DetectedPencil& pencil) {
+std::vector<int> LinesAround(const LineSet& set, const DetectedPencil& pencil) {
+  const std::vector<DetectedLine>& lines = set.lines;
   std::vector<int> around;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const int k = static_cast<int>(i);
     if (std::binary_search(pencil.members.begin(), pencil.members.end(), k)) continue;
-    const bool meets = std::any_of(pencil.ends.begin(), pencil.ends.end(),
-                                   [&](const Segment& s) { return AreNear(s, lines[i].ends); });
+    const bool meets = std::any_of(pencil.ends.begin(), pencil.ends.end(), [&](const Segment& s) {
+      return AreNear(s, lines[i].ends, set.diagonal_px);
+    });
     if (meets) around.push_back(k);
   }
   return around;
@@ -254,7 +257,7 @@ std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::ve
 
 // The pencils orthogonal to one, among the lines that meet its own.
 std::vector<DetectedPencil> SearchAround(const LineSet& set, const DetectedPencil& pencil) {
-  std::vector<int> left = LinesAround(set.lines, pencil);
+  std::vector<int> left = LinesAround(set, pencil);
   std::vector<DetectedPencil> found;
   for (int k = 0; k < kFoundAround; ++k) {
     std::optional<DetectedPencil> next =
@@ -282,12 +285,12 @@ bool IsKnown(const DetectedPencil& pencil, const std::vector<DetectedPencil>& ot
 }  // namespace
 
 Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, std::uint64_t seed,
-                     std::vector<DetectedPencil>* pencils) {
+                     std::vector<DetectedPencil>* pencils, double diagonal_px) {
   pencils->clear();
   const PencilOptions options = SearchOptions(max_pencils, seed);
   const Status status = options.Validate();
   if (!status.ok()) return status;
-  const LineSet set(lines);
+  const LineSet set(lines, diagonal_px);
   *pencils = Search(set, options);
   const auto longer = [](const DetectedPencil& a, const DetectedPencil& b) {
     return a.support_px > b.support_px;
@@ -304,8 +307,8 @@ Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, st
 }
 
 bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
-                 DetectedPencil* pencil) {
-  const LineSet set(lines);
+                 DetectedPencil* pencil, double diagonal_px) {
+  const LineSet set(lines, diagonal_px);
   FoundPencil found;
   found.fit = *pencil->observation.fit;
   double spread;
@@ -347,7 +350,7 @@ LineFit WithSharedError(const DetectedLine& line, double shared_px) {
   return fit;
 }
 
-std::vector<int> FindTwins(const std::vector<DetectedLine>& lines) {
+std::vector<int> FindTwins(const std::vector<DetectedLine>& lines, double diagonal_px) {
   std::vector<int> order(lines.size());
   std::iota(order.begin(), order.end(), 0);
   const auto line = [&lines](int i) -> const DetectedLine& {
@@ -359,7 +362,7 @@ std::vector<int> FindTwins(const std::vector<DetectedLine>& lines) {
   for (std::size_t k = 0; k < order.size(); ++k) {
     const auto beside = [&](int longer) {
       return twin_of[static_cast<std::size_t>(longer)] < 0 &&
-             LiesAlong(line(order[k]).ends, line(longer).ends, kTwinPx);
+             LiesAlong(line(order[k]).ends, line(longer).ends, kTwinShareOfPhoto * diagonal_px);
     };
     const auto end = order.begin() + static_cast<std::ptrdiff_t>(k);
     const auto found = std::find_if(order.begin(), end, beside);

@@ -9,6 +9,7 @@
 #include "circline/estimators/observations.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/detection/detect_lines.h"
+#include "circline/ransac/detection/segment_meetings.h"
 
 namespace circline {
 
@@ -21,19 +22,19 @@ struct DetectedPencil {
 
 // Robust and sequential, first among all lines (`max_pencils`), then, for the longest pencils,
 // among the lines that meet theirs: the short edges of a box are few among those of a room. Lines
-// may be in several of the latter. For each pencil the scatter of its lines about their common
-// direction is estimated and the direction is fitted by maximum likelihood with it: the lines of a
-// printed board all count for what they were measured, those of an old street, each a third of a
-// degree from parallel, count alike. The longest pencil (sum of its lines) comes first. 0.5 ms for
-// 150 lines.
+// may be in several of the latter. `diagonal_px`: of the photo, as in segment_meetings.h. For each
+// pencil the scatter of its lines about their common direction is estimated and the direction is
+// fitted by maximum likelihood with it: the lines of a printed board all count for what they were
+// measured, those of an old street, each a third of a degree from parallel, count alike. The
+// longest pencil (sum of its lines) comes first. 0.5 ms for 150 lines.
 Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, std::uint64_t seed,
-                     std::vector<DetectedPencil>* pencils);
+                     std::vector<DetectedPencil>* pencils, double diagonal_px = kUsualDiagonalPx);
 
 // Fits the pencil again, to all of lines[candidates] that share its direction within up to half a
 // degree (standard deviation, estimated): for lines that are known to be of one thing, whose sides
 // may bend or be badly printed. False, and nothing changed, where none do.
 bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
-                 DetectedPencil* pencil);
+                 DetectedPencil* pencil, double diagonal_px = kUsualDiagonalPx);
 
 // The pencil of lines[members] along `direction`, each as good as its `fits` says (one a member):
 // the line's own with a covariance that counts whatever else the line may miss the direction by.
@@ -46,7 +47,8 @@ LineFit WithSharedError(const DetectedLine& line, double shared_px);
 
 // Of each line the longer one whose other side it is, or -1. Both sides are measurements; but that
 // they are parallel is no accident and says nothing of a pencil.
-std::vector<int> FindTwins(const std::vector<DetectedLine>& lines);
+std::vector<int> FindTwins(const std::vector<DetectedLine>& lines,
+                           double diagonal_px = kUsualDiagonalPx);
 
 }  // namespace circline
 

@@ -37,8 +37,8 @@ constexpr int kPasses = 4;
 // The lines that end where others do: only they can be edges of a box.
 class BoxSearch {
  public:
-  explicit BoxSearch(const std::vector<DetectedLine>& lines) : lines_(lines) {
-    FindCorners();
+  BoxSearch(const std::vector<DetectedLine>& lines, double diagonal_px) : lines_(lines) {
+    FindCorners(diagonal_px);
     axis_.resize(edges_.size());
     gain_.resize(edges_.size());
     seen_.resize(edges_.size());
@@ -97,12 +97,12 @@ class BoxSearch {
   };
 
   // Of lines that form corners: edges, and which form them.
-  void FindCorners() {
-    const std::vector<int> twin_of = FindTwins(lines_);
+  void FindCorners(double diagonal_px) {
+    const std::vector<int> twin_of = FindTwins(lines_, diagonal_px);
     std::vector<std::vector<int>> corners(lines_.size());
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       for (std::size_t j = i + 1; j < lines_.size() && twin_of[i] < 0; ++j) {
-        if (twin_of[j] >= 0 || !FormCorner(lines_[i].ends, lines_[j].ends)) continue;
+        if (twin_of[j] >= 0 || !FormCorner(lines_[i].ends, lines_[j].ends, diagonal_px)) continue;
         corners[i].push_back(static_cast<int>(j));
         corners[j].push_back(static_cast<int>(i));
         ++num_corners_;
@@ -211,8 +211,8 @@ class BoxSearch {
 }  // namespace
 
 std::optional<FoundBox> FindBox(const std::vector<DetectedLine>& lines,
-                                const std::vector<Vector3d>& normals) {
-  BoxSearch search(lines);
+                                const std::vector<Vector3d>& normals, double diagonal_px) {
+  BoxSearch search(lines, diagonal_px);
   BoxSearch::Box best;
   std::size_t best_normal = 0;
   double second = -std::numeric_limits<double>::infinity();

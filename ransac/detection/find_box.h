@@ -31,7 +31,8 @@ struct FoundBox {
 // plane comes first. Edges may be worn: a line may miss its direction by what a third of a pixel in
 // the place of its points does. 1 ms for 150 lines.
 std::optional<FoundBox> FindBox(const std::vector<DetectedLine>& lines,
-                                const std::vector<Eigen::Vector3d>& normals);
+                                const std::vector<Eigen::Vector3d>& normals,
+                                double diagonal_px = kUsualDiagonalPx);
 
 }  // namespace circline
 

@@ -21,7 +21,7 @@ constexpr int kPasses = 4;
 
 // The lines of the region in which lines of about the directions of two pencils form corners.
 std::vector<int> LinesWhereTheyMeet(const std::vector<DetectedLine>& lines,
-                                    const std::array<DetectedPencil, 2>& pair) {
+                                    const std::array<DetectedPencil, 2>& pair, double diagonal_px) {
   std::array<std::vector<Segment>, 2> alike;
   for (std::size_t k = 0; k < 2; ++k) {
     const Eigen::Vector3d& direction = pair[k].observation.fit->direction;
@@ -29,7 +29,7 @@ std::vector<int> LinesWhereTheyMeet(const std::vector<DetectedLine>& lines,
       if (std::abs(line.fit.line.dot(direction)) < kAlikeRad) alike[k].push_back(line.ends);
     }
   }
-  const std::array<std::vector<int>, 2> core = ConnectedCore(alike[0], alike[1]);
+  const std::array<std::vector<int>, 2> core = ConnectedCore(alike[0], alike[1], diagonal_px);
   std::vector<Eigen::Vector2d> points;
   for (std::size_t k = 0; k < 2; ++k) {
     for (const int i : core[k]) {
@@ -47,15 +47,15 @@ std::vector<int> LinesWhereTheyMeet(const std::vector<DetectedLine>& lines,
 
 }  // namespace
 
-bool RefitWhereTheyMeet(const std::vector<DetectedLine>& lines,
-                        std::array<DetectedPencil, 2>* pair) {
+bool RefitWhereTheyMeet(const std::vector<DetectedLine>& lines, std::array<DetectedPencil, 2>* pair,
+                        double diagonal_px) {
   std::array<DetectedPencil, 2> local = *pair;
   std::vector<int> before;
   for (int pass = 0; pass < kPasses; ++pass) {
-    std::vector<int> inside = LinesWhereTheyMeet(lines, local);
+    std::vector<int> inside = LinesWhereTheyMeet(lines, local, diagonal_px);
     if (pass > 0 && inside == before) break;
     for (DetectedPencil& pencil : local) {
-      if (!RefitPencil(lines, inside, &pencil)) return false;
+      if (!RefitPencil(lines, inside, &pencil, diagonal_px)) return false;
     }
     before = std::move(inside);
   }

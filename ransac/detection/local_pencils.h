@@ -13,8 +13,8 @@ namespace circline {
 // region in which two pencils form corners may be one thing: then all its lines count, bent or not,
 // and no others. Fits both pencils to the lines of that region. False, and nothing changed, where
 // less than half of either pencil is left: two directions of a street, say.
-bool RefitWhereTheyMeet(const std::vector<DetectedLine>& lines,
-                        std::array<DetectedPencil, 2>* pair);
+bool RefitWhereTheyMeet(const std::vector<DetectedLine>& lines, std::array<DetectedPencil, 2>* pair,
+                        double diagonal_px = kUsualDiagonalPx);
 
 }  // namespace circline
 

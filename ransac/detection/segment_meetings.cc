@@ -10,13 +10,13 @@ namespace {
 using Eigen::Vector2d;
 
 // The sides of chessboard squares form corners; the lines of a printed border, of a window and its
-// frame, keep a small distance. Pixels.
-constexpr double kCornerPx = 10.0;
-constexpr double kNearPx = 25.0;
+// frame, keep a small distance. Shares of the photo's diagonal.
+constexpr double kCornerShareOfPhoto = 10.0 / kUsualDiagonalPx;
+constexpr double kNearShareOfPhoto = 25.0 / kUsualDiagonalPx;
 // Of FormCorner.
 constexpr double kCornerShare = 0.45;
-constexpr double kMinCornerGapPx = 9.0;
-constexpr double kMaxCornerGapPx = 21.0;
+constexpr double kMinCornerGap = 9.0 / kUsualDiagonalPx;  // Shares of the diagonal.
+constexpr double kMaxCornerGap = 21.0 / kUsualDiagonalPx;
 constexpr double kMinCornerSine = 0.17;
 constexpr double kFullMeetings = 3.0;
 constexpr std::size_t kCoreMeetings = 2;
@@ -48,14 +48,14 @@ double Length(const Segment& s) { return (s[1] - s[0]).norm(); }
 // all of `b`.
 class Graph {
  public:
-  Graph(const std::vector<Segment>& a, const std::vector<Segment>& b)
+  Graph(const std::vector<Segment>& a, const std::vector<Segment>& b, double corner_px)
       : size_a_(a.size()), neighbours_(a.size() + b.size()) {
     for (const auto* list : {&a, &b}) {
       for (const Segment& s : *list) length_.push_back(Length(s));
     }
     for (std::size_t i = 0; i < a.size(); ++i) {
       for (std::size_t j = 0; j < b.size(); ++j) {
-        if (!AreWithin(kCornerPx, a[i], b[j])) continue;
+        if (!AreWithin(corner_px, a[i], b[j])) continue;
         neighbours_[i].push_back(size_a_ + j);
         neighbours_[size_a_ + j].push_back(i);
       }
@@ -139,26 +139,30 @@ bool LiesAlong(const Segment& s, const Segment& t, double px) {
          PointSegmentDistance(s[1], t) < px;
 }
 
-bool AreNear(const Segment& s, const Segment& t) { return AreWithin(kNearPx, s, t); }
+bool AreNear(const Segment& s, const Segment& t, double diagonal_px) {
+  return AreWithin(kNearShareOfPhoto * diagonal_px, s, t);
+}
 
-bool FormCorner(const Segment& s, const Segment& t) {
-  if (FarApart(s, t, 2.0 * kMaxCornerGapPx)) return false;
+bool FormCorner(const Segment& s, const Segment& t, double diagonal_px) {
+  const double least = kMinCornerGap * diagonal_px, most = kMaxCornerGap * diagonal_px;
+  if (FarApart(s, t, 2.0 * most)) return false;
   const Vector2d d = s[1] - s[0], e = t[1] - t[0];
   const double sine_scaled = Cross(d, e), d_length = d.norm(), e_length = e.norm();
   if (std::abs(sine_scaled) <= kMinCornerSine * d_length * e_length) return false;
   const Vector2d crossing = s[0] + d * (Cross(t[0] - s[0], e) / sine_scaled);
   const auto ends_there = [&](const Segment& segment, double length) {
     const double gap = std::min((crossing - segment[0]).norm(), (crossing - segment[1]).norm());
-    return gap <= std::clamp(kCornerShare * length, kMinCornerGapPx, kMaxCornerGapPx);
+    return gap <= std::clamp(kCornerShare * length, least, most);
   };
   return ends_there(s, d_length) && ends_there(t, e_length);
 }
 
-double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& b) {
+double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& b,
+                     double diagonal_px) {
   double length = 0.0;
   for (const Segment& s : a) {
-    const auto meetings =
-        std::count_if(b.begin(), b.end(), [&s](const Segment& t) { return AreNear(s, t); });
+    const auto meetings = std::count_if(
+        b.begin(), b.end(), [&](const Segment& t) { return AreNear(s, t, diagonal_px); });
     const double share = std::min(1.0, static_cast<double>(meetings) / kFullMeetings);
     length += Length(s) * share;
   }
@@ -166,8 +170,8 @@ double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& 
 }
 
 std::array<std::vector<int>, 2> ConnectedCore(const std::vector<Segment>& a,
-                                              const std::vector<Segment>& b) {
-  Graph graph(a, b);
+                                              const std::vector<Segment>& b, double diagonal_px) {
+  Graph graph(a, b, kCornerShareOfPhoto * diagonal_px);
   graph.DropBelow(kCoreMeetings);
   return graph.LargestComponent();
 }
