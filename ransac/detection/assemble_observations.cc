@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -152,7 +153,8 @@ class Assembler {
   }
 
   // Length of the lines of two pencils that meet; 0 where these are too few to tell a plane. No
-  // better than by the weaker of the two: one long pencil makes no plane.
+  // better than by the weaker of the two: one long pencil makes no plane. What is one thing meets
+  // all over; of a room's long pencils the half that meets may do so by accident.
   double JointSupport(std::size_t i, std::size_t j) const {
     const PlacedPencil& a = pencils_[i];
     const PlacedPencil& b = pencils_[j];
@@ -161,7 +163,7 @@ class Assembler {
     const double share = std::min(of_a / a.support_px, of_b / b.support_px);
     const bool is_plane = share >= kMinSpanningShare ||
                           (share >= kMinRectangularShare && Rectangular(a.direction, b.direction));
-    return is_plane ? 2.0 * std::min(of_a, of_b) : 0.0;
+    return is_plane ? 2.0 * std::min(of_a, of_b) * std::sqrt(share) : 0.0;
   }
 
   // The plane with most support: of two pencils and the circles that agree, or of circles alone.
