@@ -116,36 +116,4 @@ bool OrthogonalTripletModel::Accept(const Value& rotation, double threshold) con
   return SortedSupport(lines_, rotation, threshold)[1] >= 2;
 }
 
-bool DirectionPairModel::Fit(const int* sample, Value* directions) const {
-  for (std::size_t k = 0; k < 2; ++k) {
-    PencilModel::Value direction;
-    if (!lines_.Fit(sample + 2 * k, &direction)) return false;
-    std::copy(direction.begin(), direction.end(), directions->begin() + 3 * k);
-  }
-  return true;
-}
-
-void DirectionPairModel::SquaredResiduals(const Value& directions, int begin, int end,
-                                          float* r2) const {
-  NearestResiduals(lines_, directions, begin, end, r2);
-}
-
-bool DirectionPairModel::Refine(const float* weights, Value* directions) const {
-  std::array<Vector3d, 2> v = {Vector3d(directions->data()), Vector3d(directions->data() + 3)};
-  std::array<DirectionStep, 2> steps = {DirectionStep(v[0]), DirectionStep(v[1])};
-  ForEachNearest(lines_, *directions, [&](int i, int k, float /*r2*/) {
-    const std::size_t own = static_cast<std::size_t>(k);
-    if (!(weights[i] > 0.0f)) return;
-    steps[own].Add(lines_.Line(i), lines_.Variance(v[own], i), static_cast<double>(weights[i]));
-  });
-  if (!steps[0].Move(&v[0]) || !steps[1].Move(&v[1])) return false;
-  Eigen::Map<Vector3d>(directions->data()) = v[0];
-  Eigen::Map<Vector3d>(directions->data() + 3) = v[1];
-  return true;
-}
-
-bool DirectionPairModel::Accept(const Value& directions, double threshold) const {
-  return SortedSupport(lines_, directions, threshold)[1] >= 3;
-}
-
 }  // namespace circline

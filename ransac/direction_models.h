@@ -1,5 +1,5 @@
-// Several vanishing points at once, as models for RANSAC: three orthogonal ones (a rotation; the
-// "Manhattan frame" of streets and rooms), and any two. A line counts for the direction that it
+// Three orthogonal vanishing points at once, as a model for RANSAC (a rotation; the "Manhattan
+// frame" of streets and rooms). A line counts for the direction that it
 // misses least; residuals are those of pencil_model.h.
 #ifndef CIRCLINE_RANSAC_DIRECTION_MODELS_H_
 #define CIRCLINE_RANSAC_DIRECTION_MODELS_H_
@@ -29,27 +29,6 @@ class OrthogonalTripletModel {
   bool Refine(const float* weights, Value* rotation) const;
   // Whether two of the directions have two lines each within the threshold.
   bool Accept(const Value& rotation, double threshold) const;
-
- private:
-  const PencilModel& lines_;
-};
-
-// Any two directions, from two lines of each.
-class DirectionPairModel {
- public:
-  using Value = std::array<double, 6>;  // Two unit directions.
-  static constexpr int kMinSamples = 4;
-  // Of all-inlier samples of two evenly used directions, those with two lines of each in order.
-  static constexpr double kGoodSamples = 1.0 / 8.0;
-
-  explicit DirectionPairModel(const PencilModel& lines) : lines_(lines) {}
-
-  int NumData() const { return lines_.NumData(); }
-  bool Fit(const int* sample, Value* directions) const;
-  void SquaredResiduals(const Value& directions, int begin, int end, float* r2) const;
-  bool Refine(const float* weights, Value* directions) const;
-  // Whether each direction has three lines within the threshold: two always meet.
-  bool Accept(const Value& directions, double threshold) const;
 
  private:
   const PencilModel& lines_;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/ransac/inlier_weights.h"
+
 namespace circline {
 
 LineModel::LineModel(const std::vector<CalibratedPoint>& points)

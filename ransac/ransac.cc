@@ -17,7 +17,6 @@ Status RansacOptions::Validate() const {
   if (local_start < 0) return Status::Invalid("local_start must not be negative");
   if (local_samples < 0) return Status::Invalid("local_samples must not be negative");
   if (local_steps < 0) return Status::Invalid("local_steps must not be negative");
-  if (!(max_seconds >= 0.0)) return Status::Invalid("max_seconds must not be negative");
   return Status::Ok();
 }
 
@@ -34,8 +33,6 @@ const char* StopReasonName(StopReason reason) {
       return "confident";
     case StopReason::kMaxIterations:
       return "max_iterations";
-    case StopReason::kMaxSeconds:
-      return "max_seconds";
     case StopReason::kTooFewData:
       return "too_few_data";
   }

@@ -1,7 +1,7 @@
-// One robust estimator for every model: random sample consensus with a truncated or marginalised
-// loss, local optimisation, early rejection and an exact stopping rule.
+// One robust estimator for every model: random sample consensus with a truncated loss, local
+// optimisation, early rejection and an exact stopping rule.
 //
-// In:  a Model (below) that holds the data, RansacOptions, optionally the data ordered by quality.
+// In:  a Model (below) that holds the data, RansacOptions.
 // Out: a RansacReport: the best model, its score and inliers - all three computed after the last
 //      refinement, so that they agree - and why the search stopped.
 //
@@ -33,14 +33,12 @@
 //
 // M. Fischler, R. Bolles, CACM 1981; P. Torr, A. Zisserman, MLESAC, CVIU 2000 (the truncated loss);
 // O. Chum, J. Matas, J. Kittler, Locally optimized RANSAC, DAGM 2003; K. Lebeda, J. Matas, O. Chum,
-// Fixing the locally optimized RANSAC, BMVC 2012; O. Chum, J. Matas, PROSAC, CVPR 2005; D. Barath
-// et al., MAGSAC++, CVPR 2020.
+// Fixing the locally optimized RANSAC, BMVC 2012.
 #ifndef CIRCLINE_RANSAC_RANSAC_H_
 #define CIRCLINE_RANSAC_RANSAC_H_
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -52,7 +50,6 @@
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/random.h"
 #include "circline/estimators/status.h"
-#include "circline/ransac/ransac_loss.h"
 #include "circline/ransac/sampler.h"
 
 namespace circline {
@@ -65,11 +62,9 @@ struct RansacOptions {
   int min_iterations = 1;       // Draws that are made whatever the confidence; 0 or more.
   int max_iterations = 200000;  // Draws; 1 or more.
   std::uint64_t seed = 1;
-  ScoreType score = ScoreType::kMsac;
-  int local_start = 30;    // Draws before the first local optimisation (Lebeda 2012); 0 or more.
-  int local_samples = 3;   // Inner samples of each local optimisation; 0 = refine the best only.
-  int local_steps = 3;     // Reweighted steps from each inner sample; 0 = no local optimisation.
-  double max_seconds = 0;  // Stops after this time if > 0; the result then depends on the machine.
+  int local_start = 30;   // Draws before the first local optimisation (Lebeda 2012); 0 or more.
+  int local_samples = 3;  // Inner samples of each local optimisation; 0 = refine the best only.
+  int local_steps = 3;    // Reweighted steps from each inner sample; 0 = no local optimisation.
 
   // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
@@ -84,7 +79,7 @@ struct RobustFitOptions {
   Status Validate() const;
 };
 
-enum class StopReason { kConfident, kMaxIterations, kMaxSeconds, kTooFewData };
+enum class StopReason { kConfident, kMaxIterations, kTooFewData };
 const char* StopReasonName(StopReason reason);  // "confident", "max_iterations", ...
 
 template <typename Value>
@@ -124,14 +119,12 @@ class Ransac {
   using Report = RansacReport<Value>;
 
   // `options` must be valid.
-  explicit Ransac(const RansacOptions& options) : options_(options), loss_(options.score) {}
+  explicit Ransac(const RansacOptions& options) : options_(options) {}
 
-  // `order` (optional): all data, the most promising first.
-  void Run(const Model& model, Report* report, const std::vector<int>* order = nullptr) {
+  void Run(const Model& model, Report* report) {
     constexpr int m = Model::kMinSamples;
-    SetUp(model, order, report);
+    SetUp(model, report);
     if (num_data_ < m) return;
-    const auto start = std::chrono::steady_clock::now();
     std::array<int, static_cast<std::size_t>(m)> sample{};
     int needed = options_.max_iterations;
     bool optimized = true;  // Whether `best_` has been through local optimisation.
@@ -154,22 +147,16 @@ class Ransac {
           Optimize(model, candidate.value, report);
           optimized = true;
         }
-        needed = Needed(model, order);
+        needed = Needed();
       }
       if (report->num_iterations >= needed && !optimized) {
         Optimize(model, best_.value, report);
         optimized = true;
-        needed = Needed(model, order);
-      }
-      if (OutOfTime(start, report->num_iterations)) {
-        report->stop_reason = StopReason::kMaxSeconds;
-        break;
+        needed = Needed();
       }
     }
     if (!optimized) Optimize(model, best_.value, report);
-    if (report->stop_reason != StopReason::kMaxSeconds && needed < options_.max_iterations) {
-      report->stop_reason = StopReason::kConfident;
-    }
+    if (needed < options_.max_iterations) report->stop_reason = StopReason::kConfident;
     Finish(model, report);
   }
 
@@ -180,7 +167,7 @@ class Ransac {
     int num_inliers = 0;
   };
 
-  void SetUp(const Model& model, const std::vector<int>* order, Report* report) {
+  void SetUp(const Model& model, Report* report) {
     num_data_ = model.NumData();
     const std::size_t n = static_cast<std::size_t>(num_data_);
     weights_.assign(n, 0.0f);
@@ -193,9 +180,7 @@ class Ransac {
     report->num_degenerate = report->num_local_optimizations = 0;
     report->stop_reason = StopReason::kTooFewData;
     report->score = num_data_;
-    // A bad order must not use up the draws: halfway through them it is forgotten.
-    sampler_.Reset(num_data_, Model::kMinSamples, options_.seed, order,
-                   options_.max_iterations / 2);
+    sampler_.Reset(num_data_, Model::kMinSamples, options_.seed);
     inverse_t2_ = static_cast<float>(1.0 / (options_.threshold * options_.threshold));
     best_ = Candidate();
     best_.score = drawn_score_ = num_data_;  // What a model without inliers has.
@@ -233,36 +218,24 @@ class Ransac {
   }
 
   double ScoreBlock(const float* r2, int size, int* inliers) const {
-    float sum = 0.0f;
-    int count = 0;
-    if (options_.score == ScoreType::kMsac) {
-      // Four sums side by side: they vectorise without permission to reorder.
-      std::array<float, 4> sums{};
-      std::array<int, 4> counts{};
-      int i = 0;
-      for (; i + 4 <= size; i += 4) {
-        for (std::size_t k = 0; k < 4; ++k) {
-          const float u = r2[static_cast<std::size_t>(i) + k] * inverse_t2_;
-          sums[k] += u < 1.0f ? u : 1.0f;
-          counts[k] += u < 1.0f ? 1 : 0;
-        }
-      }
-      for (; i < size; ++i) {
-        const float u = r2[i] * inverse_t2_;
-        sums[0] += u < 1.0f ? u : 1.0f;
-        counts[0] += u < 1.0f ? 1 : 0;
-      }
-      sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
-      count = counts[0] + counts[1] + counts[2] + counts[3];
-    } else {
-      for (int i = 0; i < size; ++i) {
-        const float u = r2[i] * inverse_t2_;
-        sum += loss_.Value(u);
-        count += u < 1.0f ? 1 : 0;
+    // Four sums side by side: they vectorise without permission to reorder.
+    std::array<float, 4> sums{};
+    std::array<int, 4> counts{};
+    int i = 0;
+    for (; i + 4 <= size; i += 4) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        const float u = r2[static_cast<std::size_t>(i) + k] * inverse_t2_;
+        sums[k] += u < 1.0f ? u : 1.0f;
+        counts[k] += u < 1.0f ? 1 : 0;
       }
     }
-    *inliers += count;
-    return sum;
+    for (; i < size; ++i) {
+      const float u = r2[i] * inverse_t2_;
+      sums[0] += u < 1.0f ? u : 1.0f;
+      counts[0] += u < 1.0f ? 1 : 0;
+    }
+    *inliers += counts[0] + counts[1] + counts[2] + counts[3];
+    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
   }
 
   // Sets weights_ for threshold `scale` T and lists the inliers; returns how many there are.
@@ -275,7 +248,9 @@ class Ransac {
       model.SquaredResiduals(value, begin, end, r2.data());
       for (int i = begin; i < end; ++i) {
         const float u = r2[static_cast<std::size_t>(i - begin)] * inverse;
-        weights_[static_cast<std::size_t>(i)] = loss_.Weight(u);
+        // Tukey's, not the truncated square's own step: a datum that crosses the threshold must not
+        // make the iteration jump. 0 for NaN.
+        weights_[static_cast<std::size_t>(i)] = u < 1.0f ? (1.0f - u) * (1.0f - u) : 0.0f;
         if (u < 1.0f) inliers_[static_cast<std::size_t>(count++)] = i;
       }
     }
@@ -320,35 +295,11 @@ class Ransac {
     return model.Refine(weights_.data(), value);
   }
 
-  // Draws after which the search may stop. With an order of quality, those of the best prefix whose
-  // inliers are not explained by chance (Chum and Matas 2005, sections 2.1 and 2.2).
-  int Needed(const Model& model, const std::vector<int>* order) {
-    constexpr int m = Model::kMinSamples;
-    constexpr double kShare = GoodSamples<Model>::kShare;
-    int needed = RequiredIterations(num_data_, best_.num_inliers, m, options_.confidence, kShare);
-    if (order != nullptr) {
-      const int num_inliers = Weigh(model, best_.value, 1.0);
-      std::fill(weights_.begin(), weights_.end(), 0.0f);
-      for (int i = 0; i < num_inliers; ++i) {
-        weights_[static_cast<std::size_t>(inliers_[static_cast<std::size_t>(i)])] = 1.0f;
-      }
-      int inliers = 0;
-      for (int n = 1; n <= num_data_; ++n) {
-        const int datum = (*order)[static_cast<std::size_t>(n - 1)];
-        inliers += weights_[static_cast<std::size_t>(datum)] > 0.0f ? 1 : 0;
-        constexpr double kChance = 0.1;  // Probability that a wrong model holds a datum.
-        const double mean = kChance * (n - m);
-        if (n < 4 * m || inliers < m + mean + 2.33 * std::sqrt(mean * (1.0 - kChance))) continue;
-        needed = std::min(needed, RequiredIterations(n, inliers, m, options_.confidence, kShare));
-      }
-    }
+  // Draws after which the search may stop.
+  int Needed() const {
+    const int needed = RequiredIterations(num_data_, best_.num_inliers, Model::kMinSamples,
+                                          options_.confidence, GoodSamples<Model>::kShare);
     return std::min(std::max(needed, options_.min_iterations), options_.max_iterations);
-  }
-
-  bool OutOfTime(std::chrono::steady_clock::time_point start, int iteration) const {
-    if (options_.max_seconds <= 0.0 || iteration % 64 != 0) return false;
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-    return elapsed.count() >= options_.max_seconds;
   }
 
   void Finish(const Model& model, Report* report) {
@@ -369,7 +320,6 @@ class Ransac {
   }
 
   RansacOptions options_;
-  RansacLoss loss_;
   Sampler sampler_;
   int num_data_ = 0;
   float inverse_t2_ = 1.0f;

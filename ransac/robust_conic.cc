@@ -7,6 +7,7 @@
 
 #include "circline/ransac/conic_weights.h"
 #include "circline/ransac/crowds.h"
+#include "circline/ransac/inlier_weights.h"
 #include "circline/ransac/oriented_conic_model.h"
 
 namespace circline {

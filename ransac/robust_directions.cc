@@ -127,18 +127,6 @@ Slopes<3, 3> SlopesOfRotation(const std::array<Vector3d, 3>& directions) {
   return slopes;
 }
 
-// Each direction in its own tangent plane.
-Slopes<2, 4> SlopesOfPair(const std::array<Vector3d, 2>& directions) {
-  Slopes<2, 4> slopes;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const int own = 2 * static_cast<int>(k);
-    slopes[k].setZero();
-    slopes[k].col(own) = directions[k].unitOrthogonal();
-    slopes[k].col(own + 1) = directions[k].cross(slopes[k].col(own));
-  }
-  return slopes;
-}
-
 // The sums of one Gauss-Newton step of the directions.
 template <int P>
 struct Equations {
@@ -251,48 +239,6 @@ Status FitOrthogonalTriplet(const std::vector<LineFit>& lines, const PencilOptio
   result.rotation = sorted;
   for (int& k : members) k = k < 0 ? -1 : rank[static_cast<std::size_t>(k)];
   *fit = result;
-  if (membership != nullptr) *membership = std::move(members);
-  return Status::Ok();
-}
-
-Status FitDirectionPair(const std::vector<LineFit>& lines, const PencilOptions& options,
-                        std::array<VanishingPointFit, 2>* fits, std::vector<int>* membership) {
-  Status status = options.Validate();
-  if (!status.ok()) return status;
-  const Status too_few = Status::Refused("no two directions have three lines each");
-  DirectionPairModel::Value value;
-  if (!Draw<DirectionPairModel>(lines, options, &value)) return too_few;
-  Mixture<2> mixture(lines, options);
-  std::array<VanishingPointFit, 2> result;
-  for (std::size_t k = 0; k < 2; ++k) mixture.directions[k] = Vector3d(value.data() + 3 * k);
-  std::vector<double> weights(mixture.lines.size());
-  for (int pass = 0; pass < kPasses; ++pass) {
-    mixture.Weigh();
-    for (std::size_t k = 0; k < 2; ++k) {
-      for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = mixture.weights[i][k];
-      status = FitVanishingPoint(mixture.lines, &result[k], &weights);
-      if (!status.ok()) return status;
-      mixture.directions[k] = result[k].direction;
-    }
-  }
-  mixture.Weigh();
-  const Slopes<2, 4> slopes = SlopesOfPair(mixture.directions);
-  Eigen::Matrix4d covariance;
-  if (!MixtureCovariance(mixture, slopes, &covariance)) {
-    return Status::Refused("the lines do not fix two directions");
-  }
-  for (std::size_t k = 0; k < 2; ++k) {
-    result[k].covariance = slopes[k] * covariance * slopes[k].transpose();
-  }
-  std::array<int, 2> support;
-  std::vector<int> members = mixture.Membership(lines.size());
-  const std::array<std::size_t, 2> order = BySupport<2>(members, &support);
-  if (support[order[1]] < 3) return too_few;
-  if (order[0] == 1) {
-    std::swap(result[0], result[1]);
-    for (int& k : members) k = k < 0 ? -1 : 1 - k;
-  }
-  *fits = result;
   if (membership != nullptr) *membership = std::move(members);
   return Status::Ok();
 }

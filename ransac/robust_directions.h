@@ -1,15 +1,12 @@
-// Robust fits of several vanishing points at once: three orthogonal ones as one rotation, or any
-// two.
+// Robust fit of three orthogonal vanishing points at once, as one rotation.
 #ifndef CIRCLINE_RANSAC_ROBUST_DIRECTIONS_H_
 #define CIRCLINE_RANSAC_ROBUST_DIRECTIONS_H_
 
 #include <Eigen/Core>
-#include <array>
 #include <vector>
 
 #include "circline/estimators/line.h"
 #include "circline/estimators/status.h"
-#include "circline/estimators/vanishing_point.h"
 #include "circline/ransac/robust_pencils.h"
 
 namespace circline {
@@ -36,15 +33,6 @@ struct OrthogonalTripletFit {
 // one error in a hundred is larger than it says (mean NEES 3.6 of 3, median 2.5 of 2.4).
 Status FitOrthogonalTriplet(const std::vector<LineFit>& lines, const PencilOptions& options,
                             OrthogonalTripletFit* fit, std::vector<int>* membership = nullptr);
-
-// The same for the two best supported directions together, at whatever angle; the better supported
-// one first. Refuses where a direction has fewer than three lines. `membership`: 0, 1 or -1.
-//
-// 30 and 20 segments along two directions among 50 stray ones: median NEES 1.44 of 1.39, mean 2.2
-// of 2 but for one scene in 1500 that takes strays for a direction; without strays 2.02.
-Status FitDirectionPair(const std::vector<LineFit>& lines, const PencilOptions& options,
-                        std::array<VanishingPointFit, 2>* fits,
-                        std::vector<int>* membership = nullptr);
 
 }  // namespace circline
 

@@ -2,7 +2,7 @@
 // RANSAC with a Tukey finish reach on the same data. Every row says whether it meets its bar.
 //
 //     circline_robust_fit_benchmark --trials=200
-//     circline_robust_fit_benchmark --rows=cluster --peers=false --score=magsac
+//     circline_robust_fit_benchmark --rows=cluster --peers=false
 //
 // C is the error along the true curve over the Cramer-Rao bound of the inliers; a fit is ok if
 // C <= 3; times are processor time of one fit.

@@ -17,12 +17,10 @@ DEFINE_int32(min_iterations, circline::RansacOptions().min_iterations,
              "RansacOptions::min_iterations.");
 DEFINE_int32(max_iterations, circline::RansacOptions().max_iterations,
              "RansacOptions::max_iterations.");
-DEFINE_string(score, "msac", "RansacOptions::score: msac or magsac.");
 DEFINE_int32(local_start, circline::RansacOptions().local_start, "RansacOptions::local_start.");
 DEFINE_int32(local_samples, circline::RansacOptions().local_samples,
              "RansacOptions::local_samples.");
 DEFINE_int32(local_steps, circline::RansacOptions().local_steps, "RansacOptions::local_steps.");
-DEFINE_double(max_seconds, circline::RansacOptions().max_seconds, "RansacOptions::max_seconds.");
 DEFINE_uint64(ransac_seed, circline::RansacOptions().seed, "RansacOptions::seed.");
 
 namespace circline::apps {
@@ -33,11 +31,9 @@ RansacOptions EngineOptions() {
   options.confidence = FLAGS_confidence;
   options.min_iterations = FLAGS_min_iterations;
   options.max_iterations = FLAGS_max_iterations;
-  options.score = FLAGS_score == "magsac" ? ScoreType::kMagsac : ScoreType::kMsac;
   options.local_start = FLAGS_local_start;
   options.local_samples = FLAGS_local_samples;
   options.local_steps = FLAGS_local_steps;
-  options.max_seconds = FLAGS_max_seconds;
   options.seed = FLAGS_ransac_seed;
   return options;
 }
@@ -57,9 +53,6 @@ Status CheckFlags() {
   }
   if (!(FLAGS_direction_sigma_deg >= 0.0 && FLAGS_direction_sigma_deg <= 180.0)) {
     return Status::Invalid("--direction_sigma_deg: must be from 0 to 180");
-  }
-  if (FLAGS_score != "msac" && FLAGS_score != "magsac") {
-    return Status::Invalid("--score: '" + FLAGS_score + "' is not msac or magsac");
   }
   return PixelOptions().Validate();
 }

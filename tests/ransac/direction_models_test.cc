@@ -115,35 +115,8 @@ TEST_F(DirectionModels, AcceptAsksForTwoDirections) {
   OrthogonalTripletModel::Value value;
   Eigen::Map<Matrix3d>(value.data()) = R_;
   EXPECT_FALSE(triplet.Accept(value, kInlierSigmas));
-  const DirectionPairModel pair(pencil);
-  EXPECT_FALSE(
-      pair.Accept({R_(0, 0), R_(1, 0), R_(2, 0), R_(0, 1), R_(1, 1), R_(2, 1)}, kInlierSigmas));
   const PencilModel every(lines_, all_, 0.0);
   EXPECT_TRUE(OrthogonalTripletModel(every).Accept(value, kInlierSigmas));
-}
-
-TEST_F(DirectionModels, PairFitsAndRefines) {
-  const std::vector<int> two(all_.begin(), all_.begin() + 24);
-  const PencilModel pencil(lines_, two, 0.0);
-  const DirectionPairModel model(pencil);
-  const std::array<int, 4> sample{Position(pencil, 0), Position(pencil, 7), Position(pencil, 15),
-                                  Position(pencil, 20)};
-  DirectionPairModel::Value value;
-  ASSERT_TRUE(model.Fit(sample.data(), &value));
-  for (int k = 0; k < 2; ++k) {
-    const Vector3d v(value.data() + 3 * k);
-    EXPECT_NEAR(v.dot(pencil.Line(sample[static_cast<std::size_t>(2 * k)])), 0.0, 1e-12);
-    EXPECT_NEAR(v.dot(pencil.Line(sample[static_cast<std::size_t>(2 * k + 1)])), 0.0, 1e-12);
-  }
-  const std::vector<float> weights(two.size(), 1.0f);
-  for (int i = 0; i < 10; ++i) ASSERT_TRUE(model.Refine(weights.data(), &value));
-  for (int k = 0; k < 2; ++k) {
-    VanishingPointFit fit;
-    ASSERT_TRUE(
-        FitVanishingPoint({lines_.begin() + 12 * k, lines_.begin() + 12 * (k + 1)}, &fit).ok());
-    EXPECT_LT(Vector3d(value.data() + 3 * k).cross(fit.direction).norm(),
-              std::sqrt(fit.covariance.trace()));
-  }
 }
 
 }  // namespace

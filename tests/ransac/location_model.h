@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -31,7 +30,6 @@ class Location {
     if (always_degenerate_) return false;
     const double a = Datum(sample[0]), b = Datum(sample[1]);
     EXPECT_NE(sample[0], sample[1]);
-    if (seconds_per_fit_ > 0.0) Wait();
     const bool all_inliers = std::abs(a) < 10.0 && std::abs(b) < 10.0;
     if (all_inliers && first_good_ == 0) first_good_ = fits_;
     *value = {0.5 * (a + b)};
@@ -59,23 +57,15 @@ class Location {
   double Datum(int i) const { return data_[static_cast<std::size_t>(i)]; }
 
   bool always_degenerate_ = false;
-  double seconds_per_fit_ = 0.0;
   double accept_below_ = std::numeric_limits<double>::infinity();
   mutable int fits_ = 0, first_good_ = 0;
 
  private:
-  void Wait() const {
-    const auto start = std::chrono::steady_clock::now();
-    while (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() <
-           seconds_per_fit_) {
-    }
-  }
-
   std::vector<double> data_;
 };
 
 // `inliers` values about 0 with standard deviation `sigma`, the rest 100 apart from each other.
-inline Location MakeData(int n, int inliers, double sigma, std::vector<int>* order = nullptr) {
+inline Location MakeData(int n, int inliers, double sigma) {
   const std::vector<int> position = RandomOrder(n, 7);
   std::vector<double> data(static_cast<std::size_t>(n));
   Random random(3);
@@ -83,7 +73,6 @@ inline Location MakeData(int n, int inliers, double sigma, std::vector<int>* ord
     data[static_cast<std::size_t>(position[static_cast<std::size_t>(i)])] =
         i < inliers ? sigma * random.Normal() : 100.0 * (i + 1);
   }
-  if (order != nullptr) *order = position;
   return Location(data);
 }
 

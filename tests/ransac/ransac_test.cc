@@ -30,18 +30,14 @@ TEST(RequiredIterations, CountsTheSamplesOfTheRightPattern) {
 }
 
 TEST(Ransac, FindsTheInliers) {
-  for (const ScoreType score : {ScoreType::kMsac, ScoreType::kMagsac}) {
-    const Location model = MakeData(200, 40, 0.1);
-    RansacOptions options;
-    options.score = score;
-    Ransac<Location>::Report report;
-    Ransac<Location>(options).Run(model, &report);
-    ASSERT_TRUE(report.success);
-    EXPECT_EQ(report.num_inliers, 40);
-    EXPECT_NEAR(report.model[0], 0.0, 0.06);
-    EXPECT_EQ(report.stop_reason, StopReason::kConfident);
-    EXPECT_GT(report.num_local_optimizations, 0);
-  }
+  const Location model = MakeData(200, 40, 0.1);
+  Ransac<Location>::Report report;
+  Ransac<Location>(RansacOptions()).Run(model, &report);
+  ASSERT_TRUE(report.success);
+  EXPECT_EQ(report.num_inliers, 40);
+  EXPECT_NEAR(report.model[0], 0.0, 0.06);
+  EXPECT_EQ(report.stop_reason, StopReason::kConfident);
+  EXPECT_GT(report.num_local_optimizations, 0);
 }
 
 TEST(Ransac, StopsExactlyWhenConfident) {
@@ -103,18 +99,6 @@ TEST(Ransac, KeepsToItsBounds) {
   EXPECT_EQ(report.num_iterations, 30);
 }
 
-TEST(Ransac, StopsInTimeIfAsked) {
-  Location model = MakeData(1000, 10, 0.0);
-  model.seconds_per_fit_ = 1e-4;
-  RansacOptions options;
-  options.max_iterations = 1000000;
-  options.max_seconds = 0.02;
-  Ransac<Location>::Report report;
-  Ransac<Location>(options).Run(model, &report);
-  EXPECT_EQ(report.stop_reason, StopReason::kMaxSeconds);
-  EXPECT_LT(report.num_iterations, 1000);
-}
-
 TEST(Ransac, DegenerateSamplesAreNoModel) {
   Location model = MakeData(50, 50, 0.0);
   model.always_degenerate_ = true;
@@ -168,28 +152,24 @@ TEST(Ransac, TheModelHasTheLastWord) {
 }
 
 TEST(Ransac, MaskAndScoreAreThoseOfTheReturnedModel) {
-  for (const ScoreType score : {ScoreType::kMsac, ScoreType::kMagsac}) {
-    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-      // Noise well beyond the threshold: refinement moves data in and out.
-      const Location model = MakeData(300, 200, 2.0);
-      RansacOptions options;
-      options.score = score;
-      options.seed = seed;
-      Ransac<Location>::Report report;
-      Ransac<Location>(options).Run(model, &report);
-      ASSERT_TRUE(report.success);
-      const RansacLoss loss(score);
-      double expected = 0.0;
-      int inliers = 0;
-      for (int i = 0; i < model.NumData(); ++i) {
-        const double r = model.Datum(i) - report.model[0];
-        expected += static_cast<double>(loss.Value(static_cast<float>(r * r)));
-        EXPECT_EQ(report.inlier_mask[static_cast<std::size_t>(i)], std::abs(r) < 1.0 ? 1 : 0);
-        inliers += std::abs(r) < 1.0 ? 1 : 0;
-      }
-      EXPECT_EQ(report.num_inliers, inliers);
-      EXPECT_NEAR(report.score, expected, 1e-3);
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    // Noise well beyond the threshold: refinement moves data in and out.
+    const Location model = MakeData(300, 200, 2.0);
+    RansacOptions options;
+    options.seed = seed;
+    Ransac<Location>::Report report;
+    Ransac<Location>(options).Run(model, &report);
+    ASSERT_TRUE(report.success);
+    double expected = 0.0;
+    int inliers = 0;
+    for (int i = 0; i < model.NumData(); ++i) {
+      const double r = model.Datum(i) - report.model[0];
+      expected += std::min(r * r, 1.0);
+      EXPECT_EQ(report.inlier_mask[static_cast<std::size_t>(i)], std::abs(r) < 1.0 ? 1 : 0);
+      inliers += std::abs(r) < 1.0 ? 1 : 0;
     }
+    EXPECT_EQ(report.num_inliers, inliers);
+    EXPECT_NEAR(report.score, expected, 1e-3);
   }
 }
 
@@ -219,30 +199,6 @@ TEST(Ransac, SameSeedSameBits) {
   EXPECT_EQ(a.inlier_mask, b.inlier_mask);
 }
 
-TEST(Ransac, ProsacFindsGoodDataFirst) {
-  std::vector<int> order;
-  const Location model = MakeData(1000, 30, 0.0, &order);  // The inliers come first.
-  RansacOptions options;
-  options.max_iterations = 100000;
-  Ransac<Location>::Report ordered, uniform;
-  Ransac<Location>(options).Run(model, &ordered, &order);
-  Ransac<Location>(options).Run(model, &uniform);
-  EXPECT_EQ(ordered.num_inliers, 30);
-  EXPECT_EQ(uniform.num_inliers, 30);
-  EXPECT_LT(ordered.num_iterations, 20);
-  EXPECT_GT(uniform.num_iterations, 1000);
-}
-
-TEST(Ransac, ProsacSurvivesABadOrder) {
-  std::vector<int> order;
-  const Location model = MakeData(100, 40, 0.0, &order);
-  std::reverse(order.begin(), order.end());
-  Ransac<Location>::Report report;
-  Ransac<Location>(RansacOptions()).Run(model, &report, &order);
-  ASSERT_TRUE(report.success);
-  EXPECT_EQ(report.num_inliers, 40);
-}
-
 TEST(RansacOptions, NamesTheBadField) {
   struct Case {
     const char* field;
@@ -258,7 +214,6 @@ TEST(RansacOptions, NamesTheBadField) {
       {"local_start", [](RansacOptions* o) { o->local_start = -1; }},
       {"local_samples", [](RansacOptions* o) { o->local_samples = -1; }},
       {"local_steps", [](RansacOptions* o) { o->local_steps = -1; }},
-      {"max_seconds", [](RansacOptions* o) { o->max_seconds = -1.0; }},
   };
   EXPECT_TRUE(RansacOptions().Validate().ok());
   for (const Case& c : cases) {

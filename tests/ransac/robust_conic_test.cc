@@ -27,15 +27,13 @@ struct Statistics {
 
 // Default options throughout. A few wrong ones are never more likely than among all trials.
 Statistics RunTrials(int trials, double outlier_ratio, double arc_deg = 360.0,
-                     Clutter clutter = Clutter::kUniform, bool with_directions = false,
-                     ScoreType score = ScoreType::kMsac) {
+                     Clutter clutter = Clutter::kUniform, bool with_directions = false) {
   Statistics statistics;
   std::vector<double> errors;
   for (int trial = 0; trial < Trials(trials); ++trial) {
     const Scene scene =
         MakeScene(static_cast<std::uint64_t>(1000 + trial), outlier_ratio, arc_deg, clutter);
     RobustFitOptions options;
-    options.ransac.score = score;
     ConicFit fit;
     const Status status = FitConicRobust(scene.points, options, &fit, nullptr, ConicLimits(),
                                          with_directions ? &scene.directions : nullptr);
@@ -60,14 +58,6 @@ TEST(FitConicRobust, IsEfficientUpToSeventyPercentOutliers) {
         EXPECT_LE(s.median, c.median) << c.outlier_ratio;
       }
     }
-  }
-}
-
-TEST(FitConicRobust, TheMarginalScoreServesToo) {
-  const Statistics s = RunTrials(50, 0.5, 360.0, Clutter::kUniform, false, ScoreType::kMagsac);
-  EXPECT_EQ(s.wrong, 0);
-  if (!kSanitized) {
-    EXPECT_LE(s.median, 1.1);
   }
 }
 

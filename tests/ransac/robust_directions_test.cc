@@ -148,82 +148,6 @@ TEST(FitOrthogonalTriplet, RefusesWhatFixesNoRotation) {
   EXPECT_EQ(membership, std::vector<int>(2, 5));
 }
 
-// Lines along two directions at an angle, then clutter.
-std::vector<LineFit> MakePair(std::uint64_t seed, double angle, Vector3d* first, Vector3d* second,
-                              int num_first = 30, int num_second = 20, int clutter = 50) {
-  Random random(seed);
-  const Matrix3d R = RandomRotation(&random);
-  *first = R.col(0);
-  *second = std::cos(angle) * R.col(0) + std::sin(angle) * R.col(1);
-  std::vector<LineFit> lines;
-  for (int i = 0; i < num_first; ++i) AddSegment(first, &random, &lines);
-  for (int i = 0; i < num_second; ++i) AddSegment(second, &random, &lines);
-  for (int i = 0; i < clutter; ++i) AddSegment(nullptr, &random, &lines);
-  return lines;
-}
-
-TEST(FitDirectionPair, IsNearTheBoundAtAnyAngle) {
-  double squares = 0.0, bounds = 0.0;
-  int trials = 0;
-  for (const double angle : {0.4, 1.0, 1.5708}) {
-    for (std::uint64_t seed = 0; seed < 40; ++seed, ++trials) {
-      std::array<Vector3d, 2> truth;
-      const std::vector<LineFit> lines = MakePair(100 + seed, angle, &truth[0], &truth[1]);
-      std::array<VanishingPointFit, 2> fits;
-      std::vector<int> membership;
-      ASSERT_TRUE(FitDirectionPair(lines, ExactOptions(), &fits, &membership).ok());
-      for (std::size_t k = 0; k < 2; ++k) {
-        const auto begin = lines.begin() + (k == 0 ? 0 : 30);
-        VanishingPointFit oracle;
-        ASSERT_TRUE(FitVanishingPoint({begin, begin + (k == 0 ? 30 : 20)}, &oracle).ok());
-        const double error = AngleBetween(fits[k].direction, truth[k]);
-        EXPECT_LT(error * error, 36.0 * oracle.covariance.trace()) << angle << " " << seed;
-        squares += error * error;
-        bounds += oracle.covariance.trace();
-      }
-      EXPECT_GE(std::count(membership.begin(), membership.begin() + 30, 0), 24);
-      EXPECT_GE(std::count(membership.begin() + 30, membership.begin() + 50, 1), 14);
-    }
-  }
-  EXPECT_LT(std::sqrt(squares / bounds), 1.2);
-}
-
-// Error of a direction in its own tangent plane, squared and in units of its covariance.
-double Nees(const VanishingPointFit& fit, const Vector3d& truth) {
-  Eigen::Matrix<double, 3, 2> basis;
-  basis.col(0) = fit.direction.unitOrthogonal();
-  basis.col(1) = fit.direction.cross(basis.col(0));
-  const double sense = fit.direction.dot(truth) < 0.0 ? -1.0 : 1.0;
-  const Eigen::Vector2d error = sense * basis.transpose() * truth;
-  return error.dot((basis.transpose() * fit.covariance * basis).inverse() * error);
-}
-
-TEST(FitDirectionPair, TheCovarianceKnowsThatMembershipsAreGuessed) {
-  constexpr int kScenes = 80;
-  std::vector<double> nees;
-  for (const double angle : {0.4, 1.0, 1.5708}) {
-    for (int scene = 0; scene < kScenes; ++scene) {
-      std::array<Vector3d, 2> truth;
-      const std::uint64_t seed = 1000 + nees.size();
-      std::array<VanishingPointFit, 2> fits;
-      ASSERT_TRUE(
-          FitDirectionPair(MakePair(seed, angle, &truth[0], &truth[1]), ExactOptions(), &fits)
-              .ok());
-      // Strays decide now and then which of the two has more lines.
-      if (AngleBetween(fits[0].direction, truth[0]) > AngleBetween(fits[1].direction, truth[0])) {
-        std::swap(fits[0], fits[1]);
-      }
-      for (std::size_t k = 0; k < 2; ++k) nees.push_back(Nees(fits[k], truth[k]));
-    }
-  }
-  const double n = static_cast<double>(nees.size());
-  const double mean = std::accumulate(nees.begin(), nees.end(), 0.0) / n;
-  std::printf("pair: mean NEES %.2f of 2 over %.0f directions\n", mean, n);
-  // Chi-square with two degrees of freedom has variance 4.
-  EXPECT_NEAR(mean, 2.0, 3.0 * 2.0 / std::sqrt(n));
-}
-
-// Lines without any error along three orthogonal directions, ten each, and ten strays.
 TEST(RobustDirections, ExactLinesGiveTheExactDirections) {
   for (std::uint64_t seed = 0; seed < 8; ++seed) {
     Random random(seed);
@@ -241,38 +165,16 @@ TEST(RobustDirections, ExactLinesGiveTheExactDirections) {
     EXPECT_LT(RotationError(truth, triplet.rotation).norm(), 1e-12);
     EXPECT_EQ(std::count(membership.begin(), membership.begin() + 30, -1), 0);
     EXPECT_EQ(std::count(membership.begin() + 30, membership.end(), -1), 10);
-    std::array<VanishingPointFit, 2> pair;
-    ASSERT_TRUE(FitDirectionPair(lines, ExactOptions(), &pair).ok()) << seed;
-    for (const VanishingPointFit& fit : pair) {
-      const double nearest = std::min({AngleBetween(fit.direction, truth.col(0)),
-                                       AngleBetween(fit.direction, truth.col(1)),
-                                       AngleBetween(fit.direction, truth.col(2))});
-      EXPECT_LT(nearest, 1e-12) << seed;
-    }
   }
 }
 
-TEST(FitDirectionPair, RefusesOneDirectionAlone) {
-  Vector3d first, second;
-  std::array<VanishingPointFit, 2> fits;
-  fits[0].direction.setConstant(7.0);
-  EXPECT_EQ(
-      FitDirectionPair(MakePair(1, 1.0, &first, &second, 2, 2, 0), PencilOptions(), &fits).code,
-      StatusCode::kRefused);
-  EXPECT_EQ(FitDirectionPair({}, PencilOptions(), &fits).code, StatusCode::kRefused);
-  EXPECT_EQ(fits[0].direction, Vector3d::Constant(7.0));
-}
-
-TEST(FitDirectionPair, NamesBadOptions) {
+TEST(FitOrthogonalTriplet, NamesBadOptions) {
   PencilOptions options;
   options.model_sigma_rad = -1.0;
-  std::array<VanishingPointFit, 2> fits;
   OrthogonalTripletFit fit;
-  for (const Status& status :
-       {FitDirectionPair({}, options, &fits), FitOrthogonalTriplet({}, options, &fit)}) {
-    EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
-    EXPECT_NE(status.message.find("model_sigma_rad"), std::string::npos);
-  }
+  const Status status = FitOrthogonalTriplet({}, options, &fit);
+  EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
+  EXPECT_NE(status.message.find("model_sigma_rad"), std::string::npos);
 }
 
 }  // namespace

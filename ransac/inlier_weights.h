@@ -1,38 +1,10 @@
-// What a residual costs in the robust estimator, and what it weighs in a refit.
-#ifndef CIRCLINE_RANSAC_RANSAC_LOSS_H_
-#define CIRCLINE_RANSAC_RANSAC_LOSS_H_
+// What residuals say of who belongs to a model, and of the noise.
+#ifndef CIRCLINE_RANSAC_INLIER_WEIGHTS_H_
+#define CIRCLINE_RANSAC_INLIER_WEIGHTS_H_
 
 #include <vector>
 
 namespace circline {
-
-enum class ScoreType {
-  kMsac,    // min(r^2 / T^2, 1): truncated least squares.
-  kMagsac,  // The same truncated at T, averaged over all noise levels that T admits (MAGSAC++).
-};
-
-// The loss of a datum as a function of u = r^2 / T^2, in [0, 1], 1 for u >= 1; and the weight
-// (derivative, scaled to 1 at most, 0 for u >= 1) with which a refit takes it.
-class RansacLoss {
- public:
-  explicit RansacLoss(ScoreType type);
-  float Value(float u) const {
-    if (!(u < 1.0f)) return 1.0f;
-    return type_ == ScoreType::kMsac ? u : MarginalValue(u);
-  }
-  float Weight(float u) const {
-    if (!(u < 1.0f)) return 0.0f;
-    // Tukey's, not the truncated square's own step: a datum that crosses the threshold must not
-    // make the iteration jump.
-    return type_ == ScoreType::kMsac ? (1.0f - u) * (1.0f - u) : MarginalWeight(u);
-  }
-
- private:
-  static float MarginalValue(float u);
-  static float MarginalWeight(float u);
-
-  ScoreType type_;
-};
 
 // Inlier weights for a final, statistically efficient fit: the posterior probability that a datum
 // belongs to the Gaussian about the model rather than to a uniform background, whose density is
@@ -50,4 +22,4 @@ double InlierRms(const std::vector<double>& residuals, double threshold);
 
 }  // namespace circline
 
-#endif  // CIRCLINE_RANSAC_RANSAC_LOSS_H_
+#endif  // CIRCLINE_RANSAC_INLIER_WEIGHTS_H_
