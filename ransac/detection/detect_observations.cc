@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,6 +35,7 @@ constexpr int kMaxPencils = 100;
 
 struct Evidence {
   std::vector<CircleEvidence> circles;  // Best first.
+  std::size_t num_ellipses = 0;         // Found, before the best of them were kept.
   std::vector<DetectedLine> lines, bent;
   std::vector<DetectedPencil> pencils;
 };
@@ -96,7 +98,7 @@ EllipseOptions ToEllipseOptions(const DetectionOptions& options) {
   EllipseOptions result;
   result.min_axis_px = options.min_ellipse_axis_px;
   result.min_arc_deg = options.min_arc_deg;
-  result.max_ellipses = options.max_circles;
+  result.max_ellipses = std::numeric_limits<int>::max();  // Cut later, and said so.
   return result;
 }
 
@@ -113,12 +115,15 @@ Status CollectEvidence(const cv::Mat& image, const Camera& camera, const Detecti
   std::vector<DetectedEllipse> ellipses;
   status = DetectEllipses(edges, camera, ToEllipseOptions(options), &ellipses);
   if (!status.ok()) return status;
+  const std::vector<std::uint8_t> on_ellipses = EllipsePoints(edges, ellipses);
+  evidence->num_ellipses = ellipses.size();
+  ellipses.resize(std::min(ellipses.size(), static_cast<std::size_t>(options.max_circles)));
   evidence->circles = MakeCircles(edges, ellipses, options.noise_model);
   if (options.max_pencils == 0) return Status::Ok();
   LineOptions line_options;
   line_options.min_length_px = options.min_segment_length_px;
-  const std::vector<std::uint8_t> skip = EllipsePoints(edges, ellipses);
-  status = DetectLines(edges, camera, line_options, &evidence->lines, &skip, &evidence->bent);
+  status =
+      DetectLines(edges, camera, line_options, &evidence->lines, &on_ellipses, &evidence->bent);
   if (!status.ok()) return status;
   UndoEdgeShift(edges, camera, &evidence->lines);
   return DetectPencils(evidence->lines, options.max_pencils + kExtraPencils, options.seed,
@@ -193,6 +198,12 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   AssembleObservations(assembly, evidence.lines, evidence.bent, &evidence.circles,
                        &evidence.pencils, observations);
   observations->message = Describe(*observations);
+  const auto most = static_cast<std::size_t>(options.max_circles);
+  if (evidence.num_ellipses > most && most > 0) {
+    if (!observations->message.empty()) observations->message += "; ";
+    observations->message += std::to_string(evidence.num_ellipses) + " ellipses found, the best " +
+                             std::to_string(most) + " kept (max_circles)";
+  }
   return Status::Ok();
 }
 

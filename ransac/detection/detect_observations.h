@@ -31,8 +31,8 @@ struct DetectionOptions {
   double min_ellipse_axis_px = 3.0;     // Smallest semi-minor axis; > 0.
   double min_arc_deg = 100.0;           // Smallest angular coverage of an ellipse; in (0, 360].
   double min_segment_length_px = 20.0;  // Shortest line; > 0.
-  int max_circles = 128;                // The best ones by coverage and size; 0 or more.
-  int max_pencils = 3;                  // Directions of parallel lines to look for; 0 to 100.
+  int max_circles = 400;  // The best ones by coverage and size; 0 or more. `message` says more.
+  int max_pencils = 3;    // Directions of parallel lines to look for; 0 to 100.
   double max_shared_plane_deg =
       5.0;  // Two planes nearer than this may be one (a statistical test decides); > 0.
   std::uint64_t seed = 1;  // Same photo, options and seed: same bits out.
@@ -45,7 +45,7 @@ struct DetectionOptions {
 
 // Detects everything; fits included. `image` is 8-bit, 1, 3 or 4 channels. The status is not ok for
 // an empty image, a wrong type, a wrong size (against camera.width x height) or bad options; a
-// photo in which nothing is found is ok, and observations->message says so.
+// photo in which nothing is found is ok; observations->message says so, and what was cut.
 Status DetectObservations(const cv::Mat& image, const Camera& camera,
                           const DetectionOptions& options, Observations* observations);
 

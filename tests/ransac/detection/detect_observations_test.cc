@@ -172,7 +172,14 @@ TEST(DetectObservations, AGridOfDotsIsOnePlane) {
     EXPECT_LT(std::min(AxisDeg(pencil.fit->direction, pose.rotation.col(0)),
                        AxisDeg(pencil.fit->direction, pose.rotation.col(1))),
               0.3);
-  }
+  }  EXPECT_EQ(found.message, "");
+  // What is cut is said.
+  DetectionOptions options;
+  options.max_circles = 20;
+  const Observations cut = Detect(image, camera, options);
+  EXPECT_EQ(cut.circles.size(), 20U);
+  EXPECT_NE(cut.message.find("25 ellipses found, the best 20 kept"), std::string::npos)
+      << cut.message;
 }
 
 TEST(DetectObservations, LimitsAreKept) {
