@@ -66,13 +66,14 @@ class ReadingSearch {
   std::vector<State>& minima() { return minima_; }
 
  private:
-  // The minima that the seeds lead to, in the order of the seeds.
-  std::vector<State> RefineAll(const Reading& reading) {
-    struct Start {
-      State state;
-      double cost;  // With what is left out.
-      std::size_t seed;
-    };
+  struct Start {
+    State state;
+    double cost;  // With what is left out.
+    std::size_t seed;
+  };
+
+  // All seeds that can start, the cheapest first.
+  std::vector<Start> Starts(const Reading& reading) {
     std::vector<Start> starts;
     for (std::size_t i = 0; i < seeds_.size(); ++i) {
       State state;
@@ -83,12 +84,17 @@ class ReadingSearch {
     }
     std::stable_sort(starts.begin(), starts.end(),
                      [](const Start& a, const Start& b) { return a.cost < b.cost; });
+    return starts;
+  }
+
+  // The minima that the seeds lead to, in the order of the seeds.
+  std::vector<State> RefineAll(const Reading& reading) {
     std::vector<std::pair<std::size_t, State>> found;
     std::vector<std::size_t> tried;
     const int best_circle = BestCircle(reading);
     double best = std::numeric_limits<double>::infinity();
     bool is_consistent = false;  // The best one explains all that is to take part.
-    for (Start& start : starts) {
+    for (Start& start : Starts(reading)) {
       State& state = start.state;
       // Where all evidence agrees, one circle's planes are those of all.
       const int source = seeds_[start.seed].source;
@@ -115,11 +121,16 @@ class ReadingSearch {
     std::vector<State> minima;
     for (auto& [seed, state] : found) {
       minima.push_back(state);
-      if (HasOutliers(state)) continue;
-      Grow(&state);
-      if (!IsKnown(state, minima_)) minima_.push_back(std::move(state));
+      Keep(std::move(state));
     }
     return minima;
+  }
+
+  // A minimum for the answer, with all that agrees with it.
+  void Keep(State state) {
+    if (HasOutliers(state)) return;
+    Grow(&state);
+    if (!IsKnown(state, minima_)) minima_.push_back(std::move(state));
   }
 
   // The first seed that is as near to the same minimum.

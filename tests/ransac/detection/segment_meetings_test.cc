@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "circline/estimators/random.h"
+
 namespace circline {
 namespace {
 
@@ -42,6 +44,26 @@ TEST(SegmentMeetings, LengthCountsByTheNumberOfMeetings) {
   EXPECT_NEAR(MeetingLength({Make(0, 0, 60, 0)}, across), 20.0, 1e-9);
   EXPECT_NEAR(MeetingLength({Make(0, 90, 300, 90)}, across), 0.0, 1e-9);
   EXPECT_EQ(MeetingLength({}, across), 0.0);
+}
+
+// Twice the pixels, twice the distances: the same photo.
+TEST(SegmentMeetings, WhatMeetsDoesSoAtAnySize) {
+  Random random(1);
+  const auto point = [&random] { return random.Uniform(0.0, 120.0); };
+  int near = 0, corners = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Segment s = Make(point(), point(), point(), point());
+    const Segment t = Make(point(), point(), point(), point());
+    const Segment s2 = {2.0 * s[0], 2.0 * s[1]}, t2 = {2.0 * t[0], 2.0 * t[1]};
+    EXPECT_EQ(AreNear(s, t, 300.0), AreNear(s2, t2, 600.0));
+    EXPECT_EQ(FormCorner(s, t, 300.0), FormCorner(s2, t2, 600.0));
+    EXPECT_NEAR(2.0 * MeetingLength({s}, {t}, 300.0), MeetingLength({s2}, {t2}, 600.0), 1e-9);
+    near += AreNear(s, t, 300.0) ? 1 : 0;
+    corners += FormCorner(s, t, 300.0) ? 1 : 0;
+  }
+  EXPECT_GT(near, 200);
+  EXPECT_LT(near, 1900);
+  EXPECT_GT(corners, 20);
 }
 
 // Rows and columns, and what touches them by accident.
