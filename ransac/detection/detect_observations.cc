@@ -102,7 +102,11 @@ EllipseOptions ToEllipseOptions(const DetectionOptions& options) {
   return result;
 }
 
-double DiagonalPx(const cv::Mat& image) { return std::hypot(image.cols, image.rows); }
+// Of a photo that what meets is measured in. Edges are smoothed and end some pixels before corners:
+// in photos smaller than usual distances shrink no further.
+double DiagonalPx(const cv::Mat& image) {
+  return std::max(kUsualDiagonalPx, std::hypot(image.cols, image.rows));
+}
 
 Status CollectEvidence(const cv::Mat& image, const Camera& camera, const DetectionOptions& options,
                        Evidence* evidence) {

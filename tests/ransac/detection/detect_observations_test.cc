@@ -172,7 +172,8 @@ TEST(DetectObservations, AGridOfDotsIsOnePlane) {
     EXPECT_LT(std::min(AxisDeg(pencil.fit->direction, pose.rotation.col(0)),
                        AxisDeg(pencil.fit->direction, pose.rotation.col(1))),
               0.3);
-  }  EXPECT_EQ(found.message, "");
+  }
+  EXPECT_EQ(found.message, "");
   // What is cut is said.
   DetectionOptions options;
   options.max_circles = 20;
