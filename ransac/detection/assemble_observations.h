@@ -26,9 +26,9 @@ struct AssemblyOptions {
 
 // Chooses the plane with most support, "p0": that of two pencils and the circles that agree with
 // it, or of circles alone. Agreement is a test with the propagated covariances. Two pencils in it
-// that are orthogonal as far as can be told become x and y, a third orthogonal to both z; others
-// stay free. Appends circles ("c0", ...) and pencils ("L0", ...) to `observations`, those of the
-// plane first. `circles` and `pencils` are ordered by support; they are moved from. `lines` are
+// that are likelier at right angles than at any become x and y, a third orthogonal to both z;
+// others stay free. Appends circles ("c0", ...) and pencils ("L0", ...) to `observations`, those of
+// the plane first. `circles` and `pencils` are ordered by support; they are moved from. `lines` are
 // those that the pencils' members index; the two pencils that span the plane are fitted again to
 // all that lie where the two meet. Where circles are all that a plane has, a box that stands on it
 // (of `lines` and `bent` ones) gives it x and y, and tells which of a lone circle's two normals it
