@@ -130,11 +130,16 @@ class NoiseMeter {
   std::vector<double> residuals_, sizes_;
 };
 
+double Freedom(const std::vector<Scatter>& scatters) {
+  double freedom = 0.0;
+  for (const Scatter& s : scatters) freedom += s.freedom;
+  return freedom;
+}
+
 // The noise that half of the degrees of freedom exceed.
 double Common(std::vector<Scatter> scatters, double default_px, double worth = 1.0) {
-  double freedom = 0.0;
+  const double freedom = Freedom(scatters);
   for (Scatter& s : scatters) {
-    freedom += s.freedom;
     // The median of chi-square over its mean (Wilson and Hilferty 1931), so that few degrees of
     // freedom each do not pull the median down.
     const double cube_root = 1.0 - 2.0 / (9.0 * std::max(1.0, s.freedom));
@@ -157,27 +162,29 @@ PointNoise MeasurePointNoise(const Observations& fitted, const NoiseModel& model
   PointNoise noise;
   std::vector<Scatter> circles, lines;
   for (const CircleObservation& circle : fitted.circles) circles.push_back(meter.OfCircle(circle));
-  noise.conic_px = Common(circles, conic_default_px);
-  for (std::size_t i = 0; i < circles.size(); ++i) {
-    const double stated = fitted.circles[i].sigma_px;
-    noise.circles.push_back(stated > 0.0 ? stated : Shrink(circles[i], noise.conic_px));
-  }
-
   // One for each pencil's segments, then one for each of its lines.
   for (const PencilObservation& pencil : fitted.pencils) {
     lines.push_back(meter.OfSegments(pencil));
     for (const LineObservation& line : pencil.lines) lines.push_back(meter.OfLine(pencil, line));
   }
-  // A photo is about as sharp along its lines as along its contours. Where many contour points say
-  // how sharp, that counts as ten residuals of lines would: segments have few of their own.
+  // A photo is about as sharp along its lines as along its contours. Where many points of the one
+  // kind say how sharp, that counts as ten residuals of the other would: segments have few of their
+  // own, and so have small contours.
   constexpr double kMany = 20.0, kWorth = 10.0;
-  double freedom = 0.0;
-  for (const Scatter& s : circles) freedom += s.freedom;
-  const double worth = freedom >= kMany ? kWorth : 1.0;
-  const double prior =
-      freedom >= kMany ? noise.conic_px * line_default_px / conic_default_px : line_default_px;
+  const bool many_on_circles = Freedom(circles) >= kMany, many_on_lines = Freedom(lines) >= kMany;
+  const double ratio = line_default_px / conic_default_px;
+  const bool lines_tell = many_on_lines && !many_on_circles;
+  const double conic_worth = lines_tell ? kWorth : 1.0;
+  noise.conic_px = Common(
+      circles, lines_tell ? Common(lines, line_default_px) / ratio : conic_default_px, conic_worth);
+  for (std::size_t i = 0; i < circles.size(); ++i) {
+    const double stated = fitted.circles[i].sigma_px;
+    noise.circles.push_back(stated > 0.0 ? stated
+                                         : Shrink(circles[i], noise.conic_px, conic_worth));
+  }
+  const double worth = many_on_circles ? kWorth : 1.0;
   noise.line_worth = worth;
-  noise.line_px = Common(lines, prior, worth);
+  noise.line_px = Common(lines, many_on_circles ? noise.conic_px * ratio : line_default_px, worth);
   std::size_t next = 0;
   for (const PencilObservation& pencil : fitted.pencils) {
     const Scatter segments = lines[next++];

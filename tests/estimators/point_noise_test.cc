@@ -120,6 +120,22 @@ TEST(PointNoise, ManyShortLinesDoNotPullTheCommonNoiseDown) {
   EXPECT_NEAR(common, 0.5, 0.04);
 }
 
+// Seven points of a contour say little of its noise, hundreds of lines' points a lot.
+TEST(PointNoise, LinesTellTheNoiseOfASmallContour) {
+  constexpr int kTrials = 200;
+  int right = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Random random(static_cast<std::uint64_t>(trial));
+    Observations photo = MakePhoto();
+    AddCircle(2.0, 7, &random, &photo);
+    AddPencil(2.0, 6, 50, &random, &photo);
+    const double sigma = Measure(true, photo).circles[0];
+    EXPECT_GT(sigma, 1.0);
+    right += sigma < 3.0 ? 1 : 0;
+  }
+  EXPECT_GT(right, 0.93 * kTrials);
+}
+
 TEST(PointNoise, WhatIsStatedIsBelieved) {
   Random random(1);
   Observations photo = MakePhoto();
