@@ -71,8 +71,7 @@ function(circline_app name)
 endfunction()
 
 # circline_test(<folder> <targets>): all *.cc of the folder as circline_<name>_test, after the last
-# part of its path, one ctest
-# entry per case. Test helpers are "tests/x.h".
+# part of its path, one ctest entry per case. Test helpers are "tests/x.h".
 function(circline_test folder)
   file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cc")
   if(NOT sources)

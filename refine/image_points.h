@@ -17,26 +17,9 @@
 #include "circline/estimators/conic.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/robust_loss.h"
+#include "circline/refine/camera_shifts.h"
 
 namespace circline {
-
-// A camera as unknowns: shifts against the camera as given, so that zeros are that camera. 0: of
-// log f (both focal lengths); 1: of log (fy / fx); 2, 3: of the principal point, pixels; from 4 on:
-// of the distortion coefficients.
-constexpr int kCameraSize = 12;
-Camera ShiftedCamera(const Camera& camera, const double* shifts);
-// What one distortion coefficient does to a pixel. The models are linear in their coefficients but
-// for the rational ones of kOpenCV (k4 to k6), for which it holds at 0.
-class LensSlope {
- public:
-  LensSlope(const Camera& camera, int k);
-  // d pixel / d coefficient of a point at calibrated x, and of d pixel / d x (may be null).
-  Eigen::Vector2d At(const Camera& camera, const Eigen::Vector2d& x,
-                     Eigen::Matrix2d* pixel_from_x) const;
-
- private:
-  Camera lens_;  // Of unit focal length, with this coefficient alone.
-};
 
 // How far a contour point is from a circle's image: to first order (Sampson), or orthogonally, in
 // twice the time. By itself: orthogonally where the first order does not suffice, that is where the

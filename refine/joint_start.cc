@@ -209,9 +209,22 @@ bool JointProblem::Admit(std::size_t feature, State* state) const {
   const auto line = std::find_if(lines_.begin(), lines_.end(), is_it);
   if (line != lines_.end()) return PlaceLine(*line, state);
   const auto circle = std::find_if(circles_.begin(), circles_.end(), is_it);
+  if (circle == circles_.end()) return false;
+  const std::vector<double> before = state->x;
   const double* camera = state->x.data() + blocks_[kCamera].offset;
   Eigen::Vector3d unused;
-  return circle != circles_.end() && PlaceCircle(*circle, camera, state, &unused);
+  if (!PlaceCircle(*circle, camera, state, &unused)) return false;
+  // What it shares with circles that take part stays where these have it.
+  for (int CircleBlocks::*const block : {&CircleBlocks::center, &CircleBlocks::radius}) {
+    const bool is_shared = std::any_of(circles_.begin(), circles_.end(), [&](const auto& other) {
+      return other.feature != circle->feature && other.*block == (*circle).*block &&
+             state->active[static_cast<std::size_t>(other.feature)] != 0;
+    });
+    if (!is_shared) continue;
+    const Block& shared = blocks_[static_cast<std::size_t>((*circle).*block)];
+    std::copy_n(before.begin() + shared.offset, shared.size, state->x.begin() + shared.offset);
+  }
+  return true;
 }
 
 void JointProblem::PlaceLines(const double* camera, State* state) const {

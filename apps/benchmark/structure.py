@@ -2,7 +2,7 @@
 """Does the structure of a photograph depend on its size, or on chance? A line for each set; exit code 1 if it does.
 
   structure.py DATA [--compare=build/release/bin/circline_compare] [--converter=to_scene.py] [--sets=part,of,names]
-               [--sizes=0.5,1,2] [--seeds=1,2,3] [--flags='--threads=1'] [--keep=DIR]
+               [--sizes=0.5,1,2] [--seeds=1,2,3] [--flags='--threads=1']
 
 DATA, the converter and what it needs as for photographs.py. Everything is detected in each photo, at each size of it (lenses
 and truths follow) and with each seed; the answers of `joint` with a probability of 0.9 or more are compared with those of
@@ -88,7 +88,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('data')
     for flag, default in (('converter', None), ('compare', 'build/release/bin/circline_compare'), ('sets', ''),
-                          ('sizes', '0.5,1,2'), ('seeds', '1,2,3'), ('flags', ''), ('keep', None)):
+                          ('sizes', '0.5,1,2'), ('seeds', '1,2,3'), ('flags', '')):
         parser.add_argument('--' + flag, default=default)
     args = parser.parse_args()
     args.converter = args.converter or os.path.join(args.data, '..', 'tools', 'to_scene.py')
