@@ -1,11 +1,16 @@
 // What detection finds on photographs with truth: prints one table a kind of truth.
 //
 //     circline_detection_benchmark --data=DIR [--set=NAME]
+//     circline_detection_benchmark --render_seed=1 [--render_seeds=5] [--render_count=60]
+//         [--render_textures=DIR] [--render_output=DIR]
 //
 // DIR holds folders with a groundtruth.yml (camera, and per photo what is true of it) or, for
-// renderings, a truth.csv; each is measured by what its truth offers.
+// renderings, a truth.csv; each is measured by what its truth offers. The second form renders sets
+// of 60 images of its own, one a seed, and prints a row for each and their mean; or writes the
+// first of them as such a folder. Its textures are the photographs of the package opencv-doc.
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <opencv2/core.hpp>
 #include <string>
@@ -45,13 +50,33 @@ std::string Flag(int argc, char** argv, const std::string& name) {
   return std::string();
 }
 
+int NumberFlag(int argc, char** argv, const std::string& name, int preset) {
+  const std::string value = Flag(argc, argv, name);
+  return value.empty() ? preset : std::atoi(value.c_str());
+}
+
+int Render(int argc, char** argv) {
+  std::string textures = Flag(argc, argv, "render_textures");
+  if (textures.empty()) textures = "/usr/share/doc/opencv-doc/examples/data";
+  const std::string output = Flag(argc, argv, "render_output");
+  const int seed = NumberFlag(argc, argv, "render_seed", 1);
+  const int count = NumberFlag(argc, argv, "render_count", 60);
+  const bool done =
+      output.empty()
+          ? MeasureFreshRenderings(textures, seed, NumberFlag(argc, argv, "render_seeds", 1), count)
+          : WriteRenderings(textures, seed, count, output);
+  if (!done) std::fprintf(stderr, "no photographs in %s, or no output\n", textures.c_str());
+  return done ? 0 : 1;
+}
+
 int Main(int argc, char** argv) {
   const std::string data = Flag(argc, argv, "data"), set = Flag(argc, argv, "set");
+  cv::setNumThreads(1);
+  if (!Flag(argc, argv, "render_seed").empty()) return Render(argc, argv);
   if (data.empty()) {
-    std::fprintf(stderr, "usage: %s --data=DIR [--set=NAME]\n", argv[0]);
+    std::fprintf(stderr, "usage: %s --data=DIR [--set=NAME] | --render_seed=N\n", argv[0]);
     return 2;
   }
-  cv::setNumThreads(1);
   if (!set.empty()) {
     MeasureFolder(data + "/" + set);
     return 0;

@@ -12,6 +12,14 @@ namespace circline::benchmark {
 // Renderings with a truth.csv: ellipses and normals, ours and OpenCV's.
 void MeasureRenderings(const std::string& folder);
 
+// Fresh renderings, `count` of each of the seeds first, first + 1, ...: what the table of a folder
+// ends with, a line a seed and their average. `textures`: a folder with OpenCV's sample
+// photographs. False where it has none.
+bool MeasureFreshRenderings(const std::string& textures, int first_seed, int num_seeds, int count);
+
+// The renderings of one seed as a folder with a truth.csv. False where it cannot be written.
+bool WriteRenderings(const std::string& textures, int seed, int count, const std::string& folder);
+
 // Photographs with labelled ellipses, not calibrated.
 void MeasureLabels(const std::string& folder, const cv::FileNode& root);
 

@@ -45,7 +45,7 @@ std::map<std::string, RenderedImage> ReadRenderings(const std::string& path) {
     std::getline(row, name, ',');
     std::vector<double> v;
     while (std::getline(row, cell, ',')) v.push_back(std::atof(cell.c_str()));
-    if (v.size() < 9) continue;
+    if (v.size() < 11) continue;
     RenderedImage& image = images[name];
     image.group = static_cast<int>(v[0]);
     Ellipse e;
@@ -55,6 +55,7 @@ std::map<std::string, RenderedImage> ReadRenderings(const std::string& path) {
     e.angle = v[5];
     image.ellipses.push_back(e);
     image.normals.emplace_back(v[6], v[7], v[8]);
+    image.centers.emplace_back(v[9], v[10]);
   }
   return images;
 }

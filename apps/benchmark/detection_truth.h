@@ -17,6 +17,7 @@ struct RenderedImage {
   int group = 0;
   std::vector<Ellipse> ellipses;
   std::vector<Eigen::Vector3d> normals;
+  std::vector<Eigen::Vector2d> centers;  // Of the circle; the two rims of a ring share theirs.
 };
 
 // By file name.

@@ -1,0 +1,54 @@
+// Table of labelled photographs.
+#include <algorithm>
+#include <cstdio>
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
+#include "apps/benchmark/detection_ellipses_run.h"
+#include "apps/benchmark/detection_statistics.h"
+#include "apps/benchmark/detection_tables.h"
+#include "apps/benchmark/detection_truth.h"
+#include "apps/benchmark/ellipse_overlap.h"
+
+namespace circline::benchmark {
+
+void MeasureLabels(const std::string& folder, const cv::FileNode& root) {
+  Score all;
+  std::vector<double> ms;
+  std::printf(
+      "labelled ellipses %s\n  photo            labels found  recall(0.8) (0.95)   ms: edges "
+      "ellipses besides\n",
+      folder.c_str());
+  for (const cv::FileNode& node : root["images"]) {
+    const std::string file = ReadText(node, "file");
+    const cv::Mat image = cv::imread(folder + "/" + file, cv::IMREAD_COLOR);
+    if (image.empty()) continue;
+    Camera camera;  // Not calibrated: any pinhole does for finding ellipses.
+    camera.width = image.cols;
+    camera.height = image.rows;
+    camera.fx = camera.fy = image.cols;
+    camera.cx = 0.5 * (image.cols - 1);
+    camera.cy = 0.5 * (image.rows - 1);
+    const Timed t = RunEllipses(image, camera);
+    ms.push_back(t.edges_ms + t.ellipses_ms);
+    std::vector<PolygonPoints> truth;
+    for (const cv::FileNode& label : node["ellipses"]) {
+      const Ellipse ellipse = ReadEllipse(ReadMatrix(label, "ellipse"));
+      if (2.0 * ellipse.a >= 20.0) truth.push_back(EllipsePolygon(ellipse));
+    }
+    std::vector<double> overlap;
+    Match(truth, t.polygons, &overlap);
+    Score s;
+    s.Add(overlap, t.polygons.size());
+    all.Add(overlap, t.polygons.size());
+    std::printf("  %-16s %5d %5d   %8.3f  %8.3f  %9.1f %.1f\n", file.c_str(), s.truth, s.found,
+                static_cast<double>(s.hit80) / std::max(1, s.truth),
+                static_cast<double>(s.hit95) / std::max(1, s.truth), t.edges_ms, t.ellipses_ms);
+  }
+  std::printf("  all %18d %5d   %8.3f  %8.3f   ms with edges: median %.1f worst %.1f\n", all.truth,
+              all.found, static_cast<double>(all.hit80) / std::max(1, all.truth),
+              static_cast<double>(all.hit95) / std::max(1, all.truth), Quantile(ms, 0.5),
+              Quantile(ms, 1.0));
+}
+
+}  // namespace circline::benchmark
