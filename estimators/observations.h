@@ -22,6 +22,12 @@ namespace circline {
 // Two pixels of the photo. As an axis it is oriented from [0] to [1]; elsewhere it has no sense.
 using Segment = std::array<Eigen::Vector2d, 2>;
 
+// A conic and the points that speak for it.
+struct ConicReading {
+  ConicFit fit;
+  std::vector<std::uint8_t> inliers;  // One per point of the contour, 1 = inlier.
+};
+
 // Image of one circle. All pixels are pixels of the photo as taken.
 struct CircleObservation {
   std::string id;
@@ -46,6 +52,8 @@ struct CircleObservation {
   // Added by a fit.
   std::optional<ConicFit> fit;
   std::vector<std::uint8_t> inliers;  // One per point, 1 = inlier; empty = all.
+  // Another ellipse through points that `fit` leaves out: a second rim, or the right one.
+  std::optional<ConicReading> second;
 };
 
 // Image of one straight line: the end points of a segment, or points along it.

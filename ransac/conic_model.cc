@@ -248,51 +248,19 @@ bool ConicModel::Accept(const Value& value, double threshold) const {
   return GainOfLine(some, threshold * pixel_) <= limits_.max_line_share * gain;
 }
 
-namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-
-struct Axes {
-  double a, b;
-
-  // Semi-axes of an ellipse: squares are k / eigenvalue with k = -det / minor.
-  explicit Axes(const ConicModel::Value& value) {
-    const auto [p, q, r, d, e, f] = value;
-    const double minor = p * r - q * q;
-    const double k = std::abs(f * minor - p * e * e - r * d * d + 2.0 * q * d * e) / minor;
-    const double half = 0.5 * (p + r);
-    const double root = std::sqrt(std::max(0.0, half * half - minor));
-    a = std::sqrt(k * (half + root) / minor);
-    b = std::sqrt(k / (half + root));
-  }
-  // Ramanujan's first approximation.
-  double Perimeter() const {
-    return kPi * (3.0 * (a + b) - std::sqrt((3.0 * a + b) * (a + 3.0 * b)));
-  }
-};
-
-}  // namespace
-
 double ConicModel::BandShare(const Value& value, double threshold) const {
-  const double area = Axes(value).Perimeter() * 2.0 * threshold * pixel_;
+  // Semi-axes: squares are k / eigenvalue with k = -det / minor.
+  const auto [p, q, r, d, e, f] = value;
+  const double minor = p * r - q * q;
+  const double k = std::abs(f * minor - p * e * e - r * d * d + 2.0 * q * d * e) / minor;
+  const double half = 0.5 * (p + r);
+  const double large = half + std::sqrt(std::max(0.0, half * half - minor));
+  const double a = std::sqrt(k * large / minor), b = std::sqrt(k / large);
+  // Ramanujan's first approximation of the perimeter.
+  constexpr double kPi = 3.14159265358979323846;
+  const double perimeter = kPi * (3.0 * (a + b) - std::sqrt((3.0 * a + b) * (a + 3.0 * b)));
+  const double area = perimeter * 2.0 * threshold * pixel_;
   return area < box_area_ ? area / box_area_ : 1.0;
-}
-
-bool ConicModel::IsBlob(const Value& value, double threshold) const {
-  int in_band = 0, inside = 0;
-  for (int i = 0; i < NumData(); ++i) {
-    const double distance = Distance(value, i);
-    // The centre has no direction to the ellipse: its distance is infinite.
-    if (std::abs(distance) <= threshold) {
-      ++in_band;
-    } else if (distance < 0.0 || std::isinf(distance)) {
-      ++inside;
-    }
-  }
-  const Axes axes(value);
-  const double t = threshold * pixel_;
-  const double area = kPi * std::max(0.0, axes.a - t) * std::max(0.0, axes.b - t);
-  return inside * axes.Perimeter() * 2.0 * t > 0.5 * in_band * area && inside > 0;
 }
 
 double ConicModel::Distance(const Value& value, int i) const {

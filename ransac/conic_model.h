@@ -74,9 +74,6 @@ class ConicModel {
   // Area within the threshold of the ellipse over that of the points' box: the chance that a stray
   // point is an inlier.
   double BandShare(const Value& value, double threshold) const;
-  // Whether the ellipse lies in a blob of points: its inside is more than half as dense as the band
-  // within the threshold.
-  bool IsBlob(const Value& value, double threshold) const;
 
   // Signed distance of datum i, pixels, in double precision.
   double Distance(const Value& value, int i) const;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include "circline/estimators/conic_fit.h"
@@ -25,6 +28,7 @@ class PointFitter {
       circles_.push_back(Prepare(circle.points, circle.sigma_px));
       circle.fit.reset();
       circle.inliers.clear();
+      circle.second.reset();
       Status status = FitCircle(circles_.back(), nullptr, &circle);
       if (LeaveCrowdsOut(circle.points, circle.inliers, &circles_.back()))
         status = FitCircle(circles_.back(), nullptr, &circle);
@@ -47,7 +51,10 @@ class PointFitter {
     }
     for (int round = 0; round < FitRun::kMaxRounds && FollowNoise(); ++round) continue;
     for (std::size_t i = 0; i < circles_.size(); ++i) {
-      SetCovariance(circles_[i], &run_.observations.circles[i]);
+      CircleObservation& circle = run_.observations.circles[i];
+      if (!circle.fit) continue;
+      FitSecond(circles_[i], &circle);
+      ScaleCovariance(circles_[i], circle.points, circle.inliers, &*circle.fit);
     }
     FitDirections(&lines_, &run_);
   }
@@ -110,17 +117,21 @@ class PointFitter {
     return true;
   }
 
-  // From `initial`, or by a search.
-  Status FitCircle(const FittedFeature& f, const ConicFit* initial, CircleObservation* circle) {
+  // Those of the points; none where the contour has none.
+  std::optional<EdgeDirections> Directions(const FittedFeature& f,
+                                           const CircleObservation& circle) const {
+    if (circle.normals.empty()) return {};
     EdgeDirections directions;
     directions.sigma_rad = run_.options.direction_sigma_rad;
-    const bool has_normals = !circle->normals.empty();
-    if (has_normals) {
-      for (const int i : f.indices) {
-        directions.normals.push_back(circle->normals[static_cast<std::size_t>(i)]);
-      }
-    }
-    const EdgeDirections* given = has_normals ? &directions : nullptr;
+    for (const int i : f.indices)
+      directions.normals.push_back(circle.normals[static_cast<std::size_t>(i)]);
+    return directions;
+  }
+
+  // From `initial`, or by a search.
+  Status FitCircle(const FittedFeature& f, const ConicFit* initial, CircleObservation* circle) {
+    const std::optional<EdgeDirections> directions = Directions(f, *circle);
+    const EdgeDirections* given = directions ? &*directions : nullptr;
     const RobustFitOptions options = NextOptions(f);
     ConicFit fit;
     const Status status =
@@ -131,6 +142,22 @@ class PointFitter {
     circle->fit = fit;
     circle->inliers = PixelMask(f, circle->points.size());
     return status;
+  }
+
+  void FitSecond(const FittedFeature& f, CircleObservation* circle) {
+    const std::optional<EdgeDirections> directions = Directions(f, *circle);
+    ConicReading second;
+    const Status status =
+        FitSecondConic(f.points, NextOptions(f), circle->fit->conic, &second.fit, &mask_,
+                       ConicLimits(), directions ? &*directions : nullptr);
+    if (!status.ok()) return;
+    second.inliers = PixelMask(f, circle->points.size());
+    const auto share = 100 * std::count(mask_.begin(), mask_.end(), 1) /
+                       static_cast<std::ptrdiff_t>(circle->points.size());
+    run_.Report("circle '" + circle->id + "'",
+                "a second ellipse passes through " + std::to_string(share) + " % of its points");
+    ScaleCovariance(f, circle->points, second.inliers, &second.fit);
+    circle->second = std::move(second);
   }
 
   Status FitLine(const FittedFeature& f, LineObservation* line) {
@@ -162,11 +189,11 @@ class PointFitter {
     return moved;
   }
 
-  void SetCovariance(const FittedFeature& f, CircleObservation* circle) const {
-    if (!circle->fit) return;
-    const double weight =
-        run_.options.noise_model.ContourWeight(f.sigma_px, circle->points, circle->inliers);
-    circle->fit->ScaleCovariance(f.sigma_px * f.sigma_px / weight);
+  // From points of 1 px to those that there are, with what they share.
+  void ScaleCovariance(const FittedFeature& f, const std::vector<Eigen::Vector2d>& pixels,
+                       const std::vector<std::uint8_t>& inliers, ConicFit* fit) const {
+    const double weight = run_.options.noise_model.ContourWeight(f.sigma_px, pixels, inliers);
+    fit->ScaleCovariance(f.sigma_px * f.sigma_px / weight);
   }
 
   FitRun& run_;

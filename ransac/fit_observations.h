@@ -34,8 +34,10 @@ struct FitOptions {
 
 // Fills the fits of all circles, lines and pencils, and what of them are outliers: points, and
 // lines that are not parallel to the others of their pencil. What cannot be fitted stays without a
-// fit; `problems` (optional) receives one sentence for each, and for each such line, naming it. The
-// returned status is not ok only for invalid options or observations.
+// fit; `problems` (optional) receives one sentence for each, and for each such line, naming it. A
+// contour whose outliers hold an ellipse of their own has that as its second reading, and is named
+// too: the first is the likelier one. The returned status is not ok only for invalid options or
+// observations.
 Status FitObservations(const FitOptions& options, Observations* observations,
                        std::vector<std::string>* problems = nullptr);
 

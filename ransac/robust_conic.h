@@ -41,6 +41,16 @@ Status RefitConicRobust(const std::vector<CalibratedPoint>& points, const Robust
                         std::vector<std::uint8_t>* mask = nullptr, const ConicLimits& limits = {},
                         const EdgeDirections* directions = nullptr);
 
+// A second ellipse through points that `first` leaves out by more than twice the threshold: a
+// second rim, a neighbour. Refuses what is no better than chance: where one as good or more is
+// expected in a hundred sets of as many stray points (Desolneux, Moisan, Morel, IJCV 2000), or the
+// points are a blob. 500 draws at the most, 0.2 ms: it is found where it has a third of what is
+// left (a sixth with directions).
+Status FitSecondConic(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
+                      const Eigen::Matrix3d& first, ConicFit* fit,
+                      std::vector<std::uint8_t>* mask = nullptr, const ConicLimits& limits = {},
+                      const EdgeDirections* directions = nullptr);
+
 }  // namespace circline
 
 #endif  // CIRCLINE_RANSAC_ROBUST_CONIC_H_

@@ -25,7 +25,7 @@ int Run() {
     return kExitUsage;
   }
   RunConics();
-  RunInstances();
+  RunContours();
   RunLines();
   RunPencils();
   return kExitOk;

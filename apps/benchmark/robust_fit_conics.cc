@@ -12,7 +12,7 @@
 #include "apps/benchmark/robust_fit_table.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/random.h"
-#include "circline/ransac/find_conics.h"
+#include "circline/ransac/robust_conic.h"
 
 namespace circline::apps {
 namespace {
@@ -185,32 +185,6 @@ const ConicRow kStructuredRows[] = {
     {"cluster, 70 %", 0.7, 360.0, Clutter::kCluster, {99.0, 0.0, 0.0}},
 };
 
-// A trial is ok if all four are found; the second column counts what is none of them.
-void RunInstancesRow(const char* method, bool with_directions) {
-  FindConicsOptions options;
-  options.fit = PixelOptions();
-  std::vector<double> times;
-  int complete = 0, wrong = 0;
-  for (int trial = 0; trial < FLAGS_trials; ++trial) {
-    InstancesScene scene =
-        MakeInstancesScene(FLAGS_sigma_px, FLAGS_direction_sigma_deg * kRadians, TrialSeed(trial));
-    scene.directions.sigma_rad = std::max(FLAGS_direction_sigma_deg * kRadians, 1e-3);
-    std::vector<FoundConic> found;
-    times.push_back(Timed([&] {
-      (void)FindConics(scene.points, options, &found,
-                       with_directions ? &scene.directions : nullptr);
-    }));
-    std::vector<Matrix3d> conics;
-    for (const FoundConic& conic : found) conics.push_back(conic.fit.conic);
-    const int right = scene.NumFound(conics);
-    complete += right == 4 ? 1 : 0;
-    wrong += std::max(0, static_cast<int>(conics.size()) - right);
-  }
-  std::printf("%-26s %-28s %6.1f %9.2f %9.3f\n", "four ellipses, 50 %", method,
-              100.0 * complete / FLAGS_trials, static_cast<double>(wrong) / FLAGS_trials,
-              Median(times));
-}
-
 }  // namespace
 
 void RunConics() {
@@ -227,13 +201,6 @@ void RunConics() {
   for (const ConicRow& row : kStructuredRows) {
     if (Wanted(row.name)) RunConicRow(row);
   }
-}
-
-void RunInstances() {
-  if (!Wanted("four ellipses, 50 %")) return;
-  PrintHead("Several ellipses from one set: all four found, and others reported", "others");
-  RunInstancesRow("ours, points", false);
-  RunInstancesRow("ours, with directions", true);
 }
 
 }  // namespace circline::apps

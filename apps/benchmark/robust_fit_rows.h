@@ -4,8 +4,8 @@
 
 namespace circline::apps {
 
-void RunConics();     // One ellipse among outliers of many kinds.
-void RunInstances();  // Several ellipses from one set of points.
+void RunConics();    // One ellipse among outliers of many kinds.
+void RunContours();  // The same through FitObservations, and what only that decides.
 void RunLines();
 void RunPencils();  // Three orthogonal directions among clutter.
 

@@ -16,7 +16,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr int kContourPoints = 100;
+// Semi-axes of the second rim over those of the first.
+constexpr double kRimScale = 1.15;
 
 Vector2d Noise(double sigma, Random* random) {
   const double x = random->Normal(), y = random->Normal();
@@ -70,6 +71,12 @@ class ClutterSource {
     along_ = Unit(random->Uniform(0.0, kPi));
     on_edge_ = ellipse.center + Vector2d(20.0, 10.0);
     disc_ = box.Draw(random);
+    rim_ = ellipse;
+    rim_.a *= kRimScale;
+    rim_.b *= kRimScale;
+    if (options.clutter != Clutter::kRim) return;
+    rim_start_ = random->Uniform(0.0, 2.0 * kPi);
+    rim_arc_ = 2.0 * kPi * options.outlier_ratio / (1.0 - options.outlier_ratio);
   }
 
   void Draw(Vector2d* pixel, Vector2d* normal) {
@@ -90,6 +97,12 @@ class ClutterSource {
             on_edge_ + random_->Uniform(-150.0, 150.0) * along_ + Noise(options_.sigma_px, random_);
         *normal = Turned({-along_.y(), along_.x()}, options_.direction_sigma_rad, random_);
         break;
+      case Clutter::kRim: {
+        const double t = rim_start_ + random_->Uniform(0.0, rim_arc_);
+        *pixel = EllipsePoint(rim_, t) + Noise(options_.sigma_px, random_);
+        *normal = Turned(EllipseNormal(rim_, t), options_.direction_sigma_rad, random_);
+        break;
+      }
       case Clutter::kCluster: {
         const double r = 15.0 * std::sqrt(random_->Uniform());
         *pixel = disc_ + r * Unit(random_->Uniform(0.0, 2.0 * kPi));
@@ -98,12 +111,22 @@ class ClutterSource {
     }
   }
 
+  // The second rim where it is seen.
+  std::vector<Vector2d> Rim() const {
+    std::vector<Vector2d> points;
+    if (options_.clutter != Clutter::kRim) return points;
+    const int n = NumOutliers(options_.num_inliers, options_.outlier_ratio);
+    for (int i = 0; i < n; ++i) points.push_back(EllipsePoint(rim_, rim_start_ + rim_arc_ * i / n));
+    return points;
+  }
+
  private:
   const ConicSceneOptions& options_;
   const Box& box_;
   Random* random_;
-  Ellipse other_;
+  Ellipse other_, rim_;
   Vector2d along_, on_edge_, disc_;
+  double rim_start_ = 0.0, rim_arc_ = 0.0;
 };
 
 double RmsOver(double sum, double parameters, double sigma) {
@@ -123,13 +146,23 @@ Camera SceneCamera() {
   return camera;
 }
 
-double ConicScene::Error(const Matrix3d& conic) const {
+namespace {
+
+double ErrorAlong(const std::vector<CalibratedPoint>& truth, const Matrix3d& conic, double sigma) {
   double sum = 0.0;
   for (const CalibratedPoint& p : truth) {
     const double d = ConicDistancePx(p, conic);
     sum += d * d;
   }
-  return RmsOver(sum, 5.0, sigma_px);
+  return RmsOver(sum, 5.0, sigma);
+}
+
+}  // namespace
+
+double ConicScene::Error(const Matrix3d& conic) const { return ErrorAlong(truth, conic, sigma_px); }
+
+double ConicScene::RimError(const Matrix3d& conic) const {
+  return ErrorAlong(rim, conic, sigma_px);
 }
 
 ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed) {
@@ -144,8 +177,8 @@ ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed) 
   std::vector<Vector2d> truth;
   const double arc = options.arc_deg / 180.0 * kPi;
   const double start = random.Uniform(0.0, 2.0 * kPi);
-  for (int i = 0; i < kContourPoints; ++i) {
-    const double t = start + arc * i / kContourPoints;
+  for (int i = 0; i < options.num_inliers; ++i) {
+    const double t = start + arc * i / options.num_inliers;
     truth.push_back(EllipsePoint(ellipse, t));
     scene.pixels.push_back(truth.back() + Noise(options.sigma_px, &random));
     scene.directions.normals.push_back(
@@ -154,7 +187,7 @@ ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed) 
   const double seen = options.clutter == Clutter::kArcBox ? arc : 2.0 * kPi;
   const Box box(ellipse, start, start + seen, 1.5);
   ClutterSource clutter(options, ellipse, box, &random);
-  for (int i = 0; i < NumOutliers(kContourPoints, options.outlier_ratio); ++i) {
+  for (int i = 0; i < NumOutliers(options.num_inliers, options.outlier_ratio); ++i) {
     Vector2d pixel, normal;
     clutter.Draw(&pixel, &normal);
     scene.pixels.push_back(pixel);
@@ -162,51 +195,7 @@ ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed) 
   }
   PixelsToCalibrated(SceneCamera(), scene.pixels, &scene.points);
   PixelsToCalibrated(SceneCamera(), truth, &scene.truth);
-  return scene;
-}
-
-int InstancesScene::NumFound(const std::vector<Matrix3d>& conics) const {
-  const auto follows = [&](const Ellipse& ellipse, const Matrix3d& conic) {
-    for (int i = 0; i < 64; ++i) {
-      CalibratedPoint p;
-      const Vector2d pixel = EllipsePoint(ellipse, 2.0 * kPi * i / 64);
-      if (!PixelToCalibrated(SceneCamera(), pixel, &p)) return false;
-      if (!(std::abs(ConicDistancePx(p, conic)) < 2.0 * sigma_px)) return false;
-    }
-    return true;
-  };
-  return static_cast<int>(std::count_if(ellipses.begin(), ellipses.end(), [&](const Ellipse& e) {
-    return std::any_of(conics.begin(), conics.end(),
-                       [&](const Matrix3d& conic) { return follows(e, conic); });
-  }));
-}
-
-InstancesScene MakeInstancesScene(double sigma_px, double direction_sigma_rad, std::uint64_t seed) {
-  Random random(seed);
-  InstancesScene scene;
-  scene.sigma_px = sigma_px;
-  const double angle = random.Uniform(-1.5, 1.5), other = random.Uniform(-1.5, 1.5);
-  scene.ellipses = {{{200.0, 200.0}, 100.0, 60.0, angle},
-                    {{200.0, 200.0}, 70.0, 42.0, angle},
-                    {{290.0, 230.0}, 60.0, 50.0, other},
-                    {{500.0, 350.0}, 50.0, 30.0, -angle}};
-  std::vector<Vector2d> pixels;
-  for (const Ellipse& ellipse : scene.ellipses) {
-    const int num_points = static_cast<int>(ellipse.a / 2.0) + 50;
-    for (int i = 0; i < num_points; ++i) {
-      const double t = 2.0 * kPi * i / num_points;
-      pixels.push_back(EllipsePoint(ellipse, t) + Noise(sigma_px, &random));
-      scene.directions.normals.push_back(
-          Turned(EllipseNormal(ellipse, t), direction_sigma_rad, &random));
-    }
-  }
-  const std::size_t num_inliers = pixels.size();
-  for (std::size_t i = 0; i < num_inliers; ++i) {
-    const double x = random.Uniform(0.0, 640.0), y = random.Uniform(0.0, 480.0);
-    pixels.emplace_back(x, y);
-    scene.directions.normals.push_back(Unit(random.Uniform(0.0, kPi)));
-  }
-  PixelsToCalibrated(SceneCamera(), pixels, &scene.points);
+  PixelsToCalibrated(SceneCamera(), clutter.Rim(), &scene.rim);
   return scene;
 }
 

@@ -23,22 +23,27 @@ enum class Clutter {
   kEllipse,  // A second ellipse of semi-axes 80 and 50 px that shares the box, with the same noise.
   kEdge,     // A straight edge of 300 px that crosses the contour, with the same noise.
   kCluster,  // A disc of 15 px radius somewhere in the box.
+  kRim,      // An arc of a second rim, 1.15 times as large and as dense, with the same noise.
 };
 
-// 100 points of an ellipse of semi-axes 100 and 60 px, evenly spread (in the eccentric anomaly)
+// Points of an ellipse of semi-axes 100 and 60 px, evenly spread (in the eccentric anomaly)
 // over an arc, with Gaussian noise on both coordinates; then the clutter.
 struct ConicScene {
   std::vector<Eigen::Vector2d> pixels;
   std::vector<CalibratedPoint> points;  // The same.
   EdgeDirections directions;            // Normals with noise; any where the clutter has none.
   std::vector<CalibratedPoint> truth;   // The contour without noise.
+  std::vector<CalibratedPoint> rim;     // The second rim, as far as it is seen, without noise.
   double sigma_px = 1.0;
 
-  // RMS error along the true contour in units of the Cramer-Rao bound (5 parameters).
+  // RMS error along the true contour, or the second rim, in units of the Cramer-Rao bound (5
+  // parameters).
   double Error(const Eigen::Matrix3d& conic) const;
+  double RimError(const Eigen::Matrix3d& conic) const;
 };
 
 struct ConicSceneOptions {
+  int num_inliers = 100;
   double outlier_ratio = 0.5;  // Of all points.
   double arc_deg = 360.0;
   Clutter clutter = Clutter::kUniform;
@@ -47,20 +52,6 @@ struct ConicSceneOptions {
 };
 
 ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed);
-
-// Four ellipses of 60 to 100 points, two of them concentric and one crossing another, among as many
-// stray points again, all over a photo of 640 x 480.
-struct InstancesScene {
-  std::vector<Ellipse> ellipses;  // Pixels.
-  std::vector<CalibratedPoint> points;
-  EdgeDirections directions;
-
-  // How many of the ellipses have a conic that stays within two standard deviations all along.
-  int NumFound(const std::vector<Eigen::Matrix3d>& conics) const;
-  double sigma_px = 1.0;
-};
-
-InstancesScene MakeInstancesScene(double sigma_px, double direction_sigma_rad, std::uint64_t seed);
 
 // 100 points along 300 px with Gaussian noise, outliers uniform in 400 x 400 px.
 struct LineScene {

@@ -317,6 +317,34 @@ TEST(FitObservations, MasksAndCovariancesAreRightAtAnyNoiseStatedOrNot) {
   }
 }
 
+// A manhole's rim and, over 40 % of it, that of its frame.
+TEST(FitObservations, ASecondRimIsASecondReadingAndNamed) {
+  Random random(5);
+  Observations observations;
+  observations.camera = TestCamera();
+  CircleObservation circle;
+  circle.id = "cover";
+  for (int i = 0; i < 140; ++i) {
+    const double t = 0.0628 * i, scale = i < 100 ? 1.0 : 1.15;
+    const double x = random.Normal(), y = random.Normal();
+    circle.points.emplace_back(
+        Pixel(0.05 + 0.15 * scale * std::cos(t), 0.09 * scale * std::sin(t)) +
+        0.5 * Eigen::Vector2d(x, y));
+  }
+  observations.circles = {circle};
+  std::vector<std::string> problems;
+  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+  const CircleObservation& fitted = observations.circles[0];
+  ASSERT_TRUE(fitted.fit && fitted.second);
+  EXPECT_NEAR(static_cast<double>(std::count(fitted.inliers.begin(), fitted.inliers.end(), 1)),
+              100.0, 2.0);
+  const std::vector<std::uint8_t>& others = fitted.second->inliers;
+  EXPECT_NEAR(static_cast<double>(std::count(others.begin() + 100, others.end(), 1)), 40.0, 2.0);
+  EXPECT_LE(std::count(others.begin(), others.begin() + 100, 1), 2);
+  ASSERT_EQ(problems.size(), 1U);
+  EXPECT_NE(problems[0].find("circle 'cover': a second ellipse"), std::string::npos) << problems[0];
+}
+
 TEST(FitObservations, ACapIsKept) {
   NoisyScene scene(1, 2.0);
   FitOptions options;

@@ -273,5 +273,37 @@ TEST(FitConicRobust, NamesBadOptions) {
   EXPECT_NE(status.message.find("min_arc_deg"), std::string::npos);
 }
 
+// Share of scenes in which what the first fit leaves holds a second ellipse.
+double ShareWithSecond(double outlier_ratio, Clutter clutter, bool with_directions) {
+  const int trials = Trials(50);
+  int seconds = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    const Scene scene =
+        MakeScene(static_cast<std::uint64_t>(2000 + trial), outlier_ratio, 360.0, clutter);
+    const EdgeDirections* directions = with_directions ? &scene.directions : nullptr;
+    const RobustFitOptions options;
+    ConicFit first, second;
+    std::vector<std::uint8_t> mask;
+    EXPECT_TRUE(FitConicRobust(scene.points, options, &first, nullptr, {}, directions).ok());
+    if (!FitSecondConic(scene.points, options, first.conic, &second, &mask, {}, directions).ok())
+      continue;
+    ++seconds;
+    EXPECT_EQ(mask.size(), scene.points.size());
+    // The contour comes first: none of its points are the second ellipse's but where they cross.
+    EXPECT_LE(std::count(mask.begin(), mask.begin() + 100, 1), 5);
+  }
+  return static_cast<double>(seconds) / trials;
+}
+
+TEST(FitSecondConic, FindsAnotherEllipseAndNothingInClutter) {
+  for (const bool with_directions : {false, true}) {
+    EXPECT_GE(ShareWithSecond(0.3, Clutter::kEllipse, with_directions), 0.98);
+    EXPECT_LE(ShareWithSecond(0.5, Clutter::kUniform, with_directions), 0.0);
+    EXPECT_LE(ShareWithSecond(0.7, Clutter::kUniform, with_directions), 0.0);
+    EXPECT_LE(ShareWithSecond(0.5, Clutter::kCluster, with_directions), 0.02);
+    EXPECT_LE(ShareWithSecond(0.5, Clutter::kEdge, with_directions), 0.0);
+  }
+}
+
 }  // namespace
 }  // namespace circline

@@ -1,0 +1,193 @@
+#include "circline/ransac/conic_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "circline/ransac/crowds.h"
+#include "circline/ransac/false_alarms.h"
+#include "circline/ransac/inlier_weights.h"
+
+namespace circline {
+
+Status NoEllipse() { return Status::Refused("no ellipse explains the points"); }
+
+ContourSubset SelectPoints(const std::vector<CalibratedPoint>& points,
+                           const EdgeDirections* directions, const std::vector<int>& indices) {
+  ContourSubset selected;
+  if (directions != nullptr) selected.directions = EdgeDirections{{}, directions->sigma_rad};
+  for (const int i : indices) {
+    const auto k = static_cast<std::size_t>(i);
+    selected.points.push_back(points[k]);
+    if (directions != nullptr) selected.directions->normals.push_back(directions->normals[k]);
+  }
+  return selected;
+}
+
+ConicCandidate ConicSearch::Polished(const ConicModel::Value& value) const {
+  constexpr int kMaxPasses = 30;
+  // Of half the points' box: a hundredth of a pixel in a hundred.
+  constexpr double kConverged = 1e-4;
+  ConicCandidate result;
+  result.value = value;
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    WeighConic(model_, result.value, options_.ransac.threshold, &result.weights);
+    const ConicModel::Value before = result.value;
+    if (!model_.Refine(result.weights.weights.data(), &result.value)) break;
+    double change = 0.0;
+    for (std::size_t k = 0; k < before.size(); ++k) {
+      change = std::max(change, std::abs(result.value[k] - before[k]));
+    }
+    if (change < kConverged) break;
+  }
+  WeighConic(model_, result.value, options_.ransac.threshold, &result.weights);
+  result.log_likelihood = result.weights.LogLikelihood();
+  return result;
+}
+
+// The engine counts inliers, and that misleads it in two ways: on short or sparse contours it may
+// end on an ellipse that takes in clutter where the contour has none, and a dense blob of clutter
+// holds an ellipse with more inliers than the contour has. Both have far less likelihood than the
+// contour, whose inliers lie close to it and have nothing beside them. So where less than half of
+// the points are inliers, searches from other seeds and, where the ellipse explains its inliers
+// badly, among the points that are not near it and among those that do not crowd, are compared by
+// likelihood. With directions, which need so few draws that an ellipse through parts of two rims
+// may come first, there is one more seed up to two thirds.
+std::vector<ConicCandidate> ConicSearch::Run() const {
+  RansacOptions options = options_.ransac;
+  // One sample is often not good enough: a second all-inlier sample.
+  options.confidence = 1.0 - (1.0 - options.confidence) * (1.0 - options.confidence);
+  std::vector<ConicCandidate> candidates;
+  Report report;
+  Draw(options, &report);
+  if (!report.success) return candidates;
+  candidates.push_back(Polished(report.model));
+  const int num_inliers = report.num_inliers, n = model_.NumData();
+  const bool good = IsGood(candidates[0], num_inliers);
+  const bool are_most = good && 2 * num_inliers >= n;
+  if (are_most && (!oriented_ || 3 * num_inliers >= 2 * n)) return candidates;
+  if (!good) SearchAmong(Uncrowded(), options, num_inliers, &candidates);
+  constexpr double kBad = 2.0;
+  if (candidates[0].log_likelihood < kBad * num_inliers) {
+    SearchAmong(FarFrom(candidates[0]), options, num_inliers, &candidates);
+  }
+  const int num_seeds = are_most ? 2 : 3;
+  for (int k = 1; k < num_seeds; ++k) {
+    options.seed = Random(options.seed).Next();
+    options.max_iterations -= report.num_iterations;  // They are for all seeds.
+    if (options.max_iterations <= 0) break;
+    Draw(options, &report);
+    if (report.success) candidates.push_back(Polished(report.model));
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const ConicCandidate& a, const ConicCandidate& b) {
+                     return a.log_likelihood > b.log_likelihood;
+                   });
+  return candidates;
+}
+
+std::optional<ConicCandidate> ConicSearch::RunShort() const {
+  constexpr double kPi = 3.14159265358979323846;
+  RansacOptions options = options_.ransac;
+  constexpr int kMost = 500;
+  options.max_iterations = std::min(kMost, options.max_iterations);
+  Report report;
+  Draw(options, &report);
+  if (!report.success) return {};
+  ConicCandidate candidate = Polished(report.model);
+  if (!IsGood(candidate, report.num_inliers)) return {};
+  const double chance =
+      oriented_ ? std::min(1.0, 2.0 * kInlierSigmas * model_.sigma_rad() / kPi) : 1.0;
+  const double stray = static_cast<double>(model_.NumData() - report.num_inliers);
+  const double log_false_alarms = LogFalseAlarms(
+      points_.size(), oriented_ ? OrientedConicModel::kMinSamples : ConicModel::kMinSamples,
+      chance * stray * model_.BandShare(candidate.value, options.threshold),
+      static_cast<std::size_t>(report.num_inliers));
+  constexpr double kMaxFalseAlarms = 0.01;
+  if (log_false_alarms > std::log(kMaxFalseAlarms)) return {};
+  return candidate;
+}
+
+// Log-likelihood for each inlier: 4 in sparse clutter, 3 among twice as many, 1 to 2.5 in a blob.
+bool ConicSearch::IsGood(const ConicCandidate& candidate, int num_inliers) const {
+  constexpr double kGood = 3.0;
+  return candidate.log_likelihood >= kGood * num_inliers &&
+         model_.Accept(candidate.value, options_.ransac.threshold);
+}
+
+// Points that do not lie near the candidate.
+std::vector<int> ConicSearch::FarFrom(const ConicCandidate& candidate) const {
+  std::vector<int> indices;
+  for (int i = 0; i < model_.NumData(); ++i) {
+    const double distance = std::abs(candidate.weights.residuals[static_cast<std::size_t>(i)]);
+    if (distance > 3.0 * options_.ransac.threshold) indices.push_back(model_.PointIndex(i));
+  }
+  return indices;
+}
+
+std::vector<int> ConicSearch::Uncrowded() const {
+  constexpr int kSome = 300;  // Points, in random order, that stand for all.
+  std::vector<int> indices = circline::Uncrowded(model_.NumData(), kSome, [this](int i, int j) {
+    return model_.PixelsBetween(i, j) < kCrowdThresholds * options_.ransac.threshold;
+  });
+  for (int& i : indices) i = model_.PointIndex(i);
+  return indices;
+}
+
+// Adds the best ellipse among some of the points, if these are not nearly all.
+void ConicSearch::SearchAmong(const std::vector<int>& indices, const RansacOptions& options,
+                              int num_inliers, std::vector<ConicCandidate>* candidates) const {
+  const int num_points = static_cast<int>(indices.size());
+  if (10 * num_points > 9 * model_.NumData()) return;
+  const ContourSubset rest = SelectPoints(points_, directions_, indices);
+  const ConicSearch search(rest.points, rest.Directions(), options_, limits_);
+  // What could win has more than half as many inliers; a tenth of the draws may go into that.
+  constexpr int kFewest = 500;
+  const int needed = RequiredIterations(num_points, std::min(num_points, num_inliers * 3 / 5),
+                                        ConicModel::kMinSamples, options.confidence);
+  RansacOptions limited = options;
+  limited.min_iterations = kFewest;
+  limited.max_iterations =
+      std::clamp(needed, kFewest, std::max(kFewest, options.max_iterations / 10));
+  Report report;
+  search.Draw(limited, &report);
+  ConicModel::Value value;
+  if (report.success && model_.FromConic(search.model().ToConic(report.model), &value)) {
+    candidates->push_back(Polished(value));
+  }
+}
+
+Status ConicSearch::Finish(const ConicCandidate& candidate, ConicFit* fit,
+                           std::vector<std::uint8_t>* mask) const {
+  std::vector<CalibratedPoint> chosen;
+  std::vector<double> weights;
+  chosen.reserve(points_.size());
+  weights.reserve(points_.size());
+  for (int i = 0; i < model_.NumData(); ++i) {
+    const double w = static_cast<double>(candidate.weights.weights[static_cast<std::size_t>(i)]);
+    if (w < 1e-3) continue;
+    chosen.push_back(points_[static_cast<std::size_t>(model_.PointIndex(i))]);
+    weights.push_back(w);
+  }
+  if (chosen.size() < 5) return NoEllipse();
+  const Status status =
+      RefineConic(chosen, options_.sigma_px, model_.ToConic(candidate.value), fit, &weights);
+  if (!status.ok()) return status;
+  ConicModel::Value value;
+  const double threshold = options_.ransac.threshold;
+  if (!model_.FromConic(fit->conic, &value) || !model_.Accept(value, threshold)) {
+    return NoEllipse();
+  }
+  mask->assign(points_.size(), 0);
+  std::vector<double> distances;
+  distances.reserve(points_.size());
+  for (int i = 0; i < model_.NumData(); ++i) {
+    if (!model_.DirectionFits(value, i)) continue;
+    const std::size_t point = static_cast<std::size_t>(model_.PointIndex(i));
+    distances.push_back(ConicDistancePx(points_[point], fit->conic));
+    (*mask)[point] = std::abs(distances.back()) <= threshold ? 1 : 0;
+  }
+  fit->rms_px = InlierRms(distances, threshold);
+  return Status::Ok();
+}
+
+}  // namespace circline
