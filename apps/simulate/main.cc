@@ -6,6 +6,7 @@
 #include "apps/simulate/options.h"
 #include "apps/simulate/plot.h"
 #include "apps/simulate/simulate.h"
+#include "apps/simulate/street_trials.h"
 
 namespace {
 
@@ -19,8 +20,10 @@ constexpr char kUsage[] =
     "  circline_simulate --output=out\n"
     "  circline_simulate --trials=500 --noise_px=1 --outlier_ratio=0,0.3,0.5 "
     "--outlier_kind=cluster --output=out\n"
+    "  circline_simulate --scene=street --trials=1000 --output=out\n"
     "\n"
-    "Writes simulation.csv and simulation.svg. Exit code 0: done; 1: the results could not be "
+    "Writes simulation.csv and simulation.svg, or street.csv. Exit code 0: done; 1: the results "
+    "could not be "
     "written;\n"
     "2: unusable flags (nothing is written).";
 
@@ -29,20 +32,32 @@ int Refuse(const Status& status, int exit_code) {
   return exit_code;
 }
 
+Status SimulateStreet(const circline::apps::SimulationOptions& options, const std::string& output) {
+  const std::vector<circline::apps::StreetTrial> trials =
+      circline::apps::SimulateStreets(options.trials, options.seed, options.threads);
+  std::cout << circline::apps::StreetSummary(trials);
+  return circline::apps::WriteFile(output + "/street.csv", circline::apps::StreetCsv(trials));
+}
+
+Status SimulatePaper(const circline::apps::SimulationOptions& options, const std::string& output) {
+  const std::vector<circline::apps::SimulationRow> rows = circline::apps::Simulate(options);
+  std::cout << circline::apps::SimulationTable(rows);
+  const Status status =
+      circline::apps::WriteFile(output + "/simulation.csv", circline::apps::SimulationCsv(rows));
+  if (!status.ok()) return status;
+  return circline::apps::WriteFile(output + "/simulation.svg",
+                                   circline::apps::RenderSimulation(rows));
+}
+
 int Simulate() {
   circline::apps::SimulationOptions options;
   std::string output;
   Status status = circline::apps::SimulationFromFlags(&options, &output);
   if (status.ok()) status = circline::apps::CreateFolder(output);
   if (!status.ok()) return Refuse(status, circline::apps::kExitUsage);
-  const std::vector<circline::apps::SimulationRow> rows = circline::apps::Simulate(options);
-  std::cout << circline::apps::SimulationTable(rows);
-  status =
-      circline::apps::WriteFile(output + "/simulation.csv", circline::apps::SimulationCsv(rows));
-  if (status.ok()) {
-    status = circline::apps::WriteFile(output + "/simulation.svg",
-                                       circline::apps::RenderSimulation(rows));
-  }
+  status = options.scene == circline::apps::SimulatedScene::kStreet
+               ? SimulateStreet(options, output)
+               : SimulatePaper(options, output);
   return status.ok() ? circline::apps::kExitOk : Refuse(status, circline::apps::kExitUnreadable);
 }
 

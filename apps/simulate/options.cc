@@ -4,6 +4,9 @@
 
 #include "apps/common/text.h"
 
+DEFINE_string(scene, "paper",
+              "paper: a circle and two pairs of parallel lines; street: segments of houses, for "
+              "which trials, seed and threads count.");
 DEFINE_int32(trials, 200, "Images for each noise level and outlier ratio; 1 or more.");
 DEFINE_string(noise_px, "0,0.5,1,1.5,2,2.5,3",
               "Standard deviations of the Gaussian noise on both coordinates of every point, "
@@ -58,6 +61,15 @@ Status ReadOutlierKind(OutlierKind* kind) {
   return Status::Ok();
 }
 
+Status ReadScene(SimulatedScene* scene) {
+  if (FLAGS_scene != "paper" && FLAGS_scene != "street") {
+    return Status::Invalid("--scene: '" + FLAGS_scene + "' is not paper or street" +
+                           DidYouMean(FLAGS_scene, {"paper", "street"}));
+  }
+  *scene = FLAGS_scene == "street" ? SimulatedScene::kStreet : SimulatedScene::kPaper;
+  return Status::Ok();
+}
+
 Status ReadLoss(SimulationOptions* options) {
   if (FLAGS_robust_loss == "auto") return Status::Ok();
   if (!LossFromName(FLAGS_robust_loss, &options->loss)) {
@@ -78,7 +90,8 @@ Status SimulationFromFlags(SimulationOptions* options, std::string* output) {
   options->threads = FLAGS_threads;
   options->inlier_sigmas = FLAGS_inlier_sigmas;
   *output = FLAGS_output;
-  Status status = ReadNumbers("noise_px", FLAGS_noise_px, &options->noise_px);
+  Status status = ReadScene(&options->scene);
+  if (status.ok()) status = ReadNumbers("noise_px", FLAGS_noise_px, &options->noise_px);
   if (status.ok())
     status = ReadNumbers("outlier_ratio", FLAGS_outlier_ratio, &options->outlier_ratios);
   if (status.ok()) status = ReadTranslation(&options->translation);

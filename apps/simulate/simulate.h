@@ -15,7 +15,11 @@
 
 namespace circline::apps {
 
+enum class SimulatedScene { kPaper, kStreet };
+
 struct SimulationOptions {
+  // Of the street trials, seed and threads count.
+  SimulatedScene scene = SimulatedScene::kPaper;
   int trials = 200;                                                    // 1 or more.
   std::vector<double> noise_px = {0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0};  // 0 or more.
   std::vector<double> outlier_ratios = {0.0};                          // From 0 to 0.8.

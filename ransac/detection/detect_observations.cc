@@ -7,12 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "circline/ransac/detection/assemble_observations.h"
 #include "circline/ransac/detection/detect_ellipses.h"
 #include "circline/ransac/detection/detect_lines.h"
-#include "circline/ransac/detection/detect_pencils.h"
 #include "circline/ransac/detection/edge_shift.h"
 #include "circline/ransac/detection/edges.h"
+#include "circline/ransac/detection/observe_evidence.h"
 
 namespace circline {
 namespace {
@@ -27,18 +26,8 @@ constexpr std::size_t kThinFrom = 60;  // Points from which every second one is 
 constexpr double kCorrelationDense = 1.9;
 // No contour lies farther than this from the edges it was fitted to, pixels.
 constexpr double kMaxBiasPx = 1.0;
-// Directions looked for beyond those wanted, so that the choice is made by the length of their
-// lines and by the circles rather than by the number of lines.
-constexpr int kExtraPencils = 3;
 // A photo has no more directions worth telling apart.
 constexpr int kMaxPencils = 100;
-
-struct Evidence {
-  std::vector<CircleEvidence> circles;  // Best first.
-  std::size_t num_ellipses = 0;         // Found, before the best of them were kept.
-  std::vector<DetectedLine> lines, bent;
-  std::vector<DetectedPencil> pencils;
-};
 
 // Points of an ellipse as an observation: thinned, and the fit's covariance widened by the
 // correlation of dense points and by what they all share.
@@ -102,14 +91,8 @@ EllipseOptions ToEllipseOptions(const DetectionOptions& options) {
   return result;
 }
 
-// Of a photo that what meets is measured in. Edges are smoothed and end some pixels before corners:
-// in photos smaller than usual distances shrink no further.
-double DiagonalPx(const cv::Mat& image) {
-  return std::max(kUsualDiagonalPx, std::hypot(image.cols, image.rows));
-}
-
 Status CollectEvidence(const cv::Mat& image, const Camera& camera, const DetectionOptions& options,
-                       Evidence* evidence) {
+                       PhotoEvidence* evidence) {
   cv::Mat gray;
   Status status = ToGray(image, &gray);
   if (!status.ok()) return status;
@@ -130,25 +113,7 @@ Status CollectEvidence(const cv::Mat& image, const Camera& camera, const Detecti
       DetectLines(edges, camera, line_options, &evidence->lines, &on_ellipses, &evidence->bent);
   if (!status.ok()) return status;
   UndoEdgeShift(edges, camera, &evidence->lines);
-  return DetectPencils(evidence->lines, options.max_pencils + kExtraPencils, options.seed,
-                       &evidence->pencils, DiagonalPx(gray));
-}
-
-std::string Describe(const Observations& observations) {
-  const std::size_t circles = observations.circles.size(), pencils = observations.pencils.size();
-  if (circles == 0 && pencils == 0) {
-    return "nothing found: neither an ellipse nor three lines that could be parallel";
-  }
-  if (circles == 0 && pencils == 1) {
-    return "one pencil of parallel lines only, and no circle: that is a direction, not a pose";
-  }
-  if (circles == 0 && observations.frame.plane.empty()) {
-    return "the pencils found span no plane, and there is no circle: that is no pose";
-  }
-  if (circles == 1 && pencils == 0) {
-    return "one circle and nothing else: two poses explain it equally well";
-  }
-  return std::string();
+  return Status::Ok();
 }
 
 Status CheckInput(const cv::Mat& image, const Camera& camera, const DetectionOptions& options) {
@@ -192,23 +157,10 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   observations->camera = camera;
   Status status = CheckInput(image, camera, options);
   if (!status.ok()) return status;
-  Evidence evidence;
+  PhotoEvidence evidence;
   status = CollectEvidence(image, camera, options, &evidence);
   if (!status.ok()) return status;
-  AssemblyOptions assembly;
-  assembly.max_pencils = options.max_pencils;
-  assembly.max_shared_plane_deg = options.max_shared_plane_deg;
-  assembly.diagonal_px = DiagonalPx(image);
-  AssembleObservations(assembly, evidence.lines, evidence.bent, &evidence.circles,
-                       &evidence.pencils, observations);
-  observations->message = Describe(*observations);
-  const auto most = static_cast<std::size_t>(options.max_circles);
-  if (evidence.num_ellipses > most && most > 0) {
-    if (!observations->message.empty()) observations->message += "; ";
-    observations->message += std::to_string(evidence.num_ellipses) + " ellipses found, the best " +
-                             std::to_string(most) + " kept (max_circles)";
-  }
-  return Status::Ok();
+  return ObserveEvidence(options, DiagonalPx(image.cols, image.rows), &evidence, observations);
 }
 
 Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::Rect& roi,

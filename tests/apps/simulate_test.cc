@@ -3,6 +3,8 @@
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -20,13 +22,15 @@ constexpr char kHeader[] =
     "noise_px,outlier_ratio,method,trials,failures,axis_mean_rad,axis_std_rad,angle_mean_rad,"
     "angle_std_rad,rotation_rms_rad,bound_rms_rad,nees_mean";
 
-// Exit code; what it says on stderr goes to `err`.
-int RunSimulate(const std::string& arguments, std::string* err = nullptr) {
+// Exit code; what it says on stderr goes to `err`, on stdout to `out`.
+int RunSimulate(const std::string& arguments, std::string* err = nullptr,
+                std::string* out = nullptr) {
   const TestFolder folder;
-  const std::string command = std::string("'") + CIRCLINE_SIMULATE + "' " + arguments +
-                              " >/dev/null 2>'" + folder / "err" + "' </dev/null";
+  const std::string command = std::string("'") + CIRCLINE_SIMULATE + "' " + arguments + " >'" +
+                              folder / "out" + "' 2>'" + folder / "err" + "' </dev/null";
   const int status = std::system(command.c_str());
   if (err != nullptr) *err = ReadAll(folder / "err");
+  if (out != nullptr) *out = ReadAll(folder / "out");
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
@@ -44,11 +48,11 @@ std::vector<std::string> Cells(const std::string& line) {
   return cells;
 }
 
-std::vector<Row> ReadCsv(const std::string& path) {
+std::vector<Row> ReadCsv(const std::string& path, const std::string& header = kHeader) {
   std::istringstream text(ReadAll(path));
   std::string line;
   std::getline(text, line);
-  EXPECT_EQ(line, kHeader);
+  EXPECT_EQ(line, header);
   const std::vector<std::string> names = Cells(line);
   std::vector<Row> rows;
   while (std::getline(text, line)) {
@@ -140,6 +144,71 @@ TEST(Simulate, SameBytesWhateverTheThreads) {
   EXPECT_NE(ReadAll(folder / "one/simulation.csv"), ReadAll(folder / "other/simulation.csv"));
 }
 
+constexpr char kStreetHeader[] =
+    "trial,orthogonal,houses,segments,sigma_px,detected_failed,detected_error_deg,"
+    "detected_error_any_deg,detected_error_x_deg,detected_error_y_deg,detected_error_z_deg,"
+    "detected_sigma_x_deg,detected_sigma_y_deg,detected_sigma_z_deg,detected_probability,"
+    "known_failed,known_error_deg,known_error_any_deg,known_error_x_deg,known_error_y_deg,"
+    "known_error_z_deg,known_sigma_x_deg,known_sigma_y_deg,known_sigma_z_deg,known_probability";
+
+// Area under the share of errors below a threshold, per cent of its greatest.
+double Area(const std::vector<Row>& rows, const std::string& who, double most_deg) {
+  double area = 0.0;
+  for (Row row : rows) {
+    if (row[who + "_failed"] == "1") continue;
+    area += std::max(0.0, 1.0 - std::stod(row[who + "_error_deg"]) / most_deg);
+  }
+  return 100.0 * area / static_cast<double>(rows.size());
+}
+
+TEST(Simulate, StreetsAreFoundAboutAsWellAsIfMembershipWereKnown) {
+  const TestFolder folder;
+  constexpr int kStreets = kSanitized ? 20 : 400;
+  std::string out;
+  ASSERT_EQ(RunSimulate("--scene=street --trials=" + std::to_string(kStreets) + " --output='" +
+                            folder / "out" + "'",
+                        nullptr, &out),
+            0);
+  const std::vector<Row> rows = ReadCsv(folder / "out/street.csv", kStreetHeader);
+  ASSERT_EQ(rows.size(), static_cast<std::size_t>(kStreets));
+  // The line on stdout says what the rows do.
+  char areas[80];
+  std::snprintf(areas, sizeof areas, "%.1f of %.1f, %.1f of %.1f, %.1f of %.1f",
+                Area(rows, "detected", 3.0), Area(rows, "known", 3.0), Area(rows, "detected", 5.0),
+                Area(rows, "known", 5.0), Area(rows, "detected", 10.0), Area(rows, "known", 10.0));
+  EXPECT_CONTAINS(out.c_str(), areas);
+  int orthogonal = 0, within = 0, all = 0;
+  for (Row row : rows) {
+    orthogonal += row["orthogonal"] == "1" ? 1 : 0;
+    EXPECT_GE(std::stoi(row["segments"]), 12);
+    EXPECT_GE(std::stoi(row["houses"]), 1);
+    if (row["detected_failed"] == "1" || std::stod(row["detected_error_any_deg"]) > 5.0) continue;
+    for (const std::string axis : {"x", "y", "z"}) {
+      const double error = std::stod(row["detected_error_" + axis + "_deg"]);
+      within += std::abs(error) <= 2.0 * std::stod(row["detected_sigma_" + axis + "_deg"]) ? 1 : 0;
+      ++all;
+    }
+  }
+  EXPECT_NEAR(orthogonal, kStreets / 2, 0.1 * kStreets + 5);
+  if (kSanitized) return;
+  EXPECT_GE(Area(rows, "known", 10.0), 85.0);
+  for (const double most_deg : {3.0, 5.0, 10.0}) {
+    EXPECT_GE(Area(rows, "detected", most_deg), 0.9 * Area(rows, "known", most_deg)) << most_deg;
+  }
+  EXPECT_GE(within, 0.9 * all - 2.0 * std::sqrt(0.09 * all));
+  EXPECT_LE(within, 0.98 * all);
+}
+
+TEST(Simulate, StreetsAreTheSameWhateverTheThreads) {
+  const TestFolder folder;
+  const std::string arguments = "--scene=street --trials=20 --seed=5 ";
+  ASSERT_EQ(RunSimulate(arguments + "--threads=1 --output='" + folder / "one" + "'"), 0);
+  ASSERT_EQ(RunSimulate(arguments + "--threads=2 --output='" + folder / "two" + "'"), 0);
+  EXPECT_EQ(ReadAll(folder / "one/street.csv"), ReadAll(folder / "two/street.csv"));
+  ASSERT_EQ(RunSimulate(arguments + "--seed=6 --output='" + folder / "other" + "'"), 0);
+  EXPECT_NE(ReadAll(folder / "one/street.csv"), ReadAll(folder / "other/street.csv"));
+}
+
 TEST(Simulate, BadFlagsAreNamedAndNothingIsWritten) {
   const TestFolder folder;
   const std::map<std::string, std::string> cases = {
@@ -154,6 +223,7 @@ TEST(Simulate, BadFlagsAreNamedAndNothingIsWritten) {
       {"--focal=0", "--focal"},
       {"--translation=1,2", "--translation"},
       {"--translation=0,0,-100", "--translation"},
+      {"--scene=streets", "did you mean 'street'?"},
       {"--robust_loss=tuckey", "did you mean 'tukey'?"},
       {"--inlier_sigmas=0", "--inlier_sigmas"},
       {"--threads=-1", "--threads"},

@@ -1,0 +1,73 @@
+#include "circline/ransac/detection/observe_evidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "circline/ransac/detection/detect_pencils.h"
+
+namespace circline {
+namespace {
+
+// Directions looked for beyond those wanted, so that the choice is made by the length of their
+// lines and by the circles rather than by the number of lines.
+constexpr int kExtraPencils = 3;
+std::string Describe(const Observations& observations) {
+  const std::size_t circles = observations.circles.size(), pencils = observations.pencils.size();
+  if (circles == 0 && pencils == 0) {
+    return "nothing found: neither an ellipse nor three lines that could be parallel";
+  }
+  if (circles == 0 && pencils == 1) {
+    return "one pencil of parallel lines only, and no circle: that is a direction, not a pose";
+  }
+  if (circles == 0 && observations.frame.plane.empty()) {
+    return "the pencils found span no plane, and there is no circle: that is no pose";
+  }
+  if (circles == 1 && pencils == 0) {
+    return "one circle and nothing else: two poses explain it equally well";
+  }
+  return std::string();
+}
+
+}  // namespace
+
+double DiagonalPx(int width, int height) {
+  return std::max(kUsualDiagonalPx, std::hypot(width, height));
+}
+
+Status ObserveEvidence(const DetectionOptions& options, double diagonal_px, PhotoEvidence* evidence,
+                       Observations* observations) {
+  std::vector<DetectedPencil> pencils;
+  if (options.max_pencils > 0) {
+    const Status status = DetectPencils(evidence->lines, options.max_pencils + kExtraPencils,
+                                        options.seed, &pencils, diagonal_px);
+    if (!status.ok()) return status;
+  }
+  AssemblyOptions assembly;
+  assembly.max_pencils = options.max_pencils;
+  assembly.max_shared_plane_deg = options.max_shared_plane_deg;
+  assembly.diagonal_px = diagonal_px;
+  AssembleObservations(assembly, evidence->lines, evidence->bent, &evidence->circles, &pencils,
+                       observations);
+  observations->message = Describe(*observations);
+  const auto most = static_cast<std::size_t>(options.max_circles);
+  if (evidence->num_ellipses > most && most > 0) {
+    if (!observations->message.empty()) observations->message += "; ";
+    observations->message += std::to_string(evidence->num_ellipses) + " ellipses found, the best " +
+                             std::to_string(most) + " kept (max_circles)";
+  }
+  return Status::Ok();
+}
+
+Status LineFromSegment(const Camera& camera, const Segment& segment, double sigma_px,
+                       DetectedLine* line) {
+  line->ends = segment;
+  line->points = {segment[0], segment[1]};
+  line->length_px = (segment[1] - segment[0]).norm();
+  line->sigma_px = sigma_px;
+  std::vector<CalibratedPoint> points;
+  PixelsToCalibrated(camera, line->points, &points);
+  return FitLine(points, sigma_px, &line->fit);
+}
+
+}  // namespace circline

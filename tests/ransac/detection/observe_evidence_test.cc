@@ -1,0 +1,65 @@
+#include "circline/ransac/detection/observe_evidence.h"
+
+#include <gtest/gtest.h>
+
+#include "circline/estimators/pose.h"
+#include "tests/ransac/detection/detected_line_scene.h"
+#include "tests/ransac/detection/detection_test_util.h"
+
+namespace circline {
+namespace {
+
+using detection_test::AxisDeg;
+using detection_test::TestCamera;
+using Eigen::Vector2d;
+
+TEST(LineFromSegment, IsTheLineThroughItsEnds) {
+  const Segment segment = {Vector2d(100.0, 80.0), Vector2d(160.0, 160.0)};
+  DetectedLine line;
+  ASSERT_TRUE(LineFromSegment(TestCamera(), segment, 0.3, &line).ok());
+  EXPECT_DOUBLE_EQ(line.length_px, 100.0);
+  for (const Vector2d& end : segment) {
+    CalibratedPoint point;
+    ASSERT_TRUE(PixelToCalibrated(TestCamera(), end, &point));
+    EXPECT_NEAR(LineDistancePx(point, line.fit.line), 0.0, 1e-9);
+  }
+  EXPECT_FALSE(LineFromSegment(TestCamera(), {segment[0], segment[0]}, 0.3, &line).ok());
+}
+
+// Rows and columns of one front, as segments: no photo, no circles.
+TEST(ObserveEvidence, SegmentsAloneHaveAPlaneAndItsAxes) {
+  const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.2, 0.5, 0.1));
+  Random random(1);
+  PhotoEvidence evidence;
+  for (int k = 0; k < 40; ++k) {
+    const double u = random.Uniform(120.0, 360.0), v = random.Uniform(80.0, 260.0);
+    const DetectedLine line =
+        detection_test::MakeLine(TestCamera(), u, v, axes.col(k % 2), 60.0, 0.0, 0.1, &random);
+    evidence.lines.emplace_back();
+    ASSERT_TRUE(LineFromSegment(TestCamera(), line.ends, 0.1, &evidence.lines.back()).ok());
+  }
+  Observations observations;
+  observations.camera = TestCamera();
+  ASSERT_TRUE(ObserveEvidence(DetectionOptions(), 600.0, &evidence, &observations).ok());
+  EXPECT_EQ(observations.message, "");
+  ASSERT_GE(observations.pencils.size(), 2U);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const PencilObservation& pencil = observations.pencils[k];
+    EXPECT_NE(pencil.direction, PencilDirection::kFree);
+    EXPECT_EQ(pencil.plane, "p0");
+    EXPECT_LT(std::min(AxisDeg(pencil.fit->direction, axes.col(0)),
+                       AxisDeg(pencil.fit->direction, axes.col(1))),
+              1.0);
+  }
+}
+
+TEST(ObserveEvidence, SaysWhatIsMissing) {
+  PhotoEvidence evidence;
+  Observations observations;
+  observations.camera = TestCamera();
+  ASSERT_TRUE(ObserveEvidence(DetectionOptions(), 800.0, &evidence, &observations).ok());
+  EXPECT_EQ(observations.message.substr(0, 13), "nothing found");
+}
+
+}  // namespace
+}  // namespace circline
