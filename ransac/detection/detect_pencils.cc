@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include "circline/ransac/detection/orthogonal_evidence.h"
 #include "circline/ransac/detection/segment_meetings.h"
-#include "circline/ransac/false_alarms.h"
 #include "circline/ransac/robust_pencils.h"
 
 namespace circline {
@@ -30,8 +30,6 @@ constexpr double kMaxSpreadRad = 12e-3;
 // For so many of the longest pencils, so many are searched among the lines that meet theirs.
 constexpr std::size_t kMaxSearchedAround = 3;
 constexpr int kFoundAround = 2;
-// A line so nearly orthogonal to an axis (a sine) has no direction orthogonal to that axis.
-constexpr double kMinCross = 0.05;
 // The two sides of a thin line are so near to each other, a share of the photo's diagonal.
 constexpr double kTwinShareOfPhoto = 4.0 / kUsualDiagonalPx;
 // What all points of a line share, pixels: no number of them averages it out. It turns short lines
@@ -216,43 +214,40 @@ std::vector<int> LinesAround(const LineSet& set, const DetectedPencil& pencil) {
   return around;
 }
 
-// Boxes, boards and rooms have right angles: each of lines[subset] proposes the direction that it
-// then has if it is orthogonal to `axis`, and that with the fewest false alarms is fitted.
+// An edge that is broken into pieces is one line: where it meets another, all of them do. Of each
+// edge in lines[subset] the first piece, which is the longest.
+std::vector<int> OneOfEachEdge(const LineSet& set, const std::vector<int>& subset) {
+  std::vector<int> edges;
+  const double px = kTwinShareOfPhoto * set.diagonal_px;
+  for (const int i : subset) {
+    const Segment& ends = set.lines[static_cast<std::size_t>(i)].ends;
+    const bool is_piece = std::any_of(edges.begin(), edges.end(), [&](int k) {
+      const Segment& edge = set.lines[static_cast<std::size_t>(k)].ends;
+      const Eigen::ParametrizedLine<double, 2> line =
+          Eigen::ParametrizedLine<double, 2>::Through(edge[0], edge[1]);
+      return line.distance(ends[0]) <= px && line.distance(ends[1]) <= px;
+    });
+    if (!set.IsTwin(i) && !is_piece) edges.push_back(i);
+  }
+  return edges;
+}
+
+// Boxes, boards and rooms have right angles: the direction orthogonal to `axis` that lines[subset]
+// have the best evidence of, if any.
 std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::vector<int>& subset,
                                                const Vector3d& axis) {
-  const PencilOptions options = SearchOptions(1, 0);
   std::vector<LineFit> pool;
-  for (const int i : subset) {
-    if (set.IsTwin(i)) continue;
-    pool.push_back(WithDirectionError(set.fits[static_cast<std::size_t>(i)], kSearchSigmaRad));
+  for (const int i : OneOfEachEdge(set, subset)) {
+    pool.push_back(set.fits[static_cast<std::size_t>(i)]);
   }
-  FoundPencil best;
-  best.log_false_alarms = std::log(options.max_false_alarms);
-  bool found = false;
-  for (const LineFit& proposer : pool) {
-    const Vector3d cross = axis.cross(proposer.line);
-    if (cross.norm() < kMinCross) continue;
-    const Vector3d direction = cross.normalized();
-    double expected = 0.0;
-    std::size_t members = 0;
-    for (const LineFit& line : pool) {
-      // A direction uniform on the sphere comes within kInlierSigmas sigma with this probability.
-      expected +=
-          std::min(1.0, kInlierSigmas * std::sqrt(direction.dot(line.covariance * direction)));
-      members += std::abs(VanishingPointResidual(line, direction)) <= kInlierSigmas ? 1 : 0;
-    }
-    const double log_false_alarms = LogFalseAlarms(pool.size(), 1, expected, members);
-    if (log_false_alarms >= best.log_false_alarms) continue;
-    best.log_false_alarms = log_false_alarms;
-    best.fit.direction = direction;
-    found = true;
-  }
+  const std::optional<Vector3d> best = OrthogonalEvidence(pool, axis, kSearchSigmaRad).Best();
+  if (!best) return std::nullopt;
+  FoundPencil found;
+  found.fit.direction = *best;
   double spread;
-  if (!found || !PencilFitter(set, kSearchSigmaRad).Fit(subset, &best, &spread)) {
-    return std::nullopt;
-  }
-  if (set.Count(best.lines) < options.min_lines) return std::nullopt;
-  return MakePencil(best, set, spread);
+  if (!PencilFitter(set, kSearchSigmaRad).Fit(subset, &found, &spread)) return std::nullopt;
+  if (set.Count(found.lines) < PencilOptions().min_lines) return std::nullopt;
+  return MakePencil(found, set, spread);
 }
 
 // The pencils orthogonal to one, among the lines that meet its own.

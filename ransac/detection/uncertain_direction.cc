@@ -23,9 +23,7 @@ constexpr double kRadians = 3.14159265358979323846 / 180.0;
 constexpr double kModelSigmaDeg = 0.5;
 // Agreement is believed up to this many standard deviations.
 constexpr double kMaxSigmas = 3.0;
-// The walls of most houses are at right angles, to about so much (each pair, standard deviation,
-// degrees); the others are at any angle.
-constexpr double kRightAngleSigmaDeg = 0.7;
+// So many houses have walls at right angles; the others at any angle.
 constexpr double kRightAngleShare = 0.5;
 // Rows and columns of a sheet of circles are made at right angles; paper that bends shows them at
 // others. A lattice this near to a rectangular one is rectangular.

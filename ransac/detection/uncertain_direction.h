@@ -12,6 +12,9 @@
 
 namespace circline {
 
+// The walls of most houses are at right angles, to about so much (each pair, standard deviation).
+constexpr double kRightAngleSigmaDeg = 0.7;
+
 // A unit vector (a normal, or a pencil's direction), its sense without meaning, and its covariance,
 // rank 2, rad^2.
 struct UncertainDirection {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "circline/ransac/conic_model.h"
-#include "circline/ransac/direction_models.h"
 #include "circline/ransac/line_model.h"
 #include "circline/ransac/oriented_conic_model.h"
 #include "circline/ransac/pencil_model.h"
@@ -102,7 +101,6 @@ TEST(Ransac, TheModelsAllocateNothingInTheLoop) {
   }
   const PencilModel pencil(lines, indices, 0.0);
   ExpectNoAllocations(pencil, kInlierSigmas);
-  ExpectNoAllocations(OrthogonalTripletModel(pencil), kInlierSigmas);
 }
 
 }  // namespace

@@ -1,0 +1,69 @@
+#include "circline/ransac/detection/orthogonal_evidence.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "circline/estimators/noise_model.h"
+#include "circline/ransac/detection/uncertain_direction.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kPi = 3.14159265358979323846;
+// 12 to 1. Of 0, 2, 2.5 and 3, on simulated streets (seed 1; others had no part in it) and one
+// photograph of a box, where the lowest two are too low.
+constexpr double kMinLogOdds = 2.5;
+// A line so nearly orthogonal to the axis (a sine) has no direction orthogonal to it.
+constexpr double kMinCross = 0.05;
+// How much likelier a line without miss is, times its standard deviation, than a line that lies any
+// way: l . v is uniform on [-1, 1] for these (Archimedes). 2 / sqrt(2 pi).
+constexpr double kPeakRatio = 0.7978845608028654;
+
+}  // namespace
+
+OrthogonalEvidence::OrthogonalEvidence(const std::vector<LineFit>& lines, const Vector3d& axis,
+                                       double spread_rad)
+    : axis_(axis) {
+  for (const LineFit& line : lines) {
+    const double lean = kRightAngleSigmaDeg * kPi / 180.0 * line.line.dot(axis);
+    lines_.push_back(WithDirectionError(line, std::hypot(spread_rad, lean)));
+  }
+}
+
+double OrthogonalEvidence::LogOdds(const Vector3d& direction) const {
+  const Vector3d turn = axis_.cross(direction);
+  double expected = 0.0, information = 0.0;
+  std::vector<double> ratios;  // Of likelihoods, of the lines that may share the direction.
+  for (const LineFit& line : lines_) {
+    const double sigma = std::sqrt(direction.dot(line.covariance * direction));
+    expected += std::min(1.0, kInlierSigmas * sigma);  // Lines as near by chance.
+    const double r = line.line.dot(direction) / sigma, slope = line.line.dot(turn) / sigma;
+    if (std::abs(r) > kInlierSigmas) continue;
+    ratios.push_back(kPeakRatio / sigma * std::exp(-0.5 * r * r));
+    information += slope * slope;
+  }
+  const double all = static_cast<double>(lines_.size()), near = static_cast<double>(ratios.size());
+  const double share = std::max(0.5 * near, near - expected) / (all + 1.0);
+  double log_odds = (all - near) * std::log(1.0 - share);
+  for (const double ratio : ratios) log_odds += std::log(1.0 - share + share * ratio);
+  return log_odds + 0.5 * std::log(2.0 * kPi / information) - std::log(kPi);
+}
+
+std::optional<Vector3d> OrthogonalEvidence::Best() const {
+  std::optional<Vector3d> best;
+  double best_odds = kMinLogOdds;
+  for (const LineFit& proposer : lines_) {
+    const Vector3d cross = axis_.cross(proposer.line);
+    if (cross.norm() < kMinCross) continue;
+    const double log_odds = LogOdds(cross.normalized());
+    if (!(log_odds > best_odds)) continue;
+    best_odds = log_odds;
+    best = cross.normalized();
+  }
+  return best;
+}
+
+}  // namespace circline
