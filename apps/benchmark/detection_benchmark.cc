@@ -1,13 +1,15 @@
 // What detection finds on photographs with truth: prints one table a kind of truth.
 //
 //     circline_detection_benchmark --data=DIR [--set=NAME]
+//     circline_detection_benchmark --data=DIR [--set=NAME] --speed
 //     circline_detection_benchmark --render_seed=1 [--render_seeds=5] [--render_count=60]
 //         [--render_textures=DIR] [--render_output=DIR]
 //
 // DIR holds folders with a groundtruth.yml (camera, and per photo what is true of it) or, for
-// renderings, a truth.csv; each is measured by what its truth offers. The second form renders sets
-// of 60 images of its own, one a seed, and prints a row for each and their mean; or writes the
-// first of them as such a folder. Its textures are the photographs of the package opencv-doc.
+// renderings, a truth.csv; each is measured by what its truth offers. --speed prints times only.
+// The third form renders sets of 60 images of its own, one a seed, and prints a row for each and
+// their mean; or writes the first of them as such a folder. Its textures are the photographs of the
+// package opencv-doc.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -21,9 +23,9 @@
 namespace circline::benchmark {
 namespace {
 
-void MeasureFolder(const std::string& folder) {
+void MeasureFolder(const std::string& folder, bool speed) {
   if (std::ifstream(folder + "/truth.csv").good()) {
-    MeasureRenderings(folder);
+    if (!speed) MeasureRenderings(folder);
     return;
   }
   cv::FileStorage file;
@@ -33,12 +35,24 @@ void MeasureFolder(const std::string& folder) {
   }
   const cv::FileNode root = file.root();
   const bool calibrated = !root["camera_matrix"].empty() || !root["cameras"].empty();
-  if (calibrated) {
+  if (speed) {
+    if (calibrated) MeasureSpeed(folder, root);
+  } else if (calibrated) {
     MeasurePhotographs(folder, root);
     MeasureSegments(folder, root);
   } else {
     MeasureLabels(folder, root);
   }
+}
+
+std::vector<std::string> FoldersBelow(const std::string& data) {
+  std::vector<cv::String> files;
+  cv::glob(data + "/*", files, true);
+  std::vector<std::string> folders;
+  for (const std::string& f : files) folders.push_back(f.substr(0, f.find_last_of('/')));
+  std::sort(folders.begin(), folders.end());
+  folders.erase(std::unique(folders.begin(), folders.end()), folders.end());
+  return folders;
 }
 
 std::string Flag(int argc, char** argv, const std::string& name) {
@@ -74,23 +88,18 @@ int Main(int argc, char** argv) {
   cv::setNumThreads(1);
   if (!Flag(argc, argv, "render_seed").empty()) return Render(argc, argv);
   if (data.empty()) {
-    std::fprintf(stderr, "usage: %s --data=DIR [--set=NAME] | --render_seed=N\n", argv[0]);
+    std::fprintf(stderr, "usage: %s --data=DIR [--set=NAME] [--speed] | --render_seed=N\n",
+                 argv[0]);
     return 2;
   }
-  if (!set.empty()) {
-    MeasureFolder(data + "/" + set);
-    return 0;
+  const bool speed = std::find(argv + 1, argv + argc, std::string("--speed")) != argv + argc;
+  const std::vector<std::string> folders =
+      set.empty() ? FoldersBelow(data) : std::vector<std::string>{data + "/" + set};
+  if (speed) {
+    MeasureRingSpeed();
+    std::printf("photographs                 640x480 ms     worst  12 megapixels ms\n");
   }
-  std::vector<cv::String> files;
-  cv::glob(data + "/*", files, true);
-  std::vector<std::string> folders;
-  for (const std::string& f : files) {
-    const std::string folder = f.substr(0, f.find_last_of('/'));
-    if (folders.empty() || folders.back() != folder) folders.push_back(folder);
-  }
-  std::sort(folders.begin(), folders.end());
-  folders.erase(std::unique(folders.begin(), folders.end()), folders.end());
-  for (const std::string& folder : folders) MeasureFolder(folder);
+  for (const std::string& folder : folders) MeasureFolder(folder, speed);
   return 0;
 }
 

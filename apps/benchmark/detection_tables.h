@@ -30,6 +30,13 @@ void MeasurePhotographs(const std::string& folder, const cv::FileNode& root);
 // no chessboards.
 void MeasureSegments(const std::string& folder, const cv::FileNode& root);
 
+// Times of the photographs of a calibrated set at the size of 640 x 480, and of its first one at 12
+// megapixels: a row.
+void MeasureSpeed(const std::string& folder, const cv::FileNode& root);
+
+// Times of targets with many rings, drawn here.
+void MeasureRingSpeed();
+
 // The angle between a normal and the better of the two that an ellipse allows.
 double BetterNormalDeg(const Eigen::Matrix3d& conic, const Eigen::Vector3d& normal);
 

@@ -1,0 +1,144 @@
+// The table of times: photographs at the sizes that times are quoted for, and targets of many
+// rings. Times are of DetectObservations, everything in it; the best of some runs, so that other
+// work on the machine does not count.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/benchmark/detection_statistics.h"
+#include "apps/benchmark/detection_tables.h"
+#include "apps/benchmark/detection_truth.h"
+#include "circline/ransac/detection/detect_observations.h"
+
+namespace circline::benchmark {
+namespace {
+
+constexpr double kSmallPixels = 640.0 * 480.0, kLargePixels = 12e6;
+constexpr int kRings = 84;
+
+// Milliseconds, the least of `runs`; what was found last.
+double TimeDetection(const cv::Mat& image, const Camera& camera, int runs, Observations* found) {
+  double least = std::nan("");
+  for (int run = 0; run < runs; ++run) {
+    const std::clock_t start = std::clock();
+    const Status status = DetectObservations(image, camera, DetectionOptions(), found);
+    const double ms = Milliseconds(start);
+    if (status.ok() && !(least <= ms)) least = ms;
+  }
+  return least;
+}
+
+// The photo with so many pixels, and its camera: pixel centres lie at integers.
+void ScaleTo(double pixels, cv::Mat* image, Camera* camera) {
+  const double scale = std::sqrt(pixels / static_cast<double>(image->total()));
+  cv::resize(*image, *image, {}, scale, scale, scale > 1.0 ? cv::INTER_CUBIC : cv::INTER_AREA);
+  camera->width = image->cols;
+  camera->height = image->rows;
+  camera->fx *= scale;
+  camera->fy *= scale;
+  camera->cx = (camera->cx + 0.5) * scale - 0.5;
+  camera->cy = (camera->cy + 0.5) * scale - 0.5;
+}
+
+// A plane 4 units ahead that leans by 35 degrees, seen by a camera of 65 degrees, 1600 x 1200:
+// black rings on white paper, drawn four times as large, blurred like a lens and with noise.
+class RingSheet {
+ public:
+  RingSheet() : large_(4800, 6400, CV_8U, cv::Scalar(235)) {
+    camera_.width = 1600;
+    camera_.height = 1200;
+    camera_.fx = camera_.fy = 1250.0;
+    camera_.cx = 799.5;
+    camera_.cy = 599.5;
+  }
+
+  void Disc(const cv::Point2d& center, double radius, int gray) {
+    std::vector<cv::Point> contour;
+    for (int i = 0; i < 720; ++i) {
+      const double t = i * 3.14159265358979323846 / 360.0;
+      contour.push_back(Project(center.x + radius * std::cos(t), center.y + radius * std::sin(t)));
+    }
+    cv::fillPoly(large_, std::vector<std::vector<cv::Point>>{contour}, cv::Scalar(gray), cv::LINE_8,
+                 kShift);
+  }
+
+  const Camera& camera() const { return camera_; }
+  cv::Mat Photo() const {
+    cv::Mat photo, noise(1200, 1600, CV_16S);
+    cv::resize(large_, photo, {1600, 1200}, 0.0, 0.0, cv::INTER_AREA);
+    cv::GaussianBlur(photo, photo, {}, 0.7);
+    cv::RNG random(84);
+    random.fill(noise, cv::RNG::NORMAL, 0.0, 2.0);
+    cv::add(photo, noise, photo, cv::noArray(), CV_8U);
+    return photo;
+  }
+
+ private:
+  static constexpr int kShift = 6, kEnlarged = 4;
+  cv::Point Project(double x, double y) const {
+    constexpr double kCosine = 0.8191520443, kSine = 0.5735764364;  // Of 35 degrees.
+    const double depth = 4.0 + kSine * y;
+    const double u = camera_.fx * x / depth + camera_.cx;
+    const double v = camera_.fy * kCosine * y / depth + camera_.cy;
+    const double unit = kEnlarged * (1 << kShift);
+    return {static_cast<int>(std::lround((u + 0.5) * unit)),
+            static_cast<int>(std::lround((v + 0.5) * unit))};
+  }
+
+  Camera camera_;
+  cv::Mat large_;
+};
+
+void PrintRings(const char* name, const RingSheet& sheet) {
+  Observations found;
+  const double ms = TimeDetection(sheet.Photo(), sheet.camera(), 3, &found);
+  std::printf("  %-26s  %8.0f   %d circles  %s\n", name, ms, static_cast<int>(found.circles.size()),
+              found.message.c_str());
+}
+
+}  // namespace
+
+void MeasureRingSpeed() {
+  std::printf("%d rings, 1600 x 1200         ms\n", kRings);
+  RingSheet lattice, concentric;  // Side by side, and about one centre.
+  for (int i = 0; i < kRings; ++i) {
+    const cv::Point2d center(0.36 * (i % 12 - 5.5), 0.36 * (i / 12 - 3.0));
+    lattice.Disc(center, 0.14, 20);
+    lattice.Disc(center, 0.08, 235);
+    const double outer = 0.017 * (kRings - i);
+    concentric.Disc({0.0, 0.0}, outer, 20);
+    concentric.Disc({0.0, 0.0}, outer - 0.0085, 235);
+  }
+  PrintRings("side by side", lattice);
+  PrintRings("about one centre", concentric);
+}
+
+void MeasureSpeed(const std::string& folder, const cv::FileNode& root) {
+  std::vector<double> small;
+  double large = std::nan("");
+  for (const cv::FileNode& node : root["images"]) {
+    const cv::Mat photo = cv::imread(folder + "/" + ReadText(node, "file"), cv::IMREAD_COLOR);
+    Camera camera;
+    if (photo.empty() || !CameraOf(root, node, photo.size(), &camera)) continue;
+    const auto time = [&](double pixels, int runs) {
+      cv::Mat scaled = photo;
+      Camera scaled_camera = camera;
+      ScaleTo(pixels, &scaled, &scaled_camera);
+      Observations found;
+      return TimeDetection(scaled, scaled_camera, runs, &found);
+    };
+    small.push_back(time(kSmallPixels, 3));
+    if (small.size() == 1) large = time(kLargePixels, 2);
+  }
+  if (small.empty()) return;
+  std::printf("  %-26s  %8.1f  %8.1f  %16.0f\n",
+              folder.substr(folder.find_last_of('/') + 1).c_str(), Quantile(small, 0.5),
+              Quantile(small, 1.0), large);
+}
+
+}  // namespace circline::benchmark
