@@ -1,4 +1,4 @@
-// Anti-aliased drawing on an enlarged copy of a photo, in pixels of the photo.
+// Anti-aliased drawing on a copy of a photo, in its pixels.
 #ifndef CIRCLINE_APPS_COMPARE_CANVAS_H_
 #define CIRCLINE_APPS_COMPARE_CANVAS_H_
 
@@ -10,22 +10,26 @@
 
 namespace circline::apps {
 
-// Positions are pixels of the photo; widths, radii and letter sizes are pixels of the picture.
-// Positions that are not finite are left out, and lines break there.
+// Positions are pixels of the photo. Widths, radii, margins and letter sizes are those on a photo
+// 960 pixels wide; they are scaled with the photo, so that strokes look alike on small and large
+// ones. Positions that are not finite are left out, and lines break there.
 class Canvas {
  public:
   explicit Canvas(const cv::Mat& photo);
 
   int height() const { return image_.rows; }
-  // Length in photo pixels of so many pixels of the picture.
-  double PhotoPixels(double picture_pixels) const { return picture_pixels / scale_; }
-  // At least `margin` picture pixels from the border.
+  // A width given for a photo 960 pixels wide, on this one.
+  double Scaled(double width) const { return width * stroke_; }
+  // At least `margin` from the border.
   bool IsInside(const Eigen::Vector2d& pixel, double margin) const;
 
-  void Polyline(const std::vector<Eigen::Vector2d>& pixels, const cv::Scalar& color, int thickness);
-  void Dashes(const std::vector<Eigen::Vector2d>& pixels, const cv::Scalar& color, int thickness);
-  void Arrow(const std::vector<Eigen::Vector2d>& pixels, const cv::Scalar& color, int thickness);
-  void Dot(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color);
+  void Polyline(const std::vector<Eigen::Vector2d>& pixels, const cv::Scalar& color,
+                double thickness);
+  void Dashes(const std::vector<Eigen::Vector2d>& pixels, const cv::Scalar& color,
+              double thickness);
+  void Arrow(const std::vector<Eigen::Vector2d>& pixels, const cv::Scalar& color, double thickness);
+  void Dot(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color,
+           double opacity = 1.0);
   void Ring(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color);
   void Cross(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color);
   // Text with a dark rim, moved inside the picture; begins at the pixel, or is centred there.
@@ -35,16 +39,17 @@ class Canvas {
   // What `draw` draws shows with this opacity.
   void Blend(double opacity, const std::function<void()>& draw);
 
-  // The picture with lines of text on a dark strip below; the first is the title.
-  cv::Mat WithCaption(const std::vector<std::string>& lines) const;
+  // The picture with text on a dark strip below: a title, then parts in as many rows as they need.
+  cv::Mat WithCaption(const std::string& title, const std::vector<std::string>& parts) const;
 
  private:
-  cv::Point2d ToPicture(const Eigen::Vector2d& pixel) const;
-  bool IsNear(const cv::Point2d& point) const;
-  void Line(const cv::Point2d& a, const cv::Point2d& b, const cv::Scalar& color, int thickness);
+  bool IsNear(const Eigen::Vector2d& pixel) const;
+  int Thickness(double thickness) const;
+  double LetterSize(double size) const;
+  void Run(const std::vector<cv::Point>& points, const cv::Scalar& color, int thickness);
 
   cv::Mat image_;
-  double scale_ = 1.0;
+  double stroke_;
 };
 
 }  // namespace circline::apps

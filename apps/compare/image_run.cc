@@ -1,7 +1,6 @@
 #include "apps/compare/image_run.h"
 
 #include <algorithm>
-#include <chrono>
 #include <optional>
 
 #include "apps/common/photo_file.h"
@@ -11,17 +10,6 @@
 
 namespace circline::apps {
 namespace {
-
-class Stopwatch {
- public:
-  double Microseconds() const {
-    return std::chrono::duration<double, std::micro>(Clock::now() - start_).count();
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
-};
 
 std::string SizeError(const cv::Mat& photo, const Camera& camera) {
   const bool differs = (camera.width > 0 && camera.width != photo.cols) ||

@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_COMPARE_IMAGE_RUN_H_
 #define CIRCLINE_APPS_COMPARE_IMAGE_RUN_H_
 
+#include <chrono>
 #include <opencv2/core.hpp>
 #include <string>
 #include <utility>
@@ -39,6 +40,17 @@ class SolverSet {
   std::vector<Task> tasks_;
 };
 
+class Stopwatch {
+ public:
+  double Microseconds() const {
+    return std::chrono::duration<double, std::micro>(Clock::now() - start_).count();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
 struct SolverRun {
   std::string solver;
   SolverStage stage = SolverStage::kClosedForm;
@@ -55,7 +67,8 @@ struct ImageRun {
   Observations observations;
   std::vector<std::string> problems;  // What could not be fitted or detected, a sentence each.
   std::vector<SolverRun> solvers;
-  std::vector<std::pair<std::string, double>> stages;  // "read", "detect", "fit"; microseconds.
+  std::vector<std::pair<std::string, double>>
+      stages;  // "read", "detect", "fit", "overlay"; microseconds.
 };
 
 // How well an image's camera is known: as --focal_sigma says, else the scene file, else the noise

@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_COMPARE_IMAGE_WORKER_H_
 #define CIRCLINE_APPS_COMPARE_IMAGE_WORKER_H_
 
+#include <functional>
 #include <string>
 
 #include "apps/compare/image_run.h"
@@ -16,14 +17,21 @@ struct WorkedImage {
   Status status;           // Of writing its overlay.
 };
 
+// What is left to do with a photo once it is solved: to draw it, and to write its lines. Called
+// once, by any thread.
+using Finishing = std::function<WorkedImage()>;
+
 // Many threads may use one. The options outlive it.
 class ImageWorker {
  public:
   explicit ImageWorker(const CompareOptions& options) : options_(options), solvers_(options) {}
-  WorkedImage Work(SceneImage image) const;
+  // Detects and solves. The worker outlives what it returns.
+  Finishing Work(SceneImage image) const;
   const SolverSet& solvers() const { return solvers_; }
 
  private:
+  WorkedImage Finish(ImageRun* run) const;
+
   const CompareOptions& options_;
   SolverSet solvers_;
 };

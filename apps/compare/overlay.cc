@@ -3,9 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "apps/common/text.h"
 #include "apps/compare/canvas.h"
@@ -27,10 +24,23 @@ const std::array<cv::Scalar, 4> kFreePencils = {cv::Scalar(220, 80, 230), cv::Sc
                                                 cv::Scalar(230, 220, 60),
                                                 cv::Scalar(120, 255, 200)};
 
+// So many straight pieces make an ellipse of this longer semi-axis: they miss it by 0.1 px.
+int PiecesOfEllipse(double semi_axis_px) {
+  return static_cast<int>(std::clamp(7.0 * std::sqrt(semi_axis_px), 16.0, 400.0));
+}
+
+// And an image of a straight line, which lenses bend by a fortieth of its length at most: by 0.1
+// px.
+int PiecesOfLine(double length_px) {
+  return static_cast<int>(std::clamp(0.5 * std::sqrt(length_px), 1.0, 50.0));
+}
+
 // A curve of the camera frame as pixels of the photo; not finite where it cannot be seen.
+template <typename Curve>
 std::vector<Eigen::Vector2d> ProjectCurve(const Camera& camera, int samples, double t0, double t1,
-                                          const std::function<Eigen::Vector3d(double)>& curve) {
+                                          const Curve& curve) {
   std::vector<Eigen::Vector2d> pixels;
+  pixels.reserve(static_cast<std::size_t>(samples) + 1);
   for (int i = 0; i <= samples; ++i) {
     const Eigen::Vector3d point = curve(t0 + (t1 - t0) * i / samples);
     Eigen::Vector2d pixel;
@@ -45,14 +55,15 @@ std::vector<Eigen::Vector2d> ProjectCurve(const Camera& camera, int samples, dou
 void DrawContourPoints(const CircleObservation& circle, Canvas* canvas) {
   for (std::size_t i = 0; i < circle.points.size(); ++i) {
     const bool inlier = circle.inliers.empty() || circle.inliers[i] != 0;
-    canvas->Dot(circle.points[i], inlier ? 1.6 : 2.2, inlier ? kWhite : kOutlier);
+    canvas->Dot(circle.points[i], inlier ? 1.6 : 2.2, inlier ? kWhite : kOutlier, 0.55);
   }
 }
 
 void DrawEllipse(const Camera& camera, const CircleObservation& circle, bool used, Canvas* canvas) {
   Ellipse ellipse;
   if (!circle.fit || !ConicToEllipse(circle.fit->conic, &ellipse)) return;
-  const auto pixels = ProjectCurve(camera, 180, 0.0, kFullTurn, [&ellipse](double t) {
+  const int pieces = PiecesOfEllipse(ellipse.a * camera.fx);
+  const auto pixels = ProjectCurve(camera, pieces, 0.0, kFullTurn, [&ellipse](double t) {
     return EllipsePoint(ellipse, t).homogeneous().eval();
   });
   canvas->Polyline(pixels, used ? kEllipse : kUnusedEllipse, used ? 2 : 1);
@@ -71,7 +82,8 @@ void DrawSegment(const Camera& camera, const Segment& segment, const cv::Scalar&
   if (!PixelToCalibrated(camera, segment[0], &a) || !PixelToCalibrated(camera, segment[1], &b))
     return;
   const Eigen::Vector3d from = a.Homogeneous(), to = b.Homogeneous();
-  canvas->Polyline(ProjectCurve(camera, 24, 0.0, 1.0,
+  const int pieces = PiecesOfLine((segment[1] - segment[0]).norm());
+  canvas->Polyline(ProjectCurve(camera, pieces, 0.0, 1.0,
                                 [&](double t) { return ((1.0 - t) * from + t * to).eval(); }),
                    color, 2);
 }
@@ -97,7 +109,7 @@ struct WorldDrawing {
   const CameraPose& pose;
 
   std::vector<Eigen::Vector2d> Line(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
-    return ProjectCurve(camera, 32, 0.0, 1.0, [&](double t) {
+    return ProjectCurve(camera, 16, 0.0, 1.0, [&](double t) {
       return (pose.rotation * ((1.0 - t) * from + t * to) + pose.translation).eval();
     });
   }
@@ -134,13 +146,13 @@ void DrawVanishingLine(const Camera& camera, const Eigen::Vector3d& normal, Canv
           .normalized();
   const Eigen::Vector3d forward = sideways.cross(normal).normalized();
   const double sign = forward.z() < 0.0 ? -1.0 : 1.0;
-  const auto pixels = ProjectCurve(camera, 400, -1.55, 1.55, [&](double t) {
+  const auto pixels = ProjectCurve(camera, 120, -1.55, 1.55, [&](double t) {
     return (std::sin(t) * sideways + sign * std::cos(t) * forward).eval();
   });
   canvas->Dashes(pixels, kHorizon, 2);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     if (!canvas->IsInside(pixels[i], 24.0)) continue;
-    canvas->Label(pixels[i] + Eigen::Vector2d(0.0, canvas->PhotoPixels(-8.0)), "vanishing line",
+    canvas->Label(pixels[i] + Eigen::Vector2d(0.0, canvas->Scaled(-8.0)), "vanishing line",
                   kHorizon, 0.5);
     return;
   }
@@ -148,7 +160,7 @@ void DrawVanishingLine(const Camera& camera, const Eigen::Vector3d& normal, Canv
 
 // World length at which the longest visible axis takes up a sixth of the photo's height.
 double AxisLength(const WorldDrawing& world, const Eigen::Vector3d& origin, const Canvas& canvas) {
-  const double wanted = canvas.PhotoPixels(canvas.height() * 0.17);
+  const double wanted = 0.17 * canvas.height();
   Eigen::Vector2d start;
   if (!world.Pixel(origin, &start)) return 0.0;
   double length = 0.1 * (world.pose.rotation * origin + world.pose.translation).norm();
@@ -182,8 +194,7 @@ void DrawAxes(const WorldDrawing& world, const Eigen::Vector3d& origin, bool rot
     const auto index = static_cast<std::size_t>(axis);
     canvas->Arrow(pixels, kAxes[index], 3);
     if (!pixels.back().allFinite()) continue;
-    const Eigen::Vector2d ahead =
-        (pixels.back() - start).stableNormalized() * canvas->PhotoPixels(15.0);
+    const Eigen::Vector2d ahead = (pixels.back() - start).stableNormalized() * canvas->Scaled(15.0);
     canvas->Label(pixels.back() + ahead, rotation_is_free ? "normal" : kNames[index], kAxes[index],
                   0.75, true);
   }
@@ -238,10 +249,10 @@ std::string SigmaText(const PoseHypothesis& hypothesis) {
   return "sigma " + FormatShort(sigma.norm(), 2) + " deg";
 }
 
-std::vector<std::string> Caption(const ImageRun& run, const SolverRun* shown) {
+cv::Mat WithCaption(const ImageRun& run, const SolverRun* shown, const Canvas& canvas) {
   if (shown == nullptr) {
-    std::string reason = run.solvers.empty() ? "" : run.solvers.back().estimate.status.message;
-    return {"no pose", reason};
+    return canvas.WithCaption(
+        "no pose", {run.solvers.empty() ? "" : run.solvers.back().estimate.status.message});
   }
   const PoseHypothesis& best = shown->estimate.hypotheses.front();
   std::string title =
@@ -249,10 +260,10 @@ std::vector<std::string> Caption(const ImageRun& run, const SolverRun* shown) {
   const auto error = shown->errors.front().Headline();
   if (error) title += "    error " + FormatShort(*error, 2) + " deg";
   const std::size_t count = shown->estimate.hypotheses.size();
-  std::string details = "rms " + FormatShort(best.rms_px, 2) + " px    " + SigmaText(best) +
-                        "    probability " + FormatFixed(best.probability, 2) + " (" +
-                        std::to_string(count) + (count == 1 ? " hypothesis)" : " hypotheses)");
-  return {title, details};
+  return canvas.WithCaption(
+      title, {"rms " + FormatShort(best.rms_px, 2) + " px", SigmaText(best),
+              "probability " + FormatFixed(best.probability, 2) + " (" + std::to_string(count) +
+                  (count == 1 ? " hypothesis)" : " hypotheses)")});
 }
 
 // Whether the shown pose rests on this circle; where there is no pose, all are drawn alike.
@@ -268,35 +279,14 @@ bool IsUsed(const CircleObservation& circle, const SolverRun* shown) {
 cv::Mat DrawOverlay(const ImageRun& run) {
   Canvas canvas(run.photo);
   const Observations& observations = run.observations;
-  canvas.Blend(0.55, [&] {
-    for (const CircleObservation& circle : observations.circles) DrawContourPoints(circle, &canvas);
-  });
+  for (const CircleObservation& circle : observations.circles) DrawContourPoints(circle, &canvas);
   const SolverRun* shown = RunToShow(run);
   for (const CircleObservation& circle : observations.circles) {
     DrawEllipse(observations.camera, circle, IsUsed(circle, shown), &canvas);
   }
   DrawPencils(observations, &canvas);
   if (shown != nullptr) DrawPose(observations, shown->estimate, &canvas);
-  return canvas.WithCaption(Caption(run, shown));
-}
-
-std::vector<std::uint8_t> EncodePng(const cv::Mat& picture) {
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", picture, bytes);  // OpenCV's default: twice as fast as a third smaller.
-  return bytes;
-}
-
-std::vector<std::uint8_t> EncodeJpeg(const cv::Mat& picture, int max_width) {
-  cv::Mat small = picture;
-  if (picture.cols > max_width) {
-    const double scale = static_cast<double>(max_width) / picture.cols;
-    cv::resize(picture, small,
-               cv::Size(max_width, static_cast<int>(std::lround(picture.rows * scale))), 0.0, 0.0,
-               cv::INTER_AREA);
-  }
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, 82});
-  return bytes;
+  return WithCaption(run, shown, canvas);
 }
 
 }  // namespace circline::apps

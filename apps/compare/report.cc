@@ -7,7 +7,7 @@
 
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
-#include "apps/compare/overlay.h"
+#include "apps/compare/encode.h"
 #include "apps/compare/record_files.h"
 #include "apps/compare/report_image.h"
 #include "apps/compare/report_plots.h"

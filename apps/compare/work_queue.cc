@@ -2,14 +2,18 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <deque>
 #include <map>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
+#include <thread>
+#include <utility>
 
 namespace circline::apps {
 namespace {
 
-constexpr std::size_t kMaxAhead = 256;  // Images taken before the oldest unfinished one is done.
+constexpr std::size_t kMaxAhead = 256;     // Images taken before the oldest unfinished one is done.
+constexpr std::size_t kMaxUnfinished = 4;  // Photos that wait in memory to be drawn.
 
 class Queue {
  public:
@@ -55,19 +59,73 @@ class Queue {
   bool delivering_ = false, stopped_ = false;
 };
 
+// Finishes images in a thread of its own; all that it took, before it ends.
+class Finisher {
+ public:
+  explicit Finisher(Queue* queue) : queue_(queue), thread_([this] { Run(); }) {}
+  Finisher(const Finisher&) = delete;
+  Finisher& operator=(const Finisher&) = delete;
+  ~Finisher() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      closed_ = true;
+    }
+    work_.notify_one();
+    thread_.join();
+  }
+
+  // False if enough wait already: the image stays with the caller.
+  bool Take(std::size_t index, Finishing* finishing) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (waiting_.size() >= kMaxUnfinished) return false;
+      waiting_.emplace_back(index, std::move(*finishing));
+    }
+    work_.notify_one();
+    return true;
+  }
+
+ private:
+  void Run() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (true) {
+      work_.wait(lock, [this] { return closed_ || !waiting_.empty(); });
+      if (waiting_.empty()) return;
+      {
+        const auto [index, finishing] = std::move(waiting_.front());
+        waiting_.pop_front();
+        lock.unlock();
+        queue_->Put(index, finishing());
+      }
+      lock.lock();
+    }
+  }
+
+  Queue* const queue_;
+  std::mutex mutex_;
+  std::condition_variable work_;
+  std::deque<std::pair<std::size_t, Finishing>> waiting_;
+  bool closed_ = false;
+  std::thread thread_;  // The last, so that it finds the others made.
+};
+
 }  // namespace
 
-void WorkInOrder(std::size_t count, const std::function<WorkedImage(std::size_t)>& work,
+void WorkInOrder(std::size_t count, const std::function<Finishing(std::size_t)>& work,
                  const std::function<bool(std::size_t, const WorkedImage&)>& deliver) {
   const std::size_t threads = static_cast<std::size_t>(std::max(1, cv::getNumThreads()));
   const int num_workers = static_cast<int>(std::min(threads, count));
   if (num_workers == 0) return;
   Queue queue(count, deliver);
+  Finisher finisher(&queue);
   cv::parallel_for_(
       cv::Range(0, num_workers),
       [&](const cv::Range& range) {
         for (int i = range.start; i < range.end; ++i) {
-          for (std::size_t index = 0; queue.Take(&index);) queue.Put(index, work(index));
+          for (std::size_t index = 0; queue.Take(&index);) {
+            Finishing finishing = work(index);
+            if (!finisher.Take(index, &finishing)) queue.Put(index, finishing());
+          }
         }
       },
       num_workers);

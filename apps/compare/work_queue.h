@@ -10,9 +10,11 @@
 namespace circline::apps {
 
 // Calls `work` for 0 .. count - 1 in OpenCV's thread pool, on as many threads as cv::getNumThreads
-// says, and `deliver` with what came of it: one call at a time, in order. Only so many results wait
-// for their turn that memory does not depend on `count`. A `deliver` that returns false ends it.
-void WorkInOrder(std::size_t count, const std::function<WorkedImage(std::size_t)>& work,
+// says. What `work` returns is called in one more thread, so that the next image need not wait for
+// it; where that thread falls behind, by the one that worked. `deliver` gets what came of it: one
+// call at a time, in order. Only so many images wait for their turn that memory does not depend on
+// `count`. A `deliver` that returns false ends it.
+void WorkInOrder(std::size_t count, const std::function<Finishing(std::size_t)>& work,
                  const std::function<bool(std::size_t, const WorkedImage&)>& deliver);
 
 }  // namespace circline::apps

@@ -11,6 +11,7 @@
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
 #include "apps/compare/canvas.h"
+#include "apps/compare/encode.h"
 #include "apps/compare/image_run.h"
 #include "apps/compare/options.h"
 #include "apps/compare/overlay.h"
@@ -76,10 +77,9 @@ Status FindImage(const ImageSet& images, SceneImage* image) {
 cv::Mat Views(const ImageRun& run, const Model& model, const std::string& unit) {
   const Patch& plane = model.patches.front();
   cv::Mat left = DrawOverlay(run);
-  cv::Mat right =
-      Canvas(plane.texture)
-          .WithCaption({"the plane, rectified",
-                        FormatShort(plane.u.norm()) + " x " + FormatShort(plane.v.norm()) + unit});
+  cv::Mat right = Canvas(plane.texture)
+                      .WithCaption("the plane, rectified", {FormatShort(plane.u.norm()) + " x " +
+                                                            FormatShort(plane.v.norm()) + unit});
   const double scale = static_cast<double>(left.rows) / right.rows;
   cv::resize(right, right, cv::Size(static_cast<int>(right.cols * scale), left.rows), 0.0, 0.0,
              scale < 1.0 ? cv::INTER_AREA : cv::INTER_CUBIC);

@@ -36,9 +36,13 @@ TEST(WorkQueue, DeliversInOrderAndKeepsNearTheOldest) {
         while (ahead > most && !most_ahead.compare_exchange_weak(most, ahead)) {
         }
         if (i == 0) std::this_thread::sleep_for(std::chrono::milliseconds(200));  // The slow one.
-        WorkedImage image;
-        image.lines.results = std::to_string(i);
-        return image;
+        return [i] {
+          // One that is slow to draw: the others are worked on and drawn meanwhile.
+          if (i == kCount / 2) std::this_thread::sleep_for(std::chrono::milliseconds(200));
+          WorkedImage image;
+          image.lines.results = std::to_string(i);
+          return image;
+        };
       },
       [&](std::size_t i, const WorkedImage& image) {
         EXPECT_EQ(image.lines.results, std::to_string(i));
@@ -56,7 +60,7 @@ TEST(WorkQueue, EndsWhenDeliveryFails) {
     cv::setNumThreads(threads);
     int delivered = 0;
     WorkInOrder(
-        1000, [](std::size_t) { return WorkedImage(); },
+        1000, [](std::size_t) { return [] { return WorkedImage(); }; },
         [&](std::size_t i, const WorkedImage&) {
           ++delivered;
           return i < 5;
