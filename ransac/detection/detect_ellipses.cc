@@ -141,7 +141,7 @@ class EllipseDetector {
     for (const DetectedEllipse& other : accepted_) {
       const bool same_side = other.bright == e.bright || other.bright == BrightSide::kEither ||
                              e.bright == BrightSide::kEither;
-      if (same_side && fitter_.Farthest(e, other.fit.conic) < kDuplicatePx) return true;
+      if (same_side && fitter_.LiesOn(e, other.fit.conic, kDuplicatePx)) return true;
     }
     return false;
   }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "circline/ransac/detection/line_pieces.h"
+#include "circline/ransac/detection/piece_beginnings.h"
 
 namespace circline {
 namespace {
@@ -30,11 +31,6 @@ constexpr double kMinSigmaPx = 0.1;
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-// The first point of a piece, calibrated, and no less than what kMaxAlternatingPx are there.
-struct Beginning {
-  double x, y, reach;
-};
 
 // A line being joined from pieces.
 struct Joined {
@@ -83,40 +79,25 @@ class LineJoiner {
   }
 
   void JoinPieces() {
-    std::vector<std::uint8_t> used(pieces_.size(), 0);
-    for (const LinePiece& piece : pieces_) beginnings_.push_back(BeginningOf(piece));
+    PieceBeginnings free(kMaxAlternatingPx);
+    for (const LinePiece& piece : pieces_) free.Add(edges_.X(piece.begin));
     for (std::size_t k = 0; k < pieces_.size(); ++k) {
-      if (used[k]) continue;
-      used[k] = 1;
+      if (!free.Has(k)) continue;
+      free.Remove(k);
       Joined joined = Start(static_cast<int>(k));
       // Joining one piece makes the line longer and may bring the next one within reach.
       bool again = true;
       while (again) {
         again = false;
-        for (std::size_t j = k + 1; j < pieces_.size(); ++j) {
-          if (used[j] || IsFar(joined.line, beginnings_[j]) || !Continues(joined, pieces_[j])) {
-            continue;
-          }
-          used[j] = 1;
+        for (std::size_t j = k + 1; (j = free.NextNear(joined.line, j)) < free.size(); ++j) {
+          if (!Continues(joined, pieces_[j])) continue;
+          free.Remove(j);
           again = true;
           Append(static_cast<int>(j), &joined);
         }
       }
       Finish(joined);
     }
-  }
-
-  Beginning BeginningOf(const LinePiece& piece) const {
-    const CalibratedPoint first = edges_.X(piece.begin);
-    const std::array<double, 4>& j = first.x_from_pixel;
-    const double square = j[0] * j[0] + j[1] * j[1] + j[2] * j[2] + j[3] * j[3];
-    return {first.x.x(), first.x.y(), kMaxAlternatingPx * std::sqrt(square)};
-  }
-
-  // Whether a piece cannot continue a line. (All pieces are asked about all lines: what is asked
-  // lies close together.)
-  static bool IsFar(const Vector3d& line, const Beginning& b) {
-    return std::abs(line.x() * b.x + line.y() * b.y + line.z()) > b.reach;
   }
 
   Joined Start(int piece) const {
@@ -266,7 +247,6 @@ class LineJoiner {
   const LineEdges& edges_;
   const LineOptions& options_;
   std::vector<LinePiece> pieces_, bent_;
-  std::vector<Beginning> beginnings_;
   std::vector<DetectedLine> lines_;
   // Scratch.
   std::vector<CalibratedPoint> averages_, calibrated_;

@@ -88,8 +88,8 @@ class PointFinder {
   void Find(EdgeMap* map, std::vector<std::int32_t>* pixels) {
     constexpr int kBandRows = 48;
     map->index.assign(gray_.total(), -1);
-    map->points.reserve(gray_.total() / 8);  // A busy photo's.
-    pixels->reserve(gray_.total() / 8);
+    map->points.reserve(gray_.total() / 4);  // More than a busy photo's.
+    pixels->reserve(gray_.total() / 4);
     for (int y = 1; y + 1 < gray_.rows; y += kBandRows) {
       FindInBand(y, std::min(y + kBandRows, gray_.rows - 1), map, pixels);
     }

@@ -164,14 +164,13 @@ void EllipseFitter::Take(const DetectedEllipse& e) {
   supporter_.Take(e.points);
 }
 
-double EllipseFitter::Farthest(const DetectedEllipse& e, const Matrix3d& conic) {
-  double farthest = 0.0;
+bool EllipseFitter::LiesOn(const DetectedEllipse& e, const Matrix3d& conic, double reach_px) {
   for (std::size_t k = 0; k < e.points.size(); k += 1 + e.points.size() / 16) {
     CalibratedPoint p;
     if (!calibrated_.Get(e.points[k], &p)) continue;
-    farthest = std::max(farthest, std::abs(ConicDistancePx(p, conic)));
+    if (std::abs(ConicDistancePx(p, conic)) >= reach_px) return false;
   }
-  return farthest;
+  return true;
 }
 
 void EllipseFitter::AppendPoints(const Arc& arc) {

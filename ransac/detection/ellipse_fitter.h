@@ -47,8 +47,9 @@ class EllipseFitter {
   void Take(const DetectedEllipse& e);
   bool IsTaken(int i) const { return supporter_.IsTaken(i); }
 
-  // Largest distance of some of the ellipse's points to a conic, pixels.
-  double Farthest(const DetectedEllipse& e, const Eigen::Matrix3d& conic);
+  // Whether a conic passes within `reach_px` of the ellipse's points. (A dozen of them are looked
+  // at.)
+  bool LiesOn(const DetectedEllipse& e, const Eigen::Matrix3d& conic, double reach_px);
 
  private:
   void AppendPoints(const Arc& arc);
