@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "apps/common/photo_file.h"
+#include "apps/compare/other_planes.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/record.h"
 #include "circline/refine/refined_solvers.h"
@@ -168,6 +169,7 @@ void RunAll(const CompareOptions& options, const SolverSet& solvers, SceneImage*
   for (const SolverSet::Task& task : (own_solvers ? *own_solvers : solvers).tasks()) {
     run->solvers.push_back(RunSolver(task, options, *run, &evidence));
   }
+  NoteOtherPlanes(&run->solvers);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "apps/compare/agreement.h"
+#include "apps/compare/other_planes.h"
 #include "apps/compare/overlay.h"
 #include "apps/compare/record_files.h"
 #include "apps/compare/selection.h"
@@ -135,6 +136,36 @@ TEST(Overlay, DrawsWithTheRefinedFocalLength) {
   const cv::Mat expected = draw(600.0, 1.0);
   EXPECT_EQ(cv::norm(draw(500.0, 1.2), expected, cv::NORM_INF), 0.0);
   EXPECT_GT(cv::norm(draw(500.0, 1.0), expected, cv::NORM_INF), 0.0);
+}
+
+SolverRun RunOf(const std::string& solver, const LossSetting* loss, double tilt_deg,
+                double probability) {
+  SolverRun run;
+  run.solver = solver;
+  run.loss = loss;
+  PoseHypothesis hypothesis;
+  hypothesis.cam_from_world.rotation = ExpRotation({tilt_deg / 57.29577951308232, 0.0, 0.0});
+  hypothesis.probability = probability;
+  run.estimate.hypotheses = {hypothesis};
+  return run;
+}
+
+TEST(OtherPlanes, SureAnswersThatContradictEachOtherSaySo) {
+  const LossSetting first, second;
+  std::vector<SolverRun> runs = {
+      RunOf("line_pairs", nullptr, 0.0, 1.0),         RunOf("line_pairs", &first, 1.0, 0.95),
+      RunOf("line_pairs", &second, 40.0, 0.95),       RunOf("parallel_circles", &first, 30.0, 0.8),
+      RunOf("concentric_circles", &first, 4.0, 0.99), RunOf("joint", &first, 31.0, 0.92)};
+  NoteOtherPlanes(&runs);
+  using Notes = std::vector<std::string>;
+  const std::string others = "others are as sure of another plane: ";
+  EXPECT_EQ(runs[0].estimate.notes, Notes{others + "joint (31 deg away)"});
+  EXPECT_EQ(runs[1].estimate.notes, Notes{others + "joint (30 deg away)"});
+  EXPECT_EQ(runs[2].estimate.notes, Notes{});  // Another loss has rivals of its own.
+  EXPECT_EQ(runs[3].estimate.notes, Notes{});  // Not sure.
+  EXPECT_EQ(runs[4].estimate.notes, Notes{others + "joint (27 deg away)"});
+  EXPECT_EQ(runs[5].estimate.notes,
+            Notes{others + "line_pairs (31 deg away), concentric_circles (27 deg away)"});
 }
 
 TEST(Selection, TakesWorstMedianAndRefused) {
