@@ -7,29 +7,6 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/setup.sh
 
-# find_folder <package> <folder>: sets `found` to where the package's folder is: in the system if the
-# package is installed with all of its files (minimal systems leave out documentation), else unpacked
-# below build/, so that half a gigabyte of documentation does not become part of the user's system.
-find_folder() {
-  local package=$1 folder=$2 unpacked=build/demo/packages/$1
-  found=$folder
-  [ ! -d "$found" ] || return 0
-  found=$unpacked$folder
-  [ ! -d "$found" ] || return 0
-  say "fetching the photographs of the Debian package $package"
-  rm -rf "$unpacked"
-  mkdir -p "$unpacked"
-  quietly "$unpacked.log" download "$package" "$unpacked"
-  dpkg-deb --fsys-tarfile "$unpacked"/*.deb | tar -x -C "$unpacked" ".$folder"
-  rm "$unpacked"/*.deb
-  [ -d "$found" ] || fail "the package $package has no folder $folder"
-}
-
-# download <package> <folder>; a fresh system has no package lists yet.
-download() {
-  (cd "$2" && apt-get -q download "$1") || { apt update && (cd "$2" && apt-get -q download "$1"); }
-}
-
 # compare <set> <folder>: copies the photographs that the scene file names next to a copy of it, so
 # that build/demo/<set> can be opened, changed and run again by hand.
 compare() {

@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# What tests/run.sh, apps/demo.sh and .ci/run have in common; sourced by them in the top folder.
+# What tests/run.sh, apps/demo.sh, apps/gallery.sh and .ci/run have in common; sourced by them in the top folder.
 
 # Debian packages: what builds circline, its apps, tests and benchmarks.
 # shellcheck disable=SC2034
@@ -52,4 +52,27 @@ build() {
   quietly "build/$preset-configure.log" cmake --preset "$preset" \
     -DCIRCLINE_WERROR="${CIRCLINE_WERROR:-OFF}"
   cmake --build "build/$preset" --target "${@:-all}" -j "$(nproc)" -- --quiet
+}
+
+# find_folder <package> <folder>: sets `found` to where the package's folder is: in the system if the
+# package is installed with all of its files (minimal systems leave out documentation), else unpacked
+# below build/, so that half a gigabyte of documentation does not become part of the user's system.
+find_folder() {
+  local package=$1 folder=$2 unpacked=build/packages/$1
+  found=$folder
+  [ ! -d "$found" ] || return 0
+  found=$unpacked$folder
+  [ ! -d "$found" ] || return 0
+  say "fetching the photographs of the Debian package $package"
+  rm -rf "$unpacked"
+  mkdir -p "$unpacked"
+  quietly "$unpacked.log" download "$package" "$unpacked"
+  dpkg-deb --fsys-tarfile "$unpacked"/*.deb | tar -x -C "$unpacked" ".$folder"
+  rm "$unpacked"/*.deb
+  [ -d "$found" ] || fail "the package $package has no folder $folder"
+}
+
+# download <package> <folder>; a fresh system has no package lists yet.
+download() {
+  (cd "$2" && apt-get -q download "$1") || { apt update && (cd "$2" && apt-get -q download "$1"); }
 }
