@@ -97,7 +97,7 @@ int Main(int argc, char** argv) {
       set.empty() ? FoldersBelow(data) : std::vector<std::string>{data + "/" + set};
   if (speed) {
     MeasureRingSpeed();
-    std::printf("photographs                 640x480 ms     worst  12 megapixels ms\n");
+    std::printf("photographs              640 x 480 ms     worst     12 MP  12 MP tiled\n");
   }
   for (const std::string& folder : folders) MeasureFolder(folder, speed);
   return 0;

@@ -31,7 +31,7 @@ void MeasurePhotographs(const std::string& folder, const cv::FileNode& root);
 void MeasureSegments(const std::string& folder, const cv::FileNode& root);
 
 // Times of the photographs of a calibrated set at the size of 640 x 480, and of its first one at 12
-// megapixels: a row.
+// megapixels, enlarged and tiled: a row.
 void MeasureSpeed(const std::string& folder, const cv::FileNode& root);
 
 // Times of targets with many rings, drawn here.
