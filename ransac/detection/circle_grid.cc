@@ -100,9 +100,9 @@ class LatticeFinder {
     for (std::size_t i = 0; i < points_.size(); ++i) {
       double smallest = 1e300;
       for (std::size_t j = 0; j < points_.size(); ++j) {
-        if (i != j) smallest = std::min(smallest, (points_[i] - points_[j]).norm());
+        if (i != j) smallest = std::min(smallest, (points_[i] - points_[j]).squaredNorm());
       }
-      nearest.push_back(smallest);
+      nearest.push_back(std::sqrt(smallest));
     }
     return MedianOf(nearest);
   }

@@ -31,22 +31,28 @@ constexpr double kRectangularDeg = 4.0;
 // Two pencils span a plane if they are this far from parallel.
 constexpr double kMinSpanDeg = 15.0;
 
-// Angle between two axes (no sense of sign) and its standard deviation.
+// An angle and its standard deviation.
 struct AngleTest {
   double angle_deg = 0.0, sigma_deg = 0.0;
 };
 
-AngleTest Compare(const UncertainDirection& a, const UncertainDirection& b) {
+// Between the ends of two axes (no sense of sign).
+Vector3d Chord(const UncertainDirection& a, const UncertainDirection& b) {
   const double sign = a.vector.dot(b.vector) < 0.0 ? -1.0 : 1.0;
-  const Vector3d difference = a.vector - sign * b.vector;
-  const double norm = difference.norm();
-  AngleTest test;
-  test.angle_deg = 2.0 * std::asin(std::min(1.0, 0.5 * norm)) / kRadians;
+  return a.vector - sign * b.vector;
+}
+
+double ChordAngleDeg(const Vector3d& chord) {
+  return 2.0 * std::asin(std::min(1.0, 0.5 * chord.norm())) / kRadians;
+}
+
+double ChordSigmaDeg(const UncertainDirection& a, const UncertainDirection& b,
+                     const Vector3d& chord) {
+  const double norm = chord.norm();
   const Matrix3d covariance = a.covariance + b.covariance;
-  const double variance = norm > 1e-12 ? difference.dot(covariance * difference) / (norm * norm)
-                                       : 0.5 * covariance.trace();
-  test.sigma_deg = std::hypot(std::sqrt(std::max(0.0, variance)) / kRadians, kModelSigmaDeg);
-  return test;
+  const double variance =
+      norm > 1e-12 ? chord.dot(covariance * chord) / (norm * norm) : 0.5 * covariance.trace();
+  return std::hypot(std::sqrt(std::max(0.0, variance)) / kRadians, kModelSigmaDeg);
 }
 
 // How far from 90 degrees.
@@ -62,12 +68,15 @@ AngleTest CompareToRightAngle(const UncertainDirection& a, const UncertainDirect
 }  // namespace
 
 double AngleBetweenDeg(const UncertainDirection& a, const UncertainDirection& b) {
-  return Compare(a, b).angle_deg;
+  return ChordAngleDeg(Chord(a, b));
 }
 
+// Most pairs are far apart: what is asked of all circles and all planes costs one angle.
 bool SamePlane(const UncertainDirection& a, const UncertainDirection& b, double max_deg) {
-  const AngleTest test = Compare(a, b);
-  return test.angle_deg <= std::min(max_deg, kMaxSigmas * test.sigma_deg);
+  const Vector3d chord = Chord(a, b);
+  const double angle_deg = ChordAngleDeg(chord);
+  if (!(angle_deg <= max_deg)) return false;
+  return angle_deg <= std::min(max_deg, kMaxSigmas * ChordSigmaDeg(a, b, chord));
 }
 
 bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal,
