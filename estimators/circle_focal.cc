@@ -1,0 +1,191 @@
+#include "circline/estimators/circle_focal.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "circline/estimators/focal_roots.h"
+
+namespace circline {
+namespace {
+
+constexpr double kRounding = 1e-12;  // Of what is scaled to 1.
+
+// f^2 = |b|^2 - |a|^2 of the points a +- ib in which a plane's vanishing line meets the image of
+// one of its circles. With s the line's point at infinity and t across it, unit, s.t = 0 in the
+// first two coordinates: tau s + t lies on C where tau^2 s'Cs + 2 tau s'Ct + t'Ct = 0.
+FocalRoots OnLine(const Eigen::Matrix3d& C, const Eigen::Vector3d& vanishing_line) {
+  const Eigen::Vector3d l = vanishing_line.normalized();
+  const double slope = l.head<2>().norm();
+  if (!(slope > kRounding)) return FocalRoots(FocalRefusal::kFrontal);
+  const Eigen::Vector3d s = Eigen::Vector3d(l.y(), -l.x(), 0.0) / slope, t = l.cross(s);
+  const Eigen::Vector3d Cs = C * s, Ct = C * t;
+  const double real = -s.dot(Ct) / s.dot(Cs);
+  const double imag2 = t.dot(Ct) / s.dot(Cs) - real * real;
+  if (!(imag2 > 0.0)) return FocalRoots(FocalRefusal::kLineMeetsCircle);
+  FocalRoots roots;
+  roots.Add((imag2 - real * real - t.head<2>().squaredNorm()) / (t.z() * t.z()));
+  return roots;
+}
+
+// Two conics in coordinates u in which the first is the unit circle: x = T u, D = diag(1, 1, -1).
+struct ConicPencil {
+  Eigen::Matrix3d T, second;
+
+  static Eigen::Matrix3d D() { return Eigen::Vector3d(1.0, 1.0, -1.0).asDiagonal(); }
+  // The member second - lambda D.
+  Eigen::Matrix3d Member(double lambda) const { return second - lambda * D(); }
+  Eigen::Vector3d LineInImage(const Eigen::Vector3d& line) const {
+    return T.inverse().transpose() * line;
+  }
+};
+
+bool MakeConicPencil(const Eigen::Matrix3d& first, const Eigen::Matrix3d& second,
+                     ConicPencil* pencil) {
+  Ellipse e;
+  Eigen::Matrix3d scaled;
+  if (!ConicToEllipse(first, &e) || !NormalizeEllipse(second, &scaled)) return false;
+  const double c = std::cos(e.angle), s = std::sin(e.angle);
+  pencil->T << e.a * c, -e.b * s, e.center.x(), e.a * s, e.b * c, e.center.y(), 0.0, 0.0, 1.0;
+  return NormalizeEllipse(TransformConic(scaled, pencil->T), &pencil->second);
+}
+
+Eigen::Matrix3d Adjugate(const Eigen::Matrix3d& S) {
+  Eigen::Matrix3d adjugate;
+  adjugate << S.col(1).cross(S.col(2)), S.col(2).cross(S.col(0)), S.col(0).cross(S.col(1));
+  return adjugate.transpose();
+}
+
+// Real lambda with det(second - lambda D) = 0, the one farthest from the other two first.
+int DegenerateMembers(const ConicPencil& pencil, std::array<double, 3>* lambdas) {
+  const Eigen::Matrix3d M = ConicPencil::D() * pencil.second;
+  const double c2 = M.trace(), c1 = Adjugate(M).trace(), c0 = M.determinant();
+  // lambda = t + c2 / 3 with t^3 + p t + q = 0.
+  const double p = c1 - c2 * c2 / 3.0;
+  const double q = c2 * (c1 / 3.0 - 2.0 * c2 * c2 / 27.0) - c0;
+  const double discriminant = 0.25 * q * q + p * p * p / 27.0;
+  int count = 1;
+  if (discriminant > 0.0) {
+    const double A = -std::copysign(std::cbrt(0.5 * std::abs(q) + std::sqrt(discriminant)), q);
+    *lambdas = {A - p / (3.0 * A), 0.0, 0.0};
+  } else {
+    constexpr double kThird = 2.0943951023931953;  // Of a turn.
+    const double m = std::copysign(2.0 * std::sqrt(std::max(0.0, -p / 3.0)), -q);
+    const double angle = std::acos(m != 0.0 ? std::min(1.0, 3.0 * q / (p * m)) : 1.0) / 3.0;
+    *lambdas = {m * std::cos(angle), m * std::cos(angle + kThird), m * std::cos(angle - kThird)};
+    count = 3;
+  }
+  for (double& x : *lambdas) {  // The last digits by a Newton step.
+    x += c2 / 3.0;
+    const double step = (((x - c2) * x + c1) * x - c0) / ((3.0 * x - 2.0 * c2) * x + c1);
+    if (std::abs(step) < 1e-6 * std::abs(x)) x -= step;
+  }
+  return count;
+}
+
+// f^2 from both of two concentric circles.
+std::array<FocalRoots, 2> Concentric(const Vector<12>& z) {
+  const Eigen::Matrix3d A = VectorToConic(z.head<6>()), B = VectorToConic(z.tail<6>());
+  ConicPencil pencil;
+  const auto refused = [](FocalRefusal why) {
+    return std::array{FocalRoots(why), FocalRoots(why)};
+  };
+  if (!MakeConicPencil(A, B, &pencil)) return refused(FocalRefusal::kNoEllipse);
+  std::array<double, 3> lambdas;
+  DegenerateMembers(pencil, &lambdas);
+  const Eigen::Matrix3d adjugate = Adjugate(pencil.Member(lambdas[0]));
+  Eigen::Index longest;
+  const double size = adjugate.colwise().norm().maxCoeff(&longest);
+  constexpr double kSame = 1e-9;  // A root that is triple is good to 1e-5, and enters squared.
+  if (!(size > kSame)) return refused(FocalRefusal::kSameCircle);
+  const Eigen::Vector3d line = pencil.LineInImage(ConicPencil::D() * adjugate.col(longest));
+  return {OnLine(A, line), OnLine(B, line)};
+}
+
+// The two lines of a symmetric matrix l m^T + m l^T, of which `adjugate` is that: -(l x m)(l x
+// m)^T.
+std::array<Eigen::Vector3d, 2> LinesOf(const Eigen::Matrix3d& pair,
+                                       const Eigen::Matrix3d& adjugate) {
+  Eigen::Index i, row, column;
+  adjugate.diagonal().minCoeff(&i);
+  const Eigen::Vector3d p = -adjugate.col(i) / std::sqrt(-adjugate(i, i));
+  Eigen::Matrix3d single = pair;
+  single.row(0) += Eigen::RowVector3d(0.0, -p.z(), p.y());
+  single.row(1) += Eigen::RowVector3d(p.z(), 0.0, -p.x());
+  single.row(2) += Eigen::RowVector3d(-p.y(), p.x(), 0.0);
+  single.cwiseAbs().maxCoeff(&row, &column);
+  return {single.row(row).transpose(), single.col(column)};
+}
+
+FocalRoots Coplanar(const Vector<12>& z) {
+  const Eigen::Matrix3d A = VectorToConic(z.head<6>());
+  ConicPencil pencil;
+  if (!MakeConicPencil(A, VectorToConic(z.tail<6>()), &pencil))
+    return FocalRoots(FocalRefusal::kNoEllipse);
+  std::array<double, 3> lambdas;
+  const int count = DegenerateMembers(pencil, &lambdas);
+  // A pair of real lines has eigenvalues of both signs beside 0: the trace of the adjugate, which
+  // is their product, is negative.
+  Eigen::Matrix3d pair = Eigen::Matrix3d::Zero(), adjugate = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Matrix3d member = pencil.Member(lambdas[static_cast<std::size_t>(i)]);
+    const Eigen::Matrix3d of_member = Adjugate(member);
+    if (of_member.trace() < adjugate.trace()) pair = member, adjugate = of_member;
+  }
+  // A double root, of circles about one centre, is good to 1e-8.
+  constexpr double kSameCenter = 1e-7;
+  if (!(adjugate.trace() < -kSameCenter)) return FocalRoots(FocalRefusal::kSameCircle);
+  const Eigen::Vector2d other =
+      -pencil.second.topLeftCorner<2, 2>().inverse() * pencil.second.topRightCorner<2, 1>();
+  FocalRoots roots;
+  roots.why = FocalRefusal::kLineMeetsCircle;
+  for (const Eigen::Vector3d& line : LinesOf(pair, adjugate)) {
+    // The vanishing line leaves both circles on one side.
+    if (!(line.z() * other.homogeneous().dot(line) > 0.0)) continue;
+    const FocalRoots on_line = OnLine(A, pencil.LineInImage(line));
+    if (on_line.count == 1) roots.Add(on_line.squared[0]);
+    if (roots.count == 0) roots.why = on_line.why;
+  }
+  return roots;
+}
+
+// False, with the reason, where one is no ellipse.
+bool SetConics(const ConicFit& a, const ConicFit& b, FocalInputs<12>* inputs, FocalRefusal* why) {
+  const bool first = inputs->SetConic(0, a), second = inputs->SetConic(6, b);
+  if (inputs->IsFinite() && first && second) return true;
+  RefuseFocal(inputs->IsFinite() ? FocalRefusal::kNoEllipse : FocalRefusal::kNotFinite, why);
+  return false;
+}
+
+}  // namespace
+
+int FocalFromCircleAndCenter(const ConicFit& circle, const Eigen::Vector3d& center,
+                             const Eigen::Matrix3d& center_covariance, FocalSolution* solution,
+                             FocalRefusal* why) {
+  FocalInputs<9> inputs;
+  const bool is_ellipse = inputs.SetConic(0, circle);
+  inputs.SetPoint(6, center, center_covariance);
+  if (inputs.IsFinite() && !is_ellipse) return RefuseFocal(FocalRefusal::kNoEllipse, why);
+  return FocalSolutionsOf<9>(
+      [](const Vector<9>& z) {
+        const Eigen::Matrix3d C = VectorToConic(z.head<6>());
+        return OnLine(C, C * z.tail<3>());
+      },
+      inputs, solution, why);
+}
+
+int FocalFromConcentricCircles(const ConicFit& a, const ConicFit& b, FocalSolution* solution,
+                               FocalRefusal* why) {
+  FocalInputs<12> inputs;
+  if (!SetConics(a, b, &inputs, why)) return 0;
+  return CombinedSolution<2>(Concentric, inputs, solution, why);
+}
+
+int FocalFromCoplanarCircles(const ConicFit& a, const ConicFit& b,
+                             std::array<FocalSolution, 2>* solutions, FocalRefusal* why) {
+  FocalInputs<12> inputs;
+  if (!SetConics(a, b, &inputs, why)) return 0;
+  return FocalSolutionsOf<12>(Coplanar, inputs, solutions->data(), why);
+}
+
+}  // namespace circline

@@ -1,0 +1,182 @@
+#include "circline/estimators/plane_equations.h"
+
+#include <Eigen/Dense>
+#include <array>
+#include <cmath>
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+
+constexpr double kRounding = 1e-10;  // Standard deviation of residuals that state none.
+
+// A conic M on the plane as three numbers: (M00 - M11, 2 M01) / (M00 + M11), which are 0 for a
+// circle, and the log of its radius (of the circle of its area); `rates`: d number = <rate, dM>.
+struct PlaneShape {
+  Vector3d value;
+  std::array<Matrix3d, 3> rates;
+
+  // False where the plane's horizon meets the conic.
+  bool Set(const Matrix3d& M) {
+    const double trace = M(0, 0) + M(1, 1), determinant = M.determinant();
+    const double quadratic = M(0, 0) * M(1, 1) - M(0, 1) * M(0, 1);
+    if (!(trace > 0.0 && quadratic > 0.0 && determinant < 0.0)) return false;
+    const double u = (M(0, 0) - M(1, 1)) / trace, v = 2.0 * M(0, 1) / trace;
+    value << u, v, 0.5 * std::log(-determinant) - 0.75 * std::log(quadratic);
+    for (Matrix3d& rate : rates) rate.setZero();
+    rates[0](0, 0) = (1.0 - u) / trace;
+    rates[0](1, 1) = (-1.0 - u) / trace;
+    rates[1](0, 0) = rates[1](1, 1) = -v / trace;
+    rates[1](0, 1) = rates[1](1, 0) = 1.0 / trace;
+    rates[2] = 0.5 * M.inverse();
+    rates[2](0, 0) -= 0.75 * M(1, 1) / quadratic;
+    rates[2](1, 1) -= 0.75 * M(0, 0) / quadratic;
+    rates[2](0, 1) += 0.75 * M(0, 1) / quadratic;
+    rates[2](1, 0) += 0.75 * M(0, 1) / quadratic;
+    return true;
+  }
+};
+
+// From the plane to the image.
+Matrix3d ImageFromPlane(const PlaneState& state) {
+  const double f = std::exp(state.log_focal);
+  return Vector3d(f, f, 1.0).asDiagonal() * state.basis;
+}
+
+// Residuals with their derivatives by the state and by the principal point.
+template <int N>
+bool Add(const Eigen::Matrix<double, N, 1>& r, const Eigen::Matrix<double, N, 4>& J,
+         const Eigen::Matrix<double, N, 2>& J_shift, Eigen::Matrix<double, N, N> covariance,
+         PlaneEquations* equations) {
+  covariance.diagonal().array() += kRounding * kRounding;
+  const Eigen::Matrix<double, N, N> weight = covariance.inverse();
+  const Eigen::Matrix<double, 4, N> JW = J.transpose() * weight;
+  equations->information += JW * J;
+  equations->gradient += JW * r;
+  equations->shift += JW * J_shift;
+  equations->chi2 += r.dot(weight * r);
+  return std::isfinite(equations->chi2);
+}
+
+bool AddCircle(const PlaneEvidence& evidence, const ConicFit& fit, const PlaneState& state,
+               PlaneEquations* equations) {
+  const Matrix3d G = ImageFromPlane(state), M = G.transpose() * fit.conic * G;
+  PlaneShape shape;
+  if (!shape.Set(M)) return false;
+  Eigen::Matrix<double, 3, 4> J;
+  Eigen::Matrix<double, 3, 2> J_shift;
+  Eigen::Matrix<double, 3, 6> J_conic;
+  for (int i = 0; i < 3; ++i) {
+    const Matrix3d& rate = shape.rates[static_cast<std::size_t>(i)];
+    // <rate, dM> of dM = G^T dC G is <B, dC>.
+    const Matrix3d B = G * rate * G.transpose(), BC = B * fit.conic, RM = rate * M;
+    J.row(i) << 2.0 * (BC(0, 0) + BC(1, 1)), 2.0 * (RM(2, 0) - RM(0, 2)),
+        2.0 * (RM(2, 1) - RM(1, 2)), i == 2 ? -1.0 : 0.0;
+    J_shift.row(i) = 2.0 * BC.row(2).head<2>();
+    J_conic.row(i) = ConicToVector(B).transpose();
+  }
+  Matrix3d covariance = J_conic * fit.Covariance() * J_conic.transpose();
+  covariance += evidence.tilt_sigma * evidence.tilt_sigma * J.middleCols<2>(1) *
+                J.middleCols<2>(1).transpose();
+  covariance(2, 2) += evidence.radius_sigma * evidence.radius_sigma;
+  if (evidence.equal_radii) {
+    const Vector3d r = shape.value - Vector3d(0.0, 0.0, state.log_radius);
+    return Add<3>(r, J, J_shift, covariance, equations);
+  }
+  return Add<2>(shape.value.head<2>(), J.topRows<2>(), J_shift.topRows<2>(),
+                covariance.topLeftCorner<2, 2>(), equations);
+}
+
+// The direction of a vanishing point at a focal length, unit, and its derivatives.
+struct Direction {
+  Vector3d value, by_focal;
+  Matrix3d by_point, covariance;
+
+  Direction(const VanishingPointFit& fit, double f) {
+    const Vector3d scale(1.0, 1.0, f), u = scale.cwiseProduct(fit.direction);
+    value = u.normalized();
+    by_point = (Matrix3d::Identity() - value * value.transpose()) * scale.asDiagonal() / u.norm();
+    by_focal = by_point.col(2) * fit.direction.z();
+    covariance = by_point * fit.covariance * by_point.transpose();
+    by_point *= -fit.direction.z();  // From here on: columns 0 and 1 by the principal point.
+  }
+};
+
+bool AddPencils(const PlaneEvidence& evidence, const PlaneState& state, PlaneEquations* equations) {
+  const double f = std::exp(state.log_focal);
+  const double model = evidence.pencil_sigma * evidence.pencil_sigma;
+  const Vector3d n = state.basis.col(2);
+  std::size_t i = 0;
+  if (evidence.orthogonal_pencils) {
+    const Direction a(*evidence.pencils[0], f), b(*evidence.pencils[1], f);
+    const Vector3d r(n.dot(a.value), n.dot(b.value), a.value.dot(b.value));
+    Eigen::Matrix<double, 3, 4> J = Eigen::Matrix<double, 3, 4>::Zero();
+    J.col(0) << n.dot(a.by_focal), n.dot(b.by_focal),
+        a.by_focal.dot(b.value) + b.by_focal.dot(a.value);
+    J.block<1, 2>(0, 1) = a.value.transpose() * state.basis.leftCols<2>();
+    J.block<1, 2>(1, 1) = b.value.transpose() * state.basis.leftCols<2>();
+    Matrix3d by_a = Matrix3d::Zero(), by_b = Matrix3d::Zero();
+    by_a << n.transpose(), Eigen::RowVector3d::Zero(), b.value.transpose();
+    by_b << Eigen::RowVector3d::Zero(), n.transpose(), a.value.transpose();
+    const Matrix3d covariance = by_a * a.covariance * by_a.transpose() +
+                                by_b * b.covariance * by_b.transpose() +
+                                model * Matrix3d::Identity();
+    if (!Add<3>(r, J, (by_a * a.by_point + by_b * b.by_point).leftCols<2>(), covariance,
+                equations)) {
+      return false;
+    }
+    i = 2;
+  }
+  for (; i < evidence.pencils.size(); ++i) {
+    const Direction a(*evidence.pencils[i], f);
+    Eigen::Matrix<double, 1, 4> J;
+    J << n.dot(a.by_focal), a.value.transpose() * state.basis.leftCols<2>(), 0.0;
+    const Eigen::Matrix<double, 1, 1> r(n.dot(a.value)),
+        covariance(n.dot(a.covariance * n) + model);
+    if (!Add<1>(r, J, (n.transpose() * a.by_point).leftCols<2>(), covariance, equations)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+bool PlaneState::Set(const Vector3d& normal, const Matrix3d& conic) {
+  basis.col(2) = normal;
+  basis.col(0) = normal.unitOrthogonal();
+  basis.col(1) = normal.cross(basis.col(0));
+  const Matrix3d G = ImageFromPlane(*this);
+  PlaneShape shape;
+  if (!shape.Set(G.transpose() * conic * G)) return false;
+  log_radius = shape.value[2];
+  return true;
+}
+
+void PlaneState::Step(const Vector4d& step) {
+  log_focal += step[0];
+  const Vector3d n = (basis.col(2) + basis.leftCols<2>() * step.segment<2>(1)).normalized();
+  const Vector3d x = (basis.col(0) - n * n.dot(basis.col(0))).normalized();
+  basis << x, n.cross(x), n;
+  log_radius += step[3];
+}
+
+bool PlaneEquations::Set(const PlaneEvidence& evidence, const PlaneState& state) {
+  *this = PlaneEquations();
+  for (const ConicFit* circle : evidence.circles) {
+    if (!AddCircle(evidence, *circle, state, this)) return false;
+  }
+  if (!AddPencils(evidence, state, this)) return false;
+  if (!evidence.equal_radii) {
+    // Radii that differ are not compared: no residual holds the size.
+    information.row(3).setZero();
+    information.col(3).setZero();
+    information(3, 3) = 1.0;
+  }
+  return true;
+}
+
+}  // namespace circline
