@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/circle_pose.h"
 #include "circline/estimators/focal_roots.h"
+#include "circline/estimators/pose.h"
 
 namespace circline {
 namespace {
@@ -158,6 +160,27 @@ bool SetConics(const ConicFit& a, const ConicFit& b, FocalInputs<12>* inputs, Fo
 }
 
 }  // namespace
+
+ConicFit WithTiltError(const ConicFit& fit, double tilt_sigma) {
+  ConicFit out = fit;
+  Eigen::Map<Matrix6d> covariance(out.covariance.data());
+  std::array<CirclePose, 2> poses;
+  const int count = CirclePoses(fit.conic, &poses);
+  constexpr double kStep = 1e-5;
+  for (int i = 0; i < 2 * count; ++i) {
+    const CirclePose& pose = poses[static_cast<std::size_t>(i / 2)];
+    const Eigen::Vector3d x = pose.normal.unitOrthogonal();
+    const Eigen::Vector3d axis = i % 2 == 0 ? x : pose.normal.cross(x);
+    const auto tilted = [&](double angle) {
+      CirclePose moved = pose;
+      moved.normal = ExpRotation(angle * axis) * pose.normal;
+      return ConicToVector(ProjectCircle(moved));
+    };
+    const Vector6d rate = (tilted(kStep) - tilted(-kStep)) / (2.0 * kStep);
+    covariance += tilt_sigma * tilt_sigma / count * rate * rate.transpose();
+  }
+  return out;
+}
 
 int FocalFromCircleAndCenter(const ConicFit& circle, const Eigen::Vector3d& center,
                              const Eigen::Matrix3d& center_covariance, FocalSolution* solution,

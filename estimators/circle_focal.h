@@ -30,6 +30,11 @@ int FocalFromConcentricCircles(const ConicFit& a, const ConicFit& b, FocalSoluti
 int FocalFromCoplanarCircles(const ConicFit& a, const ConicFit& b,
                              std::array<FocalSolution, 2>* solutions, FocalRefusal* why = nullptr);
 
+// The fit as one of several circles of a plane against which its own plane is tilted, about each of
+// two axes, by an error of `tilt_sigma` radians: adds to the covariance the mean of what that does
+// to both circles that the conic may be the image of.
+ConicFit WithTiltError(const ConicFit& fit, double tilt_sigma);
+
 }  // namespace circline
 
 #endif  // CIRCLINE_ESTIMATORS_CIRCLE_FOCAL_H_

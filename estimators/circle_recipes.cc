@@ -158,29 +158,6 @@ Recipe CircleCenterRecipe() {
       });
 }
 
-// Where chords through the centre meet: in calibrated coordinates just what a vanishing point is to
-// a pencil's lines.
-Status GatherDiameters(const Observations& evidence, double sigma_px, Inputs* inputs) {
-  const CircleObservation& circle = evidence.circles.front();
-  const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : sigma_px;
-  std::vector<LineFit> chords;
-  for (const Segment& diameter : circle.diameters) {
-    std::vector<CalibratedPoint> points;
-    LineFit fit;
-    PixelsToCalibrated(evidence.camera, {diameter[0], diameter[1]}, &points);
-    if (FitLine(points, sigma, &fit).ok()) chords.push_back(fit);
-  }
-  VanishingPointFit center;
-  const Status status = FitVanishingPoint(chords, &center);
-  if (!status.ok()) {
-    return Status::Refused("the diameters of circle '" + circle.id +
-                           "' do not cross in one point: " + status.message);
-  }
-  if (center.direction.z() < 0.0) center.direction = -center.direction;
-  inputs->center = Measured(center.direction, center.covariance);
-  return Status::Ok();
-}
-
 Recipe CircleDiametersRecipe() {
   return CenterRecipe(
       "circle_diameters", "a circle and two or more chords through its centre",
@@ -188,7 +165,10 @@ Recipe CircleDiametersRecipe() {
       [](const Observations&, const CircleObservation& circle) {
         return circle.diameters.size() >= 2;
       },
-      GatherDiameters);
+      [](const Observations& evidence, double sigma_px, Inputs* inputs) {
+        const CircleObservation& circle = evidence.circles.front();
+        return GatherDiameters(evidence.camera, circle, sigma_px, &inputs->center);
+      });
 }
 
 // Sum of the normal's variances, rad^2, by statistical linearisation.
@@ -312,6 +292,27 @@ Recipe CircleFrameRecipe() {
 }
 
 }  // namespace
+
+Status GatherDiameters(const Camera& camera, const CircleObservation& circle, double sigma_px,
+                       Measured* center) {
+  const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : sigma_px;
+  std::vector<LineFit> chords;
+  for (const Segment& diameter : circle.diameters) {
+    std::vector<CalibratedPoint> points;
+    LineFit fit;
+    PixelsToCalibrated(camera, {diameter[0], diameter[1]}, &points);
+    if (FitLine(points, sigma, &fit).ok()) chords.push_back(fit);
+  }
+  VanishingPointFit crossing;
+  const Status status = FitVanishingPoint(chords, &crossing);
+  if (!status.ok()) {
+    return Status::Refused("the diameters of circle '" + circle.id +
+                           "' do not cross in one point: " + status.message);
+  }
+  if (crossing.direction.z() < 0.0) crossing.direction = -crossing.direction;
+  *center = Measured(crossing.direction, crossing.covariance);
+  return Status::Ok();
+}
 
 std::vector<Recipe> CircleRecipes() {
   return {SingleCircleRecipe(),      CircleCenterRecipe(),    CircleDiametersRecipe(),

@@ -22,6 +22,11 @@ struct Recipe {
   std::string decided_by;  // What tells several hypotheses apart.
 };
 
+// A circle's centre, where its diameters cross: in calibrated coordinates that is to chords what a
+// vanishing point is to a pencil's lines.
+Status GatherDiameters(const Camera& camera, const CircleObservation& circle, double sigma_px,
+                       Measured* center);
+
 std::vector<Recipe> PencilRecipes();
 std::vector<Recipe> CircleRecipes();
 

@@ -61,8 +61,9 @@ bool Add(const Eigen::Matrix<double, N, 1>& r, const Eigen::Matrix<double, N, 4>
   return std::isfinite(equations->chi2);
 }
 
-bool AddCircle(const PlaneEvidence& evidence, const ConicFit& fit, const PlaneState& state,
+bool AddCircle(const PlaneEvidence& evidence, std::size_t index, const PlaneState& state,
                PlaneEquations* equations) {
+  const ConicFit& fit = *evidence.circles[index];
   const Matrix3d G = ImageFromPlane(state), M = G.transpose() * fit.conic * G;
   PlaneShape shape;
   if (!shape.Set(M)) return false;
@@ -79,11 +80,10 @@ bool AddCircle(const PlaneEvidence& evidence, const ConicFit& fit, const PlaneSt
     J_conic.row(i) = ConicToVector(B).transpose();
   }
   Matrix3d covariance = J_conic * fit.Covariance() * J_conic.transpose();
-  covariance += evidence.tilt_sigma * evidence.tilt_sigma * J.middleCols<2>(1) *
-                J.middleCols<2>(1).transpose();
   covariance(2, 2) += evidence.radius_sigma * evidence.radius_sigma;
-  if (evidence.equal_radii) {
-    const Vector3d r = shape.value - Vector3d(0.0, 0.0, state.log_radius);
+  if (!evidence.radii.empty()) {
+    const double log_radius = std::log(evidence.radii[index]) + state.log_unit;
+    const Vector3d r = shape.value - Vector3d(0.0, 0.0, log_radius);
     return Add<3>(r, J, J_shift, covariance, equations);
   }
   return Add<2>(shape.value.head<2>(), J.topRows<2>(), J_shift.topRows<2>(),
@@ -152,7 +152,7 @@ bool PlaneState::Set(const Vector3d& normal, const Matrix3d& conic) {
   const Matrix3d G = ImageFromPlane(*this);
   PlaneShape shape;
   if (!shape.Set(G.transpose() * conic * G)) return false;
-  log_radius = shape.value[2];
+  log_unit = shape.value[2];
   return true;
 }
 
@@ -161,17 +161,17 @@ void PlaneState::Step(const Vector4d& step) {
   const Vector3d n = (basis.col(2) + basis.leftCols<2>() * step.segment<2>(1)).normalized();
   const Vector3d x = (basis.col(0) - n * n.dot(basis.col(0))).normalized();
   basis << x, n.cross(x), n;
-  log_radius += step[3];
+  log_unit += step[3];
 }
 
 bool PlaneEquations::Set(const PlaneEvidence& evidence, const PlaneState& state) {
   *this = PlaneEquations();
-  for (const ConicFit* circle : evidence.circles) {
-    if (!AddCircle(evidence, *circle, state, this)) return false;
+  for (std::size_t i = 0; i < evidence.circles.size(); ++i) {
+    if (!AddCircle(evidence, i, state, this)) return false;
   }
   if (!AddPencils(evidence, state, this)) return false;
-  if (!evidence.equal_radii) {
-    // Radii that differ are not compared: no residual holds the size.
+  if (evidence.radii.empty()) {
+    // No residual holds the unit.
     information.row(3).setZero();
     information.col(3).setZero();
     information(3, 3) = 1.0;

@@ -8,13 +8,13 @@
 
 namespace circline {
 
-// Unknowns, in the order of a step: log focal length, normal (2, in the tangent plane), log radius.
+// Unknowns, in the order of a step: log focal length, normal (2, in the tangent plane), log unit.
 struct PlaneState {
   double log_focal = 0.0;
   Eigen::Matrix3d basis = Eigen::Matrix3d::Identity();  // Two directions of the plane, its normal.
-  double log_radius = 0.0;                              // Of every circle, on the plane n . X = 1.
+  double log_unit = 0.0;                                // Of the radii, on the plane n . X = 1.
 
-  // The normal, and the radius of this circle; false where it would be none on that plane.
+  // The normal, and the radius of this circle as the unit; false where it would be none there.
   bool Set(const Eigen::Vector3d& normal, const Eigen::Matrix3d& conic);
   void Step(const Eigen::Vector4d& step);
 };

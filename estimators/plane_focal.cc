@@ -75,6 +75,7 @@ bool StartStates(const PlaneEvidence& evidence, double log_focal,
   for (std::size_t i = 0; i < 2; ++i) {
     (*states)[i].log_focal = log_focal;
     if (!(*states)[i].Set(-poses[i].normal, evidence.circles[0]->conic)) return false;
+    if (!evidence.radii.empty()) (*states)[i].log_unit -= std::log(evidence.radii[0]);
   }
   return true;
 }
@@ -113,6 +114,12 @@ bool ProfileBranches(const PlaneEvidence& evidence, double low, double high,
 FocalRefusal Check(const PlaneEvidence& evidence) {
   if (evidence.circles.empty() || evidence.circles.size() + evidence.pencils.size() < 2) {
     return FocalRefusal::kTooLittle;
+  }
+  if (!evidence.radii.empty() && evidence.radii.size() != evidence.circles.size()) {
+    return FocalRefusal::kNotFinite;
+  }
+  for (const double radius : evidence.radii) {
+    if (!(radius > 0.0) || !std::isfinite(radius)) return FocalRefusal::kNotFinite;
   }
   bool are_ellipses = true;
   for (const ConicFit* fit : evidence.circles) {
@@ -166,7 +173,7 @@ class Solutions {
 double Freedom(const PlaneEvidence& evidence) {
   const double circles = static_cast<double>(evidence.circles.size());
   const double pencils = static_cast<double>(evidence.pencils.size());
-  return (evidence.equal_radii ? 3.0 * circles - 1.0 : 2.0 * circles) + pencils +
+  return (evidence.radii.empty() ? 2.0 * circles : 3.0 * circles - 1.0) + pencils +
          (evidence.orthogonal_pencils ? 1.0 : 0.0) - 3.0;
 }
 

@@ -13,21 +13,21 @@
 namespace circline {
 
 struct PlaneEvidence {
-  std::vector<const ConicFit*> circles;           // One or more, the best-measured first.
-  bool equal_radii = false;                       // Circles of one size, not known.
+  std::vector<const ConicFit*> circles;  // One or more, the best-measured first.
+  // One for each circle, in any one unit, as 1 and 1 for circles of one size; empty: not known.
+  std::vector<double> radii;
   std::vector<const VanishingPointFit*> pencils;  // Of lines of the plane.
   bool orthogonal_pencils = false;  // The first two are: the rows and columns of a lattice.
-  // Standard deviations: of a circle against the plane about each of two axes, and of a pencil
-  // against the plane and its right angle, radians; of log radius.
-  double tilt_sigma = 0.0, pencil_sigma = 0.0, radius_sigma = 0.0;
+  // Standard deviations: of a pencil against the plane and its right angle, radians; of log radius.
+  double pencil_sigma = 0.0, radius_sigma = 0.0;
 };
 
 // For a focal length and a normal every circle, taken back to the plane, has a shape (two numbers,
 // 0 for a circle) and a size, and every pencil an angle with the plane: their least squares,
-// weighted by the covariances, over focal length, normal and size. Searched in one dimension: at 40
-// focal lengths from `min_focal` to `max_focal` (those of fields of view of 120 and 10 degrees are
-// usual), from both poses of the first circle, the others of the unknowns are solved for; then all
-// together from every minimum, to 1e-12.
+// weighted by the covariances, over focal length, normal and unit of the radii. Searched in one
+// dimension: at 40 focal lengths from `min_focal` to `max_focal` (those of fields of view of 120
+// and 10 degrees are usual), from both poses of the first circle, the others of the unknowns are
+// solved for; then all together from every minimum, to 1e-12.
 //
 // Writes up to four solutions, the lowest chi2 first, without those that chi2 excludes (by more
 // than 60, where a unit is chi2 per degree of freedom if that is above 1). Refuses one circle

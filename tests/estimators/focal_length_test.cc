@@ -184,7 +184,7 @@ TEST(FocalLengthTest, CirclesAreExact) {
 
 TEST(FocalLengthTest, PlanesAreExact) {
   Random random(3);
-  Errors pencil, equal, lattice;
+  Errors pencil, equal, known, lattice;
   for (int i = 0; i < NumScenes(1000); ++i) {
     const Scene scene(&random);
     const ConicFit a = scene.Conic(-1.5, 0.3, 1.0), b = scene.Conic(1.7, -0.5, 1.0);
@@ -199,15 +199,21 @@ TEST(FocalLengthTest, PlanesAreExact) {
     pencil.Add(FocalFromPlane(evidence, kMinFocal, kMaxFocal, &four), four.data(), scene.focal);
     evidence.circles = {&a, &b};
     evidence.pencils.clear();
-    evidence.equal_radii = true;
+    evidence.radii = {1.0, 1.0};
     equal.Add(FocalFromPlane(evidence, kMinFocal, kMaxFocal, &four), four.data(), scene.focal);
+    const ConicFit small = scene.Conic(1.7, -0.5, 0.7);
+    evidence.circles = {&a, &small};
+    evidence.radii = {3.0, 2.1};
+    known.Add(FocalFromPlane(evidence, kMinFocal, kMaxFocal, &four), four.data(), scene.focal);
     evidence.circles = {&a, &b, &c};
+    evidence.radii = {1.0, 1.0, 1.0};
     evidence.pencils = {&v, &w};
     evidence.orthogonal_pencils = true;
     lattice.Add(FocalFromPlane(evidence, kMinFocal, kMaxFocal, &four), four.data(), scene.focal);
   }
   pencil.Expect("circle and pencil");
   equal.Expect("two circles of one size");
+  known.Expect("two of known radii");
   lattice.Expect("three of a lattice");
 }
 
@@ -304,7 +310,7 @@ TEST(FocalLengthTest, CovarianceOfCirclesIsHonest) {
     pencil.Add(FocalFromPlane(evidence, kMinFocal, kMaxFocal, &four), four.data(), scene.focal);
     evidence.circles = {&a, &b, &c};
     evidence.pencils.clear();
-    evidence.equal_radii = true;
+    evidence.radii = {1.0, 1.0, 1.0};
     equal.Add(FocalFromPlane(evidence, kMinFocal, kMaxFocal, &four), four.data(), scene.focal);
     evidence.pencils = {&v, &w};
     evidence.orthogonal_pencils = true;
@@ -347,7 +353,7 @@ TEST(FocalLengthTest, DerivativesByThePrincipalPointAreThoseOfMovedInputs) {
       const auto mv = Moved(v, p), mw = Moved(w, p), mz = Moved(z, p);
       std::array<FocalSolution, 4> s;
       std::array<FocalSolution, 2> two;
-      PlaneEvidence evidence{{&ma, &mb}, true, {&mv, &mw}, true, 1e-3, 1e-3, 1e-3};
+      PlaneEvidence evidence{{&ma, &mb}, {1.0, 1.0}, {&mv, &mw}, true, 1e-3, 1e-3};
       const auto keep = [&](int count, const FocalSolution* all) {
         ASSERT_GT(count, 0);
         found->push_back(*std::min_element(all, all + count, [&](const auto& c, const auto& d) {
@@ -417,7 +423,7 @@ TEST(FocalLengthTest, RefusesInWords) {
   EXPECT_EQ(FocalFromCoplanarCircles(a, b, &two, &why), 0);
   expect(why, FocalRefusal::kFrontal);
   PlaneEvidence evidence;
-  evidence.equal_radii = true;
+  evidence.radii = {1.0, 1.0};
   for (int i = 0; i < 20; ++i) {
     const ConicFit na = frontal.NoisyConic(1.5, 0.3, 1.0, kSigma, &random);
     const ConicFit nb = frontal.NoisyConic(-1.5, 0.2, 1.0, kSigma, &random);
@@ -443,6 +449,7 @@ TEST(FocalLengthTest, RefusesInWords) {
   expect(why, FocalRefusal::kNoEllipse);
   // A plane.
   evidence.circles = {&c};
+  evidence.radii.clear();
   EXPECT_EQ(FocalFromPlane(evidence, kMinFocal, kMaxFocal, &four, &why), 0);
   expect(why, FocalRefusal::kTooLittle);
   evidence.pencils = {&x};
@@ -469,8 +476,8 @@ TEST(FocalLengthTest, RefusesWhatIsNotFinite) {
       FocalSolution one;
       std::array<FocalSolution, 2> two;
       std::array<FocalSolution, 4> four;
-      PlaneEvidence evidence{{&a, &conic}, true, {&w}, false, 0.0, 0.0, 0.0};
-      PlaneEvidence with_point{{&a, &b}, true, {&point}, false, 0.0, 0.0, 0.0};
+      PlaneEvidence evidence{{&a, &conic}, {1.0, 1.0}, {&w}, false, 0.0, 0.0};
+      PlaneEvidence with_point{{&a, &b}, {1.0, 1.0}, {&point}, false, 0.0, 0.0};
       std::vector<FocalRefusal> whys(7);
       EXPECT_EQ(FocalFromVanishingPoints(point, w, 1.0, 0.0, &two, &whys[0]), 0);
       EXPECT_EQ(FocalFromThreeVanishingPoints({point, v, w}, 0.0, &one, &whys[1]), 0);
