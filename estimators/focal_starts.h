@@ -34,7 +34,7 @@ struct FocalStart {
 // circles that state no sigma.
 //
 // `problems` (optional) receives a sentence for each part of the evidence that could not say.
-// Empty where none could. 10 us for pencils and pairs of circles, 0.1 to 0.5 ms for a plane.
+// Empty where none could. 10 us for pencils and pairs of circles, 0.2 to 1.4 ms for a plane.
 std::vector<FocalStart> FocalLengthStarts(const Observations& observations, double default_sigma_px,
                                           const NoiseModel& noise = NoiseModel(),
                                           std::vector<std::string>* problems = nullptr);

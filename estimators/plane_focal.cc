@@ -38,7 +38,7 @@ bool TakeStep(PlaneEquations equations, bool hold_focal, PlaneState* state, doub
 
 // The other unknowns at a focal length, roughly, and chi2 there.
 double Profile(const PlaneEvidence& evidence, PlaneState* state) {
-  constexpr int kSteps = 3;
+  constexpr int kSteps = 2;
   PlaneEquations equations;
   for (int i = 0; i < kSteps; ++i) {
     double length;

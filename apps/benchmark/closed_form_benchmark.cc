@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "apps/benchmark/closed_form_rows.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/circular_points.h"
 #include "circline/estimators/conic_fit.h"
@@ -31,7 +32,6 @@ using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocal = 800.0;
-constexpr std::size_t kScenes = 64;  // Taken in turn, so that no branch is learnt by heart.
 
 // A circle, the frame of its plane, and everything seen of them, without noise.
 struct Scene {
@@ -70,42 +70,6 @@ std::vector<Scene> RandomScenes(std::size_t count = kScenes) {
   return scenes;
 }
 
-// Calls `solve` on every scene in turn.
-template <typename Inputs, typename Solve>
-void RunInTurn(benchmark::State& state, const std::vector<Inputs>& inputs, const Solve& solve) {
-  std::size_t i = 0;
-  for (auto _ : state) {
-    benchmark::DoNotOptimize(solve(inputs[i]));
-    benchmark::ClobberMemory();
-    i = i + 1 < inputs.size() ? i + 1 : 0;
-  }
-}
-
-// Columns of the table of solvers, over 10^4 scenes: hypotheses a call; how many of them are proper
-// (finite rotations, unit normals facing the camera) and how often the truth is among them to
-// 1e-6 rad, in per cent. `errors` writes, for each hypothesis, its error in radians (NaN if it is
-// improper) and returns how many there are.
-template <typename Errors>
-void CountHypotheses(benchmark::State& state, const Errors& errors) {
-  constexpr std::size_t kCounted = 10000;
-  constexpr double kExact = 1e-6;
-  double hypotheses = 0, valid = 0, found = 0;
-  for (const Scene& s : RandomScenes(kCounted)) {
-    std::array<double, 4> error;
-    const auto count = static_cast<std::size_t>(errors(s, &error));
-    bool hit = false;
-    for (std::size_t i = 0; i < count; ++i) {
-      valid += std::isfinite(error[i]) ? 1.0 : 0.0;
-      hit = hit || error[i] < kExact;
-    }
-    hypotheses += static_cast<double>(count);
-    found += hit ? 1.0 : 0.0;
-  }
-  state.counters["hypotheses"] = hypotheses / kCounted;
-  state.counters["valid_pct"] = 100.0 * valid / hypotheses;
-  state.counters["truth_found_pct"] = 100.0 * found / kCounted;
-}
-
 // Angle between rotations, the least over the senses of the axes; NaN if it is no rotation.
 double RotationError(const Matrix3d& estimate, const Matrix3d& truth) {
   const double off = (estimate.transpose() * estimate - Matrix3d::Identity()).norm();
@@ -121,15 +85,17 @@ double RotationError(const Matrix3d& estimate, const Matrix3d& truth) {
 void BM_CirclePoses(benchmark::State& state) {
   std::array<CirclePose, 2> poses;
   RunInTurn(state, RandomScenes(), [&](const Scene& s) { return CirclePoses(s.conic, &poses); });
-  CountHypotheses(state, [&](const Scene& s, std::array<double, 4>* errors) {
-    const int count = CirclePoses(s.conic, &poses);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-      const CirclePose& p = poses[i];
-      const bool proper = std::abs(p.normal.norm() - 1.0) < 1e-9 && p.normal.dot(p.center) < 0.0;
-      (*errors)[i] = proper ? (p.normal - s.rotation.col(2)).norm() : std::nan("");
-    }
-    return count;
-  });
+  CountHypotheses(state, RandomScenes(kCountedScenes),
+                  [&](const Scene& s, std::array<double, 4>* errors) {
+                    const int count = CirclePoses(s.conic, &poses);
+                    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+                      const CirclePose& p = poses[i];
+                      const bool proper =
+                          std::abs(p.normal.norm() - 1.0) < 1e-9 && p.normal.dot(p.center) < 0.0;
+                      (*errors)[i] = proper ? (p.normal - s.rotation.col(2)).norm() : std::nan("");
+                    }
+                    return count;
+                  });
 }
 BENCHMARK(BM_CirclePoses);
 
@@ -139,13 +105,14 @@ void BM_CircleFrameToRotation(benchmark::State& state) {
   RunInTurn(state, RandomScenes(), [&](const Scene& s) {
     return RotationsFromCircleAndFrame(s.conic, s.x_line, s.y_line, &rotations);
   });
-  CountHypotheses(state, [&](const Scene& s, std::array<double, 4>* errors) {
-    const int count = RotationsFromCircleAndFrame(s.conic, s.x_line, s.y_line, &rotations);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-      (*errors)[i] = RotationError(rotations[i].rotation, s.rotation);
-    }
-    return count;
-  });
+  CountHypotheses(
+      state, RandomScenes(kCountedScenes), [&](const Scene& s, std::array<double, 4>* errors) {
+        const int count = RotationsFromCircleAndFrame(s.conic, s.x_line, s.y_line, &rotations);
+        for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+          (*errors)[i] = RotationError(rotations[i].rotation, s.rotation);
+        }
+        return count;
+      });
 }
 BENCHMARK(BM_CircleFrameToRotation);
 
@@ -159,14 +126,15 @@ void BM_TwoLinePairsToRotation(benchmark::State& state) {
     return RotationFromDirections(vanishing_point(s.first_pair), vanishing_point(s.second_pair),
                                   &R);
   });
-  CountHypotheses(state, [&](const Scene& s, std::array<double, 4>* errors) {
-    if (!RotationFromDirections(vanishing_point(s.first_pair), vanishing_point(s.second_pair),
-                                &R)) {
-      return 0;
-    }
-    (*errors)[0] = RotationError(R, s.rotation);
-    return 1;
-  });
+  CountHypotheses(state, RandomScenes(kCountedScenes),
+                  [&](const Scene& s, std::array<double, 4>* errors) {
+                    if (!RotationFromDirections(vanishing_point(s.first_pair),
+                                                vanishing_point(s.second_pair), &R)) {
+                      return 0;
+                    }
+                    (*errors)[0] = RotationError(R, s.rotation);
+                    return 1;
+                  });
 }
 BENCHMARK(BM_TwoLinePairsToRotation);
 
@@ -185,18 +153,19 @@ void BM_OpenCV_SolvePnP_IPPE_FourKnownPoints(benchmark::State& state) {
     return cv::solvePnPGeneric(object, image, identity, cv::noArray(), rotations, translations,
                                false, cv::SOLVEPNP_IPPE);
   });
-  CountHypotheses(state, [&](const Scene& s, std::array<double, 4>* errors) {
-    std::vector<cv::Point2d> image;
-    for (const Vector2d& x : s.square) image.emplace_back(x.x(), x.y());
-    const int count = cv::solvePnPGeneric(object, image, identity, cv::noArray(), rotations,
-                                          translations, false, cv::SOLVEPNP_IPPE);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-      const cv::Mat& r = rotations[i];
-      const Vector3d delta(r.at<double>(0), r.at<double>(1), r.at<double>(2));
-      (*errors)[i] = RotationError(ExpRotation(delta), s.rotation);
-    }
-    return count;
-  });
+  CountHypotheses(
+      state, RandomScenes(kCountedScenes), [&](const Scene& s, std::array<double, 4>* errors) {
+        std::vector<cv::Point2d> image;
+        for (const Vector2d& x : s.square) image.emplace_back(x.x(), x.y());
+        const int count = cv::solvePnPGeneric(object, image, identity, cv::noArray(), rotations,
+                                              translations, false, cv::SOLVEPNP_IPPE);
+        for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+          const cv::Mat& r = rotations[i];
+          const Vector3d delta(r.at<double>(0), r.at<double>(1), r.at<double>(2));
+          (*errors)[i] = RotationError(ExpRotation(delta), s.rotation);
+        }
+        return count;
+      });
 }
 BENCHMARK(BM_OpenCV_SolvePnP_IPPE_FourKnownPoints);
 #endif
