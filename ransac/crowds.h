@@ -15,6 +15,7 @@ namespace circline {
 // for all; put them in random order where they are fewer than n.
 template <typename Near>
 std::vector<int> Uncrowded(int n, int stand_ins, const Near& near) {
+  if (n == 0) return {};
   std::vector<int> neighbors(static_cast<std::size_t>(n), 0);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < std::min(n, stand_ins); ++j)

@@ -185,6 +185,32 @@ TEST(FitObservations, NamesWhatCannotBeFitted) {
   EXPECT_FALSE(observations.pencils[0].fit.has_value());
 }
 
+// A barrel distortion ends somewhere, and with a focal length guessed too short that is within the
+// photo: features out there lose all of their points.
+TEST(FitObservations, NamesWhatTheLensLeavesNoPointOf) {
+  Observations observations;
+  observations.camera = TestCamera();
+  observations.camera.fx = observations.camera.fy = 300.0;
+  observations.camera.distortion[0] = -0.5;
+  CircleObservation circle;
+  circle.id = "corner";
+  PencilObservation pencil;
+  pencil.id = "P";
+  pencil.lines.resize(2);
+  for (int i = 0; i < 20; ++i) {
+    circle.points.emplace_back(600.0 + 20.0 * std::cos(0.3 * i), 440.0 + 20.0 * std::sin(0.3 * i));
+    pencil.lines[0].points.emplace_back(600.0 + i, 440.0);
+    pencil.lines[1].points.emplace_back(600.0 + i, 450.0);
+  }
+  observations.circles = {circle};
+  observations.pencils = {pencil};
+  std::vector<std::string> problems;
+  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+  ASSERT_EQ(problems.size(), 4u);
+  EXPECT_NE(problems[0].find("circle 'corner'"), std::string::npos);
+  EXPECT_EQ(observations.num_dropped_points, 60);
+}
+
 TEST(FitObservations, ASingleLineAlongAnAxisIsNoProblem) {
   Observations observations = MakeObservations();
   PencilObservation& pencil = observations.pencils[0];
