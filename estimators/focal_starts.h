@@ -26,12 +26,14 @@ struct FocalStart {
 //   pencils of that plane, for fields of view of the photo's longer side from 10 to 120 degrees.
 //
 // `observations` are fitted (FitDirect, FitObservations) with a camera whose focal length is a
-// guess; what has no fit is passed over. Its principal point, aspect and distortion are taken as
-// they are. The distortion's coefficients are those of calibrated coordinates: points are
-// undistorted as the guess has it, which under strong distortion bends what a wrong guess yields.
+// guess; what has no fit is passed over. Principal point, aspect and distortion are taken as given.
+// The coefficients of a distortion are those of calibrated coordinates: points are undistorted as
+// the guess has it. Where there is one, `noise.camera.log_focal`, the guess's own uncertainty, is
+// carried through fits at longer and shorter focal lengths; under strong distortion little more
+// than the guess may be left.
+//
 // `noise` is the one of the fits; its sigmas of the principal point, of circles against their plane
-// and of pencils against their axes count here. `default_sigma_px`: of centres and diameters of
-// circles that state no sigma.
+// and of pencils against their axes count as well. `default_sigma_px`: of what states no sigma.
 //
 // `problems` (optional) receives a sentence for each part of the evidence that could not say.
 // Empty where none could. 10 us for pencils and pairs of circles, 0.2 to 1.4 ms for a plane.

@@ -170,6 +170,29 @@ TEST(FocalStartsTest, DistortionIsTakenAsGiven) {
   }
 }
 
+// With a lens, a wrong guess bends the answer: by no more than its sigma says.
+TEST(FocalStartsTest, UnderDistortionTheGuessIsCountedIn) {
+  NoiseModel noise = NoiseModel::Exact();
+  noise.camera.log_focal = 0.3;
+  int too_sure = 0;
+  for (const Kind& kind : Kinds()) {
+    for (const double factor : {0.8, 1.25}) {
+      PlaneScene scene;
+      scene.camera.fy = scene.camera.fx;
+      scene.camera.distortion = {-0.2, 0.05, 0.0, 0.0, 0.0};
+      const Observations observations = Guessed(kind, factor, &scene);
+      const auto starts = FocalLengthStarts(observations, 0.1, noise);
+      const FocalStart* best = Nearest(starts, scene.camera.fx);
+      ASSERT_NE(best, nullptr) << kind.name;
+      const double error = std::abs(std::log(best->focal_px / scene.camera.fx));
+      EXPECT_LT(error, 2.0 * best->sigma_log) << kind.name;
+      const auto held = FocalLengthStarts(observations, 0.1, NoiseModel::Exact());
+      too_sure += error > 2.0 * Nearest(held, scene.camera.fx)->sigma_log ? 1 : 0;
+    }
+  }
+  EXPECT_GE(too_sure, 5);  // Where the guess was not counted in.
+}
+
 TEST(FocalStartsTest, NoiseModelWidensTheSigma) {
   for (const Kind& kind : Kinds()) {
     PlaneScene scene = Scene(0.05);
