@@ -179,8 +179,10 @@ ceres::CostFunction* NewAngleCost(double angle, double sigma);
 ceres::CostFunction* NewLengthCost(double length, double sigma);
 // A positive number (1), a radius: its logarithm; sigma relative.
 ceres::CostFunction* NewLogPrior(double value, double sigma);
-// `size` numbers about zero; where a sigma is 0 that number has no residual: hold it.
-ceres::CostFunction* NewGaussianPrior(const std::vector<double>& sigmas);
+// As many numbers about `mean` (empty: zeros); where a sigma is 0 that number has no residual: hold
+// it.
+ceres::CostFunction* NewGaussianPrior(const std::vector<double>& sigmas,
+                                      const std::vector<double>& mean = {});
 // A direction (3) about `axis` (unit), each of two components, radians; and one about a plane of
 // this unit normal.
 ceres::CostFunction* NewDirectionPrior(const Eigen::Vector3d& axis, double sigma);

@@ -82,12 +82,14 @@ struct AcrossResidual {
 };
 
 struct GaussianResidual {
-  std::vector<double> sigmas;
+  std::vector<double> sigmas, mean;
 
   template <typename T>
   bool operator()(const T* const* x, T* residual) const {
-    for (std::size_t k = 0; k < sigmas.size(); ++k)
-      residual[k] = sigmas[k] > 0.0 ? x[0][k] / sigmas[k] : static_cast<T>(0.0);
+    for (std::size_t k = 0; k < sigmas.size(); ++k) {
+      const double at = mean.empty() ? 0.0 : mean[k];
+      residual[k] = sigmas[k] > 0.0 ? (x[0][k] - at) / sigmas[k] : static_cast<T>(0.0);
+    }
     return true;
   }
 };
@@ -154,9 +156,10 @@ ceres::CostFunction* NewLogPrior(double value, double sigma) {
   return new ceres::AutoDiffCostFunction<LogResidual, 1, 1>(new LogResidual{value, sigma});
 }
 
-ceres::CostFunction* NewGaussianPrior(const std::vector<double>& sigmas) {
+ceres::CostFunction* NewGaussianPrior(const std::vector<double>& sigmas,
+                                      const std::vector<double>& mean) {
   auto* cost =
-      new ceres::DynamicAutoDiffCostFunction<GaussianResidual>(new GaussianResidual{sigmas});
+      new ceres::DynamicAutoDiffCostFunction<GaussianResidual>(new GaussianResidual{sigmas, mean});
   cost->AddParameterBlock(static_cast<int>(sigmas.size()));
   cost->SetNumResiduals(static_cast<int>(sigmas.size()));
   return cost;

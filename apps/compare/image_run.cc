@@ -1,6 +1,7 @@
 #include "apps/compare/image_run.h"
 
 #include <algorithm>
+#include <functional>
 #include <optional>
 
 #include "apps/common/photo_file.h"
@@ -147,8 +148,7 @@ CompareOptions WithCamera(CompareOptions options, const SceneImage& image) {
   return options;
 }
 
-void RunAll(const CompareOptions& options, const SolverSet& solvers, SceneImage* scene_image,
-            ImageRun* run) {
+void ReadAndObserve(const CompareOptions& options, SceneImage* scene_image, ImageRun* run) {
   const SceneImage& image = *scene_image;
   const bool needs_photo = options.overlays || image.detect_everything || !image.rois.empty();
   if (needs_photo) {
@@ -162,7 +162,11 @@ void RunAll(const CompareOptions& options, const SolverSet& solvers, SceneImage*
     if (run->read_error.empty()) run->read_error = SizeError(run->photo, image.observations.camera);
   }
   if (run->read_error.empty()) Observe(options, run);
+}
+
+void RunSolvers(const CompareOptions& options, const SolverSet& solvers, ImageRun* run) {
   if (!run->read_error.empty()) return;
+  const SceneImage& image = *run->image;
   LossEvidence evidence(*run);
   std::optional<SolverSet> own_solvers;
   if (image.camera_sigma.IsAny()) own_solvers.emplace(WithCamera(options, image));
@@ -201,17 +205,32 @@ SolverSet::SolverSet(const CompareOptions& options) {
   for (const PeerSolver& peer : peers_) tasks_.push_back({nullptr, &peer, -1});
 }
 
-ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image) {
+namespace {
+
+ImageRun Guarded(SceneImage* image, const std::function<void(ImageRun*)>& work) {
   ImageRun run;
   run.image = image;
   try {
-    RunAll(options, solvers, image, &run);
+    work(&run);
   } catch (const std::exception& error) {  // Such as a photo too large for the memory.
     run.read_error = std::string("cannot be worked on: ") + error.what();
     std::replace(run.read_error.begin(), run.read_error.end(), '\n', ' ');
     run.solvers.clear();
   }
   return run;
+}
+
+}  // namespace
+
+ImageRun ObserveImage(const CompareOptions& options, SceneImage* image) {
+  return Guarded(image, [&](ImageRun* run) { ReadAndObserve(options, image, run); });
+}
+
+ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image) {
+  return Guarded(image, [&](ImageRun* run) {
+    ReadAndObserve(options, image, run);
+    RunSolvers(options, solvers, run);
+  });
 }
 
 std::vector<SolverKey> SolverSet::Keys(const CompareOptions& options) const {

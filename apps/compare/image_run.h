@@ -75,8 +75,12 @@ struct ImageRun {
 // model.
 CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image);
 
-// Never throws. Image, options and solvers outlive the result. A camera that is only guessed gets
-// its focal length from the size of the photo.
+// The photo read and everything in it detected or fitted; no solver. Never throws. Image and options
+// outlive the result. A camera that is only guessed gets its focal length from the size of the
+// photo.
+ImageRun ObserveImage(const CompareOptions& options, SceneImage* image);
+
+// The same, and all solvers, which outlive the result.
 ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image);
 
 // The run to show in a picture (see ShowRank). Null if every solver refused.

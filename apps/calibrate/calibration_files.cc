@@ -1,0 +1,157 @@
+#include "apps/calibrate/calibration_files.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <sstream>
+
+#include "apps/common/output_file.h"
+#include "apps/common/text.h"
+#include "apps/compare/export.h"
+
+namespace circline::apps {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* ModelName(CameraModel model) {
+  return model == CameraModel::kPinhole ? "pinhole"
+         : model == CameraModel::kOpenCV ? "opencv"
+                                         : "fisheye";
+}
+
+// OpenCV's order; the rational terms only where they are there.
+std::vector<double> Distortion(const Camera& camera) {
+  if (camera.model == CameraModel::kPinhole) return std::vector<double>(4, 0.0);
+  std::vector<double> d(camera.distortion.begin(), camera.distortion.end());
+  const std::size_t least = camera.model == CameraModel::kFisheye ? 4 : 5;
+  while (d.size() > least && d.back() == 0.0) d.pop_back();
+  return d;
+}
+
+std::string CalibrationYaml(const AdjustedCamera& adjusted) {
+  const Camera& camera = adjusted.camera;
+  cv::FileStorage file("x.yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
+  const std::vector<double> distortion = Distortion(camera);
+  file << "image_width" << camera.width << "image_height" << camera.height;
+  if (camera.model == CameraModel::kFisheye) file << "fisheye_model" << 1;
+  file << "camera_matrix"
+       << cv::Mat((cv::Mat_<double>(3, 3) << camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy,
+                   0.0, 0.0, 1.0));
+  file << "distortion_coefficients" << cv::Mat(distortion).reshape(1, 1);
+  file << "avg_reprojection_error" << adjusted.rms_px;
+  return file.releaseAndGetString();
+}
+
+Json CameraJson(const AdjustedCamera& adjusted) {
+  const Camera& camera = adjusted.camera;
+  const std::vector<double> d = Distortion(camera);
+  const double f = adjusted.Sigma(0), aspect = adjusted.Sigma(1);
+  Json sigma = {{"fx", camera.fx * f},
+                {"fy", camera.fy * std::hypot(f, aspect)},
+                {"cx", adjusted.Sigma(2)},
+                {"cy", adjusted.Sigma(3)}};
+  Json distortion = Json::array();
+  for (std::size_t k = 0; k < d.size(); ++k)
+    distortion.push_back(adjusted.Sigma(4 + static_cast<int>(k)));
+  sigma["distortion"] = distortion;
+  Json correlation = Json::array();
+  for (int i = 0; i < kCameraSize; ++i) {
+    Json row = Json::array();
+    for (int j = 0; j < kCameraSize; ++j) {
+      const double both = adjusted.Sigma(i) * adjusted.Sigma(j);
+      row.push_back(both > 0.0 ? adjusted.covariance[static_cast<std::size_t>(i * kCameraSize + j)] / both
+                               : 0.0);
+    }
+    correlation.push_back(row);
+  }
+  return {{"id", camera.id},
+          {"model", ModelName(camera.model)},
+          {"width", camera.width},
+          {"height", camera.height},
+          {"fx", camera.fx},
+          {"fy", camera.fy},
+          {"cx", camera.cx},
+          {"cy", camera.cy},
+          {"distortion", d},
+          {"sigma", sigma},
+          {"at_prior", adjusted.at_prior},
+          {"correlation", correlation},
+          {"num_images", adjusted.num_photos},
+          {"rms_px", adjusted.rms_px}};
+}
+
+Json PhotoJson(const AdjustedPhoto& photo, const std::string& name) {
+  Json out = {{"file", name},
+              {"status", photo.status.ok() ? "ok" : "refused"},
+              {"message", photo.status.message}};
+  if (!photo.status.ok()) return out;
+  Json rotation = Json::array(), translation = Json::array();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) rotation.push_back(photo.cam_from_world.rotation(i, j));
+    translation.push_back(photo.cam_from_world.translation[i]);
+  }
+  out["rotation"] = rotation;
+  out["translation"] = translation;
+  out["rms_px"] = photo.rms_px;
+  out["misfit"] = photo.misfit;
+  return out;
+}
+
+}  // namespace
+
+Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observations>& photos,
+                        const std::vector<std::string>& names, const std::string& folder) {
+  Json json = {{"rigid", adjusted.rigid}, {"metric", adjusted.metric}, {"cameras", Json::array()}};
+  Status status;
+  for (std::size_t c = 0; c < adjusted.cameras.size() && status.ok(); ++c) {
+    json["cameras"].push_back(CameraJson(adjusted.cameras[c]));
+    const std::string name =
+        c == 0 ? "calibration.yml" : "calibration_" + adjusted.cameras[c].camera.id + ".yml";
+    status = WriteFile(folder + "/" + name, CalibrationYaml(adjusted.cameras[c]));
+  }
+  const std::unique_ptr<Exporter> colmap = MakeColmapExporter(folder);
+  json["images"] = Json::array();
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    const AdjustedPhoto& photo = adjusted.photos[i];
+    json["images"].push_back(PhotoJson(photo, names[i]));
+    if (!photo.status.ok()) continue;
+    colmap->Add({names[i], i, adjusted.cameras[static_cast<std::size_t>(photo.camera)].camera,
+                 photo.cam_from_world.rotation, photo.cam_from_world.translation});
+  }
+  json["notes"] = adjusted.notes;
+  if (status.ok()) status = WriteFile(folder + "/calibration.json", json.dump(1) + "\n");
+  if (status.ok()) status = colmap->Finish();
+  return status;
+}
+
+std::string CalibrationTable(const AdjustedPhotos& adjusted,
+                             const std::vector<std::string>& names) {
+  std::ostringstream out;
+  for (const AdjustedCamera& made : adjusted.cameras) {
+    const Camera& camera = made.camera;
+    out << "camera '" << camera.id << "', " << made.num_photos << " photos, "
+        << (adjusted.rigid ? "one world" : "each photo a world of its own") << ", rms "
+        << FormatShort(made.rms_px) << " px\n";
+    out << "  focal length " << FormatFixed(camera.fx, 2) << " +- "
+        << FormatShort(made.SigmaFocalPx(), 2) << " px\n";
+    if (camera.fy != camera.fx) out << "  fy " << FormatFixed(camera.fy, 2) << " px\n";
+    out << "  principal point " << FormatFixed(camera.cx, 1) << " " << FormatFixed(camera.cy, 1)
+        << " +- " << FormatShort(made.Sigma(2), 2) << " " << FormatShort(made.Sigma(3), 2)
+        << " px\n";
+    for (std::size_t k = 0; k < camera.distortion.size(); ++k) {
+      if (made.Sigma(4 + static_cast<int>(k)) > 0.0)
+        out << "  distortion[" << k << "] " << FormatShort(camera.distortion[k], 4) << " +- "
+            << FormatShort(made.Sigma(4 + static_cast<int>(k)), 2) << "\n";
+    }
+    if (!made.at_prior.empty())
+      out << "  the photos say next to nothing of: " << JoinList(made.at_prior, ", ") << "\n";
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (!adjusted.photos[i].status.ok())
+      out << names[i] << ": left out, " << adjusted.photos[i].status.message << "\n";
+  }
+  return out.str();
+}
+
+}  // namespace circline::apps

@@ -1,0 +1,24 @@
+// What a calibration leaves behind, for people and for other programs.
+#ifndef CIRCLINE_APPS_CALIBRATE_CALIBRATION_FILES_H_
+#define CIRCLINE_APPS_CALIBRATE_CALIBRATION_FILES_H_
+
+#include <string>
+#include <vector>
+
+#include "circline/estimators/observations.h"
+#include "circline/estimators/status.h"
+#include "circline/refine/adjust_photos.h"
+
+namespace circline::apps {
+
+// calibration.yml (one more for each further camera, after its id), calibration.json, cameras.txt
+// and images.txt in `folder`. `names`: of the photos.
+Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observations>& photos,
+                        const std::vector<std::string>& names, const std::string& folder);
+
+// The same for the eye.
+std::string CalibrationTable(const AdjustedPhotos& adjusted, const std::vector<std::string>& names);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_CALIBRATE_CALIBRATION_FILES_H_

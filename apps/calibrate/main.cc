@@ -1,0 +1,175 @@
+// circline_calibrate: the camera from a handful of photos of circles and parallel lines.
+#include <gflags/gflags.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <mutex>
+#include <opencv2/core/utility.hpp>
+
+#include "apps/calibrate/calibration_files.h"
+#include "apps/common/flags_util.h"
+#include "apps/common/output_file.h"
+#include "apps/common/progress.h"
+#include "apps/common/text.h"
+#include "apps/compare/image_run.h"
+#include "apps/compare/options.h"
+#include "circline/refine/adjust_photos.h"
+
+DEFINE_string(model, "opencv", "Camera model: pinhole, opencv or fisheye.");
+DEFINE_string(fix, "k3,tangential,aspect",
+              "What is not estimated, of: principal_point, aspect, k1, k2, k3, tangential; a list, "
+              "or nothing.");
+DEFINE_string(rigid, circline::RigidWorldName(circline::AdjustOptions().rigid),
+              "Whether a circle's id means the same circle in all photos: auto, yes, no.");
+
+namespace circline::apps {
+namespace {
+
+constexpr char kUsage[] =
+    "circline_calibrate: the camera from a handful of photos of circles and parallel lines.\n"
+    "\n"
+    "  circline_calibrate --images='photos/*.jpg' --output=out    # nothing known\n"
+    "  circline_calibrate --scene=set/scene.yaml --output=out     # annotated\n"
+    "\n"
+    "Writes calibration.yml (for OpenCV and --camera), calibration.json, cameras.txt and images.txt "
+    "(COLMAP) and report.html. Flags for inputs, detection and losses are those of "
+    "circline_compare.\n"
+    "Exit code 0: done; 1: some photo could not be read, or no camera came out; 2: unusable flags "
+    "or scene file.";
+
+struct CalibrateOptions {
+  CompareOptions compare;
+  AdjustOptions adjust;
+  CameraModel model = CameraModel::kOpenCV;
+  bool fix_principal_point = false, free_aspect = false;
+};
+
+int Refuse(const Status& status) {
+  SayOnStderr("circline_calibrate: " + status.message);
+  return status.code == StatusCode::kInvalidArgument ? kExitUsage : kExitUnreadable;
+}
+
+Status ModelFromFlag(CameraModel* model) {
+  if (FLAGS_model == "pinhole") *model = CameraModel::kPinhole;
+  else if (FLAGS_model == "opencv") *model = CameraModel::kOpenCV;
+  else if (FLAGS_model == "fisheye") *model = CameraModel::kFisheye;
+  else return Status::Invalid("--model=" + FLAGS_model + ": must be pinhole, opencv or fisheye");
+  return Status::Ok();
+}
+
+Status FixFromFlag(CalibrateOptions* options) {
+  const std::vector<std::string> known = {"principal_point", "aspect", "k1", "k2", "k3",
+                                          "tangential"};
+  std::vector<std::string> fixed = FLAGS_fix.empty() ? std::vector<std::string>() : SplitList(FLAGS_fix);
+  const auto has = [&](const char* name) {
+    return std::find(fixed.begin(), fixed.end(), name) != fixed.end();
+  };
+  for (const std::string& name : fixed) {
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      return Status::Invalid("--fix: there is no '" + name + "'" + DidYouMean(name, known));
+  }
+  options->fix_principal_point = has("principal_point");
+  options->free_aspect = !has("aspect");
+  options->adjust.tangential = !has("tangential");
+  options->adjust.num_radial = has("k1") ? 0 : has("k2") ? 1 : has("k3") ? 2 : 3;
+  return Status::Ok();
+}
+
+Status FromFlags(CalibrateOptions* options) {
+  Status status = OptionsFromFlags(&options->compare);
+  if (status.ok()) status = ModelFromFlag(&options->model);
+  if (status.ok()) status = FixFromFlag(options);
+  if (status.ok() && !RigidWorldFromName(FLAGS_rigid, &options->adjust.rigid))
+    status = Status::Invalid("--rigid=" + FLAGS_rigid + ": must be auto, yes or no");
+  const EstimationOptions& estimation = options->compare.losses.front().estimation;
+  options->adjust.conic_loss = estimation.conic_loss;
+  options->adjust.line_loss = estimation.line_loss;
+  options->adjust.noise_model = estimation.noise_model;
+  options->adjust.num_threads = std::max(1, cv::getNumThreads());
+  return status;
+}
+
+// The photos, each read and observed, on all threads.
+std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<SceneImage>* images) {
+  std::vector<ImageRun> runs(images->size());
+  Progress progress("photos", static_cast<int>(images->size()), 0);
+  std::mutex mutex;
+  cv::parallel_for_(cv::Range(0, static_cast<int>(images->size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      const auto index = static_cast<std::size_t>(i);
+      runs[index] = ObserveImage(options, &(*images)[index]);
+      runs[index].photo.release();
+      const std::lock_guard<std::mutex> lock(mutex);
+      progress.Advance();
+    }
+  });
+  return runs;
+}
+
+int Calibrate() {
+  CalibrateOptions options;
+  ImageSet set;
+  Status status = FromFlags(&options);
+  if (status.ok()) status = ImagesFromFlags(options.compare.inputs, &set);
+  if (!status.ok()) return Refuse(status);
+  options.compare.overlays = true;  // The photo's size is needed.
+  std::vector<SceneImage> images;
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    images.push_back(set.At(i));
+    Camera& camera = images.back().observations.camera;
+    if (camera.model != options.model) {
+      camera.model = options.model;
+      camera.distortion = {};
+    }
+  }
+  std::vector<ImageRun> runs = ObserveAll(options.compare, &images);
+  int exit_code = kExitOk;
+  std::vector<Observations> photos;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (!runs[i].read_error.empty()) {
+      SayOnStderr(images[i].path + ": " + runs[i].read_error);
+      exit_code = kExitUnreadable;
+      continue;
+    }
+    photos.push_back(std::move(runs[i].observations));
+    photos.back().camera.model = options.model;
+    names.push_back(images[i].name);
+  }
+  if (photos.empty()) return Refuse(Status::Failed("no photo could be read"));
+  const EstimationOptions& estimation = options.compare.losses.front().estimation;
+  CameraSigma sigma = UnknownCamera(photos.front().camera);
+  if (estimation.camera_sigma) sigma.log_focal = estimation.camera_sigma->log_focal;
+  if (options.fix_principal_point) sigma.principal_point_px = 0.0;
+  if (options.free_aspect) sigma.log_aspect = 0.02;
+  options.adjust.camera_sigma = sigma;
+  const AdjustedPhotos adjusted = AdjustPhotos(photos, options.adjust);
+  if (!adjusted.status.ok()) return Refuse(adjusted.status);
+  status = CreateFolder(options.compare.output);
+  if (status.ok()) status = WriteCalibration(adjusted, photos, names, options.compare.output);
+  if (!status.ok()) return Refuse(status);
+  std::cout << CalibrationTable(adjusted, names);
+  return exit_code;
+}
+
+}  // namespace
+}  // namespace circline::apps
+
+int main(int argc, char** argv) {
+  circline::apps::InitAppLogging(argv[0]);
+  circline::apps::CommandLine command_line;
+  const circline::Status status = circline::apps::ParseCommandLine(argc, argv, &command_line);
+  if (!status.ok()) {
+    circline::apps::SayOnStderr("circline_calibrate: " + status.message);
+    return circline::apps::kExitUsage;
+  }
+  if (command_line.help) {
+    std::cout << circline::apps::HelpText(circline::apps::kUsage);
+  } else if (command_line.version) {
+    std::cout << circline::apps::VersionText("circline_calibrate") << "\n";
+  } else {
+    return circline::apps::Calibrate();
+  }
+  return circline::apps::kExitOk;
+}

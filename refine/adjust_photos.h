@@ -1,0 +1,105 @@
+// Many photos at once: the camera that took them (or several), the pose of every photo and what is
+// seen, in one ceres::Problem. No known layout: circles and parallel lines are enough.
+//
+//   std::vector<Observations> photos = ...;     // DetectObservations or FitObservations, each.
+//   const AdjustedPhotos adjusted = AdjustPhotos(photos);
+//   if (adjusted.status.ok()) use(adjusted.cameras[0].camera, adjusted.cameras[0].Sigma(0));
+#ifndef CIRCLINE_REFINE_ADJUST_PHOTOS_H_
+#define CIRCLINE_REFINE_ADJUST_PHOTOS_H_
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/camera.h"
+#include "circline/estimators/noise_model.h"
+#include "circline/estimators/observations.h"
+#include "circline/estimators/pose.h"
+#include "circline/estimators/status.h"
+#include "circline/refine/camera_shifts.h"
+#include "circline/refine/estimate_pose.h"
+
+namespace circline {
+
+// Whether a circle's id means the same circle in all photos: one world seen from many sides; or
+// every photo has a world of its own, and only the camera is common.
+enum class RigidWorld { kAuto, kYes, kNo };
+const char* RigidWorldName(RigidWorld rigid);  // "auto", "yes", "no".
+bool RigidWorldFromName(const std::string& name, RigidWorld* rigid);
+
+struct AdjustOptions {
+  LossOptions conic_loss, line_loss;  // As in EstimationOptions.
+  NoiseModel noise_model;             // Its camera is not used here: see camera_sigma.
+  // Prior of each camera about the one that its photos come with; none: UnknownCamera().
+  std::optional<CameraSigma> camera_sigma;
+  // Distortion coefficients that are estimated, about those of the camera: so many radial ones, the
+  // first of the model (0 to 3; fisheye 0 to 4), each with the prior k1 has; none of them where
+  // that is 0. A pinhole camera has none: make it kOpenCV with zeros to estimate them.
+  int num_radial = 2;
+  bool tangential = false;  // p1 and p2, kOpenCV only; standard deviation 0.01.
+  RigidWorld rigid = RigidWorld::kAuto;
+  int max_iterations = 100;  // Of the joint problem, each time it is solved; 1 or more.
+  // Photos are started on so many threads; the joint problem is evaluated on as many, and then
+  // equal from run to run to 1e-9 only, where this is above 1.
+  int num_threads = 1;
+  // Told how far it is, from any thread but one call at a time: "poses", photos done, of how many.
+  std::function<void(const char* what, int done, int total)> progress;
+
+  Status Validate() const;
+};
+
+// A camera of which nothing is known but the size of its photos: standard deviations 0.7 of log f,
+// 3 % of the diagonal for the principal point, 0.3 for k1; square pixels.
+CameraSigma UnknownCamera(const Camera& camera);
+
+struct AdjustedCamera {
+  Camera camera;  // Estimated.
+  // Of the shifts of camera_shifts.h (log f, log aspect, principal point, distortion), 12 x 12
+  // row-major; zero where one was held. Scaled by the misfit of features, where that is above 1.
+  std::array<double, kCameraSize * kCameraSize> covariance{};
+  std::vector<std::string> at_prior;  // Parameters of which the photos say next to nothing.
+  int num_photos = 0;
+  double rms_px = 0.0;  // Of the inlier residuals, pixels.
+
+  double Sigma(int shift) const;
+  double SigmaFocalPx() const { return camera.fx * Sigma(0); }
+};
+
+struct AdjustedPhoto {
+  Status status;  // Not ok: it has no part in the rest, and this says why.
+  int camera = 0;
+  CameraPose cam_from_world;  // Of its world; its unit is that of the world's.
+  double rms_px = 0.0;        // Of the inlier residuals, pixels.
+  double misfit = 0.0;        // Mean chi^2 per degree of freedom of its features; about 1.
+  std::vector<std::string> left_out;  // Features, as PoseHypothesis::left_out.
+};
+
+// A circle of a world.
+struct AdjustedCircle {
+  std::string id;
+  int photo = -1;  // Of which world: -1 the one of all photos, else that photo's.
+  Eigen::Vector3d center = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
+  double radius = 0.0;
+};
+
+struct AdjustedPhotos {
+  Status status;
+  std::vector<AdjustedCamera> cameras;  // In the order in which photos name them (Camera::id).
+  std::vector<AdjustedPhoto> photos;    // One for each of the input.
+  std::vector<AdjustedCircle> circles;
+  bool rigid = false, metric = false;
+  std::vector<std::string> notes;
+};
+
+// Photos with the same Camera::id share a camera, which must be the same in all of them. Starts
+// from EstimatePose on each photo: the focal length that most photos agree on, then the poses at
+// it; photos that contradict the rest as a whole are left out. Never throws, never returns NaN.
+// Thread-safe.
+AdjustedPhotos AdjustPhotos(const std::vector<Observations>& photos,
+                            const AdjustOptions& options = {});
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_ADJUST_PHOTOS_H_

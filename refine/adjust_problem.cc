@@ -1,0 +1,267 @@
+// The blocks and terms of many photos.
+#include "circline/refine/adjust_problem.h"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "circline/refine/manifolds.h"
+#include "circline/refine/mostly_exact.h"
+
+namespace circline {
+
+AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
+                             const std::vector<CameraPrior>& priors,
+                             const AdjustOptions& options)
+    : photos_(photos), options_(options) {
+  for (const CameraPrior& prior : priors) {
+    for (int k = 4; k < kCameraSize; ++k) {
+      if (prior.sigma[static_cast<std::size_t>(k)] > 0.0)
+        num_distortion_ = std::max(num_distortion_, k - 3);
+    }
+  }
+  rotations_.assign(photos.size(), nullptr);
+  translations_.assign(photos.size(), nullptr);
+  AddCameras(priors);
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    if (photos[i].takes_part) AddPhoto(static_cast<int>(i));
+  }
+  SetGauge();
+}
+
+double* AdjustProblem::NewBlock(int size, std::initializer_list<double> values,
+                                const ceres::Manifold* manifold, bool constant) {
+  std::array<double, kCameraSize>& block = values_.emplace_back();
+  block.fill(0.0);
+  std::copy(values.begin(), values.end(), block.begin());
+  blocks_[block.data()] = {size, manifold, constant};
+  return block.data();
+}
+
+void AdjustProblem::AddPrior(ceres::CostFunction* cost, std::vector<double*> blocks,
+                             ceres::LossFunction* loss) {
+  priors_.push_back({std::unique_ptr<ceres::CostFunction>(cost),
+                     std::unique_ptr<ceres::LossFunction>(loss), std::move(blocks)});
+}
+
+void AdjustProblem::AddFeature(int photo, const std::string& id, const std::string& name,
+                               std::unique_ptr<FeatureCost> cost, std::vector<double*> blocks) {
+  features_.push_back({photo, id, name, cost.get(), std::move(blocks)});
+  costs_.push_back(std::move(cost));
+}
+
+void AdjustProblem::AddCameras(const std::vector<CameraPrior>& priors) {
+  constexpr int kFocal = 0, kFirstRadial = 4;
+  for (const CameraPrior& prior : priors) {
+    std::vector<int> held, held_at_first;
+    for (int k = 0; k < kCameraSize; ++k) {
+      const bool is_held = !(prior.sigma[static_cast<std::size_t>(k)] > 0.0);
+      if (is_held) held.push_back(k);
+      if (is_held || (k != kFocal && k != kFirstRadial)) held_at_first.push_back(k);
+    }
+    cameras_.push_back(NewBlock(kCameraSize, {}));
+    const auto manifold = [&](const std::vector<int>& constant) -> const ceres::Manifold* {
+      const bool all = constant.size() == kCameraSize;
+      return all ? nullptr : NewManifold<ceres::SubsetManifold>(int{kCameraSize}, constant);
+    };
+    all_free_.push_back(manifold(held));
+    coarse_free_.push_back(manifold(held_at_first));
+    AddPrior(NewGaussianPrior({prior.sigma.begin(), prior.sigma.end()},
+                              {prior.mean.begin(), prior.mean.end()}),
+             {cameras_.back()});
+  }
+}
+
+void AdjustProblem::AddPhoto(int photo) {
+  const auto i = static_cast<std::size_t>(photo);
+  const AdjustInput& input = photos_[i];
+  const Eigen::Quaterniond q = Eigen::Quaterniond(input.pose.rotation).normalized();
+  const Eigen::Vector3d& t = input.pose.translation;
+  rotations_[i] = NewBlock(4, {q.x(), q.y(), q.z(), q.w()}, NewManifold<WorldRotationManifold>(3));
+  translations_[i] = NewBlock(3, {t.x(), t.y(), t.z()});
+  const Observations& obs = *input.observations;
+  for (std::size_t k = 0; k < obs.circles.size(); ++k) {
+    const CircleObservation& circle = obs.circles[k];
+    if (!circle.fit || circle.plane != obs.frame.plane) continue;
+    const double stated =
+        circle.sigma_px > 0.0 ? circle.sigma_px : options_.conic_loss.scale_px;
+    AddCircle(photo, circle, stated > 0.0 ? stated : input.noise.circles[k]);
+  }
+  for (std::size_t k = 0; k < obs.pencils.size(); ++k) AddPencil(photo, k);
+}
+
+// Where a world lies, how large it is and how it is turned about its normal is nobody's to say: the
+// first photo's translation is held, but for its length where a length is known, and its spin,
+// unless a pencil fixes that.
+void AdjustProblem::SetGauge() {
+  std::map<int, bool> done;
+  for (std::size_t i = 0; i < photos_.size(); ++i) {
+    const int world = photos_[i].world;
+    if (rotations_[i] == nullptr) continue;
+    const bool sees_circle =
+        std::any_of(features_.begin(), features_.end(), [&](const Feature& f) {
+          return f.photo == static_cast<int>(i) && f.blocks.size() > 1 &&
+                 f.blocks[1] == translations_[i];
+        });
+    Block& translation = blocks_[translations_[i]];
+    if (!sees_circle) {
+      translation.constant = true;  // Nothing speaks of it.
+      continue;
+    }
+    if (done[world]) continue;
+    done[world] = true;
+    if (has_scale_[world]) {
+      translation.manifold = NewManifold<ScaleManifold>();
+    } else {
+      translation.constant = true;
+    }
+    if (!x_is_fixed_[world]) blocks_[rotations_[i]].manifold = NewManifold<WorldRotationManifold>(2);
+  }
+}
+
+bool AdjustProblem::Points(int photo, const std::vector<Eigen::Vector2d>& pixels,
+                           const std::vector<std::uint8_t>& inliers, double sigma_px,
+                           bool is_circle, std::unique_ptr<ImagePoints>* points) const {
+  const NoiseModel& model = options_.noise_model;
+  const double shared = is_circle ? model.contour_px : model.line_px;
+  const double sigma = std::hypot(sigma_px, shared);
+  ImagePoints::Options options;
+  options.sigma_px = sigma;
+  options.loss = (is_circle ? options_.conic_loss : options_.line_loss).type;
+  options.num_distortion = num_distortion_;
+  const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
+  *points = std::make_unique<ImagePoints>(input.observations->camera, pixels, inliers, options);
+  const double weight = is_circle ? model.ContourWeight(sigma_px, pixels, inliers)
+                                  : model.LineWeight(sigma_px, pixels, inliers);
+  (*points)->set_weight(weight * (sigma * sigma) / (sigma_px * sigma_px));
+  return (*points)->size() >= (is_circle ? 5U : 2U);
+}
+
+AdjustProblem::Circle* AdjustProblem::CircleOf(int world, const CircleObservation& circle,
+                                               const Layout& layout) {
+  const auto known = circles_.find({world, circle.id});
+  if (known != circles_.end()) return &known->second;
+  const auto start = layout.find(circle.id);
+  if (start == layout.end()) return nullptr;
+  const NoiseModel& model = options_.noise_model;
+  Circle made{circle.id, world};
+  double*& center = circle.concentric.empty() ? made.center : centers_[{world, circle.concentric}];
+  const Eigen::Vector2d& at = start->second.center;
+  if (center == nullptr) center = NewBlock(2, {at.x(), at.y()});
+  made.center = center;
+  double*& radius = circle.radius_group.empty() ? made.radius
+                                                : radius_groups_[{world, circle.radius_group}];
+  if (radius == nullptr) radius = NewBlock(1, {start->second.radius});
+  made.radius = radius;
+  if (circle.radius > 0.0) {
+    const double sigma = circle.radius_sigma > 0.0 ? circle.radius_sigma : model.radius;
+    *radius = circle.radius;
+    if (sigma > 0.0) AddPrior(NewLogPrior(circle.radius, sigma), {radius});
+    blocks_[radius].constant = !(sigma > 0.0);
+    has_scale_[world] = metric_ = true;
+  }
+  if (model.circle_tilt_rad > 0.0 || model.circle_height > 0.0) made.tilt = NewBlock(3, {});
+  return &(circles_[{world, circle.id}] = made);
+}
+
+// Contours of one contrast share an offset, in each photo its own.
+double* AdjustProblem::OffsetOf(int photo, const CircleObservation& circle) {
+  const double sigma = options_.noise_model.contour_offset_px;
+  if (!(sigma > 0.0)) return nullptr;
+  double*& offset = offsets_[{photo, std::clamp(circle.contrast, -1, 1)}];
+  if (offset == nullptr) {
+    offset = NewBlock(1, {});
+    AddPrior(NewGaussianPrior({sigma}), {offset}, new MostlyExact);
+  }
+  return offset;
+}
+
+void AdjustProblem::AddCircle(int photo, const CircleObservation& circle, double sigma_px) {
+  const auto i = static_cast<std::size_t>(photo);
+  const AdjustInput& input = photos_[i];
+  std::unique_ptr<ImagePoints> points;
+  if (!Points(photo, circle.points, circle.inliers, sigma_px, true, &points)) return;
+  const Circle* made = CircleOf(input.world, circle, *input.layout);
+  if (made == nullptr) return;
+  const NoiseModel& model = options_.noise_model;
+  PlaneCircleContourCost::Blocks with;
+  with.tilt_and_height = made->tilt != nullptr;
+  with.camera = true;
+  with.tilt_sigma = model.circle_tilt_rad;
+  with.height_sigma = model.circle_height;
+  std::vector<double*> blocks = {rotations_[i], translations_[i], made->center, made->radius};
+  if (made->tilt != nullptr) blocks.push_back(made->tilt);
+  if (double* offset = OffsetOf(photo, circle)) {
+    with.offset = true;
+    blocks.push_back(offset);
+  }
+  blocks.push_back(cameras_[static_cast<std::size_t>(input.camera)]);
+  AddFeature(photo, circle.id, "circle '" + circle.id + "'",
+             std::make_unique<PlaneCircleContourCost>(std::move(*points), with), blocks);
+  if (!circle.center) return;
+  AddFeature(photo, circle.id + ".center", "the centre of circle '" + circle.id + "'",
+             std::make_unique<PlanePointCost>(input.observations->camera, *circle.center, sigma_px,
+                                              options_.conic_loss.type, true),
+             {rotations_[i], translations_[i], made->center, blocks.back()});
+}
+
+// Where a world has its pencils: along an axis, or in the plane.
+double* AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
+  constexpr double kAlong = 0.98;  // Cosine: it is that axis, not one turned against it.
+  const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
+  double*& block = directions_[{input.world, pencil.id}];
+  if (block != nullptr) return block;
+  const double sigma = std::max(options_.noise_model.pencil_axis_rad, 1e-6);
+  Eigen::Vector3d d = input.pose.rotation.transpose() * pencil.fit->direction;
+  const bool is_free = pencil.direction == PencilDirection::kFree;
+  const Eigen::Vector3d axis = is_free ? Eigen::Vector3d::UnitZ()
+                                       : Eigen::Vector3d::Unit(static_cast<int>(pencil.direction));
+  const bool is_along = !is_free && std::abs(d.dot(axis)) > kAlong;
+  if (is_along) d = axis;
+  block = NewBlock(3, {d.x(), d.y(), d.z()}, NewManifold<ceres::SphereManifold<3>>());
+  if (is_along) {
+    AddPrior(NewDirectionPrior(axis, sigma), {block}, new MostlyExact);
+    x_is_fixed_[input.world] =
+        x_is_fixed_[input.world] || pencil.direction != PencilDirection::kZ;
+  } else if (pencil.direction != PencilDirection::kZ) {
+    AddPrior(NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma), {block}, new MostlyExact);
+  }
+  return block;
+}
+
+void AdjustProblem::AddPencil(int photo, std::size_t index) {
+  const auto i = static_cast<std::size_t>(photo);
+  const AdjustInput& input = photos_[i];
+  const PencilObservation& pencil = input.observations->pencils[index];
+  const bool is_free = pencil.direction == PencilDirection::kFree;
+  if (!pencil.fit || (is_free && pencil.plane != input.observations->frame.plane)) return;
+  double* direction = DirectionOf(photo, pencil);
+  for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
+    const LineObservation& line = pencil.lines[j];
+    if (!line.fit) continue;
+    const double own = LineSigma(pencil, line);
+    const double stated = own > 0.0 ? own : options_.line_loss.scale_px;
+    std::unique_ptr<ImagePoints> points;
+    if (!Points(photo, line.points, line.inliers,
+                stated > 0.0 ? stated : input.noise.lines[index][j], false, &points)) {
+      continue;
+    }
+    DirectionLineCost::Options options;
+    options.direction_sigma = options_.noise_model.line_direction_rad;
+    options.camera = true;
+    auto cost =
+        std::make_unique<DirectionLineCost>(std::move(*points), line.fit->line, options);
+    double* place = NewBlock(options.direction_sigma > 0.0 ? 2 : 1, {});
+    double* camera = cameras_[static_cast<std::size_t>(input.camera)];
+    const std::vector<double*> blocks = {rotations_[i], direction, place, camera};
+    if (!cost->Start(blocks.data(), place)) continue;
+    const std::string number = std::to_string(j);
+    AddFeature(photo, pencil.id + "[" + number + "]",
+               "pencil '" + pencil.id + "', line " + number, std::move(cost), blocks);
+  }
+}
+
+}  // namespace circline

@@ -1,0 +1,143 @@
+// Many photos as one ceres::Problem of public cost functions: cameras, poses, worlds. Internal: not
+// installed.
+#ifndef CIRCLINE_REFINE_ADJUST_PROBLEM_H_
+#define CIRCLINE_REFINE_ADJUST_PROBLEM_H_
+
+#include <ceres/loss_function.h>
+#include <ceres/manifold.h>
+#include <ceres/problem.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/observations.h"
+#include "circline/estimators/point_noise.h"
+#include "circline/estimators/pose.h"
+#include "circline/refine/adjust_photos.h"
+#include "circline/refine/adjust_start.h"
+#include "circline/refine/cost_functions.h"
+
+namespace circline {
+
+// A photo as the problem takes it. All outlive the problem.
+struct AdjustInput {
+  const Observations* observations = nullptr;  // Fitted and resolved, through the camera at start.
+  PointNoise noise;
+  int camera = 0;
+  int world = 0;                // Photos of one world share circles and pencils of one id.
+  CameraPose pose;              // To start from, of that world.
+  const Layout* layout = nullptr;  // Circles of that world.
+  bool takes_part = true;
+};
+
+// Of a camera's shifts (camera_shifts.h) against the one that its points were made with.
+struct CameraPrior {
+  std::array<double, kCameraSize> mean{}, sigma{};  // 0 = held.
+};
+
+class AdjustProblem {
+ public:
+  // `priors`: by camera.
+  AdjustProblem(const std::vector<AdjustInput>& photos, const std::vector<CameraPrior>& priors,
+                const AdjustOptions& options);
+
+  // Runs ceres with the losses `stretch` times as wide; of the cameras only the first distortion
+  // coefficient and the focal length are free where `coarse`.
+  Status Solve(double stretch, bool coarse, int max_iterations);
+  // Root mean square over the points of the worst feature, standard deviations.
+  double LargestMiss() const;
+
+  struct Feature {
+    int photo = 0;
+    std::string id, name;
+    FeatureCost* cost = nullptr;
+    std::vector<double*> blocks;
+    bool active = true;
+    // At the last Judge(): chi^2 of what its points agree on (a conic, a line) against the rest,
+    // priors of its own imperfections included, and how many residuals that is.
+    double chi2 = 0.0;
+    int rows = 0;
+  };
+  void Judge();
+  std::vector<Feature>& features() { return features_; }
+  const std::vector<Feature>& features() const { return features_; }
+  // Of all features that take part, per degree of freedom.
+  double Misfit() const;
+
+  // Of the shifts of one camera, all else marginalised; from the inliers of the features in force.
+  // Zero rows where a shift is held.
+  Eigen::Matrix<double, kCameraSize, kCameraSize> CameraCovariance(int camera) const;
+
+  Camera CameraAt(int camera) const;
+  CameraPose PoseAt(int photo) const;
+  // Sum of squares of the inlier residuals of a photo, pixels, and how many.
+  void Residuals(int photo, double* squares, int* count) const;
+  std::vector<AdjustedCircle> Circles() const;
+  bool metric() const { return metric_; }
+
+ private:
+  struct Block {
+    int size = 0;
+    const ceres::Manifold* manifold = nullptr;
+    bool constant = false;
+  };
+  struct Prior {
+    std::unique_ptr<ceres::CostFunction> cost;
+    std::unique_ptr<ceres::LossFunction> loss;
+    std::vector<double*> blocks;
+  };
+  struct Circle {
+    std::string id;
+    int world = 0;
+    double *center = nullptr, *radius = nullptr, *tilt = nullptr;
+  };
+
+  double* NewBlock(int size, std::initializer_list<double> values,
+                   const ceres::Manifold* manifold = nullptr, bool constant = false);
+  template <typename M, typename... Args>
+  const ceres::Manifold* NewManifold(Args... args) {
+    return manifolds_.emplace_back(std::make_unique<M>(args...)).get();
+  }
+  void AddCameras(const std::vector<CameraPrior>& priors);
+  void AddPhoto(int photo);
+  void SetGauge();
+  void AddCircle(int photo, const CircleObservation& circle, double sigma_px);
+  Circle* CircleOf(int world, const CircleObservation& circle, const Layout& layout);
+  double* OffsetOf(int photo, const CircleObservation& circle);
+  void AddPencil(int photo, std::size_t pencil);
+  double* DirectionOf(int photo, const PencilObservation& pencil);
+  bool Points(int photo, const std::vector<Eigen::Vector2d>& pixels,
+              const std::vector<std::uint8_t>& inliers, double sigma_px, bool is_circle,
+              std::unique_ptr<ImagePoints>* points) const;
+  void AddFeature(int photo, const std::string& id, const std::string& name,
+                  std::unique_ptr<FeatureCost> cost, std::vector<double*> blocks);
+  void AddPrior(ceres::CostFunction* cost, std::vector<double*> blocks,
+                ceres::LossFunction* loss = nullptr);
+  void Fill(const std::vector<const ceres::Manifold*>& cameras, ceres::Problem* problem) const;
+
+  const std::vector<AdjustInput>& photos_;
+  const AdjustOptions& options_;
+  int num_distortion_ = 0;
+  std::deque<std::array<double, kCameraSize>> values_;  // One block each; their addresses stay.
+  std::map<double*, Block> blocks_;
+  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
+  std::vector<double*> cameras_, rotations_, translations_;
+  std::vector<const ceres::Manifold*> all_free_, coarse_free_;  // Of the cameras.
+  std::map<std::pair<int, std::string>, Circle> circles_;
+  std::map<std::pair<int, std::string>, double*> radius_groups_, centers_, directions_;
+  std::map<std::pair<int, int>, double*> offsets_;
+  std::map<int, bool> x_is_fixed_, has_scale_;  // By world.
+  std::vector<std::unique_ptr<FeatureCost>> costs_;
+  std::vector<Feature> features_;
+  std::vector<Prior> priors_;
+  bool metric_ = false;
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_ADJUST_PROBLEM_H_

@@ -1,0 +1,250 @@
+// Many photos: solved, judged, and how well the cameras are known.
+#include <ceres/ceres.h>
+
+#include <Eigen/Dense>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "circline/refine/adjust_problem.h"
+#include "circline/refine/block_chain.h"
+
+namespace circline {
+
+void AdjustProblem::Fill(const std::vector<const ceres::Manifold*>& cameras,
+                         ceres::Problem* problem) const {
+  const auto add = [&](const std::vector<double*>& blocks) {
+    for (double* values : blocks) {
+      if (problem->HasParameterBlock(values)) continue;
+      const Block& block = blocks_.at(values);
+      problem->AddParameterBlock(values, block.size, const_cast<ceres::Manifold*>(block.manifold));
+      if (block.constant) problem->SetParameterBlockConstant(values);
+    }
+  };
+  std::vector<double*> used;
+  for (const Feature& feature : features_) {
+    if (!feature.active) continue;
+    add(feature.blocks);
+    problem->AddResidualBlock(feature.cost, nullptr, feature.blocks);
+  }
+  for (const Prior& prior : priors_) {
+    const bool has_all = std::all_of(prior.blocks.begin(), prior.blocks.end(), [&](double* values) {
+      return problem->HasParameterBlock(values);
+    });
+    if (has_all) problem->AddResidualBlock(prior.cost.get(), prior.loss.get(), prior.blocks);
+  }
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    if (!problem->HasParameterBlock(cameras_[i])) continue;
+    if (cameras[i] == nullptr) {
+      problem->SetParameterBlockConstant(cameras_[i]);
+    } else {
+      problem->SetManifold(cameras_[i], const_cast<ceres::Manifold*>(cameras[i]));
+    }
+  }
+}
+
+namespace {
+
+ceres::Problem::Options NothingOwned() {
+  ceres::Problem::Options ownership;
+  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ownership.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return ownership;
+}
+
+}  // namespace
+
+Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
+  Weighing weighing;
+  weighing.stretch = stretch;
+  for (const Feature& feature : features_) feature.cost->set_weighing(weighing);
+  ceres::Problem problem(NothingOwned());
+  Fill(coarse ? coarse_free_ : all_free_, &problem);
+  if (problem.NumResidualBlocks() == 0) return Status::Refused("no photo has evidence in its plane");
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.max_num_iterations = max_iterations;
+  options.num_threads = options_.num_threads;
+  options.logging_type = ceres::SILENT;
+  options.function_tolerance = 1e-8;
+  options.parameter_tolerance = 1e-9;
+  options.initial_trust_region_radius = 1e5;
+  options.max_trust_region_radius = 1e8;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  for (const Feature& feature : features_) feature.cost->set_weighing(Weighing());
+  return summary.IsSolutionUsable()
+             ? Status::Ok()
+             : Status::Failed("the photos cannot be evaluated at where they start");
+}
+
+double AdjustProblem::LargestMiss() const {
+  constexpr double kNoLoss = 1e4;
+  Weighing weighing;
+  weighing.stretch = kNoLoss;
+  double most = 0.0;
+  std::vector<double> residuals;
+  for (const Feature& feature : features_) {
+    if (!feature.active) continue;
+    residuals.resize(static_cast<std::size_t>(feature.cost->num_residuals()));
+    if (!feature.cost->EvaluateWith(weighing, feature.blocks.data(), residuals.data(), nullptr))
+      continue;
+    const ImagePoints* points = feature.cost->points();
+    const double count =
+        points == nullptr ? 1.0 : points->options().weight * static_cast<double>(points->size());
+    double sum = 0.0;
+    for (const double r : residuals) sum += r * r;
+    most = std::max(most, sum / std::max(1.0, count));
+  }
+  return std::sqrt(most);
+}
+
+void AdjustProblem::Judge() {
+  for (Feature& feature : features_) {
+    const auto rows = static_cast<std::size_t>(feature.cost->num_residuals());
+    std::vector<double> residuals(rows);
+    std::vector<std::vector<double>> jacobians;
+    std::vector<double*> pointers;
+    for (const double* block : feature.blocks) {
+      const auto size = static_cast<std::size_t>(blocks_.at(const_cast<double*>(block)).size);
+      jacobians.emplace_back(rows * size);
+    }
+    for (std::vector<double>& jacobian : jacobians) pointers.push_back(jacobian.data());
+    feature.chi2 = 0.0;
+    feature.rows = 0;
+    if (!feature.cost->Evaluate(feature.blocks.data(), residuals.data(), pointers.data())) continue;
+    // The row without derivative is what no curve explains: the noise of the points.
+    for (std::size_t row = 0; row < rows; ++row) {
+      bool is_rest = true;
+      for (std::size_t b = 0; b < jacobians.size() && is_rest; ++b) {
+        const std::size_t size = jacobians[b].size() / rows;
+        is_rest = std::all_of(jacobians[b].begin() + static_cast<std::ptrdiff_t>(row * size),
+                              jacobians[b].begin() + static_cast<std::ptrdiff_t>((row + 1) * size),
+                              [](double d) { return d == 0.0; });
+      }
+      if (is_rest) continue;
+      feature.chi2 += residuals[row] * residuals[row];
+      ++feature.rows;
+    }
+  }
+}
+
+double AdjustProblem::Misfit() const {
+  ceres::Problem problem(NothingOwned());
+  Fill(all_free_, &problem);
+  double chi2 = 0.0;
+  int rows = 0, unknowns = 0;
+  for (const Feature& feature : features_) {
+    if (!feature.active) continue;
+    chi2 += feature.chi2;
+    rows += feature.rows;
+  }
+  for (const Prior& prior : priors_) {
+    const bool has_all = std::all_of(prior.blocks.begin(), prior.blocks.end(), [&](double* values) {
+      return problem.HasParameterBlock(values);
+    });
+    if (!has_all) continue;
+    std::vector<double> residuals(static_cast<std::size_t>(prior.cost->num_residuals()));
+    if (!prior.cost->Evaluate(prior.blocks.data(), residuals.data(), nullptr)) continue;
+    for (const double r : residuals) chi2 += r * r;
+    rows += prior.cost->num_residuals();
+  }
+  std::vector<double*> all;
+  problem.GetParameterBlocks(&all);
+  for (double* values : all) {
+    if (!problem.IsParameterBlockConstant(values))
+      unknowns += problem.ParameterBlockTangentSize(values);
+  }
+  return rows > unknowns ? chi2 / (rows - unknowns) : 1.0;
+}
+
+Eigen::Matrix<double, kCameraSize, kCameraSize> AdjustProblem::CameraCovariance(int camera) const {
+  using Result = Eigen::Matrix<double, kCameraSize, kCameraSize>;
+  using Sparse = Eigen::SparseMatrix<double>;
+  double* const values = cameras_[static_cast<std::size_t>(camera)];
+  Weighing inliers;
+  inliers.inliers_only = true;
+  for (const Feature& feature : features_) feature.cost->set_weighing(inliers);
+  ceres::Problem problem(NothingOwned());
+  Fill(all_free_, &problem);
+  Result covariance = Result::Zero();
+  ceres::CRSMatrix crs;
+  ceres::Problem::EvaluateOptions evaluate;
+  evaluate.apply_loss_function = false;  // A prior that is mostly exact counts as its Gaussian.
+  problem.GetParameterBlocks(&evaluate.parameter_blocks);
+  auto& order = evaluate.parameter_blocks;
+  const auto is_held = [&](double* block) { return problem.IsParameterBlockConstant(block); };
+  order.erase(std::remove_if(order.begin(), order.end(), is_held), order.end());
+  const auto own = std::find(order.begin(), order.end(), values);
+  const bool is_estimated = own != order.end();
+  if (is_estimated) std::rotate(own, own + 1, order.end());
+  const bool evaluated =
+      is_estimated && problem.Evaluate(evaluate, nullptr, nullptr, nullptr, &crs);
+  for (const Feature& feature : features_) feature.cost->set_weighing(Weighing());
+  if (!evaluated) return covariance;
+  const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> J(
+      crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(),
+      crs.cols.data(), crs.values.data());
+  const Sparse information = Sparse(J.transpose()) * Sparse(J);
+  const int size = problem.ParameterBlockTangentSize(values), rest = crs.num_cols - size;
+  Eigen::MatrixXd marginal = Eigen::MatrixXd(information.bottomRightCorner(size, size));
+  if (rest > 0) {
+    Sparse others = information.topLeftCorner(rest, rest);
+    constexpr double kTiny = 1e-10;  // What nothing ties (one circle's spin) says nothing.
+    for (int k = 0; k < rest; ++k) others.coeffRef(k, k) = others.coeff(k, k) * (1.0 + kTiny) + kTiny;
+    const Eigen::SimplicialLDLT<Sparse> factor(others);
+    if (factor.info() != Eigen::Success) return covariance;
+    const Eigen::MatrixXd cross = information.topRightCorner(rest, size);
+    marginal -= cross.transpose() * factor.solve(cross);
+  }
+  const Eigen::MatrixXd small = marginal.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> plus(int{kCameraSize},
+                                                                              size);
+  all_free_[static_cast<std::size_t>(camera)]->PlusJacobian(values, plus.data());
+  covariance = plus * small * plus.transpose();
+  return covariance;
+}
+
+Camera AdjustProblem::CameraAt(int camera) const {
+  const auto member = std::find_if(photos_.begin(), photos_.end(),
+                                   [&](const AdjustInput& photo) { return photo.camera == camera; });
+  return ShiftedCamera(member->observations->camera, cameras_[static_cast<std::size_t>(camera)]);
+}
+
+CameraPose AdjustProblem::PoseAt(int photo) const {
+  const auto i = static_cast<std::size_t>(photo);
+  return {RotationFromBlock(rotations_[i]), Eigen::Vector3d(translations_[i])};
+}
+
+void AdjustProblem::Residuals(int photo, double* squares, int* count) const {
+  std::vector<double> distances;
+  for (const Feature& feature : features_) {
+    if (feature.photo != photo || !feature.active || feature.cost->points() == nullptr) continue;
+    feature.cost->Distances(feature.blocks.data(), &distances);
+    const double gate = kInlierSigmas * feature.cost->points()->options().sigma_px;
+    for (const double d : distances) {
+      if (!(std::abs(d) <= gate)) continue;
+      *squares += d * d;
+      ++*count;
+    }
+  }
+}
+
+std::vector<AdjustedCircle> AdjustProblem::Circles() const {
+  std::vector<AdjustedCircle> out;
+  for (const auto& [key, circle] : circles_) {
+    AdjustedCircle made;
+    made.id = circle.id;
+    made.photo = key.first - 1;
+    made.radius = *circle.radius;
+    const double height = circle.tilt != nullptr ? circle.tilt[2] * made.radius : 0.0;
+    made.center = {circle.center[0], circle.center[1], height};
+    if (circle.tilt != nullptr)
+      made.normal = Eigen::Vector3d(circle.tilt[0], circle.tilt[1], 1.0).normalized();
+    out.push_back(made);
+  }
+  return out;
+}
+
+}  // namespace circline

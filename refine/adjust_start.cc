@@ -1,0 +1,292 @@
+#include "circline/refine/adjust_start.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <thread>
+
+#include "circline/estimators/closed_form_solvers.h"
+#include "circline/refine/joint_problem.h"
+#include "circline/refine/joint_result.h"
+#include "circline/refine/pose_seeds.h"
+
+namespace circline {
+
+void ParallelFor(int count, int num_threads, const std::function<void(int)>& work) {
+  std::atomic<int> next{0};
+  const auto run = [&] {
+    for (int i = next++; i < count; i = next++) work(i);
+  };
+  std::vector<std::thread> others;
+  for (int k = 1; k < std::min(num_threads, count); ++k) others.emplace_back(run);
+  run();
+  for (std::thread& thread : others) thread.join();
+}
+
+PreparedPhoto Prepare(const Observations& given, const Camera& camera, const NoiseModel& noise) {
+  constexpr double kDefaultSigmaPx = 0.4;  // For fits only.
+  PreparedPhoto photo{given, {}};
+  Observations& obs = photo.observations;
+  obs.camera = camera;
+  for (CircleObservation& circle : obs.circles) circle.fit.reset();
+  for (PencilObservation& pencil : obs.pencils) {
+    pencil.fit.reset();
+    for (LineObservation& line : pencil.lines) line.fit.reset();
+  }
+  obs = ResolveWorld(obs);
+  FitDirect(kDefaultSigmaPx, &obs);
+  obs = ResolveWorld(obs);
+  photo.noise = MeasurePointNoise(obs, noise);
+  return photo;
+}
+
+namespace {
+
+// Points that the camera cannot have seen.
+int NumImpossible(const Observations& observations) {
+  CalibratedPoint unused;
+  int count = 0;
+  const auto add = [&](const std::vector<Eigen::Vector2d>& pixels) {
+    for (const Eigen::Vector2d& pixel : pixels)
+      count += PixelToCalibrated(observations.camera, pixel, &unused) ? 0 : 1;
+  };
+  for (const CircleObservation& circle : observations.circles) add(circle.points);
+  for (const PencilObservation& pencil : observations.pencils) {
+    for (const LineObservation& line : pencil.lines) add(line.points);
+  }
+  return count;
+}
+
+}  // namespace
+
+double CoarseCost(const PreparedPhoto& photo, const PointNoise& noise,
+                  const EstimationOptions& options) {
+  constexpr int kIterations = 3;
+  constexpr double kImpossible = 0.5 * kInlierSigmas * kInlierSigmas;  // As an outlier.
+  const double impossible = kImpossible * NumImpossible(photo.observations);
+  SolverRegistry registry;
+  AddClosedFormSolvers(&registry);
+  std::vector<std::string> unused;
+  const std::vector<Seed> seeds =
+      CollectSeeds(photo.observations, registry.solvers(), 0.0, &unused);
+  const JointProblem problem(photo.observations, options, noise);
+  State state, best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Seed& seed : seeds) {
+    if (!problem.Start(seed.pose, 0.0, problem.FirstReading(), &state).ok()) continue;
+    const double cost = state.cost + LeftOutCost(problem, state);
+    if (!(cost < least)) continue;
+    least = cost;
+    best = state;
+  }
+  if (!std::isfinite(least) || !problem.Solve(kIterations, &best).ok()) return least + impossible;
+  return best.cost + LeftOutCost(problem, best) + impossible;
+}
+
+CameraSweep::CameraSweep(std::vector<const Observations*> photos, const Camera& given,
+                         const EstimationOptions& options, int num_threads)
+    : photos_(std::move(photos)),
+      given_(given),
+      options_(options),
+      num_threads_(num_threads),
+      noise_(photos_.size()),
+      least_(photos_.size(), std::numeric_limits<double>::infinity()) {
+  ParallelFor(static_cast<int>(photos_.size()), num_threads_, [&](int i) {
+    const auto index = static_cast<std::size_t>(i);
+    noise_[index] = Prepare(*photos_[index], given_, options_.noise_model).noise;
+  });
+}
+
+std::vector<double> CameraSweep::CostsAt(const std::vector<Camera>& cameras) {
+  std::vector<std::vector<double>> costs(photos_.size());
+  ParallelFor(static_cast<int>(photos_.size()), num_threads_, [&](int i) {
+    const auto index = static_cast<std::size_t>(i);
+    for (const Camera& camera : cameras) {
+      costs[index].push_back(CoarseCost(Prepare(*photos_[index], camera, options_.noise_model),
+                                        noise_[index], options_));
+      least_[index] = std::min(least_[index], costs[index].back());
+    }
+  });
+  // A photo that no pose explains at one of them tells nothing but that.
+  constexpr double kNoPose = 1e3;  // Of cost, above its best.
+  std::vector<double> sums(cameras.size(), 0.0);
+  for (std::size_t i = 0; i < photos_.size(); ++i) {
+    if (!std::isfinite(least_[i])) continue;
+    for (std::size_t c = 0; c < cameras.size(); ++c)
+      sums[c] += std::min(costs[i][c], least_[i] + kNoPose);
+  }
+  return sums;
+}
+
+std::vector<Camera> CameraSweep::Candidates(double log_focal_sigma, bool has_radial) {
+  constexpr double kFocalStep = 0.3, kWidest = 1.8;  // Of log f; standard deviations of the prior.
+  constexpr double kRadialStep = -0.2;
+  constexpr std::size_t kMost = 3;
+  const int half = static_cast<int>(std::ceil(kWidest * log_focal_sigma / kFocalStep));
+  const int focals = 2 * half + 1, radials = has_radial ? 3 : 1;
+  std::vector<Camera> cameras;
+  for (int k = 0; k < focals; ++k) {
+    for (int r = 0; r < radials; ++r) {
+      Camera& made = cameras.emplace_back(given_);
+      made.fx *= std::exp((k - half) * kFocalStep);
+      made.fy *= std::exp((k - half) * kFocalStep);
+      made.distortion[0] += r * kRadialStep;
+    }
+  }
+  const std::vector<double> costs = CostsAt(cameras);
+  if (std::none_of(least_.begin(), least_.end(), [](double cost) { return std::isfinite(cost); }))
+    return {};
+  const auto at = [&](int k, int r) {
+    const bool inside = k >= 0 && k < focals && r >= 0 && r < radials;
+    return inside ? costs[static_cast<std::size_t>(k * radials + r)]
+                  : std::numeric_limits<double>::infinity();
+  };
+  std::vector<std::pair<double, std::size_t>> minima;
+  for (int k = 0; k < focals; ++k) {
+    for (int r = 0; r < radials; ++r) {
+      double around = std::numeric_limits<double>::infinity();
+      for (const auto& [dk, dr] : {std::pair(-1, 0), {1, 0}, {0, -1}, {0, 1}})
+        around = std::min(around, at(k + dk, r + dr));
+      if (at(k, r) <= around) minima.emplace_back(at(k, r), static_cast<std::size_t>(k * radials + r));
+    }
+  }
+  std::sort(minima.begin(), minima.end());
+  std::vector<Camera> candidates;
+  for (std::size_t m = 0; m < std::min(kMost, minima.size()); ++m)
+    candidates.push_back(cameras[minima[m].second]);
+  return candidates;
+}
+
+Layout LayoutOf(const PoseHypothesis& h) {
+  Layout layout;
+  for (const CircleEstimate& circle : h.circles) {
+    const Eigen::Vector3d X =
+        h.cam_from_world.rotation.transpose() * (circle.center - h.cam_from_world.translation);
+    if (circle.radius > 0.0) layout[circle.id] = {X.head<2>(), circle.radius};
+  }
+  return layout;
+}
+
+namespace {
+
+// x_to = scale * Rotation2D(angle) * x_from + shift.
+struct Similarity {
+  double scale = 1.0, angle = 0.0;
+  Eigen::Vector2d shift = Eigen::Vector2d::Zero();
+  double misfit = 0.0;  // Median distance of the centres after it, radii.
+  int shared = 0;       // Circles that both have.
+
+  Eigen::Vector2d operator()(const Eigen::Vector2d& x) const {
+    return scale * (Eigen::Rotation2Dd(angle) * x) + shift;
+  }
+};
+
+// Least squares of the centres that both have (Umeyama 1991). False for fewer than two.
+bool Align(const Layout& from, const Layout& to, Similarity* out) {
+  std::vector<std::pair<const PlaneCircle*, const PlaneCircle*>> pairs;
+  for (const auto& [id, circle] : from) {
+    const auto other = to.find(id);
+    if (other != to.end()) pairs.emplace_back(&circle, &other->second);
+  }
+  constexpr std::size_t kFewest = 2;
+  out->shared = static_cast<int>(pairs.size());
+  if (pairs.size() < kFewest) return false;
+  Eigen::Vector2d a = Eigen::Vector2d::Zero(), b = a;
+  const double n = static_cast<double>(pairs.size());
+  for (const auto& [p, q] : pairs) {
+    a += p->center / n;
+    b += q->center / n;
+  }
+  double dot = 0.0, cross = 0.0, square = 0.0;
+  for (const auto& [p, q] : pairs) {
+    const Eigen::Vector2d u = p->center - a, v = q->center - b;
+    dot += u.dot(v);
+    cross += u.x() * v.y() - u.y() * v.x();
+    square += u.squaredNorm();
+  }
+  if (!(square > 0.0) || !(std::hypot(dot, cross) > 0.0)) return false;
+  out->angle = std::atan2(cross, dot);
+  out->scale = std::hypot(dot, cross) / square;
+  out->shift = Eigen::Vector2d::Zero();
+  out->shift = b - (*out)(a);
+  std::vector<double> misses;
+  for (const auto& [p, q] : pairs) {
+    const double radius = std::log(out->scale * p->radius / q->radius);
+    misses.push_back(std::hypot(((*out)(p->center) - q->center).norm() / q->radius, radius));
+  }
+  std::nth_element(misses.begin(), misses.begin() + static_cast<std::ptrdiff_t>(pairs.size() / 2),
+                   misses.end());
+  out->misfit = misses[pairs.size() / 2];
+  return true;
+}
+
+// A pose of a photo's own world in the world that `to_shared` maps its plane to.
+CameraPose Moved(const CameraPose& own, const Similarity& to_shared) {
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(to_shared.angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  CameraPose pose;
+  pose.rotation = own.rotation * turn.transpose();
+  pose.translation =
+      to_shared.scale * own.translation -
+      pose.rotation * Eigen::Vector3d(to_shared.shift.x(), to_shared.shift.y(), 0.0);
+  return pose;
+}
+
+}  // namespace
+
+SharedLayout AlignLayouts(const std::vector<PoseEstimate>& estimates) {
+  constexpr double kFar = 0.5;  // Radii: another circle, or another pose of the photo.
+  SharedLayout out;
+  out.poses.resize(estimates.size());
+  out.placed.assign(estimates.size(), false);
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < estimates.size(); ++i) {
+    if (estimates[i].hypotheses.empty()) continue;
+    const Layout own = LayoutOf(estimates[i].hypotheses.front());
+    if (own.size() <= most) continue;
+    most = own.size();
+    out.reference = static_cast<int>(i);
+    out.circles = own;
+  }
+  if (out.reference < 0) return out;
+  const auto reference = static_cast<std::size_t>(out.reference);
+  out.poses[reference] = estimates[reference].hypotheses.front().cam_from_world;
+  out.placed[reference] = true;
+  std::vector<double> misfits;
+  for (;;) {  // The photo that shares most with what is placed comes next.
+    Similarity best;
+    std::size_t next = estimates.size();
+    const PoseHypothesis* hypothesis = nullptr;
+    for (std::size_t i = 0; i < estimates.size(); ++i) {
+      if (out.placed[i]) continue;
+      for (const PoseHypothesis& h : estimates[i].hypotheses) {
+        Similarity to_shared;
+        if (!Align(LayoutOf(h), out.circles, &to_shared) || to_shared.misfit > kFar) continue;
+        const bool better =
+            to_shared.shared > best.shared ||
+            (next == i && to_shared.shared == best.shared && to_shared.misfit < best.misfit);
+        if (!better) continue;
+        best = to_shared;
+        next = i;
+        hypothesis = &h;
+      }
+    }
+    if (hypothesis == nullptr) break;
+    out.placed[next] = true;
+    out.poses[next] = Moved(hypothesis->cam_from_world, best);
+    misfits.push_back(best.misfit);
+    for (const auto& [id, circle] : LayoutOf(*hypothesis))
+      out.circles.insert({id, {best(circle.center), best.scale * circle.radius}});
+  }
+  if (!misfits.empty()) {
+    const auto middle = misfits.begin() + static_cast<std::ptrdiff_t>(misfits.size() / 2);
+    std::nth_element(misfits.begin(), middle, misfits.end());
+    out.misfit = *middle;
+  }
+  return out;
+}
+
+}  // namespace circline

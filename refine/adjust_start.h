@@ -1,0 +1,81 @@
+// Where a joint adjustment of many photos starts: the focal length that most of them agree on, a
+// pose for each, and their circles in one world. Internal: not installed.
+#ifndef CIRCLINE_REFINE_ADJUST_START_H_
+#define CIRCLINE_REFINE_ADJUST_START_H_
+
+#include <Eigen/Core>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/observations.h"
+#include "circline/estimators/point_noise.h"
+#include "circline/estimators/pose.h"
+#include "circline/refine/adjust_photos.h"
+
+namespace circline {
+
+// Calls work(0) .. work(count - 1) on so many threads.
+void ParallelFor(int count, int num_threads, const std::function<void(int)>& work);
+
+// Photos as they are refined: fitted, resolved (ResolveWorld), with the noise of their points.
+struct PreparedPhoto {
+  Observations observations;
+  PointNoise noise;
+};
+// All fits anew, through this camera.
+PreparedPhoto Prepare(const Observations& given, const Camera& camera, const NoiseModel& noise);
+
+// How badly the best pose of a photo explains it through this camera: the robust cost after a few
+// steps from the best closed form, half of chi^2; that of the points in `noise`. Infinity where
+// there is none.
+double CoarseCost(const PreparedPhoto& photo, const PointNoise& noise,
+                  const EstimationOptions& options);
+
+// Cameras that might have taken some photos, by how well these are explained.
+class CameraSweep {
+ public:
+  // `given`: the camera that the photos come with. All outlive it.
+  CameraSweep(std::vector<const Observations*> photos, const Camera& given,
+              const EstimationOptions& options, int num_threads);
+  // CoarseCost of all photos, none counted for more than being hopeless.
+  std::vector<double> CostsAt(const std::vector<Camera>& cameras);
+  // Up to three to start from, the best first: the minima over a grid of focal lengths, as far as
+  // the prior reaches, and (with has_radial) of the first distortion coefficient. Empty where no
+  // photo gives a pose at any.
+  std::vector<Camera> Candidates(double log_focal_sigma, bool has_radial);
+
+ private:
+  std::vector<const Observations*> photos_;
+  const Camera& given_;
+  const EstimationOptions& options_;
+  int num_threads_;
+  std::vector<PointNoise> noise_;  // Through the camera given.
+  std::vector<double> least_;      // By photo, of all costs so far.
+};
+
+// A circle in the world's plane.
+struct PlaneCircle {
+  Eigen::Vector2d center = Eigen::Vector2d::Zero();
+  double radius = 1.0;
+};
+using Layout = std::map<std::string, PlaneCircle>;  // By id.
+
+// A hypothesis' circles in its own plane.
+Layout LayoutOf(const PoseHypothesis& hypothesis);
+
+// The layout that photos share by their circles' ids, in the frame and unit of the photo that sees
+// most of it, and the pose of each in that frame.
+struct SharedLayout {
+  Layout circles;
+  std::vector<CameraPose> poses;
+  std::vector<bool> placed;  // False: shares too few circles with the others, or contradicts them.
+  int reference = -1;        // That photo.
+  double misfit = 0.0;       // Median distance of circles from their place, radii.
+};
+SharedLayout AlignLayouts(const std::vector<PoseEstimate>& estimates);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_ADJUST_START_H_
