@@ -73,6 +73,7 @@ class AdjustProblem {
   // Zero rows where a shift is held.
   Eigen::Matrix<double, kCameraSize, kCameraSize> CameraCovariance(int camera) const;
 
+  bool IsUsed(int camera) const;  // By a photo that takes part; else there is nothing to ask of it.
   Camera CameraAt(int camera) const;
   CameraPose PoseAt(int photo) const;
   // Sum of squares of the inlier residuals of a photo, pixels, and how many.

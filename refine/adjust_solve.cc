@@ -206,9 +206,16 @@ Eigen::Matrix<double, kCameraSize, kCameraSize> AdjustProblem::CameraCovariance(
   return covariance;
 }
 
+bool AdjustProblem::IsUsed(int camera) const {
+  return std::any_of(photos_.begin(), photos_.end(), [&](const AdjustInput& photo) {
+    return photo.camera == camera && photo.takes_part;
+  });
+}
+
 Camera AdjustProblem::CameraAt(int camera) const {
-  const auto member = std::find_if(photos_.begin(), photos_.end(),
-                                   [&](const AdjustInput& photo) { return photo.camera == camera; });
+  const auto member = std::find_if(photos_.begin(), photos_.end(), [&](const AdjustInput& photo) {
+    return photo.camera == camera && photo.takes_part;
+  });
   return ShiftedCamera(member->observations->camera, cameras_[static_cast<std::size_t>(camera)]);
 }
 

@@ -62,8 +62,8 @@ int NumImpossible(const Observations& observations) {
 
 }  // namespace
 
-double CoarseCost(const PreparedPhoto& photo, const PointNoise& noise,
-                  const EstimationOptions& options) {
+double CoarsePose(const PreparedPhoto& photo, const PointNoise& noise,
+                  const EstimationOptions& options, PoseEstimate* estimate) {
   constexpr int kIterations = 3;
   constexpr double kImpossible = 0.5 * kInlierSigmas * kInlierSigmas;  // As an outlier.
   const double impossible = kImpossible * NumImpossible(photo.observations);
@@ -82,7 +82,14 @@ double CoarseCost(const PreparedPhoto& photo, const PointNoise& noise,
     least = cost;
     best = state;
   }
+  if (estimate != nullptr)
+    estimate->status = Status::Refused("no closed form leads to a pose that can be refined");
   if (!std::isfinite(least) || !problem.Solve(kIterations, &best).ok()) return least + impossible;
+  Refined refined;
+  if (estimate != nullptr && FillRefined(problem, best, &refined).ok()) {
+    estimate->status = Status::Ok();
+    estimate->hypotheses = {std::move(refined.hypothesis)};
+  }
   return best.cost + LeftOutCost(problem, best) + impossible;
 }
 
@@ -105,8 +112,8 @@ std::vector<double> CameraSweep::CostsAt(const std::vector<Camera>& cameras) {
   ParallelFor(static_cast<int>(photos_.size()), num_threads_, [&](int i) {
     const auto index = static_cast<std::size_t>(i);
     for (const Camera& camera : cameras) {
-      costs[index].push_back(CoarseCost(Prepare(*photos_[index], camera, options_.noise_model),
-                                        noise_[index], options_));
+      costs[index].push_back(CoarsePose(Prepare(*photos_[index], camera, options_.noise_model),
+                                        noise_[index], options_, nullptr));
       least_[index] = std::min(least_[index], costs[index].back());
     }
   });

@@ -27,11 +27,11 @@ struct PreparedPhoto {
 // All fits anew, through this camera.
 PreparedPhoto Prepare(const Observations& given, const Camera& camera, const NoiseModel& noise);
 
-// How badly the best pose of a photo explains it through this camera: the robust cost after a few
-// steps from the best closed form, half of chi^2; that of the points in `noise`. Infinity where
-// there is none.
-double CoarseCost(const PreparedPhoto& photo, const PointNoise& noise,
-                  const EstimationOptions& options);
+// A pose of a photo after a few steps from the best closed form, and how badly it explains the
+// photo: the robust cost, half of chi^2, that of the points in `noise`; infinity where there is
+// none. `estimate` may be null.
+double CoarsePose(const PreparedPhoto& photo, const PointNoise& noise,
+                  const EstimationOptions& options, PoseEstimate* estimate);
 
 // Cameras that might have taken some photos, by how well these are explained.
 class CameraSweep {
@@ -39,7 +39,7 @@ class CameraSweep {
   // `given`: the camera that the photos come with. All outlive it.
   CameraSweep(std::vector<const Observations*> photos, const Camera& given,
               const EstimationOptions& options, int num_threads);
-  // CoarseCost of all photos, none counted for more than being hopeless.
+  // Of CoarsePose, all photos, none counted for more than being hopeless.
   std::vector<double> CostsAt(const std::vector<Camera>& cameras);
   // Up to three to start from, the best first: the minima over a grid of focal lengths, as far as
   // the prior reaches, and (with has_radial) of the first distortion coefficient. Empty where no
