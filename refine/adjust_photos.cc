@@ -90,6 +90,13 @@ Shifts ShiftsBetween(const Camera& from, const Camera& to) {
   return shifts;
 }
 
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 // A whole run: the input, and where it stands.
 class Adjustment {
  public:
@@ -119,6 +126,7 @@ class Adjustment {
   Status Start();
   Status StartHere();
   bool PlaceWorlds();
+  void ShareWorld(const SharedLayout& shared, bool by_id);
   void SolveWithoutGross();
   bool HasMoved() const;
   void SeeAnew();
@@ -277,29 +285,37 @@ bool Adjustment::PlaceWorlds() {
     inputs_[i].layout = &layouts_[i + 1];
   }
   if (!any || options_.rigid == RigidWorld::kNo) return any;
-  const SharedLayout shared = AlignLayouts(estimates_);
   const auto with_pose = std::count_if(inputs_.begin(), inputs_.end(),
                                        [](const AdjustInput& input) { return input.takes_part; });
-  const auto placed = std::count(shared.placed.begin(), shared.placed.end(), true);
-  const bool alike = placed > 1 && shared.misfit < kAlike &&
-                     static_cast<double>(placed) >= kMostPhotos * static_cast<double>(with_pose);
-  out_.rigid = alike || options_.rigid == RigidWorld::kYes;
-  if (!out_.rigid) return true;
-  layouts_[0] = shared.circles;
-  for (std::size_t i = 0; i < given_.size(); ++i) {
-    if (!inputs_[i].takes_part) continue;
-    if (!shared.placed[i]) {
-      inputs_[i].takes_part = false;
-      out_.photos[i].status = Status::Refused(
-          "its circles do not lie as those of the same id in the other photos, or it has fewer "
-          "than two of them");
-      continue;
-    }
-    inputs_[i].world = 0;
-    inputs_[i].pose = shared.poses[i];
-    inputs_[i].layout = &layouts_[0];
+  for (const bool by_id : {true, false}) {
+    const SharedLayout shared = AlignLayouts(estimates_, by_id);
+    const auto placed = std::count(shared.placed.begin(), shared.placed.end(), true);
+    const bool alike = placed > 1 && shared.misfit < kAlike &&
+                       static_cast<double>(placed) >= kMostPhotos * static_cast<double>(with_pose);
+    out_.rigid = alike || (by_id && options_.rigid == RigidWorld::kYes);
+    if (!out_.rigid) continue;
+    ShareWorld(shared, by_id);
+    break;
   }
   return true;
+}
+
+void Adjustment::ShareWorld(const SharedLayout& shared, bool by_id) {
+  layouts_[0] = shared.circles;
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    AdjustInput& input = inputs_[i];
+    if (!input.takes_part) continue;
+    if (!shared.placed[i]) {
+      input.takes_part = false;
+      out_.photos[i].status = Status::Refused(
+          "its circles do not lie as those of the other photos, or it has too few of them");
+      continue;
+    }
+    input.world = 0;
+    input.pose = shared.poses[i];
+    input.layout = &layouts_[0];
+    input.names = by_id ? std::map<std::string, std::string>() : shared.names[i];
+  }
 }
 
 // From wide losses to narrow ones, the camera's coarse parameters first.
@@ -320,34 +336,39 @@ void Adjustment::SolveOnce(int rounds) {
 
 // Photos, then features, that contradict the rest as a whole. True where there were any.
 bool Adjustment::LeaveOut() {
-  constexpr double kGross = 10.0;  // Of the median photo's misfit, and of what is expected.
+  constexpr double kGross = 10.0;         // A photo, of the median one's misfit or what is expected.
+  constexpr double kGrossFeature = 30.0;  // A feature: p = 1e-7 for one degree of freedom.
   problem_->Judge();
   std::vector<double> misfits;
   for (std::size_t i = 0; i < given_.size(); ++i) {
     if (!inputs_[i].takes_part) continue;
-    double chi2 = 0.0;
-    int rows = 0;
+    std::vector<double> own;
     for (const AdjustProblem::Feature& feature : problem_->features()) {
-      if (feature.photo != static_cast<int>(i) || !feature.active) continue;
-      chi2 += feature.chi2;
-      rows += feature.rows;
+      if (feature.photo == static_cast<int>(i) && feature.active && feature.rows > 0)
+        own.push_back(feature.chi2 / feature.rows);
     }
-    out_.photos[i].misfit = rows > 0 ? chi2 / rows : 0.0;
+    out_.photos[i].misfit = Median(std::move(own));
     misfits.push_back(out_.photos[i].misfit);
   }
-  std::nth_element(misfits.begin(), misfits.begin() + static_cast<std::ptrdiff_t>(misfits.size() / 2),
-                   misfits.end());
-  const double most = kGross * std::max(1.0, misfits[misfits.size() / 2]);
+  const double median = Median(misfits), common = std::max(1.0, median);
   bool any = false;
   for (std::size_t i = 0; i < given_.size(); ++i) {
-    if (!inputs_[i].takes_part || !(out_.photos[i].misfit > most)) continue;
+    if (!inputs_[i].takes_part || !(out_.photos[i].misfit > kGross * common)) continue;
     any = true;
     inputs_[i].takes_part = false;
     char text[120];
     std::snprintf(text, sizeof(text),
                   "it contradicts the other photos: misfit %.3g, theirs %.3g (1 expected)",
-                  out_.photos[i].misfit, misfits[misfits.size() / 2]);
+                  out_.photos[i].misfit, median);
     out_.photos[i].status = Status::Refused(text);
+  }
+  for (const AdjustProblem::Feature& feature : problem_->features()) {
+    const auto i = static_cast<std::size_t>(feature.photo);
+    if (!inputs_[i].takes_part || !feature.active || !(feature.chi2 > kGrossFeature * common))
+      continue;
+    any = true;
+    inputs_[i].left_out.insert(feature.id);
+    out_.photos[i].left_out.push_back(feature.id);
   }
   return any;
 }

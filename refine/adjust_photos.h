@@ -37,7 +37,7 @@ struct AdjustOptions {
   // Distortion coefficients that are estimated, about those of the camera: so many radial ones, the
   // first of the model (0 to 3; fisheye 0 to 4), each with the prior k1 has; none of them where
   // that is 0. A pinhole camera has none: make it kOpenCV with zeros to estimate them.
-  int num_radial = 2;
+  int num_radial = 3;
   bool tangential = false;  // p1 and p2, kOpenCV only; standard deviation 0.01.
   RigidWorld rigid = RigidWorld::kAuto;
   int max_iterations = 100;  // Of the joint problem, each time it is solved; 1 or more.

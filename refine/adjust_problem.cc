@@ -49,7 +49,8 @@ void AdjustProblem::AddPrior(ceres::CostFunction* cost, std::vector<double*> blo
 
 void AdjustProblem::AddFeature(int photo, const std::string& id, const std::string& name,
                                std::unique_ptr<FeatureCost> cost, std::vector<double*> blocks) {
-  features_.push_back({photo, id, name, cost.get(), std::move(blocks)});
+  const bool active = photos_[static_cast<std::size_t>(photo)].left_out.count(id) == 0;
+  features_.push_back({photo, id, name, cost.get(), std::move(blocks), active});
   costs_.push_back(std::move(cost));
 }
 
@@ -140,14 +141,17 @@ bool AdjustProblem::Points(int photo, const std::vector<Eigen::Vector2d>& pixels
   return (*points)->size() >= (is_circle ? 5U : 2U);
 }
 
-AdjustProblem::Circle* AdjustProblem::CircleOf(int world, const CircleObservation& circle,
-                                               const Layout& layout) {
-  const auto known = circles_.find({world, circle.id});
+AdjustProblem::Circle* AdjustProblem::CircleOf(const AdjustInput& input,
+                                               const CircleObservation& circle) {
+  const int world = input.world;
+  const auto name = input.names.find(circle.id);
+  const std::string& id = name != input.names.end() ? name->second : circle.id;
+  const auto known = circles_.find({world, id});
   if (known != circles_.end()) return &known->second;
-  const auto start = layout.find(circle.id);
-  if (start == layout.end()) return nullptr;
+  const auto start = input.layout->find(id);
+  if (start == input.layout->end()) return nullptr;
   const NoiseModel& model = options_.noise_model;
-  Circle made{circle.id, world};
+  Circle made{id, world};
   double*& center = circle.concentric.empty() ? made.center : centers_[{world, circle.concentric}];
   const Eigen::Vector2d& at = start->second.center;
   if (center == nullptr) center = NewBlock(2, {at.x(), at.y()});
@@ -164,7 +168,7 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(int world, const CircleObservatio
     has_scale_[world] = metric_ = true;
   }
   if (model.circle_tilt_rad > 0.0 || model.circle_height > 0.0) made.tilt = NewBlock(3, {});
-  return &(circles_[{world, circle.id}] = made);
+  return &(circles_[{world, id}] = made);
 }
 
 // Contours of one contrast share an offset, in each photo its own.
@@ -184,7 +188,7 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle, double
   const AdjustInput& input = photos_[i];
   std::unique_ptr<ImagePoints> points;
   if (!Points(photo, circle.points, circle.inliers, sigma_px, true, &points)) return;
-  const Circle* made = CircleOf(input.world, circle, *input.layout);
+  const Circle* made = CircleOf(input, circle);
   if (made == nullptr) return;
   const NoiseModel& model = options_.noise_model;
   PlaneCircleContourCost::Blocks with;
@@ -212,7 +216,9 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle, double
 double* AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   constexpr double kAlong = 0.98;  // Cosine: it is that axis, not one turned against it.
   const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
-  double*& block = directions_[{input.world, pencil.id}];
+  const std::string id =
+      input.names.empty() ? pencil.id : std::to_string(photo) + ":" + pencil.id;
+  double*& block = directions_[{input.world, id}];
   if (block != nullptr) return block;
   const double sigma = std::max(options_.noise_model.pencil_axis_rad, 1e-6);
   Eigen::Vector3d d = input.pose.rotation.transpose() * pencil.fit->direction;

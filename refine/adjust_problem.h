@@ -12,6 +12,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,9 @@ struct AdjustInput {
   int world = 0;                // Photos of one world share circles and pencils of one id.
   CameraPose pose;              // To start from, of that world.
   const Layout* layout = nullptr;  // Circles of that world.
+  // What the world calls its circles, by own id; empty: the same. Pencils are then its own, too.
+  std::map<std::string, std::string> names;
+  std::set<std::string> left_out;  // Ids of features that have no part in it.
   bool takes_part = true;
 };
 
@@ -108,7 +112,7 @@ class AdjustProblem {
   void AddPhoto(int photo);
   void SetGauge();
   void AddCircle(int photo, const CircleObservation& circle, double sigma_px);
-  Circle* CircleOf(int world, const CircleObservation& circle, const Layout& layout);
+  Circle* CircleOf(const AdjustInput& input, const CircleObservation& circle);
   double* OffsetOf(int photo, const CircleObservation& circle);
   void AddPencil(int photo, std::size_t pencil);
   double* DirectionOf(int photo, const PencilObservation& pencil);

@@ -65,16 +65,19 @@ using Layout = std::map<std::string, PlaneCircle>;  // By id.
 // A hypothesis' circles in its own plane.
 Layout LayoutOf(const PoseHypothesis& hypothesis);
 
-// The layout that photos share by their circles' ids, in the frame and unit of the photo that sees
-// most of it, and the pose of each in that frame.
+// The layout that photos share, in the frame and unit of the photo that sees most of it, and the
+// pose of each in that frame.
 struct SharedLayout {
   Layout circles;
   std::vector<CameraPose> poses;
   std::vector<bool> placed;  // False: shares too few circles with the others, or contradicts them.
-  int reference = -1;        // That photo.
-  double misfit = 0.0;       // Median distance of circles from their place, radii.
+  std::vector<std::map<std::string, std::string>> names;  // By photo: own id to the shared one.
+  double misfit = 0.0;  // Median distance of circles from their place, radii.
 };
-SharedLayout AlignLayouts(const std::vector<PoseEstimate>& estimates);
+// Circles are the same where their ids are; or, without `by_id`, where they lie alike: a pattern of
+// circles and sizes that both have, be it a lattice or not. (Of a lattice seen in part that is one
+// of several ways, which fit alike.)
+SharedLayout AlignLayouts(const std::vector<PoseEstimate>& estimates, bool by_id);
 
 }  // namespace circline
 

@@ -17,7 +17,7 @@
 #include "circline/refine/adjust_photos.h"
 
 DEFINE_string(model, "opencv", "Camera model: pinhole, opencv or fisheye.");
-DEFINE_string(fix, "k3,tangential,aspect",
+DEFINE_string(fix, "tangential,aspect",
               "What is not estimated, of: principal_point, aspect, k1, k2, k3, tangential; a list, "
               "or nothing.");
 DEFINE_string(rigid, circline::RigidWorldName(circline::AdjustOptions().rigid),
