@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <map>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 
@@ -107,6 +108,65 @@ std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<Scen
   return runs;
 }
 
+struct Calibration {
+  std::vector<Observations> photos;
+  std::vector<std::string> names;   // Of the photos.
+  std::vector<std::string> errors;  // Photos that could not be read.
+  AdjustedPhotos adjusted;
+};
+
+Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
+                     Calibration* calibration) {
+  *calibration = Calibration();
+  std::vector<ImageRun> runs = ObserveAll(options->compare, images);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (!runs[i].read_error.empty()) {
+      calibration->errors.push_back((*images)[i].path + ": " + runs[i].read_error);
+      continue;
+    }
+    calibration->photos.push_back(std::move(runs[i].observations));
+    calibration->photos.back().camera.model = options->model;
+    calibration->names.push_back((*images)[i].name);
+  }
+  if (calibration->photos.empty()) return Status::Failed("no photo could be read");
+  const EstimationOptions& estimation = options->compare.losses.front().estimation;
+  CameraSigma sigma = UnknownCamera(calibration->photos.front().camera);
+  if (estimation.camera_sigma) sigma.log_focal = estimation.camera_sigma->log_focal;
+  if (options->fix_principal_point) sigma.principal_point_px = 0.0;
+  constexpr double kAspect = 0.02;  // Analogue video's.
+  if (options->free_aspect) sigma.log_aspect = kAspect;
+  options->adjust.camera_sigma = sigma;
+  calibration->adjusted = AdjustPhotos(calibration->photos, options->adjust);
+  return calibration->adjusted.status;
+}
+
+// What belongs together on a photo is judged through its camera: photos in which everything is
+// detected are looked at again through the camera that they have led to.
+Status CalibrateInPasses(CalibrateOptions* options, std::vector<SceneImage>* images,
+                         Calibration* calibration) {
+  constexpr int kPasses = 3;
+  constexpr double kSame = 0.02;  // Of log f.
+  const bool detects = std::any_of(images->begin(), images->end(),
+                                   [](const SceneImage& image) { return image.detect_everything; });
+  for (int pass = 0;; ++pass) {
+    const Status status = CalibrateOnce(options, images, calibration);
+    if (!status.ok() || !detects || pass + 1 == kPasses) return status;
+    bool same = true;
+    std::map<std::string, Camera> found;
+    for (const AdjustedCamera& made : calibration->adjusted.cameras)
+      found[made.camera.id] = made.camera;
+    for (SceneImage& image : *images) {
+      Camera& camera = image.observations.camera;
+      const auto now = found.find(camera.id);
+      if (now == found.end()) continue;
+      same = same && std::abs(std::log(now->second.fx / camera.fx)) < kSame;
+      camera = now->second;
+    }
+    if (same) return status;
+    options->compare.inputs.guess = CameraGuess();  // It has served.
+  }
+}
+
 int Calibrate() {
   CalibrateOptions options;
   ImageSet set;
@@ -123,34 +183,18 @@ int Calibrate() {
       camera.distortion = {};
     }
   }
-  std::vector<ImageRun> runs = ObserveAll(options.compare, &images);
-  int exit_code = kExitOk;
-  std::vector<Observations> photos;
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    if (!runs[i].read_error.empty()) {
-      SayOnStderr(images[i].path + ": " + runs[i].read_error);
-      exit_code = kExitUnreadable;
-      continue;
-    }
-    photos.push_back(std::move(runs[i].observations));
-    photos.back().camera.model = options.model;
-    names.push_back(images[i].name);
-  }
-  if (photos.empty()) return Refuse(Status::Failed("no photo could be read"));
-  const EstimationOptions& estimation = options.compare.losses.front().estimation;
-  CameraSigma sigma = UnknownCamera(photos.front().camera);
-  if (estimation.camera_sigma) sigma.log_focal = estimation.camera_sigma->log_focal;
-  if (options.fix_principal_point) sigma.principal_point_px = 0.0;
-  if (options.free_aspect) sigma.log_aspect = 0.02;
-  options.adjust.camera_sigma = sigma;
-  const AdjustedPhotos adjusted = AdjustPhotos(photos, options.adjust);
-  if (!adjusted.status.ok()) return Refuse(adjusted.status);
-  status = CreateFolder(options.compare.output);
-  if (status.ok()) status = WriteCalibration(adjusted, photos, names, options.compare.output);
+  Calibration calibration;
+  status = CalibrateInPasses(&options, &images, &calibration);
+  for (const std::string& error : calibration.errors) SayOnStderr(error);
   if (!status.ok()) return Refuse(status);
-  std::cout << CalibrationTable(adjusted, names);
-  return exit_code;
+  status = CreateFolder(options.compare.output);
+  if (status.ok()) {
+    status = WriteCalibration(calibration.adjusted, calibration.photos, calibration.names,
+                              options.compare.output);
+  }
+  if (!status.ok()) return Refuse(status);
+  std::cout << CalibrationTable(calibration.adjusted, calibration.names);
+  return calibration.errors.empty() ? kExitOk : kExitUnreadable;
 }
 
 }  // namespace
