@@ -172,10 +172,11 @@ Eigen::Matrix<double, kCameraSize, kCameraSize> AdjustProblem::CameraCovariance(
   ceres::CRSMatrix crs;
   ceres::Problem::EvaluateOptions evaluate;
   evaluate.apply_loss_function = false;  // A prior that is mostly exact counts as its Gaussian.
-  problem.GetParameterBlocks(&evaluate.parameter_blocks);
-  auto& order = evaluate.parameter_blocks;
-  const auto is_held = [&](double* block) { return problem.IsParameterBlockConstant(block); };
-  order.erase(std::remove_if(order.begin(), order.end(), is_held), order.end());
+  std::vector<double*>& order = evaluate.parameter_blocks;
+  for (const auto& block : values_) {  // As they were made, not by address: the same bits out.
+    double* const at = const_cast<double*>(block.data());
+    if (problem.HasParameterBlock(at) && !problem.IsParameterBlockConstant(at)) order.push_back(at);
+  }
   const auto own = std::find(order.begin(), order.end(), values);
   const bool is_estimated = own != order.end();
   if (is_estimated) std::rotate(own, own + 1, order.end());

@@ -1,0 +1,238 @@
+// Many photos: the camera comes out on its stated uncertainty, whatever is known of the layout;
+// what contradicts the rest is left out; what the photos cannot tell is said.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "circline/refine/adjust_photos.h"
+#include "tests/plane_scene.h"
+#include "tests/trials.h"
+
+namespace circline {
+namespace {
+
+constexpr double kSigmaPx = 0.2, kMistake = 1.5;
+
+class Photos {
+ public:
+  explicit Photos(int count, std::uint64_t seed = 1, double tilt = 0.6)
+      : scene_(0.0, kSigmaPx, seed) {
+    scene_.camera.id = "cam";
+    scene_.camera.fy = scene_.camera.fx;
+    scene_.camera.distortion = {-0.2, 0.05};
+    for (int i = 0; i < count; ++i) {
+      const double turn = 6.283185307179586 * i / count;
+      scene_.pose.rotation = ExpRotation(tilt * Eigen::Vector3d(std::cos(turn), std::sin(turn), 0.0)) *
+                             ExpRotation({0.0, 0.0, 0.4 * i}) *
+                             Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+      scene_.pose.translation = {1.5 * std::sin(2.0 * turn), 1.2 * std::cos(3.0 * turn), 9.0};
+      poses.push_back(scene_.pose);
+      photos.push_back(Guessed());
+    }
+  }
+
+  // Nine circles of the sheet, not quite in a lattice.
+  Photos& WithCircles() {
+    for (std::size_t i = 0; i < photos.size(); ++i) {
+      scene_.pose = poses[i];
+      for (int k = 0; k < 9; ++k) {
+        const double x = 2.0 * (k % 3 - 1) + 0.1 * (k % 2), y = 1.6 * (k / 3 - 1) - 0.07 * (k % 4);
+        photos[i].circles.push_back(scene_.Circle("c" + std::to_string(k), x, y, 0.5));
+      }
+    }
+    return *this;
+  }
+  Photos& WithPencils() {
+    for (std::size_t i = 0; i < photos.size(); ++i) {
+      scene_.pose = poses[i];
+      photos[i].pencils = {scene_.Pencil("rows", PencilDirection::kX, {1.0, 0.0, 0.0}, 4, 30),
+                           scene_.Pencil("columns", PencilDirection::kY, {0.0, 1.0, 0.0}, 4, 30)};
+    }
+    return *this;
+  }
+  const Camera& truth() const { return scene_.camera; }
+
+  std::vector<CameraPose> poses;
+  std::vector<Observations> photos;
+
+ private:
+  Observations Guessed() const {
+    Observations observations = scene_.Empty();
+    Camera& camera = observations.camera;
+    camera.fx = camera.fy = kMistake * scene_.camera.fx;
+    camera.cx = 0.5 * (camera.width - 1);
+    camera.cy = 0.5 * (camera.height - 1);
+    camera.distortion = {};
+    return observations;
+  }
+
+  PlaneScene scene_;
+};
+
+AdjustOptions PointNoiseOnly() {
+  AdjustOptions options;
+  options.noise_model = NoiseModel::Exact();
+  options.num_radial = 2;
+  return options;
+}
+
+// Of log f, principal point, k1, k2: in standard deviations squared, 5 expected.
+double Nees(const AdjustedCamera& made, const Camera& truth) {
+  constexpr int kShifts[] = {0, 2, 3, 4, 5};
+  Eigen::Matrix<double, 5, 5> covariance;
+  for (int i = 0; i < 5; ++i) {
+    for (int j = 0; j < 5; ++j)
+      covariance(i, j) =
+          made.covariance[static_cast<std::size_t>(kShifts[i] * kCameraSize + kShifts[j])];
+  }
+  Eigen::Matrix<double, 5, 1> error;
+  error << std::log(made.camera.fx / truth.fx), made.camera.cx - truth.cx,
+      made.camera.cy - truth.cy, made.camera.distortion[0] - truth.distortion[0],
+      made.camera.distortion[1] - truth.distortion[1];
+  return error.dot(covariance.inverse() * error);
+}
+
+TEST(AdjustPhotos, CameraComesOutWithinItsSigma) {
+  const int trials = Trials(20);
+  for (const RigidWorld rigid : {RigidWorld::kAuto, RigidWorld::kNo}) {
+    double sum = 0.0;
+    for (int trial = 0; trial < trials; ++trial) {
+      const Photos sheet = Photos(6, 10 + trial).WithCircles();
+      AdjustOptions options = PointNoiseOnly();
+      options.rigid = rigid;
+      const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
+      ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+      EXPECT_EQ(adjusted.rigid, rigid == RigidWorld::kAuto);
+      const AdjustedCamera& made = adjusted.cameras.front();
+      EXPECT_EQ(made.num_photos, 6);
+      EXPECT_LT(std::abs(made.camera.fx / sheet.truth().fx - 1.0), 0.02);
+      sum += Nees(made, sheet.truth()) / 5.0;
+    }
+    if (kSanitized) continue;
+    EXPECT_GT(sum / trials, 0.6) << RigidWorldName(rigid);  // 0.68 to 1.38 in 95 % of runs.
+    EXPECT_LT(sum / trials, 1.45) << RigidWorldName(rigid);
+  }
+}
+
+TEST(AdjustPhotos, OneWorldSaysMoreThanOneForEachPhoto) {
+  const Photos sheet = Photos(6).WithCircles();
+  AdjustOptions options = PointNoiseOnly();
+  const AdjustedPhotos together = AdjustPhotos(sheet.photos, options);
+  options.rigid = RigidWorld::kNo;
+  const AdjustedPhotos apart = AdjustPhotos(sheet.photos, options);
+  ASSERT_TRUE(together.status.ok() && apart.status.ok());
+  EXPECT_LT(together.cameras[0].Sigma(0), 0.7 * apart.cameras[0].Sigma(0));
+}
+
+// Ids that mean nothing: the circles are the same where they lie alike.
+TEST(AdjustPhotos, CirclesAreMatchedByHowTheyLie) {
+  Photos sheet = Photos(6).WithCircles();
+  const AdjustedPhotos named = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  for (std::size_t i = 0; i < sheet.photos.size(); ++i) {
+    std::vector<CircleObservation>& circles = sheet.photos[i].circles;
+    for (std::size_t k = 0; k < circles.size(); ++k)
+      circles[k].id = "d" + std::to_string((k * 4 + i) % circles.size());
+  }
+  const AdjustedPhotos found = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  ASSERT_TRUE(named.status.ok() && found.status.ok());
+  EXPECT_TRUE(found.rigid);
+  EXPECT_EQ(found.circles.size(), 9U);
+  EXPECT_NEAR(found.cameras[0].camera.fx, named.cameras[0].camera.fx, 1e-2);
+  EXPECT_NEAR(found.cameras[0].Sigma(0), named.cameras[0].Sigma(0), 1e-5);
+}
+
+TEST(AdjustPhotos, RowsAndColumnsOfUnknownSpacingSuffice) {
+  const Photos board = Photos(8).WithPencils();
+  const AdjustedPhotos adjusted = AdjustPhotos(board.photos, PointNoiseOnly());
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedCamera& made = adjusted.cameras.front();
+  EXPECT_LT(std::abs(std::log(made.camera.fx / board.truth().fx)), 4.0 * made.Sigma(0));
+  EXPECT_LT(made.Sigma(0), 0.02);
+}
+
+TEST(AdjustPhotos, AKnownRadiusMakesItMetric) {
+  Photos sheet = Photos(5).WithCircles();
+  for (Observations& photo : sheet.photos) photo.circles[4].radius = 0.05;  // A tenth.
+  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  EXPECT_TRUE(adjusted.metric);
+  for (std::size_t i = 0; i < sheet.photos.size(); ++i) {
+    // Up to where the world lies in the plane: the camera's height over it.
+    const CameraPose& pose = adjusted.photos[i].cam_from_world;
+    const CameraPose& truth = sheet.poses[i];
+    const double height = pose.rotation.col(2).dot(pose.translation);
+    EXPECT_NEAR(std::abs(height), 0.1 * std::abs(truth.rotation.col(2).dot(truth.translation)),
+                0.01);
+  }
+}
+
+TEST(AdjustPhotos, AGrossPhotoIsLeftOutAndNamed) {
+  Photos sheet = Photos(8).WithCircles();
+  for (CircleObservation& circle : sheet.photos[3].circles) {
+    for (Eigen::Vector2d& pixel : circle.points) pixel.x() = 320.0 + 0.8 * (pixel.x() - 320.0);
+  }
+  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  for (std::size_t i = 0; i < sheet.photos.size(); ++i)
+    EXPECT_EQ(adjusted.photos[i].status.ok(), i != 3) << i << adjusted.photos[i].status.message;
+  EXPECT_NE(adjusted.photos[3].status.message, "");
+  const AdjustedCamera& made = adjusted.cameras.front();
+  EXPECT_LT(std::abs(std::log(made.camera.fx / sheet.truth().fx)), 4.0 * made.Sigma(0));
+}
+
+TEST(AdjustPhotos, FrontalPhotosDoNotTellTheFocalLength) {
+  const Photos sheet = Photos(4, 1, 0.0).WithCircles();
+  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const std::vector<std::string>& unknown = adjusted.cameras.front().at_prior;
+  EXPECT_NE(std::find(unknown.begin(), unknown.end(), "focal length"), unknown.end())
+      << adjusted.cameras.front().Sigma(0);
+}
+
+TEST(AdjustPhotos, TwoCamerasAreTwo) {
+  Photos sheet = Photos(5).WithCircles(), other = Photos(5, 2).WithCircles();
+  for (Observations& photo : other.photos) {
+    photo.camera.id = "other";
+    for (CircleObservation& circle : photo.circles) {
+      for (Eigen::Vector2d& pixel : circle.points) pixel *= 1.5;  // A finer sensor.
+    }
+    photo.camera.width *= 1.5;
+    photo.camera.height *= 1.5;
+    photo.camera.cx *= 1.5;
+    photo.camera.cy *= 1.5;
+    sheet.photos.push_back(photo);
+  }
+  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  ASSERT_EQ(adjusted.cameras.size(), 2U);
+  EXPECT_NEAR(adjusted.cameras[1].camera.fx / adjusted.cameras[0].camera.fx, 1.5, 0.01);
+}
+
+TEST(AdjustPhotos, RefusesInWords) {
+  EXPECT_EQ(AdjustPhotos({}).status.code, StatusCode::kRefused);
+  Photos sheet = Photos(3).WithCircles();
+  sheet.photos[2].camera.cx += 1.0;  // The same id, another camera.
+  const AdjustedPhotos two = AdjustPhotos(sheet.photos);
+  EXPECT_EQ(two.status.code, StatusCode::kInvalidArgument);
+  EXPECT_NE(two.status.message.find("'cam'"), std::string::npos);
+  std::vector<Observations> empty = Photos(3).photos;
+  EXPECT_EQ(AdjustPhotos(empty).status.code, StatusCode::kRefused);
+  AdjustOptions options;
+  options.num_threads = 0;
+  EXPECT_EQ(AdjustPhotos(empty, options).status.code, StatusCode::kInvalidArgument);
+}
+
+TEST(AdjustPhotos, SameBitsOnOneThread) {
+  const Photos sheet = Photos(4).WithCircles();
+  const AdjustedPhotos a = AdjustPhotos(sheet.photos, PointNoiseOnly()),
+                       b = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  ASSERT_TRUE(a.status.ok());
+  EXPECT_EQ(a.cameras[0].camera.fx, b.cameras[0].camera.fx);
+  EXPECT_EQ(a.cameras[0].covariance, b.cameras[0].covariance);
+}
+
+}  // namespace
+}  // namespace circline
