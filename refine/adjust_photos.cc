@@ -445,9 +445,10 @@ void Adjustment::Report() {
     if (!inputs_[i].takes_part) continue;
     AdjustedPhoto& photo = out_.photos[i];
     photo.cam_from_world = problem_->PoseAt(static_cast<int>(i));
+    photo.residuals = problem_->Residuals(static_cast<int>(i));
+    const int count = static_cast<int>(photo.residuals.size());
     double sum = 0.0;
-    int count = 0;
-    problem_->Residuals(static_cast<int>(i), &sum, &count);
+    for (const AdjustedResidual& r : photo.residuals) sum += r.offset.squaredNorm();
     photo.rms_px = count > 0 ? std::sqrt(sum / count) : 0.0;
     squares[CameraOf(i)] += sum;
     counts[CameraOf(i)] += count;

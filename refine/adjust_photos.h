@@ -67,6 +67,11 @@ struct AdjustedCamera {
   double SigmaFocalPx() const { return camera.fx * Sigma(0); }
 };
 
+// An inlier of a contour or a line, and how far it lies from where it should.
+struct AdjustedResidual {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero(), offset = Eigen::Vector2d::Zero();
+};
+
 struct AdjustedPhoto {
   Status status;  // Not ok: it has no part in the rest, and this says why.
   int camera = 0;
@@ -74,6 +79,7 @@ struct AdjustedPhoto {
   double rms_px = 0.0;        // Of the inlier residuals, pixels.
   double misfit = 0.0;        // Mean chi^2 per degree of freedom of its features; about 1.
   std::vector<std::string> left_out;  // Features, as PoseHypothesis::left_out.
+  std::vector<AdjustedResidual> residuals;
 };
 
 // A circle of a world.

@@ -80,8 +80,7 @@ class AdjustProblem {
   bool IsUsed(int camera) const;  // By a photo that takes part; else there is nothing to ask of it.
   Camera CameraAt(int camera) const;
   CameraPose PoseAt(int photo) const;
-  // Sum of squares of the inlier residuals of a photo, pixels, and how many.
-  void Residuals(int photo, double* squares, int* count) const;
+  std::vector<AdjustedResidual> Residuals(int photo) const;  // Of the inliers.
   std::vector<AdjustedCircle> Circles() const;
   bool metric() const { return metric_; }
 

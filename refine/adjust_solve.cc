@@ -225,18 +225,38 @@ CameraPose AdjustProblem::PoseAt(int photo) const {
   return {RotationFromBlock(rotations_[i]), Eigen::Vector3d(translations_[i])};
 }
 
-void AdjustProblem::Residuals(int photo, double* squares, int* count) const {
+namespace {
+
+// Unit vectors across a curve at its points: away from the middle of a contour's, to one side of a
+// line's, as its first and last point have it.
+std::vector<Eigen::Vector2d> Across(const std::vector<Eigen::Vector2d>& pixels, bool is_line) {
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& p : pixels) middle += p / static_cast<double>(pixels.size());
+  const Eigen::Vector2d along = (pixels.back() - pixels.front()).normalized();
+  std::vector<Eigen::Vector2d> across;
+  for (const Eigen::Vector2d& p : pixels)
+    across.push_back(is_line ? Eigen::Vector2d(-along.y(), along.x()) : (p - middle).normalized());
+  return across;
+}
+
+}  // namespace
+
+std::vector<AdjustedResidual> AdjustProblem::Residuals(int photo) const {
+  std::vector<AdjustedResidual> out;
   std::vector<double> distances;
   for (const Feature& feature : features_) {
-    if (feature.photo != photo || !feature.active || feature.cost->points() == nullptr) continue;
+    const ImagePoints* points = feature.cost->points();
+    if (feature.photo != photo || !feature.active || points == nullptr) continue;
     feature.cost->Distances(feature.blocks.data(), &distances);
-    const double gate = kInlierSigmas * feature.cost->points()->options().sigma_px;
-    for (const double d : distances) {
-      if (!(std::abs(d) <= gate)) continue;
-      *squares += d * d;
-      ++*count;
+    const bool is_line = dynamic_cast<const DirectionLineCost*>(feature.cost) != nullptr;
+    const std::vector<Eigen::Vector2d> across = Across(points->pixels(), is_line);
+    const double gate = kInlierSigmas * points->options().sigma_px;
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      if (std::abs(distances[i]) <= gate)
+        out.push_back({points->pixels()[i], distances[i] * across[i]});
     }
   }
+  return out;
 }
 
 std::vector<AdjustedCircle> AdjustProblem::Circles() const {

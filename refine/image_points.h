@@ -66,6 +66,7 @@ class ImagePoints {
 
   std::size_t size() const { return points_.size(); }
   const std::vector<CalibratedPoint>& points() const { return points_; }
+  const std::vector<Eigen::Vector2d>& pixels() const { return pixels_; }  // Of the same points.
   const Options& options() const { return options_; }
   void set_weight(double weight) { options_.weight = weight; }
   // Of the kCameraSize shifts these come first and have derivatives; those of the others are zero.

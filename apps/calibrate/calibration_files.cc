@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
+#include "apps/calibrate/calibration_report.h"
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
 #include "apps/compare/export.h"
@@ -122,6 +123,7 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
   json["notes"] = adjusted.notes;
   if (status.ok()) status = WriteFile(folder + "/calibration.json", json.dump(1) + "\n");
   if (status.ok()) status = colmap->Finish();
+  if (status.ok()) status = WriteFile(folder + "/report.html", CalibrationReport(adjusted, names));
   return status;
 }
 
@@ -147,9 +149,14 @@ std::string CalibrationTable(const AdjustedPhotos& adjusted,
     if (!made.at_prior.empty())
       out << "  the photos say next to nothing of: " << JoinList(made.at_prior, ", ") << "\n";
   }
+  for (std::size_t c = 0; c < adjusted.cameras.size(); ++c) {
+    for (const std::string& sentence : Advice(adjusted, static_cast<int>(c)))
+      out << "  " << sentence << "\n";
+  }
   for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string& message = adjusted.photos[i].status.message;
     if (!adjusted.photos[i].status.ok())
-      out << names[i] << ": left out, " << adjusted.photos[i].status.message << "\n";
+      out << names[i] << ": left out, " << message.substr(0, message.find(" (")) << "\n";
   }
   return out.str();
 }

@@ -7,6 +7,7 @@
 #include <map>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
+#include <optional>
 
 #include "apps/calibrate/calibration_files.h"
 #include "apps/common/flags_util.h"
@@ -136,7 +137,15 @@ Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
   constexpr double kAspect = 0.02;  // Analogue video's.
   if (options->free_aspect) sigma.log_aspect = kAspect;
   options->adjust.camera_sigma = sigma;
+  std::optional<Progress> progress;
+  std::string stage;
+  options->adjust.progress = [&](const char* what, int done, int total) {
+    if (what != stage) progress.emplace(what, total, 0);
+    stage = what;
+    if (done > 0) progress->Advance();
+  };
   calibration->adjusted = AdjustPhotos(calibration->photos, options->adjust);
+  options->adjust.progress = nullptr;
   return calibration->adjusted.status;
 }
 
