@@ -75,9 +75,9 @@ struct AdjustedResidual {
 struct AdjustedPhoto {
   Status status;  // Not ok: it has no part in the rest, and this says why.
   int camera = 0;
-  CameraPose cam_from_world;  // Of its world; its unit is that of the world's.
-  double rms_px = 0.0;        // Of the inlier residuals, pixels.
-  double misfit = 0.0;        // Mean chi^2 per degree of freedom of its features; about 1.
+  CameraPose cam_from_world;          // Of its world; its unit is that of the world's.
+  double rms_px = 0.0;                // Of the inlier residuals, pixels.
+  double misfit = 0.0;                // Mean chi^2 per degree of freedom of its features; about 1.
   std::vector<std::string> left_out;  // Features, as PoseHypothesis::left_out.
   std::vector<AdjustedResidual> residuals;
 };

@@ -14,8 +14,7 @@
 namespace circline {
 
 AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
-                             const std::vector<CameraPrior>& priors,
-                             const AdjustOptions& options)
+                             const std::vector<CameraPrior>& priors, const AdjustOptions& options)
     : photos_(photos), options_(options) {
   for (const CameraPrior& prior : priors) {
     for (int k = 4; k < kCameraSize; ++k) {
@@ -87,8 +86,7 @@ void AdjustProblem::AddPhoto(int photo) {
   for (std::size_t k = 0; k < obs.circles.size(); ++k) {
     const CircleObservation& circle = obs.circles[k];
     if (!circle.fit || circle.plane != obs.frame.plane) continue;
-    const double stated =
-        circle.sigma_px > 0.0 ? circle.sigma_px : options_.conic_loss.scale_px;
+    const double stated = circle.sigma_px > 0.0 ? circle.sigma_px : options_.conic_loss.scale_px;
     AddCircle(photo, circle, stated > 0.0 ? stated : input.noise.circles[k]);
   }
   for (std::size_t k = 0; k < obs.pencils.size(); ++k) AddPencil(photo, k);
@@ -102,11 +100,10 @@ void AdjustProblem::SetGauge() {
   for (std::size_t i = 0; i < photos_.size(); ++i) {
     const int world = photos_[i].world;
     if (rotations_[i] == nullptr) continue;
-    const bool sees_circle =
-        std::any_of(features_.begin(), features_.end(), [&](const Feature& f) {
-          return f.photo == static_cast<int>(i) && f.blocks.size() > 1 &&
-                 f.blocks[1] == translations_[i];
-        });
+    const bool sees_circle = std::any_of(features_.begin(), features_.end(), [&](const Feature& f) {
+      return f.photo == static_cast<int>(i) && f.blocks.size() > 1 &&
+             f.blocks[1] == translations_[i];
+    });
     Block& translation = blocks_[translations_[i]];
     if (!sees_circle) {
       translation.constant = true;  // Nothing speaks of it.
@@ -119,7 +116,8 @@ void AdjustProblem::SetGauge() {
     } else {
       translation.constant = true;
     }
-    if (!x_is_fixed_[world]) blocks_[rotations_[i]].manifold = NewManifold<WorldRotationManifold>(2);
+    if (!x_is_fixed_[world])
+      blocks_[rotations_[i]].manifold = NewManifold<WorldRotationManifold>(2);
   }
 }
 
@@ -156,8 +154,8 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(const AdjustInput& input,
   const Eigen::Vector2d& at = start->second.center;
   if (center == nullptr) center = NewBlock(2, {at.x(), at.y()});
   made.center = center;
-  double*& radius = circle.radius_group.empty() ? made.radius
-                                                : radius_groups_[{world, circle.radius_group}];
+  double*& radius =
+      circle.radius_group.empty() ? made.radius : radius_groups_[{world, circle.radius_group}];
   if (radius == nullptr) radius = NewBlock(1, {start->second.radius});
   made.radius = radius;
   if (circle.radius > 0.0) {
@@ -216,8 +214,7 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle, double
 double* AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   constexpr double kAlong = 0.98;  // Cosine: it is that axis, not one turned against it.
   const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
-  const std::string id =
-      input.names.empty() ? pencil.id : std::to_string(photo) + ":" + pencil.id;
+  const std::string id = input.names.empty() ? pencil.id : std::to_string(photo) + ":" + pencil.id;
   double*& block = directions_[{input.world, id}];
   if (block != nullptr) return block;
   const double sigma = std::max(options_.noise_model.pencil_axis_rad, 1e-6);
@@ -230,8 +227,7 @@ double* AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   block = NewBlock(3, {d.x(), d.y(), d.z()}, NewManifold<ceres::SphereManifold<3>>());
   if (is_along) {
     AddPrior(NewDirectionPrior(axis, sigma), {block}, new MostlyExact);
-    x_is_fixed_[input.world] =
-        x_is_fixed_[input.world] || pencil.direction != PencilDirection::kZ;
+    x_is_fixed_[input.world] = x_is_fixed_[input.world] || pencil.direction != PencilDirection::kZ;
   } else if (pencil.direction != PencilDirection::kZ) {
     AddPrior(NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma), {block}, new MostlyExact);
   }
@@ -258,15 +254,14 @@ void AdjustProblem::AddPencil(int photo, std::size_t index) {
     DirectionLineCost::Options options;
     options.direction_sigma = options_.noise_model.line_direction_rad;
     options.camera = true;
-    auto cost =
-        std::make_unique<DirectionLineCost>(std::move(*points), line.fit->line, options);
+    auto cost = std::make_unique<DirectionLineCost>(std::move(*points), line.fit->line, options);
     double* place = NewBlock(options.direction_sigma > 0.0 ? 2 : 1, {});
     double* camera = cameras_[static_cast<std::size_t>(input.camera)];
     const std::vector<double*> blocks = {rotations_[i], direction, place, camera};
     if (!cost->Start(blocks.data(), place)) continue;
     const std::string number = std::to_string(j);
-    AddFeature(photo, pencil.id + "[" + number + "]",
-               "pencil '" + pencil.id + "', line " + number, std::move(cost), blocks);
+    AddFeature(photo, pencil.id + "[" + number + "]", "pencil '" + pencil.id + "', line " + number,
+               std::move(cost), blocks);
   }
 }
 

@@ -19,8 +19,8 @@
 #include "circline/estimators/observations.h"
 #include "circline/estimators/point_noise.h"
 #include "circline/estimators/pose.h"
+#include "circline/refine/adjust_layout.h"
 #include "circline/refine/adjust_photos.h"
-#include "circline/refine/adjust_start.h"
 #include "circline/refine/cost_functions.h"
 
 namespace circline {
@@ -30,8 +30,8 @@ struct AdjustInput {
   const Observations* observations = nullptr;  // Fitted and resolved, through the camera at start.
   PointNoise noise;
   int camera = 0;
-  int world = 0;                // Photos of one world share circles and pencils of one id.
-  CameraPose pose;              // To start from, of that world.
+  int world = 0;                   // Photos of one world share circles and pencils of one id.
+  CameraPose pose;                 // To start from, of that world.
   const Layout* layout = nullptr;  // Circles of that world.
   // What the world calls its circles, by own id; empty: the same. Pencils are then its own, too.
   std::map<std::string, std::string> names;

@@ -61,7 +61,8 @@ Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
   for (const Feature& feature : features_) feature.cost->set_weighing(weighing);
   ceres::Problem problem(NothingOwned());
   Fill(coarse ? coarse_free_ : all_free_, &problem);
-  if (problem.NumResidualBlocks() == 0) return Status::Refused("no photo has evidence in its plane");
+  if (problem.NumResidualBlocks() == 0)
+    return Status::Refused("no photo has evidence in its plane");
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = max_iterations;
@@ -193,7 +194,8 @@ Eigen::Matrix<double, kCameraSize, kCameraSize> AdjustProblem::CameraCovariance(
   if (rest > 0) {
     Sparse others = information.topLeftCorner(rest, rest);
     constexpr double kTiny = 1e-10;  // What nothing ties (one circle's spin) says nothing.
-    for (int k = 0; k < rest; ++k) others.coeffRef(k, k) = others.coeff(k, k) * (1.0 + kTiny) + kTiny;
+    for (int k = 0; k < rest; ++k)
+      others.coeffRef(k, k) = others.coeff(k, k) * (1.0 + kTiny) + kTiny;
     const Eigen::SimplicialLDLT<Sparse> factor(others);
     if (factor.info() != Eigen::Success) return covariance;
     const Eigen::MatrixXd cross = information.topRightCorner(rest, size);

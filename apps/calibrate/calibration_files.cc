@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 const char* ModelName(CameraModel model) {
-  return model == CameraModel::kPinhole ? "pinhole"
+  return model == CameraModel::kPinhole  ? "pinhole"
          : model == CameraModel::kOpenCV ? "opencv"
                                          : "fisheye";
 }
@@ -61,8 +61,9 @@ Json CameraJson(const AdjustedCamera& adjusted) {
     Json row = Json::array();
     for (int j = 0; j < kCameraSize; ++j) {
       const double both = adjusted.Sigma(i) * adjusted.Sigma(j);
-      row.push_back(both > 0.0 ? adjusted.covariance[static_cast<std::size_t>(i * kCameraSize + j)] / both
-                               : 0.0);
+      row.push_back(both > 0.0
+                        ? adjusted.covariance[static_cast<std::size_t>(i * kCameraSize + j)] / both
+                        : 0.0);
     }
     correlation.push_back(row);
   }

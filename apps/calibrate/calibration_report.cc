@@ -56,8 +56,8 @@ std::string FieldSvg(const AdjustedPhotos& adjusted, int camera) {
       }
       const Eigen::Vector2d arrow = kLonger * scale * cell.sum / cell.count;
       svg << "<line x1=\"" << px << "\" y1=\"" << py << "\" x2=\"" << px + arrow.x() << "\" y2=\""
-          << py + arrow.y() << "\" stroke=\"var(--accent)\" stroke-width=\"1.6\"/><circle cx=\"" << px
-          << "\" cy=\"" << py << "\" r=\"2\" fill=\"var(--accent)\"/>";
+          << py + arrow.y() << "\" stroke=\"var(--accent)\" stroke-width=\"1.6\"/><circle cx=\""
+          << px << "\" cy=\"" << py << "\" r=\"2\" fill=\"var(--accent)\"/>";
     }
   }
   svg << "</svg>";
@@ -68,9 +68,9 @@ struct Parameter {
   const char* name;
   int shift;
 };
-constexpr Parameter kParameters[] = {{"log f", 0}, {"log fy/fx", 1}, {"cx", 2}, {"cy", 3},
-                                     {"k1", 4},    {"k2", 5},        {"p1 (k3)", 6}, {"p2 (k4)", 7},
-                                     {"k3", 8}};
+constexpr Parameter kParameters[] = {{"log f", 0},   {"log fy/fx", 1}, {"cx", 2},
+                                     {"cy", 3},      {"k1", 4},        {"k2", 5},
+                                     {"p1 (k3)", 6}, {"p2 (k4)", 7},   {"k3", 8}};
 
 std::vector<Parameter> Estimated(const AdjustedCamera& made) {
   std::vector<Parameter> out;
@@ -89,9 +89,8 @@ std::string CorrelationTable(const AdjustedCamera& made) {
   for (const Parameter& p : rows) {
     html << "<tr><th class=\"l\">" << p.name << "</th>";
     for (const Parameter& q : rows) {
-      const double r =
-          made.covariance[static_cast<std::size_t>(p.shift * kCameraSize + q.shift)] /
-          (made.Sigma(p.shift) * made.Sigma(q.shift));
+      const double r = made.covariance[static_cast<std::size_t>(p.shift * kCameraSize + q.shift)] /
+                       (made.Sigma(p.shift) * made.Sigma(q.shift));
       html << "<td style=\"background:rgba(31,111,209," << 0.5 * std::abs(r) << ")\">"
            << FormatFixed(r, 2) << "</td>";
     }
@@ -138,8 +137,8 @@ std::string PhotoTable(const AdjustedPhotos& adjusted, const std::vector<std::st
            << "</td><td>" << photo.residuals.size() << "</td><td class=\"say\">"
            << EscapeHtml(JoinList(photo.left_out, ", ")) << "</td></tr>";
     } else {
-      html << "<td>-</td><td>-</td><td>-</td><td class=\"say\">"
-           << EscapeHtml(photo.status.message) << "</td></tr>";
+      html << "<td>-</td><td>-</td><td>-</td><td class=\"say\">" << EscapeHtml(photo.status.message)
+           << "</td></tr>";
     }
   }
   html << "</tbody></table></div>";
@@ -164,11 +163,13 @@ std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera) {
   }
   if (most_tilt < kFlat) {
     advice.push_back("Tilt the sheet more: no photo has it tilted by more than " +
-                     FormatFixed(most_tilt * kToRadians, 0) + " degrees; 30 to 50 tell the focal length best.");
+                     FormatFixed(most_tilt * kToRadians, 0) +
+                     " degrees; 30 to 50 tell the focal length best.");
   } else if (std::min(tilts.x(), tilts.y()) < 0.5 * kFlat) {
-    advice.push_back(tilts.x() < tilts.y()
-                         ? "Tilt the sheet about a vertical axis, too: all photos tilt it up or down."
-                         : "Tilt the sheet about a horizontal axis, too: all photos tilt it sideways.");
+    advice.push_back(
+        tilts.x() < tilts.y()
+            ? "Tilt the sheet about a vertical axis, too: all photos tilt it up or down."
+            : "Tilt the sheet about a horizontal axis, too: all photos tilt it sideways.");
   }
   const Field field = FieldOf(adjusted, camera);
   const char* const corners[] = {"upper left", "upper right", "lower left", "lower right"};

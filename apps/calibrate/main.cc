@@ -34,7 +34,8 @@ constexpr char kUsage[] =
     "  circline_calibrate --images='photos/*.jpg' --output=out    # nothing known\n"
     "  circline_calibrate --scene=set/scene.yaml --output=out     # annotated\n"
     "\n"
-    "Writes calibration.yml (for OpenCV and --camera), calibration.json, cameras.txt and images.txt "
+    "Writes calibration.yml (for OpenCV and --camera), calibration.json, cameras.txt and "
+    "images.txt "
     "(COLMAP) and report.html. Flags for inputs, detection and losses are those of "
     "circline_compare.\n"
     "Exit code 0: done; 1: some photo could not be read, or no camera came out; 2: unusable flags "
@@ -53,17 +54,22 @@ int Refuse(const Status& status) {
 }
 
 Status ModelFromFlag(CameraModel* model) {
-  if (FLAGS_model == "pinhole") *model = CameraModel::kPinhole;
-  else if (FLAGS_model == "opencv") *model = CameraModel::kOpenCV;
-  else if (FLAGS_model == "fisheye") *model = CameraModel::kFisheye;
-  else return Status::Invalid("--model=" + FLAGS_model + ": must be pinhole, opencv or fisheye");
+  if (FLAGS_model == "pinhole")
+    *model = CameraModel::kPinhole;
+  else if (FLAGS_model == "opencv")
+    *model = CameraModel::kOpenCV;
+  else if (FLAGS_model == "fisheye")
+    *model = CameraModel::kFisheye;
+  else
+    return Status::Invalid("--model=" + FLAGS_model + ": must be pinhole, opencv or fisheye");
   return Status::Ok();
 }
 
 Status FixFromFlag(CalibrateOptions* options) {
   const std::vector<std::string> known = {"principal_point", "aspect", "k1", "k2", "k3",
                                           "tangential"};
-  std::vector<std::string> fixed = FLAGS_fix.empty() ? std::vector<std::string>() : SplitList(FLAGS_fix);
+  std::vector<std::string> fixed =
+      FLAGS_fix.empty() ? std::vector<std::string>() : SplitList(FLAGS_fix);
   const auto has = [&](const char* name) {
     return std::find(fixed.begin(), fixed.end(), name) != fixed.end();
   };

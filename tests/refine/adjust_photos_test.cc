@@ -1,5 +1,7 @@
 // Many photos: the camera comes out on its stated uncertainty, whatever is known of the layout;
 // what contradicts the rest is left out; what the photos cannot tell is said.
+#include "circline/refine/adjust_photos.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -7,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "circline/refine/adjust_photos.h"
 #include "tests/plane_scene.h"
 #include "tests/trials.h"
 
@@ -25,9 +26,9 @@ class Photos {
     scene_.camera.distortion = {-0.2, 0.05};
     for (int i = 0; i < count; ++i) {
       const double turn = 6.283185307179586 * i / count;
-      scene_.pose.rotation = ExpRotation(tilt * Eigen::Vector3d(std::cos(turn), std::sin(turn), 0.0)) *
-                             ExpRotation({0.0, 0.0, 0.4 * i}) *
-                             Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+      scene_.pose.rotation =
+          ExpRotation(tilt * Eigen::Vector3d(std::cos(turn), std::sin(turn), 0.0)) *
+          ExpRotation({0.0, 0.0, 0.4 * i}) * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
       scene_.pose.translation = {1.5 * std::sin(2.0 * turn), 1.2 * std::cos(3.0 * turn), 9.0};
       poses.push_back(scene_.pose);
       photos.push_back(Guessed());

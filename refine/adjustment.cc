@@ -1,0 +1,166 @@
+// Solved, judged and reported.
+#include "circline/refine/adjustment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace circline {
+namespace {
+
+const char* const kShiftNames[kCameraSize] = {"focal length", "aspect", "cx", "cy", "k1", "k2",
+                                              "k3",           "k4",     "k5", "k6", "k7", "k8"};
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+// From wide losses to narrow ones, the camera's coarse parameters first.
+void Adjustment::SolveOnce(int rounds) {
+  constexpr double kWidest = 300.0, kNear = 3.0, kNarrower = 0.25;
+  constexpr int kIterations = 8;
+  std::vector<CameraPrior> priors;
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    priors.push_back(
+        {ShiftsBetween(cameras_[c], guesses_[c]), ShiftSigmas(cameras_[c], priors_[c], options_)});
+  }
+  problem_ = std::make_unique<AdjustProblem>(inputs_, priors, options_);
+  double width = std::min(problem_->LargestMiss(), kWidest);
+  for (bool first = true; width > kNear && out_.status.ok(); width *= kNarrower, first = false)
+    out_.status = problem_->Solve(width, first, kIterations);
+  if (out_.status.ok()) out_.status = problem_->Solve(1.0, false, rounds);
+}
+
+// Photos, then features, that contradict the rest as a whole. True where there were any.
+bool Adjustment::LeaveOut() {
+  constexpr double kGross = 10.0;  // A photo, of the median one's misfit or what is expected.
+  constexpr double kGrossFeature = 30.0;  // A feature: p = 1e-7 for one degree of freedom.
+  problem_->Judge();
+  std::vector<double> misfits;
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    if (!inputs_[i].takes_part) continue;
+    std::vector<double> own;
+    for (const AdjustProblem::Feature& feature : problem_->features()) {
+      if (feature.photo == static_cast<int>(i) && feature.active && feature.rows > 0)
+        own.push_back(feature.chi2 / feature.rows);
+    }
+    out_.photos[i].misfit = Median(std::move(own));
+    misfits.push_back(out_.photos[i].misfit);
+  }
+  const double median = Median(misfits), common = std::max(1.0, median);
+  bool any = false;
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    if (!inputs_[i].takes_part || !(out_.photos[i].misfit > kGross * common)) continue;
+    any = true;
+    inputs_[i].takes_part = false;
+    char text[120];
+    std::snprintf(text, sizeof(text),
+                  "it contradicts the other photos: misfit %.3g, theirs %.3g (1 expected)",
+                  out_.photos[i].misfit, median);
+    out_.photos[i].status = Status::Refused(text);
+  }
+  for (const AdjustProblem::Feature& feature : problem_->features()) {
+    const auto i = static_cast<std::size_t>(feature.photo);
+    if (!inputs_[i].takes_part || !feature.active || !(feature.chi2 > kGrossFeature * common))
+      continue;
+    any = true;
+    inputs_[i].left_out.insert(feature.id);
+    out_.photos[i].left_out.push_back(feature.id);
+  }
+  return any;
+}
+
+// Whether the photos have led to another camera than they were prepared with.
+bool Adjustment::HasMoved() const {
+  constexpr double kMoved[] = {0.005, 0.005};  // Of log f; of the first distortion coefficient.
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    if (!problem_->IsUsed(static_cast<int>(c))) continue;
+    const Shifts moved = ShiftsBetween(cameras_[c], problem_->CameraAt(static_cast<int>(c)));
+    if (std::abs(moved[0]) > kMoved[0] || std::abs(moved[4]) > kMoved[1]) return true;
+  }
+  return false;
+}
+
+// Fits, noise and robust distances are those of the camera that the photos have led to.
+void Adjustment::SeeAnew() {
+  std::vector<Layout> found(layouts_.size());
+  for (const AdjustedCircle& circle : problem_->Circles())
+    found[static_cast<std::size_t>(circle.photo + 1)][circle.id] = {circle.center.head<2>(),
+                                                                    circle.radius};
+  layouts_ = std::move(found);
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    if (problem_->IsUsed(static_cast<int>(c)))
+      cameras_[c] = problem_->CameraAt(static_cast<int>(c));
+  }
+  ParallelFor(static_cast<int>(given_.size()), options_.num_threads, [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    if (!inputs_[i].takes_part) return;
+    prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], options_.noise_model);
+    inputs_[i].noise = prepared_[i].noise;
+    inputs_[i].pose = problem_->PoseAt(index);
+    inputs_[i].layout = &layouts_[static_cast<std::size_t>(inputs_[i].world)];
+  });
+}
+
+void Adjustment::SolveWithoutGross() {
+  constexpr int kRounds = 4;
+  SolveOnce(options_.max_iterations);
+  if (start_ != nullptr) return;  // Good enough to be compared.
+  for (int round = 0; round < kRounds && out_.status.ok(); ++round) {
+    const bool moved = HasMoved(), left_out = LeaveOut();
+    if (!moved && !left_out) return;
+    SeeAnew();
+    SolveOnce(options_.max_iterations);
+  }
+}
+
+void Adjustment::Report() {
+  const double scale = std::max(1.0, problem_->Misfit());
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    AdjustedCamera made;
+    made.camera = cameras_[c];
+    if (!problem_->IsUsed(static_cast<int>(c))) {
+      out_.notes.push_back("camera '" + made.camera.id + "': no photo of it takes part");
+      out_.cameras.push_back(made);
+      continue;
+    }
+    made.camera = problem_->CameraAt(static_cast<int>(c));
+    Eigen::Map<Eigen::Matrix<double, kCameraSize, kCameraSize, Eigen::RowMajor>>(
+        made.covariance.data()) = scale * problem_->CameraCovariance(static_cast<int>(c));
+    const Shifts prior = ShiftSigmas(cameras_[c], priors_[c], options_);
+    constexpr double kNextToNothing = 0.7;  // Of the prior's standard deviation.
+    for (int k = 0; k < kCameraSize; ++k) {
+      const double sigma = prior[static_cast<std::size_t>(k)];
+      if (sigma > 0.0 && made.Sigma(k) > kNextToNothing * sigma)
+        made.at_prior.emplace_back(kShiftNames[k]);
+    }
+    out_.cameras.push_back(std::move(made));
+  }
+  std::vector<double> squares(cameras_.size(), 0.0);
+  std::vector<int> counts(cameras_.size(), 0);
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    if (!inputs_[i].takes_part) continue;
+    AdjustedPhoto& photo = out_.photos[i];
+    photo.cam_from_world = problem_->PoseAt(static_cast<int>(i));
+    photo.residuals = problem_->Residuals(static_cast<int>(i));
+    const int count = static_cast<int>(photo.residuals.size());
+    double sum = 0.0;
+    for (const AdjustedResidual& r : photo.residuals) sum += r.offset.squaredNorm();
+    photo.rms_px = count > 0 ? std::sqrt(sum / count) : 0.0;
+    squares[CameraOf(i)] += sum;
+    counts[CameraOf(i)] += count;
+    ++out_.cameras[CameraOf(i)].num_photos;
+  }
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    if (counts[c] > 0) out_.cameras[c].rms_px = std::sqrt(squares[c] / counts[c]);
+  }
+  out_.circles = problem_->Circles();
+  out_.metric = problem_->metric();
+}
+
+}  // namespace circline

@@ -1,0 +1,81 @@
+// A joint adjustment of many photos while it runs: the input, and where it stands. Internal: not
+// installed.
+#ifndef CIRCLINE_REFINE_ADJUSTMENT_H_
+#define CIRCLINE_REFINE_ADJUSTMENT_H_
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "circline/refine/adjust_layout.h"
+#include "circline/refine/adjust_photos.h"
+#include "circline/refine/adjust_problem.h"
+#include "circline/refine/adjust_start.h"
+
+namespace circline {
+
+using Shifts = std::array<double, kCameraSize>;  // In the order of camera_shifts.h.
+
+// Prior standard deviations of a camera's shifts; 0 = held.
+Shifts ShiftSigmas(const Camera& camera, const CameraSigma& prior, const AdjustOptions& options);
+// From one camera to another of its model.
+Shifts ShiftsBetween(const Camera& from, const Camera& to);
+
+class Adjustment {
+ public:
+  Adjustment(const std::vector<Observations>& photos, const AdjustOptions& options)
+      : options_(options),
+        given_(photos),
+        is_valid_(photos.size(), 0),
+        prepared_(photos.size()),
+        inputs_(photos.size()) {
+    out_.photos.resize(photos.size());
+  }
+
+  AdjustedPhotos Run() {
+    out_.status = options_.Validate();
+    if (out_.status.ok()) out_.status = FindCameras();
+    if (out_.status.ok()) out_.status = Start();
+    if (out_.status.ok()) SolveWithoutGross();
+    if (out_.status.ok()) Report();
+    return std::move(out_);
+  }
+
+ private:
+  Status FindCameras();
+  EstimationOptions PoseOptions() const;
+  void Estimate();
+  Status FindCamera(std::size_t camera);
+  Status Start();
+  Status StartHere();
+  bool PlaceWorlds();
+  void ShareWorld(const SharedLayout& shared, bool by_id);
+  void SolveWithoutGross();
+  bool HasMoved() const;
+  void SeeAnew();
+  bool LeaveOut();
+  void SolveOnce(int rounds);
+  void Report();
+  std::size_t CameraOf(std::size_t photo) const {
+    return static_cast<std::size_t>(inputs_[photo].camera);
+  }
+
+  const AdjustOptions& options_;
+  const std::vector<Observations>& given_;
+  const Camera* start_ = nullptr;  // Not null: of the only camera, which is not searched.
+  std::vector<Camera> cameras_;    // As they stand.
+  std::vector<CameraSigma> priors_;
+  std::vector<Camera> guesses_;         // As given.
+  std::vector<std::uint8_t> is_valid_;  // By photo.
+  std::vector<PreparedPhoto> prepared_;
+  std::vector<AdjustInput> inputs_;
+  std::vector<PoseEstimate> estimates_;
+  std::vector<Layout> layouts_;  // By world.
+  std::unique_ptr<AdjustProblem> problem_;
+  AdjustedPhotos out_;
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_ADJUSTMENT_H_

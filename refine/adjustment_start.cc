@@ -1,0 +1,213 @@
+// Cameras, poses and worlds to start from.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <mutex>
+
+#include "circline/refine/adjustment.h"
+
+namespace circline {
+namespace {
+
+bool IsSameCamera(const Camera& a, const Camera& b) {
+  return a.model == b.model && a.width == b.width && a.height == b.height && a.fx == b.fx &&
+         a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion;
+}
+
+}  // namespace
+
+// kOpenCV has k1 k2 p1 p2 k3, kFisheye k1 to k4.
+Shifts ShiftSigmas(const Camera& camera, const CameraSigma& prior, const AdjustOptions& options) {
+  constexpr double kTangential = 0.01;
+  Shifts sigma{};
+  sigma[0] = prior.log_focal;
+  sigma[1] = prior.log_aspect;
+  sigma[2] = sigma[3] = prior.principal_point_px;
+  if (camera.model == CameraModel::kPinhole) return sigma;
+  const bool opencv = camera.model == CameraModel::kOpenCV;
+  const std::array<std::size_t, 4> radial = {4, 5, opencv ? 8U : 6U, 7};
+  const int count = std::min(options.num_radial, opencv ? 3 : 4);
+  for (int k = 0; k < count; ++k) sigma[radial[static_cast<std::size_t>(k)]] = prior.k1;
+  if (opencv && options.tangential) sigma[6] = sigma[7] = kTangential;
+  return sigma;
+}
+
+Shifts ShiftsBetween(const Camera& from, const Camera& to) {
+  Shifts shifts{};
+  shifts[0] = std::log(to.fx / from.fx);
+  shifts[1] = std::log(to.fy / from.fy) - shifts[0];
+  shifts[2] = to.cx - from.cx;
+  shifts[3] = to.cy - from.cy;
+  for (std::size_t k = 0; k < to.distortion.size(); ++k)
+    shifts[4 + k] = to.distortion[k] - from.distortion[k];
+  return shifts;
+}
+
+Status Adjustment::FindCameras() {
+  if (given_.empty()) return Status::Refused("there is no photo");
+  std::map<std::string, int> index;
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    const Camera& camera = given_[i].camera;
+    const auto [known, is_new] = index.insert({camera.id, static_cast<int>(cameras_.size())});
+    inputs_[i].camera = known->second;
+    if (is_new) {
+      const Status status = camera.Validate();
+      if (!status.ok()) return status;
+      cameras_.push_back(camera);
+      priors_.push_back(options_.camera_sigma.value_or(UnknownCamera(camera)));
+    } else if (!IsSameCamera(camera, cameras_[static_cast<std::size_t>(known->second)])) {
+      return Status::Invalid("photo " + std::to_string(i) + ": its camera '" + camera.id +
+                             "' is not the one that an earlier photo has under that id");
+    }
+    out_.photos[i].camera = known->second;
+    out_.photos[i].status = given_[i].Validate();
+    is_valid_[i] = out_.photos[i].status.ok() ? 1 : 0;
+  }
+  guesses_ = cameras_;
+  return Status::Ok();
+}
+
+EstimationOptions Adjustment::PoseOptions() const {
+  EstimationOptions pose;
+  pose.conic_loss = options_.conic_loss;
+  pose.line_loss = options_.line_loss;
+  pose.noise_model = options_.noise_model;
+  // In the pose's covariance only: the camera is not what the photo says of it.
+  pose.camera_sigma = CameraSigma::Exact();
+  return pose;
+}
+
+// Every photo through the cameras as they stand.
+void Adjustment::Estimate() {
+  const int count = static_cast<int>(given_.size());
+  std::mutex mutex;
+  int done = 0;
+  estimates_.assign(given_.size(), {});
+  ParallelFor(count, options_.num_threads, [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    if (is_valid_[i]) {
+      prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], options_.noise_model);
+      inputs_[i].observations = &prepared_[i].observations;
+      inputs_[i].noise = prepared_[i].noise;
+      if (start_ != nullptr) {
+        CoarsePose(prepared_[i], prepared_[i].noise, PoseOptions(), &estimates_[i]);
+      } else {
+        estimates_[i] = EstimatePose(prepared_[i].observations, PoseOptions());
+      }
+    } else {
+      estimates_[i].status = out_.photos[i].status;
+    }
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (options_.progress) options_.progress("poses", ++done, count);
+  });
+}
+
+// The camera that photos lead to from each candidate, and the best of those.
+Status Adjustment::FindCamera(std::size_t c) {
+  constexpr int kCoarseIterations = 10;
+  constexpr double kMostPhotos = 12.0;  // So many tell a start.
+  std::vector<Observations> members;
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    if (CameraOf(i) == c && is_valid_[i]) members.push_back(given_[i]);
+  }
+  const double step = std::max(1.0, static_cast<double>(members.size()) / kMostPhotos);
+  std::vector<Observations> used;
+  for (double i = 0.0; i < static_cast<double>(members.size()); i += step)
+    used.push_back(members[static_cast<std::size_t>(i)]);
+  std::vector<const Observations*> pointers;
+  for (const Observations& photo : used) pointers.push_back(&photo);
+  EstimationOptions pose = PoseOptions();
+  pose.conic_distance = ConicDistanceType::kSampson;  // Cheaper.
+  CameraSweep sweep(pointers, guesses_[c], pose, options_.num_threads);
+  const bool has_radial = ShiftSigmas(cameras_[c], priors_[c], options_)[4] > 0.0;
+  std::vector<Camera> candidates = sweep.Candidates(priors_[c].log_focal, has_radial);
+  if (candidates.empty()) return Status::Refused("no photo gives a pose at any focal length");
+  if (candidates.size() > 1) {
+    AdjustOptions coarse = options_;
+    coarse.max_iterations = kCoarseIterations;
+    coarse.progress = nullptr;
+    for (Camera& candidate : candidates) {
+      Adjustment alone(used, coarse);
+      alone.start_ = &candidate;
+      const AdjustedPhotos led_to = alone.Run();
+      if (led_to.status.ok()) candidate = led_to.cameras.front().camera;
+    }
+  }
+  const std::vector<double> costs = sweep.CostsAt(candidates);
+  cameras_[c] = candidates[static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) -
+                                                    costs.begin())];
+  return Status::Ok();
+}
+
+Status Adjustment::Start() {
+  constexpr double kWide = 0.1;  // Of log f: from here on it is searched.
+  if (start_ != nullptr) cameras_.front() = *start_;
+  for (std::size_t c = 0; c < cameras_.size() && start_ == nullptr; ++c) {
+    if (options_.progress)
+      options_.progress("cameras", static_cast<int>(c), static_cast<int>(cameras_.size()));
+    if (priors_[c].log_focal < kWide) continue;
+    const Status status = FindCamera(c);
+    if (!status.ok()) return status;
+  }
+  return StartHere();
+}
+
+Status Adjustment::StartHere() {
+  Estimate();
+  return PlaceWorlds()
+             ? Status::Ok()
+             : Status::Refused("no photo gives a pose: " + estimates_.front().status.message);
+}
+
+// One world, where the photos' circles lie alike under one id; else each its own.
+bool Adjustment::PlaceWorlds() {
+  constexpr double kAlike = 0.1;       // Radii.
+  constexpr double kMostPhotos = 0.8;  // Of those with a pose.
+  bool any = false;
+  layouts_.assign(given_.size() + 1, Layout());
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    AdjustedPhoto& photo = out_.photos[i];
+    photo.status = estimates_[i].status;
+    inputs_[i].takes_part = photo.status.ok() && !estimates_[i].hypotheses.empty();
+    if (!inputs_[i].takes_part) continue;
+    any = true;
+    inputs_[i].world = static_cast<int>(i) + 1;
+    inputs_[i].pose = estimates_[i].hypotheses.front().cam_from_world;
+    layouts_[i + 1] = LayoutOf(estimates_[i].hypotheses.front());
+    inputs_[i].layout = &layouts_[i + 1];
+  }
+  if (!any || options_.rigid == RigidWorld::kNo) return any;
+  const auto with_pose = std::count_if(inputs_.begin(), inputs_.end(),
+                                       [](const AdjustInput& input) { return input.takes_part; });
+  for (const bool by_id : {true, false}) {
+    const SharedLayout shared = AlignLayouts(estimates_, by_id);
+    const auto placed = std::count(shared.placed.begin(), shared.placed.end(), true);
+    const bool alike = placed > 1 && shared.misfit < kAlike &&
+                       static_cast<double>(placed) >= kMostPhotos * static_cast<double>(with_pose);
+    out_.rigid = alike || (by_id && options_.rigid == RigidWorld::kYes);
+    if (!out_.rigid) continue;
+    ShareWorld(shared, by_id);
+    break;
+  }
+  return true;
+}
+
+void Adjustment::ShareWorld(const SharedLayout& shared, bool by_id) {
+  layouts_[0] = shared.circles;
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    AdjustInput& input = inputs_[i];
+    if (!input.takes_part) continue;
+    if (!shared.placed[i]) {
+      input.takes_part = false;
+      out_.photos[i].status = Status::Refused(
+          "its circles do not lie as those of the other photos, or it has too few of them");
+      continue;
+    }
+    input.world = 0;
+    input.pose = shared.poses[i];
+    input.layout = &layouts_[0];
+    input.names = by_id ? std::map<std::string, std::string>() : shared.names[i];
+  }
+}
+
+}  // namespace circline
