@@ -27,6 +27,8 @@ Status AdjustOptions::Validate() const {
   same.camera_sigma = camera_sigma;
   const Status status = same.Validate();
   if (!status.ok()) return status;
+  if (!(tangential_sigma >= 0.0) || !std::isfinite(tangential_sigma))
+    return Status::Invalid("tangential_sigma must be 0 or more");
   if (num_radial < 0 || num_radial > 4) return Status::Invalid("num_radial must be from 0 to 4");
   if (max_iterations < 1) return Status::Invalid("max_iterations must be 1 or more");
   if (num_threads < 1) return Status::Invalid("num_threads must be 1 or more");
@@ -35,7 +37,8 @@ Status AdjustOptions::Validate() const {
 
 CameraSigma UnknownCamera(const Camera& camera) {
   constexpr double kOfDiagonal = 0.03;  // Of 5 calibrated cameras: 0.005 to 0.028.
-  return {0.7, 0.0, kOfDiagonal * std::hypot(camera.width, camera.height), 0.3};
+  constexpr double kSquare = 0.001;
+  return {0.7, kSquare, kOfDiagonal * std::hypot(camera.width, camera.height), 0.3};
 }
 
 double AdjustedCamera::Sigma(int shift) const {

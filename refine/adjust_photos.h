@@ -38,7 +38,8 @@ struct AdjustOptions {
   // first of the model (0 to 3; fisheye 0 to 4), each with the prior k1 has; none of them where
   // that is 0. A pinhole camera has none: make it kOpenCV with zeros to estimate them.
   int num_radial = 3;
-  bool tangential = false;  // p1 and p2, kOpenCV only; standard deviation 0.01.
+  // Standard deviation of p1 and p2 about those of the camera, kOpenCV only; 0 = held.
+  double tangential_sigma = 0.0005;
   RigidWorld rigid = RigidWorld::kAuto;
   int max_iterations = 100;  // Of the joint problem, each time it is solved; 1 or more.
   // Photos are started on so many threads; the joint problem is evaluated on as many, and then
@@ -51,7 +52,7 @@ struct AdjustOptions {
 };
 
 // A camera of which nothing is known but the size of its photos: standard deviations 0.7 of log f,
-// 3 % of the diagonal for the principal point, 0.3 for k1; square pixels.
+// 3 % of the diagonal for the principal point, 0.3 for k1; pixels are square to 0.1 %.
 CameraSigma UnknownCamera(const Camera& camera);
 
 struct AdjustedCamera {

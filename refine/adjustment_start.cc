@@ -18,7 +18,6 @@ bool IsSameCamera(const Camera& a, const Camera& b) {
 
 // kOpenCV has k1 k2 p1 p2 k3, kFisheye k1 to k4.
 Shifts ShiftSigmas(const Camera& camera, const CameraSigma& prior, const AdjustOptions& options) {
-  constexpr double kTangential = 0.01;
   Shifts sigma{};
   sigma[0] = prior.log_focal;
   sigma[1] = prior.log_aspect;
@@ -28,7 +27,7 @@ Shifts ShiftSigmas(const Camera& camera, const CameraSigma& prior, const AdjustO
   const std::array<std::size_t, 4> radial = {4, 5, opencv ? 8U : 6U, 7};
   const int count = std::min(options.num_radial, opencv ? 3 : 4);
   for (int k = 0; k < count; ++k) sigma[radial[static_cast<std::size_t>(k)]] = prior.k1;
-  if (opencv && options.tangential) sigma[6] = sigma[7] = kTangential;
+  if (opencv && count > 0) sigma[6] = sigma[7] = options.tangential_sigma;
   return sigma;
 }
 

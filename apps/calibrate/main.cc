@@ -8,6 +8,7 @@
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <optional>
+#include <set>
 
 #include "apps/calibrate/calibration_files.h"
 #include "apps/common/flags_util.h"
@@ -18,10 +19,16 @@
 #include "apps/compare/options.h"
 #include "circline/refine/adjust_photos.h"
 
+DECLARE_string(images);
+DECLARE_string(camera);
+DECLARE_double(focal_px);
+DECLARE_double(fov_deg);
+
 DEFINE_string(model, "opencv", "Camera model: pinhole, opencv or fisheye.");
-DEFINE_string(fix, "tangential,aspect",
-              "What is not estimated, of: principal_point, aspect, k1, k2, k3, tangential; a list, "
-              "or nothing.");
+DEFINE_string(fix, "",
+              "What is held as it is given, of: principal_point, aspect, k1, k2, k3, tangential; a "
+              "list. Without, pixels are square to 0.1 % and tangential distortion is 0.0005.");
+DEFINE_string(free, "", "What may be far from that, of: aspect, tangential; a list.");
 DEFINE_string(rigid, circline::RigidWorldName(circline::AdjustOptions().rigid),
               "Whether a circle's id means the same circle in all photos: auto, yes, no.");
 
@@ -45,7 +52,8 @@ struct CalibrateOptions {
   CompareOptions compare;
   AdjustOptions adjust;
   CameraModel model = CameraModel::kOpenCV;
-  bool fix_principal_point = false, free_aspect = false;
+  bool fix_principal_point = false;
+  std::optional<double> aspect_sigma;
 };
 
 int Refuse(const Status& status) {
@@ -65,29 +73,51 @@ Status ModelFromFlag(CameraModel* model) {
   return Status::Ok();
 }
 
-Status FixFromFlag(CalibrateOptions* options) {
-  const std::vector<std::string> known = {"principal_point", "aspect", "k1", "k2", "k3",
-                                          "tangential"};
-  std::vector<std::string> fixed =
-      FLAGS_fix.empty() ? std::vector<std::string>() : SplitList(FLAGS_fix);
-  const auto has = [&](const char* name) {
-    return std::find(fixed.begin(), fixed.end(), name) != fixed.end();
-  };
-  for (const std::string& name : fixed) {
-    if (std::find(known.begin(), known.end(), name) == known.end())
-      return Status::Invalid("--fix: there is no '" + name + "'" + DidYouMean(name, known));
+// The names in a list flag.
+Status NamesFromFlag(const char* flag, const std::string& text,
+                     const std::vector<std::string>& known, std::set<std::string>* names) {
+  if (text.empty()) return Status::Ok();
+  for (const std::string& name : SplitList(text)) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      return Status::Invalid(std::string("--") + flag + ": there is no '" + name + "'" +
+                             DidYouMean(name, known));
+    }
+    names->insert(name);
   }
-  options->fix_principal_point = has("principal_point");
-  options->free_aspect = !has("aspect");
-  options->adjust.tangential = !has("tangential");
-  options->adjust.num_radial = has("k1") ? 0 : has("k2") ? 1 : has("k3") ? 2 : 3;
+  return Status::Ok();
+}
+
+Status ParametersFromFlags(CalibrateOptions* options) {
+  std::set<std::string> fixed, free;
+  Status status = NamesFromFlag(
+      "fix", FLAGS_fix, {"principal_point", "aspect", "k1", "k2", "k3", "tangential"}, &fixed);
+  if (status.ok()) status = NamesFromFlag("free", FLAGS_free, {"aspect", "tangential"}, &free);
+  if (!status.ok()) return status;
+  for (const std::string& name : free) {
+    if (fixed.count(name) > 0) return Status::Invalid("--fix and --free both name '" + name + "'");
+  }
+  constexpr double kFreeAspect = 0.02, kFreeTangential = 0.01;
+  options->fix_principal_point = fixed.count("principal_point") > 0;
+  if (fixed.count("aspect") > 0) options->aspect_sigma = 0.0;
+  if (free.count("aspect") > 0) options->aspect_sigma = kFreeAspect;
+  if (fixed.count("tangential") > 0) options->adjust.tangential_sigma = 0.0;
+  if (free.count("tangential") > 0) options->adjust.tangential_sigma = kFreeTangential;
+  options->adjust.num_radial = fixed.count("k1") > 0   ? 0
+                               : fixed.count("k2") > 0 ? 1
+                               : fixed.count("k3") > 0 ? 2
+                                                       : 3;
   return Status::Ok();
 }
 
 Status FromFlags(CalibrateOptions* options) {
+  // Nothing known of the camera: something to start from.
+  if (!FLAGS_images.empty() && FLAGS_camera.empty() && FLAGS_focal_px == 0.0 &&
+      FLAGS_fov_deg == 0.0) {
+    FLAGS_fov_deg = 60.0;
+  }
   Status status = OptionsFromFlags(&options->compare);
   if (status.ok()) status = ModelFromFlag(&options->model);
-  if (status.ok()) status = FixFromFlag(options);
+  if (status.ok()) status = ParametersFromFlags(options);
   if (status.ok() && !RigidWorldFromName(FLAGS_rigid, &options->adjust.rigid))
     status = Status::Invalid("--rigid=" + FLAGS_rigid + ": must be auto, yes or no");
   const EstimationOptions& estimation = options->compare.losses.front().estimation;
@@ -140,8 +170,7 @@ Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
   CameraSigma sigma = UnknownCamera(calibration->photos.front().camera);
   if (estimation.camera_sigma) sigma.log_focal = estimation.camera_sigma->log_focal;
   if (options->fix_principal_point) sigma.principal_point_px = 0.0;
-  constexpr double kAspect = 0.02;  // Analogue video's.
-  if (options->free_aspect) sigma.log_aspect = kAspect;
+  if (options->aspect_sigma) sigma.log_aspect = *options->aspect_sigma;
   options->adjust.camera_sigma = sigma;
   std::optional<Progress> progress;
   std::string stage;

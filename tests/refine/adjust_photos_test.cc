@@ -77,6 +77,9 @@ AdjustOptions PointNoiseOnly() {
   AdjustOptions options;
   options.noise_model = NoiseModel::Exact();
   options.num_radial = 2;
+  options.tangential_sigma = 0.0;
+  options.camera_sigma = UnknownCamera(PlaneScene().camera);
+  options.camera_sigma->log_aspect = 0.0;
   return options;
 }
 
