@@ -203,8 +203,8 @@ TEST(AdjustPhotos, TwoCamerasAreTwo) {
     for (CircleObservation& circle : photo.circles) {
       for (Eigen::Vector2d& pixel : circle.points) pixel *= 1.5;  // A finer sensor.
     }
-    photo.camera.width *= 1.5;
-    photo.camera.height *= 1.5;
+    photo.camera.width = 960;
+    photo.camera.height = 720;
     photo.camera.cx *= 1.5;
     photo.camera.cy *= 1.5;
     sheet.photos.push_back(photo);
