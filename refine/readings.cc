@@ -4,11 +4,13 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <utility>
 
 #include "circline/estimators/closed_form_solvers.h"
+#include "circline/estimators/focal_starts.h"
 #include "circline/estimators/point_noise.h"
 #include "circline/refine/imperfection_scales.h"
 #include "circline/refine/joint_problem.h"
@@ -70,18 +72,35 @@ std::vector<Seed> SeedsFromPrior(const JointProblem& problem, const Observations
   return seeds;
 }
 
+// Logarithms of the focal lengths from which it is searched, against the one given: over the prior,
+// and what closed forms say.
+std::vector<double> FocalStarts(const JointProblem& problem, const Observations& resolved) {
+  constexpr std::size_t kMostClosedForms = 3;
+  constexpr double kReach = 3.0;       // Standard deviations of the prior.
+  constexpr double kAnySigmaPx = 0.5;  // Every feature has its own.
+  const double sigma = problem.camera_sigma().log_focal;
+  std::vector<double> starts;
+  for (const double start : kFocalStarts) starts.push_back(start * sigma);
+  NoiseModel noise = problem.options().noise_model;
+  noise.camera = problem.camera_sigma();
+  for (const FocalStart& start : FocalLengthStarts(resolved, kAnySigmaPx, noise)) {
+    const double log_focal = std::log(start.focal_px / resolved.camera.fx);
+    if (starts.size() == std::size(kFocalStarts) + kMostClosedForms) break;
+    if (std::abs(log_focal) <= kReach * sigma) starts.push_back(log_focal);
+  }
+  return starts;
+}
+
 std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& resolved,
                            const std::vector<std::shared_ptr<const Solver>>& seeders,
                            std::vector<std::string>* reasons) {
   std::vector<Seed> seeds = CollectSeeds(resolved, seeders, 0.0, reasons);
-  const double sigma = problem.camera_sigma().log_focal;
-  if (problem.camera_is_estimated() && sigma >= kWideFocal) {
-    for (const double start : kFocalStarts) {
-      std::vector<std::string> unused;
-      const std::vector<Seed> more =
-          CollectSeeds(Refocused(resolved, start * sigma), seeders, start * sigma, &unused);
-      seeds.insert(seeds.end(), more.begin(), more.end());
-    }
+  if (!problem.camera_is_estimated() || problem.camera_sigma().log_focal < kWideFocal) return seeds;
+  for (const double start : FocalStarts(problem, resolved)) {
+    std::vector<std::string> unused;
+    const std::vector<Seed> more =
+        CollectSeeds(Refocused(resolved, start), seeders, start, &unused);
+    seeds.insert(seeds.end(), more.begin(), more.end());
   }
   return seeds;
 }
