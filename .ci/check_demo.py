@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Do the results of apps/demo.sh (build/demo) hold? The last line is `N passed, N failed`."""
 import json
+import math
 import os
 import statistics
 import sys
@@ -103,6 +104,16 @@ def check_lines(name):
     check(f'{name}: lines of results.jsonl', not bad, bad[0] if bad else 'sound')
 
 
+def check_calibration(side, focal_px, percent, point_px):
+    """Nothing known, against OpenCV's calibration from the known board."""
+    with open(f'build/demo/calibration/{side}/calibration.json') as file:
+        camera = json.load(file)['cameras'][0]
+    off = 100 * (camera['fx'] / focal_px[0] - 1)
+    point = math.hypot(camera['cx'] - focal_px[1], camera['cy'] - focal_px[2])
+    check(f'calibration {side}: focal length within {percent} %', abs(off) <= percent, f'{off:.2f} %')
+    check(f'calibration {side}: principal point within {point_px} px', point <= point_px, f'{point:.1f} px')
+
+
 for scene in ('chessboard', 'disc', 'box', 'dots'):
     check_files(scene)
     check_lines(scene)
@@ -116,6 +127,8 @@ check_error('dots', 'joint', 'refined', 'normal_error_deg', 0.3)
 check_error('box', 'joint', 'refined', 'normal_error_deg', 0.3)
 check_axes('box', 8, 0.3, 1.0)
 check_choice('disc', 'circle_center', 'refined', 0.95)
+check_calibration('left', (532.8, 342.5, 233.9), 1.5, 5.0)
+check_calibration('right', (537.5, 327.6, 248.9), 1.5, 5.0)
 
 print(f'{passed} passed, {failed} failed')
 sys.exit(failed > 0)

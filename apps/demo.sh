@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Shows circline on real photographs, on Debian 12: installs the packages that are missing, builds in
 # build/release, fetches the photographs (they come with two Debian packages), runs circline_compare
-# on the four sets described in apps/demo/*.yaml and circline_reconstruct on one photograph. The
-# results are in build/demo.
+# on the four sets described in apps/demo/*.yaml, circline_reconstruct on one photograph and
+# circline_calibrate on photographs of which nothing is known. The results are in build/demo.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/setup.sh
@@ -28,7 +28,7 @@ compare() {
 }
 
 install_packages "${BUILD_PACKAGES[@]}"
-build release circline_compare circline_reconstruct
+build release circline_compare circline_reconstruct circline_calibrate
 
 find_folder opencv-doc /usr/share/doc/opencv-doc/examples/data
 compare chessboard "$found"
@@ -43,8 +43,20 @@ build/release/bin/circline_reconstruct --scene=build/demo/disc/scene.yaml --imag
   --output=build/demo/disc/model
 cat build/demo/disc/model/measurements.csv
 
+for side in left right; do
+  echo
+  say "calibration: the $side camera of the chessboards, neither its lens nor the board known"
+  build/release/bin/circline_calibrate --images="build/demo/chessboard/$side*.jpg" \
+    --output="build/demo/calibration/$side"
+  grep -A 3 'id: "'"$side"'"' build/demo/chessboard/scene.yaml | grep -o 'camera_matrix: [^]]*]' |
+    sed 's/^/  by OpenCV, from the known board: /'
+done
+
 echo
 say "the reports, with a picture of every photograph:"
 for set in chessboard disc box dots; do
   echo "  $PWD/build/demo/$set/out/report.html"
+done
+for side in left right; do
+  echo "  $PWD/build/demo/calibration/$side/report.html"
 done

@@ -41,6 +41,14 @@ CameraSigma UnknownCamera(const Camera& camera) {
   return {0.7, kSquare, kOfDiagonal * std::hypot(camera.width, camera.height), 0.3};
 }
 
+const char* ShiftName(CameraModel model, int shift) {
+  static constexpr const char* kNames[] = {"focal length", "aspect", "cx", "cy"};
+  static constexpr const char* kOpenCV[] = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
+  static constexpr const char* kFisheye[] = {"k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8"};
+  if (shift < 4) return kNames[shift];
+  return (model == CameraModel::kFisheye ? kFisheye : kOpenCV)[shift - 4];
+}
+
 double AdjustedCamera::Sigma(int shift) const {
   return std::sqrt(covariance[static_cast<std::size_t>(shift * (kCameraSize + 1))]);
 }

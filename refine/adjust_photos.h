@@ -55,12 +55,17 @@ struct AdjustOptions {
 // 3 % of the diagonal for the principal point, 0.3 for k1; pixels are square to 0.1 %.
 CameraSigma UnknownCamera(const Camera& camera);
 
+// What a shift of camera_shifts.h changes: "focal length", "aspect", "cx", "cy", then the model's
+// distortion coefficients, "k1" first.
+const char* ShiftName(CameraModel model, int shift);
+
 struct AdjustedCamera {
   Camera camera;  // Estimated.
   // Of the shifts of camera_shifts.h (log f, log aspect, principal point, distortion), 12 x 12
   // row-major; zero where one was held. Scaled by the misfit of features, where that is above 1.
   std::array<double, kCameraSize * kCameraSize> covariance{};
-  std::vector<std::string> at_prior;  // Parameters of which the photos say next to nothing.
+  // Of focal length, principal point and radial distortion: what the photos say next to nothing of.
+  std::vector<std::string> at_prior;
   int num_photos = 0;
   double rms_px = 0.0;  // Of the inlier residuals, pixels.
 

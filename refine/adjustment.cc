@@ -8,9 +8,6 @@
 namespace circline {
 namespace {
 
-const char* const kShiftNames[kCameraSize] = {"focal length", "aspect", "cx", "cy", "k1", "k2",
-                                              "k3",           "k4",     "k5", "k6", "k7", "k8"};
-
 double Median(std::vector<double> values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -136,8 +133,10 @@ void Adjustment::Report() {
     constexpr double kNextToNothing = 0.7;  // Of the prior's standard deviation.
     for (int k = 0; k < kCameraSize; ++k) {
       const double sigma = prior[static_cast<std::size_t>(k)];
+      const bool is_tangential = made.camera.model == CameraModel::kOpenCV && (k == 6 || k == 7);
+      if (k == 1 || is_tangential) continue;  // Their priors are meant to hold them.
       if (sigma > 0.0 && made.Sigma(k) > kNextToNothing * sigma)
-        made.at_prior.emplace_back(kShiftNames[k]);
+        made.at_prior.emplace_back(ShiftName(made.camera.model, k));
     }
     out_.cameras.push_back(std::move(made));
   }

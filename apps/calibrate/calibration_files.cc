@@ -144,7 +144,8 @@ std::string CalibrationTable(const AdjustedPhotos& adjusted,
         << " px\n";
     for (std::size_t k = 0; k < camera.distortion.size(); ++k) {
       if (made.Sigma(4 + static_cast<int>(k)) > 0.0)
-        out << "  distortion[" << k << "] " << FormatShort(camera.distortion[k], 4) << " +- "
+        out << "  " << ShiftName(camera.model, 4 + static_cast<int>(k)) << " "
+            << FormatShort(camera.distortion[k], 4) << " +- "
             << FormatShort(made.Sigma(4 + static_cast<int>(k)), 2) << "\n";
     }
     if (!made.at_prior.empty())

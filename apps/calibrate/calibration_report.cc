@@ -64,33 +64,26 @@ std::string FieldSvg(const AdjustedPhotos& adjusted, int camera) {
   return svg.str();
 }
 
-struct Parameter {
-  const char* name;
-  int shift;
-};
-constexpr Parameter kParameters[] = {{"log f", 0},   {"log fy/fx", 1}, {"cx", 2},
-                                     {"cy", 3},      {"k1", 4},        {"k2", 5},
-                                     {"p1 (k3)", 6}, {"p2 (k4)", 7},   {"k3", 8}};
-
-std::vector<Parameter> Estimated(const AdjustedCamera& made) {
-  std::vector<Parameter> out;
-  for (const Parameter& parameter : kParameters) {
-    if (made.Sigma(parameter.shift) > 0.0) out.push_back(parameter);
+std::vector<int> Estimated(const AdjustedCamera& made) {
+  std::vector<int> shifts;
+  for (int shift = 0; shift < kCameraSize; ++shift) {
+    if (made.Sigma(shift) > 0.0) shifts.push_back(shift);
   }
-  return out;
+  return shifts;
 }
 
 std::string CorrelationTable(const AdjustedCamera& made) {
-  const std::vector<Parameter> rows = Estimated(made);
+  const std::vector<int> rows = Estimated(made);
+  const auto name = [&](int shift) { return ShiftName(made.camera.model, shift); };
   std::ostringstream html;
   html << "<div class=\"scroll\"><table class=\"matrix\"><tr><th></th>";
-  for (const Parameter& p : rows) html << "<th>" << p.name << "</th>";
+  for (const int p : rows) html << "<th>" << name(p) << "</th>";
   html << "</tr>";
-  for (const Parameter& p : rows) {
-    html << "<tr><th class=\"l\">" << p.name << "</th>";
-    for (const Parameter& q : rows) {
-      const double r = made.covariance[static_cast<std::size_t>(p.shift * kCameraSize + q.shift)] /
-                       (made.Sigma(p.shift) * made.Sigma(q.shift));
+  for (const int p : rows) {
+    html << "<tr><th class=\"l\">" << name(p) << "</th>";
+    for (const int q : rows) {
+      const double r = made.covariance[static_cast<std::size_t>(p * kCameraSize + q)] /
+                       (made.Sigma(p) * made.Sigma(q));
       html << "<td style=\"background:rgba(31,111,209," << 0.5 * std::abs(r) << ")\">"
            << FormatFixed(r, 2) << "</td>";
     }
@@ -118,7 +111,7 @@ std::string ParameterTable(const AdjustedCamera& made) {
   for (std::size_t k = 0; k < c.distortion.size(); ++k) {
     const double sigma = made.Sigma(4 + static_cast<int>(k));
     if (sigma > 0.0 || c.distortion[k] != 0.0)
-      row("distortion[" + std::to_string(k) + "]", c.distortion[k], sigma, "", 5);
+      row(ShiftName(c.model, 4 + static_cast<int>(k)), c.distortion[k], sigma, "", 5);
   }
   html << "</table></div>";
   return html.str();
