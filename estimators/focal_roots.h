@@ -100,7 +100,7 @@ int FocalSolutionsOf(const Solve& solve, const FocalInputs<N>& inputs, FocalSolu
     const double squared = roots.squared[static_cast<std::size_t>(i)];
     const Vector<N> gradient = LogFocalGradient<N>(solve, z, squared);
     const double variance = gradient.dot(inputs.covariance * gradient);
-    if (!(variance < kMaxLogFocalVariance)) {
+    if (!(variance >= 0.0 && variance < kMaxLogFocalVariance)) {
       reason = FocalRefusal::kUndetermined;
       continue;
     }

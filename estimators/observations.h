@@ -52,7 +52,8 @@ struct CircleObservation {
   // Added by a fit.
   std::optional<ConicFit> fit;
   std::vector<std::uint8_t> inliers;  // One per point, 1 = inlier; empty = all.
-  // Another ellipse through points that `fit` leaves out: a second rim, or the right one.
+  // A less likely ellipse, through points that `fit` leaves out: of two rims the other one. For the
+  // caller: no solver takes it by itself.
   std::optional<ConicReading> second;
 };
 

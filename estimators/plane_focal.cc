@@ -121,6 +121,7 @@ FocalRefusal Check(const PlaneEvidence& evidence) {
   for (const double radius : evidence.radii) {
     if (!(radius > 0.0) || !std::isfinite(radius)) return FocalRefusal::kNotFinite;
   }
+  if (evidence.orthogonal_pencils && evidence.pencils.size() < 2) return FocalRefusal::kTooLittle;
   bool are_ellipses = true;
   for (const ConicFit* fit : evidence.circles) {
     if (!fit->conic.allFinite() || !fit->Covariance().allFinite()) return FocalRefusal::kNotFinite;
@@ -211,7 +212,7 @@ int FocalFromPlane(const PlaneEvidence& evidence, double min_focal, double max_f
       if (!IsNearMinimum(branch, i) || !Polish(evidence, &state, &equations)) continue;
       if (state.log_focal < low || state.log_focal > high) continue;
       const Matrix4d covariance = equations.information.inverse();
-      if (!(covariance(0, 0) < kMaxLogFocalVariance)) {
+      if (!(covariance(0, 0) >= 0.0 && covariance(0, 0) < kMaxLogFocalVariance)) {
         reason = FocalRefusal::kUndetermined;
         continue;
       }

@@ -1,4 +1,4 @@
-// Robust ellipses through contour points: one, or all that a set of points holds.
+// A robust ellipse through contour points, and a second one through what it leaves out.
 #ifndef CIRCLINE_RANSAC_ROBUST_CONIC_H_
 #define CIRCLINE_RANSAC_ROBUST_CONIC_H_
 

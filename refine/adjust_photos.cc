@@ -24,13 +24,16 @@ Status AdjustOptions::Validate() const {
   same.conic_loss = conic_loss;
   same.line_loss = line_loss;
   same.noise_model = noise_model;
-  same.camera_sigma = camera_sigma;
-  const Status status = same.Validate();
+  Status status = same.Validate();
+  for (const auto& [id, sigma] : camera_sigma) {
+    if (status.ok()) status = sigma.Validate();
+  }
   if (!status.ok()) return status;
   if (!(tangential_sigma >= 0.0) || !std::isfinite(tangential_sigma))
     return Status::Invalid("tangential_sigma must be 0 or more");
   if (num_radial < 0 || num_radial > 4) return Status::Invalid("num_radial must be from 0 to 4");
   if (max_iterations < 1) return Status::Invalid("max_iterations must be 1 or more");
+  if (num_solver_threads < 1) return Status::Invalid("num_solver_threads must be 1 or more");
   if (num_threads < 1) return Status::Invalid("num_threads must be 1 or more");
   return Status::Ok();
 }
@@ -38,7 +41,10 @@ Status AdjustOptions::Validate() const {
 CameraSigma UnknownCamera(const Camera& camera) {
   constexpr double kOfDiagonal = 0.03;  // Of 5 calibrated cameras: 0.005 to 0.028.
   constexpr double kSquare = 0.001;
-  return {0.7, kSquare, kOfDiagonal * std::hypot(camera.width, camera.height), 0.3};
+  // A photo of unknown size has its principal point in the middle.
+  const double width = camera.width > 0 ? camera.width : 2.0 * camera.cx;
+  const double height = camera.height > 0 ? camera.height : 2.0 * camera.cy;
+  return {0.7, kSquare, kOfDiagonal * std::hypot(width, height), 0.3};
 }
 
 const char* ShiftName(CameraModel model, int shift) {

@@ -9,7 +9,7 @@
 
 #include <array>
 #include <functional>
-#include <optional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -32,20 +32,22 @@ bool RigidWorldFromName(const std::string& name, RigidWorld* rigid);
 struct AdjustOptions {
   LossOptions conic_loss, line_loss;  // As in EstimationOptions.
   NoiseModel noise_model;             // Its camera is not used here: see camera_sigma.
-  // Prior of each camera about the one that its photos come with; none: UnknownCamera().
-  std::optional<CameraSigma> camera_sigma;
+  // Prior of a camera about the one that its photos come with, by Camera::id; UnknownCamera() where
+  // there is none.
+  std::map<std::string, CameraSigma> camera_sigma;
   // Distortion coefficients that are estimated, about those of the camera: so many radial ones, the
   // first of the model (0 to 3; fisheye 0 to 4), each with the prior k1 has; none of them where
   // that is 0. A pinhole camera has none: make it kOpenCV with zeros to estimate them.
   int num_radial = 3;
-  // Standard deviation of p1 and p2 about those of the camera, kOpenCV only; 0 = held.
+  // Standard deviation of p1 and p2 about those of the camera, kOpenCV with radial ones only; 0 =
+  // held.
   double tangential_sigma = 0.0005;
   RigidWorld rigid = RigidWorld::kAuto;
-  int max_iterations = 100;  // Of the joint problem, each time it is solved; 1 or more.
-  // Photos are started on so many threads; the joint problem is evaluated on as many, and then
-  // equal from run to run to 1e-9 only, where this is above 1.
-  int num_threads = 1;
-  // Told how far it is, from any thread but one call at a time: "poses", photos done, of how many.
+  int max_iterations = 100;    // Of the joint problem, each time it is solved; 1 or more.
+  int num_threads = 1;         // Photos are started on so many; the same bits with any number.
+  int num_solver_threads = 1;  // Of the joint problem; above 1 runs are equal to 1e-9 only.
+  // Told how far it is, from any thread but one call at a time: "cameras" and how many of all are
+  // found, then "poses" and of how many photos.
   std::function<void(const char* what, int done, int total)> progress;
 
   Status Validate() const;
@@ -83,7 +85,7 @@ struct AdjustedPhoto {
   int camera = 0;
   CameraPose cam_from_world;          // Of its world; its unit is that of the world's.
   double rms_px = 0.0;                // Of the inlier residuals, pixels.
-  double misfit = 0.0;                // Mean chi^2 per degree of freedom of its features; about 1.
+  double misfit = 0.0;                // Median chi^2 of its features by residual; 1 or less.
   std::vector<std::string> left_out;  // Features, as PoseHypothesis::left_out.
   std::vector<AdjustedResidual> residuals;
 };
@@ -105,6 +107,9 @@ struct AdjustedPhotos {
   std::vector<std::string> notes;
 };
 
+// Circles of the world's plane, their centres and radii, and pencils take part; known lengths and
+// angles, drawn axes and diameters serve the poses to start from, and no more.
+//
 // Photos with the same Camera::id share a camera, which must be the same in all of them. Starts
 // from EstimatePose on each photo: the focal length that most photos agree on, then the poses at
 // it; photos that contradict the rest as a whole are left out. Never throws, never returns NaN.

@@ -101,7 +101,7 @@ void AdjustProblem::SetGauge() {
     const int world = photos_[i].world;
     if (rotations_[i] == nullptr) continue;
     const bool sees_circle = std::any_of(features_.begin(), features_.end(), [&](const Feature& f) {
-      return f.photo == static_cast<int>(i) && f.blocks.size() > 1 &&
+      return f.active && f.photo == static_cast<int>(i) && f.blocks.size() > 1 &&
              f.blocks[1] == translations_[i];
     });
     Block& translation = blocks_[translations_[i]];
@@ -139,32 +139,42 @@ bool AdjustProblem::Points(int photo, const std::vector<Eigen::Vector2d>& pixels
   return (*points)->size() >= (is_circle ? 5U : 2U);
 }
 
-AdjustProblem::Circle* AdjustProblem::CircleOf(const AdjustInput& input,
-                                               const CircleObservation& circle) {
+void AdjustProblem::AddKnownRadius(int world, const CircleObservation& circle, double* radius) {
+  if (!(circle.radius > 0.0) || !known_radii_.insert(radius).second) return;
+  const double sigma =
+      circle.radius_sigma > 0.0 ? circle.radius_sigma : options_.noise_model.radius;
+  *radius = circle.radius;
+  if (sigma > 0.0) AddPrior(NewLogPrior(circle.radius, sigma), {radius});
+  blocks_[radius].constant = !(sigma > 0.0);
+  has_scale_[world] = metric_ = true;
+}
+
+AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservation& circle) {
+  const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
   const int world = input.world;
-  const auto name = input.names.find(circle.id);
-  const std::string& id = name != input.names.end() ? name->second : circle.id;
+  const std::string& id = input.NameOf(circle.id);
   const auto known = circles_.find({world, id});
-  if (known != circles_.end()) return &known->second;
+  if (known != circles_.end()) {
+    AddKnownRadius(world, circle, known->second.radius);
+    return &known->second;
+  }
   const auto start = input.layout->find(id);
   if (start == input.layout->end()) return nullptr;
   const NoiseModel& model = options_.noise_model;
+  // Where circles were matched by how they lie, ids of groups are a photo's own.
+  const std::string own = input.names.empty() ? "" : std::to_string(photo) + ":";
   Circle made{id, world};
-  double*& center = circle.concentric.empty() ? made.center : centers_[{world, circle.concentric}];
+  double*& center =
+      circle.concentric.empty() ? made.center : centers_[{world, own + circle.concentric}];
   const Eigen::Vector2d& at = start->second.center;
   if (center == nullptr) center = NewBlock(2, {at.x(), at.y()});
   made.center = center;
-  double*& radius =
-      circle.radius_group.empty() ? made.radius : radius_groups_[{world, circle.radius_group}];
+  double*& radius = circle.radius_group.empty()
+                        ? made.radius
+                        : radius_groups_[{world, own + circle.radius_group}];
   if (radius == nullptr) radius = NewBlock(1, {start->second.radius});
   made.radius = radius;
-  if (circle.radius > 0.0) {
-    const double sigma = circle.radius_sigma > 0.0 ? circle.radius_sigma : model.radius;
-    *radius = circle.radius;
-    if (sigma > 0.0) AddPrior(NewLogPrior(circle.radius, sigma), {radius});
-    blocks_[radius].constant = !(sigma > 0.0);
-    has_scale_[world] = metric_ = true;
-  }
+  AddKnownRadius(world, circle, radius);
   if (model.circle_tilt_rad > 0.0 || model.circle_height > 0.0) made.tilt = NewBlock(3, {});
   return &(circles_[{world, id}] = made);
 }
@@ -186,7 +196,7 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle, double
   const AdjustInput& input = photos_[i];
   std::unique_ptr<ImagePoints> points;
   if (!Points(photo, circle.points, circle.inliers, sigma_px, true, &points)) return;
-  const Circle* made = CircleOf(input, circle);
+  const Circle* made = CircleOf(photo, circle);
   if (made == nullptr) return;
   const NoiseModel& model = options_.noise_model;
   PlaneCircleContourCost::Blocks with;

@@ -9,11 +9,13 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 #include <deque>
 #include <map>
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "circline/estimators/observations.h"
@@ -37,6 +39,11 @@ struct AdjustInput {
   std::map<std::string, std::string> names;
   std::set<std::string> left_out;  // Ids of features that have no part in it.
   bool takes_part = true;
+
+  const std::string& NameOf(const std::string& id) const {
+    const auto name = names.find(id);
+    return name != names.end() ? name->second : id;
+  }
 };
 
 // Of a camera's shifts (camera_shifts.h) against the one that its points were made with.
@@ -111,7 +118,8 @@ class AdjustProblem {
   void AddPhoto(int photo);
   void SetGauge();
   void AddCircle(int photo, const CircleObservation& circle, double sigma_px);
-  Circle* CircleOf(const AdjustInput& input, const CircleObservation& circle);
+  Circle* CircleOf(int photo, const CircleObservation& circle);
+  void AddKnownRadius(int world, const CircleObservation& circle, double* radius);
   double* OffsetOf(int photo, const CircleObservation& circle);
   void AddPencil(int photo, std::size_t pencil);
   double* DirectionOf(int photo, const PencilObservation& pencil);
@@ -136,6 +144,7 @@ class AdjustProblem {
   std::map<std::pair<int, std::string>, double*> radius_groups_, centers_, directions_;
   std::map<std::pair<int, int>, double*> offsets_;
   std::map<int, bool> x_is_fixed_, has_scale_;  // By world.
+  std::set<const double*> known_radii_;
   std::vector<std::unique_ptr<FeatureCost>> costs_;
   std::vector<Feature> features_;
   std::vector<Prior> priors_;

@@ -21,7 +21,6 @@ void AdjustProblem::Fill(const std::vector<const ceres::Manifold*>& cameras,
       if (block.constant) problem->SetParameterBlockConstant(values);
     }
   };
-  std::vector<double*> used;
   for (const Feature& feature : features_) {
     if (!feature.active) continue;
     add(feature.blocks);
@@ -66,7 +65,7 @@ Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = max_iterations;
-  options.num_threads = options_.num_threads;
+  options.num_threads = options_.num_solver_threads;
   options.logging_type = ceres::SILENT;
   options.function_tolerance = 1e-8;
   options.parameter_tolerance = 1e-9;

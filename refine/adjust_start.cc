@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <thread>
 
 #include "circline/estimators/closed_form_solvers.h"
@@ -132,7 +131,9 @@ std::vector<Camera> CameraSweep::Candidates(double log_focal_sigma, bool has_rad
   constexpr double kFocalStep = 0.3, kWidest = 1.8;  // Of log f; standard deviations of the prior.
   constexpr double kRadialStep = -0.2;
   constexpr std::size_t kMost = 3;
-  const int half = static_cast<int>(std::ceil(kWidest * log_focal_sigma / kFocalStep));
+  constexpr double kWidestPrior = 1.5;  // Of log f: a view of 60 degrees from 150 to 5 degrees.
+  const int half =
+      static_cast<int>(std::ceil(kWidest * std::min(log_focal_sigma, kWidestPrior) / kFocalStep));
   const int focals = 2 * half + 1, radials = has_radial ? 3 : 1;
   std::vector<Camera> cameras;
   for (int k = 0; k < focals; ++k) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 namespace circline {
 namespace {
@@ -18,7 +19,7 @@ double Median(std::vector<double> values) {
 }  // namespace
 
 // From wide losses to narrow ones, the camera's coarse parameters first.
-void Adjustment::SolveOnce(int rounds) {
+void Adjustment::SolveOnce() {
   constexpr double kWidest = 300.0, kNear = 3.0, kNarrower = 0.25;
   constexpr int kIterations = 8;
   std::vector<CameraPrior> priors;
@@ -30,13 +31,11 @@ void Adjustment::SolveOnce(int rounds) {
   double width = std::min(problem_->LargestMiss(), kWidest);
   for (bool first = true; width > kNear && out_.status.ok(); width *= kNarrower, first = false)
     out_.status = problem_->Solve(width, first, kIterations);
-  if (out_.status.ok()) out_.status = problem_->Solve(1.0, false, rounds);
+  if (out_.status.ok()) out_.status = problem_->Solve(1.0, false, options_.max_iterations);
 }
 
-// Photos, then features, that contradict the rest as a whole. True where there were any.
-bool Adjustment::LeaveOut() {
-  constexpr double kGross = 10.0;  // A photo, of the median one's misfit or what is expected.
-  constexpr double kGrossFeature = 30.0;  // A feature: p = 1e-7 for one degree of freedom.
+// Fills the photos' misfits; returns their median.
+double Adjustment::JudgePhotos() {
   problem_->Judge();
   std::vector<double> misfits;
   for (std::size_t i = 0; i < given_.size(); ++i) {
@@ -49,25 +48,37 @@ bool Adjustment::LeaveOut() {
     out_.photos[i].misfit = Median(std::move(own));
     misfits.push_back(out_.photos[i].misfit);
   }
-  const double median = Median(misfits), common = std::max(1.0, median);
+  return Median(std::move(misfits));
+}
+
+// Photos, and features, that contradict the rest as a whole. True where there were any.
+bool Adjustment::LeaveOut() {
+  constexpr double kGross = 10.0;  // A photo, of the median one's misfit or what is expected.
+  constexpr double kGrossFeature = 30.0;  // A feature: p = 1e-7 for one degree of freedom.
+  const double median = JudgePhotos(), common = std::max(1.0, median);
   bool any = false;
+  std::vector<int> left(given_.size(), 0);
+  for (const AdjustProblem::Feature& feature : problem_->features()) {
+    const auto i = static_cast<std::size_t>(feature.photo);
+    if (!feature.active) continue;
+    ++left[i];
+    if (out_.photos[i].misfit > kGross * common || !(feature.chi2 > kGrossFeature * common))
+      continue;
+    any = true;
+    --left[i];
+    inputs_[i].left_out.insert(feature.id);
+    out_.photos[i].left_out.push_back(feature.id);
+  }
   for (std::size_t i = 0; i < given_.size(); ++i) {
-    if (!inputs_[i].takes_part || !(out_.photos[i].misfit > kGross * common)) continue;
+    const bool is_gross = out_.photos[i].misfit > kGross * common;
+    if (!inputs_[i].takes_part || (!is_gross && left[i] > 0)) continue;
     any = true;
     inputs_[i].takes_part = false;
     char text[120];
     std::snprintf(text, sizeof(text),
                   "it contradicts the other photos: misfit %.3g, theirs %.3g (1 expected)",
                   out_.photos[i].misfit, median);
-    out_.photos[i].status = Status::Refused(text);
-  }
-  for (const AdjustProblem::Feature& feature : problem_->features()) {
-    const auto i = static_cast<std::size_t>(feature.photo);
-    if (!inputs_[i].takes_part || !feature.active || !(feature.chi2 > kGrossFeature * common))
-      continue;
-    any = true;
-    inputs_[i].left_out.insert(feature.id);
-    out_.photos[i].left_out.push_back(feature.id);
+    out_.photos[i].status = Status::Refused(is_gross ? text : "nothing in it agrees with the rest");
   }
   return any;
 }
@@ -106,17 +117,18 @@ void Adjustment::SeeAnew() {
 
 void Adjustment::SolveWithoutGross() {
   constexpr int kRounds = 4;
-  SolveOnce(options_.max_iterations);
+  SolveOnce();
   if (start_ != nullptr) return;  // Good enough to be compared.
   for (int round = 0; round < kRounds && out_.status.ok(); ++round) {
     const bool moved = HasMoved(), left_out = LeaveOut();
     if (!moved && !left_out) return;
     SeeAnew();
-    SolveOnce(options_.max_iterations);
+    SolveOnce();
   }
 }
 
 void Adjustment::Report() {
+  JudgePhotos();
   const double scale = std::max(1.0, problem_->Misfit());
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     AdjustedCamera made;

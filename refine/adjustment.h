@@ -46,16 +46,18 @@ class Adjustment {
   Status FindCameras();
   EstimationOptions PoseOptions() const;
   void Estimate();
-  Status FindCamera(std::size_t camera);
+  void FindCamera(std::size_t camera);
   Status Start();
   Status StartHere();
   bool PlaceWorlds();
   void ShareWorld(const SharedLayout& shared, bool by_id);
+  void ScaleWorlds();
   void SolveWithoutGross();
   bool HasMoved() const;
   void SeeAnew();
+  double JudgePhotos();
   bool LeaveOut();
-  void SolveOnce(int rounds);
+  void SolveOnce();
   void Report();
   std::size_t CameraOf(std::size_t photo) const {
     return static_cast<std::size_t>(inputs_[photo].camera);

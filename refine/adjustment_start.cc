@@ -53,7 +53,9 @@ Status Adjustment::FindCameras() {
       const Status status = camera.Validate();
       if (!status.ok()) return status;
       cameras_.push_back(camera);
-      priors_.push_back(options_.camera_sigma.value_or(UnknownCamera(camera)));
+      const auto stated = options_.camera_sigma.find(camera.id);
+      priors_.push_back(stated != options_.camera_sigma.end() ? stated->second
+                                                              : UnknownCamera(camera));
     } else if (!IsSameCamera(camera, cameras_[static_cast<std::size_t>(known->second)])) {
       return Status::Invalid("photo " + std::to_string(i) + ": its camera '" + camera.id +
                              "' is not the one that an earlier photo has under that id");
@@ -102,7 +104,7 @@ void Adjustment::Estimate() {
 }
 
 // The camera that photos lead to from each candidate, and the best of those.
-Status Adjustment::FindCamera(std::size_t c) {
+void Adjustment::FindCamera(std::size_t c) {
   constexpr int kCoarseIterations = 10;
   constexpr double kMostPhotos = 12.0;  // So many tell a start.
   std::vector<Observations> members;
@@ -120,7 +122,7 @@ Status Adjustment::FindCamera(std::size_t c) {
   CameraSweep sweep(pointers, guesses_[c], pose, options_.num_threads);
   const bool has_radial = ShiftSigmas(cameras_[c], priors_[c], options_)[4] > 0.0;
   std::vector<Camera> candidates = sweep.Candidates(priors_[c].log_focal, has_radial);
-  if (candidates.empty()) return Status::Refused("no photo gives a pose at any focal length");
+  if (candidates.empty()) return;  // No photo gives a pose at any focal length.
   if (candidates.size() > 1) {
     AdjustOptions coarse = options_;
     coarse.max_iterations = kCoarseIterations;
@@ -135,7 +137,6 @@ Status Adjustment::FindCamera(std::size_t c) {
   const std::vector<double> costs = sweep.CostsAt(candidates);
   cameras_[c] = candidates[static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) -
                                                     costs.begin())];
-  return Status::Ok();
 }
 
 Status Adjustment::Start() {
@@ -144,18 +145,17 @@ Status Adjustment::Start() {
   for (std::size_t c = 0; c < cameras_.size() && start_ == nullptr; ++c) {
     if (options_.progress)
       options_.progress("cameras", static_cast<int>(c), static_cast<int>(cameras_.size()));
-    if (priors_[c].log_focal < kWide) continue;
-    const Status status = FindCamera(c);
-    if (!status.ok()) return status;
+    if (priors_[c].log_focal >= kWide) FindCamera(c);
   }
   return StartHere();
 }
 
 Status Adjustment::StartHere() {
   Estimate();
-  return PlaceWorlds()
-             ? Status::Ok()
-             : Status::Refused("no photo gives a pose: " + estimates_.front().status.message);
+  if (!PlaceWorlds())
+    return Status::Refused("no photo gives a pose: " + estimates_.front().status.message);
+  ScaleWorlds();
+  return Status::Ok();
 }
 
 // One world, where the photos' circles lie alike under one id; else each its own.
@@ -178,17 +178,47 @@ bool Adjustment::PlaceWorlds() {
   if (!any || options_.rigid == RigidWorld::kNo) return any;
   const auto with_pose = std::count_if(inputs_.begin(), inputs_.end(),
                                        [](const AdjustInput& input) { return input.takes_part; });
+  SharedLayout by_ids;
   for (const bool by_id : {true, false}) {
     const SharedLayout shared = AlignLayouts(estimates_, by_id);
     const auto placed = std::count(shared.placed.begin(), shared.placed.end(), true);
-    const bool alike = placed > 1 && shared.misfit < kAlike &&
-                       static_cast<double>(placed) >= kMostPhotos * static_cast<double>(with_pose);
-    out_.rigid = alike || (by_id && options_.rigid == RigidWorld::kYes);
-    if (!out_.rigid) continue;
-    ShareWorld(shared, by_id);
-    break;
+    out_.rigid = placed > 1 && shared.misfit < kAlike &&
+                 static_cast<double>(placed) >= kMostPhotos * static_cast<double>(with_pose);
+    if (out_.rigid) {
+      ShareWorld(shared, by_id);
+      return true;
+    }
+    if (by_id) by_ids = shared;
+  }
+  if (options_.rigid == RigidWorld::kYes) {
+    out_.rigid = std::count(by_ids.placed.begin(), by_ids.placed.end(), true) > 1;
+    if (out_.rigid) ShareWorld(by_ids, true);
+    if (!out_.rigid)
+      out_.notes.emplace_back("the photos share no circles: each has a world of its own");
   }
   return true;
+}
+
+// Every world in the unit of the radii that are known in it.
+void Adjustment::ScaleWorlds() {
+  std::map<int, std::vector<double>> ratios;
+  for (const AdjustInput& input : inputs_) {
+    if (!input.takes_part) continue;
+    for (const CircleObservation& circle : input.observations->circles) {
+      const auto at = input.layout->find(input.NameOf(circle.id));
+      if (circle.radius > 0.0 && at != input.layout->end())
+        ratios[input.world].push_back(circle.radius / at->second.radius);
+    }
+  }
+  for (auto& [world, own] : ratios) {
+    const auto middle = own.begin() + static_cast<std::ptrdiff_t>(own.size() / 2);
+    std::nth_element(own.begin(), middle, own.end());
+    for (auto& [id, circle] : layouts_[static_cast<std::size_t>(world)])
+      circle = {*middle * circle.center, *middle * circle.radius};
+    for (AdjustInput& input : inputs_) {
+      if (input.takes_part && input.world == world) input.pose.translation *= *middle;
+    }
+  }
 }
 
 void Adjustment::ShareWorld(const SharedLayout& shared, bool by_id) {

@@ -30,7 +30,7 @@ struct Disc {
   bool is_ring = false;
 
   Ellipse Rim(const Camera& camera, double share) const {
-    // x^T (a b^T-type form): of a ray x the point in the plane is x (n.c) / (n.x); its squared
+    // Of a ray x the point in the plane is x (n.c) / (n.x); its squared
     // distance from c is r^2: |x (n.c) - c (n.x)|^2 = r^2 (n.x)^2.
     const Matrix3d m = normal.dot(center) * Matrix3d::Identity() - center * normal.transpose();
     const double r = share * radius;

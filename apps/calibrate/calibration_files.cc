@@ -1,6 +1,7 @@
 #include "apps/calibrate/calibration_files.h"
 
 #include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <sstream>
@@ -122,7 +123,9 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
                  photo.cam_from_world.rotation, photo.cam_from_world.translation});
   }
   json["notes"] = adjusted.notes;
-  if (status.ok()) status = WriteFile(folder + "/calibration.json", json.dump(1) + "\n");
+  if (status.ok())
+    status = WriteFile(folder + "/calibration.json",
+                       json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   if (status.ok()) status = colmap->Finish();
   if (status.ok()) status = WriteFile(folder + "/report.html", CalibrationReport(adjusted, names));
   return status;
@@ -132,6 +135,10 @@ std::string CalibrationTable(const AdjustedPhotos& adjusted,
                              const std::vector<std::string>& names) {
   std::ostringstream out;
   for (const AdjustedCamera& made : adjusted.cameras) {
+    if (made.num_photos == 0) {
+      out << "camera '" << made.camera.id << "': no photo of it takes part\n";
+      continue;
+    }
     const Camera& camera = made.camera;
     out << "camera '" << camera.id << "', " << made.num_photos << " photos, "
         << (adjusted.rigid ? "one world" : "each photo a world of its own") << ", rms "
@@ -153,7 +160,8 @@ std::string CalibrationTable(const AdjustedPhotos& adjusted,
   }
   for (std::size_t c = 0; c < adjusted.cameras.size(); ++c) {
     for (const std::string& sentence : Advice(adjusted, static_cast<int>(c)))
-      out << "  " << sentence << "\n";
+      out << (adjusted.cameras.size() > 1 ? "  '" + adjusted.cameras[c].camera.id + "': " : "  ")
+          << sentence << "\n";
   }
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::string& message = adjusted.photos[i].status.message;

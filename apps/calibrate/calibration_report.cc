@@ -25,8 +25,10 @@ Field FieldOf(const AdjustedPhotos& adjusted, int camera) {
   for (const AdjustedPhoto& photo : adjusted.photos) {
     if (photo.camera != camera || !photo.status.ok()) continue;
     for (const AdjustedResidual& r : photo.residuals) {
-      const int x = std::clamp(static_cast<int>(r.pixel.x() / c.width * kColumns), 0, kColumns - 1),
-                y = std::clamp(static_cast<int>(r.pixel.y() / c.height * kRows), 0, kRows - 1);
+      const int x = std::clamp(static_cast<int>(r.pixel.x() / std::max(1, c.width) * kColumns), 0,
+                               kColumns - 1),
+                y = std::clamp(static_cast<int>(r.pixel.y() / std::max(1, c.height) * kRows), 0,
+                               kRows - 1);
       Cell& cell = field[static_cast<std::size_t>(y * kColumns + x)];
       cell.sum += r.offset;
       ++cell.count;
@@ -143,6 +145,7 @@ std::string PhotoTable(const AdjustedPhotos& adjusted, const std::vector<std::st
 std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera) {
   const AdjustedCamera& made = adjusted.cameras[static_cast<std::size_t>(camera)];
   std::vector<std::string> advice;
+  if (made.num_photos == 0) return advice;
   constexpr double kFlat = 0.35, kToRadians = 57.3;  // 20 degrees: f, and nothing else, needs more.
   double most_tilt = 0.0;
   Eigen::Vector2d tilts = Eigen::Vector2d::Zero();

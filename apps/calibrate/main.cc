@@ -24,7 +24,9 @@ DECLARE_string(camera);
 DECLARE_double(focal_px);
 DECLARE_double(fov_deg);
 
-DEFINE_string(model, "opencv", "Camera model: pinhole, opencv or fisheye.");
+DEFINE_string(model, "",
+              "Camera model: pinhole, opencv or fisheye; empty: that of the camera given, opencv "
+              "where it has no distortion.");
 DEFINE_string(fix, "",
               "What is held as it is given, of: principal_point, aspect, k1, k2, k3, tangential; a "
               "list. Without, pixels are square to 0.1 % and tangential distortion is 0.0005.");
@@ -51,7 +53,7 @@ constexpr char kUsage[] =
 struct CalibrateOptions {
   CompareOptions compare;
   AdjustOptions adjust;
-  CameraModel model = CameraModel::kOpenCV;
+  std::optional<CameraModel> model;
   bool fix_principal_point = false;
   std::optional<double> aspect_sigma;
 };
@@ -61,16 +63,23 @@ int Refuse(const Status& status) {
   return status.code == StatusCode::kInvalidArgument ? kExitUsage : kExitUnreadable;
 }
 
-Status ModelFromFlag(CameraModel* model) {
-  if (FLAGS_model == "pinhole")
-    *model = CameraModel::kPinhole;
-  else if (FLAGS_model == "opencv")
-    *model = CameraModel::kOpenCV;
-  else if (FLAGS_model == "fisheye")
-    *model = CameraModel::kFisheye;
-  else
-    return Status::Invalid("--model=" + FLAGS_model + ": must be pinhole, opencv or fisheye");
-  return Status::Ok();
+Status ModelFromFlag(std::optional<CameraModel>* model) {
+  const std::map<std::string, CameraModel> models = {{"pinhole", CameraModel::kPinhole},
+                                                     {"opencv", CameraModel::kOpenCV},
+                                                     {"fisheye", CameraModel::kFisheye}};
+  const auto named = models.find(FLAGS_model);
+  if (named != models.end()) *model = named->second;
+  return named != models.end() || FLAGS_model.empty()
+             ? Status::Ok()
+             : Status::Invalid("--model=" + FLAGS_model + ": must be pinhole, opencv or fisheye");
+}
+
+// Of another model a camera has another distortion.
+void SetModel(std::optional<CameraModel> asked, Camera* camera) {
+  const bool has_none = camera->model == CameraModel::kPinhole;
+  const CameraModel model = asked.value_or(has_none ? CameraModel::kOpenCV : camera->model);
+  if (model != camera->model) camera->distortion = {};
+  camera->model = model;
 }
 
 // The names in a list flag.
@@ -120,10 +129,12 @@ Status FromFlags(CalibrateOptions* options) {
   if (status.ok()) status = ParametersFromFlags(options);
   if (status.ok() && !RigidWorldFromName(FLAGS_rigid, &options->adjust.rigid))
     status = Status::Invalid("--rigid=" + FLAGS_rigid + ": must be auto, yes or no");
+  if (!status.ok()) return status;
   const EstimationOptions& estimation = options->compare.losses.front().estimation;
   options->adjust.conic_loss = estimation.conic_loss;
   options->adjust.line_loss = estimation.line_loss;
   options->adjust.noise_model = estimation.noise_model;
+  if (options->compare.threads > 0) cv::setNumThreads(options->compare.threads);
   options->adjust.num_threads = std::max(1, cv::getNumThreads());
   return status;
 }
@@ -137,6 +148,9 @@ std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<Scen
     for (int i = range.start; i < range.end; ++i) {
       const auto index = static_cast<std::size_t>(i);
       runs[index] = ObserveImage(options, &(*images)[index]);
+      Camera& camera = runs[index].observations.camera;
+      if (camera.width == 0) camera.width = runs[index].photo.cols;
+      if (camera.height == 0) camera.height = runs[index].photo.rows;
       runs[index].photo.release();
       const std::lock_guard<std::mutex> lock(mutex);
       progress.Advance();
@@ -152,8 +166,20 @@ struct Calibration {
   AdjustedPhotos adjusted;
 };
 
+// What is known of an image's camera before.
+CameraSigma PriorOf(const CalibrateOptions& options, const SceneImage& image,
+                    const Camera& camera) {
+  const EstimationOptions& estimation = options.compare.losses.front().estimation;
+  CameraSigma sigma = image.camera_sigma.Over(UnknownCamera(camera));
+  if (estimation.camera_sigma) sigma.log_focal = estimation.camera_sigma->log_focal;
+  if (options.fix_principal_point) sigma.principal_point_px = 0.0;
+  if (options.aspect_sigma) sigma.log_aspect = *options.aspect_sigma;
+  return sigma;
+}
+
+// `given`: the cameras as they came, by id; filled where they are not in it.
 Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
-                     Calibration* calibration) {
+                     std::map<std::string, Camera>* given, Calibration* calibration) {
   *calibration = Calibration();
   std::vector<ImageRun> runs = ObserveAll(options->compare, images);
   for (std::size_t i = 0; i < runs.size(); ++i) {
@@ -161,17 +187,13 @@ Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
       calibration->errors.push_back((*images)[i].path + ": " + runs[i].read_error);
       continue;
     }
-    calibration->photos.push_back(std::move(runs[i].observations));
-    calibration->photos.back().camera.model = options->model;
+    Observations& photo = calibration->photos.emplace_back(std::move(runs[i].observations));
+    SetModel(options->model, &photo.camera);
+    photo.camera = given->insert({photo.camera.id, photo.camera}).first->second;
+    options->adjust.camera_sigma[photo.camera.id] = PriorOf(*options, (*images)[i], photo.camera);
     calibration->names.push_back((*images)[i].name);
   }
   if (calibration->photos.empty()) return Status::Failed("no photo could be read");
-  const EstimationOptions& estimation = options->compare.losses.front().estimation;
-  CameraSigma sigma = UnknownCamera(calibration->photos.front().camera);
-  if (estimation.camera_sigma) sigma.log_focal = estimation.camera_sigma->log_focal;
-  if (options->fix_principal_point) sigma.principal_point_px = 0.0;
-  if (options->aspect_sigma) sigma.log_aspect = *options->aspect_sigma;
-  options->adjust.camera_sigma = sigma;
   std::optional<Progress> progress;
   std::string stage;
   options->adjust.progress = [&](const char* what, int done, int total) {
@@ -190,10 +212,11 @@ Status CalibrateInPasses(CalibrateOptions* options, std::vector<SceneImage>* ima
                          Calibration* calibration) {
   constexpr int kPasses = 3;
   constexpr double kSame = 0.02;  // Of log f.
+  std::map<std::string, Camera> given;
   const bool detects = std::any_of(images->begin(), images->end(),
                                    [](const SceneImage& image) { return image.detect_everything; });
   for (int pass = 0;; ++pass) {
-    const Status status = CalibrateOnce(options, images, calibration);
+    const Status status = CalibrateOnce(options, images, &given, calibration);
     if (!status.ok() || !detects || pass + 1 == kPasses) return status;
     bool same = true;
     std::map<std::string, Camera> found;
@@ -217,15 +240,11 @@ int Calibrate() {
   Status status = FromFlags(&options);
   if (status.ok()) status = ImagesFromFlags(options.compare.inputs, &set);
   if (!status.ok()) return Refuse(status);
-  options.compare.overlays = true;  // The photo's size is needed.
+  options.compare.overlays = false;  // Photos are read for detection only.
   std::vector<SceneImage> images;
   for (std::size_t i = 0; i < set.size(); ++i) {
     images.push_back(set.At(i));
-    Camera& camera = images.back().observations.camera;
-    if (camera.model != options.model) {
-      camera.model = options.model;
-      camera.distortion = {};
-    }
+    SetModel(options.model, &images.back().observations.camera);
   }
   Calibration calibration;
   status = CalibrateInPasses(&options, &images, &calibration);
@@ -245,19 +264,6 @@ int Calibrate() {
 }  // namespace circline::apps
 
 int main(int argc, char** argv) {
-  circline::apps::InitAppLogging(argv[0]);
-  circline::apps::CommandLine command_line;
-  const circline::Status status = circline::apps::ParseCommandLine(argc, argv, &command_line);
-  if (!status.ok()) {
-    circline::apps::SayOnStderr("circline_calibrate: " + status.message);
-    return circline::apps::kExitUsage;
-  }
-  if (command_line.help) {
-    std::cout << circline::apps::HelpText(circline::apps::kUsage);
-  } else if (command_line.version) {
-    std::cout << circline::apps::VersionText("circline_calibrate") << "\n";
-  } else {
-    return circline::apps::Calibrate();
-  }
-  return circline::apps::kExitOk;
+  return circline::apps::RunApp(argc, argv, "circline_calibrate", circline::apps::kUsage,
+                                circline::apps::Calibrate);
 }

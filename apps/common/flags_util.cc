@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iostream>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <sstream>
@@ -152,6 +153,24 @@ void InitAppLogging(const char* app) {
   google::InitGoogleLogging(app);
   cv::redirectError(IgnoreOpenCvError);
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+}
+
+int RunApp(int argc, char** argv, const std::string& app, const std::string& usage, int (*run)()) {
+  InitAppLogging(argv[0]);
+  CommandLine command_line;
+  const Status status = ParseCommandLine(argc, argv, &command_line);
+  if (!status.ok()) {
+    SayOnStderr(app + ": " + status.message);
+    return kExitUsage;
+  }
+  if (command_line.help) {
+    std::cout << HelpText(usage);
+  } else if (command_line.version) {
+    std::cout << VersionText(app) << "\n";
+  } else {
+    return run();
+  }
+  return kExitOk;
 }
 
 }  // namespace circline::apps

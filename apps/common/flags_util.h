@@ -30,6 +30,10 @@ std::string HelpText(const std::string& usage);
 // "circline_compare 0.1.0".
 std::string VersionText(const std::string& app);
 
+// All of an app's main but what it does: logging, the command line, --help, --version. `run`
+// returns the exit code.
+int RunApp(int argc, char** argv, const std::string& app, const std::string& usage, int (*run)());
+
 // One whole line on stderr.
 void SayOnStderr(const std::string& line);
 

@@ -174,19 +174,6 @@ int Reconstruct() {
 }  // namespace circline::apps
 
 int main(int argc, char** argv) {
-  circline::apps::InitAppLogging(argv[0]);
-  circline::apps::CommandLine command_line;
-  const circline::Status status = circline::apps::ParseCommandLine(argc, argv, &command_line);
-  if (!status.ok()) {
-    circline::apps::SayOnStderr("circline_reconstruct: " + status.message);
-    return circline::apps::kExitUsage;
-  }
-  if (command_line.help) {
-    std::cout << circline::apps::HelpText(circline::apps::kUsage);
-  } else if (command_line.version) {
-    std::cout << circline::apps::VersionText("circline_reconstruct") << "\n";
-  } else {
-    return circline::apps::Reconstruct();
-  }
-  return circline::apps::kExitOk;
+  return circline::apps::RunApp(argc, argv, "circline_reconstruct", circline::apps::kUsage,
+                                circline::apps::Reconstruct);
 }

@@ -64,17 +64,5 @@ int Simulate() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  circline::apps::InitAppLogging(argv[0]);
-  circline::apps::CommandLine command_line;
-  const Status status = circline::apps::ParseCommandLine(argc, argv, &command_line);
-  if (!status.ok()) return Refuse(status, circline::apps::kExitUsage);
-  if (command_line.help) {
-    std::cout << circline::apps::HelpText(kUsage);
-    return circline::apps::kExitOk;
-  }
-  if (command_line.version) {
-    std::cout << circline::apps::VersionText("circline_simulate") << "\n";
-    return circline::apps::kExitOk;
-  }
-  return Simulate();
+  return circline::apps::RunApp(argc, argv, "circline_simulate", kUsage, Simulate);
 }

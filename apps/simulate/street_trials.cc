@@ -145,7 +145,7 @@ double CoveragePercent(const std::vector<StreetTrial>& trials, StreetAnswer Stre
         static_cast<double>((answer.error.array().abs() <= kSigmas * answer.sigma.array()).count());
     all += 3.0;
   }
-  return 100.0 * within / all;
+  return 100.0 * within / std::max(1.0, all);
 }
 
 std::vector<std::string> Cells(const StreetAnswer& answer) {
@@ -230,7 +230,8 @@ std::string StreetSummary(const std::vector<StreetTrial>& trials) {
          FormatFixed(CoveragePercent(trials, &StreetTrial::detected), 1) + " % (known " +
          FormatFixed(CoveragePercent(trials, &StreetTrial::known), 1) + " %); no answer " +
          FormatFixed(100.0 * failed / n, 1) + " %; sure " + FormatFixed(100.0 * sure / n, 1) +
-         " %, of these wrong " + FormatFixed(100.0 * wrong / sure, 1) + " %\n";
+         " %, of these wrong " +
+         FormatFixed(100.0 * wrong / std::max(1.0, static_cast<double>(sure)), 1) + " %\n";
 }
 
 }  // namespace circline::apps

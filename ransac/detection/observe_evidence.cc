@@ -12,6 +12,7 @@ namespace {
 // Directions looked for beyond those wanted, so that the choice is made by the length of their
 // lines and by the circles rather than by the number of lines.
 constexpr int kExtraPencils = 3;
+
 std::string Describe(const Observations& observations) {
   const std::size_t circles = observations.circles.size(), pencils = observations.pencils.size();
   if (circles == 0 && pencils == 0) {

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "circline/estimators/noise_model.h"
 #include "circline/ransac/detection/uncertain_direction.h"
@@ -45,6 +46,7 @@ double OrthogonalEvidence::LogOdds(const Vector3d& direction) const {
     ratios.push_back(kPeakRatio / sigma * std::exp(-0.5 * r * r));
     information += slope * slope;
   }
+  if (ratios.empty()) return -std::numeric_limits<double>::infinity();
   const double all = static_cast<double>(lines_.size()), near = static_cast<double>(ratios.size());
   const double share = std::max(0.5 * near, near - expected) / (all + 1.0);
   double log_odds = (all - near) * std::log(1.0 - share);

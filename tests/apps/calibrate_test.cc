@@ -71,8 +71,9 @@ TEST_F(CalibrateTest, NamesWhatCannotBeRead) {
 }
 
 TEST_F(CalibrateTest, UnusableFlagsWriteNothing) {
-  for (const char* flag : {"--model=round", "--fix=k9", "--free=k1", "--rigid=perhaps",
-                           "--fix=aspect --free=aspect", "--nonsense=1"}) {
+  for (const char* flag :
+       {"--model=round", "--fix=k9", "--free=k1", "--rigid=perhaps", "--robust_loss=none",
+        "--conic_distance=far", "--fix=aspect --free=aspect", "--nonsense=1"}) {
     const Outcome run = Calibrate(Photos() + " " + flag + " --output=" + Output());
     EXPECT_EQ(run.exit_code, 2) << flag << run.err;
     EXPECT_FALSE(std::filesystem::exists(Output())) << flag;

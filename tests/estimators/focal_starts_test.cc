@@ -15,7 +15,6 @@
 namespace circline {
 namespace {
 
-constexpr double kRightAngle = 1.5707963267948966;
 
 // One kind of evidence, added to what is empty.
 struct Kind {

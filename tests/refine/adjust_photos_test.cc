@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -78,8 +79,8 @@ AdjustOptions PointNoiseOnly() {
   options.noise_model = NoiseModel::Exact();
   options.num_radial = 2;
   options.tangential_sigma = 0.0;
-  options.camera_sigma = UnknownCamera(PlaneScene().camera);
-  options.camera_sigma->log_aspect = 0.0;
+  CameraSigma& prior = options.camera_sigma["cam"] = UnknownCamera(PlaneScene().camera);
+  prior.log_aspect = 0.0;
   return options;
 }
 
@@ -159,7 +160,7 @@ TEST(AdjustPhotos, RowsAndColumnsOfUnknownSpacingSuffice) {
 
 TEST(AdjustPhotos, AKnownRadiusMakesItMetric) {
   Photos sheet = Photos(5).WithCircles();
-  for (Observations& photo : sheet.photos) photo.circles[4].radius = 0.05;  // A tenth.
+  sheet.photos[3].circles[4].radius = 0.05;  // A tenth; one photo says so.
   const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
   ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
   EXPECT_TRUE(adjusted.metric);
