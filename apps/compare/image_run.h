@@ -75,9 +75,9 @@ struct ImageRun {
 // model.
 CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image);
 
-// The photo read and everything in it detected or fitted; no solver. Never throws. Image and options
-// outlive the result. A camera that is only guessed gets its focal length from the size of the
-// photo.
+// The photo read and everything in it detected or fitted; no solver. Never throws. Image and
+// options outlive the result. A camera that is only guessed gets its focal length from the size of
+// the photo.
 ImageRun ObserveImage(const CompareOptions& options, SceneImage* image);
 
 // The same, and all solvers, which outlive the result.

@@ -15,7 +15,6 @@
 namespace circline {
 namespace {
 
-
 // One kind of evidence, added to what is empty.
 struct Kind {
   std::string name;
