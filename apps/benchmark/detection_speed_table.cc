@@ -128,7 +128,8 @@ void MeasureRingSpeed() {
   std::printf("%d rings, 1600 x 1200         ms\n", kRings);
   RingSheet lattice, concentric;  // Side by side, and about one centre.
   for (int i = 0; i < kRings; ++i) {
-    const cv::Point2d center(0.36 * (i % 12 - 5.5), 0.36 * (i / 12 - 3.0));
+    const int column = i % 12, row = i / 12;
+    const cv::Point2d center(0.36 * (column - 5.5), 0.36 * (row - 3.0));
     lattice.Disc(center, 0.14, 20);
     lattice.Disc(center, 0.08, 235);
     const double outer = 0.017 * (kRings - i);

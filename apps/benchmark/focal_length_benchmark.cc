@@ -78,7 +78,8 @@ FocalScene RandomScene(Random* random) {
   s.nested = circle(0.9, 0.4, 1.0);
   s.center = K.cwiseProduct(at(0.5, 0.2));
   for (std::size_t i = 0; i < s.dots.size(); ++i) {
-    s.dots[i] = circle(static_cast<double>(i % 4) - 1.5, static_cast<double>(i / 4) - 1.0, 0.4);
+    const std::size_t column = i % 4, row = i / 4;
+    s.dots[i] = circle(static_cast<double>(column) - 1.5, static_cast<double>(row) - 1.0, 0.4);
   }
   return s;
 }
