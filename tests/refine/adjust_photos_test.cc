@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -105,7 +106,7 @@ TEST(AdjustPhotos, CameraComesOutWithinItsSigma) {
   for (const RigidWorld rigid : {RigidWorld::kAuto, RigidWorld::kNo}) {
     double sum = 0.0;
     for (int trial = 0; trial < trials; ++trial) {
-      const Photos sheet = Photos(6, 10 + trial).WithCircles();
+      const Photos sheet = Photos(6, static_cast<std::uint64_t>(10 + trial)).WithCircles();
       AdjustOptions options = PointNoiseOnly();
       options.rigid = rigid;
       const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
