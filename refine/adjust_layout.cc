@@ -64,7 +64,7 @@ bool Fit(const Layout& from, const Layout& to, const Names& names, Similarity* o
 }
 
 // In place and in size, radii.
-double Miss(const PlaneCircle& from, const PlaneCircle& to, const Similarity& similarity) {
+double Miss(const LayoutCircle& from, const LayoutCircle& to, const Similarity& similarity) {
   const double size = std::log(similarity.scale * from.radius / to.radius);
   return std::hypot((similarity(from.center) - to.center).norm() / to.radius, size);
 }

@@ -12,11 +12,11 @@
 namespace circline {
 
 // A circle in the world's plane.
-struct PlaneCircle {
+struct LayoutCircle {
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
   double radius = 1.0;
 };
-using Layout = std::map<std::string, PlaneCircle>;  // By id.
+using Layout = std::map<std::string, LayoutCircle>;  // By id.
 
 // A hypothesis' circles in its own plane.
 Layout LayoutOf(const PoseHypothesis& hypothesis);

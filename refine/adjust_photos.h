@@ -110,10 +110,13 @@ struct AdjustedPhotos {
 // Circles of the world's plane, their centres and radii, and pencils take part; known lengths and
 // angles, drawn axes and diameters serve the poses to start from, and no more.
 //
-// Photos with the same Camera::id share a camera, which must be the same in all of them. Starts
-// from EstimatePose on each photo: the focal length that most photos agree on, then the poses at
-// it; photos that contradict the rest as a whole are left out. Never throws, never returns NaN.
-// Thread-safe.
+// Photos with the same Camera::id share a camera, which must be the same in all of them. Where its
+// focal length is not known to 10 %, starts are sought over the prior of focal length and first
+// distortion coefficient, by how well the closed forms then explain all photos. EstimatePose gives
+// the poses. Circles of one world are matched by their ids, where they lie alike under these, else
+// by how they lie. Photos and features that contradict the rest as a whole are left out. Poses have
+// no covariance here; with the camera held, EstimatePose states one. Never throws, never returns
+// NaN. Thread-safe.
 AdjustedPhotos AdjustPhotos(const std::vector<Observations>& photos,
                             const AdjustOptions& options = {});
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/refine/evidence_points.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/mostly_exact.h"
 
@@ -46,10 +47,10 @@ void AdjustProblem::AddPrior(ceres::CostFunction* cost, std::vector<double*> blo
                      std::unique_ptr<ceres::LossFunction>(loss), std::move(blocks)});
 }
 
-void AdjustProblem::AddFeature(int photo, const std::string& id, const std::string& name,
-                               std::unique_ptr<FeatureCost> cost, std::vector<double*> blocks) {
+void AdjustProblem::AddFeature(int photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
+                               std::vector<double*> blocks) {
   const bool active = photos_[static_cast<std::size_t>(photo)].left_out.count(id) == 0;
-  features_.push_back({photo, id, name, cost.get(), std::move(blocks), active});
+  features_.push_back({photo, id, cost.get(), std::move(blocks), active});
   costs_.push_back(std::move(cost));
 }
 
@@ -63,6 +64,7 @@ void AdjustProblem::AddCameras(const std::vector<CameraPrior>& priors) {
       if (is_held || (k != kFocal && k != kFirstRadial)) held_at_first.push_back(k);
     }
     cameras_.push_back(NewBlock(kCameraSize, {}));
+    camera_sigmas_.push_back(prior.sigma);
     const auto manifold = [&](const std::vector<int>& constant) -> const ceres::Manifold* {
       const bool all = constant.size() == kCameraSize;
       return all ? nullptr : NewManifold<ceres::SubsetManifold>(int{kCameraSize}, constant);
@@ -121,22 +123,15 @@ void AdjustProblem::SetGauge() {
   }
 }
 
-bool AdjustProblem::Points(int photo, const std::vector<Eigen::Vector2d>& pixels,
-                           const std::vector<std::uint8_t>& inliers, double sigma_px,
-                           bool is_circle, std::unique_ptr<ImagePoints>* points) const {
-  const NoiseModel& model = options_.noise_model;
-  const double shared = is_circle ? model.contour_px : model.line_px;
-  const double sigma = std::hypot(sigma_px, shared);
+std::optional<ImagePoints> AdjustProblem::Points(const AdjustInput& input,
+                                                 const std::vector<Eigen::Vector2d>& pixels,
+                                                 const std::vector<std::uint8_t>& inliers,
+                                                 double sigma_px, bool is_circle) const {
   ImagePoints::Options options;
-  options.sigma_px = sigma;
   options.loss = (is_circle ? options_.conic_loss : options_.line_loss).type;
   options.num_distortion = num_distortion_;
-  const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
-  *points = std::make_unique<ImagePoints>(input.observations->camera, pixels, inliers, options);
-  const double weight = is_circle ? model.ContourWeight(sigma_px, pixels, inliers)
-                                  : model.LineWeight(sigma_px, pixels, inliers);
-  (*points)->set_weight(weight * (sigma * sigma) / (sigma_px * sigma_px));
-  return (*points)->size() >= (is_circle ? 5U : 2U);
+  return EvidencePoints(input.observations->camera, pixels, inliers, sigma_px, is_circle,
+                        options_.noise_model, options);
 }
 
 void AdjustProblem::AddKnownRadius(int world, const CircleObservation& circle, double* radius) {
@@ -194,9 +189,8 @@ double* AdjustProblem::OffsetOf(int photo, const CircleObservation& circle) {
 void AdjustProblem::AddCircle(int photo, const CircleObservation& circle, double sigma_px) {
   const auto i = static_cast<std::size_t>(photo);
   const AdjustInput& input = photos_[i];
-  std::unique_ptr<ImagePoints> points;
-  if (!Points(photo, circle.points, circle.inliers, sigma_px, true, &points)) return;
-  const Circle* made = CircleOf(photo, circle);
+  std::optional<ImagePoints> points = Points(input, circle.points, circle.inliers, sigma_px, true);
+  const Circle* made = points ? CircleOf(photo, circle) : nullptr;
   if (made == nullptr) return;
   const NoiseModel& model = options_.noise_model;
   PlaneCircleContourCost::Blocks with;
@@ -211,10 +205,10 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle, double
     blocks.push_back(offset);
   }
   blocks.push_back(cameras_[static_cast<std::size_t>(input.camera)]);
-  AddFeature(photo, circle.id, "circle '" + circle.id + "'",
-             std::make_unique<PlaneCircleContourCost>(std::move(*points), with), blocks);
+  AddFeature(photo, circle.id, std::make_unique<PlaneCircleContourCost>(std::move(*points), with),
+             blocks);
   if (!circle.center) return;
-  AddFeature(photo, circle.id + ".center", "the centre of circle '" + circle.id + "'",
+  AddFeature(photo, circle.id + ".center",
              std::make_unique<PlanePointCost>(input.observations->camera, *circle.center, sigma_px,
                                               options_.conic_loss.type, true),
              {rotations_[i], translations_[i], made->center, blocks.back()});
@@ -256,11 +250,10 @@ void AdjustProblem::AddPencil(int photo, std::size_t index) {
     if (!line.fit) continue;
     const double own = LineSigma(pencil, line);
     const double stated = own > 0.0 ? own : options_.line_loss.scale_px;
-    std::unique_ptr<ImagePoints> points;
-    if (!Points(photo, line.points, line.inliers,
-                stated > 0.0 ? stated : input.noise.lines[index][j], false, &points)) {
-      continue;
-    }
+    std::optional<ImagePoints> points =
+        Points(input, line.points, line.inliers,
+               stated > 0.0 ? stated : input.noise.lines[index][j], false);
+    if (!points) continue;
     DirectionLineCost::Options options;
     options.direction_sigma = options_.noise_model.line_direction_rad;
     options.camera = true;
@@ -269,9 +262,7 @@ void AdjustProblem::AddPencil(int photo, std::size_t index) {
     double* camera = cameras_[static_cast<std::size_t>(input.camera)];
     const std::vector<double*> blocks = {rotations_[i], direction, place, camera};
     if (!cost->Start(blocks.data(), place)) continue;
-    const std::string number = std::to_string(j);
-    AddFeature(photo, pencil.id + "[" + number + "]", "pencil '" + pencil.id + "', line " + number,
-               std::move(cost), blocks);
+    AddFeature(photo, pencil.id + "[" + std::to_string(j) + "]", std::move(cost), blocks);
   }
 }
 

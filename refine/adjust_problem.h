@@ -13,6 +13,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -65,7 +66,7 @@ class AdjustProblem {
 
   struct Feature {
     int photo = 0;
-    std::string id, name;
+    std::string id;  // As PoseHypothesis::left_out.
     FeatureCost* cost = nullptr;
     std::vector<double*> blocks;
     bool active = true;
@@ -75,13 +76,12 @@ class AdjustProblem {
     int rows = 0;
   };
   void Judge();
-  std::vector<Feature>& features() { return features_; }
   const std::vector<Feature>& features() const { return features_; }
   // Of all features that take part, per degree of freedom.
   double Misfit() const;
 
   // Of the shifts of one camera, all else marginalised; from the inliers of the features in force.
-  // Zero rows where a shift is held.
+  // Zero rows where a shift is held; that of the prior where the rest cannot be eliminated.
   Eigen::Matrix<double, kCameraSize, kCameraSize> CameraCovariance(int camera) const;
 
   bool IsUsed(int camera) const;  // By a photo that takes part; else there is nothing to ask of it.
@@ -123,14 +123,16 @@ class AdjustProblem {
   double* OffsetOf(int photo, const CircleObservation& circle);
   void AddPencil(int photo, std::size_t pencil);
   double* DirectionOf(int photo, const PencilObservation& pencil);
-  bool Points(int photo, const std::vector<Eigen::Vector2d>& pixels,
-              const std::vector<std::uint8_t>& inliers, double sigma_px, bool is_circle,
-              std::unique_ptr<ImagePoints>* points) const;
-  void AddFeature(int photo, const std::string& id, const std::string& name,
-                  std::unique_ptr<FeatureCost> cost, std::vector<double*> blocks);
+  std::optional<ImagePoints> Points(const AdjustInput& input,
+                                    const std::vector<Eigen::Vector2d>& pixels,
+                                    const std::vector<std::uint8_t>& inliers, double sigma_px,
+                                    bool is_circle) const;
+  void AddFeature(int photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
+                  std::vector<double*> blocks);
   void AddPrior(ceres::CostFunction* cost, std::vector<double*> blocks,
                 ceres::LossFunction* loss = nullptr);
   void Fill(const std::vector<const ceres::Manifold*>& cameras, ceres::Problem* problem) const;
+  static bool IsOf(const Prior& prior, const ceres::Problem& problem);
 
   const std::vector<AdjustInput>& photos_;
   const AdjustOptions& options_;
@@ -139,6 +141,7 @@ class AdjustProblem {
   std::map<double*, Block> blocks_;
   std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
   std::vector<double*> cameras_, rotations_, translations_;
+  std::vector<std::array<double, kCameraSize>> camera_sigmas_;  // Of the priors.
   std::vector<const ceres::Manifold*> all_free_, coarse_free_;  // Of the cameras.
   std::map<std::pair<int, std::string>, Circle> circles_;
   std::map<std::pair<int, std::string>, double*> radius_groups_, centers_, directions_;

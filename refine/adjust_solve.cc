@@ -11,6 +11,12 @@
 
 namespace circline {
 
+// Whether features that take part have its blocks.
+bool AdjustProblem::IsOf(const Prior& prior, const ceres::Problem& problem) {
+  return std::all_of(prior.blocks.begin(), prior.blocks.end(),
+                     [&](double* values) { return problem.HasParameterBlock(values); });
+}
+
 void AdjustProblem::Fill(const std::vector<const ceres::Manifold*>& cameras,
                          ceres::Problem* problem) const {
   const auto add = [&](const std::vector<double*>& blocks) {
@@ -27,10 +33,8 @@ void AdjustProblem::Fill(const std::vector<const ceres::Manifold*>& cameras,
     problem->AddResidualBlock(feature.cost, nullptr, feature.blocks);
   }
   for (const Prior& prior : priors_) {
-    const bool has_all = std::all_of(prior.blocks.begin(), prior.blocks.end(), [&](double* values) {
-      return problem->HasParameterBlock(values);
-    });
-    if (has_all) problem->AddResidualBlock(prior.cost.get(), prior.loss.get(), prior.blocks);
+    if (IsOf(prior, *problem))
+      problem->AddResidualBlock(prior.cost.get(), prior.loss.get(), prior.blocks);
   }
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     if (!problem->HasParameterBlock(cameras_[i])) continue;
@@ -141,10 +145,7 @@ double AdjustProblem::Misfit() const {
     rows += feature.rows;
   }
   for (const Prior& prior : priors_) {
-    const bool has_all = std::all_of(prior.blocks.begin(), prior.blocks.end(), [&](double* values) {
-      return problem.HasParameterBlock(values);
-    });
-    if (!has_all) continue;
+    if (!IsOf(prior, problem)) continue;
     std::vector<double> residuals(static_cast<std::size_t>(prior.cost->num_residuals()));
     if (!prior.cost->Evaluate(prior.blocks.data(), residuals.data(), nullptr)) continue;
     for (const double r : residuals) chi2 += r * r;
@@ -169,6 +170,9 @@ Eigen::Matrix<double, kCameraSize, kCameraSize> AdjustProblem::CameraCovariance(
   ceres::Problem problem(NothingOwned());
   Fill(all_free_, &problem);
   Result covariance = Result::Zero();
+  const auto& prior = camera_sigmas_[static_cast<std::size_t>(camera)];
+  covariance.diagonal() =
+      Eigen::Map<const Eigen::Array<double, kCameraSize, 1>>(prior.data()).square();
   ceres::CRSMatrix crs;
   ceres::Problem::EvaluateOptions evaluate;
   evaluate.apply_loss_function = false;  // A prior that is mostly exact counts as its Gaussian.
@@ -200,7 +204,9 @@ Eigen::Matrix<double, kCameraSize, kCameraSize> AdjustProblem::CameraCovariance(
     const Eigen::MatrixXd cross = information.topRightCorner(rest, size);
     marginal -= cross.transpose() * factor.solve(cross);
   }
-  const Eigen::MatrixXd small = marginal.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+  const Eigen::LLT<Eigen::MatrixXd> llt(marginal);
+  if (llt.info() != Eigen::Success) return covariance;
+  const Eigen::MatrixXd small = llt.solve(Eigen::MatrixXd::Identity(size, size));
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> plus(int{kCameraSize},
                                                                               size);
   all_free_[static_cast<std::size_t>(camera)]->PlusJacobian(values, plus.data());

@@ -53,7 +53,9 @@ double Adjustment::JudgePhotos() {
 
 // Photos, and features, that contradict the rest as a whole. True where there were any.
 bool Adjustment::LeaveOut() {
-  constexpr double kGross = 10.0;  // A photo, of the median one's misfit or what is expected.
+  // A photo, of the median one's misfit or what is expected. Photographs of discs, dots and
+  // chessboards here have 0 to 0.5; one squeezed by a fifth has more than 100.
+  constexpr double kGross = 10.0;
   constexpr double kGrossFeature = 30.0;  // A feature: p = 1e-7 for one degree of freedom.
   const double median = JudgePhotos(), common = std::max(1.0, median);
   bool any = false;

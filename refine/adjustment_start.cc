@@ -158,7 +158,8 @@ Status Adjustment::StartHere() {
   return Status::Ok();
 }
 
-// One world, where the photos' circles lie alike under one id; else each its own.
+// One world, where the photos' circles lie alike, by their ids or whatever these are; else each its
+// own.
 bool Adjustment::PlaceWorlds() {
   constexpr double kAlike = 0.1;       // Radii.
   constexpr double kMostPhotos = 0.8;  // Of those with a pose.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/refine/evidence_points.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/square_root.h"
 
@@ -61,29 +62,14 @@ std::vector<int> JointProblemBuilder::WithCamera(std::vector<int> blocks) const 
   return blocks;
 }
 
-ImagePoints::Options JointProblemBuilder::PointOptions(double sigma_px, bool is_circle) const {
-  const LossOptions& loss = is_circle ? p_.options_.conic_loss : p_.options_.line_loss;
-  ImagePoints::Options options;
-  options.sigma_px = sigma_px;
-  options.loss = loss.type;
-  options.distance = p_.options_.conic_distance;
-  options.num_distortion = p_.camera_sigma_.k1 > 0.0 ? 1 : 0;
-  return options;
-}
-
 std::optional<ImagePoints> JointProblemBuilder::Points(const std::vector<Eigen::Vector2d>& pixels,
                                                        const std::vector<std::uint8_t>& inliers,
                                                        double sigma_px, bool is_circle) const {
-  if (pixels.empty()) return {};
-  // A point is off by its own noise and by what it shares with its neighbours.
-  const double shared = is_circle ? model_.contour_px : model_.line_px,
-               sigma = std::hypot(sigma_px, shared);
-  ImagePoints points(obs_.camera, pixels, inliers, PointOptions(sigma, is_circle));
-  if (points.size() < (is_circle ? 5U : 2U)) return {};
-  const double weight = is_circle ? model_.ContourWeight(sigma_px, pixels, inliers)
-                                  : model_.LineWeight(sigma_px, pixels, inliers);
-  points.set_weight(weight * (sigma * sigma) / (sigma_px * sigma_px));
-  return points;
+  ImagePoints::Options options;
+  options.loss = (is_circle ? p_.options_.conic_loss : p_.options_.line_loss).type;
+  options.distance = p_.options_.conic_distance;
+  options.num_distortion = p_.camera_sigma_.k1 > 0.0 ? 1 : 0;
+  return EvidencePoints(obs_.camera, pixels, inliers, sigma_px, is_circle, model_, options);
 }
 
 double JointProblemBuilder::FreeCost(const ImagePoints& points,

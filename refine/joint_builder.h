@@ -36,7 +36,6 @@ class JointProblemBuilder {
   int AddFeature(Feature feature);
   std::vector<int> WithCamera(std::vector<int> blocks) const;
 
-  ImagePoints::Options PointOptions(double sigma_px, bool is_circle) const;
   std::optional<ImagePoints> Points(const std::vector<Eigen::Vector2d>& pixels,
                                     const std::vector<std::uint8_t>& inliers, double sigma_px,
                                     bool is_circle) const;

@@ -40,6 +40,7 @@ Field FieldOf(const AdjustedPhotos& adjusted, int camera) {
 // Mean residuals by cell, as arrows so many times as long.
 std::string FieldSvg(const AdjustedPhotos& adjusted, int camera) {
   constexpr double kLonger = 200.0;
+  constexpr int kFewest = 10;  // Points: the mean of fewer shows their noise.
   const Camera& c = adjusted.cameras[static_cast<std::size_t>(camera)].camera;
   const Field field = FieldOf(adjusted, camera);
   const double w = 640.0, h = w * c.height / std::max(1, c.width), scale = w / std::max(1, c.width);
@@ -51,7 +52,7 @@ std::string FieldSvg(const AdjustedPhotos& adjusted, int camera) {
     for (int x = 0; x < kColumns; ++x) {
       const Cell& cell = field[static_cast<std::size_t>(y * kColumns + x)];
       const double px = (x + 0.5) * w / kColumns, py = (y + 0.5) * h / kRows;
-      if (cell.count == 0) {
+      if (cell.count < kFewest) {
         svg << "<circle cx=\"" << px << "\" cy=\"" << py
             << "\" r=\"3\" fill=\"currentColor\" fill-opacity=\".12\"/>";
         continue;
@@ -146,7 +147,7 @@ std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera) {
   const AdjustedCamera& made = adjusted.cameras[static_cast<std::size_t>(camera)];
   std::vector<std::string> advice;
   if (made.num_photos == 0) return advice;
-  constexpr double kFlat = 0.35, kToRadians = 57.3;  // 20 degrees: f, and nothing else, needs more.
+  constexpr double kFlat = 0.35, kDegrees = 57.29578;  // 20 degrees; of a radian.
   double most_tilt = 0.0;
   Eigen::Vector2d tilts = Eigen::Vector2d::Zero();
   for (const AdjustedPhoto& photo : adjusted.photos) {
@@ -159,7 +160,7 @@ std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera) {
   }
   if (most_tilt < kFlat) {
     advice.push_back("Tilt the sheet more: no photo has it tilted by more than " +
-                     FormatFixed(most_tilt * kToRadians, 0) +
+                     FormatFixed(most_tilt * kDegrees, 0) +
                      " degrees; 30 to 50 tell the focal length best.");
   } else if (std::min(tilts.x(), tilts.y()) < 0.5 * kFlat) {
     advice.push_back(
@@ -203,7 +204,8 @@ std::string CalibrationReport(const AdjustedPhotos& adjusted,
     }
     html << "<div class=\"two\"><div>" << ParameterTable(made) << "</div><div>"
          << FieldSvg(adjusted, static_cast<int>(c))
-         << "<p class=\"lead\">Mean residuals over the photo, 200 times as long; grey: nothing seen"
+         << "<p class=\"lead\">Mean residuals over the photo, 200 times as long; grey: fewer than "
+            "ten points seen"
             "</p></div></div><h3>Correlations</h3>"
          << CorrelationTable(made);
     const std::vector<std::string> advice = Advice(adjusted, static_cast<int>(c));

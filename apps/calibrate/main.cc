@@ -32,7 +32,8 @@ DEFINE_string(fix, "",
               "list. Without, pixels are square to 0.1 % and tangential distortion is 0.0005.");
 DEFINE_string(free, "", "What may be far from that, of: aspect, tangential; a list.");
 DEFINE_string(rigid, circline::RigidWorldName(circline::AdjustOptions().rigid),
-              "Whether a circle's id means the same circle in all photos: auto, yes, no.");
+              "Whether all photos show one sheet: yes, no (only the camera is common), or auto: "
+              "where the circles of one id lie alike, or circles do whatever their ids.");
 
 namespace circline::apps {
 namespace {
@@ -44,7 +45,7 @@ constexpr char kUsage[] =
     "  circline_calibrate --scene=set/scene.yaml --output=out     # annotated\n"
     "\n"
     "Writes calibration.yml (for OpenCV and --camera), calibration.json, cameras.txt and "
-    "images.txt "
+    "images.txt\n"
     "(COLMAP) and report.html. Flags for inputs, detection and losses are those of "
     "circline_compare.\n"
     "Exit code 0: done; 1: some photo could not be read, or no camera came out; 2: unusable flags "

@@ -21,11 +21,15 @@ constexpr double kSigmaPx = 0.2, kMistake = 1.5;
 
 class Photos {
  public:
-  explicit Photos(int count, std::uint64_t seed = 1, double tilt = 0.6)
+  explicit Photos(int count, std::uint64_t seed = 1, double tilt = 0.6,
+                  CameraModel model = CameraModel::kOpenCV)
       : scene_(0.0, kSigmaPx, seed) {
     scene_.camera.id = "cam";
+    scene_.camera.model = model;
     scene_.camera.fy = scene_.camera.fx;
-    scene_.camera.distortion = {-0.2, 0.05};
+    scene_.camera.distortion = {};
+    if (model == CameraModel::kOpenCV) scene_.camera.distortion = {-0.2, 0.05};
+    if (model == CameraModel::kFisheye) scene_.camera.distortion = {0.05, -0.02};
     for (int i = 0; i < count; ++i) {
       const double turn = 6.283185307179586 * i / count;
       scene_.pose.rotation =
@@ -231,10 +235,29 @@ TEST(AdjustPhotos, RefusesInWords) {
   EXPECT_EQ(AdjustPhotos(empty, options).status.code, StatusCode::kInvalidArgument);
 }
 
-TEST(AdjustPhotos, SameBitsOnOneThread) {
+TEST(AdjustPhotos, EveryCameraModelComesOutWithinItsSigma) {
+  for (const CameraModel model : {CameraModel::kPinhole, CameraModel::kFisheye}) {
+    const Photos sheet = Photos(6, 3, 0.6, model).WithCircles();
+    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedCamera& made = adjusted.cameras.front();
+    EXPECT_LT(std::abs(std::log(made.camera.fx / sheet.truth().fx)), 4.0 * made.Sigma(0));
+    EXPECT_LT(std::abs(made.camera.cx - sheet.truth().cx), 4.0 * made.Sigma(2));
+    EXPECT_LT(made.Sigma(0), 0.01);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double error = made.camera.distortion[k] - sheet.truth().distortion[k];
+      EXPECT_LE(std::abs(error), 4.0 * made.Sigma(4 + static_cast<int>(k))) << k;
+    }
+    EXPECT_EQ(made.Sigma(4) > 0.0, model != CameraModel::kPinhole);
+  }
+}
+
+TEST(AdjustPhotos, SameBitsWithAnyNumberOfThreads) {
   const Photos sheet = Photos(4).WithCircles();
-  const AdjustedPhotos a = AdjustPhotos(sheet.photos, PointNoiseOnly()),
-                       b = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  AdjustOptions options = PointNoiseOnly();
+  const AdjustedPhotos a = AdjustPhotos(sheet.photos, options);
+  options.num_threads = 3;
+  const AdjustedPhotos b = AdjustPhotos(sheet.photos, options);
   ASSERT_TRUE(a.status.ok());
   EXPECT_EQ(a.cameras[0].camera.fx, b.cameras[0].camera.fx);
   EXPECT_EQ(a.cameras[0].covariance, b.cameras[0].covariance);

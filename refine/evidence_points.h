@@ -1,0 +1,39 @@
+// The points of a contour or a line with the noise that they have, and that they share. Internal:
+// not installed.
+#ifndef CIRCLINE_REFINE_EVIDENCE_POINTS_H_
+#define CIRCLINE_REFINE_EVIDENCE_POINTS_H_
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "circline/estimators/noise_model.h"
+#include "circline/refine/image_points.h"
+
+namespace circline {
+
+// `sigma_px`: of each coordinate, what neighbours share not included; it takes the place of that in
+// `options`. None where there are too few points for a contour (5), a line (2).
+inline std::optional<ImagePoints> EvidencePoints(const Camera& camera,
+                                                 const std::vector<Eigen::Vector2d>& pixels,
+                                                 const std::vector<std::uint8_t>& inliers,
+                                                 double sigma_px, bool is_contour,
+                                                 const NoiseModel& noise,
+                                                 ImagePoints::Options options) {
+  if (pixels.empty()) return {};
+  const double shared = is_contour ? noise.contour_px : noise.line_px;
+  const double sigma = std::hypot(sigma_px, shared);
+  options.sigma_px = sigma;
+  ImagePoints points(camera, pixels, inliers, options);
+  if (points.size() < (is_contour ? 5U : 2U)) return {};
+  const double weight = is_contour ? noise.ContourWeight(sigma_px, pixels, inliers)
+                                   : noise.LineWeight(sigma_px, pixels, inliers);
+  points.set_weight(weight * (sigma * sigma) / (sigma_px * sigma_px));
+  return points;
+}
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_EVIDENCE_POINTS_H_
