@@ -115,7 +115,7 @@ template <std::size_t K, int N, typename Solve>
 int CombinedSolution(const Solve& solve, const FocalInputs<N>& inputs, FocalSolution* solution,
                      FocalRefusal* why) {
   if (!inputs.IsFinite()) return RefuseFocal(FocalRefusal::kNotFinite, why);
-  constexpr double kRounding = 1e-24;
+  constexpr double kRounding2 = 1e-24;  // Of log f, squared.
   constexpr int kSize = static_cast<int>(K);
   Eigen::Matrix<double, N, kSize> gradients = Eigen::Matrix<double, N, kSize>::Zero();
   Vector<kSize> log_focal = Vector<kSize>::Zero(), present = Vector<kSize>::Zero();
@@ -141,7 +141,7 @@ int CombinedSolution(const Solve& solve, const FocalInputs<N>& inputs, FocalSolu
   if (present.isZero()) return RefuseFocal(reason, why);
   Eigen::Matrix<double, kSize, kSize> covariance =
       gradients.transpose() * inputs.covariance * gradients;
-  covariance.diagonal().array() += kRounding;
+  covariance.diagonal().array() += kRounding2;
   covariance.diagonal() += Vector<kSize>::Ones() - present;
   Vector<kSize> weights = covariance.inverse() * present;
   weights /= weights.sum();

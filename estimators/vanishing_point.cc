@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "circline/estimators/weights.h"
 
@@ -17,6 +18,55 @@ double Cost(const std::vector<LineFit>& lines, const std::vector<double>* weight
     cost += WeightAt(weights, i) * r * r;
   }
   return cost;
+}
+
+struct Descent {
+  VanishingPointFit fit;
+  double cost;
+};
+
+// The minimum that a direction leads to by damped Gauss-Newton steps in its tangent plane. False
+// where the lines fix no direction.
+bool Descend(const std::vector<LineFit>& lines, const std::vector<double>* weights,
+             const Eigen::Vector3d& start, int max_iterations, Descent* found) {
+  Eigen::Vector3d v = start;
+  double cost = Cost(lines, weights, v);
+  Eigen::Matrix2d information;
+  Eigen::Matrix<double, 3, 2> basis;
+  double damping = 0.0;
+  for (int iteration = 0;; ++iteration) {
+    basis.col(0) = v.unitOrthogonal();
+    basis.col(1) = v.cross(basis.col(0));
+    information.setZero();
+    Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      const Eigen::Vector3d s_v = lines[i].covariance * v;
+      const double sigma = std::sqrt(v.dot(s_v));
+      const double r = lines[i].line.dot(v) / sigma;
+      const Eigen::Vector2d j = basis.transpose() * (lines[i].line - (r / sigma) * s_v) / sigma;
+      information += WeightAt(weights, i) * j * j.transpose();
+      gradient += WeightAt(weights, i) * r * j;
+    }
+    if (iteration == max_iterations) break;
+    Eigen::Matrix2d damped = information;
+    damped.diagonal() *= 1.0 + damping;
+    const Eigen::Vector2d step = -(damped.inverse() * gradient);
+    if (!step.allFinite()) return false;
+    if (step.norm() < 1e-14) break;
+    const Eigen::Vector3d candidate = (v + basis * step).normalized();
+    const double next = Cost(lines, weights, candidate);
+    if (next <= cost) {
+      const bool converged = cost - next <= 1e-13 * cost;
+      v = candidate;
+      cost = next;
+      damping *= 0.1;
+      if (converged) iteration = max_iterations - 1;  // One more linearisation, for the covariance.
+    } else {
+      damping = std::max(1e-3, 10.0 * damping);
+    }
+  }
+  *found = {{v, basis * information.inverse() * basis.transpose()}, cost};
+  return found->fit.covariance.allFinite();
 }
 
 }  // namespace
@@ -36,7 +86,7 @@ double DirectionSeparation(const VanishingPointFit& a, const VanishingPointFit& 
 }
 
 Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* fit,
-                         const std::vector<double>* weights) {
+                         const std::vector<double>* weights, VanishingPointFit* second) {
   if (lines.size() < 2) return Status::Refused("a pencil needs two lines");
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -48,48 +98,21 @@ Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* f
   if (!(eigen.eigenvalues()[1] > kMinRatio * eigen.eigenvalues()[2])) {
     return Status::Refused("the lines of the pencil coincide");
   }
-  Eigen::Vector3d v = eigen.eigenvectors().col(0);
-  double cost = Cost(lines, weights, v);
-
-  Eigen::Matrix2d information;
-  Eigen::Matrix<double, 3, 2> basis;
-  double damping = 0.0;
   constexpr int kMaxIterations = 20;
-  for (int iteration = 0;; ++iteration) {
-    basis.col(0) = v.unitOrthogonal();
-    basis.col(1) = v.cross(basis.col(0));
-    information.setZero();
-    Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
-    for (std::size_t i = 0; i < lines.size(); ++i) {
-      const Eigen::Vector3d s_v = lines[i].covariance * v;
-      const double sigma = std::sqrt(v.dot(s_v));
-      const double r = lines[i].line.dot(v) / sigma;
-      const Eigen::Vector2d j = basis.transpose() * (lines[i].line - (r / sigma) * s_v) / sigma;
-      information += WeightAt(weights, i) * j * j.transpose();
-      gradient += WeightAt(weights, i) * r * j;
-    }
-    if (iteration == kMaxIterations) break;
-    Eigen::Matrix2d damped = information;
-    damped.diagonal() *= 1.0 + damping;
-    const Eigen::Vector2d step = -(damped.inverse() * gradient);
-    if (!step.allFinite()) return Status::Refused("the lines of the pencil coincide");
-    if (step.norm() < 1e-14) break;
-    const Eigen::Vector3d candidate = (v + basis * step).normalized();
-    const double next = Cost(lines, weights, candidate);
-    if (next <= cost) {
-      const bool converged = cost - next <= 1e-13 * cost;
-      v = candidate;
-      cost = next;
-      damping *= 0.1;
-      if (converged) iteration = kMaxIterations - 1;  // One more linearisation, for the covariance.
-    } else {
-      damping = std::max(1e-3, 10.0 * damping);
-    }
+  Descent best;
+  if (!Descend(lines, weights, eigen.eigenvectors().col(0), kMaxIterations, &best))
+    return Status::Refused("the lines of the pencil coincide");
+  // Short segments near one line of the photo leave the direction open along that line.
+  constexpr double kOpen = 30.0;  // Of twice the negative log likelihood.
+  Descent other;
+  const Eigen::Vector3d across = eigen.eigenvectors().col(1);
+  if (Cost(lines, weights, across) < best.cost + kOpen &&
+      Descend(lines, weights, across, kMaxIterations, &other)) {
+    if (other.cost < best.cost) std::swap(best, other);
+    const Eigen::Vector3d far = best.fit.direction.cross(eigen.eigenvectors().col(2)).normalized();
+    if (second != nullptr && Descend(lines, weights, far, 0, &other)) *second = other.fit;
   }
-  const Eigen::Matrix3d covariance = basis * information.inverse() * basis.transpose();
-  if (!covariance.allFinite()) return Status::Refused("the lines of the pencil coincide");
-  fit->direction = v;
-  fit->covariance = covariance;
+  *fit = best.fit;
   return Status::Ok();
 }
 

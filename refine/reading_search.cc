@@ -14,9 +14,6 @@
 namespace circline {
 namespace {
 
-// Refined poses closer than this are one: radians. Solutions stop within a few hundredths of a
-// standard deviation, and those of hopeless evidence have a tenth of a radian.
-constexpr double kSamePose = 1e-3;
 constexpr std::size_t kMaxReadings = 16;
 constexpr double kHopeless = 300.0;  // Gaps that no start comes down.
 
@@ -261,15 +258,15 @@ class ReadingSearch {
 
 }  // namespace
 
-bool IsSamePose(const JointProblem& problem, const State& a, const State& b) {
+bool IsSamePose(const JointProblem& problem, const State& a, const State& b, double tolerance) {
   if (a.active != b.active) return false;
   const CameraPose p = problem.PoseAt(a), q = problem.PoseAt(b);
   const Eigen::Matrix3d &A = p.rotation, &B = q.rotation;
   const Eigen::Vector3d &s = p.translation, &t = q.translation;
-  if (problem.OriginIsPlaced(a) && s.cross(t).norm() > kSamePose * s.norm() * t.norm())
+  if (problem.OriginIsPlaced(a) && s.cross(t).norm() > tolerance * s.norm() * t.norm())
     return false;
-  if (A.col(2).cross(B.col(2)).norm() > kSamePose) return false;
-  return problem.spin_is_free() || A.col(0).cross(B.col(0)).norm() < kSamePose;
+  if (A.col(2).cross(B.col(2)).norm() > tolerance) return false;
+  return problem.spin_is_free() || A.col(0).cross(B.col(0)).norm() < tolerance;
 }
 
 Status FindMinima(const JointProblem& problem, const std::vector<Seed>& seeds,

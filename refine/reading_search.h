@@ -11,9 +11,14 @@
 
 namespace circline {
 
+// Radians. Solutions stop within a few hundredths of a standard deviation, and those of hopeless
+// evidence have a tenth of a radian.
+inline constexpr double kSamePose = 1e-3;
+
 // One pose, up to what the evidence cannot tell: the spin about the normal where that is free, and
 // the senses of the axes, which are settled by convention and may tip over.
-bool IsSamePose(const JointProblem& problem, const State& a, const State& b);
+bool IsSamePose(const JointProblem& problem, const State& a, const State& b,
+                double tolerance = kSamePose);
 
 // All minima of all readings that compete, in the order of the seeds; their cost is with what is
 // left out. A feature that contradicts the others as a whole makes a reading without it, and the

@@ -91,10 +91,40 @@ std::vector<double> FocalStarts(const JointProblem& problem, const Observations&
   return starts;
 }
 
+// A direction for a pencil that its lines leave open between two.
+std::optional<VanishingPointFit> SecondDirection(const PencilObservation& pencil) {
+  constexpr double kKnown = 0.01;  // Radians: not open.
+  if (!pencil.fit || pencil.fit->covariance.trace() < kKnown * kKnown) return {};
+  std::vector<LineFit> lines;
+  for (const LineObservation& line : pencil.lines) {
+    if (line.fit) lines.push_back(*line.fit);
+  }
+  VanishingPointFit best, second;
+  if (!FitVanishingPoint(lines, &best, nullptr, &second).ok() || second.direction.isZero())
+    return {};
+  return second;
+}
+
+// What the closed forms say with a pencil's second direction: the other evidence tells which.
+void AddSecondDirections(const Observations& resolved,
+                         const std::vector<std::shared_ptr<const Solver>>& seeders,
+                         std::vector<Seed>* seeds) {
+  for (std::size_t i = 0; i < resolved.pencils.size(); ++i) {
+    const std::optional<VanishingPointFit> second = SecondDirection(resolved.pencils[i]);
+    if (!second) continue;
+    Observations other = resolved;
+    other.pencils[i].fit = second;
+    std::vector<std::string> unused;
+    const std::vector<Seed> more = CollectSeeds(other, seeders, 0.0, &unused);
+    seeds->insert(seeds->end(), more.begin(), more.end());
+  }
+}
+
 std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& resolved,
                            const std::vector<std::shared_ptr<const Solver>>& seeders,
                            std::vector<std::string>* reasons) {
   std::vector<Seed> seeds = CollectSeeds(resolved, seeders, 0.0, reasons);
+  AddSecondDirections(resolved, seeders, &seeds);
   if (!problem.camera_is_estimated() || problem.camera_sigma().log_focal < kWideFocal) return seeds;
   for (const double start : FocalStarts(problem, resolved)) {
     std::vector<std::string> unused;
@@ -146,6 +176,17 @@ void FillNoise(const EstimationOptions& options, const PointNoise& noise, Observ
   }
 }
 
+// Where the evidence is flat, solutions stop some hundredths of a standard deviation apart.
+bool IsSameMinimum(const JointProblem& problem, const Refined& a, const Refined& b) {
+  constexpr double kHundredths = 0.1, kSameCost = 0.01;
+  double tolerance = kSamePose;
+  if (std::abs(a.hypothesis.cost - b.hypothesis.cost) < kSameCost) {
+    const Eigen::Matrix3d covariance = a.hypothesis.Covariance().topLeftCorner<3, 3>();
+    tolerance = std::max(tolerance, kHundredths * std::sqrt(covariance.diagonal().maxCoeff()));
+  }
+  return IsSamePose(problem, a.state, b.state, tolerance);
+}
+
 // Hypotheses of all minima that compete, ranked.
 Status FillHypotheses(const JointProblem& problem, const std::vector<State>& minima,
                       PoseEstimate* estimate) {
@@ -163,7 +204,7 @@ Status FillHypotheses(const JointProblem& problem, const std::vector<State>& min
       continue;
     }
     const bool known = std::any_of(all.begin(), all.end(), [&](const Refined& r) {
-      return IsSamePose(problem, r.state, refined.state);
+      return IsSameMinimum(problem, r, refined);
     });
     if (!known) all.push_back(std::move(refined));
   }

@@ -7,16 +7,24 @@
 #   tests/run.sh --sanitize   the same under AddressSanitizer and UBSan, built with clang in
 #                             build/sanitize; few trials where many serve a statistic only, and no
 #                             installed package
+#   tests/run.sh --full       the same with long draws where a statistic or a search for rare cases
+#                             takes a sample else; some twenty minutes more
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/setup.sh
 
-preset=release
+preset=release longest_s=1500
 packages=("${BUILD_PACKAGES[@]}")
 case "$*" in
   "") ;;
   --sanitize) preset=sanitize packages+=(clang libclang-rt-dev) ;;
-  *) fail "usage: tests/run.sh [--sanitize]" ;;
+  --full)
+    export CIRCLINE_AMBIGUITY_SCENES=20000 CIRCLINE_PENCIL_SCENES=100000
+    export CIRCLINE_PROPERTY_SCENES=10000000 CIRCLINE_FUZZ_CALLS=50000000
+    export CIRCLINE_FOCAL_SCENES=100000
+    longest_s=7200
+    ;;
+  *) fail "usage: tests/run.sh [--sanitize | --full]" ;;
 esac
 
 install_packages "${packages[@]}"
@@ -24,7 +32,7 @@ build "$preset"
 
 log=build/$preset-tests.log
 say "running the tests (log: $log)"
-ctest --test-dir "build/$preset" -j "$(nproc)" --output-on-failure > "$log" 2>&1 || true
+ctest --test-dir "build/$preset" -j "$(nproc)" --timeout "$longest_s" --output-on-failure > "$log" 2>&1 || true
 
 # Whatever is neither a start nor a success: the failures with their output.
 if ! grep -q '^100% tests passed' "$log"; then
