@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include "circline/refine/joint_problem.h"
@@ -14,15 +15,21 @@ namespace {
 // Of cost: half of a thirtieth of a standard deviation, squared.
 constexpr double kLittle = 5e-4;
 
-// Ends where a step, taken or not, changes the cost by little, however large the cost of all points
-// is; and where more steps like it would not lead to what competes.
+// Ends where a step, taken or not, changes the cost by little, or where the steps that would follow
+// do (near the minimum under a loss they shrink at a constant rate), however large the cost of all
+// points is; and where more steps like it would not lead to what competes.
 class Watch : public ceres::IterationCallback {
  public:
   explicit Watch(const Rival& rival) : most_(rival.cost + rival.gap) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
     constexpr double kMoreSteps = 5.0;
     if (summary.iteration == 0 || !summary.step_is_valid) return ceres::SOLVER_CONTINUE;
-    if (std::abs(summary.cost_change) < kLittle) return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+    const double rate = last_change_ > 0.0 ? summary.cost_change / last_change_ : 1.0;
+    last_change_ = summary.step_is_successful ? summary.cost_change : 0.0;
+    const bool converges = rate > 0.0 && rate < 1.0;
+    const double rest = converges ? summary.cost_change * rate / (1.0 - rate) : summary.cost_change;
+    if (std::min(std::abs(summary.cost_change), std::abs(rest)) < kLittle)
+      return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     const bool is_hopeless =
         summary.step_is_successful && summary.cost - kMoreSteps * summary.cost_change > most_;
     return is_hopeless ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
@@ -30,6 +37,7 @@ class Watch : public ceres::IterationCallback {
 
  private:
   double most_;
+  double last_change_ = 0.0;
 };
 
 }  // namespace
@@ -42,6 +50,9 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
   ownership.disable_all_safety_checks = true;
   ceres::Problem problem(ownership);
   std::vector<double*> blocks;
+  // A feature's own unknowns, one block of each, are eliminated first.
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  std::vector<double*> own(static_cast<std::size_t>(num_groups_), nullptr);
   std::vector<std::uint8_t> added(blocks_.size(), 0);
   int unknowns = 0;
   for (const Term& term : terms_) {
@@ -58,16 +69,22 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
       problem.AddParameterBlock(values, block.size,
                                 const_cast<ceres::Manifold*>(block.manifold));  // Not owned.
       if (block.is_constant) problem.SetParameterBlockConstant(values);
+      if (block.tangent_size() == 0) continue;
+      double* unused = nullptr;
+      double*& first = block.group >= 0 ? own[static_cast<std::size_t>(block.group)] : unused;
+      ordering->AddElementToGroup(values, block.group >= 0 && first == nullptr ? 0 : 1);
+      first = values;
     }
     problem.AddResidualBlock(term.cost.get(), term.loss.get(), blocks);
   }
   if (unknowns == 0) return Status::Refused("nothing of the evidence ties the pose");
 
   ceres::Solver::Options options;
-  // Beyond so many unknowns most of them are features' own, and the normal equations are sparse.
+  // Beyond so many unknowns most of them are features' own.
   constexpr int kDense = 60;
   options.linear_solver_type =
-      unknowns <= kDense ? ceres::DENSE_NORMAL_CHOLESKY : ceres::SPARSE_NORMAL_CHOLESKY;
+      unknowns <= kDense ? ceres::DENSE_NORMAL_CHOLESKY : ceres::DENSE_SCHUR;
+  if (unknowns > kDense) options.linear_solver_ordering = ordering;
   options.max_num_iterations = max_iterations;
   Watch watch(rival);
   options.callbacks.push_back(&watch);

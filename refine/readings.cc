@@ -24,7 +24,7 @@ namespace {
 // Wide priors of the focal length are searched at these, in standard deviations.
 constexpr double kWideFocal = 0.1;
 constexpr double kFocalStarts[] = {-1.6, -0.8, 0.8, 1.6};
-constexpr int kForScales = 4;  // Iterations: near enough to see how far features miss each other.
+constexpr int kForScales = 2;  // Iterations: near enough to see how far features miss each other.
 
 // What tells the best hypothesis from the next, in words.
 std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
