@@ -6,7 +6,6 @@
 //
 // C is the error along the true curve over the Cramer-Rao bound of the inliers; a fit is ok if
 // C <= 3; times are processor time of one fit.
-#include <iostream>
 
 #include "apps/benchmark/robust_fit_options.h"
 #include "apps/benchmark/robust_fit_rows.h"
@@ -35,17 +34,6 @@ int Run() {
 }  // namespace circline::apps
 
 int main(int argc, char** argv) {
-  using namespace circline::apps;  // NOLINT(google-build-using-namespace)
-  InitAppLogging(argv[0]);
-  CommandLine command_line;
-  const circline::Status status = ParseCommandLine(argc, argv, &command_line);
-  if (!status.ok()) {
-    SayOnStderr("circline_robust_fit_benchmark: " + status.message);
-    return kExitUsage;
-  }
-  if (command_line.help) {
-    std::cout << HelpText(kUsage);
-    return kExitOk;
-  }
-  return Run();
+  return circline::apps::RunApp(argc, argv, "circline_robust_fit_benchmark", circline::apps::kUsage,
+                                circline::apps::Run);
 }

@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <iostream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -103,17 +102,8 @@ int RunExperiments() {
 }  // namespace circline::apps
 
 int main(int argc, char** argv) {
-  using namespace circline::apps;  // NOLINT(google-build-using-namespace)
-  InitAppLogging(argv[0]);
-  CommandLine command_line;
-  const circline::Status status = ParseCommandLine(argc, argv, &command_line);
-  if (!status.ok()) {
-    SayOnStderr(std::string(kName) + ": " + status.message);
-    return kExitUsage;
-  }
-  if (command_line.help) {
-    std::cout << HelpText(std::string(kName) + ": simulated scenes against their bound.");
-    return kExitOk;
-  }
-  return RunExperiments();
+  return circline::apps::RunApp(
+      argc, argv, circline::apps::kName,
+      std::string(circline::apps::kName) + ": simulated scenes against their bound.",
+      circline::apps::RunExperiments);
 }

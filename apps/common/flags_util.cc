@@ -1,10 +1,12 @@
 #include "apps/common/flags_util.h"
 
+#include <fcntl.h>
 #include <gflags/gflags.h>
 #include <glog/logging.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <iostream>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/core/utils/logger.hpp>
@@ -123,6 +125,15 @@ class Parser {
 // OpenCV prints each error before it throws; what is thrown reaches the user as one line of ours.
 int IgnoreOpenCvError(int, const char*, const char*, const char*, int, void*) { return 0; }
 
+// A file that is opened must not get the number of a stream that was closed: errors would land in
+// it.
+bool OccupyStandardStreams() {
+  for (int descriptor = 0; descriptor <= 2; ++descriptor) {
+    if (fcntl(descriptor, F_GETFD) == -1 && open("/dev/null", O_RDWR) != descriptor) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 Status ParseCommandLine(int argc, const char* const* argv, CommandLine* command_line) {
@@ -144,8 +155,14 @@ std::string HelpText(const std::string& usage) {
 
 std::string VersionText(const std::string& app) { return app + " " CIRCLINE_VERSION; }
 
-void SayOnStderr(const std::string& line) { std::fputs((line + "\n").c_str(), stderr); }
+void SayOnStderr(const std::string& line) {
+  std::fputs((WithoutControls(line) + "\n").c_str(), stderr);
+}
 
+namespace {
+
+// To stderr (--minloglevel=0 shows it; people are told by SayOnStderr); OpenCV's own messages
+// become ours.
 void InitAppLogging(const char* app) {
   FLAGS_logtostderr = true;
   FLAGS_log_prefix = false;
@@ -155,8 +172,8 @@ void InitAppLogging(const char* app) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
 }
 
-int RunApp(int argc, char** argv, const std::string& app, const std::string& usage, int (*run)()) {
-  InitAppLogging(argv[0]);
+int ParseAndRun(int argc, char** argv, const std::string& app, const std::string& usage,
+                int (*run)()) {
   CommandLine command_line;
   const Status status = ParseCommandLine(argc, argv, &command_line);
   if (!status.ok()) {
@@ -171,6 +188,27 @@ int RunApp(int argc, char** argv, const std::string& app, const std::string& usa
     return run();
   }
   return kExitOk;
+}
+
+}  // namespace
+
+int RunGuarded(const char* program, const std::string& app, const std::function<int()>& run) {
+  if (!OccupyStandardStreams()) return kExitUnreadable;
+  InitAppLogging(program);
+  int code = kExitUnreadable;
+  try {
+    code = run();
+  } catch (const std::exception& error) {  // Such as no memory left.
+    SayOnStderr(app + ": stopped: " + error.what());
+  }
+  std::cout.flush();
+  if (std::cout && std::fflush(stdout) == 0) return code;
+  SayOnStderr(app + ": standard output cannot be written");
+  return std::max(code, kExitUnreadable);
+}
+
+int RunApp(int argc, char** argv, const std::string& app, const std::string& usage, int (*run)()) {
+  return RunGuarded(argv[0], app, [&] { return ParseAndRun(argc, argv, app, usage, run); });
 }
 
 }  // namespace circline::apps

@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_COMMON_FLAGS_UTIL_H_
 #define CIRCLINE_APPS_COMMON_FLAGS_UTIL_H_
 
+#include <functional>
 #include <string>
 
 #include "circline/estimators/status.h"
@@ -30,16 +31,15 @@ std::string HelpText(const std::string& usage);
 // "circline_compare 0.1.0".
 std::string VersionText(const std::string& app);
 
-// All of an app's main but what it does: logging, the command line, --help, --version. `run`
-// returns the exit code.
+// What every main stands in: logging; an exception that nobody caught, or a standard output that
+// cannot be written, is a sentence and exit code 1. `run` returns the exit code.
+int RunGuarded(const char* program, const std::string& app, const std::function<int()>& run);
+
+// All of an app's main but what it does: the above, the command line, --help, --version.
 int RunApp(int argc, char** argv, const std::string& app, const std::string& usage, int (*run)());
 
 // One whole line on stderr.
 void SayOnStderr(const std::string& line);
-
-// Sets up logging to stderr (--minloglevel=0 shows it; people are told by SayOnStderr) and silences
-// OpenCV's own messages (they become ours).
-void InitAppLogging(const char* app);
 
 }  // namespace circline::apps
 

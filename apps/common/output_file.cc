@@ -23,6 +23,17 @@ std::string FoldCase(std::string text) {
   return text;
 }
 
+// At most so many bytes of a name, that it and what is appended to it fit into the 255 of a file
+// system; not within a character of UTF-8.
+std::string Shortened(std::string name) {
+  constexpr std::size_t kMaxBytes = 200;
+  if (name.size() <= kMaxBytes) return name;
+  std::size_t end = kMaxBytes;
+  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;
+  name.resize(end);
+  return name;
+}
+
 // The last `num_folders` folders of the path and its stem, joined by "_".
 std::string StemWithFolders(const fs::path& path, int num_folders) {
   std::string stem = path.stem().string();
@@ -32,18 +43,38 @@ std::string StemWithFolders(const fs::path& path, int num_folders) {
     if (name != "." && name != "..") stem = name + "_" + stem;
     folder = folder.parent_path();
   }
-  return stem;
+  return Shortened(stem);
+}
+
+// What a symbolic link points at, be it there or not: the link stays.
+std::string Followed(const std::string& path) {
+  constexpr int kMaxLinks = 16;
+  fs::path followed = path;
+  std::error_code error;
+  for (int i = 0; i < kMaxLinks && fs::is_symlink(followed, error); ++i) {
+    const fs::path target = fs::read_symlink(followed, error);
+    if (error) break;
+    followed = followed.parent_path() / target;  // `target` alone where it is absolute.
+  }
+  return followed.string();
+}
+
+// A device or pipe, which is written to and not replaced.
+bool IsSpecial(const std::string& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
 }
 
 }  // namespace
 
 OutputFile::OutputFile(std::string path)
-    : path_(std::move(path)),
-      temporary_path_(path_ + ".part"),
+    : path_(Followed(path)),
+      temporary_path_(IsSpecial(path_) ? path_ : path_ + ".part"),
       stream_(temporary_path_, std::ios::binary) {}
 
 OutputFile::~OutputFile() {
-  if (committed_) return;
+  if (committed_ || temporary_path_ == path_) return;
   stream_.close();
   std::error_code error;
   fs::remove(temporary_path_, error);
@@ -52,7 +83,7 @@ OutputFile::~OutputFile() {
 Status OutputFile::Commit() {
   stream_.close();
   std::error_code error;
-  if (stream_) fs::rename(temporary_path_, path_, error);
+  if (stream_ && temporary_path_ != path_) fs::rename(temporary_path_, path_, error);
   if (!stream_ || error) return Status::Failed(path_ + ": cannot be written");
   committed_ = true;
   return Status::Ok();
@@ -97,7 +128,8 @@ Status CanWriteFile(const std::string& path) {
 Status CreateFolder(const std::string& path) {
   std::error_code error;
   fs::create_directories(path, error);
-  if (fs::is_directory(path)) return Status::Ok();
+  std::error_code unknown;  // Where it cannot even be looked at, the first error says why.
+  if (fs::is_directory(path, unknown)) return Status::Ok();
   return Status::Invalid(path + ": this folder cannot be created" +
                          (error ? " (" + error.message() + ")" : ""));
 }

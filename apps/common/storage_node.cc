@@ -7,6 +7,7 @@
 #include <iterator>
 #include <set>
 #include <sstream>
+#include <vector>
 
 #include "apps/common/text.h"
 #include "circline/estimators/status.h"
@@ -55,7 +56,13 @@ Status ReadTextFile(const std::string& path, std::string* text) {
   }
   std::ifstream file(path, std::ios::binary);
   if (!file) return Status::Invalid(path + ": cannot be opened");
-  text->assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+  constexpr std::size_t kMaxBytes = std::size_t{256} << 20;
+  text->clear();
+  std::vector<char> piece(std::size_t{1} << 16);
+  while (file.read(piece.data(), static_cast<std::streamsize>(piece.size())) || file.gcount() > 0) {
+    text->append(piece.data(), static_cast<std::size_t>(file.gcount()));
+    if (text->size() > kMaxBytes) return Status::Invalid(path + ": is larger than 256 MB");
+  }
   if (StartsWith(*text, "\xEF\xBB\xBF")) text->erase(0, 3);
   return Status::Ok();
 }

@@ -168,4 +168,19 @@ std::string EncodeBase64(const std::vector<std::uint8_t>& bytes) {
   return text;
 }
 
+std::string WithoutControls(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    if (code >= 0x20 && code != 0x7F) {
+      out += c;
+      continue;
+    }
+    char escaped[8];
+    std::snprintf(escaped, sizeof(escaped), "\\x%02x", static_cast<unsigned>(code));
+    out += escaped;
+  }
+  return out;
+}
+
 }  // namespace circline::apps

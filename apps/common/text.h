@@ -31,6 +31,9 @@ std::string FormatMicroseconds(double microseconds);
 std::string EscapeHtml(const std::string& text);
 std::string EncodeBase64(const std::vector<std::uint8_t>& bytes);
 
+// A line for a terminal: control characters, which may move the cursor or end the line, as \xNN.
+std::string WithoutControls(const std::string& text);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMMON_TEXT_H_

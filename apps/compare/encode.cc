@@ -1,5 +1,6 @@
 #include "apps/compare/encode.h"
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -15,13 +16,16 @@ std::vector<std::uint8_t> EncodePng(const cv::Mat& picture) {
 }
 
 std::vector<std::uint8_t> EncodeJpeg(const cv::Mat& picture, int max_width) {
+  constexpr int kMaxRatio = 8;  // Of height to width; a JPEG has 65500 rows at most.
+  const double scale = std::min({1.0, static_cast<double>(max_width) / picture.cols,
+                                 static_cast<double>(kMaxRatio * max_width) / picture.rows});
+  const auto scaled = [scale](int side) {
+    return std::max(1, static_cast<int>(std::lround(side * scale)));
+  };
   cv::Mat small = picture;
-  if (picture.cols > max_width) {
-    const double scale = static_cast<double>(max_width) / picture.cols;
-    cv::resize(picture, small,
-               cv::Size(max_width, static_cast<int>(std::lround(picture.rows * scale))), 0.0, 0.0,
+  if (scale < 1.0)
+    cv::resize(picture, small, {scaled(picture.cols), scaled(picture.rows)}, 0.0, 0.0,
                cv::INTER_AREA);
-  }
   std::vector<std::uint8_t> bytes;
   cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, 82});
   return bytes;

@@ -43,7 +43,12 @@ WorkedImage ImageWorker::Finish(ImageRun* run) const {
     worked.status = WriteOverlay(*run, options_.output + "/" + overlay);
     run->stages.emplace_back("overlay", watch.Microseconds());
   }
-  worked.lines = WriteLines(*run, overlay, options_.unusual_flags, options_.fit.noise_model);
+  try {
+    worked.lines = WriteLines(*run, overlay, options_.unusual_flags, options_.fit.noise_model);
+  } catch (const std::exception& error) {  // It would end the thread, and the run with it.
+    worked.status =
+        Status::Failed(run->image->path + ": its results cannot be written: " + error.what());
+  }
   worked.read_error = run->read_error;
   return worked;
 }

@@ -1,5 +1,7 @@
 // circline_compare: photos through every solver; a table, a picture for each photo, a report.
+#include <exception>
 #include <iostream>
+#include <string>
 
 #include "apps/common/flags_util.h"
 #include "apps/compare/options.h"
@@ -69,13 +71,25 @@ bool Answer(const CommandLine& command_line) {
   return true;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  circline::apps::InitAppLogging(argv[0]);
-  const Ranks ranks(&argc, &argv);
+int ParseAndCompare(int argc, char** argv, const Ranks& ranks) {
   CommandLine command_line;
   const Status status = circline::apps::ParseCommandLine(argc, argv, &command_line);
   if (!status.ok()) return Refuse(status, ranks);
   return Answer(command_line) ? circline::apps::kExitOk : Compare(ranks);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return circline::apps::RunGuarded(argv[0], "circline_compare", [&] {
+    const Ranks ranks(&argc, &argv);
+    try {
+      return ParseAndCompare(argc, argv, ranks);
+    } catch (const std::exception& error) {
+      if (ranks.count() == 1) throw;
+      circline::apps::SayOnStderr(std::string("circline_compare: stopped: ") + error.what());
+      ranks.Abort(circline::apps::kExitUnreadable);  // The others wait to be heard.
+      return circline::apps::kExitUnreadable;
+    }
+  });
 }

@@ -263,4 +263,8 @@ ImageLines WriteLines(const ImageRun& run, const std::string& overlay,
   return lines;
 }
 
+std::string TextAsWritten(const std::string& text) {
+  return Json::parse(Line(text)).get<std::string>();
+}
+
 }  // namespace circline::apps

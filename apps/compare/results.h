@@ -23,6 +23,9 @@ namespace circline::apps {
 ImageLines WriteLines(const ImageRun& run, const std::string& overlay,
                       const std::vector<std::string>& flags, const NoiseModel& noise);
 
+// A text as these lines have it: what is not UTF-8 is replaced.
+std::string TextAsWritten(const std::string& text);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMPARE_RESULTS_H_

@@ -7,6 +7,7 @@
 #include "apps/common/output_file.h"
 #include "apps/common/storage_node.h"
 #include "apps/compare/record_files.h"
+#include "apps/compare/results.h"
 
 namespace circline::apps {
 namespace {
@@ -54,7 +55,7 @@ Status FindDone(const CompareOptions& options, const ImageSet& images,
   for (ImageLines lines; reader.Next(&lines);) {
     if (!ParseRecord(lines, &record).ok()) return Status::Ok();  // Done again from here on.
     if (done->images >= images.size()) return OtherRun(folder, "it has more images");
-    const std::string& name = images.name(done->images);
+    const std::string name = TextAsWritten(images.name(done->images));
     if (record.name != name || record.index != images.index(done->images)) {
       return OtherRun(folder, "its image " + std::to_string(done->images + 1) + " is " +
                                   record.name + ", not " + name);
