@@ -25,9 +25,12 @@ class Exporter {
   virtual ~Exporter() = default;
   virtual void Add(const ExportedPose& pose) = 0;
   virtual Status Finish() = 0;  // Writes the files.
+  // What the files could not take, a sentence; or empty.
+  virtual std::string Note() const { return ""; }
 };
 
-// images.txt (without points), cameras.txt and an empty points3D.txt.
+// images.txt (without points), cameras.txt and an empty points3D.txt. Photos with a space in their
+// name are left out: this format ends a name there.
 std::unique_ptr<Exporter> MakeColmapExporter(const std::string& folder);
 // cameras.gltf: a glTF 2.0 scene with a camera for each photo, upright in programs whose Z is up.
 // It has no place for lens distortion and the principal point.
@@ -36,8 +39,10 @@ std::unique_ptr<Exporter> MakeGltfExporter(const std::string& folder);
 // name where that is a number, else its position in the set.
 std::unique_ptr<Exporter> MakeTumExporter(const std::string& folder);
 
-// Writes the answer to show of every photo that has one; `formats` are colmap, gltf, tum.
-Status WriteExports(const std::string& folder, const std::vector<std::string>& formats);
+// Writes the answer to show of every photo that has one; `formats` are colmap, gltf, tum. `notes`:
+// sentences, a line each, on what a reader of the files could not know.
+Status WriteExports(const std::string& folder, const std::vector<std::string>& formats,
+                    std::string* notes);
 
 }  // namespace circline::apps
 

@@ -2,8 +2,11 @@
 #include <algorithm>
 #include <map>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "apps/common/output_file.h"
+#include "apps/common/text.h"
 #include "apps/compare/export.h"
 
 namespace circline::apps {
@@ -37,6 +40,11 @@ class ColmapExporter : public Exporter {
   }
 
   void Add(const ExportedPose& pose) override {
+    // COLMAP would read it up to there, and find no such photo, or another one.
+    if (pose.name.find_first_of(" \t\r\n") != std::string::npos) {
+      left_out_.push_back("'" + pose.name + "'");
+      return;
+    }
     const int camera_id =
         cameras_.emplace(CameraText(pose.camera), static_cast<int>(cameras_.size()) + 1)
             .first->second;
@@ -52,16 +60,26 @@ class ColmapExporter : public Exporter {
     for (const auto& [text, id] : cameras_) by_id[id] = text;
     std::string cameras = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n";
     for (const auto& [id, text] : by_id) cameras += std::to_string(id) + " " + text + "\n";
-    Status status = WriteFile(folder_ + "/images.txt", images_.str());
+    std::string images = images_.str();
+    if (!left_out_.empty())
+      images += "# without " + std::to_string(left_out_.size()) + " whose names have spaces\n";
+    Status status = WriteFile(folder_ + "/images.txt", images);
     if (status.ok()) status = WriteFile(folder_ + "/cameras.txt", cameras);
     if (status.ok()) status = WriteFile(folder_ + "/points3D.txt", "# no points\n");
     return status;
+  }
+
+  std::string Note() const override {
+    if (left_out_.empty()) return "";
+    return "images.txt is without photos whose names COLMAP cannot read, for their spaces: " +
+           JoinList(left_out_, ", ");
   }
 
  private:
   std::string folder_;
   std::ostringstream images_;
   std::map<std::string, int> cameras_;  // By text: id.
+  std::vector<std::string> left_out_;   // Names.
 };
 
 }  // namespace

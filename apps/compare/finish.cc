@@ -49,10 +49,11 @@ Status FinishFolder(const std::string& folder, const FinishOptions& options,
   const Summary& summary = digest.summary;
   if (status.ok()) status = WriteFile(folder + "/summary.csv", summary.Csv());
   if (status.ok()) status = WriteReport(folder, digest);
-  if (status.ok()) status = WriteExports(folder, options.exports);
+  std::string notes;
+  if (status.ok()) status = WriteExports(folder, options.exports, &notes);
   if (status.ok() && !options.save_options.empty()) status = SaveBest(summary, options);
   result->num_unreadable = summary.num_unreadable();
-  result->table = summary.Table() + BestSentence(summary);
+  result->table = summary.Table() + BestSentence(summary) + notes;
   return status;
 }
 

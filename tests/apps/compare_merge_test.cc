@@ -151,7 +151,9 @@ TEST_F(CompareMerge, ExportsTheRefinedFocalLength) {
 }
 
 TEST_F(CompareMerge, ExportsThePosesThatAreShown) {
-  ASSERT_EQ(Run("--overlays=false --export_as=colmap,gltf,tum", "out").exit_code, 1);
+  const Outcome outcome = Run("--overlays=false --export_as=colmap,gltf,tum", "out");
+  ASSERT_EQ(outcome.exit_code, 1);
+  EXPECT_CONTAINS(outcome.out, "exported poses: 0 of 6 have a scale");
   std::vector<Json> shown;
   for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
     if (line["solver"] == "joint" && line["hypothesis"] == 0) shown.push_back(line);
