@@ -98,16 +98,16 @@ void AdjustProblem::AddPhoto(int photo) {
 // first photo's translation is held, but for its length where a length is known, and its spin,
 // unless a pencil fixes that.
 void AdjustProblem::SetGauge() {
+  std::set<const double*> observed;  // Translations.
+  for (const Feature& feature : features_) {
+    if (feature.active) observed.insert(feature.blocks[1]);
+  }
   std::map<int, bool> done;
   for (std::size_t i = 0; i < photos_.size(); ++i) {
     const int world = photos_[i].world;
     if (rotations_[i] == nullptr) continue;
-    const bool sees_circle = std::any_of(features_.begin(), features_.end(), [&](const Feature& f) {
-      return f.active && f.photo == static_cast<int>(i) && f.blocks.size() > 1 &&
-             f.blocks[1] == translations_[i];
-    });
     Block& translation = blocks_[translations_[i]];
-    if (!sees_circle) {
+    if (observed.count(translations_[i]) == 0) {
       translation.constant = true;  // Nothing speaks of it.
       continue;
     }

@@ -87,7 +87,7 @@ class AdjustProblem {
   bool IsUsed(int camera) const;  // By a photo that takes part; else there is nothing to ask of it.
   Camera CameraAt(int camera) const;
   CameraPose PoseAt(int photo) const;
-  std::vector<AdjustedResidual> Residuals(int photo) const;  // Of the inliers.
+  std::vector<std::vector<AdjustedResidual>> Residuals() const;  // Of the inliers; by photo.
   std::vector<AdjustedCircle> Circles() const;
   bool metric() const { return metric_; }
 

@@ -248,19 +248,20 @@ std::vector<Eigen::Vector2d> Across(const std::vector<Eigen::Vector2d>& pixels, 
 
 }  // namespace
 
-std::vector<AdjustedResidual> AdjustProblem::Residuals(int photo) const {
-  std::vector<AdjustedResidual> out;
+std::vector<std::vector<AdjustedResidual>> AdjustProblem::Residuals() const {
+  std::vector<std::vector<AdjustedResidual>> out(photos_.size());
   std::vector<double> distances;
   for (const Feature& feature : features_) {
     const ImagePoints* points = feature.cost->points();
-    if (feature.photo != photo || !feature.active || points == nullptr) continue;
+    if (!feature.active || points == nullptr) continue;
     feature.cost->Distances(feature.blocks.data(), &distances);
     const bool is_line = dynamic_cast<const DirectionLineCost*>(feature.cost) != nullptr;
     const std::vector<Eigen::Vector2d> across = Across(points->pixels(), is_line);
     const double gate = kInlierSigmas * points->options().sigma_px;
     for (std::size_t i = 0; i < distances.size(); ++i) {
       if (std::abs(distances[i]) <= gate)
-        out.push_back({points->pixels()[i], distances[i] * across[i]});
+        out[static_cast<std::size_t>(feature.photo)].push_back(
+            {points->pixels()[i], distances[i] * across[i]});
     }
   }
   return out;

@@ -37,15 +37,15 @@ void Adjustment::SolveOnce() {
 // Fills the photos' misfits; returns their median.
 double Adjustment::JudgePhotos() {
   problem_->Judge();
+  std::vector<std::vector<double>> by_photo(given_.size());
+  for (const AdjustProblem::Feature& feature : problem_->features()) {
+    if (feature.active && feature.rows > 0)
+      by_photo[static_cast<std::size_t>(feature.photo)].push_back(feature.chi2 / feature.rows);
+  }
   std::vector<double> misfits;
   for (std::size_t i = 0; i < given_.size(); ++i) {
     if (!inputs_[i].takes_part) continue;
-    std::vector<double> own;
-    for (const AdjustProblem::Feature& feature : problem_->features()) {
-      if (feature.photo == static_cast<int>(i) && feature.active && feature.rows > 0)
-        own.push_back(feature.chi2 / feature.rows);
-    }
-    out_.photos[i].misfit = Median(std::move(own));
+    out_.photos[i].misfit = Median(std::move(by_photo[i]));
     misfits.push_back(out_.photos[i].misfit);
   }
   return Median(std::move(misfits));
@@ -156,11 +156,12 @@ void Adjustment::Report() {
   }
   std::vector<double> squares(cameras_.size(), 0.0);
   std::vector<int> counts(cameras_.size(), 0);
+  std::vector<std::vector<AdjustedResidual>> residuals = problem_->Residuals();
   for (std::size_t i = 0; i < given_.size(); ++i) {
     if (!inputs_[i].takes_part) continue;
     AdjustedPhoto& photo = out_.photos[i];
     photo.cam_from_world = problem_->PoseAt(static_cast<int>(i));
-    photo.residuals = problem_->Residuals(static_cast<int>(i));
+    photo.residuals = std::move(residuals[i]);
     const int count = static_cast<int>(photo.residuals.size());
     double sum = 0.0;
     for (const AdjustedResidual& r : photo.residuals) sum += r.offset.squaredNorm();

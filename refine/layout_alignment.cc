@@ -1,0 +1,163 @@
+// Pairs of circles, and the similarity that maps them onto each other.
+#include "circline/refine/layout_alignment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+namespace circline {
+
+Places PlacesOf(const Layout& layout) {
+  Places places;
+  places.reserve(layout.size());
+  for (const auto& [id, circle] : layout) places.push_back({&id, circle});
+  std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+    return a.circle.center.x() < b.circle.center.x();
+  });
+  return places;
+}
+
+namespace {
+
+// Least squares of the centres (Umeyama 1991). False for fewer than two.
+bool Fit(const Places& from, const Places& to, const Pairs& pairs, Similarity* out) {
+  constexpr std::size_t kFewest = 2;
+  if (pairs.size() < kFewest) return false;
+  Eigen::Vector2d a = Eigen::Vector2d::Zero(), b = a;
+  const double n = static_cast<double>(pairs.size());
+  for (const auto& [own, shared] : pairs) {
+    a += from[own].circle.center / n;
+    b += to[shared].circle.center / n;
+  }
+  double dot = 0.0, cross = 0.0, square = 0.0;
+  for (const auto& [own, shared] : pairs) {
+    const Eigen::Vector2d u = from[own].circle.center - a, v = to[shared].circle.center - b;
+    dot += u.dot(v);
+    cross += u.x() * v.y() - u.y() * v.x();
+    square += u.squaredNorm();
+  }
+  const double both = std::hypot(dot, cross);
+  if (!(square > 0.0) || !(both > 0.0)) return false;
+  out->scale = both / square;
+  out->turn << dot / square, -cross / square, cross / square, dot / square;
+  out->shift = b - out->turn * a;
+  return true;
+}
+
+// In place and in size, radii.
+double Miss(const LayoutCircle& from, const LayoutCircle& to, const Similarity& similarity) {
+  const double size = std::log(similarity.scale * from.radius / to.radius);
+  return std::hypot((similarity(from.center) - to.center).norm() / to.radius, size);
+}
+
+bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
+  if (!Fit(from, to, alignment->pairs, &alignment->to_shared)) return false;
+  std::vector<double> misses;
+  for (const auto& [own, shared] : alignment->pairs)
+    misses.push_back(Miss(from[own].circle, to[shared].circle, alignment->to_shared));
+  const auto middle = misses.begin() + static_cast<std::ptrdiff_t>(misses.size() / 2);
+  std::nth_element(misses.begin(), middle, misses.end());
+  alignment->misfit = *middle;
+  return true;
+}
+
+// Each circle and the one nearest to it.
+Pairs NeighbourPairs(const Places& places) {
+  Pairs pairs;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    std::size_t nearest = k;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t other = 0; other < places.size(); ++other) {
+      const double distance = (places[other].circle.center - places[k].circle.center).squaredNorm();
+      if (other == k || !(distance < least)) continue;
+      least = distance;
+      nearest = other;
+    }
+    if (nearest != k) pairs.push_back({k, nearest});
+  }
+  return pairs;
+}
+
+// The circles of `from` that lie on one of `to`, each on another.
+Pairs Matches(const Places& from, const Places& to, const Similarity& similarity) {
+  constexpr double kNear = 0.3;  // Radii.
+  double largest = 0.0;
+  for (const Place& place : to) largest = std::max(largest, place.circle.radius);
+  Pairs pairs;
+  std::vector<bool> taken(to.size(), false);
+  for (std::size_t own = 0; own < from.size(); ++own) {
+    const Eigen::Vector2d at = similarity(from[own].circle.center);
+    const double reach = kNear * largest;
+    const auto first =
+        std::lower_bound(to.begin(), to.end(), at.x() - reach,
+                         [](const Place& place, double x) { return place.circle.center.x() < x; });
+    for (auto k = static_cast<std::size_t>(first - to.begin());
+         k < to.size() && to[k].circle.center.x() <= at.x() + reach; ++k) {
+      const LayoutCircle& circle = to[k].circle;
+      if (taken[k] || std::abs(circle.center.y() - at.y()) > reach ||
+          !(Miss(from[own].circle, circle, similarity) < kNear)) {
+        continue;
+      }
+      pairs.push_back({own, k});
+      taken[k] = true;
+      break;
+    }
+  }
+  return pairs;
+}
+
+}  // namespace
+
+bool AlignById(const Places& from, const Places& to, Alignment* alignment) {
+  std::map<std::string, std::size_t> shared;
+  for (std::size_t k = 0; k < to.size(); ++k) shared[*to[k].id] = k;
+  for (std::size_t k = 0; k < from.size(); ++k) {
+    const auto same = shared.find(*from[k].id);
+    if (same != shared.end()) alignment->pairs.push_back({k, same->second});
+  }
+  return FitAndJudge(from, to, alignment);
+}
+
+bool AlignFrom(const Places& from, const Places& to, const Similarity& start,
+               Alignment* alignment) {
+  alignment->pairs = Matches(from, to, start);
+  return FitAndJudge(from, to, alignment);
+}
+
+bool AlignByPattern(const Places& from, const Places& to, Alignment* alignment) {
+  constexpr std::size_t kBases = 6;
+  constexpr double kSize = 0.2;  // Two circles alike in size and distance, relative.
+  const Pairs own_pairs = NeighbourPairs(from);
+  Pairs shared_pairs = NeighbourPairs(to);
+  const std::size_t count = shared_pairs.size(), fewer = std::min(from.size(), to.size());
+  for (std::size_t k = 0; k < count; ++k)
+    shared_pairs.push_back({shared_pairs[k][1], shared_pairs[k][0]});
+  const std::size_t step = std::max<std::size_t>(1, own_pairs.size() / kBases);
+  for (std::size_t base = 0; base < own_pairs.size(); base += step) {
+    const auto& [a, b] = own_pairs[base];
+    for (const auto& [c, d] : shared_pairs) {
+      if (alignment->pairs.size() == fewer) break;  // All of them.
+      Similarity similarity;
+      if (!Fit(from, to, {{a, c}, {b, d}}, &similarity) ||
+          std::abs(std::log(similarity.scale * from[a].circle.radius / to[c].circle.radius)) >
+              kSize) {
+        continue;
+      }
+      Pairs pairs = Matches(from, to, similarity);
+      if (pairs.size() > alignment->pairs.size()) alignment->pairs = std::move(pairs);
+    }
+  }
+  constexpr double kMost = 0.6;  // Of the circles of the photo that has fewer.
+  constexpr std::size_t kFewest = 4;
+  if (alignment->pairs.size() < kFewest ||
+      static_cast<double>(alignment->pairs.size()) < kMost * static_cast<double>(fewer) ||
+      !FitAndJudge(from, to, alignment)) {
+    return false;
+  }
+  const Similarity from_all_pairs = alignment->to_shared;
+  return AlignFrom(from, to, from_all_pairs, alignment);
+}
+
+}  // namespace circline
