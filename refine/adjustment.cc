@@ -59,9 +59,10 @@ bool Adjustment::LeaveOut() {
   constexpr double kGrossFeature = 30.0;  // A feature: p = 1e-7 for one degree of freedom.
   const double median = JudgePhotos(), common = std::max(1.0, median);
   bool any = false;
-  std::vector<int> left(given_.size(), 0);
+  std::vector<int> left(given_.size(), 0), all(given_.size(), 0);
   for (const AdjustProblem::Feature& feature : problem_->features()) {
     const auto i = static_cast<std::size_t>(feature.photo);
+    ++all[i];
     if (!feature.active) continue;
     ++left[i];
     if (out_.photos[i].misfit > kGross * common || !(feature.chi2 > kGrossFeature * common))
@@ -73,14 +74,19 @@ bool Adjustment::LeaveOut() {
   }
   for (std::size_t i = 0; i < given_.size(); ++i) {
     const bool is_gross = out_.photos[i].misfit > kGross * common;
-    if (!inputs_[i].takes_part || (!is_gross && left[i] > 0)) continue;
+    if (!inputs_[i].takes_part || (!is_gross && 2 * left[i] >= all[i])) continue;
     any = true;
     inputs_[i].takes_part = false;
     char text[120];
-    std::snprintf(text, sizeof(text),
-                  "it contradicts the other photos: misfit %.3g, theirs %.3g (1 expected)",
-                  out_.photos[i].misfit, median);
-    out_.photos[i].status = Status::Refused(is_gross ? text : "nothing in it agrees with the rest");
+    if (is_gross) {
+      std::snprintf(text, sizeof(text),
+                    "it contradicts the other photos: misfit %.3g, theirs %.3g (1 expected)",
+                    out_.photos[i].misfit, median);
+    } else {
+      std::snprintf(text, sizeof(text), "it contradicts the other photos in %d of %d features",
+                    all[i] - left[i], all[i]);
+    }
+    out_.photos[i].status = Status::Refused(text);
   }
   return any;
 }

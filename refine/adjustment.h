@@ -36,6 +36,7 @@ class Adjustment {
   AdjustedPhotos Run() {
     out_.status = options_.Validate();
     if (out_.status.ok()) out_.status = FindCameras();
+    if (out_.status.ok()) SetAsideEqualViews();
     if (out_.status.ok()) out_.status = Start();
     if (out_.status.ok()) SolveWithoutGross();
     if (out_.status.ok()) Report();
@@ -44,6 +45,7 @@ class Adjustment {
 
  private:
   Status FindCameras();
+  void SetAsideEqualViews();
   EstimationOptions PoseOptions() const;
   void Estimate();
   void FindCamera(std::size_t camera);

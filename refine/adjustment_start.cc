@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "circline/refine/adjustment.h"
+#include "circline/refine/equal_views.h"
 
 namespace circline {
 namespace {
@@ -66,6 +67,24 @@ Status Adjustment::FindCameras() {
   }
   guesses_ = cameras_;
   return Status::Ok();
+}
+
+void Adjustment::SetAsideEqualViews() {
+  if (!(options_.nearly_equal > 0.0)) return;
+  const std::vector<int> equal = NearlyEqualViews(given_, options_.nearly_equal);
+  const auto count =
+      std::count_if(equal.begin(), equal.end(), [](int other) { return other >= 0; });
+  for (std::size_t i = 0; i < equal.size(); ++i) {
+    if (equal[i] < 0 || is_valid_[i] == 0) continue;
+    is_valid_[i] = 0;
+    out_.photos[i].status =
+        Status::Refused("it shows nearly the same as photo " + std::to_string(equal[i]) +
+                        " (counted from 0), whose errors it shares");
+  }
+  if (count > 0) {
+    out_.notes.push_back(std::to_string(count) + " of " + std::to_string(equal.size()) +
+                         " photos show nearly the same as another one, and are set aside");
+  }
 }
 
 EstimationOptions Adjustment::PoseOptions() const {

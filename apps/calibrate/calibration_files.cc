@@ -140,7 +140,8 @@ std::string CalibrationTable(const AdjustedPhotos& adjusted,
       continue;
     }
     const Camera& camera = made.camera;
-    out << "camera '" << camera.id << "', " << made.num_photos << " photos, "
+    out << "camera '" << camera.id << "', " << made.num_photos
+        << (made.num_photos == 1 ? " photo, " : " photos, ")
         << (adjusted.rigid ? "one world" : "each photo a world of its own") << ", rms "
         << FormatShort(made.rms_px) << " px\n";
     out << "  focal length " << FormatFixed(camera.fx, 2) << " +- "
@@ -163,11 +164,15 @@ std::string CalibrationTable(const AdjustedPhotos& adjusted,
       out << (adjusted.cameras.size() > 1 ? "  '" + adjusted.cameras[c].camera.id + "': " : "  ")
           << sentence << "\n";
   }
+  for (const std::string& note : adjusted.notes) out << "  " << note << "\n";
+  constexpr int kMostNamed = 20;  // All are in calibration.json and the report.
+  int left_out = 0;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::string& message = adjusted.photos[i].status.message;
-    if (!adjusted.photos[i].status.ok())
-      out << names[i] << ": left out, " << message.substr(0, message.find(" (")) << "\n";
+    if (adjusted.photos[i].status.ok() || ++left_out > kMostNamed) continue;
+    out << names[i] << ": left out, " << message.substr(0, message.find(" (")) << "\n";
   }
+  if (left_out > kMostNamed) out << "and " << left_out - kMostNamed << " more are left out\n";
   return out.str();
 }
 

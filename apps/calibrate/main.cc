@@ -178,6 +178,17 @@ CameraSigma PriorOf(const CalibrateOptions& options, const SceneImage& image,
   return sigma;
 }
 
+// Of a camera that is only guessed photos may have any size: those of another one are another
+// camera's.
+void SetApartBySize(const std::map<std::string, Camera>& given, Camera* camera) {
+  const auto same = given.find(camera->id);
+  if (same == given.end() ||
+      (same->second.width == camera->width && same->second.height == camera->height)) {
+    return;
+  }
+  camera->id += "_" + std::to_string(camera->width) + "x" + std::to_string(camera->height);
+}
+
 // `given`: the cameras as they came, by id; filled where they are not in it.
 Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
                      std::map<std::string, Camera>* given, Calibration* calibration) {
@@ -190,6 +201,8 @@ Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
     }
     Observations& photo = calibration->photos.emplace_back(std::move(runs[i].observations));
     SetModel(options->model, &photo.camera);
+    SetApartBySize(*given, &photo.camera);
+    (*images)[i].observations.camera.id = photo.camera.id;
     photo.camera = given->insert({photo.camera.id, photo.camera}).first->second;
     options->adjust.camera_sigma[photo.camera.id] = PriorOf(*options, (*images)[i], photo.camera);
     calibration->names.push_back((*images)[i].name);

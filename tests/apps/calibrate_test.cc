@@ -1,11 +1,15 @@
 // circline_calibrate on painted boards of which nothing is known.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <string>
+#include <vector>
 
 #include "tests/apps/board_set.h"
 #include "tests/apps/run_compare.h"
@@ -60,6 +64,83 @@ TEST_F(CalibrateTest, ItsCameraCanBeUsed) {
                                       "--overlays=false --output=" +
                                       folder_.path() + "/compared");
   EXPECT_EQ(compared.exit_code, 0) << compared.err;
+}
+
+// Nine circles of a board, from several sides; contours given.
+std::string SheetPhoto(const Board& board, const std::string& file, double squeeze) {
+  std::string text = "  - file: \"" + file + "\"\n    camera: \"k\"\n    circles:\n";
+  for (int k = 0; k < 9; ++k) {
+    std::vector<Eigen::Vector2d> contour;
+    for (int i = 0; i < 40; ++i) {
+      const double t = 2.0 * 3.14159265358979 * i / 40;
+      contour.push_back(
+          board.Pixel(k % 3 - 1 + 0.3 * std::cos(t), k / 3 * 0.8 - 0.8 + 0.3 * std::sin(t)));
+      contour.back().x() *= squeeze;
+    }
+    text += "      - { id: \"c" + std::to_string(k) + "\", contour: " + Numbers(contour) +
+            ", plane: \"p\" }\n";
+  }
+  return text;
+}
+
+std::string SheetScene(const TestFolder& folder, int count, int gross) {
+  std::string scene = "%YAML:1.0\n---\n" + BoardCamera() + "images:\n";
+  for (int i = 0; i < count; ++i) {
+    Board board(0.0);
+    const double turn = 6.283185307179586 * i / count;
+    board.rotation = Eigen::AngleAxisd(0.6, Eigen::Vector3d(std::cos(turn), std::sin(turn), 0.0)) *
+                     Eigen::AngleAxisd(0.3 * i, Eigen::Vector3d::UnitZ());
+    board.translation.x() += 0.3 * std::sin(2.0 * turn);
+    const std::string name = "view" + std::to_string(i) + ".png";
+    scene += SheetPhoto(board, folder.Write(name, ""), i == gross ? 0.8 : 1.0);
+  }
+  return folder.Write("scene.yaml", scene);
+}
+
+TEST_F(CalibrateTest, NamesAGrossPhotoOfTen) {
+  const Outcome run = Calibrate("--scene=" + SheetScene(folder_, 10, 4) + " --output=" + Output());
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_CONTAINS(run.out, "view4.png: left out, it contradicts the other photos");
+  const nlohmann::json made = ReadJson(Output() + "/calibration.json");
+  EXPECT_EQ(made["cameras"][0]["num_images"], 9);
+  EXPECT_NEAR(made["cameras"][0]["fx"].get<double>(), kFocal, 0.01 * kFocal);
+}
+
+TEST_F(CalibrateTest, OnePhotoSaysWhatItCannotTell) {
+  const Outcome run = Calibrate("--images=" + folder_ / "board0.png" + " --output=" + Output());
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_CONTAINS(run.out, "1 photo,");
+  EXPECT_CONTAINS(run.out, "the photos say next to nothing of: ");
+  EXPECT_CONTAINS(run.out, "Take five photos or more");
+}
+
+// Of photos whose camera is a guess those of another size are another camera's.
+TEST_F(CalibrateTest, PhotosOfAnotherSizeAreAnotherCameras) {
+  for (const char* name : {"board1.png", "board4.png"}) {
+    const cv::Mat photo = cv::imread(folder_ / name);
+    cv::Mat half;
+    cv::resize(photo, half, {}, 0.75, 0.75, cv::INTER_AREA);
+    cv::imwrite(folder_ / name, half);
+  }
+  const Outcome run = Calibrate(Photos() + " --output=" + Output());
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json cameras = ReadJson(Output() + "/calibration.json")["cameras"];
+  ASSERT_EQ(cameras.size(), 2U);
+  EXPECT_EQ(cameras[1]["id"], "guessed_240x180");
+  EXPECT_EQ(cameras[0]["num_images"], 3);
+  EXPECT_EQ(cameras[1]["num_images"], 2);
+  EXPECT_TRUE(std::filesystem::exists(Output() + "/calibration_guessed_240x180.yml"));
+  // A camera that is given has a size.
+  const std::string given = folder_.Write("camera.yml",
+                                          "%YAML:1.0\n---\nimage_width: 320\n"
+                                          "image_height: 240\ncamera_matrix: "
+                                          "!!opencv-matrix\n   rows: 3\n   cols: 3\n"
+                                          "   dt: d\n   data: [ 300., 0., 159.5, 0., "
+                                          "300., 119.5, 0., 0., 1. ]\n");
+  const Outcome stated =
+      Calibrate(Photos() + " --camera=" + given + " --output=" + folder_.path() + "/stated");
+  EXPECT_EQ(stated.exit_code, 1);
+  EXPECT_CONTAINS(stated.err, "board4.png: the photo has 240 x 180 pixels");
 }
 
 TEST_F(CalibrateTest, NamesWhatCannotBeRead) {

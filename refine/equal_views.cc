@@ -1,0 +1,83 @@
+#include "circline/refine/equal_views.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace circline {
+namespace {
+
+// Where a contour or a line lies.
+struct Spot {
+  bool is_line = false;
+  Eigen::Vector2d first, last;  // Ends of a line; corners of the box around a contour.
+};
+using View = std::vector<Spot>;
+
+View ViewOf(const Observations& photo) {
+  View view;
+  for (const CircleObservation& circle : photo.circles) {
+    if (circle.points.empty()) continue;
+    Spot& spot = view.emplace_back(Spot{false, circle.points.front(), circle.points.front()});
+    for (const Eigen::Vector2d& pixel : circle.points) {
+      spot.first = spot.first.cwiseMin(pixel);
+      spot.last = spot.last.cwiseMax(pixel);
+    }
+  }
+  for (const PencilObservation& pencil : photo.pencils) {
+    for (const LineObservation& line : pencil.lines) {
+      if (line.points.size() >= 2) view.push_back({true, line.points.front(), line.points.back()});
+    }
+  }
+  return view;
+}
+
+// Along a line nothing is compared: where it ends changes from photo to photo.
+bool IsNear(const Spot& a, const Spot& b, double distance) {
+  if (a.is_line != b.is_line) return false;
+  if (!a.is_line)
+    return (b.first - a.first).norm() < distance && (b.last - a.last).norm() < distance;
+  const Eigen::Vector2d along = (a.last - a.first).normalized();
+  const auto off = [&](const Eigen::Vector2d& pixel) {
+    const Eigen::Vector2d d = pixel - a.first;
+    return std::abs(along.x() * d.y() - along.y() * d.x());
+  };
+  return off(b.first) < distance && off(b.last) < distance;
+}
+
+// Whether most of the spots of `a` are near one of `b`.
+bool IsIn(const View& a, const View& b, double distance) {
+  constexpr double kMost = 0.8;
+  const auto may_miss = static_cast<std::size_t>((1.0 - kMost) * static_cast<double>(a.size()));
+  std::size_t missed = 0;
+  for (const Spot& spot : a) {
+    if (std::any_of(b.begin(), b.end(),
+                    [&](const Spot& other) { return IsNear(spot, other, distance); })) {
+      continue;
+    }
+    if (++missed > may_miss) return false;
+  }
+  return !a.empty();
+}
+
+}  // namespace
+
+std::vector<int> NearlyEqualViews(const std::vector<Observations>& photos, double distance) {
+  std::vector<int> equal(photos.size(), -1);
+  std::vector<View> views;
+  for (const Observations& photo : photos) views.push_back(ViewOf(photo));
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    const Camera& camera = photos[i].camera;
+    const double pixels = distance * std::hypot(camera.width, camera.height);
+    for (std::size_t j = 0; j < i && equal[i] < 0; ++j) {
+      if (equal[j] < 0 && photos[j].camera.id == camera.id && IsIn(views[i], views[j], pixels) &&
+          IsIn(views[j], views[i], pixels)) {
+        equal[i] = static_cast<int>(j);
+      }
+    }
+  }
+  return equal;
+}
+
+}  // namespace circline

@@ -1,0 +1,104 @@
+// Sets of photos that a calibration had better not trust, or cannot tell much from.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/random.h"
+#include "circline/refine/adjust_photos.h"
+#include "tests/sheet_photos.h"
+
+namespace circline {
+namespace {
+
+TEST(AdjustHard, OnePhotoIsAsGoodAsItsSigma) {
+  const Photos sheet = Photos(1).WithCircles();
+  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  EXPECT_FALSE(adjusted.rigid);
+  const AdjustedCamera& made = adjusted.cameras.front();
+  EXPECT_EQ(made.num_photos, 1);
+  EXPECT_LT(std::abs(std::log(made.camera.fx / sheet.truth().fx)), 3.0 * made.Sigma(0));
+}
+
+// Every photo has circles of its own, elsewhere and of other sizes.
+TEST(AdjustHard, PhotosThatShareNothingShareTheCamera) {
+  Photos sheet = Photos(4).WithCircles();
+  for (std::size_t i = 0; i < sheet.photos.size(); ++i) {
+    std::vector<CircleObservation> own;
+    for (std::size_t k = 0; k < 3; ++k) own.push_back(sheet.photos[i].circles[(2 * i + 3 * k) % 9]);
+    for (CircleObservation& circle : own) circle.id += "_" + std::to_string(i);
+    sheet.photos[i].circles = own;
+  }
+  AdjustOptions options = PointNoiseOnly();
+  const AdjustedPhotos apart = AdjustPhotos(sheet.photos, options);
+  ASSERT_TRUE(apart.status.ok()) << apart.status.message;
+  EXPECT_FALSE(apart.rigid);
+  EXPECT_EQ(apart.cameras[0].num_photos, 4);
+  EXPECT_LT(std::abs(std::log(apart.cameras[0].camera.fx / sheet.truth().fx)),
+            4.0 * apart.cameras[0].Sigma(0));
+  options.rigid = RigidWorld::kYes;
+  const AdjustedPhotos forced = AdjustPhotos(sheet.photos, options);
+  ASSERT_TRUE(forced.status.ok());
+  EXPECT_FALSE(forced.rigid);
+  ASSERT_FALSE(forced.notes.empty());
+  EXPECT_NE(forced.notes.front().find("share no circles"), std::string::npos);
+}
+
+// No photo sees the whole sheet, and some share no circle with each other.
+TEST(AdjustHard, PhotosThatOverlapInPartAreOfOneWorld) {
+  Photos sheet = Photos(6).WithCircles();
+  for (std::size_t i = 0; i < sheet.photos.size(); ++i) {
+    std::vector<CircleObservation> own;  // Two rows, or the one that the others do not share.
+    for (std::size_t k = 0; k < 9; ++k) {
+      if ((i % 2 == 0 ? k / 3 != 2 : k / 3 != 0)) own.push_back(sheet.photos[i].circles[k]);
+    }
+    sheet.photos[i].circles = own;
+  }
+  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  EXPECT_TRUE(adjusted.rigid);
+  EXPECT_EQ(adjusted.circles.size(), 9U);
+  EXPECT_EQ(adjusted.cameras[0].num_photos, 6);
+}
+
+// A thousand frames of a video in which next to nothing moves.
+TEST(AdjustHard, FramesThatAreNearlyEqualCountOnce) {
+  constexpr int kFrames = 1000;
+  const Photos views = Photos(2).WithCircles();
+  std::vector<Observations> video;
+  Random random(1);
+  for (int i = 0; i < kFrames; ++i) {
+    Observations& frame = video.emplace_back(views.photos[i < kFrames / 2 ? 0 : 1]);
+    const Eigen::Vector2d shake(0.5 * random.Normal(), 0.5 * random.Normal());
+    for (CircleObservation& circle : frame.circles) {
+      for (Eigen::Vector2d& pixel : circle.points) pixel += shake;
+    }
+  }
+  const AdjustedPhotos two = AdjustPhotos(views.photos, PointNoiseOnly());
+  const AdjustedPhotos all = AdjustPhotos(video, PointNoiseOnly());
+  ASSERT_TRUE(two.status.ok() && all.status.ok()) << all.status.message;
+  EXPECT_EQ(all.cameras[0].num_photos, 2);
+  EXPECT_GT(all.cameras[0].Sigma(0), 0.8 * two.cameras[0].Sigma(0));
+  EXPECT_NE(all.photos[7].status.message.find("nearly the same"), std::string::npos);
+  ASSERT_FALSE(all.notes.empty());
+  EXPECT_NE(all.notes.front().find("998 of 1000"), std::string::npos) << all.notes.front();
+}
+
+TEST(AdjustHard, NearlyEqualFramesTakePartWhereThatIsAskedFor) {
+  Photos views = Photos(2).WithCircles();
+  views.photos.push_back(views.photos.front());
+  AdjustOptions options = PointNoiseOnly();
+  options.nearly_equal = 0.0;
+  const AdjustedPhotos adjusted = AdjustPhotos(views.photos, options);
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  EXPECT_EQ(adjusted.cameras[0].num_photos, 3);
+  options.nearly_equal = -1.0;
+  EXPECT_EQ(AdjustPhotos(views.photos, options).status.code, StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace circline

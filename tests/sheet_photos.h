@@ -1,0 +1,90 @@
+// Photos of one sheet by a camera that nobody knows, for tests of AdjustPhotos.
+#ifndef CIRCLINE_TESTS_SHEET_PHOTOS_H_
+#define CIRCLINE_TESTS_SHEET_PHOTOS_H_
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "circline/refine/adjust_photos.h"
+#include "tests/plane_scene.h"
+
+namespace circline {
+
+// Photos of a sheet from all around; each comes with a camera whose focal length is far off and
+// that has no distortion.
+class Photos {
+ public:
+  explicit Photos(int count, std::uint64_t seed = 1, double tilt = 0.6,
+                  CameraModel model = CameraModel::kOpenCV)
+      : scene_(0.0, 0.2, seed) {
+    scene_.camera.id = "cam";
+    scene_.camera.model = model;
+    scene_.camera.fy = scene_.camera.fx;
+    scene_.camera.distortion = {};
+    if (model == CameraModel::kOpenCV) scene_.camera.distortion = {-0.2, 0.05};
+    if (model == CameraModel::kFisheye) scene_.camera.distortion = {0.05, -0.02};
+    for (int i = 0; i < count; ++i) {
+      const double turn = 6.283185307179586 * i / count;
+      scene_.pose.rotation =
+          ExpRotation(tilt * Eigen::Vector3d(std::cos(turn), std::sin(turn), 0.0)) *
+          ExpRotation({0.0, 0.0, 0.4 * i}) * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+      scene_.pose.translation = {1.5 * std::sin(2.0 * turn), 1.2 * std::cos(3.0 * turn), 9.0};
+      poses.push_back(scene_.pose);
+      photos.push_back(Guessed());
+    }
+  }
+
+  // Nine circles of the sheet, not quite in a lattice.
+  Photos& WithCircles() {
+    for (std::size_t i = 0; i < photos.size(); ++i) {
+      scene_.pose = poses[i];
+      for (int k = 0; k < 9; ++k) {
+        const double x = 2.0 * (k % 3 - 1) + 0.1 * (k % 2), y = 1.6 * (k / 3 - 1) - 0.07 * (k % 4);
+        photos[i].circles.push_back(scene_.Circle("c" + std::to_string(k), x, y, 0.5));
+      }
+    }
+    return *this;
+  }
+  Photos& WithPencils() {
+    for (std::size_t i = 0; i < photos.size(); ++i) {
+      scene_.pose = poses[i];
+      photos[i].pencils = {scene_.Pencil("rows", PencilDirection::kX, {1.0, 0.0, 0.0}, 4, 30),
+                           scene_.Pencil("columns", PencilDirection::kY, {0.0, 1.0, 0.0}, 4, 30)};
+    }
+    return *this;
+  }
+  const Camera& truth() const { return scene_.camera; }
+
+  std::vector<CameraPose> poses;
+  std::vector<Observations> photos;
+
+ private:
+  Observations Guessed() const {
+    Observations observations = scene_.Empty();
+    Camera& camera = observations.camera;
+    camera.fx = camera.fy = 1.5 * scene_.camera.fx;
+    camera.cx = 0.5 * (camera.width - 1);
+    camera.cy = 0.5 * (camera.height - 1);
+    camera.distortion = {};
+    return observations;
+  }
+
+  PlaneScene scene_;
+};
+
+inline AdjustOptions PointNoiseOnly() {
+  AdjustOptions options;
+  options.noise_model = NoiseModel::Exact();
+  options.num_radial = 2;
+  options.tangential_sigma = 0.0;
+  CameraSigma& prior = options.camera_sigma["cam"] = UnknownCamera(PlaneScene().camera);
+  prior.log_aspect = 0.0;
+  return options;
+}
+
+}  // namespace circline
+
+#endif  // CIRCLINE_TESTS_SHEET_PHOTOS_H_
