@@ -88,7 +88,9 @@ class KnownLayout:
         if circles.size() > 0:
             circles = [circles.at(k) for k in range(circles.size())]
             world = [c.getNode('centre_world').mat().ravel() for c in circles]
-            pixels = [cv2.fitEllipse(c.getNode('contour').mat().reshape(-1, 2).astype(np.float32))[0] for c in circles]
+            contours = [c.getNode('contour').mat() for c in circles]
+            pixels = [cv2.fitEllipse(contour.reshape(-1, 2).astype(np.float32))[0] if contour is not None
+                      else c.getNode('fitted_ellipse_raw').mat().ravel()[:2] for c, contour in zip(circles, contours)]
             return name, np.array(world, np.float32), np.array(pixels, np.float32)
         grey = cv2.imread(os.path.join(folder, image.getNode('file').string()), cv2.IMREAD_GRAYSCALE)
         found, corners = cv2.findChessboardCorners(grey, (9, 6))
