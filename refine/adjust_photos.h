@@ -88,7 +88,11 @@ struct AdjustedResidual {
 struct AdjustedPhoto {
   Status status;  // Not ok: it has no part in the rest, and this says why.
   int camera = 0;
-  CameraPose cam_from_world;          // Of its world; its unit is that of the world's.
+  CameraPose cam_from_world;  // Of its world; its unit is that of the world's.
+  // Of [delta, delta_t], 6x6 row-major, as in PoseHypothesis; the cameras' uncertainty is in it. Of
+  // its world the first photo is held where nothing else ties it: its translation, or the length
+  // of that, and its turn about the plane's normal.
+  std::array<double, 36> covariance{};
   double rms_px = 0.0;                // Of the inlier residuals, pixels.
   double misfit = 0.0;                // Median chi^2 of its features by residual; 1 or less.
   std::vector<std::string> left_out;  // Features, as PoseHypothesis::left_out.
@@ -119,9 +123,8 @@ struct AdjustedPhotos {
 // focal length is not known to 10 %, starts are sought over the prior of focal length and first
 // distortion coefficient, by how well the closed forms then explain all photos. EstimatePose gives
 // the poses. Circles of one world are matched by their ids, where they lie alike under these, else
-// by how they lie. Photos and features that contradict the rest as a whole are left out. Poses have
-// no covariance here; with the camera held, EstimatePose states one. Never throws, never returns
-// NaN. Thread-safe.
+// by how they lie. Photos and features that contradict the rest as a whole are left out. Never
+// throws, never returns NaN. Thread-safe.
 AdjustedPhotos AdjustPhotos(const std::vector<Observations>& photos,
                             const AdjustOptions& options = {});
 

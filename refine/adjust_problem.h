@@ -28,6 +28,8 @@
 
 namespace circline {
 
+class InverseOnPattern;
+
 // A photo as the problem takes it. All outlive the problem.
 struct AdjustInput {
   const Observations* observations = nullptr;  // Fitted and resolved, through the camera at start.
@@ -80,9 +82,13 @@ class AdjustProblem {
   // Of all features that take part, per degree of freedom.
   double Misfit() const;
 
-  // Of the shifts of one camera, all else marginalised; from the inliers of the features in force.
-  // Zero rows where a shift is held; that of the prior where the rest cannot be eliminated.
-  Eigen::Matrix<double, kCameraSize, kCameraSize> CameraCovariance(int camera) const;
+  // All else marginalised; from the inliers of the features in force.
+  struct Covariances {
+    // Of the shifts; zero rows where one is held; the prior's where the problem is singular.
+    std::vector<Eigen::Matrix<double, kCameraSize, kCameraSize>> cameras;
+    std::vector<Matrix6d> poses;  // Of [delta, delta_t], as PoseHypothesis has them.
+  };
+  Covariances Covariance() const;
 
   bool IsUsed(int camera) const;  // By a photo that takes part; else there is nothing to ask of it.
   Camera CameraAt(int camera) const;
@@ -132,6 +138,10 @@ class AdjustProblem {
   void AddPrior(ceres::CostFunction* cost, std::vector<double*> blocks,
                 ceres::LossFunction* loss = nullptr);
   void Fill(const std::vector<const ceres::Manifold*>& cameras, ceres::Problem* problem) const;
+  static ceres::Problem::Options NothingOwned();
+  Covariances OfPriors() const;
+  Matrix6d PoseCovariance(int photo, const InverseOnPattern& inverse,
+                          const std::map<const double*, int>& offsets) const;
   static bool IsOf(const Prior& prior, const ceres::Problem& problem);
 
   const std::vector<AdjustInput>& photos_;

@@ -1,8 +1,7 @@
-// Many photos: solved, judged, and how well the cameras are known.
+// Many photos: solved and judged.
 #include <ceres/ceres.h>
 
 #include <Eigen/Dense>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +9,14 @@
 #include "circline/refine/block_chain.h"
 
 namespace circline {
+
+ceres::Problem::Options AdjustProblem::NothingOwned() {
+  ceres::Problem::Options ownership;
+  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ownership.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return ownership;
+}
 
 // Whether features that take part have its blocks.
 bool AdjustProblem::IsOf(const Prior& prior, const ceres::Problem& problem) {
@@ -45,18 +52,6 @@ void AdjustProblem::Fill(const std::vector<const ceres::Manifold*>& cameras,
     }
   }
 }
-
-namespace {
-
-ceres::Problem::Options NothingOwned() {
-  ceres::Problem::Options ownership;
-  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  return ownership;
-}
-
-}  // namespace
 
 Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
   Weighing weighing;
@@ -158,60 +153,6 @@ double AdjustProblem::Misfit() const {
       unknowns += problem.ParameterBlockTangentSize(values);
   }
   return rows > unknowns ? chi2 / (rows - unknowns) : 1.0;
-}
-
-Eigen::Matrix<double, kCameraSize, kCameraSize> AdjustProblem::CameraCovariance(int camera) const {
-  using Result = Eigen::Matrix<double, kCameraSize, kCameraSize>;
-  using Sparse = Eigen::SparseMatrix<double>;
-  double* const values = cameras_[static_cast<std::size_t>(camera)];
-  Weighing inliers;
-  inliers.inliers_only = true;
-  for (const Feature& feature : features_) feature.cost->set_weighing(inliers);
-  ceres::Problem problem(NothingOwned());
-  Fill(all_free_, &problem);
-  Result covariance = Result::Zero();
-  const auto& prior = camera_sigmas_[static_cast<std::size_t>(camera)];
-  covariance.diagonal() =
-      Eigen::Map<const Eigen::Array<double, kCameraSize, 1>>(prior.data()).square();
-  ceres::CRSMatrix crs;
-  ceres::Problem::EvaluateOptions evaluate;
-  evaluate.apply_loss_function = false;  // A prior that is mostly exact counts as its Gaussian.
-  std::vector<double*>& order = evaluate.parameter_blocks;
-  for (const auto& block : values_) {  // As they were made, not by address: the same bits out.
-    double* const at = const_cast<double*>(block.data());
-    if (problem.HasParameterBlock(at) && !problem.IsParameterBlockConstant(at)) order.push_back(at);
-  }
-  const auto own = std::find(order.begin(), order.end(), values);
-  const bool is_estimated = own != order.end();
-  if (is_estimated) std::rotate(own, own + 1, order.end());
-  const bool evaluated =
-      is_estimated && problem.Evaluate(evaluate, nullptr, nullptr, nullptr, &crs);
-  for (const Feature& feature : features_) feature.cost->set_weighing(Weighing());
-  if (!evaluated) return covariance;
-  const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> J(
-      crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(),
-      crs.cols.data(), crs.values.data());
-  const Sparse information = Sparse(J.transpose()) * Sparse(J);
-  const int size = problem.ParameterBlockTangentSize(values), rest = crs.num_cols - size;
-  Eigen::MatrixXd marginal = Eigen::MatrixXd(information.bottomRightCorner(size, size));
-  if (rest > 0) {
-    Sparse others = information.topLeftCorner(rest, rest);
-    constexpr double kTiny = 1e-10;  // What nothing ties (one circle's spin) says nothing.
-    for (int k = 0; k < rest; ++k)
-      others.coeffRef(k, k) = others.coeff(k, k) * (1.0 + kTiny) + kTiny;
-    const Eigen::SimplicialLDLT<Sparse> factor(others);
-    if (factor.info() != Eigen::Success) return covariance;
-    const Eigen::MatrixXd cross = information.topRightCorner(rest, size);
-    marginal -= cross.transpose() * factor.solve(cross);
-  }
-  const Eigen::LLT<Eigen::MatrixXd> llt(marginal);
-  if (llt.info() != Eigen::Success) return covariance;
-  const Eigen::MatrixXd small = llt.solve(Eigen::MatrixXd::Identity(size, size));
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> plus(int{kCameraSize},
-                                                                              size);
-  all_free_[static_cast<std::size_t>(camera)]->PlusJacobian(values, plus.data());
-  covariance = plus * small * plus.transpose();
-  return covariance;
 }
 
 bool AdjustProblem::IsUsed(int camera) const {

@@ -138,6 +138,7 @@ void Adjustment::SolveWithoutGross() {
 void Adjustment::Report() {
   JudgePhotos();
   const double scale = std::max(1.0, problem_->Misfit());
+  const AdjustProblem::Covariances covariances = problem_->Covariance();
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     AdjustedCamera made;
     made.camera = cameras_[c];
@@ -148,7 +149,7 @@ void Adjustment::Report() {
     }
     made.camera = problem_->CameraAt(static_cast<int>(c));
     Eigen::Map<Eigen::Matrix<double, kCameraSize, kCameraSize, Eigen::RowMajor>>(
-        made.covariance.data()) = scale * problem_->CameraCovariance(static_cast<int>(c));
+        made.covariance.data()) = scale * covariances.cameras[c];
     const Shifts prior = ShiftSigmas(cameras_[c], priors_[c], options_);
     constexpr double kNextToNothing = 0.7;  // Of the prior's standard deviation.
     for (int k = 0; k < kCameraSize; ++k) {
@@ -167,6 +168,7 @@ void Adjustment::Report() {
     if (!inputs_[i].takes_part) continue;
     AdjustedPhoto& photo = out_.photos[i];
     photo.cam_from_world = problem_->PoseAt(static_cast<int>(i));
+    Eigen::Map<Matrix6d>(photo.covariance.data()) = scale * covariances.poses[i];  // Symmetric.
     photo.residuals = std::move(residuals[i]);
     const int count = static_cast<int>(photo.residuals.size());
     double sum = 0.0;

@@ -96,6 +96,8 @@ Json PhotoJson(const AdjustedPhoto& photo, const std::string& name) {
   }
   out["rotation"] = rotation;
   out["translation"] = translation;
+  out["covariance"] = photo.covariance;
+  out["left_out"] = photo.left_out;
   out["rms_px"] = photo.rms_px;
   out["misfit"] = photo.misfit;
   return out;

@@ -65,6 +65,51 @@ TEST(AdjustPhotos, OneWorldSaysMoreThanOneForEachPhoto) {
   EXPECT_LT(together.cameras[0].Sigma(0), 0.7 * apart.cameras[0].Sigma(0));
 }
 
+// The truth in the frame that the first photo holds: its origin, unit and turn.
+CameraPose InFrameOf(const CameraPose& truth, const CameraPose& first_truth,
+                     const CameraPose& first) {
+  const Eigen::Vector3d ray = first.translation.normalized(), n = first_truth.rotation.col(2);
+  const double distance = n.dot(first_truth.translation) / n.dot(ray);
+  const Eigen::Vector3d origin =
+      first_truth.rotation.transpose() * (distance * ray - first_truth.translation);
+  double turn = 0.0;
+  const auto turned = [&](const CameraPose& pose) -> Eigen::Matrix3d {
+    return pose.rotation * Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  };
+  for (int k = 0; k < 20; ++k)
+    turn -= LogRotation(first.rotation.transpose() * turned(first_truth)).z();
+  const double scale = first.translation.norm() / distance;
+  return {turned(truth), scale * (truth.rotation * origin + truth.translation)};
+}
+
+TEST(AdjustPhotos, PosesComeOutWithinTheirCovariance) {
+  const int trials = Trials(12);
+  double sum = 0.0;
+  int count = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    const Photos sheet = Photos(5, static_cast<std::uint64_t>(50 + trial)).WithCircles();
+    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    std::size_t first = 0;  // Held: its translation has no variance.
+    while (first < 4 && adjusted.photos[first].covariance[35] > 0.0) ++first;
+    for (std::size_t i = 0; i < adjusted.photos.size(); ++i) {
+      const AdjustedPhoto& photo = adjusted.photos[i];
+      const CameraPose truth =
+          InFrameOf(sheet.poses[i], sheet.poses[first], adjusted.photos[first].cam_from_world);
+      Vector6d error;
+      error << LogRotation(truth.rotation * photo.cam_from_world.rotation.transpose()),
+          truth.translation - photo.cam_from_world.translation;
+      const Eigen::Map<const Matrix6d> covariance(photo.covariance.data());
+      if (i == first) continue;
+      sum += error.dot(covariance.llt().solve(error)) / 6.0;
+      ++count;
+    }
+  }
+  if (kSanitized) return;
+  EXPECT_GT(sum / count, 0.75);
+  EXPECT_LT(sum / count, 1.35);
+}
+
 // Ids that mean nothing: the circles are the same where they lie alike.
 TEST(AdjustPhotos, CirclesAreMatchedByHowTheyLie) {
   Photos sheet = Photos(6).WithCircles();
