@@ -23,7 +23,7 @@ foreach(module estimators ransac detection refine)
   install(FILES ${headers} DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/circline/${folder}")
 endforeach()
 
-foreach(app compare reconstruct simulate)
+foreach(app calibrate compare reconstruct simulate)
   if(TARGET circline_${app})
     install(TARGETS circline_${app} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
   endif()
