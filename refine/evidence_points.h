@@ -4,6 +4,7 @@
 #define CIRCLINE_REFINE_EVIDENCE_POINTS_H_
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -11,6 +12,7 @@
 
 #include "circline/estimators/noise_model.h"
 #include "circline/refine/image_points.h"
+#include "circline/refine/square_root.h"
 
 namespace circline {
 
@@ -32,6 +34,21 @@ inline std::optional<ImagePoints> EvidencePoints(const Camera& camera,
                                    : noise.LineWeight(sigma_px, pixels, inliers);
   points.set_weight(weight * (sigma * sigma) / (sigma_px * sigma_px));
   return points;
+}
+
+// Twice what the points cost under their loss at their own best curve, by one step from a fit.
+inline double FreeTwiceCost(const ImagePoints& points, const Eigen::Matrix3d& conic) {
+  CurveModel model;
+  points.SumConic(conic, 0.0, nullptr, Weighing(), {}, &model);
+  const SquareRoot<6> root = SquareRootOf<6>(model, 5, 6, 5);
+  return std::max(0.0, model.twice_cost - root.f.squaredNorm());
+}
+
+inline double FreeTwiceCost(const ImagePoints& points, const Eigen::Vector3d& line) {
+  CurveModel model;
+  points.SumLine(line, nullptr, Weighing(), false, &model);
+  const SquareRoot<3> root = SquareRootOf<3>(model, 2, 3, 2);
+  return std::max(0.0, model.twice_cost - root.f.squaredNorm());
 }
 
 }  // namespace circline

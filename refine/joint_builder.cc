@@ -9,7 +9,6 @@
 
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/manifolds.h"
-#include "circline/refine/square_root.h"
 
 namespace circline {
 namespace {
@@ -70,21 +69,6 @@ std::optional<ImagePoints> JointProblemBuilder::Points(const std::vector<Eigen::
   options.distance = p_.options_.conic_distance;
   options.num_distortion = p_.camera_sigma_.k1 > 0.0 ? 1 : 0;
   return EvidencePoints(obs_.camera, pixels, inliers, sigma_px, is_circle, model_, options);
-}
-
-double JointProblemBuilder::FreeCost(const ImagePoints& points,
-                                     const Eigen::Matrix3d& conic) const {
-  CurveModel model;
-  points.SumConic(conic, 0.0, nullptr, Weighing(), {}, &model);
-  const SquareRoot<6> root = SquareRootOf<6>(model, 5, 6, 5);
-  return std::max(0.0, model.twice_cost - root.f.squaredNorm());
-}
-
-double JointProblemBuilder::FreeCost(const ImagePoints& points, const Eigen::Vector3d& line) const {
-  CurveModel model;
-  points.SumLine(line, nullptr, Weighing(), false, &model);
-  const SquareRoot<3> root = SquareRootOf<3>(model, 2, 3, 2);
-  return std::max(0.0, model.twice_cost - root.f.squaredNorm());
 }
 
 void JointProblemBuilder::Build() {

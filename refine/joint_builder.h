@@ -39,8 +39,6 @@ class JointProblemBuilder {
   std::optional<ImagePoints> Points(const std::vector<Eigen::Vector2d>& pixels,
                                     const std::vector<std::uint8_t>& inliers, double sigma_px,
                                     bool is_circle) const;
-  double FreeCost(const ImagePoints& points, const Eigen::Matrix3d& conic) const;
-  double FreeCost(const ImagePoints& points, const Eigen::Vector3d& line) const;
 
   void AddOrigin();
   void AddCircle(std::size_t index);

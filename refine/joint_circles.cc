@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/refine/evidence_points.h"
 #include "circline/refine/joint_builder.h"
 #include "circline/refine/mostly_exact.h"
 
@@ -119,7 +120,7 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   Feature feature{Feature::Kind::kCircle, circle.id, "circle '" + circle.id + "'"};
   feature.dof = circle.radius > 0.0 ? 3 : 2;
   feature.observation = static_cast<int>(index);
-  feature.free_twice_cost = FreeCost(*points, circle.fit->conic);
+  feature.free_twice_cost = FreeTwiceCost(*points, circle.fit->conic);
   const int f = AddFeature(feature), group = p_.num_groups_++;
   const int center = CenterBlock(circle, group), radius = RadiusBlock(circle, f, group);
 

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "circline/refine/evidence_points.h"
 #include "circline/refine/joint_builder.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/mostly_exact.h"
@@ -85,7 +86,7 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
 
 void JointProblemBuilder::AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,
                                   double direction_sigma, Feature feature) {
-  feature.free_twice_cost = FreeCost(points, fit);
+  feature.free_twice_cost = FreeTwiceCost(points, fit);
   DirectionLineCost::Options options;
   options.direction_sigma = direction_sigma;
   options.camera = has_camera_;
@@ -105,7 +106,7 @@ void JointProblemBuilder::AddAxisLine(const LineObservation& line, double sigma_
   p_.x_is_fixed_ = true;
   Feature feature{Feature::Kind::kPlaneLine, id, name};
   feature.dof = 2;
-  feature.free_twice_cost = FreeCost(*points, line.fit->line);
+  feature.free_twice_cost = FreeTwiceCost(*points, line.fit->line);
   const int f = AddFeature(feature), angle = AddConstant({axis * kHalfPi});
   AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
                  {JointProblem::kRotation, JointProblem::kTranslation, origin_point_, angle}, f,

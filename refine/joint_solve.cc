@@ -8,12 +8,10 @@
 #include <vector>
 
 #include "circline/refine/joint_problem.h"
+#include "circline/refine/nearby_solve.h"
 
 namespace circline {
 namespace {
-
-// Of cost: half of a thirtieth of a standard deviation, squared.
-constexpr double kLittle = 5e-4;
 
 // Ends where a step, taken or not, changes the cost by little, or where the steps that would follow
 // do (near the minimum under a loss they shrink at a constant rate), however large the cost of all
@@ -28,7 +26,7 @@ class Watch : public ceres::IterationCallback {
     last_change_ = summary.step_is_successful ? summary.cost_change : 0.0;
     const bool converges = rate > 0.0 && rate < 1.0;
     const double rest = converges ? summary.cost_change * rate / (1.0 - rate) : summary.cost_change;
-    if (std::min(std::abs(summary.cost_change), std::abs(rest)) < kLittle)
+    if (std::min(std::abs(summary.cost_change), std::abs(rest)) < kLittleCost)
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     const bool is_hopeless =
         summary.step_is_successful && summary.cost - kMoreSteps * summary.cost_change > most_;
@@ -43,12 +41,7 @@ class Watch : public ceres::IterationCallback {
 }  // namespace
 
 Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival) const {
-  ceres::Problem::Options ownership;
-  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.disable_all_safety_checks = true;
-  ceres::Problem problem(ownership);
+  ceres::Problem problem(OwnsNothing());
   std::vector<double*> blocks;
   // A feature's own unknowns, one block of each, are eliminated first.
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -79,26 +72,13 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
   }
   if (unknowns == 0) return Status::Refused("nothing of the evidence ties the pose");
 
-  ceres::Solver::Options options;
-  // Beyond so many unknowns most of them are features' own.
-  constexpr int kDense = 60;
-  options.linear_solver_type =
-      unknowns <= kDense ? ceres::DENSE_NORMAL_CHOLESKY : ceres::DENSE_SCHUR;
-  if (unknowns > kDense) options.linear_solver_ordering = ordering;
-  options.max_num_iterations = max_iterations;
+  ceres::Solver::Options options = NearbyOptions(unknowns, max_iterations, state->cost);
+  if (options.linear_solver_type == ceres::SPARSE_NORMAL_CHOLESKY) {
+    options.linear_solver_type = ceres::DENSE_SCHUR;
+    options.linear_solver_ordering = ordering;
+  }
   Watch watch(rival);
   options.callbacks.push_back(&watch);
-  // A step that does less is not worth its derivatives.
-  constexpr double kNothing = 0.1 * kLittle;
-  options.function_tolerance = kNothing / std::max(1.0, state->cost);
-  options.gradient_tolerance = 1e-9;
-  options.parameter_tolerance = 1e-10;
-  options.initial_trust_region_radius = 1e6;  // Starts are near, and the model is good.
-  // What is known too badly to be estimated stays where it is.
-  options.max_trust_region_radius = 1e8;
-  options.max_consecutive_nonmonotonic_steps = 0;
-  options.logging_type = ceres::SILENT;
-  options.num_threads = 1;  // Same bits out.
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   if (summary.termination_type == ceres::USER_FAILURE)

@@ -8,30 +8,10 @@
 
 #include "circline/refine/block_chain.h"
 #include "circline/refine/joint_problem.h"
+#include "circline/refine/plane_circle.h"
 
 namespace circline {
 namespace {
-
-// Circle of least squares of x^2 + y^2 + .. (Kasa 1976): (cx, cy, r). False for points in line.
-bool FitPlaneCircle(const std::vector<Eigen::Vector2d>& points, Eigen::Vector3d* circle) {
-  const double n = static_cast<double>(points.size());
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (const Eigen::Vector2d& p : points) mean += p / n;
-  Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d b = Eigen::Vector2d::Zero();
-  double squared = 0.0;
-  for (const Eigen::Vector2d& p : points) {
-    const Eigen::Vector2d d = p - mean;
-    A += d * d.transpose();
-    b += 0.5 * d.squaredNorm() * d;
-    squared += d.squaredNorm() / n;
-  }
-  constexpr double kInLine = 1e-12;
-  if (!(A.determinant() > kInLine * A.trace() * A.trace())) return false;
-  const Eigen::Vector2d center = A.inverse() * b;
-  *circle << mean + center, std::sqrt(squared + center.squaredNorm());
-  return circle->allFinite();
-}
 
 // A ray of the camera as given, seen through one with another focal length (distortion left out).
 Eigen::Vector3d Refocused(const Eigen::Vector3d& ray, double log_focal) {

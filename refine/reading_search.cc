@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "circline/refine/chi_square.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/linearization.h"
 
@@ -18,17 +19,6 @@ constexpr std::size_t kMaxReadings = 16;
 constexpr double kHopeless = 300.0;  // Gaps that no start comes down.
 
 using Reading = std::vector<std::uint8_t>;  // By feature: takes part.
-
-// A chi-square variable of `dof` degrees of freedom exceeds this with probability p (Wilson and
-// Hilferty 1931; p by the tail of a Gaussian, good to 1 % from 1e-3 to 1e-9).
-double ChiSquareLimit(int dof, double p) {
-  const double t = std::sqrt(-2.0 * std::log(p));
-  const double z = t - (2.515517 + 0.802853 * t + 0.010328 * t * t) /
-                           (1.0 + 1.432788 * t + 0.189269 * t * t + 0.001308 * t * t * t);
-  const double n = dof, h = 2.0 / (9.0 * n);
-  const double root = 1.0 - h + z * std::sqrt(h);
-  return n * root * root * root;
-}
 
 class ReadingSearch {
  public:

@@ -1,0 +1,35 @@
+// A circle through points of its own plane. Internal: not installed.
+#ifndef CIRCLINE_REFINE_PLANE_CIRCLE_H_
+#define CIRCLINE_REFINE_PLANE_CIRCLE_H_
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <cmath>
+#include <vector>
+
+namespace circline {
+
+// Circle of least squares of x^2 + y^2 + .. (Kasa 1976): (cx, cy, r). False for points in line.
+inline bool FitPlaneCircle(const std::vector<Eigen::Vector2d>& points, Eigen::Vector3d* circle) {
+  const double n = static_cast<double>(points.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& p : points) mean += p / n;
+  Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d b = Eigen::Vector2d::Zero();
+  double squared = 0.0;
+  for (const Eigen::Vector2d& p : points) {
+    const Eigen::Vector2d d = p - mean;
+    A += d * d.transpose();
+    b += 0.5 * d.squaredNorm() * d;
+    squared += d.squaredNorm() / n;
+  }
+  constexpr double kInLine = 1e-12;
+  if (!(A.determinant() > kInLine * A.trace() * A.trace())) return false;
+  const Eigen::Vector2d center = A.inverse() * b;
+  *circle << mean + center, std::sqrt(squared + center.squaredNorm());
+  return circle->allFinite();
+}
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_PLANE_CIRCLE_H_

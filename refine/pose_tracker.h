@@ -1,0 +1,145 @@
+// Poses of a camera that moves, or of a thing that moves before it, frame after frame: what
+// EstimatePose says of one photo, carried on in time.
+//
+//     PoseTracker tracker(options);
+//     for (const Frame& frame : frames) {
+//       const TrackedPose tracked = tracker.Update(frame.observations, frame.seconds);
+//       if (!tracked.estimate.status.ok()) continue;  // Nothing is known yet; the message says
+//       why. Use(tracked.estimate.hypotheses.front());     // Best first; probabilities sum to 1.
+//     }
+//
+// What is carried. Several hypotheses, each a Gaussian with a probability: the pose, its velocity,
+// and a map of the circles and directions seen so far; and what does not change from frame to frame
+// and so does not average out: the error of the camera, and the offset of each contour. One frame's
+// posterior is the next one's prior. Each hypothesis is moved on (constant velocity, or what
+// the caller knows of the motion), then refined on the frame's points by ceres, and its probability
+// multiplied by what the frame says of it (Laplace's approximation of its evidence). Of a circle's
+// two poses the wrong one dies once perspective, other features or known motion contradict it;
+// where nothing does (one circle, weak perspective, unknown motion) both stay, at their
+// probabilities, and the first stays first (TrackerOptions::flip_odds).
+//
+// Features are known again by their ids: a circle or pencil with the id of an earlier frame is the
+// same thing in the world. A feature without a part in the map yet is added to it. Circles of other
+// planes than the world's take no part, as in EstimatePose.
+//
+// The world frame is that of the first frame (EstimatePose; docs/conventions.md) and stays: what
+// later frames say of FrameObservation::origin, known angles and known lengths is not used. A turn
+// about the normal that nothing fixes is zero in the first frame and then follows the motion.
+// Unit: that of the first frame's pose; where that is not metric, the distance of its origin, so
+// that later translations have other lengths than 1 though `metric` is false. Without any circle
+// only the rotation is tracked, and the translation stays that of the first frame.
+//
+// Loss. A frame that contradicts all hypotheses is not used (predicted_only). After
+// TrackerOptions::lost_after of them in a row, or a gap longer than max_gap_s, the tracker starts
+// anew from the frame that it is given, with a new world and `reinitialized` set.
+//
+// Errors are statuses. Wrong input (a time that is not finite or runs backwards, observations or
+// options that do not pass their Validate) is refused in words and changes nothing. A frame without
+// evidence gives the predicted pose, predicted_only, and a message that says so.
+//
+// Cost: bounded by TrackerOptions::max_hypotheses and max_evaluations
+// (`circline_benchmark --benchmark_filter=Tracker`). Not thread-safe: one tracker a thread; several
+// trackers share nothing.
+#ifndef CIRCLINE_REFINE_POSE_TRACKER_H_
+#define CIRCLINE_REFINE_POSE_TRACKER_H_
+
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "circline/estimators/observations.h"
+#include "circline/estimators/pose.h"
+#include "circline/estimators/status.h"
+#include "circline/refine/estimate_pose.h"
+
+namespace circline {
+
+struct TrackerOptions {
+  // Losses, noise model and camera, as for a single photo. Its pose_prior, gravity_prior and prior
+  // count in first frames only; max_iterations too.
+  EstimationOptions estimation;
+
+  // How far velocities change within a second: standard deviations of a random walk, > 0. The
+  // velocity is that of the world in the camera frame: a turn, radians per second, and a shift, in
+  // distances of the world's origin per second. The defaults are those of a camera in a hand.
+  double turn_rate_sigma = 1.0;  // rad/s within a second.
+  double velocity_sigma = 0.5;   // Distances/s within a second.
+  // Of the velocities before anything is known of them.
+  double initial_turn_rate_sigma = 0.5;  // rad/s.
+  double initial_velocity_sigma = 0.3;   // Distances/s.
+
+  // Hypotheses less probable than this are dropped, and those beyond this number.
+  double min_probability = 1e-6;
+  int max_hypotheses = 8;
+  // The first hypothesis stays first until another one is so many times as probable; 1 or more.
+  double flip_odds = 2.0;
+  // A frame contradicts a hypothesis where its misfit would be exceeded with this probability.
+  double gate_probability = 1e-7;
+  int lost_after = 3;      // Frames in a row that contradict all hypotheses; 1 or more.
+  double max_gap_s = 1.0;  // Seconds without evidence that can be used.
+  // Evaluations of the evidence (with derivatives) that one hypothesis may take in a call.
+  int max_evaluations = 10;
+
+  Status Validate() const;
+};
+
+// How the camera has moved since the last call: X_now = rotation * X_before + translation, camera
+// frames; from odometry or an IMU. The covariance is of [delta, delta_t], 6x6 row-major as
+// PoseHypothesis::covariance; positive definite.
+struct RelativePose {
+  CameraPose now_from_before = {Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()};
+  std::array<double, 36> covariance{};
+  // Whether the translation is in the unit of the tracked poses (that of a metric map). Otherwise
+  // it is not used, and the shift follows the constant velocity.
+  bool has_translation = true;
+};
+
+// What is known of one frame's pose besides its pixels.
+struct MotionPrior {
+  std::optional<RelativePose> relative;  // Takes the place of the constant velocity.
+  std::optional<PosePrior> absolute;     // In the tracker's world frame.
+  std::optional<GravityPrior> gravity;   // in_world: in the tracker's world frame.
+
+  Status Validate() const;
+};
+
+struct TrackedPose {
+  // As EstimatePose's, but for the unit of translations (see above). Covariances and probabilities
+  // are those of all frames so far. `status` not ok: no hypotheses, and why; ok with a message: the
+  // frame has no part in the pose, and why.
+  PoseEstimate estimate;
+  double timestamp_s = 0.0;
+  bool reinitialized = false;   // The track starts with this frame, with a world frame of its own.
+  bool predicted_only = false;  // Moved on from earlier frames; this one has no part in it.
+  int frames_since_start = 0;   // 0 for the one with which the track starts.
+};
+
+class PoseTracker {
+ public:
+  explicit PoseTracker(const TrackerOptions& options = {});
+  ~PoseTracker();
+  PoseTracker(PoseTracker&&) noexcept;
+  PoseTracker& operator=(PoseTracker&&) noexcept;
+
+  // The pose at `timestamp_s`, seconds, not before that of the last call. Never throws, never
+  // returns NaN.
+  TrackedPose Update(const Observations& observations, double timestamp_s);
+  TrackedPose Update(const Observations& observations, double timestamp_s,
+                     const MotionPrior& motion);
+
+  // The best hypothesis moved on to that time, with the circles of the map (camera frame) and its
+  // directions: where a detector may look. None where nothing is tracked or the time is not after
+  // the last one. Changes nothing.
+  std::optional<PoseHypothesis> Predict(double timestamp_s) const;
+
+  // Forgets everything but the options.
+  void Reset();
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_POSE_TRACKER_H_

@@ -1,0 +1,283 @@
+#include "circline/refine/track_map.h"
+
+#include <ceres/sphere_manifold.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "circline/refine/manifolds.h"
+#include "circline/refine/plane_circle.h"
+
+namespace circline {
+namespace {
+
+// What is not known yet: of directions and turns, radians; of lengths, distances of the origin.
+constexpr double kUnknown = 1.0;
+// Bounds what a call costs; features beyond these stay without a part.
+constexpr std::size_t kMaxCircles = 64, kMaxDirections = 32;
+
+// A circle by its points in the plane Z = 0: (cx, cy, r). False where it cannot lie there.
+bool PlaceCircle(const Camera& camera, const CircleObservation& circle, const CameraPose& pose,
+                 Eigen::Vector3d* placed) {
+  const Eigen::Vector3d n = pose.rotation.col(2);
+  const double distance = n.dot(pose.translation);
+  std::vector<CalibratedPoint> points;
+  std::vector<Eigen::Vector2d> in_plane;
+  CalibrateInliers(camera, circle.points, circle.inliers, &points);
+  for (const CalibratedPoint& p : points) {
+    const Eigen::Vector3d ray = p.Homogeneous();
+    const double depth = distance / n.dot(ray);
+    if (!(depth > 0.0) || !std::isfinite(depth)) return false;
+    in_plane.emplace_back((pose.rotation.transpose() * (depth * ray - pose.translation)).head<2>());
+  }
+  return in_plane.size() >= 3 && FitPlaneCircle(in_plane, placed);
+}
+
+class MapBuilder {
+ public:
+  MapBuilder(const Observations& frame, const TrackerOptions& options, TrackMap* map,
+             std::vector<TrackState>* states)
+      : frame_(frame),
+        options_(options),
+        noise_(options.estimation.noise_model),
+        map_(*map),
+        states_(*states) {}
+
+  // `is_first`: it fixes the origin and the unit.
+  void AddCircle(const CircleObservation& circle, bool is_first) {
+    if (map_.circles.size() >= kMaxCircles) return;
+    std::vector<Eigen::Vector3d> placed;
+    for (const TrackState& state : states_) {
+      Eigen::Vector3d at;
+      // Beyond a hypothesis' horizon: anywhere, and the frames to come decide.
+      if (!PlaceCircle(frame_.camera, circle, state.Pose(map_), &at))
+        at = Eigen::Vector3d(0.0, 0.0, state.Pose(map_).translation.norm());
+      placed.push_back(at);
+    }
+    TrackMap::Circle added;
+    added.id = circle.id;
+    added.center = SharedBlock(circle, &TrackMap::Circle::center);
+    added.radius = SharedBlock(circle, &TrackMap::Circle::radius);
+    if (added.center < 0) {
+      added.center = map_.AddBlock(2, {}, is_first);
+      Append(added.center, [&](std::size_t i) {
+        return std::pair(Eigen::VectorXd(placed[i].head<2>()), Eigen::VectorXd(Length(i, 2)));
+      });
+    }
+    if (added.radius < 0) {
+      added.radius = map_.AddBlock(1, {}, is_first);
+      const double stated = circle.radius_sigma > 0.0 ? circle.radius_sigma : noise_.radius;
+      constexpr double kExact = 1e-6;  // Stands for a radius that is known exactly.
+      Append(added.radius, [&](std::size_t i) {
+        const bool known = map_.metric && circle.radius > 0.0;
+        const double radius = known ? circle.radius : placed[i].z();
+        const Eigen::VectorXd sigma =
+            known ? Eigen::VectorXd::Constant(1, radius * std::max(stated, kExact)) : Length(i, 1);
+        return std::pair(Eigen::VectorXd(Eigen::VectorXd::Constant(1, radius)), sigma);
+      });
+    }
+    AddImperfections(circle, &added);
+    map_.circles.push_back(std::move(added));
+  }
+
+  // `role`: of its pencil in this frame's world.
+  void AddDirection(const std::string& id, PencilDirection role, bool in_plane,
+                    const Eigen::Vector3d& in_camera) {
+    if (map_.directions.size() >= kMaxDirections) return;
+    const double lean = noise_.pencil_axis_rad;
+    const bool is_free = role == PencilDirection::kFree, is_exact = !(lean > 0.0);
+    std::unique_ptr<ceres::Manifold> manifold;
+    if (is_free && in_plane && is_exact) {
+      manifold = std::make_unique<InPlaneManifold>();
+    } else if (is_free || !is_exact) {
+      manifold = std::make_unique<ceres::SphereManifold<3>>();
+    }
+    const bool is_constant = manifold == nullptr;
+    const int block = map_.AddBlock(3, std::move(manifold), is_constant);
+    for (TrackState& state : states_) {
+      Eigen::Vector3d d = state.Pose(map_).rotation.transpose() * in_camera;
+      if (!is_free) d = Eigen::Vector3d::Unit(static_cast<int>(role));
+      if (is_free && in_plane) d.z() = 0.0;
+      constexpr double kNone = 1e-6;
+      d = d.norm() > kNone ? d.normalized() : Eigen::Vector3d::UnitX();
+      Eigen::Vector3d sigma = Eigen::Vector3d::Constant(is_free ? kUnknown : lean);
+      if (in_plane) sigma.z() = lean;
+      const Eigen::MatrixXd plus = PlusJacobianOf(map_.block(block), d.data());
+      Eigen::MatrixXd covariance = plus.transpose() * sigma.cwiseAbs2().asDiagonal() * plus;
+      if (is_constant) covariance.resize(0, 0);
+      state.Append(map_, block, d.data(), covariance);
+    }
+    map_.directions.push_back({id, block});
+  }
+
+ private:
+  // Standard deviation of an unknown length.
+  Eigen::VectorXd Length(std::size_t i, int size) const {
+    return Eigen::VectorXd::Constant(size, kUnknown * states_[i].Pose(map_).translation.norm());
+  }
+
+  // `of(i)`: values and standard deviations for the i-th hypothesis.
+  template <typename Of>
+  void Append(int block, const Of& of) {
+    for (std::size_t i = 0; i < states_.size(); ++i) {
+      const auto [values, sigma] = of(i);
+      const Eigen::Index size = map_.block(block).tangent_size();
+      states_[i].Append(map_, block, values.data(),
+                        Eigen::MatrixXd(sigma.head(size).cwiseAbs2().asDiagonal()));
+    }
+  }
+
+  // Of a circle of the map with the same centre, or the same radius; -1 where there is none.
+  int SharedBlock(const CircleObservation& circle, int TrackMap::Circle::*block) const {
+    const bool is_center = block == &TrackMap::Circle::center;
+    const auto group = [is_center](const CircleObservation& c) {
+      return is_center ? c.concentric : c.radius_group;
+    };
+    if (group(circle).empty()) return -1;
+    for (const TrackMap::Circle& other : map_.circles) {
+      const int index = FindCircle(frame_, other.id);
+      if (index >= 0 && group(frame_.circles[static_cast<std::size_t>(index)]) == group(circle))
+        return other.*block;
+    }
+    return -1;
+  }
+
+  // What does not average out over frames: the circle's own tilt and height, and the offset of all
+  // contours of its contrast.
+  void AddImperfections(const CircleObservation& circle, TrackMap::Circle* added) {
+    constexpr double kExact = 1e-6;  // Stands for a standard deviation of 0.
+    if (noise_.circle_tilt_rad > 0.0 || noise_.circle_height > 0.0) {
+      added->tilt = map_.AddBlock(3);
+      const double tilt = std::max(noise_.circle_tilt_rad, kExact),
+                   height = std::max(noise_.circle_height, kExact);
+      Append(added->tilt, [&](std::size_t) {
+        return std::pair(Eigen::VectorXd(Eigen::Vector3d::Zero()),
+                         Eigen::VectorXd(Eigen::Vector3d(tilt, tilt, height)));
+      });
+    }
+    if (!(noise_.contour_offset_px > 0.0)) return;
+    added->contrast = std::clamp(circle.contrast, -1, 1);
+    for (const TrackMap::Circle& other : map_.circles) {
+      if (other.contrast == added->contrast) added->offset = other.offset;
+    }
+    if (added->offset >= 0) return;
+    added->offset = map_.AddBlock(1);
+    Append(added->offset, [&](std::size_t) {
+      return std::pair(Eigen::VectorXd(Eigen::VectorXd::Zero(1)),
+                       Eigen::VectorXd(Eigen::VectorXd::Constant(1, noise_.contour_offset_px)));
+    });
+  }
+
+  const Observations& frame_;
+  const TrackerOptions& options_;
+  const NoiseModel& noise_;
+  TrackMap& map_;
+  std::vector<TrackState>& states_;
+};
+
+// Pose, velocities and camera of a hypothesis, as a first frame's evidence finds them.
+TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const TrackerOptions& options,
+                      const CameraSigma& sigma) {
+  TrackState state;
+  const double distance = h.cam_from_world.translation.norm();
+  const Eigen::Quaterniond q(h.cam_from_world.rotation);
+  // A turn that nothing fixes is what the first frame's convention says.
+  constexpr double kConvention = 1e-4;  // Radians.
+  const Eigen::Vector3d turn(kUnknown, kUnknown, h.RotationIsFree() ? kConvention : kUnknown);
+  const auto diagonal = [&](int block, const Eigen::VectorXd& sigmas) {
+    const Eigen::Index size = map.block(block).tangent_size();
+    return Eigen::MatrixXd(sigmas.head(size).cwiseAbs2().asDiagonal());
+  };
+  const auto all = [](double value) { return Eigen::VectorXd(Eigen::Vector3d::Constant(value)); };
+  const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(kCameraSize);
+  state.Append(map, TrackMap::kRotation, q.coeffs().data(), diagonal(TrackMap::kRotation, turn));
+  state.Append(map, TrackMap::kTranslation, h.cam_from_world.translation.data(),
+               diagonal(TrackMap::kTranslation, all(kUnknown * distance)));
+  state.Append(map, TrackMap::kTurnRate, zeros.data(),
+               diagonal(TrackMap::kTurnRate, all(options.initial_turn_rate_sigma)));
+  state.Append(map, TrackMap::kVelocity, zeros.data(),
+               diagonal(TrackMap::kVelocity, all(options.initial_velocity_sigma * distance)));
+  Eigen::VectorXd camera = zeros;
+  camera.head<5>() << sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
+      sigma.principal_point_px, sigma.k1;
+  const Block& block = map.block(TrackMap::kCamera);
+  Eigen::MatrixXd covariance(0, 0);
+  if (block.tangent_size() > 0) {
+    const Eigen::MatrixXd chart = ChartOf(block, zeros.data());
+    covariance = chart * camera.cwiseAbs2().asDiagonal() * chart.transpose();
+  }
+  state.Append(map, TrackMap::kCamera, zeros.data(), covariance);
+  state.log_weight = std::log(std::max(h.probability, 1e-300));
+  return state;
+}
+
+bool InPlane(const std::string& plane, const TrackMap& map) {
+  return !plane.empty() && plane == map.plane;
+}
+
+void AddDirections(const Observations& frame, const TrackMap& map, MapBuilder* builder) {
+  const auto is_known = [&](const std::string& id) {
+    return std::any_of(map.directions.begin(), map.directions.end(),
+                       [&](const TrackMap::Direction& d) { return d.id == id; });
+  };
+  if (frame.frame.x_axis && !is_known(kXAxisId))
+    builder->AddDirection(kXAxisId, PencilDirection::kX, true, Eigen::Vector3d::UnitX());
+  if (frame.frame.y_axis && !is_known(kYAxisId))
+    builder->AddDirection(kYAxisId, PencilDirection::kY, true, Eigen::Vector3d::UnitY());
+  for (const PencilObservation& pencil : frame.pencils) {
+    if (is_known(pencil.id) || (pencil.direction == PencilDirection::kFree && !pencil.fit))
+      continue;
+    builder->AddDirection(pencil.id, pencil.direction, InPlane(pencil.plane, map),
+                          pencil.fit ? pencil.fit->direction : Eigen::Vector3d::UnitX());
+  }
+}
+
+}  // namespace
+
+void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& hypotheses,
+              const TrackerOptions& options, TrackMap* map, std::vector<TrackState>* states) {
+  const EstimationOptions& estimation = options.estimation;
+  const CameraSigma sigma = estimation.camera_sigma.value_or(estimation.noise_model.camera);
+  const auto takes_part = [&](const CircleObservation& c) {
+    return c.fit && c.plane == resolved.frame.plane;
+  };
+  const auto first = std::find_if(resolved.circles.begin(), resolved.circles.end(), takes_part);
+  const bool has_position = first != resolved.circles.end();
+  map->Reset(has_position, resolved.camera, sigma);
+  map->metric = hypotheses.front().metric;
+  map->origin_observed = hypotheses.front().origin_observed;
+  map->plane = resolved.frame.plane;
+  states->clear();
+  for (const PoseHypothesis& h : hypotheses) states->push_back(FirstState(*map, h, options, sigma));
+  MapBuilder builder(resolved, options, map, states);
+  if (has_position) {
+    const auto is_at_origin = [&](const CircleObservation& c) {
+      return takes_part(c) && c.id == resolved.frame.origin_is_center;
+    };
+    const auto named = std::find_if(resolved.circles.begin(), resolved.circles.end(), is_at_origin);
+    const auto& base = named != resolved.circles.end() ? named : first;
+    builder.AddCircle(*base, true);
+    for (auto c = resolved.circles.begin(); c != resolved.circles.end(); ++c) {
+      if (c != base && takes_part(*c)) builder.AddCircle(*c, false);
+    }
+  }
+  AddDirections(resolved, *map, &builder);
+}
+
+void ExtendMap(const Observations& fitted, const TrackerOptions& options, TrackMap* map,
+               std::vector<TrackState>* states) {
+  MapBuilder builder(fitted, options, map, states);
+  for (const CircleObservation& circle : fitted.circles) {
+    const bool is_known = std::any_of(map->circles.begin(), map->circles.end(),
+                                      [&](const TrackMap::Circle& c) { return c.id == circle.id; });
+    if (!is_known && map->has_position() && circle.fit && InPlane(circle.plane, *map))
+      builder.AddCircle(circle, false);
+  }
+  AddDirections(fitted, *map, &builder);
+}
+
+}  // namespace circline

@@ -1,0 +1,126 @@
+#include "circline/refine/track_result.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace circline {
+namespace {
+
+constexpr double kRadToDeg = 57.29577951308232;
+// A turn this uncertain, radians, is one of which nothing is known: a uniform one has 1.8.
+constexpr double kFreeTurn = 1.0;
+
+void FillCovariance(const TrackMap& map, const TrackState& state, PoseHypothesis* h) {
+  const Eigen::Matrix3d R = h->cam_from_world.rotation;
+  const int size = map.has_position() ? 6 : 3;
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.topLeftCorner(size, size) = state.covariance.topLeftCorner(size, size);
+  Matrix6d T = Matrix6d::Identity();
+  T.topLeftCorner<3, 3>() = R;
+  covariance = T * covariance * T.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance.topLeftCorner<3, 3>());
+  for (int k = 0; k < 3; ++k) {
+    if (!(eigen.eigenvalues()[k] > kFreeTurn * kFreeTurn)) continue;
+    std::array<double, 6> direction{};
+    Eigen::Map<Vector6d> free(direction.data());
+    free.head<3>() = eigen.eigenvectors().col(k);
+    h->free_directions.push_back(direction);
+    const Matrix6d without = Matrix6d::Identity() - free * free.transpose();
+    covariance = without * covariance * without;
+  }
+  if (!map.has_position()) {
+    for (int k = 3; k < 6; ++k) {
+      std::array<double, 6> direction{};
+      direction[static_cast<std::size_t>(k)] = 1.0;
+      h->free_directions.push_back(direction);
+    }
+  }
+  Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
+  h->rank = CovarianceRank(covariance);
+}
+
+void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& camera,
+                   PoseHypothesis* h) {
+  const CameraPose& pose = h->cam_from_world;
+  const auto at = [&](int block) { return state.x.data() + map.block(block).offset; };
+  const Camera shifted = ShiftedCamera(camera, at(TrackMap::kCamera));
+  for (const TrackMap::Circle& c : map.circles) {
+    CircleEstimate estimate;
+    estimate.id = c.id;
+    estimate.radius = std::abs(at(c.radius)[0]);
+    Eigen::Vector3d center(at(c.center)[0], at(c.center)[1], 0.0), normal(0.0, 0.0, 1.0);
+    if (c.tilt >= 0) {
+      normal.head<2>() = Eigen::Vector2d(at(c.tilt)[0], at(c.tilt)[1]);
+      center.z() = at(c.tilt)[2] * estimate.radius;
+    }
+    estimate.center = pose.rotation * center + pose.translation;
+    estimate.normal = (pose.rotation * normal).normalized();
+    if (estimate.normal.dot(estimate.center) > 0.0) estimate.normal = -estimate.normal;
+    CameraToPixel(shifted, estimate.center, &estimate.center_px);
+    h->circles.push_back(estimate);
+  }
+  for (const TrackMap::Direction& d : map.directions) {
+    PencilEstimate estimate;
+    estimate.id = d.id;
+    const Block& block = map.block(d.block);
+    const Eigen::Vector3d in_world = Eigen::Map<const Eigen::Vector3d>(at(d.block)).normalized();
+    estimate.direction = pose.rotation * in_world;
+    const Eigen::Index rows = block.tangent_size();
+    Eigen::MatrixXd J(3, 3 + rows);
+    J.leftCols<3>() = -CrossMatrix(in_world);
+    if (rows > 0) J.rightCols(rows) = PlusJacobianOf(block, at(d.block));
+    std::vector<Eigen::Index> columns = {0, 1, 2};
+    for (Eigen::Index k = 0; k < rows; ++k) columns.push_back(map.tangent(d.block) + k);
+    const Eigen::Matrix3d covariance = J * state.covariance(columns, columns) * J.transpose();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+    estimate.sigma_deg = kRadToDeg * std::sqrt(std::max(0.0, eigen.eigenvalues()[2]));
+    h->pencils.push_back(estimate);
+  }
+}
+
+}  // namespace
+
+PoseHypothesis HypothesisOf(const TrackMap& map, const TrackState& state, const Camera& camera) {
+  PoseHypothesis h;
+  h.cam_from_world = state.Pose(map);
+  h.metric = map.metric;
+  h.origin_observed = map.origin_observed;
+  h.structure = map.plane;
+  FillCovariance(map, state, &h);
+  FillLandmarks(map, state, camera, &h);
+  return h;
+}
+
+void FillFrame(const TrackFrame& frame, const TrackFit& fit, PoseHypothesis* h,
+               std::vector<std::string>* notes) {
+  h->cost = fit.cost;
+  double squares = 0.0;
+  std::vector<double> distances;
+  const double* parameters[8];
+  for (std::size_t i = 0; i < frame.terms().size(); ++i) {
+    const TrackFrame::Term& term = frame.terms()[i];
+    if (fit.active[i] == 0) {
+      if (term.parent >= 0 && fit.active[static_cast<std::size_t>(term.parent)] == 0) continue;
+      h->left_out.push_back(term.id);
+      if (notes != nullptr)
+        notes->push_back(term.name + ": left out, it contradicts the pose found");
+      continue;
+    }
+    const ImagePoints* points = term.cost->points();
+    if (points == nullptr) continue;
+    frame.Parameters(term, fit.state.x.data(), fit.own.data(), parameters);
+    term.cost->Distances(parameters, &distances);
+    h->num_observations += static_cast<int>(distances.size());
+    for (const double d : distances) {
+      if (!(std::abs(d) <= kInlierSigmas * points->options().sigma_px)) continue;
+      ++h->num_inliers;
+      squares += d * d;
+    }
+  }
+  h->rms_px = h->num_inliers > 0 ? std::sqrt(squares / h->num_inliers) : 0.0;
+  for (const std::string& id : h->left_out) h->structure += " - " + id;
+}
+
+}  // namespace circline

@@ -1,0 +1,243 @@
+#include "circline/refine/track_state.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "circline/refine/block_chain.h"
+#include "circline/refine/manifolds.h"
+
+namespace circline {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// d exp(v) = exp(v) at the left: exp([v + dv]x) = exp([J dv]x) exp([v]x), to second order in v.
+Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& v) {
+  const Eigen::Matrix3d V = CrossMatrix(v);
+  const double angle = v.norm();
+  constexpr double kSmall = 1e-4;
+  if (angle < kSmall) return Eigen::Matrix3d::Identity() + 0.5 * V + V * V / 6.0;
+  return Eigen::Matrix3d::Identity() + (1.0 - std::cos(angle)) / (angle * angle) * V +
+         (angle - std::sin(angle)) / (angle * angle * angle) * V * V;
+}
+
+// The rows and columns of one block's tangent; none for a constant one.
+Eigen::Block<Eigen::MatrixXd> Corner(const TrackMap& map, int a, int b, Eigen::MatrixXd* M) {
+  return M->block(map.tangent(a), map.tangent(b), map.block(a).tangent_size(),
+                  map.block(b).tangent_size());
+}
+
+// Kalman's update by a measurement z = J x + noise: x moves by K z.
+void KalmanUpdate(const TrackMap& map, const Eigen::MatrixXd& J, const Eigen::VectorXd& z,
+                  const Eigen::MatrixXd& noise, TrackState* state) {
+  Eigen::MatrixXd& P = state->covariance;
+  const Eigen::MatrixXd PJt = P * J.transpose(), S = J * PJt + noise;
+  const Eigen::LLT<Eigen::MatrixXd> llt(S);
+  if (llt.info() != Eigen::Success) return;
+  const Eigen::VectorXd weighed = llt.solve(z), dx = PJt * weighed;
+  const double log_det = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+  state->log_weight -= 0.5 * (z.dot(weighed) + log_det);
+  P -= PJt * llt.solve(PJt.transpose());
+  P = 0.5 * (P + P.transpose()).eval();
+  for (int i = 0; i < map.size(); ++i) {
+    const Block& block = map.block(i);
+    if (block.tangent_size() == 0) continue;
+    double* values = state->x.data() + block.offset;
+    const Eigen::VectorXd step = dx.segment(map.tangent(i), block.tangent_size());
+    if (block.manifold == nullptr) {
+      Eigen::Map<Eigen::VectorXd>(values, block.size) += step;
+      continue;
+    }
+    Eigen::VectorXd moved(block.size);
+    block.manifold->Plus(values, step.data(), moved.data());
+    std::copy(moved.data(), moved.data() + block.size, values);
+  }
+}
+
+}  // namespace
+
+void TrackMap::Reset(bool has_position, const Camera& camera, const CameraSigma& sigma) {
+  *this = TrackMap();
+  AddBlock(4, std::make_unique<WorldRotationManifold>(3));
+  AddBlock(3, {}, !has_position);
+  AddBlock(3);
+  AddBlock(3, {}, !has_position);
+  const double k1 = camera.model != CameraModel::kPinhole ? sigma.k1 : 0.0;
+  const double sigmas[] = {sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
+                           sigma.principal_point_px, k1};
+  std::vector<int> held;
+  for (int k = 0; k < kCameraSize; ++k) {
+    if (k >= 5 || !(sigmas[k] > 0.0)) held.push_back(k);
+  }
+  const bool is_exact = held.size() == kCameraSize;
+  AddBlock(kCameraSize,
+           is_exact ? nullptr : std::make_unique<ceres::SubsetManifold>(kCameraSize, held),
+           is_exact);
+}
+
+int TrackMap::AddBlock(int size, std::unique_ptr<ceres::Manifold> manifold, bool is_constant) {
+  Block block;
+  block.offset = size_ == 0 ? 0 : blocks_.back().offset + blocks_.back().size;
+  block.size = size;
+  block.manifold = manifold.get();
+  block.is_constant = is_constant;
+  blocks_.push_back(block);
+  manifolds_.push_back(std::move(manifold));
+  tangents_.push_back(tangent_size_);
+  tangent_size_ += block.tangent_size();
+  return size_++;
+}
+
+CameraPose TrackState::Pose(const TrackMap& map) const {
+  CameraPose pose;
+  pose.rotation = RotationFromBlock(x.data() + map.block(TrackMap::kRotation).offset);
+  pose.translation = Vector(map, TrackMap::kTranslation);
+  return pose;
+}
+
+void TrackState::SetPose(const TrackMap& map, const CameraPose& pose) {
+  Eigen::Map<Eigen::Quaterniond> q(x.data() + map.block(TrackMap::kRotation).offset);
+  const Eigen::Quaterniond moved = Eigen::Quaterniond(pose.rotation).normalized();
+  // The same sense as before: charts are linear in it.
+  q = moved.dot(q) < 0.0 ? Eigen::Quaterniond(-moved.coeffs()) : moved;
+  Eigen::Map<Eigen::Vector3d>(x.data() + map.block(TrackMap::kTranslation).offset) =
+      pose.translation;
+}
+
+void TrackState::Append(const TrackMap& map, int index, const double* values,
+                        const Eigen::MatrixXd& block_covariance) {
+  const Block& block = map.block(index);
+  x.conservativeResize(block.offset + block.size);
+  std::copy(values, values + block.size, x.data() + block.offset);
+  const Eigen::Index before = covariance.rows(), more = block.tangent_size();
+  covariance.conservativeResize(before + more, before + more);
+  covariance.rightCols(more).setZero();
+  covariance.bottomRows(more).setZero();
+  covariance.bottomRightCorner(more, more) = block_covariance;
+}
+
+Eigen::MatrixXd ChartOf(const Block& block, const double* at) {
+  if (block.manifold == nullptr) return Eigen::MatrixXd::Identity(block.size, block.size);
+  RowMajor J(block.tangent_size(), block.size);
+  block.manifold->MinusJacobian(at, J.data());
+  return J;
+}
+
+Eigen::MatrixXd PlusJacobianOf(const Block& block, const double* at) {
+  if (block.manifold == nullptr) return Eigen::MatrixXd::Identity(block.size, block.size);
+  RowMajor J(block.size, block.tangent_size());
+  block.manifold->PlusJacobian(at, J.data());
+  return J;
+}
+
+// X_cam moves as R' = exp([w dt]x) R, t' = exp([w dt]x) t + V v dt: a constant twist (w, v). Its
+// noise is a random walk of w and v, integrated over dt.
+void MoveOn(const TrackMap& map, const TrackerOptions& options, double dt, TrackState* state) {
+  if (!(dt > 0.0)) return;
+  using M = TrackMap;
+  const CameraPose pose = state->Pose(map);
+  const Eigen::Vector3d turn = dt * state->Vector(map, M::kTurnRate);
+  const Eigen::Matrix3d E = ExpRotation(turn), V = LeftJacobian(turn);
+  CameraPose moved = {E * pose.rotation, pose.translation};
+  if (map.has_position()) {
+    moved.translation = E * pose.translation + V * (dt * state->Vector(map, M::kVelocity));
+  }
+  state->SetPose(map, moved);
+
+  // F of the first rows; it is the identity for all that follows.
+  const int n = map.tangent(M::kCamera);
+  Eigen::MatrixXd F = Eigen::MatrixXd::Identity(n, n), Q = Eigen::MatrixXd::Zero(n, n);
+  const Eigen::Matrix3d back = moved.rotation.transpose();
+  Corner(map, M::kRotation, M::kTurnRate, &F) = dt * back * V;
+  const double w2 = options.turn_rate_sigma * options.turn_rate_sigma * dt;
+  const Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
+  Corner(map, M::kRotation, M::kRotation, &Q) = w2 * dt * dt / 3.0 * unit;
+  Corner(map, M::kRotation, M::kTurnRate, &Q) = 0.5 * w2 * dt * back;
+  Corner(map, M::kTurnRate, M::kRotation, &Q) = 0.5 * w2 * dt * back.transpose();
+  Corner(map, M::kTurnRate, M::kTurnRate, &Q) = w2 * unit;
+  if (map.has_position()) {
+    // The shift is turned half as far as what it starts from.
+    const Eigen::Vector3d turned = E * pose.translation;
+    const Eigen::Matrix3d across = -CrossMatrix(0.5 * (turned + moved.translation));
+    Corner(map, M::kTranslation, M::kTranslation, &F) = E;
+    Corner(map, M::kTranslation, M::kTurnRate, &F) = dt * across * V;
+    Corner(map, M::kTranslation, M::kVelocity, &F) = dt * V;
+    const double sigma = options.velocity_sigma * pose.translation.norm();
+    const double v2 = sigma * sigma * dt;
+    // The turn's noise moves the translation, too.
+    Corner(map, M::kTranslation, M::kTranslation, &Q) =
+        v2 * dt * dt / 3.0 * unit + w2 * dt * dt / 3.0 * across * across.transpose();
+    Corner(map, M::kTranslation, M::kRotation, &Q) = w2 * dt * dt / 3.0 * across * back.transpose();
+    Corner(map, M::kRotation, M::kTranslation, &Q) = w2 * dt * dt / 3.0 * back * across.transpose();
+    Corner(map, M::kTranslation, M::kTurnRate, &Q) = 0.5 * w2 * dt * across;
+    Corner(map, M::kTurnRate, M::kTranslation, &Q) = 0.5 * w2 * dt * across.transpose();
+    Corner(map, M::kTranslation, M::kVelocity, &Q) = 0.5 * v2 * dt * unit;
+    Corner(map, M::kVelocity, M::kTranslation, &Q) = 0.5 * v2 * dt * unit;
+    Corner(map, M::kVelocity, M::kVelocity, &Q) = v2 * unit;
+  }
+  Eigen::MatrixXd& P = state->covariance;
+  P.topRows(n) = (F * P.topRows(n)).eval();
+  P.leftCols(n) = (P.leftCols(n) * F.transpose()).eval();
+  P.topLeftCorner(n, n) += Q;
+}
+
+// The motion is a measurement of the velocities between the frames: it takes their place, and they
+// take the pose on without noise of their own.
+void MoveBy(const TrackMap& map, const TrackerOptions& options, const RelativePose& motion,
+            double dt, TrackState* state) {
+  using M = TrackMap;
+  const double seconds = dt > 0.0 ? dt : 1.0, rate = 1.0 / seconds;
+  const Eigen::Vector3d turn = LogRotation(motion.now_from_before.rotation);
+  const Eigen::Matrix3d inverse = LeftJacobian(turn).inverse();
+  const bool has_shift = map.has_position() && motion.has_translation;
+  Eigen::MatrixXd& P = state->covariance;
+  const int first = map.tangent(M::kTurnRate), rows = has_shift ? 6 : 3;
+  P.middleRows(first, rows).setZero();
+  P.middleCols(first, rows).setZero();
+  Matrix6d T = Matrix6d::Zero();
+  T.topLeftCorner<3, 3>() = T.bottomRightCorner<3, 3>() = rate * inverse;
+  const Matrix6d noise = T * Eigen::Map<const Matrix6d>(motion.covariance.data()) * T.transpose();
+  P.block(first, first, rows, rows) = noise.topLeftCorner(rows, rows);
+  Eigen::Map<Eigen::Vector3d>(state->x.data() + map.block(M::kTurnRate).offset) = rate * turn;
+  if (has_shift) {
+    Eigen::Map<Eigen::Vector3d>(state->x.data() + map.block(M::kVelocity).offset) =
+        rate * (inverse * motion.now_from_before.translation);
+  }
+  TrackerOptions exact = options;
+  exact.turn_rate_sigma = 0.0;
+  if (has_shift) exact.velocity_sigma = 0.0;
+  MoveOn(map, exact, seconds, state);
+  // Of the velocities to come.
+  const double w = options.turn_rate_sigma,
+               v = has_shift ? options.velocity_sigma * state->Pose(map).translation.norm() : 0.0;
+  P.diagonal().segment<3>(first).array() += w * w * dt;
+  if (has_shift) P.diagonal().segment<3>(first + 3).array() += v * v * dt;
+}
+
+void Condition(const TrackMap& map, const PosePrior& prior, TrackState* state) {
+  const CameraPose pose = state->Pose(map);
+  const int rows = map.has_position() ? 6 : 3;
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, state->covariance.rows());
+  J.block<3, 3>(0, map.tangent(TrackMap::kRotation)) = pose.rotation;
+  Eigen::VectorXd z(rows);
+  z.head<3>() = LogRotation(prior.mean.rotation * pose.rotation.transpose());
+  if (rows == 6) {
+    J.block<3, 3>(3, map.tangent(TrackMap::kTranslation)).setIdentity();
+    z.tail<3>() = prior.mean.translation - pose.translation;
+  }
+  const Eigen::Map<const Matrix6d> noise(prior.covariance.data());
+  KalmanUpdate(map, J, z, noise.topLeftCorner(rows, rows), state);
+}
+
+void Condition(const TrackMap& map, const GravityPrior& prior, TrackState* state) {
+  const Eigen::Matrix3d R = state->Pose(map).rotation;
+  const Eigen::Vector3d predicted = R * prior.in_world;
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, state->covariance.rows());
+  J.block<3, 3>(0, map.tangent(TrackMap::kRotation)) = -R * CrossMatrix(prior.in_world);
+  const Eigen::Matrix3d noise = prior.sigma_rad * prior.sigma_rad * Eigen::Matrix3d::Identity();
+  KalmanUpdate(map, J, prior.in_camera - predicted, noise, state);
+}
+
+}  // namespace circline

@@ -1,0 +1,97 @@
+// What a tracker carries from frame to frame: unknowns, one Gaussian of them a hypothesis, and how
+// motion changes them. Internal: not installed.
+#ifndef CIRCLINE_REFINE_TRACK_STATE_H_
+#define CIRCLINE_REFINE_TRACK_STATE_H_
+
+#include <ceres/manifold.h>
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "circline/estimators/observations.h"
+#include "circline/estimators/pose.h"
+#include "circline/refine/joint_problem.h"
+#include "circline/refine/pose_tracker.h"
+
+namespace circline {
+
+// Directions of axes that are drawn.
+constexpr char kXAxisId[] = "frame.x_axis", kYAxisId[] = "frame.y_axis";
+
+// The unknowns that hypotheses have in common: which there are, not their values.
+class TrackMap {
+ public:
+  enum { kRotation, kTranslation, kTurnRate, kVelocity, kCamera, kFirstLandmark };
+  struct Circle {
+    std::string id;
+    int center = -1, radius = -1;  // Blocks: X and Y in the world plane; in the world's unit.
+    int tilt = -1;                 // X and Y of its normal, radians, and height in radii.
+    int offset = -1;               // Of all contours of its contrast, pixels outwards.
+    int contrast = 0;
+  };
+  struct Direction {
+    std::string id;  // Of its pencil; "frame.x_axis", "frame.y_axis".
+    int block = -1;
+  };
+
+  void Reset(bool has_position, const Camera& camera, const CameraSigma& sigma);
+  // Returns the block. A null manifold is Euclidean.
+  int AddBlock(int size, std::unique_ptr<ceres::Manifold> manifold = {}, bool is_constant = false);
+
+  const std::vector<Block>& blocks() const { return blocks_; }
+  const Block& block(int i) const { return blocks_[static_cast<std::size_t>(i)]; }
+  // First row of a block in the covariance.
+  int tangent(int i) const { return tangents_[static_cast<std::size_t>(i)]; }
+  int size() const { return size_; }
+  int tangent_size() const { return tangent_size_; }
+  bool has_camera() const { return !block(kCamera).is_constant; }
+  bool has_position() const { return !block(kTranslation).is_constant; }
+
+  std::vector<Circle> circles;
+  std::vector<Direction> directions;
+  std::string plane;  // Of the world, as observations name it; empty where they do not.
+  bool metric = false, origin_observed = false;
+
+ private:
+  std::vector<Block> blocks_;
+  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
+  std::vector<int> tangents_;
+  int size_ = 0, tangent_size_ = 0;
+};
+
+// One hypothesis: values of all blocks, and the covariance of their tangents at these.
+struct TrackState {
+  Eigen::VectorXd x;
+  Eigen::MatrixXd covariance;
+  double log_weight = 0.0;
+  int parent = 0;  // Index among the hypotheses of the frame before.
+
+  Eigen::Map<const Eigen::Vector3d> Vector(const TrackMap& map, int block) const {
+    return Eigen::Map<const Eigen::Vector3d>(x.data() + map.block(block).offset);
+  }
+  CameraPose Pose(const TrackMap& map) const;
+  void SetPose(const TrackMap& map, const CameraPose& pose);
+  // Takes in a block that has been added to the map.
+  void Append(const TrackMap& map, int block, const double* values,
+              const Eigen::MatrixXd& block_covariance);
+};
+
+// Coordinates about a place: MinusJacobian at the place, which is linear, times the difference.
+// Tangent by ambient size.
+Eigen::MatrixXd ChartOf(const Block& block, const double* at);
+Eigen::MatrixXd PlusJacobianOf(const Block& block, const double* at);
+
+// Moves a hypothesis on by dt seconds at its own velocity, with the noise of the options.
+void MoveOn(const TrackMap& map, const TrackerOptions& options, double dt, TrackState* state);
+// The same by a motion that is known from elsewhere; velocities are then those of this motion.
+void MoveBy(const TrackMap& map, const TrackerOptions& options, const RelativePose& motion,
+            double dt, TrackState* state);
+// Conditions a hypothesis on what is known of its pose (Kalman's update), its probability included.
+void Condition(const TrackMap& map, const PosePrior& prior, TrackState* state);
+void Condition(const TrackMap& map, const GravityPrior& prior, TrackState* state);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_TRACK_STATE_H_
