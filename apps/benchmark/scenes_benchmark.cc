@@ -23,7 +23,7 @@
 
 DEFINE_string(experiment, "all",
               "A list of: random, short_arcs, odd_circles, bleed, focal_length, outliers, "
-              "circle_and_pencil, odd_lines; or all.");
+              "circle_and_pencil, odd_lines, tracking; or all.");
 DEFINE_int32(trials, 0, "Scenes for each row; 0: a few, each experiment's own number.");
 DEFINE_uint64(seed, 1, "Of the scenes and their noise.");
 DEFINE_string(noise_px, "",
@@ -46,7 +46,8 @@ const std::vector<std::pair<std::string, Run>>& Experiments() {
       {"focal_length", RunFocalLength},
       {"outliers", RunOutliers},
       {"circle_and_pencil", RunCircleAndPencil},
-      {"odd_lines", RunOddLines}};
+      {"odd_lines", RunOddLines},
+      {"tracking", RunTracking}};
   return experiments;
 }
 

@@ -46,6 +46,8 @@ void RunOutliers(const ExperimentOptions& options);
 void RunCircleAndPencil(const ExperimentOptions& options);
 // Circle and pencils, some of whose lines have another direction.
 void RunOddLines(const ExperimentOptions& options);
+// Sequences of frames of a moving camera.
+void RunTracking(const ExperimentOptions& options);
 
 }  // namespace circline::apps
 

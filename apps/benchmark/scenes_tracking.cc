@@ -1,0 +1,202 @@
+// Trackers on simulated sequences: is the best hypothesis the right one, do probabilities come
+// true, and are the poses as accurate as all frames so far allow?
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "apps/benchmark/scenes_experiments.h"
+#include "apps/benchmark/scenes_score.h"
+#include "apps/benchmark/tracking_bound.h"
+#include "apps/benchmark/trajectory.h"
+#include "apps/common/progress.h"
+#include "apps/common/text.h"
+#include "circline/refine/pose_tracker.h"
+
+namespace circline::apps {
+namespace {
+
+constexpr int kFramesOfMotion = 30;  // Before the best hypothesis is held to account.
+constexpr double kSure = 0.95;
+
+struct Setting {
+  std::string name;
+  TrajectoryOptions trajectory;
+  bool odometry = false;
+};
+
+std::vector<Setting> Settings() {
+  std::vector<Setting> settings(6);
+  settings[0].name = "circle";
+  settings[1].name = "circle, pencil";
+  settings[1].trajectory.pencil = true;
+  settings[2].name = "two circles";
+  settings[2].trajectory.second_circle = true;
+  settings[3].name = "two circles, fast turns";
+  settings[3].trajectory.second_circle = true;
+  settings[3].trajectory.turn_rate_sigma = 0.5;
+  settings[3].trajectory.speed = 0.8;
+  settings[3].trajectory.num_frames = 60;
+  settings[4].name = "circle, odometry";
+  settings[4].odometry = true;
+  settings[5].name = "circle from afar";
+  settings[5].trajectory.depth = 40.0;
+  return settings;
+}
+
+TrackerOptions OptionsFor(const Setting& setting, LossType loss) {
+  TrackerOptions options;
+  options.estimation.noise_model = NoiseModel::Exact();
+  options.estimation.conic_loss.type = options.estimation.line_loss.type = loss;
+  options.turn_rate_sigma = setting.trajectory.turn_rate_sigma;
+  options.velocity_sigma = setting.trajectory.velocity_sigma;
+  return options;
+}
+
+// The turn between two frames as a gyroscope has it.
+MotionPrior Odometry(const CameraPose& before, const CameraPose& now, Random* random) {
+  constexpr double kSigma = 0.001;  // Radians of each component.
+  MotionPrior motion;
+  motion.relative.emplace();
+  const double x = random->Normal(), y = random->Normal(), z = random->Normal();
+  motion.relative->now_from_before.rotation =
+      ExpRotation(kSigma * Eigen::Vector3d(x, y, z)) * now.rotation * before.rotation.transpose();
+  motion.relative->has_translation = false;
+  for (std::size_t k = 0; k < 6; ++k)
+    motion.relative->covariance[7 * k] = k < 3 ? kSigma * kSigma : 1.0;
+  return motion;
+}
+
+double NormalError(const CameraPose& truth, const PoseHypothesis& h) {
+  return std::acos(
+      std::clamp(truth.rotation.col(2).dot(h.cam_from_world.rotation.col(2)), -1.0, 1.0));
+}
+
+// The circle's other pose has its normal mirrored at the line of sight, about.
+bool IsRight(const CameraPose& truth, const PoseHypothesis& h, double sigma) {
+  const double cosine = std::abs(truth.rotation.col(2).dot(truth.translation.normalized()));
+  const double to_other = 2.0 * std::acos(std::min(1.0, cosine));
+  constexpr double kSigmas = 5.0;
+  return NormalError(truth, h) < std::max(kSigmas * sigma, 0.5 * to_other);
+}
+
+struct Score {
+  int frames = 0, right = 0, told = 0, told_right = 0, sure_wrong = 0, predicted = 0, restarts = 0,
+      began_wrong = 0, began_wrong_and_told = 0, ended_right = 0, flips = 0;
+  // Of the first hypothesis where it is right and in the map of the first frame.
+  double squared = 0.0, bound = 0.0, nees = 0.0;
+  int measured = 0;
+  Calibration calibration;
+};
+
+// Natural logarithm of the odds that a frame without noise gives the right hypothesis: half the
+// squared distance of the two in standard deviations, d^2 / 2, of which noise makes the wrong one
+// more probable once in 1 / Phi(-d / 2) sequences: here less than once in 100.
+constexpr double kCanTell = 11.0;
+
+void RunSequence(const Setting& setting, LossType loss, std::uint64_t seed, Score* score) {
+  const Trajectory sequence(setting.trajectory, seed);
+  const TrackerOptions options = OptionsFor(setting, loss);
+  Random noise(seed + 1000003), motion_noise(seed + 2000003);
+  PoseTracker tracker(options), ideal(options);
+  TrackingBound bound(sequence, options);
+  bool began_wrong = false, was_right = false, world_is_first = true;
+  for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
+    const Trajectory::Frame& frame = sequence.frames[k];
+    const double time = static_cast<double>(k) / setting.trajectory.fps;
+    MotionPrior motion;
+    if (setting.odometry && k > 0)
+      motion = Odometry(sequence.frames[k - 1].pose, frame.pose, &motion_noise);
+    const TrackedPose tracked = tracker.Update(sequence.Observe(frame, &noise), time, motion);
+    const TrackedPose without_noise = ideal.Update(sequence.Observe(frame, nullptr), time, motion);
+    const bool bounded = !setting.odometry;
+    const double sigma = bound.Advance(k);
+    if (!tracked.estimate.status.ok() || tracked.estimate.hypotheses.empty()) continue;
+    const PoseHypothesis& first = tracked.estimate.hypotheses.front();
+    const bool right = IsRight(frame.pose, first, sigma);
+    if (k == 0) began_wrong = !right;
+    score->flips += k > 0 && right != was_right ? 1 : 0;
+    was_right = right;
+    world_is_first = world_is_first && (k == 0 || !tracked.reinitialized);
+    score->restarts += k > 0 && tracked.reinitialized ? 1 : 0;
+    score->predicted += tracked.predicted_only && !frame.is_occluded ? 1 : 0;
+    score->calibration.Add(first.probability, right);
+    score->sure_wrong += !right && first.probability >= kSure ? 1 : 0;
+    ++score->frames;
+    score->right += right ? 1 : 0;
+    double true_odds = 0.0, others = 0.0;
+    for (const PoseHypothesis& h : without_noise.estimate.hypotheses)
+      (IsRight(frame.pose, h, sigma) ? true_odds : others) += h.probability;
+    const bool can_tell = true_odds > 0.0 && std::log(true_odds) > std::log(others) + kCanTell;
+    if (k >= kFramesOfMotion && can_tell) {
+      ++score->told;
+      score->told_right += right ? 1 : 0;
+    }
+    if (right && bounded && world_is_first && k >= kFramesOfMotion) {
+      const Eigen::Matrix3d R = frame.pose.rotation;
+      const Eigen::Vector3d tilt = R.transpose() * first.cam_from_world.rotation.col(2);
+      const Eigen::Matrix<double, 2, 3> across = R.leftCols<2>().transpose();
+      // d n = delta x n: components along the world's X and Y.
+      const Eigen::Matrix<double, 2, 3> J =
+          -across * CrossMatrix(first.cam_from_world.rotation.col(2));
+      const Eigen::Matrix2d covariance =
+          J * first.Covariance().topLeftCorner<3, 3>() * J.transpose();
+      score->squared += tilt.head<2>().squaredNorm();
+      score->bound += sigma * sigma;
+      score->nees += tilt.head<2>().dot(covariance.inverse() * tilt.head<2>());
+      ++score->measured;
+    }
+    if (k + 1 < sequence.frames.size() || !began_wrong) continue;
+    ++score->began_wrong;
+    score->began_wrong_and_told += can_tell ? 1 : 0;
+    score->ended_right += can_tell && right ? 1 : 0;
+  }
+}
+
+void Print(const std::string& name, const Score& s) {
+  const auto percent = [](int part, int all) {
+    return all > 0 ? FormatFixed(100.0 * part / all, 2) : std::string("-");
+  };
+  const bool measured = s.measured > 0;
+  std::printf("  %-24s %7d %7s %8d %8s %9s %9d %8d %6d/%-6d %9s %6s\n", name.c_str(), s.frames,
+              percent(s.right, s.frames).c_str(), s.told, percent(s.told_right, s.told).c_str(),
+              percent(s.sure_wrong, s.frames).c_str(), s.predicted, s.restarts, s.ended_right,
+              s.began_wrong_and_told,
+              measured ? FormatFixed(std::sqrt(s.squared / s.bound), 3).c_str() : "-",
+              measured ? FormatFixed(s.nees / s.measured, 2).c_str() : "-");
+}
+
+}  // namespace
+
+void RunTracking(const ExperimentOptions& options) {
+  const int trials = options.Trials(40);
+  for (const LossType loss : options.Losses({LossType::kTrivial})) {
+    for (const double noise : options.Noises({2.0})) {
+      std::printf("Tracking, noise %s px, loss %s, 20 %% of frames occluded\n",
+                  FormatPlain(noise).c_str(), LossName(loss));
+      std::printf("  %-24s %7s %7s %8s %8s %9s %9s %8s %13s %9s %6s\n", "scene", "frames", "right%",
+                  "can tell", "right%", "sure+wr.%", "contrad.", "restarts", "began wrong",
+                  "rms/bound", "NEES 2");
+      Calibration all;
+      for (const Setting& given : Settings()) {
+        Setting setting = given;
+        setting.trajectory.noise_px = noise;
+        Score score;
+        Progress progress(setting.name, trials);
+        for (int trial = 0; trial < trials; ++trial) {
+          Random seeds = options.TrialRandom(9, trial);
+          RunSequence(setting, loss, seeds.Next(), &score);
+          progress.Advance();
+        }
+        progress.Clear();
+        Print(setting.name, score);
+        score.calibration.Print();
+      }
+      std::printf("\n");
+    }
+  }
+}
+
+}  // namespace circline::apps
