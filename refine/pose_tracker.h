@@ -78,7 +78,7 @@ struct TrackerOptions {
   int lost_after = 3;      // Frames in a row that contradict all hypotheses; 1 or more.
   double max_gap_s = 1.0;  // Seconds without evidence that can be used.
   // Evaluations of the evidence (with derivatives) that one hypothesis may take in a call.
-  int max_evaluations = 10;
+  int max_evaluations = 20;
 
   Status Validate() const;
 };

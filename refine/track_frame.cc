@@ -180,6 +180,16 @@ std::vector<CameraPose> TrackFrame::CircleStarts(const TrackState& prior) const 
   return starts;
 }
 
+// A term's own unknowns at the present pose. False where it cannot lie there.
+bool TrackFrame::Place(std::size_t index, TrackFit* fit) const {
+  const Term& term = terms_[index];
+  if (term.own == 0) return true;
+  const double* parameters[8];
+  Parameters(term, fit->state.x.data(), fit->own.data(), parameters);
+  return static_cast<const DirectionLineCost&>(*term.cost)
+      .Start(parameters, fit->own.data() + 2 * index);
+}
+
 // All unknowns at a pose; lines that cannot lie there are left out.
 bool TrackFrame::Begin(const TrackState& prior, const CameraPose& start, TrackFit* fit) const {
   fit->state = prior;
@@ -190,15 +200,7 @@ bool TrackFrame::Begin(const TrackState& prior, const CameraPose& start, TrackFi
   fit->active.assign(terms_.size(), 1);
   bool any = false;
   for (std::size_t i = 0; i < terms_.size(); ++i) {
-    const Term& term = terms_[i];
-    if (term.own > 0) {
-      const double* parameters[8];
-      Parameters(term, fit->state.x.data(), fit->own.data(), parameters);
-      fit->active[i] = static_cast<const DirectionLineCost&>(*term.cost)
-                               .Start(parameters, fit->own.data() + 2 * i)
-                           ? 1
-                           : 0;
-    }
+    fit->active[i] = Place(i, fit) ? 1 : 0;
     any = any || fit->active[i] != 0;
   }
   return any;

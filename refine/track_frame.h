@@ -69,8 +69,13 @@ class TrackFrame {
   std::vector<CameraPose> CircleStarts(const TrackState& prior) const;
   bool Begin(const TrackState& prior, const CameraPose& start, TrackFit* fit) const;
   double TermsCost(const TrackFit& fit) const;
-  void Solve(const Prior& prior, int max_evaluations, TrackFit* fit) const;
-  bool LeaveOutOutliers(double gate_probability, TrackFit* fit) const;
+  int Solve(const Prior& prior, int max_evaluations, TrackFit* fit) const;
+  double Excess(const Term& term, const TrackFit& fit) const;
+  bool Place(std::size_t term, TrackFit* fit) const;
+  bool TakeBack(double gate_probability, TrackFit* fit) const;
+  bool LeaveOutWorst(double gate_probability, TrackFit* fit) const;
+  bool Score(const TrackState& before, const Prior& prior, double gate_probability,
+             TrackFit* fit) const;
   bool Update(const TrackState& before, const Prior& prior, TrackFit* fit) const;
   bool RefineFrom(const TrackState& prior, const TrackerOptions& options, TrackFit* fit) const;
 

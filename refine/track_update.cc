@@ -110,7 +110,8 @@ TrackFrame::Prior::Prior(const TrackFrame& frame, const TrackState& state,
   cost = std::make_unique<LinearCost>(A, Ambient(map, state.x), sizes);
 }
 
-void TrackFrame::Solve(const Prior& prior, int max_evaluations, TrackFit* fit) const {
+// Returns the number of evaluations.
+int TrackFrame::Solve(const Prior& prior, int max_evaluations, TrackFit* fit) const {
   ceres::Problem problem(OwnsNothing());
   double* x = fit->state.x.data();
   int unknowns = static_cast<int>(prior.rows.size());
@@ -141,72 +142,111 @@ void TrackFrame::Solve(const Prior& prior, int max_evaluations, TrackFit* fit) c
   ceres::Solver::Summary summary;
   // Ceres evaluates once before the first iteration.
   ceres::Solve(NearbyOptions(unknowns, std::max(1, max_evaluations - 1), 1.0), &problem, &summary);
+  return static_cast<int>(summary.iterations.size());
 }
 
-// Terms that contradict the others cost what clutter would.
-bool TrackFrame::LeaveOutOutliers(double gate_probability, TrackFit* fit) const {
-  const auto is_whole = [&](std::size_t i) { return terms_[i].parent < 0; };
-  std::ptrdiff_t num_active = 0, num_out = 0;
-  for (std::size_t i = 0; i < terms_.size(); ++i)
-    num_active += fit->active[i] != 0 && is_whole(i) ? 1 : 0;
+// By how much twice a term's cost exceeds that of its own free fit; infinite where it has none.
+double TrackFrame::Excess(const Term& term, const TrackFit& fit) const {
   constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
-  double residuals[kMaxResiduals];
+  double residuals[kMaxResiduals], twice_cost = 0.0;
   const double* parameters[8];
+  Parameters(term, fit.state.x.data(), fit.own.data(), parameters);
+  if (!term.cost->Evaluate(parameters, residuals, nullptr))
+    return std::numeric_limits<double>::infinity();
+  for (int k = 0; k < term.cost->num_residuals(); ++k) twice_cost += residuals[k] * residuals[k];
+  return twice_cost - term.free_twice_cost;
+}
+
+// Makes the terms inactive that contradict the others most: at a compromise of all, any may seem
+// to. True where there were any.
+bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) const {
+  std::vector<std::pair<double, std::size_t>> odd;
+  std::ptrdiff_t num_whole = 0;
   for (std::size_t i = 0; i < terms_.size(); ++i) {
-    const Term& term = terms_[i];
-    if (fit->active[i] == 0) continue;
-    if (!is_whole(i) && fit->active[static_cast<std::size_t>(term.parent)] == 0) {
-      fit->active[i] = 0;
+    if (terms_[i].parent < 0) ++num_whole;
+    if (fit->active[i] == 0) {
+      if (terms_[i].parent < 0) num_whole -= 2;  // Less than half of all may be left out.
       continue;
     }
-    Parameters(term, fit->state.x.data(), fit->own.data(), parameters);
-    double twice_cost = std::numeric_limits<double>::infinity();
-    if (term.cost->Evaluate(parameters, residuals, nullptr)) {
-      twice_cost = 0.0;
-      for (int k = 0; k < term.cost->num_residuals(); ++k)
-        twice_cost += residuals[k] * residuals[k];
-    }
-    if (twice_cost - term.free_twice_cost <= ChiSquareLimit(term.dof, gate_probability)) continue;
-    // One alone says nothing of which is wrong, it or the prior: the frame contradicts.
-    if (is_whole(i) && 2 * (num_out + 1) > num_active) continue;
-    num_out += is_whole(i) ? 1 : 0;
-    fit->active[i] = 0;
+    const double beyond = Excess(terms_[i], *fit) - ChiSquareLimit(terms_[i].dof, gate_probability);
+    if (beyond > 0.0) odd.emplace_back(beyond, i);
   }
-  return num_out > 0;
+  std::sort(odd.begin(), odd.end(), [](const auto& a, const auto& b) {
+    return a.first != b.first ? a.first > b.first : a.second < b.second;
+  });
+  bool any = false;
+  for (const auto& [beyond, i] : odd) {
+    constexpr double kComparable = 0.5;  // Of the worst.
+    // One of two says nothing of which is wrong: the frame contradicts.
+    const bool is_whole = terms_[i].parent < 0;
+    if (beyond < kComparable * odd.front().first || (is_whole && num_whole <= 2)) break;
+    fit->active[i] = 0;
+    num_whole -= is_whole ? 2 : 0;
+    any = true;
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
+      if (terms_[k].parent == static_cast<int>(i)) fit->active[k] = 0;
+    }
+  }
+  return any;
+}
+
+// Takes back what agrees with the pose that the others have led to. True where there was any.
+bool TrackFrame::TakeBack(double gate_probability, TrackFit* fit) const {
+  bool any = false;
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
+    const Term& term = terms_[i];
+    const bool has_parent =
+        term.parent < 0 || fit->active[static_cast<std::size_t>(term.parent)] != 0;
+    if (fit->active[i] != 0 || !has_parent || !Place(i, fit)) continue;
+    if (Excess(term, *fit) > ChiSquareLimit(term.dof, gate_probability)) continue;
+    fit->active[i] = 1;
+    any = true;
+  }
+  return any;
 }
 
 bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& options,
                             TrackFit* fit) const {
   const double gate = options.gate_probability / static_cast<double>(terms_.size());
-  for (int attempt = 0; attempt < 2; ++attempt) {
+  bool has_dropped = false, has_taken_back = false;
+  for (int left = options.max_evaluations;;) {
     const Prior prior(*this, before, fit->active);
     if (prior.llt.info() != Eigen::Success) return false;
-    Solve(prior, options.max_evaluations, fit);
+    left -= Solve(prior, left, fit);
     if (!fit->state.x.allFinite()) return false;
-    const std::vector<std::uint8_t> active = fit->active;
-    if (attempt == 0 && LeaveOutOutliers(gate, fit)) continue;
-    fit->active = active;
-    double left_out = 0.0;
-    fit->dof = 0;
-    fit->misfit = 0.0;
-    for (std::size_t i = 0; i < terms_.size(); ++i) {
-      const Term& term = terms_[i];
-      if (fit->active[i] != 0) {
-        fit->dof += term.dof;
-        fit->misfit -= term.free_twice_cost;
-      } else {
-        left_out += 0.5 * (term.free_twice_cost + ChiSquareLimit(term.dof, gate));
+    constexpr int kFew = 2;  // Evaluations that come to nothing.
+    if (left > kFew && !has_taken_back) {
+      if (LeaveOutWorst(gate, fit)) {
+        has_dropped = true;
+        continue;
       }
+      has_taken_back = has_dropped && TakeBack(gate, fit);
+      if (has_taken_back) continue;
     }
-    fit->cost =
-        TermsCost(*fit) +
-        0.5 * (prior.A * (prior.Ambient(map_, fit->state.x) - prior.Ambient(map_, before.x)))
-                  .squaredNorm();
-    fit->misfit += 2.0 * fit->cost;
-    fit->cost += left_out;
-    return std::isfinite(fit->cost) && Update(before, prior, fit);
+    return Score(before, prior, gate, fit) && Update(before, prior, fit);
   }
-  return false;
+}
+
+// What is left out costs what clutter would: as much as what just agrees.
+bool TrackFrame::Score(const TrackState& before, const Prior& prior, double gate_probability,
+                       TrackFit* fit) const {
+  double left_out = 0.0, free = 0.0;
+  fit->dof = 0;
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
+    const Term& term = terms_[i];
+    if (fit->active[i] != 0) {
+      fit->dof += term.dof;
+      free += term.free_twice_cost;
+    } else {
+      left_out += 0.5 * (term.free_twice_cost + ChiSquareLimit(term.dof, gate_probability));
+    }
+  }
+  const Eigen::VectorXd moved =
+      prior.A * (prior.Ambient(map_, fit->state.x) - prior.Ambient(map_, before.x));
+  const double cost = TermsCost(*fit) + 0.5 * moved.squaredNorm();
+  fit->misfit = 2.0 * cost - free;
+  fit->cost = cost + left_out;
+  return std::isfinite(fit->cost);
 }
 
 // The posterior about the minimum, H^-1 with H = J^T J of all, and Laplace's evidence: exp(-cost)
