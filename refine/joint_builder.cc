@@ -15,8 +15,6 @@ namespace {
 
 constexpr double kExactAngle = 1e-6;   // Radians: stands for an angle that is known exactly.
 constexpr double kExactLength = 1e-6;  // Relative: the same for a length.
-// From here on a camera is estimated, below it is only counted in the covariance.
-constexpr double kEstimatedFocal = 0.01;
 
 }  // namespace
 

@@ -289,7 +289,9 @@ class PoseTracker::Implementation {
   }
 
   void Predicted(const Observations& observations, TrackedPose* tracked) {
-    if (!is_blank_ && ++contradictions_ >= options_.lost_after) {
+    // Features that are all new are another world, as far as anybody knows.
+    const bool says_something = !is_blank_ || !fitted_.circles.empty() || !fitted_.pencils.empty();
+    if (says_something && ++contradictions_ >= options_.lost_after) {
       TrackedPose anew = *tracked;
       Start(observations, &anew);
       if (anew.estimate.status.ok()) {

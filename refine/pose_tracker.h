@@ -29,9 +29,10 @@
 // that later translations have other lengths than 1 though `metric` is false. Without any circle
 // only the rotation is tracked, and the translation stays that of the first frame.
 //
-// Loss. A frame that contradicts all hypotheses is not used (predicted_only). After
-// TrackerOptions::lost_after of them in a row, or a gap longer than max_gap_s, the tracker starts
-// anew from the frame that it is given, with a new world and `reinitialized` set.
+// Loss. A frame that contradicts all hypotheses, or has nothing of the map but other features, is
+// not used (predicted_only). After TrackerOptions::lost_after of them in a row, or a gap longer
+// than max_gap_s, the tracker starts anew from the frame that it is given, with a new world and
+// `reinitialized` set.
 //
 // Errors are statuses. Wrong input (a time that is not finite or runs backwards, observations or
 // options that do not pass their Validate) is refused in words and changes nothing. A frame without

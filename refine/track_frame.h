@@ -14,6 +14,7 @@
 #include "circline/estimators/point_noise.h"
 #include "circline/refine/cost_functions.h"
 #include "circline/refine/estimate_pose.h"
+#include "circline/refine/track_prior.h"
 #include "circline/refine/track_state.h"
 
 namespace circline {
@@ -60,7 +61,7 @@ class TrackFrame {
   void Parameters(const Term& term, const double* x, const double* own, const double** out) const;
 
  private:
-  struct Prior;
+  class Information;
 
   void AddCircle(std::size_t index, const TrackMap::Circle& circle, const PointNoise& noise);
   void AddAxis(const std::optional<Segment>& axis, const TrackMap::Direction& direction);
@@ -69,14 +70,16 @@ class TrackFrame {
   std::vector<CameraPose> CircleStarts(const TrackState& prior) const;
   bool Begin(const TrackState& prior, const CameraPose& start, TrackFit* fit) const;
   double TermsCost(const TrackFit& fit) const;
-  int Solve(const Prior& prior, int max_evaluations, TrackFit* fit) const;
+  int Solve(const TrackPrior& prior, int max_evaluations, TrackFit* fit) const;
   double Excess(const Term& term, const TrackFit& fit) const;
   bool Place(std::size_t term, TrackFit* fit) const;
-  bool TakeBack(double gate_probability, TrackFit* fit) const;
+  int LeastOdd(TrackFit* fit) const;
   bool LeaveOutWorst(double gate_probability, TrackFit* fit) const;
-  bool Score(const TrackState& before, const Prior& prior, double gate_probability,
-             TrackFit* fit) const;
-  bool Update(const TrackState& before, const Prior& prior, TrackFit* fit) const;
+  bool Score(const TrackPrior& prior, double gate_probability, TrackFit* fit) const;
+  void MoveOthers(const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& step,
+                  TrackState* state) const;
+  std::vector<std::uint8_t> Used(const TrackFit& fit) const;
+  bool Update(const TrackState& before, const TrackPrior& prior, TrackFit* fit) const;
   bool RefineFrom(const TrackState& prior, const TrackerOptions& options, TrackFit* fit) const;
 
   const Observations& observations_;

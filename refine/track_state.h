@@ -53,6 +53,9 @@ class TrackMap {
   std::vector<Direction> directions;
   std::string plane;  // Of the world, as observations name it; empty where they do not.
   bool metric = false, origin_observed = false;
+  // Its error is not estimated but counted: it stays the same from frame to frame, and no number of
+  // them averages it out.
+  bool camera_is_considered = true;
 
  private:
   std::vector<Block> blocks_;

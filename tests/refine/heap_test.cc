@@ -8,6 +8,7 @@
 #include <cstddef>
 
 #include "circline/refine/estimate_pose.h"
+#include "circline/refine/pose_tracker.h"
 #include "tests/plane_scene.h"
 #include "tests/trials.h"
 
@@ -33,6 +34,28 @@ TEST(HeapTest, TenThousandCallsDoNotGrowIt) {
   const std::size_t after = mallinfo2().uordblks;
   // Less than a byte a call.
   EXPECT_LT(after, before + kCalls);
+}
+
+TEST(HeapTest, ATrackDoesNotGrowIt) {
+  if (kSanitized) GTEST_SKIP() << "a sanitizer has a heap of its own";
+  PlaneScene scene(0.7, 0.2);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0, 12)};
+  TrackerOptions options;
+  options.estimation.noise_model = NoiseModel::Exact();
+  PoseTracker tracker(options);
+  double time = 0.0;
+  const auto run = [&](int frames) {
+    for (int i = 0; i < frames; ++i) {
+      time += 0.03;
+      ASSERT_TRUE(tracker.Update(observations, time).estimate.status.ok());
+    }
+  };
+  run(100);
+  const std::size_t before = mallinfo2().uordblks;
+  constexpr int kFrames = 10000;
+  run(kFrames);
+  EXPECT_LT(mallinfo2().uordblks, before + kFrames);
 }
 
 #endif

@@ -1,0 +1,179 @@
+// A hypothesis refined on a frame by ceres: the minimum of the frame's terms and the prior, without
+// what contradicts the rest.
+#include <ceres/ceres.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "circline/refine/chi_square.h"
+#include "circline/refine/nearby_solve.h"
+#include "circline/refine/track_frame.h"
+
+namespace circline {
+
+// The blocks of the map that the active terms have to do with.
+std::vector<std::uint8_t> TrackFrame::Used(const TrackFit& fit) const {
+  std::vector<std::uint8_t> used(map_.blocks().size(), 0);
+  used[TrackMap::kRotation] = used[TrackMap::kTranslation] = 1;
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
+    if (fit.active[i] == 0) continue;
+    for (const int b : terms_[i].blocks) {
+      if (b >= 0) used[static_cast<std::size_t>(b)] = 1;
+    }
+  }
+  return used;
+}
+
+// Returns the number of evaluations.
+int TrackFrame::Solve(const TrackPrior& prior, int max_evaluations, TrackFit* fit) const {
+  ceres::Problem problem(OwnsNothing());
+  double* x = fit->state.x.data();
+  int unknowns = static_cast<int>(prior.rows.size());
+  std::vector<double*> blocks;
+  for (const int b : prior.blocks) {
+    const Block& block = map_.block(b);
+    problem.AddParameterBlock(x + block.offset, block.size,
+                              const_cast<ceres::Manifold*>(block.manifold));  // Not owned.
+    blocks.push_back(x + block.offset);
+  }
+  problem.AddResidualBlock(prior.cost.get(), nullptr, blocks);
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
+    if (fit->active[i] == 0) continue;
+    blocks.clear();
+    for (const int b : terms_[i].blocks) {
+      double* values = b == kOwn ? fit->own.data() + 2 * i : x + map_.block(b).offset;
+      blocks.push_back(values);
+      if (b == kOwn) {
+        problem.AddParameterBlock(values, terms_[i].own);
+        unknowns += terms_[i].own;
+      } else if (std::find(prior.blocks.begin(), prior.blocks.end(), b) == prior.blocks.end()) {
+        problem.AddParameterBlock(values, map_.block(b).size);
+        problem.SetParameterBlockConstant(values);
+      }
+    }
+    problem.AddResidualBlock(terms_[i].cost.get(), nullptr, blocks);
+  }
+  ceres::Solver::Summary summary;
+  // Ceres evaluates once before the first iteration.
+  ceres::Solve(NearbyOptions(unknowns, std::max(1, max_evaluations - 1), 1.0), &problem, &summary);
+  return static_cast<int>(summary.iterations.size());
+}
+
+// By how much twice a term's cost exceeds that of its own free fit; infinite where it has none.
+double TrackFrame::Excess(const Term& term, const TrackFit& fit) const {
+  constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
+  double residuals[kMaxResiduals], twice_cost = 0.0;
+  const double* parameters[8];
+  Parameters(term, fit.state.x.data(), fit.own.data(), parameters);
+  if (!term.cost->Evaluate(parameters, residuals, nullptr))
+    return std::numeric_limits<double>::infinity();
+  for (int k = 0; k < term.cost->num_residuals(); ++k) twice_cost += residuals[k] * residuals[k];
+  return twice_cost - term.free_twice_cost;
+}
+
+// Makes the terms inactive that contradict the others most: at a compromise of all, any may seem
+// to. True where there were any.
+bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) const {
+  std::vector<std::pair<double, std::size_t>> odd;
+  std::ptrdiff_t num_whole = 0;
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
+    if (terms_[i].parent < 0) ++num_whole;
+    if (fit->active[i] == 0) {
+      if (terms_[i].parent < 0) num_whole -= 2;  // Less than half of all may be left out.
+      continue;
+    }
+    const double beyond = Excess(terms_[i], *fit) - ChiSquareLimit(terms_[i].dof, gate_probability);
+    if (beyond > 0.0) odd.emplace_back(beyond, i);
+  }
+  std::sort(odd.begin(), odd.end(), [](const auto& a, const auto& b) {
+    return a.first != b.first ? a.first > b.first : a.second < b.second;
+  });
+  bool any = false;
+  for (const auto& [beyond, i] : odd) {
+    constexpr double kComparable = 0.5;  // Of the worst.
+    // One of two says nothing of which is wrong: the frame contradicts.
+    const bool is_whole = terms_[i].parent < 0;
+    if (beyond < kComparable * odd.front().first || (is_whole && num_whole <= 2)) break;
+    fit->active[i] = 0;
+    num_whole -= is_whole ? 2 : 0;
+    any = true;
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
+      if (terms_[k].parent == static_cast<int>(i)) fit->active[k] = 0;
+    }
+  }
+  return any;
+}
+
+// Of what is left out, the term that contradicts least; -1 where there is none.
+int TrackFrame::LeastOdd(TrackFit* fit) const {
+  int least = -1;
+  double excess = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
+    const Term& term = terms_[i];
+    const bool has_parent =
+        term.parent < 0 || fit->active[static_cast<std::size_t>(term.parent)] != 0;
+    if (fit->active[i] != 0 || !has_parent || !Place(i, fit)) continue;
+    const double its = Excess(term, *fit);
+    if (!(its < excess)) continue;
+    excess = its;
+    least = static_cast<int>(i);
+  }
+  return least;
+}
+
+bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& options,
+                            TrackFit* fit) const {
+  const double gate = options.gate_probability / static_cast<double>(terms_.size());
+  constexpr int kFew = 2;  // Evaluations that come to nothing.
+  int left = options.max_evaluations;
+  const auto solve = [&](TrackFit* at) {
+    const TrackPrior prior(map_, before, Used(*at));
+    if (!prior.ok()) return false;
+    left -= Solve(prior, left, at);
+    return at->state.x.allFinite();
+  };
+  if (!solve(fit)) return false;
+  bool has_dropped = false;
+  while (left > kFew && LeaveOutWorst(gate, fit)) {
+    has_dropped = true;
+    if (!solve(fit)) return false;
+  }
+  // What seemed to contradict may have agreed but for the worst: back, one by one, while it does.
+  while (has_dropped && left > kFew) {
+    TrackFit with = *fit;
+    const int back = LeastOdd(&with);
+    if (back < 0) break;
+    const Term& term = terms_[static_cast<std::size_t>(back)];
+    with.active[static_cast<std::size_t>(back)] = 1;
+    if (!solve(&with) || Excess(term, with) > ChiSquareLimit(term.dof, gate)) break;
+    *fit = std::move(with);
+  }
+  const TrackPrior prior(map_, before, Used(*fit));
+  return Score(prior, gate, fit) && Update(before, prior, fit);
+}
+
+// What is left out costs what clutter would: as much as what just agrees.
+bool TrackFrame::Score(const TrackPrior& prior, double gate_probability, TrackFit* fit) const {
+  double left_out = 0.0, free = 0.0;
+  fit->dof = 0;
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
+    const Term& term = terms_[i];
+    if (fit->active[i] != 0) {
+      fit->dof += term.dof;
+      free += term.free_twice_cost;
+    } else {
+      left_out += 0.5 * (term.free_twice_cost + ChiSquareLimit(term.dof, gate_probability));
+    }
+  }
+  const Eigen::VectorXd z = prior.A * (prior.Ambient(map_, fit->state.x) - prior.mean);
+  const double cost = TermsCost(*fit) + 0.5 * z.squaredNorm();
+  fit->misfit = 2.0 * cost - free;
+  fit->cost = cost + left_out;
+  return std::isfinite(fit->cost);
+}
+
+}  // namespace circline
