@@ -53,12 +53,12 @@ Matrix6d AdjustProblem::PoseCovariance(int photo, const InverseOnPattern& invers
   return slopes.leftCols(count) * tangents * slopes.leftCols(count).transpose();
 }
 
-AdjustProblem::Covariances AdjustProblem::Covariance() const {
+AdjustProblem::Covariances AdjustProblem::Covariance(int end) const {
   Weighing inliers;
   inliers.inliers_only = true;
   for (const Feature& feature : features_) feature.cost->set_weighing(inliers);
   ceres::Problem problem(NothingOwned());
-  Fill(all_free_, &problem);
+  Fill(all_free_, end, &problem);
   ceres::CRSMatrix crs;
   ceres::Problem::EvaluateOptions evaluate;
   evaluate.apply_loss_function = false;  // A prior that is mostly exact counts as its Gaussian.
@@ -98,7 +98,7 @@ AdjustProblem::Covariances AdjustProblem::Covariance() const {
     out.cameras[c] = plus * small * plus.transpose();
   }
   for (std::size_t i = 0; i < photos_.size(); ++i) {
-    if (rotations_[i] != nullptr)
+    if (rotations_[i] != nullptr && static_cast<int>(i) < end)
       out.poses[i] = PoseCovariance(static_cast<int>(i), inverse, offsets);
   }
   return out;

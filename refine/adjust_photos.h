@@ -11,6 +11,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "circline/estimators/camera.h"
@@ -75,6 +76,9 @@ struct AdjustedCamera {
   std::vector<std::string> at_prior;
   int num_photos = 0;
   double rms_px = 0.0;  // Of the inlier residuals, pixels.
+  // The standard deviation of log f (Sigma(0)) that the first photos alone would give, at the same
+  // estimate: how many, and that; 1, 2, 4, ... photos of those that take part, and all.
+  std::vector<std::pair<int, double>> sigma_by_photos;
 
   double Sigma(int shift) const;
   double SigmaFocalPx() const { return camera.fx * Sigma(0); }

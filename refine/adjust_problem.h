@@ -82,13 +82,13 @@ class AdjustProblem {
   // Of all features that take part, per degree of freedom.
   double Misfit() const;
 
-  // All else marginalised; from the inliers of the features in force.
+  // All else marginalised; from the inliers of the features in force, of photos before `end`.
   struct Covariances {
     // Of the shifts; zero rows where one is held; the prior's where the problem is singular.
     std::vector<Eigen::Matrix<double, kCameraSize, kCameraSize>> cameras;
     std::vector<Matrix6d> poses;  // Of [delta, delta_t], as PoseHypothesis has them.
   };
-  Covariances Covariance() const;
+  Covariances Covariance(int end) const;
 
   bool IsUsed(int camera) const;  // By a photo that takes part; else there is nothing to ask of it.
   Camera CameraAt(int camera) const;
@@ -137,7 +137,9 @@ class AdjustProblem {
                   std::vector<double*> blocks);
   void AddPrior(ceres::CostFunction* cost, std::vector<double*> blocks,
                 ceres::LossFunction* loss = nullptr);
-  void Fill(const std::vector<const ceres::Manifold*>& cameras, ceres::Problem* problem) const;
+  // Of photos before `end`.
+  void Fill(const std::vector<const ceres::Manifold*>& cameras, int end,
+            ceres::Problem* problem) const;
   static ceres::Problem::Options NothingOwned();
   Covariances OfPriors() const;
   Matrix6d PoseCovariance(int photo, const InverseOnPattern& inverse,

@@ -24,7 +24,7 @@ bool AdjustProblem::IsOf(const Prior& prior, const ceres::Problem& problem) {
                      [&](double* values) { return problem.HasParameterBlock(values); });
 }
 
-void AdjustProblem::Fill(const std::vector<const ceres::Manifold*>& cameras,
+void AdjustProblem::Fill(const std::vector<const ceres::Manifold*>& cameras, int end,
                          ceres::Problem* problem) const {
   const auto add = [&](const std::vector<double*>& blocks) {
     for (double* values : blocks) {
@@ -35,7 +35,7 @@ void AdjustProblem::Fill(const std::vector<const ceres::Manifold*>& cameras,
     }
   };
   for (const Feature& feature : features_) {
-    if (!feature.active) continue;
+    if (!feature.active || feature.photo >= end) continue;
     add(feature.blocks);
     problem->AddResidualBlock(feature.cost, nullptr, feature.blocks);
   }
@@ -58,7 +58,7 @@ Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
   weighing.stretch = stretch;
   for (const Feature& feature : features_) feature.cost->set_weighing(weighing);
   ceres::Problem problem(NothingOwned());
-  Fill(coarse ? coarse_free_ : all_free_, &problem);
+  Fill(coarse ? coarse_free_ : all_free_, static_cast<int>(photos_.size()), &problem);
   if (problem.NumResidualBlocks() == 0)
     return Status::Refused("no photo has evidence in its plane");
   ceres::Solver::Options options;
@@ -131,7 +131,7 @@ void AdjustProblem::Judge() {
 
 double AdjustProblem::Misfit() const {
   ceres::Problem problem(NothingOwned());
-  Fill(all_free_, &problem);
+  Fill(all_free_, static_cast<int>(photos_.size()), &problem);
   double chi2 = 0.0;
   int rows = 0, unknowns = 0;
   for (const Feature& feature : features_) {

@@ -135,10 +135,34 @@ void Adjustment::SolveWithoutGross() {
   }
 }
 
+// What the focal lengths' deviations were after 1, 2, 4, ... photos, and are after all.
+void Adjustment::ReportSigmas(double scale) {
+  std::vector<int> counts(cameras_.size(), 0);
+  int seen = 0, next = 1;
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    if (!inputs_[i].takes_part) continue;
+    ++counts[CameraOf(i)];
+    if (++seen < next) continue;
+    next *= 2;
+    const auto covariances = problem_->Covariance(static_cast<int>(i) + 1);
+    for (std::size_t c = 0; c < cameras_.size(); ++c) {
+      auto& sigmas = out_.cameras[c].sigma_by_photos;
+      if (counts[c] > 0 && (sigmas.empty() || sigmas.back().first < counts[c]))
+        sigmas.emplace_back(counts[c], std::sqrt(scale * covariances.cameras[c](0, 0)));
+    }
+  }
+  for (AdjustedCamera& made : out_.cameras) {
+    if (made.num_photos > 0 &&
+        (made.sigma_by_photos.empty() || made.sigma_by_photos.back().first < made.num_photos))
+      made.sigma_by_photos.emplace_back(made.num_photos, made.Sigma(0));
+  }
+}
+
 void Adjustment::Report() {
   JudgePhotos();
   const double scale = std::max(1.0, problem_->Misfit());
-  const AdjustProblem::Covariances covariances = problem_->Covariance();
+  const AdjustProblem::Covariances covariances =
+      problem_->Covariance(static_cast<int>(given_.size()));
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     AdjustedCamera made;
     made.camera = cameras_[c];
@@ -181,6 +205,7 @@ void Adjustment::Report() {
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (counts[c] > 0) out_.cameras[c].rms_px = std::sqrt(squares[c] / counts[c]);
   }
+  if (start_ == nullptr) ReportSigmas(scale);
   out_.circles = problem_->Circles();
   out_.metric = problem_->metric();
 }

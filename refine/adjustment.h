@@ -61,6 +61,7 @@ class Adjustment {
   bool LeaveOut();
   void SolveOnce();
   void Report();
+  void ReportSigmas(double scale);
   std::size_t CameraOf(std::size_t photo) const {
     return static_cast<std::size_t>(inputs_[photo].camera);
   }

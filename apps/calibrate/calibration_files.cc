@@ -12,9 +12,6 @@
 #include "apps/compare/export.h"
 
 namespace circline::apps {
-namespace {
-
-using Json = nlohmann::ordered_json;
 
 const char* ModelName(CameraModel model) {
   return model == CameraModel::kPinhole  ? "pinhole"
@@ -22,7 +19,6 @@ const char* ModelName(CameraModel model) {
                                          : "fisheye";
 }
 
-// OpenCV's order; the rational terms only where they are there.
 std::vector<double> Distortion(const Camera& camera) {
   if (camera.model == CameraModel::kPinhole) return std::vector<double>(4, 0.0);
   std::vector<double> d(camera.distortion.begin(), camera.distortion.end());
@@ -30,6 +26,10 @@ std::vector<double> Distortion(const Camera& camera) {
   while (d.size() > least && d.back() == 0.0) d.pop_back();
   return d;
 }
+
+namespace {
+
+using Json = nlohmann::ordered_json;
 
 std::string CalibrationYaml(const AdjustedCamera& adjusted) {
   const Camera& camera = adjusted.camera;
@@ -80,6 +80,7 @@ Json CameraJson(const AdjustedCamera& adjusted) {
           {"sigma", sigma},
           {"at_prior", adjusted.at_prior},
           {"correlation", correlation},
+          {"sigma_by_photos", adjusted.sigma_by_photos},
           {"num_images", adjusted.num_photos},
           {"rms_px", adjusted.rms_px}};
 }
@@ -106,7 +107,9 @@ Json PhotoJson(const AdjustedPhoto& photo, const std::string& name) {
 }  // namespace
 
 Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observations>& photos,
-                        const std::vector<std::string>& names, const std::string& folder) {
+                        const std::vector<std::string>& names,
+                        const std::vector<std::vector<std::uint8_t>>& pictures,
+                        const std::string& folder) {
   Json json = {{"rigid", adjusted.rigid}, {"metric", adjusted.metric}, {"cameras", Json::array()}};
   Status status;
   for (std::size_t c = 0; c < adjusted.cameras.size() && status.ok(); ++c) {
@@ -129,7 +132,8 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
     status = WriteFile(folder + "/calibration.json",
                        json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   if (status.ok()) status = colmap->Finish();
-  if (status.ok()) status = WriteFile(folder + "/report.html", CalibrationReport(adjusted, names));
+  if (status.ok())
+    status = WriteFile(folder + "/report.html", CalibrationReport(adjusted, names, pictures));
   return status;
 }
 

@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_CALIBRATE_CALIBRATION_FILES_H_
 #define CIRCLINE_APPS_CALIBRATE_CALIBRATION_FILES_H_
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -11,10 +12,18 @@
 
 namespace circline::apps {
 
+// As in scene files.
+const char* ModelName(CameraModel model);
+// In OpenCV's order; the rational terms only where they are there.
+std::vector<double> Distortion(const Camera& camera);
+
 // calibration.yml (one more for each further camera, after its id), calibration.json, cameras.txt
-// and images.txt in `folder`. `names`: of the photos.
+// and images.txt, report.html in `folder`. `names`: of the photos; `pictures`: of them, JPEG, may
+// be empty.
 Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observations>& photos,
-                        const std::vector<std::string>& names, const std::string& folder);
+                        const std::vector<std::string>& names,
+                        const std::vector<std::vector<std::uint8_t>>& pictures,
+                        const std::string& folder);
 
 // The same for the eye.
 std::string CalibrationTable(const AdjustedPhotos& adjusted, const std::vector<std::string>& names);

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <sstream>
 
+#include "apps/common/svg_plot.h"
 #include "apps/common/text.h"
+#include "apps/compare/report_image.h"
 #include "apps/compare/report_style.h"
 
 namespace circline::apps {
@@ -120,6 +122,43 @@ std::string ParameterTable(const AdjustedCamera& made) {
   return html.str();
 }
 
+// How the focal length's deviation falls as photos are added.
+std::string SigmaPlot(const AdjustedCamera& made) {
+  Plot plot;
+  plot.title = "Focal length";
+  plot.x_label = "photos, in their order";
+  plot.y_label = "standard deviation, %";
+  plot.log_x = plot.log_y = true;
+  plot.height = 260;
+  PlotSeries series{"", SeriesColor(0), false, true, {}};
+  constexpr double kPercent = 100.0;
+  for (const auto& [count, sigma] : made.sigma_by_photos) {
+    if (sigma > 0.0) series.points.emplace_back(count, kPercent * sigma);
+  }
+  if (series.points.size() < 2) return "";
+  plot.x_min = series.points.front().first;
+  plot.x_max = series.points.back().first;
+  plot.y_min = 0.7 * series.points.back().second;
+  plot.y_max = 1.4 * series.points.front().second;
+  plot.series.push_back(std::move(series));
+  return "<h3>What each photo has added</h3><div>" + RenderSvg(plot) + "</div>";
+}
+
+std::string Pictures(const AdjustedPhotos& adjusted, const std::vector<std::string>& names,
+                     const std::vector<std::vector<std::uint8_t>>& pictures) {
+  std::string html;
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    if (pictures[i].empty()) continue;
+    const std::string name = EscapeHtml(names[i]);
+    html += "<section class=\"image\"><h3>" + name +
+            (adjusted.photos[i].status.ok() ? "" : "<small>left out</small>") +
+            "</h3><figure><img alt=\"" + name +
+            ", with what was found in it\" src=\"data:image/jpeg;base64," +
+            EncodeBase64(pictures[i]) + "\"></figure></section>";
+  }
+  return html.empty() ? "" : html + OverlayLegend();
+}
+
 std::string PhotoTable(const AdjustedPhotos& adjusted, const std::vector<std::string>& names) {
   std::ostringstream html;
   html << "<div class=\"scroll\"><table class=\"named sortable\"><thead><tr><th class=\"l\">photo"
@@ -185,8 +224,8 @@ std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera) {
   return advice;
 }
 
-std::string CalibrationReport(const AdjustedPhotos& adjusted,
-                              const std::vector<std::string>& names) {
+std::string CalibrationReport(const AdjustedPhotos& adjusted, const std::vector<std::string>& names,
+                              const std::vector<std::vector<std::uint8_t>>& pictures) {
   std::ostringstream html;
   html << "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
           "content=\"width=device-width\"><title>circline: calibration</title><style>"
@@ -207,13 +246,14 @@ std::string CalibrationReport(const AdjustedPhotos& adjusted,
          << "<p class=\"lead\">Mean residuals over the photo, 200 times as long; grey: fewer than "
             "ten points seen"
             "</p></div></div><h3>Correlations</h3>"
-         << CorrelationTable(made);
+         << CorrelationTable(made) << SigmaPlot(made);
     const std::vector<std::string> advice = Advice(adjusted, static_cast<int>(c));
     if (!advice.empty()) html << "<h3>What would help most</h3><ul>";
     for (const std::string& sentence : advice) html << "<li>" << EscapeHtml(sentence) << "</li>";
     if (!advice.empty()) html << "</ul>";
   }
-  html << "<h2>Photos</h2>" << PhotoTable(adjusted, names) << "<script>" << kReportScript
+  html << "<h2>Photos</h2>" << PhotoTable(adjusted, names) << Pictures(adjusted, names, pictures)
+       << "<div id='zoom'><img alt=''><p></p></div><script>" << kReportScript
        << "</script></body></html>\n";
   return html.str();
 }

@@ -10,7 +10,9 @@
 #include <optional>
 #include <set>
 
+#include "apps/calibrate/calibrated_scene.h"
 #include "apps/calibrate/calibration_files.h"
+#include "apps/calibrate/calibration_pictures.h"
 #include "apps/common/flags_util.h"
 #include "apps/common/output_file.h"
 #include "apps/common/progress.h"
@@ -21,6 +23,7 @@
 
 DECLARE_string(images);
 DECLARE_string(camera);
+DECLARE_string(scene);
 DECLARE_double(focal_px);
 DECLARE_double(fov_deg);
 
@@ -46,7 +49,8 @@ constexpr char kUsage[] =
     "\n"
     "Writes calibration.yml (for OpenCV and --camera), calibration.json, cameras.txt and "
     "images.txt\n"
-    "(COLMAP) and report.html. Flags for inputs, detection and losses are those of "
+    "(COLMAP), scene.yaml (the scene with the estimated cameras) and report.html. Flags for "
+    "inputs, detection and losses are those of "
     "circline_compare.\n"
     "Exit code 0: done; 1: some photo could not be read, or no camera came out; 2: unusable flags "
     "or scene file.";
@@ -163,6 +167,7 @@ std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<Scen
 struct Calibration {
   std::vector<Observations> photos;
   std::vector<std::string> names;   // Of the photos.
+  std::vector<SceneImage> images;   // Of the photos.
   std::vector<std::string> errors;  // Photos that could not be read.
   AdjustedPhotos adjusted;
 };
@@ -206,6 +211,7 @@ Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
     photo.camera = given->insert({photo.camera.id, photo.camera}).first->second;
     options->adjust.camera_sigma[photo.camera.id] = PriorOf(*options, (*images)[i], photo.camera);
     calibration->names.push_back((*images)[i].name);
+    calibration->images.push_back((*images)[i]);
   }
   if (calibration->photos.empty()) return Status::Failed("no photo could be read");
   std::optional<Progress> progress;
@@ -254,6 +260,7 @@ int Calibrate() {
   Status status = FromFlags(&options);
   if (status.ok()) status = ImagesFromFlags(options.compare.inputs, &set);
   if (!status.ok()) return Refuse(status);
+  if (!set.rigid().empty()) RigidWorldFromName(set.rigid(), &options.adjust.rigid);
   options.compare.overlays = false;  // Photos are read for detection only.
   std::vector<SceneImage> images;
   for (std::size_t i = 0; i < set.size(); ++i) {
@@ -266,8 +273,14 @@ int Calibrate() {
   if (!status.ok()) return Refuse(status);
   status = CreateFolder(options.compare.output);
   if (status.ok()) {
-    status = WriteCalibration(calibration.adjusted, calibration.photos, calibration.names,
+    const auto pictures =
+        CalibrationPictures(options.compare, calibration.adjusted, calibration.images);
+    status = WriteCalibration(calibration.adjusted, calibration.photos, calibration.names, pictures,
                               options.compare.output);
+  }
+  if (status.ok()) {
+    status = WriteCalibratedScene(FLAGS_scene, calibration.adjusted, images,
+                                  options.compare.output + "/scene.yaml");
   }
   if (!status.ok()) return Refuse(status);
   std::cout << CalibrationTable(calibration.adjusted, calibration.names);

@@ -366,13 +366,18 @@ Status ExpandPattern(const std::string& pattern, std::vector<std::string>* paths
 }  // namespace
 
 Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
-                 std::vector<SceneImage>* images) {
+                 std::vector<SceneImage>* images, std::string* rigid) {
   images->clear();
   StorageDocument document;
   Status status = document.Open(path);
   if (!status.ok()) return status;
   const StorageNode root(document.root(), "", &status);
-  root.AllowKeys({"cameras", "images"});
+  root.AllowKeys({"cameras", "images", "rigid"});
+  const StorageNode stated = root.Get("rigid");
+  const std::string text = stated.Exists() ? stated.Text() : "";
+  if (stated.Exists() && text != "auto" && text != "yes" && text != "no")
+    stated.Fail("must be auto, yes or no");
+  if (rigid != nullptr) *rigid = text;
   std::vector<SceneCamera> all;
   for (const Camera& camera : cameras) all.push_back({camera, {}});
   for (const StorageNode& item : root.Get("cameras").Items()) {

@@ -67,8 +67,9 @@ struct SceneImage {
 // Reads and checks a scene file. Cameras of the file come beside `cameras` (from a camera file; may
 // be empty); an image that names no camera takes the only one there is. Not ok: one line that names
 // the file, the place in it (images[3] ("a.jpg").circles[0].contour) and what is wrong there.
+// `rigid`, which may be null: auto, yes or no, as the file says it; empty where it does not.
 Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
-                 std::vector<SceneImage>* images);
+                 std::vector<SceneImage>* images, std::string* rigid = nullptr);
 
 // The photos that a comma-separated list of files, folders and wildcards names, sorted within each;
 // to be detected. A plain file name need not exist (reading it will tell); a wildcard that matches

@@ -43,9 +43,9 @@ ImageSet::ImageSet(std::vector<SceneImage> images, int shard_index, int num_shar
     if (IsPlain(image)) {
       const Camera& camera = image.observations.camera;
       const auto known = std::find_if(cameras_.begin(), cameras_.end(),
-                                      [&](const Camera& c) { return SameCamera(c, camera); });
+                                      [&](const auto& c) { return SameCamera(c.first, camera); });
       entry.camera = static_cast<std::size_t>(known - cameras_.begin());
-      if (known == cameras_.end()) cameras_.push_back(camera);
+      if (known == cameras_.end()) cameras_.emplace_back(camera, image.camera_sigma);
       if (image.truth) entry.truth = std::make_unique<Truth>(std::move(*image.truth));
     } else {
       entry.annotated = std::make_unique<SceneImage>(std::move(image));
@@ -62,7 +62,8 @@ SceneImage ImageSet::At(std::size_t i) const {
   } else {
     image.name = entry.name;
     image.path = path(i);
-    image.observations.camera = cameras_[entry.camera];
+    image.observations.camera = cameras_[entry.camera].first;
+    image.camera_sigma = cameras_[entry.camera].second;
     image.detect_everything = true;
     if (entry.truth != nullptr) image.truth = *entry.truth;
   }

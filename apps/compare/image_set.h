@@ -25,6 +25,9 @@ class ImageSet {
   const std::string& path(std::size_t i) const {
     return entries_[i].path.empty() ? entries_[i].name : entries_[i].path;
   }
+  // Of the scene file: auto, yes or no; empty where nothing says it.
+  const std::string& rigid() const { return rigid_; }
+  void set_rigid(const std::string& rigid) { rigid_ = rigid; }
   std::size_t index(std::size_t i) const { return entries_[i].index; }
 
  private:
@@ -36,7 +39,8 @@ class ImageSet {
   };
 
   std::vector<Entry> entries_;
-  std::vector<Camera> cameras_;
+  std::vector<std::pair<Camera, StatedCameraSigma>> cameras_;
+  std::string rigid_;
   std::size_t set_size_ = 0;
 };
 

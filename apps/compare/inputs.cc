@@ -121,12 +121,13 @@ void SetRoi(const std::array<int, 4>& roi, double radius, std::vector<SceneImage
   }
 }
 
-Status ReadImages(const InputOptions& options, std::vector<SceneImage>* images) {
+Status ReadImages(const InputOptions& options, std::vector<SceneImage>* images,
+                  std::string* rigid) {
   std::vector<Camera> cameras;
   Status status;
   if (!FLAGS_camera.empty()) status = ReadCameraFile(FLAGS_camera, &cameras);
   if (!status.ok()) return status;
-  if (!FLAGS_scene.empty()) return ReadScene(FLAGS_scene, cameras, images);
+  if (!FLAGS_scene.empty()) return ReadScene(FLAGS_scene, cameras, images, rigid);
   Camera camera;
   if (!options.guess.given()) status = OneCamera(cameras, &camera);
   if (status.ok()) status = ListPhotos(FLAGS_images, camera, images);
@@ -164,8 +165,10 @@ Status InputsFromFlags(InputOptions* options) {
 
 Status ImagesFromFlags(const InputOptions& options, ImageSet* images) {
   std::vector<SceneImage> all;
-  const Status status = ReadImages(options, &all);
+  std::string rigid;
+  const Status status = ReadImages(options, &all, &rigid);
   if (status.ok()) *images = ImageSet(std::move(all), options.shard_index, options.num_shards);
+  images->set_rigid(rigid);
   return status;
 }
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/common/scene.h"
 #include "tests/apps/board_set.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
@@ -95,6 +96,68 @@ std::string SheetScene(const TestFolder& folder, int count, int gross) {
     scene += SheetPhoto(board, folder.Write(name, ""), i == gross ? 0.8 : 1.0);
   }
   return folder.Write("scene.yaml", scene);
+}
+
+// The scene with the estimated camera is one for the other programs.
+TEST_F(CalibrateTest, WritesASceneOfTheEstimatedCamera) {
+  constexpr std::size_t kCircles[] = {0, 9, 1};
+  for (int k = 0; k < 3; ++k) {
+    const std::string input = k == 0   ? Photos()
+                              : k == 1 ? "--scene=" + SheetScene(folder_, 5, -1)
+                                       : "--scene=" + MakeSet(folder_);
+    const Outcome run = Calibrate(input + " --output=" + Output());
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    const nlohmann::json made = ReadJson(Output() + "/calibration.json");
+    std::vector<SceneImage> images;
+    const Status status = ReadScene(Output() + "/scene.yaml", {}, &images);
+    ASSERT_TRUE(status.ok()) << status.message;
+    ASSERT_EQ(images.size(), made["images"].size());
+    const Camera& camera = images.front().observations.camera;
+    EXPECT_NEAR(camera.fx, made["cameras"][0]["fx"].get<double>(), 1e-6);
+    EXPECT_EQ(camera.id, made["cameras"][0]["id"]);
+    EXPECT_NEAR(*images.front().camera_sigma.log_focal * camera.fx,
+                made["cameras"][0]["sigma"]["fx"].get<double>(), 1e-6);
+    EXPECT_TRUE(std::filesystem::exists(images.front().path)) << images.front().path;
+    EXPECT_EQ(images[0].observations.circles.size(), kCircles[k]);
+  }
+  const Outcome compared = RunCompare("--scene=" + Output() +
+                                      "/scene.yaml --solvers=joint --output=" + folder_ / "again");
+  EXPECT_EQ(compared.exit_code, 0) << compared.err;
+}
+
+// What the scene file says of the world counts, whatever the flag.
+TEST_F(CalibrateTest, TheSceneSaysWhetherTheWorldIsRigid) {
+  const std::string scene = SheetScene(folder_, 5, -1);
+  for (const std::string rigid : {"no", "auto"}) {
+    const std::string stated =
+        folder_.Write("stated.yaml", ReadAll(scene) + "rigid: " + rigid + "\n");
+    const Outcome run = Calibrate("--scene=" + stated + " --rigid=yes --output=" + Output());
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(ReadJson(Output() + "/calibration.json")["rigid"], rigid == "auto");
+    EXPECT_CONTAINS(ReadAll(Output() + "/scene.yaml"), "rigid: ");
+  }
+  const Outcome run =
+      Calibrate("--scene=" + folder_.Write("bad.yaml", ReadAll(scene) + "rigid: 3\n") +
+                " --output=" + folder_ / "none");
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_CONTAINS(run.err, "rigid: must be auto, yes or no");
+}
+
+TEST_F(CalibrateTest, ItsReportShowsThePhotosAndWhatEachHasAdded) {
+  ASSERT_EQ(Calibrate(Photos() + " --output=" + Output()).exit_code, 0);
+  const std::string report = ReadAll(Output() + "/report.html");
+  std::size_t pictures = 0;
+  for (std::size_t at = report.find("data:image/jpeg"); at != std::string::npos;
+       at = report.find("data:image/jpeg", at + 1))
+    ++pictures;
+  EXPECT_EQ(pictures, 5U);
+  EXPECT_CONTAINS(report, "What each photo has added");
+  const nlohmann::json sigmas =
+      ReadJson(Output() + "/calibration.json")["cameras"][0]["sigma_by_photos"];
+  ASSERT_EQ(sigmas.size(), 4U);  // 1, 2, 4, 5 photos.
+  for (std::size_t k = 1; k < sigmas.size(); ++k)
+    EXPECT_LE(sigmas[k][1].get<double>(), 1.001 * sigmas[k - 1][1].get<double>());
+  EXPECT_EQ(sigmas.back()[0], 5);
 }
 
 TEST_F(CalibrateTest, NamesAGrossPhotoOfTen) {

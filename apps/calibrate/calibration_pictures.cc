@@ -1,0 +1,53 @@
+#include "apps/calibrate/calibration_pictures.h"
+
+#include <algorithm>
+#include <opencv2/core/utility.hpp>
+
+#include "apps/compare/encode.h"
+#include "apps/compare/image_run.h"
+#include "apps/compare/overlay.h"
+
+namespace circline::apps {
+namespace {
+
+// Photos to show, left-out ones first, the others evenly spread.
+std::vector<std::size_t> ChoosePhotos(const AdjustedPhotos& adjusted) {
+  constexpr std::size_t kMost = 24;
+  std::vector<std::size_t> chosen, others;
+  for (std::size_t i = 0; i < adjusted.photos.size(); ++i)
+    (adjusted.photos[i].status.ok() ? others : chosen).push_back(i);
+  chosen.resize(std::min(chosen.size(), kMost / 2));
+  const std::size_t step = 1 + others.size() / (kMost - chosen.size() + 1);
+  for (std::size_t k = 0; k < others.size(); k += step) chosen.push_back(others[k]);
+  return chosen;
+}
+
+}  // namespace
+
+std::vector<std::vector<std::uint8_t>> CalibrationPictures(const CompareOptions& options,
+                                                           const AdjustedPhotos& adjusted,
+                                                           const std::vector<SceneImage>& images) {
+  constexpr int kWidth = 720;  // Pixels.
+  CompareOptions joint = options;
+  joint.solvers = {"joint"};
+  joint.overlays = true;
+  joint.inputs.guess = CameraGuess();
+  const SolverSet solvers(joint);
+  const std::vector<std::size_t> chosen = ChoosePhotos(adjusted);
+  std::vector<std::vector<std::uint8_t>> pictures(images.size());
+  cv::parallel_for_(cv::Range(0, static_cast<int>(chosen.size())), [&](const cv::Range& range) {
+    for (int k = range.start; k < range.end; ++k) {
+      const std::size_t i = chosen[static_cast<std::size_t>(k)];
+      SceneImage image = images[i];
+      const AdjustedCamera& made =
+          adjusted.cameras[static_cast<std::size_t>(adjusted.photos[i].camera)];
+      image.observations.camera = made.camera;
+      image.camera_sigma = StatedCameraSigma();
+      const ImageRun run = RunImage(joint, solvers, &image);
+      if (!run.photo.empty()) pictures[i] = EncodeJpeg(DrawOverlay(run), kWidth);
+    }
+  });
+  return pictures;
+}
+
+}  // namespace circline::apps
