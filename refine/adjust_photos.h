@@ -77,7 +77,7 @@ struct AdjustedCamera {
   int num_photos = 0;
   double rms_px = 0.0;  // Of the inlier residuals, pixels.
   // The standard deviation of log f (Sigma(0)) that the first photos alone would give, at the same
-  // estimate: how many, and that; 1, 2, 4, ... photos of those that take part, and all.
+  // estimate: how many, and that; 1, 2, 4, ... 64 of those that take part, and all.
   std::vector<std::pair<int, double>> sigma_by_photos;
 
   double Sigma(int shift) const;

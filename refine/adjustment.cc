@@ -135,14 +135,16 @@ void Adjustment::SolveWithoutGross() {
   }
 }
 
-// What the focal lengths' deviations were after 1, 2, 4, ... photos, and are after all.
+// What the focal lengths' deviations were after 1, 2, 4, ... photos, and are after all. From some
+// dozens on they fall as one over the root of their number.
 void Adjustment::ReportSigmas(double scale) {
   std::vector<int> counts(cameras_.size(), 0);
+  constexpr int kMost = 64;
   int seen = 0, next = 1;
   for (std::size_t i = 0; i < given_.size(); ++i) {
     if (!inputs_[i].takes_part) continue;
     ++counts[CameraOf(i)];
-    if (++seen < next) continue;
+    if (++seen < next || seen > kMost) continue;
     next *= 2;
     const auto covariances = problem_->Covariance(static_cast<int>(i) + 1);
     for (std::size_t c = 0; c < cameras_.size(); ++c) {

@@ -36,7 +36,7 @@ void WriteCamera(const AdjustedCamera& made, cv::FileStorage* out) {
 
 void Copy(const cv::FileNode& node, const std::string& key, cv::FileStorage* out) {
   if (node.isMap() || node.isSeq()) {
-    const bool is_flat = node.isSeq() && node.size() > 0 && !(*node.begin()).isMap();
+    const bool is_flat = node.isSeq() && node.begin() != node.end() && !(*node.begin()).isMap();
     out->startWriteStruct(key, (node.isMap() ? cv::FileNode::MAP : cv::FileNode::SEQ) |
                                    (is_flat ? cv::FileNode::FLOW : 0));
     for (const cv::FileNode& child : node) Copy(child, node.isMap() ? child.name() : "", out);

@@ -130,7 +130,7 @@ std::string SigmaPlot(const AdjustedCamera& made) {
   plot.y_label = "standard deviation, %";
   plot.log_x = plot.log_y = true;
   plot.height = 260;
-  PlotSeries series{"", SeriesColor(0), false, true, {}};
+  PlotSeries series{"from the first photos alone", SeriesColor(0), false, true, {}};
   constexpr double kPercent = 100.0;
   for (const auto& [count, sigma] : made.sigma_by_photos) {
     if (sigma > 0.0) series.points.emplace_back(count, kPercent * sigma);
@@ -141,7 +141,8 @@ std::string SigmaPlot(const AdjustedCamera& made) {
   plot.y_min = 0.7 * series.points.back().second;
   plot.y_max = 1.4 * series.points.front().second;
   plot.series.push_back(std::move(series));
-  return "<h3>What each photo has added</h3><div>" + RenderSvg(plot) + "</div>";
+  return "<h3>What each photo has added</h3><div style=\"max-width:640px\">" + RenderSvg(plot) +
+         "</div>";
 }
 
 std::string Pictures(const AdjustedPhotos& adjusted, const std::vector<std::string>& names,
@@ -150,13 +151,16 @@ std::string Pictures(const AdjustedPhotos& adjusted, const std::vector<std::stri
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     if (pictures[i].empty()) continue;
     const std::string name = EscapeHtml(names[i]);
-    html += "<section class=\"image\"><h3>" + name +
+    html += "<div><section class=\"image\"><h3>" + name +
             (adjusted.photos[i].status.ok() ? "" : "<small>left out</small>") +
             "</h3><figure><img alt=\"" + name +
             ", with what was found in it\" src=\"data:image/jpeg;base64," +
-            EncodeBase64(pictures[i]) + "\"></figure></section>";
+            EncodeBase64(pictures[i]) + "\"></figure></section></div>";
   }
-  return html.empty() ? "" : html + OverlayLegend();
+  if (html.empty()) return "";
+  return "<h2>What was found in them</h2><p class=\"lead\">Seen through the estimated camera, each "
+         "photo on its own.</p>" +
+         OverlayLegend() + "<div class=\"two\">" + html + "</div>";
 }
 
 std::string PhotoTable(const AdjustedPhotos& adjusted, const std::vector<std::string>& names) {

@@ -143,6 +143,21 @@ TEST_F(CalibrateTest, TheSceneSaysWhetherTheWorldIsRigid) {
   EXPECT_CONTAINS(run.err, "rigid: must be auto, yes or no");
 }
 
+// Of photos in which everything is detected, too.
+TEST_F(CalibrateTest, TheSceneSaysHowWellItsCameraIsKnown) {
+  std::string camera = BoardCamera();
+  camera.insert(camera.rfind(" }"), ", focal_sigma: 0");
+  std::string scene = "%YAML:1.0\n---\n" + camera + "images:\n";
+  for (int i = 0; i < 3; ++i)
+    scene += "  - { file: \"board" + std::to_string(i) + ".png\", camera: \"k\" }\n";
+  const Outcome run =
+      Calibrate("--scene=" + folder_.Write("known.yaml", scene) + " --output=" + Output());
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json made = ReadJson(Output() + "/calibration.json")["cameras"][0];
+  EXPECT_EQ(made["fx"], kFocal);
+  EXPECT_EQ(made["sigma"]["fx"], 0.0);
+}
+
 TEST_F(CalibrateTest, ItsReportShowsThePhotosAndWhatEachHasAdded) {
   ASSERT_EQ(Calibrate(Photos() + " --output=" + Output()).exit_code, 0);
   const std::string report = ReadAll(Output() + "/report.html");
