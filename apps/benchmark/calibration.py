@@ -64,7 +64,7 @@ def calibrate(args, scene, flags, scratch):
     path, out = os.path.join(scratch, 'scene.yaml'), os.path.join(scratch, 'out')
     with open(path, 'w') as file:
         file.write(scene)
-    run = subprocess.run([args.calibrate, f'--scene={path}', f'--output={out}', *flags], capture_output=True, text=True)
+    run = subprocess.run([args.calibrate, f'--scene={path}', f'--output={out}', '--overlays=false', *flags], capture_output=True, text=True)
     if run.returncode != 0:
         return None
     with open(os.path.join(out, 'calibration.json')) as file:

@@ -61,7 +61,7 @@ def main():
                        f'[{GUESS}, 0., {(WIDTH - 1) / 2}, 0., {GUESS}, {(HEIGHT - 1) / 2}, 0., 0., 1.], distortion: [0., 0., 0., 0., 0.] }}\nimages:\n')
             file.writelines(photo(rng, i, args.circles, args.anonymous) + '\n' for i in range(args.photos))
         start = time.monotonic()
-        run = subprocess.run([args.calibrate, f'--scene={scene}', f'--output={folder}/out'], capture_output=True, text=True, check=False)
+        run = subprocess.run([args.calibrate, f'--scene={scene}', f'--output={folder}/out', '--overlays=false'], capture_output=True, text=True, check=False)
         seconds = time.monotonic() - start
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     print(run.stdout if run.returncode == 0 else run.stderr)

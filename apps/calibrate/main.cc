@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <iostream>
 #include <map>
 #include <mutex>
@@ -261,6 +262,7 @@ int Calibrate() {
   if (status.ok()) status = ImagesFromFlags(options.compare.inputs, &set);
   if (!status.ok()) return Refuse(status);
   if (!set.rigid().empty()) RigidWorldFromName(set.rigid(), &options.adjust.rigid);
+  const bool with_pictures = options.compare.overlays;
   options.compare.overlays = false;  // Photos are read for detection only.
   std::vector<SceneImage> images;
   for (std::size_t i = 0; i < set.size(); ++i) {
@@ -273,8 +275,9 @@ int Calibrate() {
   if (!status.ok()) return Refuse(status);
   status = CreateFolder(options.compare.output);
   if (status.ok()) {
-    const auto pictures =
-        CalibrationPictures(options.compare, calibration.adjusted, calibration.images);
+    std::vector<std::vector<std::uint8_t>> pictures;
+    if (with_pictures)
+      pictures = CalibrationPictures(options.compare, calibration.adjusted, calibration.images);
     status = WriteCalibration(calibration.adjusted, calibration.photos, calibration.names, pictures,
                               options.compare.output);
   }
