@@ -52,6 +52,10 @@ TrackerOptions OptionsFor(const Setting& setting, LossType loss) {
   options.estimation.conic_loss.type = options.estimation.line_loss.type = loss;
   options.turn_rate_sigma = setting.trajectory.turn_rate_sigma;
   options.velocity_sigma = setting.trajectory.velocity_sigma;
+  options.initial_turn_rate_sigma =
+      std::max(setting.trajectory.initial_turn_rate_sigma, setting.trajectory.speed);
+  options.initial_velocity_sigma =
+      std::max(setting.trajectory.initial_velocity_sigma, setting.trajectory.speed);
   return options;
 }
 
@@ -84,7 +88,7 @@ bool IsRight(const CameraPose& truth, const PoseHypothesis& h, double sigma) {
 
 struct Score {
   int frames = 0, right = 0, told = 0, told_right = 0, sure_wrong = 0, predicted = 0, restarts = 0,
-      began_wrong = 0, began_wrong_and_told = 0, ended_right = 0, flips = 0;
+      began_wrong_and_told = 0, ended_right = 0;
   // Of the first hypothesis where it is right and in the map of the first frame.
   double squared = 0.0, bound = 0.0, nees = 0.0;
   int measured = 0;
@@ -102,7 +106,7 @@ void RunSequence(const Setting& setting, LossType loss, std::uint64_t seed, Scor
   Random noise(seed + 1000003), motion_noise(seed + 2000003);
   PoseTracker tracker(options), ideal(options);
   TrackingBound bound(sequence, options);
-  bool began_wrong = false, was_right = false, world_is_first = true;
+  bool began_wrong = false, world_is_first = true;
   for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
     const Trajectory::Frame& frame = sequence.frames[k];
     const double time = static_cast<double>(k) / setting.trajectory.fps;
@@ -111,14 +115,11 @@ void RunSequence(const Setting& setting, LossType loss, std::uint64_t seed, Scor
       motion = Odometry(sequence.frames[k - 1].pose, frame.pose, &motion_noise);
     const TrackedPose tracked = tracker.Update(sequence.Observe(frame, &noise), time, motion);
     const TrackedPose without_noise = ideal.Update(sequence.Observe(frame, nullptr), time, motion);
-    const bool bounded = !setting.odometry;
     const double sigma = bound.Advance(k);
     if (!tracked.estimate.status.ok() || tracked.estimate.hypotheses.empty()) continue;
     const PoseHypothesis& first = tracked.estimate.hypotheses.front();
     const bool right = IsRight(frame.pose, first, sigma);
     if (k == 0) began_wrong = !right;
-    score->flips += k > 0 && right != was_right ? 1 : 0;
-    was_right = right;
     world_is_first = world_is_first && (k == 0 || !tracked.reinitialized);
     score->restarts += k > 0 && tracked.reinitialized ? 1 : 0;
     score->predicted += tracked.predicted_only && !frame.is_occluded ? 1 : 0;
@@ -134,7 +135,7 @@ void RunSequence(const Setting& setting, LossType loss, std::uint64_t seed, Scor
       ++score->told;
       score->told_right += right ? 1 : 0;
     }
-    if (right && bounded && world_is_first && k >= kFramesOfMotion) {
+    if (right && !setting.odometry && world_is_first && k >= kFramesOfMotion) {
       const Eigen::Matrix3d R = frame.pose.rotation;
       const Eigen::Vector3d tilt = R.transpose() * first.cam_from_world.rotation.col(2);
       const Eigen::Matrix<double, 2, 3> across = R.leftCols<2>().transpose();
@@ -149,7 +150,6 @@ void RunSequence(const Setting& setting, LossType loss, std::uint64_t seed, Scor
       ++score->measured;
     }
     if (k + 1 < sequence.frames.size() || !began_wrong) continue;
-    ++score->began_wrong;
     score->began_wrong_and_told += can_tell ? 1 : 0;
     score->ended_right += can_tell && right ? 1 : 0;
   }
@@ -179,7 +179,6 @@ void RunTracking(const ExperimentOptions& options) {
       std::printf("  %-24s %7s %7s %8s %8s %9s %9s %8s %13s %9s %6s\n", "scene", "frames", "right%",
                   "can tell", "right%", "sure+wr.%", "contrad.", "restarts", "began wrong",
                   "rms/bound", "NEES 2");
-      Calibration all;
       for (const Setting& given : Settings()) {
         Setting setting = given;
         setting.trajectory.noise_px = noise;

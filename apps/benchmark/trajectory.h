@@ -23,7 +23,9 @@ struct TrajectoryOptions {
   // Random walks of the velocities, as TrackerOptions has them: within a second, radians and
   // distances of the origin a second.
   double turn_rate_sigma = 0.2, velocity_sigma = 0.1;
-  double speed = 0.2;   // About the plane's origin at first, radians a second.
+  // Of the first velocities, as TrackerOptions has them.
+  double initial_turn_rate_sigma = 0.2, initial_velocity_sigma = 0.15;
+  double speed = 0.0;   // And a turn about the plane's origin at first, radians a second.
   double tilt = 0.6;    // Of the plane at first, radians.
   double depth = 10.0;  // Of the plane's origin at first; the radius of the first circle is 1.
   bool second_circle = false, pencil = false;
@@ -123,8 +125,11 @@ class Trajectory {
         ExpRotation(options_.tilt * Eigen::Vector3d(std::cos(about), std::sin(about), 0.0)) *
         Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
     first.pose.translation = options_.depth * Eigen::Vector3d(0.05, -0.05, 1.0);
-    first.turn_rate = options_.speed * Eigen::Vector3d(std::cos(to), std::sin(to), 0.0);
-    first.velocity = -first.turn_rate.cross(first.pose.translation);
+    const Eigen::Vector3d about_origin =
+        options_.speed * Eigen::Vector3d(std::cos(to), std::sin(to), 0.0);
+    first.turn_rate = about_origin + options_.initial_turn_rate_sigma * Normal();
+    first.velocity = options_.initial_velocity_sigma * options_.depth * Normal() -
+                     about_origin.cross(first.pose.translation);
     return first;
   }
 

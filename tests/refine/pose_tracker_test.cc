@@ -22,6 +22,8 @@ TrackerOptions ExactOptions(const TrajectoryOptions& trajectory) {
   options.estimation.conic_loss.type = options.estimation.line_loss.type = LossType::kTrivial;
   options.turn_rate_sigma = trajectory.turn_rate_sigma;
   options.velocity_sigma = trajectory.velocity_sigma;
+  options.initial_turn_rate_sigma = trajectory.initial_turn_rate_sigma;
+  options.initial_velocity_sigma = trajectory.initial_velocity_sigma;
   return options;
 }
 
