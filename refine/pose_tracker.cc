@@ -44,6 +44,7 @@ bool IsSame(const TrackMap& map, const TrackFit& a, const TrackFit& b) {
 }
 
 double LogAdd(double a, double b) {
+  if (std::isinf(a)) return b;
   return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
 }
 
@@ -70,9 +71,7 @@ void Merge(const TrackMap& map, std::vector<TrackFit>* fits) {
 void Rank(const TrackerOptions& options, std::vector<TrackFit>* fits) {
   const auto weight = [](const TrackFit& fit) { return fit.state.log_weight; };
   double sum = -std::numeric_limits<double>::infinity();
-  for (const TrackFit& fit : *fits) {
-    sum = std::isfinite(sum) ? LogAdd(sum, weight(fit)) : weight(fit);
-  }
+  for (const TrackFit& fit : *fits) sum = LogAdd(sum, weight(fit));
   for (TrackFit& fit : *fits) fit.state.log_weight -= sum;
   const auto is_more = [&](const TrackFit& a, const TrackFit& b) { return weight(a) > weight(b); };
   const auto best = std::min_element(fits->begin(), fits->end(), is_more);
@@ -252,6 +251,10 @@ class PoseTracker::Implementation {
       if (motion.absolute) Condition(map_, *motion.absolute, &state);
       if (motion.gravity) Condition(map_, *motion.gravity, &state);
     }
+    // Log probabilities again, for a frame that says nothing more.
+    double sum = -std::numeric_limits<double>::infinity();
+    for (const TrackState& state : states_) sum = LogAdd(sum, state.log_weight);
+    for (TrackState& state : states_) state.log_weight -= sum;
   }
 
   // Fills fits_, ranked; empty where the frame says nothing or contradicts all hypotheses.

@@ -65,7 +65,7 @@ class MapBuilder {
     if (added.center < 0) {
       added.center = map_.AddBlock(2, {}, is_first);
       Append(added.center, [&](std::size_t i) {
-        return std::pair(Eigen::VectorXd(placed[i].head<2>()), Eigen::VectorXd(Length(i, 2)));
+        return std::pair(Eigen::VectorXd(placed[i].head<2>()), Length(i, 2));
       });
     }
     if (added.radius < 0) {

@@ -371,6 +371,19 @@ TEST_F(OneTrackTest, WhatIsKnownOfThePoseCounts) {
   EXPECT_LT(Error(11, upright.estimate.hypotheses.front()), 10.0 * kSigma);
 }
 
+// Also where the frame says nothing and what is known of the motion contradicts.
+TEST_F(OneTrackTest, ProbabilitiesSumToOne) {
+  Observations empty;
+  empty.camera = sequence_.camera;
+  MotionPrior motion;
+  motion.gravity.emplace();
+  motion.gravity->in_camera = sequence_.frames[10].pose.rotation * Eigen::Vector3d::UnitX();
+  const TrackedPose tracked = tracker_.Update(empty, 10 / 30.0, motion);
+  double sum = 0.0;
+  for (const PoseHypothesis& h : tracked.estimate.hypotheses) sum += h.probability;
+  EXPECT_NEAR(sum, 1.0, 1e-9);
+}
+
 TEST_F(OneTrackTest, SameInputSameBits) {
   Trajectory again(Moving(), 20);
   PoseTracker tracker(ExactOptions(again.options()));
