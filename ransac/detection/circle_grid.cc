@@ -304,8 +304,7 @@ PointLattice FindLattice(const std::vector<Vector2d>& points) {
 std::vector<DetectedPencil> FindGridPencils(const Camera& camera,
                                             const std::vector<Matrix3d>& circles,
                                             const Vector3d& normal) {
-  std::vector<DetectedPencil> pencils;
-  if (circles.size() < kMinPoints) return pencils;
+  if (circles.size() < kMinPoints) return {};
   const PlaneCentres centres = LayOut(circles, normal);
   PointLattice lattice = FindLattice(centres.points);
   for (auto& direction : lattice.lines) {
@@ -313,6 +312,13 @@ std::vector<DetectedPencil> FindGridPencils(const Camera& camera,
       for (int& i : line) i = centres.circles[static_cast<std::size_t>(i)];
     }
   }
+  return MakeGridPencils(camera, circles, lattice, normal);
+}
+
+std::vector<DetectedPencil> MakeGridPencils(const Camera& camera,
+                                            const std::vector<Matrix3d>& circles,
+                                            const PointLattice& lattice, const Vector3d& normal) {
+  std::vector<DetectedPencil> pencils;
   // The centres' images depend a little on the normal, and their lines know it better.
   Vector3d n = normal;
   for (int pass = 0; pass < 2; ++pass) {

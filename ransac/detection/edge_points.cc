@@ -85,21 +85,31 @@ class PointFinder {
   }
 
   // The gradient is worked off in bands of rows, which stay in the processor's cache.
-  void Find(EdgeMap* map, std::vector<std::int32_t>* pixels) {
+  void Find(const std::vector<cv::Rect>& within, EdgeMap* map, std::vector<std::int32_t>* pixels) {
     constexpr int kBandRows = 48;
     map->index.assign(gray_.total(), -1);
-    map->points.reserve(gray_.total() / 4);  // More than a busy photo's.
-    pixels->reserve(gray_.total() / 4);
-    for (int y = 1; y + 1 < gray_.rows; y += kBandRows) {
-      FindInBand(y, std::min(y + kBandRows, gray_.rows - 1), map, pixels);
+    int area = 0;
+    for (const cv::Rect& box : within) area += box.area();
+    const auto room = static_cast<std::size_t>(area / 4);  // More than a busy photo's.
+    map->points.reserve(room);
+    pixels->reserve(room);
+    for (const cv::Rect& box : within) {
+      const cv::Rect inside = box & cv::Rect(1, 1, gray_.cols - 2, gray_.rows - 2);
+      if (inside.empty()) continue;
+      left_ = inside.x - 1;
+      cols_ = inside.width + 2;
+      const int bottom = inside.y + inside.height;
+      for (int y = inside.y; y < bottom; y += kBandRows) {
+        FindInBand(y, std::min(y + kBandRows, bottom), map, pixels);
+      }
     }
   }
 
  private:
-  // Rows [begin, end). (Filters see the pixels beyond a range of rows.)
+  // Rows [begin, end) of the columns at hand. (Filters see the pixels beyond.)
   void FindInBand(int begin, int end, EdgeMap* map, std::vector<std::int32_t>* pixels) {
     top_ = begin - 1;
-    const cv::Mat band = gray_.rowRange(top_, end + 1);
+    const cv::Mat band = gray_(cv::Rect(left_, top_, cols_, end + 1 - top_));
     cv::sepFilter2D(band, x_, CV_32F, derivative_, smooth_, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
     cv::sepFilter2D(band, y_, CV_32F, smooth_, derivative_, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
     Square(begin - 1);
@@ -110,7 +120,8 @@ class PointFinder {
     }
   }
 
-  // Rows of the gradient's components, and of its squared length: the last three squared.
+  // Rows of the gradient's components, and of its squared length: the last three squared. Columns
+  // are counted from left_.
   const float* X(int y) const { return x_.ptr<float>(y - top_); }
   const float* Y(int y) const { return y_.ptr<float>(y - top_); }
   float* Squared(int y) { return squared_[static_cast<std::size_t>(y % 3)].data(); }
@@ -119,18 +130,17 @@ class PointFinder {
     const float* gx = X(y);
     const float* gy = Y(y);
     float* out = Squared(y);
-    for (int x = 0; x < gray_.cols; ++x) out[x] = gx[x] * gx[x] + gy[x] * gy[x];
+    for (int x = 0; x < cols_; ++x) out[x] = gx[x] * gx[x] + gy[x] * gy[x];
   }
 
   bool IsHorizontal(int x, int y) const { return std::abs(X(y)[x]) >= std::abs(Y(y)[x]); }
 
   void FindInRow(int y, EdgeMap* map, std::vector<std::int32_t>* pixels) {
     const float* s = Squared(y);
-    MarkMaxima(X(y), Y(y), Squared(y - 1), s, Squared(y + 1), low_squared_, gray_.cols,
-               marks_.data());
-    const int count = ListMarks(marks_.data(), gray_.cols, list_.data());
+    MarkMaxima(X(y), Y(y), Squared(y - 1), s, Squared(y + 1), low_squared_, cols_, marks_.data());
+    const int count = ListMarks(marks_.data(), cols_, list_.data());
     TakeLogarithms(y, count);
-    const std::int32_t row = y * gray_.cols;
+    const std::int32_t row = y * gray_.cols + left_;
     for (int k = 0; k < count; ++k) {
       const auto i = static_cast<std::size_t>(k);
       float offset, variance;
@@ -174,7 +184,7 @@ class PointFinder {
   EdgePoint MakePoint(int x, int y, float offset, float variance, float length) const {
     const bool horizontal = IsHorizontal(x, y);
     EdgePoint point;
-    point.x = static_cast<float>(x) + (horizontal ? offset : 0.0f);
+    point.x = static_cast<float>(left_ + x) + (horizontal ? offset : 0.0f);
     point.y = static_cast<float>(y) + (horizontal ? 0.0f : offset);
     const float gx = X(y)[x], gy = Y(y)[x];
     // The gradient at the point, between the pixel and its neighbour.
@@ -201,8 +211,9 @@ class PointFinder {
   const float low_squared_;
   const float slope_noise_;
   cv::Mat smooth_, derivative_;
-  cv::Mat x_, y_;  // Of a band, 32-bit float, grey levels per pixel.
-  int top_ = 0;    // The photo's row that is the band's first.
+  cv::Mat x_, y_;            // Of a band, 32-bit float, grey levels per pixel.
+  int top_ = 0;              // The photo's row that is the band's first.
+  int left_ = 0, cols_ = 0;  // The photo's column that is the band's first, and its columns.
   std::array<std::vector<float>, 3> squared_;
   // Of a row: marks of maxima, their columns, and the neighbours' logarithms.
   std::vector<std::uint8_t> marks_;
@@ -213,8 +224,10 @@ class PointFinder {
 }  // namespace
 
 void FindEdgePoints(const cv::Mat& gray, double smoothing_px, double low, double noise,
-                    EdgeMap* map, std::vector<std::int32_t>* pixels) {
-  PointFinder(gray, smoothing_px, low, noise).Find(map, pixels);
+                    EdgeMap* map, std::vector<std::int32_t>* pixels,
+                    const std::vector<cv::Rect>* within) {
+  const std::vector<cv::Rect> all = {cv::Rect(0, 0, gray.cols, gray.rows)};
+  PointFinder(gray, smoothing_px, low, noise).Find(within != nullptr ? *within : all, map, pixels);
 }
 
 }  // namespace circline

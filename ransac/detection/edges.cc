@@ -101,7 +101,8 @@ double CurvatureBias(const EdgePoint& point, double blur_px, double curvature) {
   return 0.5 * curvature * (variance + (1.0 - cosine * cosine) * (1.0 - 3.0 * offset * offset));
 }
 
-Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edges) {
+Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edges,
+                   const std::vector<cv::Rect>* within) {
   *edges = EdgeMap();
   const Status status = options.Validate();
   if (!status.ok()) return status;
@@ -116,7 +117,7 @@ Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edg
   const double high =
       std::max(low, Threshold(options.high_gradient, options.high_noise_factor, noise));
   std::vector<std::int32_t> pixels;
-  FindEdgePoints(gray, options.smoothing_px, low, noise, edges, &pixels);
+  FindEdgePoints(gray, options.smoothing_px, low, noise, edges, &pixels, within);
   ChainEdgePoints(pixels, high, options.min_chain_points, edges);
   return Status::Ok();
 }

@@ -96,8 +96,10 @@ double CurvatureBias(const EdgePoint& point, double blur_px, double curvature);
 // channels (BGR, BGRA).
 Status ToGray(const cv::Mat& image, cv::Mat* gray);
 
-// `gray` is 8-bit with one channel. About 2 ms for a 640x480 photo.
-Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edges);
+// `gray` is 8-bit with one channel. About 2 ms for a 640x480 photo. `within` (optional): only in
+// these rectangles, as in FindEdgePoints; chains end at their borders.
+Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edges,
+                   const std::vector<cv::Rect>* within = nullptr);
 
 }  // namespace circline
 

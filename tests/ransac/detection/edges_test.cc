@@ -257,6 +257,36 @@ TEST(DetectEdges, RefusesWhatIsNotAGreyImage) {
             StatusCode::kInvalidArgument);
 }
 
+// Rectangles that tile the photo give what the whole photo gives, point by point.
+TEST(DetectEdges, WithinRectanglesPointsAreTheSame) {
+  const cv::Mat image = StepEdge(0.4, 3.0);
+  EdgeMap whole, tiled, part;
+  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &whole).ok());
+  std::vector<cv::Rect> tiles;
+  for (int y = 0; y < image.rows; y += 20) {
+    for (int x = 0; x < image.cols; x += 27)
+      tiles.push_back(cv::Rect(x, y, 27, 20) & cv::Rect({}, image.size()));
+  }
+  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &tiled, &tiles).ok());
+  ASSERT_GT(whole.points.size(), 60U);
+  EXPECT_EQ(tiled.points.size(), whole.points.size());
+  const std::vector<cv::Rect> one = {cv::Rect(30, 0, 25, 65)};
+  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &part, &one).ok());
+  EXPECT_GT(part.points.size(), 0U);
+  for (const EdgeMap* map : {&tiled, &part}) {
+    for (const EdgePoint& p : map->points) {
+      const int i =
+          whole.PointAt(static_cast<int>(std::lround(p.x)), static_cast<int>(std::lround(p.y)));
+      ASSERT_GE(i, 0);
+      const EdgePoint& same = whole.points[static_cast<std::size_t>(i)];
+      EXPECT_EQ(p.x, same.x);
+      EXPECT_EQ(p.y, same.y);
+      EXPECT_EQ(p.sigma_px, same.sigma_px);
+    }
+  }
+  for (const EdgePoint& p : part.points) EXPECT_TRUE(p.x > 28.5f && p.x < 55.5f);
+}
+
 TEST(DetectEdges, NamesTheOptionThatIsWrong) {
   EdgeMap map;
   const cv::Mat image(9, 9, CV_8UC1, cv::Scalar(0));

@@ -1,0 +1,143 @@
+#include "circline/ransac/detection/feature_follower.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "circline/ransac/detection/follow_observations.h"
+#include "circline/ransac/detection/keep_names.h"
+#include "circline/ransac/detection/move_observations.h"
+
+namespace circline {
+namespace {
+
+// After so many frames in a row that show little, and that of another scene, it is another scene.
+constexpr int kFramesOfCut = 3;
+
+// Of what was found cold, only what goes on from the features that were given.
+void KeepGiven(const Observations& given, Observations* found) {
+  const auto is_new = [&](const auto& feature,
+                          int (*find)(const Observations&, const std::string&)) {
+    return find(given, feature.id) < 0;
+  };
+  found->circles.erase(
+      std::remove_if(found->circles.begin(), found->circles.end(),
+                     [&](const CircleObservation& c) { return is_new(c, FindCircle); }),
+      found->circles.end());
+  found->pencils.erase(
+      std::remove_if(found->pencils.begin(), found->pencils.end(),
+                     [&](const PencilObservation& p) { return is_new(p, FindPencil); }),
+      found->pencils.end());
+  found->frame.origin_is_center = given.frame.origin_is_center;
+  if (FindCircle(*found, found->frame.origin_is_center) < 0) found->frame.origin_is_center.clear();
+}
+
+}  // namespace
+
+Status FollowOptions::Validate() const {
+  if (!(search_px >= 3.0 && search_px <= 200.0)) {
+    return Status::Invalid("search_px must be in [3, 200]");
+  }
+  if (!(min_found_share >= 0.0 && min_found_share <= 1.0)) {
+    return Status::Invalid("min_found_share must be in [0, 1]");
+  }
+  if (cold_every < 0) return Status::Invalid("cold_every must not be negative");
+  return detection.Validate();
+}
+
+FeatureFollower::FeatureFollower(const Camera& camera, const FollowOptions& options)
+    : camera_(camera), options_(options) {
+  held_.camera = camera;
+}
+
+Status FeatureFollower::Next(const cv::Mat& image, Observations* observations) {
+  const Status valid = options_.Validate();
+  if (!valid.ok()) return valid;
+  Observations found, expect;
+  bool look = !is_given_ && IsTimeForCold();
+  if (!look) {
+    const Status status =
+        FollowObservations(image, held_, SearchPx(), options_.detection, &found, &expect);
+    if (!status.ok()) return status;
+    look = CountFeatures(found) == 0 || !HasEnough(found);
+  }
+  if (look) {
+    const Status status = Cold(image, &found, &expect);
+    if (!status.ok()) return status;
+  } else {
+    was_cold_ = was_cut_ = false;
+    ++frames_since_cold_;
+  }
+  frames_lost_ = CountFeatures(found) > 0 && HasEnough(found) ? 0 : frames_lost_ + 1;
+  held_ = std::move(expect);
+  *observations = std::move(found);
+  return Status::Ok();
+}
+
+Status FeatureFollower::Cold(const cv::Mat& image, Observations* found, Observations* expect) {
+  const Status status = DetectObservations(image, camera_, options_.detection, found);
+  if (!status.ok()) return status;
+  const NextNames before = next_;
+  const int kept = KeepNames(held_, SearchPx(), &next_, found);
+  was_cold_ = true;
+  was_cut_ = false;
+  frames_since_cold_ = 0;
+  if (is_given_) {
+    KeepGiven(held_, found);
+    *expect = CountFeatures(*found) > 0 ? *found : held_;
+    return status;
+  }
+  if (kept == 0 &&
+      !(CountFeatures(*found) > 0 && (HasEnough(*found) || frames_lost_ + 1 >= kFramesOfCut))) {
+    // A blurred frame, or something before the lens: it passes.
+    next_ = before;
+    *found = Observations();
+    found->camera = camera_;
+    found->message = "nothing of the frames before was found in this one";
+    *expect = held_;
+    return status;
+  }
+  was_cut_ = kept == 0;
+  num_at_look_ = CountFeatures(*found);
+  num_circles_at_look_ = static_cast<int>(found->circles.size());
+  *expect = *found;
+  return status;
+}
+
+double FeatureFollower::SearchPx() const {
+  constexpr double kMostPx = 200.0;  // As Validate.
+  return std::min(kMostPx, options_.search_px * (1 + frames_lost_));
+}
+
+bool FeatureFollower::HasEnough(const Observations& found) const {
+  const double share = options_.min_found_share;
+  return static_cast<double>(found.circles.size()) >= share * num_circles_at_look_ &&
+         CountFeatures(found) >= share * num_at_look_;
+}
+
+bool FeatureFollower::IsTimeForCold() const {
+  return CountFeatures(held_) == 0 ||
+         (options_.cold_every > 0 && frames_since_cold_ + 1 >= options_.cold_every);
+}
+
+void FeatureFollower::Start(const Observations& given) {
+  held_ = given;
+  is_given_ = true;
+  num_at_look_ = CountFeatures(given);
+  num_circles_at_look_ = static_cast<int>(given.circles.size());
+}
+
+void FeatureFollower::Move(const PoseHypothesis& last, const CameraPose& next) {
+  held_ = MoveObservations(held_, last, next);
+}
+
+void FeatureFollower::Reset() {
+  held_ = Observations();
+  held_.camera = camera_;
+  is_given_ = false;
+  num_at_look_ = num_circles_at_look_ = frames_lost_ = 0;
+}
+
+}  // namespace circline

@@ -1,0 +1,145 @@
+#include "circline/ransac/detection/follow_lines.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "circline/estimators/conic.h"
+#include "circline/ransac/detection/detect_pencils.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Vector2d;
+
+// A line that covers more of the predicted one is the likelier to be it: what its whole length is
+// worth, in search distances.
+constexpr double kLengthWorth = 0.5;
+// The two share this much of the shorter one.
+constexpr double kMinOverlap = 0.5;
+// The centre of a circle lies within this share of the semi-minor axis from that of its ellipse.
+constexpr double kMaxCentreShare = 0.35;
+
+struct Match {
+  double cost;
+  std::size_t pencil, line;
+  int detected;
+};
+
+// How unlike a detected line is to the predicted one; infinite where it cannot be the same.
+double Unlikeness(const Segment& predicted, const Segment& detected, double search_px) {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  const double length = (predicted[1] - predicted[0]).norm();
+  if (!(length > 0.0)) return kNever;
+  const Vector2d along = (predicted[1] - predicted[0]) / length;
+  const Vector2d across(-along.y(), along.x());
+  double mean = 0.0, from = kNever, to = -kNever;
+  for (const Vector2d& end : detected) {
+    const double s = along.dot(end - predicted[0]);
+    from = std::min(from, s);
+    to = std::max(to, s);
+  }
+  const double overlap = std::min(to, length) - std::max(from, 0.0);
+  if (!(overlap >= kMinOverlap * std::min(length, to - from))) return kNever;
+  // The distances at the ends of what they share.
+  const Eigen::Hyperplane<double, 2> line =
+      Eigen::Hyperplane<double, 2>::Through(detected[0], detected[1]);
+  for (const double s : {std::max(from, 0.0), std::min(to, length)}) {
+    const double distance = line.absDistance(predicted[0] + s * along);
+    if (!(distance < search_px)) return kNever;
+    mean += 0.5 * distance;
+  }
+  const double angle = std::abs(across.dot((detected[1] - detected[0]).normalized()));
+  constexpr double kMaxTurn = 0.2;  // A sine: 12 degrees from a frame to the next.
+  if (angle > kMaxTurn) return kNever;
+  return mean / search_px + kLengthWorth * (1.0 - overlap / length);
+}
+
+Segment Ends(const LineObservation& line) { return {line.points.front(), line.points.back()}; }
+
+}  // namespace
+
+std::vector<std::vector<int>> MatchLines(const std::vector<PencilObservation>& predicted,
+                                         const std::vector<DetectedLine>& lines, double search_px) {
+  std::vector<Match> candidates;
+  std::vector<std::vector<int>> matches;
+  for (std::size_t p = 0; p < predicted.size(); ++p) {
+    matches.emplace_back(predicted[p].lines.size(), -1);
+    for (std::size_t k = 0; k < predicted[p].lines.size(); ++k) {
+      const Segment ends = Ends(predicted[p].lines[k]);
+      for (std::size_t i = 0; i < lines.size(); ++i) {
+        const double cost = Unlikeness(ends, lines[i].ends, search_px);
+        if (std::isfinite(cost)) candidates.push_back({cost, p, k, static_cast<int>(i)});
+      }
+    }
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Match& a, const Match& b) { return a.cost < b.cost; });
+  std::vector<bool> is_taken(lines.size(), false);
+  for (const Match& match : candidates) {
+    int& detected = matches[match.pencil][match.line];
+    const auto index = static_cast<std::size_t>(match.detected);
+    if (detected >= 0 || is_taken[index]) continue;
+    detected = match.detected;
+    is_taken[index] = true;
+  }
+  return matches;
+}
+
+PencilObservation FollowPencil(const PencilObservation& predicted,
+                               const std::vector<DetectedLine>& lines,
+                               const std::vector<int>& matches, double diagonal_px) {
+  std::vector<DetectedLine> own;
+  for (const int i : matches) {
+    if (i >= 0) own.push_back(lines[static_cast<std::size_t>(i)]);
+  }
+  DetectedPencil pencil;
+  if (!own.empty()) {
+    std::vector<int> all(own.size());
+    std::iota(all.begin(), all.end(), 0);
+    pencil.observation.fit = predicted.fit;
+    if (!predicted.fit || !RefitPencil(own, all, &pencil, diagonal_px)) {
+      // One line, or few that do not meet: no direction of their own, but evidence all the same
+      // where the pencil has a role.
+      std::vector<LineFit> fits;
+      for (const DetectedLine& line : own) fits.push_back(line.fit);
+      const Eigen::Vector3d direction =
+          predicted.fit ? predicted.fit->direction
+                        : own[0].fit.line.cross(Eigen::Vector3d::UnitZ()).stableNormalized().eval();
+      pencil = MakePencil(own, all, fits, direction);
+    }
+  }
+  pencil.observation.id = predicted.id;
+  pencil.observation.direction = predicted.direction;
+  pencil.observation.plane = predicted.plane;
+  return std::move(pencil.observation);
+}
+
+std::vector<std::vector<int>> LinesOfCentres(const Observations& predicted,
+                                             const PencilObservation& pencil) {
+  std::vector<Ellipse> ellipses(predicted.circles.size());
+  for (std::size_t i = 0; i < ellipses.size(); ++i) {
+    const CircleObservation& circle = predicted.circles[i];
+    if (circle.fit) ConicToEllipse(circle.fit->conic, &ellipses[i]);
+  }
+  std::vector<std::vector<int>> members;
+  for (const LineObservation& line : pencil.lines) {
+    std::vector<int>& circles = members.emplace_back();
+    for (const Vector2d& pixel : line.points) {
+      CalibratedPoint p;
+      if (!PixelToCalibrated(predicted.camera, pixel, &p)) return {};
+      const auto at = std::find_if(ellipses.begin(), ellipses.end(), [&](const Ellipse& e) {
+        return (p.x - e.center).norm() < kMaxCentreShare * e.b;
+      });
+      if (at == ellipses.end()) return {};
+      circles.push_back(static_cast<int>(at - ellipses.begin()));
+    }
+  }
+  return members;
+}
+
+}  // namespace circline

@@ -1,0 +1,213 @@
+#include "circline/ransac/detection/follow_observations.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "circline/ransac/detection/circle_grid.h"
+#include "circline/ransac/detection/contour_support.h"
+#include "circline/ransac/detection/edge_shift.h"
+#include "circline/ransac/detection/ellipse_evidence.h"
+#include "circline/ransac/detection/follow_circles.h"
+#include "circline/ransac/detection/follow_lines.h"
+#include "circline/ransac/detection/observe_evidence.h"
+#include "circline/ransac/detection/search_bands.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// Smoothing reaches so far beyond the band that its outermost edges are found, pixels.
+constexpr double kBandMarginPx = 2.0;
+
+// Lines through the centres of circles, by pencil; empty for pencils of edges.
+using CentreLines = std::vector<std::vector<std::vector<int>>>;
+
+std::vector<cv::Rect> BandsOf(const Observations& predicted, const CentreLines& of_centres,
+                              const cv::Size& photo, double search_px) {
+  SearchBands bands(photo, search_px + kBandMarginPx);
+  Contour contour(predicted.camera);
+  std::vector<ContourSample> samples;
+  const double largest = 2.0 * std::hypot(photo.width, photo.height);
+  for (const CircleObservation& circle : predicted.circles) {
+    if (!circle.fit || !contour.Project(circle.fit->conic, 1.0, largest)) continue;
+    if (!contour.SampleEvery(search_px, &samples)) continue;
+    for (const ContourSample& sample : samples) bands.Add(sample.pixel);
+  }
+  for (std::size_t p = 0; p < predicted.pencils.size(); ++p) {
+    if (!of_centres[p].empty()) continue;
+    for (const LineObservation& line : predicted.pencils[p].lines) {
+      for (std::size_t k = 1; k < line.points.size(); ++k)
+        bands.AddSegment({line.points[k - 1], line.points[k]});
+    }
+  }
+  return bands.Rectangles();
+}
+
+// What is known of a circle whatever the photo, with what was found of it on this one.
+CircleObservation Continued(const CircleObservation& predicted, const EdgeMap& edges,
+                            const DetectedEllipse& ellipse, const NoiseModel& noise) {
+  CircleObservation circle;
+  FillCircle(edges, ellipse, noise, &circle);
+  circle.id = predicted.id;
+  circle.plane = predicted.plane;
+  circle.concentric = predicted.concentric;
+  circle.contrast = predicted.contrast;
+  circle.radius = predicted.radius;
+  circle.radius_sigma = predicted.radius_sigma;
+  circle.radius_group = predicted.radius_group;
+  return circle;
+}
+
+// The rows and columns of a sheet of circles, of those that were found.
+void FollowGrid(const Observations& predicted, const CentreLines& of_centres, Observations* found,
+                Observations* expect) {
+  std::vector<Matrix3d> conics;
+  std::vector<int> place(predicted.circles.size(), -1);  // Of the predicted circles, in `conics`.
+  for (std::size_t i = 0; i < predicted.circles.size(); ++i) {
+    const int k = FindCircle(*found, predicted.circles[i].id);
+    if (k < 0) continue;
+    place[i] = static_cast<int>(conics.size());
+    conics.push_back(found->circles[static_cast<std::size_t>(k)].fit->conic);
+  }
+  PointLattice lattice;
+  std::vector<const PencilObservation*> grid;
+  for (std::size_t p = 0; p < of_centres.size() && grid.size() < 2; ++p) {
+    if (of_centres[p].empty() || !predicted.pencils[p].fit) continue;
+    std::vector<std::vector<int>>& lines = lattice.lines[grid.size()];
+    for (const std::vector<int>& line : of_centres[p]) {
+      std::vector<int>& members = lines.emplace_back();
+      for (const int i : line) {
+        if (place[static_cast<std::size_t>(i)] >= 0)
+          members.push_back(place[static_cast<std::size_t>(i)]);
+      }
+    }
+    grid.push_back(&predicted.pencils[p]);
+  }
+  if (grid.size() < 2) return;  // One direction does not tell where the centres are.
+  const Vector3d normal = grid[0]->fit->direction.cross(grid[1]->fit->direction).stableNormalized();
+  std::vector<DetectedPencil> pencils = MakeGridPencils(predicted.camera, conics, lattice, normal);
+  if (pencils.size() < 2) return;
+  for (std::size_t k = 0; k < 2; ++k) {
+    PencilObservation& pencil = pencils[k].observation;
+    pencil.id = grid[k]->id;
+    pencil.direction = grid[k]->direction;
+    pencil.plane = grid[k]->plane;
+    expect->pencils[static_cast<std::size_t>(FindPencil(*expect, pencil.id))] = pencil;
+    found->pencils.push_back(std::move(pencil));
+  }
+}
+
+// A pencil that was followed takes the place of its prediction, with the lines and the direction
+// that were not found again.
+void ExpectPencil(const PencilObservation& pencil, const std::vector<int>& matches,
+                  Observations* expect) {
+  PencilObservation& place =
+      expect->pencils[static_cast<std::size_t>(FindPencil(*expect, pencil.id))];
+  PencilObservation next = pencil;
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    if (matches[k] < 0) next.lines.push_back(std::move(place.lines[k]));
+  }
+  if (!next.fit) next.fit = place.fit;
+  place = std::move(next);
+}
+
+Status FollowEdgeLines(const Observations& predicted, const CentreLines& of_centres,
+                       const EdgeMap& edges, const std::vector<std::uint8_t>& on_ellipses,
+                       double search_px, const DetectionOptions& options, Observations* found,
+                       Observations* expect) {
+  std::vector<PencilObservation> pencils;
+  for (std::size_t p = 0; p < predicted.pencils.size(); ++p) {
+    if (of_centres[p].empty()) pencils.push_back(predicted.pencils[p]);
+  }
+  if (pencils.empty()) return Status::Ok();
+  LineOptions line_options;
+  line_options.min_length_px = options.min_segment_length_px;
+  std::vector<DetectedLine> lines;
+  const Status status = DetectLines(edges, predicted.camera, line_options, &lines, &on_ellipses);
+  if (!status.ok()) return status;
+  UndoEdgeShift(edges, predicted.camera, &lines);
+  const std::vector<std::vector<int>> matches = MatchLines(pencils, lines, search_px);
+  for (std::size_t p = 0; p < pencils.size(); ++p) {
+    PencilObservation pencil =
+        FollowPencil(pencils[p], lines, matches[p], DiagonalPx(edges.width, edges.height));
+    ExpectPencil(pencil, matches[p], expect);
+    if (!pencil.lines.empty()) found->pencils.push_back(std::move(pencil));
+  }
+  return Status::Ok();
+}
+
+// The frame that the features carry; pixels of it were those of another photo.
+FrameObservation FrameOf(const Observations& predicted) {
+  FrameObservation frame;
+  frame.plane = predicted.frame.plane;
+  frame.origin_is_center = predicted.frame.origin_is_center;
+  return frame;
+}
+
+// Pencils in the order of the prediction; the frame and the angles that still have what they name.
+void Settle(const Observations& predicted, Observations* found) {
+  std::stable_sort(found->pencils.begin(), found->pencils.end(),
+                   [&](const PencilObservation& a, const PencilObservation& b) {
+                     return FindPencil(predicted, a.id) < FindPencil(predicted, b.id);
+                   });
+  found->frame = FrameOf(predicted);
+  if (FindCircle(*found, found->frame.origin_is_center) < 0) found->frame.origin_is_center.clear();
+  const auto has_plane = [&](const auto& features) {
+    return std::any_of(features.begin(), features.end(),
+                       [&](const auto& f) { return f.plane == found->frame.plane; });
+  };
+  if (!has_plane(found->circles) && !has_plane(found->pencils)) found->frame.plane.clear();
+  for (const KnownAngle& angle : predicted.known_angles) {
+    if (FindPencil(*found, angle.pencils[0]) >= 0 && FindPencil(*found, angle.pencils[1]) >= 0)
+      found->known_angles.push_back(angle);
+  }
+}
+
+}  // namespace
+
+int CountFeatures(const Observations& observations) {
+  std::size_t count = observations.circles.size();
+  for (const PencilObservation& pencil : observations.pencils) count += pencil.lines.size();
+  return static_cast<int>(count);
+}
+
+Status FollowObservations(const cv::Mat& image, const Observations& predicted, double search_px,
+                          const DetectionOptions& options, Observations* found,
+                          Observations* expect) {
+  *expect = predicted;
+  *found = Observations();
+  found->camera = predicted.camera;
+  cv::Mat gray;
+  Status status = CheckDetectionInput(image, predicted.camera, options);
+  if (status.ok()) status = ToGray(image, &gray);
+  if (!status.ok()) return status;
+  CentreLines of_centres;
+  for (const PencilObservation& pencil : predicted.pencils)
+    of_centres.push_back(LinesOfCentres(predicted, pencil));
+  const std::vector<cv::Rect> bands = BandsOf(predicted, of_centres, gray.size(), search_px);
+  EdgeMap edges;
+  status = DetectEdges(gray, EdgeOptions(), &edges, &bands);
+  if (!status.ok()) return status;
+  std::vector<DetectedEllipse> ellipses = FollowCircles(edges, predicted.camera, predicted.circles,
+                                                        ToEllipseOptions(options), search_px);
+  for (std::size_t k = 0; k < ellipses.size(); ++k) {
+    if (ellipses[k].points.empty()) continue;
+    found->circles.push_back(
+        Continued(predicted.circles[k], edges, ellipses[k], options.noise_model));
+    expect->circles[k] = found->circles.back();
+  }
+  status = FollowEdgeLines(predicted, of_centres, edges, EllipsePoints(edges, ellipses), search_px,
+                           options, found, expect);
+  FollowGrid(predicted, of_centres, found, expect);
+  Settle(predicted, found);
+  return status;
+}
+
+}  // namespace circline

@@ -1,0 +1,239 @@
+#include "circline/ransac/detection/keep_names.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "circline/estimators/conic.h"
+#include "circline/ransac/detection/follow_lines.h"
+
+namespace circline {
+namespace {
+
+constexpr double kMaxGrowth = 1.5;
+constexpr double kMaxTurnSine = 0.17;  // 10 degrees.
+// A sheet of dots seen from elsewhere has some where others were: fewer than this share of the
+// features is no continuation.
+constexpr double kMinKept = 0.5;
+
+struct Pair {
+  double cost;
+  std::size_t predicted, detected;
+};
+
+// For each detected feature the index of the predicted one that it continues, or -1: the cheapest
+// pairs first, each feature once.
+std::vector<int> Assign(std::vector<Pair> pairs, std::size_t num_predicted,
+                        std::size_t num_detected) {
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const Pair& a, const Pair& b) { return a.cost < b.cost; });
+  std::vector<int> continued(num_detected, -1);
+  std::vector<bool> is_taken(num_predicted, false);
+  for (const Pair& pair : pairs) {
+    if (continued[pair.detected] >= 0 || is_taken[pair.predicted]) continue;
+    continued[pair.detected] = static_cast<int>(pair.predicted);
+    is_taken[pair.predicted] = true;
+  }
+  return continued;
+}
+
+bool FittedEllipse(const CircleObservation& circle, Ellipse* ellipse) {
+  return circle.fit && ConicToEllipse(circle.fit->conic, ellipse);
+}
+
+std::vector<int> AssignCircles(const Observations& predicted, const Observations& detected,
+                               double search_px) {
+  const double focal = 0.5 * (detected.camera.fx + detected.camera.fy);
+  std::vector<Pair> pairs;
+  for (std::size_t i = 0; i < predicted.circles.size(); ++i) {
+    Ellipse before;
+    if (!FittedEllipse(predicted.circles[i], &before)) continue;
+    for (std::size_t k = 0; k < detected.circles.size(); ++k) {
+      Ellipse now;
+      if (!FittedEllipse(detected.circles[k], &now)) continue;
+      const double offset = (now.center - before.center).norm();
+      const double growth = now.a / before.a;
+      if (offset > std::max(search_px / focal, 0.5 * before.b)) continue;
+      if (!(growth < kMaxGrowth && growth > 1.0 / kMaxGrowth)) continue;
+      pairs.push_back({offset + std::abs(now.a - before.a) + std::abs(now.b - before.b), i, k});
+    }
+  }
+  return Assign(std::move(pairs), predicted.circles.size(), detected.circles.size());
+}
+
+// How many lines of each detected pencil continue those of each predicted one,
+// [predicted][detected].
+std::vector<std::vector<int>> CountSharedLines(const Observations& predicted,
+                                               const Observations& detected, double search_px) {
+  std::vector<DetectedLine> lines;
+  std::vector<std::size_t> owner;
+  for (std::size_t k = 0; k < detected.pencils.size(); ++k) {
+    for (const LineObservation& line : detected.pencils[k].lines) {
+      lines.emplace_back().ends = {line.points.front(), line.points.back()};
+      owner.push_back(k);
+    }
+  }
+  std::vector<std::vector<int>> shared;
+  for (const std::vector<int>& matches : MatchLines(predicted.pencils, lines, search_px)) {
+    std::vector<int>& counts = shared.emplace_back(detected.pencils.size(), 0);
+    for (const int i : matches) {
+      if (i >= 0) ++counts[owner[static_cast<std::size_t>(i)]];
+    }
+  }
+  return shared;
+}
+
+// By the lines that they share: at least half of those of the smaller one.
+std::vector<int> AssignPencils(const Observations& predicted, const Observations& detected,
+                               double search_px) {
+  const std::vector<std::vector<int>> shared = CountSharedLines(predicted, detected, search_px);
+  std::vector<Pair> pairs;
+  for (std::size_t i = 0; i < predicted.pencils.size(); ++i) {
+    for (std::size_t k = 0; k < detected.pencils.size(); ++k) {
+      const auto &before = predicted.pencils[i].fit, &now = detected.pencils[k].fit;
+      if (before && now && before->direction.cross(now->direction).norm() > kMaxTurnSine) continue;
+      const std::size_t fewer =
+          std::min(predicted.pencils[i].lines.size(), detected.pencils[k].lines.size());
+      if (shared[i][k] > 0 && 2 * static_cast<std::size_t>(shared[i][k]) >= fewer)
+        pairs.push_back({-1.0 * shared[i][k], i, k});
+    }
+  }
+  return Assign(std::move(pairs), predicted.pencils.size(), detected.pencils.size());
+}
+
+// What the planes of the detection are called in the prediction: as most features say that are in
+// both.
+class PlaneNames {
+ public:
+  explicit PlaneNames(NextNames* next) : next_(*next) {}
+
+  void Vote(const std::string& detected, const std::string& predicted) {
+    if (!detected.empty() && !predicted.empty()) ++votes_[detected][predicted];
+  }
+  std::string Name(const std::string& detected) {
+    if (detected.empty()) return detected;
+    std::string& name = names_[detected];
+    if (!name.empty()) return name;
+    int most = 0;
+    for (const auto& [candidate, count] : votes_[detected]) {
+      if (count <= most) continue;
+      most = count;
+      name = candidate;
+    }
+    if (name.empty()) name = "p" + std::to_string(next_.plane++);
+    return name;
+  }
+
+ private:
+  NextNames& next_;
+  std::map<std::string, std::map<std::string, int>> votes_;
+  std::map<std::string, std::string> names_;
+};
+
+void Continue(const CircleObservation& predicted, CircleObservation* circle) {
+  circle->id = predicted.id;
+  if (!predicted.plane.empty()) circle->plane = predicted.plane;
+  circle->contrast = predicted.contrast;
+  circle->radius = predicted.radius;
+  circle->radius_sigma = predicted.radius_sigma;
+  circle->radius_group = predicted.radius_group;
+}
+
+void Continue(const PencilObservation& predicted, PencilObservation* pencil) {
+  pencil->id = predicted.id;
+  if (!predicted.plane.empty()) pencil->plane = predicted.plane;
+  if (predicted.direction != PencilDirection::kFree) pencil->direction = predicted.direction;
+}
+
+template <typename Feature>
+void NameFeatures(const std::vector<Feature>& predicted, const std::vector<int>& continued,
+                  const char* letter, int* number, PlaneNames* planes,
+                  std::vector<Feature>* features) {
+  for (std::size_t k = 0; k < features->size(); ++k) {
+    if (continued[k] >= 0)
+      planes->Vote((*features)[k].plane, predicted[static_cast<std::size_t>(continued[k])].plane);
+  }
+  for (std::size_t k = 0; k < features->size(); ++k) {
+    Feature& feature = (*features)[k];
+    feature.plane = planes->Name(feature.plane);
+    if (continued[k] >= 0) {
+      Continue(predicted[static_cast<std::size_t>(continued[k])], &feature);
+    } else {
+      feature.id = letter + std::to_string((*number)++);
+    }
+  }
+}
+
+bool IsAxis(const PencilObservation& pencil) {
+  return pencil.direction == PencilDirection::kX || pencil.direction == PencilDirection::kY;
+}
+
+// The axes of the world are those of the first pencils that had such a role: what is new has one
+// only beside one of these, and not that of a pencil that goes on.
+void SettleRoles(const Observations& predicted, NextNames* next, Observations* detected) {
+  const auto goes_on = [&](const PencilObservation& p) { return FindPencil(predicted, p.id) >= 0; };
+  const auto is_old_axis = [&](const PencilObservation& p) { return goes_on(p) && IsAxis(p); };
+  const bool has_old_axis =
+      std::any_of(detected->pencils.begin(), detected->pencils.end(), is_old_axis);
+  for (PencilObservation& pencil : detected->pencils) {
+    if (goes_on(pencil)) continue;
+    const bool has_rival = std::any_of(
+        detected->pencils.begin(), detected->pencils.end(), [&](const PencilObservation& other) {
+          return goes_on(other) && other.direction == pencil.direction;
+        });
+    if (has_rival || (IsAxis(pencil) && next->has_axes && !has_old_axis))
+      pencil.direction = PencilDirection::kFree;
+  }
+  next->has_axes =
+      next->has_axes || std::any_of(detected->pencils.begin(), detected->pencils.end(), IsAxis);
+}
+
+template <typename Feature, typename Find>
+void OldOnesFirst(const Find& find, std::vector<Feature>* features) {
+  std::stable_sort(features->begin(), features->end(), [&](const Feature& a, const Feature& b) {
+    const auto i = static_cast<unsigned>(find(a.id)), k = static_cast<unsigned>(find(b.id));
+    return i < k;  // -1, not there before, is the largest.
+  });
+}
+
+}  // namespace
+
+int KeepNames(const Observations& predicted, double search_px, NextNames* next,
+              Observations* detected) {
+  std::vector<int> circles = AssignCircles(predicted, *detected, search_px);
+  std::vector<int> pencils = AssignPencils(predicted, *detected, search_px);
+  const auto goes_on = [](int i) { return i >= 0; };
+  auto kept = std::count_if(circles.begin(), circles.end(), goes_on) +
+              std::count_if(pencils.begin(), pencils.end(), goes_on);
+  const std::size_t fewer = std::min(predicted.circles.size() + predicted.pencils.size(),
+                                     circles.size() + pencils.size());
+  if (static_cast<double>(kept) < kMinKept * static_cast<double>(fewer)) {
+    std::fill(circles.begin(), circles.end(), -1);
+    std::fill(pencils.begin(), pencils.end(), -1);
+    kept = 0;
+  }
+  PlaneNames planes(next);
+  NameFeatures(predicted.circles, circles, "c", &next->circle, &planes, &detected->circles);
+  NameFeatures(predicted.pencils, pencils, "L", &next->pencil, &planes, &detected->pencils);
+  if (kept == 0) next->has_axes = false;  // Another world, if any.
+  SettleRoles(predicted, next, detected);
+  OldOnesFirst([&](const std::string& id) { return FindCircle(predicted, id); },
+               &detected->circles);
+  OldOnesFirst([&](const std::string& id) { return FindPencil(predicted, id); },
+               &detected->pencils);
+  const std::string& plane = predicted.frame.plane;
+  const auto is_on_plane = [&](const auto& f) { return f.plane == plane; };
+  const bool has_plane =
+      !plane.empty() &&
+      (std::any_of(detected->circles.begin(), detected->circles.end(), is_on_plane) ||
+       std::any_of(detected->pencils.begin(), detected->pencils.end(), is_on_plane));
+  detected->frame.plane = has_plane ? plane : planes.Name(detected->frame.plane);
+  return static_cast<int>(kept);
+}
+
+}  // namespace circline
