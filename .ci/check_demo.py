@@ -114,6 +114,22 @@ def check_calibration(side, focal_px, percent, point_px):
     check(f'calibration {side}: principal point within {point_px} px', point <= point_px, f'{point:.1f} px')
 
 
+def check_track():
+    lines = results('track')
+    frames = len(os.listdir(os.path.join(DEMO, 'track', 'frames')))
+    check('track: a line a frame', len(lines) == frames, f'{len(lines)} of {frames}')
+    seen = sum(line['status'] == 'ok' and not line['predicted_only'] for line in lines)
+    check('track: frames that are seen', seen >= 0.95 * frames, f'{seen} of {frames}')
+    sure = sum(line['probability'] is not None and line['probability'] >= 0.95 for line in lines[30:])
+    check('track: sure after thirty frames', sure >= 0.95 * (frames - 30), f'{sure} of {frames - 30}')
+    check('track: begins once', sum(line['reinitialized'] for line in lines) == 1,
+          sum(line['reinitialized'] for line in lines))
+    out = os.path.join(DEMO, 'track', 'out')
+    missing = [f for f in ('trajectory.txt', 'report.html', 'overlays.mp4') if not os.path.exists(os.path.join(out, f))]
+    check('track: files', not missing, 'missing: ' + ', '.join(missing) if missing else 'all there')
+
+
+check_track()
 for scene in ('chessboard', 'disc', 'box', 'dots'):
     check_files(scene)
     check_lines(scene)

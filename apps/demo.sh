@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Shows circline on real photographs, on Debian 12: installs the packages that are missing, builds in
 # build/release, fetches the photographs (they come with two Debian packages), runs circline_compare
-# on the four sets described in apps/demo/*.yaml, circline_reconstruct on one photograph and
-# circline_calibrate on photographs of which nothing is known. The results are in build/demo.
+# on the four sets described in apps/demo/*.yaml, circline_reconstruct on one photograph,
+# circline_track on a hundred frames of a video and circline_calibrate on photographs of which nothing
+# is known. The results are in build/demo.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/setup.sh
@@ -27,8 +28,27 @@ compare() {
   build/release/bin/circline_compare --scene="$dir/scene.yaml" --output="$dir/out"
 }
 
+# track <folder>: the first hundred frames of a video in which a camera moves about the disc's plate.
+track() {
+  local dir=build/demo/track file
+  mkdir -p "$dir/frames"
+  for file in "$1"/image.00*; do
+    case $file in
+      *.gz) gunzip -c "$file" > "$dir/frames/$(basename "$file" .gz)" ;;
+      *) cp "$file" "$dir/frames" ;;
+    esac
+  done
+  # The camera of apps/demo/disc.yaml, as OpenCV's calibration files have it.
+  { echo '%YAML:1.0'; echo '---'
+    sed -n '/id: "cam0"/,/}/p' apps/demo/disc.yaml | tr -d '\n' |
+      sed -E 's/.*width: ([0-9]+), height: ([0-9]+),/image_width: \1\nimage_height: \2\n/; s/ *(camera_matrix: [^]]*]), */\1\n/; s/ *distortion(: [^]]*]).*/distortion_coefficients\1\n/'
+  } > "$dir/camera.yml"
+  build/release/bin/circline_track --images="$dir/frames/*.pgm" --camera="$dir/camera.yml" \
+    --output="$dir/out" --video_out=overlays.mp4
+}
+
 install_packages "${BUILD_PACKAGES[@]}"
-build release circline_compare circline_reconstruct circline_calibrate
+build release circline_compare circline_reconstruct circline_calibrate circline_track
 
 find_folder opencv-doc /usr/share/doc/opencv-doc/examples/data
 compare chessboard "$found"
@@ -36,6 +56,10 @@ find_folder visp-images-data /usr/share/visp-images-data/ViSP-images
 compare disc "$found/mire-2"
 compare box "$found/mire-2"
 compare dots "$found/calibration"
+
+echo
+say "track: a hundred frames about the disc, everything detected and followed"
+track "$found/mire-2"
 
 echo
 say "disc: a model of the plate, with measurements, from one photograph"
@@ -57,6 +81,7 @@ say "the reports, with a picture of every photograph:"
 for set in chessboard disc box dots; do
   echo "  $PWD/build/demo/$set/out/report.html"
 done
+echo "  $PWD/build/demo/track/out/report.html"
 for side in left right; do
   echo "  $PWD/build/demo/calibration/$side/report.html"
 done

@@ -14,7 +14,7 @@ circline_find(Ceres libceres-dev 2.1 CONFIG)
 circline_find(OpenCV libopencv-dev 4.6 CONFIG COMPONENTS core imgproc)
 
 if(CIRCLINE_BUILD_APPS OR CIRCLINE_BUILD_BENCHMARKS)
-  circline_find(OpenCV libopencv-dev 4.6 CONFIG COMPONENTS core imgproc imgcodecs)
+  circline_find(OpenCV libopencv-dev 4.6 CONFIG COMPONENTS core imgproc imgcodecs videoio)
 endif()
 if(CIRCLINE_BUILD_APPS OR CIRCLINE_BUILD_TESTS)
   circline_find(Threads libc6-dev)

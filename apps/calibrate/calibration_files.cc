@@ -125,7 +125,7 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
     json["images"].push_back(PhotoJson(photo, names[i]));
     if (!photo.status.ok()) continue;
     colmap->Add({names[i], i, adjusted.cameras[static_cast<std::size_t>(photo.camera)].camera,
-                 photo.cam_from_world.rotation, photo.cam_from_world.translation});
+                 photo.cam_from_world.rotation, photo.cam_from_world.translation, std::nullopt});
   }
   json["notes"] = adjusted.notes;
   if (status.ok())

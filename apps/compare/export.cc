@@ -39,7 +39,7 @@ Status WriteExports(const std::string& folder, const std::vector<std::string>& f
     num_metric += best.metric ? 1 : 0;
     for (const auto& exporter : exporters) {
       exporter->Add({record.name, record.index, Refocused(record.camera, best.focal_scale),
-                     best.rotation, best.translation});
+                     best.rotation, best.translation, std::nullopt});
     }
   }
   for (const auto& exporter : exporters) {

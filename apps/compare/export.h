@@ -3,6 +3,7 @@
 #define CIRCLINE_APPS_COMPARE_EXPORT_H_
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct ExportedPose {
   Camera camera;  // Of the refined focal length, where that was refined.
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation;
+  std::optional<double> time_s;  // Where it is known otherwise than by the name.
 };
 
 class Exporter {
@@ -35,8 +37,8 @@ std::unique_ptr<Exporter> MakeColmapExporter(const std::string& folder);
 // cameras.gltf: a glTF 2.0 scene with a camera for each photo, upright in programs whose Z is up.
 // It has no place for lens distortion and the principal point.
 std::unique_ptr<Exporter> MakeGltfExporter(const std::string& folder);
-// trajectory.txt: lines "time tx ty tz qx qy qz qw", world from camera. The time is the photo's
-// name where that is a number, else its position in the set.
+// trajectory.txt: lines "time tx ty tz qx qy qz qw", world from camera. The time is
+// time_s, else the photo's name where that is a number, else its position in the set.
 std::unique_ptr<Exporter> MakeTumExporter(const std::string& folder);
 
 // Writes the answer to show of every photo that has one; `formats` are colmap, gltf, tum. `notes`:

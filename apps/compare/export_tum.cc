@@ -21,9 +21,11 @@ class TumExporter : public Exporter {
     double time = 0.0;
     const Eigen::Vector3d center = -(pose.rotation.transpose() * pose.translation);
     const Eigen::Quaterniond q(pose.rotation.transpose().eval());
-    lines_ << (ParseDouble(stem, &time) ? stem : std::to_string(pose.index)) << " " << center.x()
-           << " " << center.y() << " " << center.z() << " " << q.x() << " " << q.y() << " " << q.z()
-           << " " << q.w() << "\n";
+    lines_ << (pose.time_s                ? FormatFixed(*pose.time_s, 6)
+               : ParseDouble(stem, &time) ? stem
+                                          : std::to_string(pose.index))
+           << " " << center.x() << " " << center.y() << " " << center.z() << " " << q.x() << " "
+           << q.y() << " " << q.z() << " " << q.w() << "\n";
   }
 
   Status Finish() override { return WriteFile(folder_ + "/trajectory.txt", lines_.str()); }

@@ -42,20 +42,6 @@ void TakeOverFrame(const Observations& scene, Observations* detected) {
   }
 }
 
-// Of the circle whose image has the longest axis.
-void SetLargestRadius(double radius, Observations* observations) {
-  if (!(radius > 0.0)) return;
-  CircleObservation* largest = nullptr;
-  double longest = 0.0;
-  for (CircleObservation& circle : observations->circles) {
-    PixelEllipse pixel;
-    if (!FitPixelEllipse(circle, &pixel) || pixel.ellipse.a <= longest) continue;
-    longest = pixel.ellipse.a;
-    largest = &circle;
-  }
-  if (largest != nullptr) largest->radius = radius;
-}
-
 void DetectAll(const CompareOptions& options, ImageRun* run) {
   const Stopwatch watch;
   const Status status = DetectObservations(run->photo, run->image->observations.camera,
@@ -148,20 +134,22 @@ CompareOptions WithCamera(CompareOptions options, const SceneImage& image) {
   return options;
 }
 
-void ReadAndObserve(const CompareOptions& options, SceneImage* scene_image, ImageRun* run) {
-  const SceneImage& image = *scene_image;
-  const bool needs_photo = options.overlays || image.detect_everything || !image.rois.empty();
-  if (needs_photo) {
-    const Stopwatch watch;
-    run->read_error = ReadPhoto(image.path, &run->photo);
-    run->stages.emplace_back("read", watch.Microseconds());
-    if (run->read_error.empty() && options.inputs.guess.given()) {
-      scene_image->observations.camera =
-          options.inputs.guess.ForPhoto(run->photo.cols, run->photo.rows);
-    }
-    if (run->read_error.empty()) run->read_error = SizeError(run->photo, image.observations.camera);
+void ObserveRead(const CompareOptions& options, SceneImage* image, ImageRun* run) {
+  if (!run->photo.empty()) {
+    if (options.inputs.guess.given())
+      image->observations.camera = options.inputs.guess.ForPhoto(run->photo.cols, run->photo.rows);
+    run->read_error = SizeError(run->photo, image->observations.camera);
   }
   if (run->read_error.empty()) Observe(options, run);
+}
+
+void ReadAndObserve(const CompareOptions& options, SceneImage* image, ImageRun* run) {
+  if (options.overlays || image->detect_everything || !image->rois.empty()) {
+    const Stopwatch watch;
+    run->read_error = ReadPhoto(image->path, &run->photo);
+    run->stages.emplace_back("read", watch.Microseconds());
+  }
+  if (run->read_error.empty()) ObserveRead(options, image, run);
 }
 
 void RunSolvers(const CompareOptions& options, const SolverSet& solvers, ImageRun* run) {
@@ -177,6 +165,20 @@ void RunSolvers(const CompareOptions& options, const SolverSet& solvers, ImageRu
 }
 
 }  // namespace
+
+int SetLargestRadius(double radius, Observations* observations) {
+  if (!(radius > 0.0)) return -1;
+  int largest = -1;
+  double longest = 0.0;
+  for (std::size_t i = 0; i < observations->circles.size(); ++i) {
+    PixelEllipse pixel;
+    if (!FitPixelEllipse(observations->circles[i], &pixel) || pixel.ellipse.a <= longest) continue;
+    longest = pixel.ellipse.a;
+    largest = static_cast<int>(i);
+  }
+  if (largest >= 0) observations->circles[static_cast<std::size_t>(largest)].radius = radius;
+  return largest;
+}
 
 CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image) {
   const CameraSigma common = options.camera_sigma.value_or(options.noise_model.camera);
@@ -224,6 +226,13 @@ ImageRun Guarded(SceneImage* image, const std::function<void(ImageRun*)>& work) 
 
 ImageRun ObserveImage(const CompareOptions& options, SceneImage* image) {
   return Guarded(image, [&](ImageRun* run) { ReadAndObserve(options, image, run); });
+}
+
+ImageRun ObservePhoto(const CompareOptions& options, const cv::Mat& photo, SceneImage* image) {
+  return Guarded(image, [&](ImageRun* run) {
+    run->photo = photo;
+    ObserveRead(options, image, run);
+  });
 }
 
 ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image) {

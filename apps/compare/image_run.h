@@ -80,6 +80,12 @@ CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& im
 // the photo.
 ImageRun ObserveImage(const CompareOptions& options, SceneImage* image);
 
+// The same of a photo that is at hand; it may be empty where nothing is to be detected in it.
+ImageRun ObservePhoto(const CompareOptions& options, const cv::Mat& photo, SceneImage* image);
+
+// Gives it to the circle whose image has the longest axis, whose index is returned; -1: to none.
+int SetLargestRadius(double radius, Observations* observations);
+
 // The same, and all solvers, which outlive the result.
 ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image);
 

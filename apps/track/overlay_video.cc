@@ -1,0 +1,51 @@
+#include "apps/track/overlay_video.h"
+
+#include <filesystem>
+#include <opencv2/imgproc.hpp>
+
+namespace circline::apps {
+namespace {
+
+bool IsAvi(const std::string& path) { return std::filesystem::path(path).extension() == ".avi"; }
+
+}  // namespace
+
+OverlayVideo::OverlayVideo(const std::string& folder, const std::string& name, double fps)
+    : path_(folder + "/" + name), temporary_path_(folder + "/part." + name), fps_(fps) {}
+
+OverlayVideo::~OverlayVideo() {
+  if (committed_ || !writer_.isOpened()) return;
+  writer_.release();
+  std::error_code ignored;
+  std::filesystem::remove(temporary_path_, ignored);
+}
+
+Status OverlayVideo::Add(const cv::Mat& picture) {
+  try {
+    if (!writer_.isOpened()) {
+      // Encoders take even sizes only.
+      size_ = cv::Size(picture.cols & ~1, picture.rows & ~1);
+      const int codec = IsAvi(path_) ? cv::VideoWriter::fourcc('M', 'J', 'P', 'G')
+                                     : cv::VideoWriter::fourcc('m', 'p', '4', 'v');
+      if (!writer_.open(temporary_path_, codec, fps_, size_))
+        return Status::Failed(path_ + " cannot be written: OpenCV has no encoder for it here");
+    }
+    cv::Mat frame = picture;
+    if (frame.size() != size_) cv::resize(picture, frame, size_, 0.0, 0.0, cv::INTER_AREA);
+    writer_.write(frame);
+  } catch (const std::exception& error) {
+    return Status::Failed(path_ + " cannot be written: " + error.what());
+  }
+  return Status::Ok();
+}
+
+Status OverlayVideo::Commit() {
+  if (!writer_.isOpened()) return Status::Ok();
+  writer_.release();
+  committed_ = true;
+  std::error_code error;
+  std::filesystem::rename(temporary_path_, path_, error);
+  return error ? Status::Failed(path_ + ": " + error.message()) : Status::Ok();
+}
+
+}  // namespace circline::apps

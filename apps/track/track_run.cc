@@ -1,0 +1,205 @@
+#include "apps/track/track_run.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "apps/common/flags_util.h"
+#include "apps/common/output_file.h"
+#include "apps/common/progress.h"
+#include "apps/compare/encode.h"
+#include "apps/compare/export.h"
+#include "apps/compare/overlay.h"
+#include "apps/compare/record_files.h"
+#include "apps/compare/results.h"
+#include "apps/track/frame_observer.h"
+#include "apps/track/overlay_video.h"
+#include "apps/track/rotation_nees.h"
+
+namespace circline::apps {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kSolver = "track";
+
+// One line a frame: that of the best hypothesis, with what only a track has.
+std::string TrackLine(const std::string& best_line, const Frame& frame, const TrackedPose& pose,
+                      bool cold) {
+  Json line = Json::parse(best_line);
+  line["frame"] = frame.index;
+  line["time_s"] = frame.time_s;
+  line["reinitialized"] = pose.reinitialized;
+  line["predicted_only"] = pose.predicted_only;
+  line["cold"] = cold;
+  line["num_hypotheses"] = pose.estimate.hypotheses.size();
+  line["hypotheses"] = Json::array();
+  for (const PoseHypothesis& h : pose.estimate.hypotheses) {
+    const Eigen::Matrix3d by_rows = h.cam_from_world.rotation.transpose();
+    const Eigen::Vector3d& t = h.cam_from_world.translation;
+    line["hypotheses"].push_back(
+        {{"probability", h.probability},
+         {"rotation", std::vector<double>(by_rows.data(), by_rows.data() + 9)},
+         {"translation", {t.x(), t.y(), t.z()}}});
+  }
+  return line.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+class Track {
+ public:
+  Track(const TrackOptions& options, FrameSource* source)
+      : options_(options),
+        source_(*source),
+        observer_(options),
+        writer_(options.compare.output, {}),
+        trajectory_(MakeTumExporter(options.compare.output)) {
+    if (!options.video_out.empty())
+      video_.emplace(options.compare.output, options.video_out, source->fps());
+  }
+
+  Status Run(std::vector<TrackedFrame>* frames) {
+    Status status = writer_.Append({});  // Names a file that cannot be written before the work.
+    Progress progress("frames", source_.num_frames());
+    Frame frame;
+    while (status.ok() && source_.Next(&frame)) {
+      frames->emplace_back();
+      status = Work(&frame, &frames->back());
+      const TrackedFrame& done = frames->back();
+      if (!done.error.empty()) {
+        progress.Clear();
+        SayOnStderr(done.name + ": " + done.error);
+      }
+      if (source_.num_frames() > 0) progress.Advance();
+    }
+    if (status.ok()) status = trajectory_->Finish();
+    if (status.ok() && video_) status = video_->Commit();
+    return status;
+  }
+
+ private:
+  Status Work(Frame* frame, TrackedFrame* tracked) {
+    const std::optional<PoseHypothesis> expected =
+        tracker_ ? tracker_->Predict(frame->time_s) : std::nullopt;
+    ImageRun run =
+        observer_.Observe(last_ ? &*last_ : nullptr, expected ? &*expected : nullptr, frame);
+    TrackedPose pose = Update(*frame, &run);
+    Keep(*frame, run, pose, tracked);
+    const Status status = Draw(&run, tracked);
+    return status.ok() ? Write(*frame, run, pose, *tracked) : status;
+  }
+
+  // The frame's pose, and the run with it as its only answer.
+  TrackedPose Update(const Frame& frame, ImageRun* run) {
+    TrackedPose pose;
+    pose.timestamp_s = frame.time_s;
+    const Stopwatch watch;
+    if (run->read_error.empty()) {
+      if (!tracker_) {
+        TrackerOptions options = options_.tracker;
+        options.estimation.camera_sigma = CameraSigmaOf(options.estimation, frame.image);
+        tracker_.emplace(options);
+      }
+      if (observer_.was_cut()) tracker_->Reset();  // Another scene: another world.
+      pose = tracker_->Update(run->observations, frame.time_s);
+      if (pose.estimate.status.code == StatusCode::kInvalidArgument)
+        run->read_error = pose.estimate.status.message;  // Such as a time that runs backwards.
+    } else {
+      pose.estimate.status = Status::Failed(run->read_error);
+    }
+    // Where nothing was seen features are expected where they were: a prediction of predictions
+    // drifts off.
+    last_.reset();
+    if (!pose.estimate.hypotheses.empty() && !pose.predicted_only)
+      last_ = pose.estimate.hypotheses.front();
+    SolverRun solver;
+    solver.solver = kSolver;
+    solver.stage = SolverStage::kRefined;
+    solver.loss = &options_.compare.losses.front();
+    solver.microseconds = watch.Microseconds();
+    solver.estimate = pose.estimate;
+    for (const PoseHypothesis& hypothesis : pose.estimate.hypotheses)
+      solver.errors.push_back(ComparePose(hypothesis, *run->image));
+    run->solvers.push_back(std::move(solver));
+    return pose;
+  }
+
+  void Keep(const Frame& frame, const ImageRun& run, const TrackedPose& pose,
+            TrackedFrame* tracked) {
+    tracked->name = frame.image.name;
+    tracked->time_s = frame.time_s;
+    tracked->error = run.read_error;
+    tracked->message = pose.estimate.status.message;
+    tracked->reinitialized = pose.reinitialized;
+    tracked->predicted_only = pose.predicted_only;
+    tracked->cold = observer_.was_cold();
+    for (const auto& [stage, microseconds] : run.stages) tracked->observe_us += microseconds;
+    tracked->track_us = run.solvers.front().microseconds;
+    if (pose.estimate.hypotheses.empty()) return;
+    const PoseHypothesis& best = pose.estimate.hypotheses.front();
+    tracked->has_pose = true;
+    for (const PoseHypothesis& h : pose.estimate.hypotheses)
+      tracked->probabilities.push_back(h.probability);
+    tracked->rotation = best.cam_from_world.rotation;
+    tracked->center = -(tracked->rotation.transpose() * best.cam_from_world.translation);
+    tracked->sigma_deg = SigmaNormalDeg(best);
+    tracked->error_deg = run.solvers.front().errors.front().Headline();
+    tracked->nees = RotationNees(best, frame.image);
+    ExportedPose exported;
+    exported.name = frame.image.name;
+    exported.index = frame.index;
+    exported.camera = run.observations.camera;
+    exported.rotation = best.cam_from_world.rotation;
+    exported.translation = best.cam_from_world.translation;
+    exported.time_s = frame.time_s;
+    trajectory_->Add(exported);
+  }
+
+  Status Draw(ImageRun* run, TrackedFrame* tracked) {
+    if (!options_.compare.overlays || !run->read_error.empty() || run->photo.empty())
+      return Status::Ok();
+    tracked->overlay = "overlays/" + run->image->stem + ".png";
+    const std::string path = options_.compare.output + "/" + tracked->overlay;
+    const Stopwatch watch;
+    try {
+      const cv::Mat picture = DrawOverlay(*run);
+      const std::vector<std::uint8_t> png = EncodePng(picture);
+      Status status = WriteFile(path, std::string(png.begin(), png.end()));
+      if (status.ok() && video_) status = video_->Add(picture);
+      run->stages.emplace_back("overlay", watch.Microseconds());
+      return status;
+    } catch (const std::exception& error) {  // Such as a picture too large for the memory.
+      return Status::Failed(path + " cannot be drawn: " + error.what());
+    }
+  }
+
+  Status Write(const Frame& frame, ImageRun& run, const TrackedPose& pose,
+               const TrackedFrame& tracked) {
+    SolverRun& solver = run.solvers.front();
+    if (solver.estimate.hypotheses.size() > 1) {
+      solver.estimate.hypotheses.resize(1);
+      solver.errors.resize(1);
+    }
+    ImageLines lines = WriteLines(run, tracked.overlay, options_.compare.unusual_flags,
+                                  options_.compare.fit.noise_model);
+    lines.results = TrackLine(lines.results, frame, pose, tracked.cold);
+    return writer_.Append(lines);
+  }
+
+  const TrackOptions& options_;
+  FrameSource& source_;
+  FrameObserver observer_;
+  std::optional<PoseTracker> tracker_;
+  std::optional<PoseHypothesis> last_;  // Of the frame before, if that saw it.
+  RecordWriter writer_;
+  std::unique_ptr<Exporter> trajectory_;
+  std::optional<OverlayVideo> video_;
+};
+
+}  // namespace
+
+Status RunTrack(const TrackOptions& options, FrameSource* source,
+                std::vector<TrackedFrame>* frames) {
+  return Track(options, source).Run(frames);
+}
+
+}  // namespace circline::apps
