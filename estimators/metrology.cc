@@ -55,11 +55,11 @@ CameraPose Moved(const CameraPose& pose, int parameter, double by) {
 }
 
 // Image points of pixels, and what a pixel is worth at each.
-bool Calibrate(const Camera& camera, double focal_scale, const std::vector<Vector2d>& pixels,
+bool Calibrate(const Camera& camera, double longer, const std::vector<Vector2d>& pixels,
                std::vector<CalibratedPoint>* points, std::vector<Vector3d>* x) {
   Camera scaled = camera;
-  scaled.fx *= focal_scale;
-  scaled.fy *= focal_scale;
+  scaled.fx *= longer;
+  scaled.fy *= longer;
   if (PixelsToCalibrated(scaled, pixels, points) > 0) return false;
   x->clear();
   for (const CalibratedPoint& p : *points) x->push_back(p.Homogeneous());
@@ -69,16 +69,14 @@ bool Calibrate(const Camera& camera, double focal_scale, const std::vector<Vecto
 // The value of `function` and its variance, by central differences along every pixel coordinate,
 // every parameter of the pose and the focal length. `subtract` tells how values are compared.
 bool Propagate(const PlaneFunction& function, double (*subtract)(double),
-               const PoseHypothesis& hypothesis, const Camera& camera,
+               const PoseHypothesis& hypothesis, const Camera& given,
                const std::vector<Vector2d>& pixels, double sigma_px, Measurement* result) {
   const CameraPose& pose = hypothesis.cam_from_world;
+  const Camera camera = CameraOf(hypothesis, given);
   std::vector<CalibratedPoint> points, unused;
   std::vector<Vector3d> x, x_high, x_low;
   Measurement m;
-  if (!Calibrate(camera, hypothesis.focal_scale, pixels, &points, &x) ||
-      !function(pose, x, &m.value)) {
-    return false;
-  }
+  if (!Calibrate(camera, 1.0, pixels, &points, &x) || !function(pose, x, &m.value)) return false;
   constexpr double kStepPx = 1e-3;
   double variance = 0.0, high, low;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -107,8 +105,8 @@ bool Propagate(const PlaneFunction& function, double (*subtract)(double),
   variance += gradient.dot(hypothesis.Covariance() * gradient);
   if (hypothesis.focal_sigma > 0.0) {
     const double h = kStep * hypothesis.focal_scale;
-    if (!Calibrate(camera, hypothesis.focal_scale + h, pixels, &unused, &x_high) ||
-        !Calibrate(camera, hypothesis.focal_scale - h, pixels, &unused, &x_low) ||
+    if (!Calibrate(camera, 1.0 + kStep, pixels, &unused, &x_high) ||
+        !Calibrate(camera, 1.0 - kStep, pixels, &unused, &x_low) ||
         !function(pose, x_high, &high) || !function(pose, x_low, &low)) {
       return false;
     }

@@ -40,10 +40,13 @@ struct Extent {
 }  // namespace
 
 Status CameraSigma::Validate() const {
+  if (doubtful_log_focal > 0.0 && !(log_focal > 0.0))
+    return Status::Invalid("camera.doubtful_log_focal takes a camera.log_focal that is positive");
   return NonNegative({{"camera.log_focal", log_focal},
                       {"camera.log_aspect", log_aspect},
                       {"camera.principal_point_px", principal_point_px},
-                      {"camera.k1", k1}});
+                      {"camera.k1", k1},
+                      {"camera.doubtful_log_focal", doubtful_log_focal}});
 }
 
 NoiseModel NoiseModel::Exact() {

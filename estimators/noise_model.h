@@ -11,6 +11,7 @@
 #define CIRCLINE_ESTIMATORS_NOISE_MODEL_H_
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -21,6 +22,8 @@ namespace circline {
 // Residuals within this many standard deviations are inliers: 99.8 % of a Gaussian's.
 constexpr double kInlierSigmas = 3.09;
 
+constexpr double kDoubtfulShare = 0.1;
+
 // How well a camera is known. Standard deviations; 0 = exact. The defaults are those of a good
 // calibration.
 struct CameraSigma {
@@ -28,8 +31,13 @@ struct CameraSigma {
   double log_aspect = 0.001;        // Of log (fy / fx).
   double principal_point_px = 1.0;  // Of each coordinate, pixels.
   double k1 = 0.0;                  // Of the first distortion coefficient.
+  // Of log f where the figure given is a placeholder, as one in ten (kDoubtfulShare) of those that
+  // cameras write into their photos is taken to be; 0: it is none.
+  double doubtful_log_focal = 0.0;
 
-  static CameraSigma Exact() { return {0.0, 0.0, 0.0, 0.0}; }
+  static CameraSigma Exact() { return {0.0, 0.0, 0.0, 0.0, 0.0}; }
+  // The wider of the two of log f: how far the focal length is to be looked for.
+  double LargestLogFocal() const { return std::max(log_focal, doubtful_log_focal); }
   Status Validate() const;
 };
 

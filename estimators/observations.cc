@@ -138,6 +138,8 @@ const char* PencilDirectionName(PencilDirection direction) {
 
 Status Observations::Validate() const {
   Status status = camera.Validate();
+  if (status.ok() && !NonNegative(stated_focal_px))
+    status = Status::Invalid("stated_focal_px must be 0 or more");
   std::set<std::string> circle_ids, pencil_ids;
   for (const CircleObservation& circle : circles) {
     if (status.ok()) status = ValidateCircle(circle);
@@ -155,6 +157,11 @@ Status Observations::Validate() const {
   if (status.ok()) status = ValidateFrame(*this);
   if (status.ok()) status = ValidateKnown(*this);
   return status;
+}
+
+double StatedLogFocal(const Observations& observations) {
+  const double stated = observations.stated_focal_px;
+  return stated > 0.0 ? std::log(stated / observations.camera.fx) : 0.0;
 }
 
 double LineSigma(const PencilObservation& pencil, const LineObservation& line) {

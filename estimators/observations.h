@@ -111,6 +111,9 @@ struct KnownLength {
 
 struct Observations {
   Camera camera;
+  // The focal length that is known beforehand, of fx, pixels, where `camera` has another, at which
+  // the photo's structure is likelier (DetectObservations); 0 = that of `camera`.
+  double stated_focal_px = 0.0;
   std::vector<CircleObservation> circles;
   std::vector<PencilObservation> pencils;
   FrameObservation frame;
@@ -124,6 +127,9 @@ struct Observations {
   // length.
   Status Validate() const;
 };
+
+// Logarithm of the focal length known beforehand, against that of `camera`.
+double StatedLogFocal(const Observations& observations);
 
 // Standard deviation of the points of a pencil's line: its own, else the pencil's; 0 = not known.
 double LineSigma(const PencilObservation& pencil, const LineObservation& line);

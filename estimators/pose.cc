@@ -7,6 +7,14 @@
 
 namespace circline {
 
+Camera CameraOf(const PoseHypothesis& hypothesis, const Camera& given) {
+  Camera camera = hypothesis.camera.value_or(given);
+  if (hypothesis.camera) return camera;
+  camera.fx *= hypothesis.focal_scale;
+  camera.fy *= hypothesis.focal_scale;
+  return camera;
+}
+
 Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
   m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;

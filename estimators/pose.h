@@ -4,9 +4,11 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/status.h"
 
@@ -52,6 +54,8 @@ struct PoseHypothesis {
   // deviation of that, and its covariance with [delta, delta_t]. Else 1 and 0.
   double focal_scale = 1.0, focal_sigma = 0.0;
   std::array<double, 6> focal_covariance{};
+  // The camera that it sees through, where that was refined; see CameraOf.
+  std::optional<Camera> camera;
   // Features that contradict the rest and have no part in it: "c1", "kerbs[3]" for the fourth line
   // of a pencil, "c1.center", "length[0]"; a pencil's id: its tie to its axis.
   std::vector<std::string> left_out;
@@ -79,6 +83,9 @@ struct PoseEstimate {
   std::string decided_by;  // Which evidence tells the first hypothesis from the others, in words.
   std::vector<std::string> notes;  // Evidence left out, and why; what was found on the way.
 };
+
+// The camera that the hypothesis sees through: its own, else the one given with its focal scale.
+Camera CameraOf(const PoseHypothesis& hypothesis, const Camera& given);
 
 // Sorts by posterior, proportional to exp(-cost) sqrt(det covariance), and fills the probabilities.
 // Those that tie with the best (odds below 11 to 10) keep the order in which they came.

@@ -53,7 +53,9 @@ struct EstimationOptions {
   NoiseModel noise_model;
   // How well the camera is known; none = noise_model.camera. Where log_focal is 0.01 or more the
   // camera is estimated too (focal length and whatever else has a sigma), from several starts where
-  // it is 0.1 or more; below, it stays as given and its uncertainty is counted in the pose's.
+  // it is 0.1 or more; below, it stays as given and its uncertainty is counted in the pose's. The
+  // prior is about Observations::stated_focal_px. Where the posterior has several humps in it each
+  // is a hypothesis.
   std::optional<CameraSigma> camera_sigma;
   std::optional<PosePrior> pose_prior;
   std::optional<GravityPrior> gravity_prior;

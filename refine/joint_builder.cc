@@ -9,6 +9,7 @@
 
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/manifolds.h"
+#include "circline/refine/mostly_exact.h"
 
 namespace circline {
 namespace {
@@ -78,7 +79,7 @@ void JointProblemBuilder::Build() {
   sigmas[2] = sigmas[3] = sigma.principal_point_px;
   sigmas[4] = has_distortion ? sigma.k1 : 0.0;
   has_camera_ = std::any_of(sigmas.begin(), sigmas.end(), [](double s) { return s > 0.0; });
-  p_.camera_is_estimated_ = sigma.log_focal >= kEstimatedFocal;
+  p_.camera_is_estimated_ = sigma.LargestLogFocal() >= kEstimatedFocal;
 
   AddBlock(4, {0.0, 0.0, 0.0, 1.0});
   AddBlock(3, {0.0, 0.0, 1.0});
@@ -92,8 +93,7 @@ void JointProblemBuilder::Build() {
   AddBlock(kCameraSize, std::vector<double>(kCameraSize, 0.0), std::move(manifold),
            !p_.camera_is_estimated_);
   if (p_.camera_is_estimated_) {
-    AddTerm(std::unique_ptr<ceres::CostFunction>(NewGaussianPrior(sigmas)),
-            {JointProblem::kCamera});
+    AddCameraPrior(sigmas);
   }
   AddOrigin();
   for (std::size_t i = 0; i < obs_.circles.size(); ++i) AddCircle(i);
@@ -107,6 +107,27 @@ void JointProblemBuilder::Build() {
   p_.blocks_[JointProblem::kRotation].manifold =
       p_.manifolds_.emplace_back(std::make_unique<WorldRotationManifold>(p_.x_is_fixed_ ? 3 : 2))
           .get();
+}
+
+// Of the shifts of the camera, but that the focal length may be doubtful.
+void JointProblemBuilder::AddCameraPrior(std::vector<double> sigmas) {
+  const auto add = [this](const std::vector<double>& gaussian) {
+    std::vector<double> mean(kCameraSize, 0.0);
+    mean[0] = StatedLogFocal(obs_);
+    AddTerm(std::unique_ptr<ceres::CostFunction>(NewGaussianPrior(gaussian, mean)),
+            {JointProblem::kCamera});
+  };
+  const double narrow = sigmas[0], wide = p_.camera_sigma_.doubtful_log_focal;
+  if (wide > narrow) {
+    std::vector<double> focal(kCameraSize, 0.0);
+    focal[0] = wide;
+    sigmas[0] = 0.0;
+    add(focal);
+    p_.terms_.back().loss =
+        std::make_unique<TwoGaussians>(1.0 - kDoubtfulShare, narrow / wide, 1.0);
+    p_.terms_.back().is_mostly_exact = false;
+  }
+  add(sigmas);
 }
 
 void JointProblemBuilder::AddAngle(std::size_t index) {

@@ -57,6 +57,7 @@ class JointProblemBuilder {
   void AddAxisLine(const LineObservation& line, double sigma_px, int axis, const std::string& id,
                    const std::string& name);
   void AddDrawnAxis(const std::optional<Segment>& axis, int which);
+  void AddCameraPrior(std::vector<double> sigmas);
   void AddAngle(std::size_t index);
   void AddLength(std::size_t index);
   void AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block, int feature, int group);

@@ -66,8 +66,10 @@ struct Term {
   int feature = -1;                // -1: always there.
   int group = -1;                  // Of the blocks that are nobody else's.
   FeatureCost* weighed = nullptr;  // The same, where it can be weighed anew.
-  // Of a prior that is mostly exact; its covariance is that of the residuals without it.
+  // Of a prior that is no Gaussian.
   std::unique_ptr<ceres::LossFunction> loss;
+  // The covariance is that of the residuals without the loss; else that which the loss makes of it.
+  bool is_mostly_exact = true;
 };
 
 // Where a refinement stands.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "circline/refine/block_chain.h"
+#include "circline/refine/camera_shifts.h"
 #include "circline/refine/linearization.h"
 
 namespace circline {
@@ -218,30 +219,59 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
   }
 }
 
+// Then the evidence alone tells a parameter no better than three times as badly as its prior does.
+constexpr double kPriorDecides = 0.95;
+
+// What of the camera beside the focal length the evidence could have told, and does not.
+void NoteWhatStays(const JointProblem& problem, const Linearization& at, Refined* refined) {
+  const CameraSigma& sigma = problem.camera_sigma();
+  constexpr double kWidePx = 5.0;  // What is known better needs no word.
+  int column = at.column(JointProblem::kCamera) + 1 + (sigma.log_aspect > 0.0 ? 1 : 0);
+  std::string stays;
+  const auto stays_at = [&](int k, double prior) {
+    return std::sqrt(at.covariance()(k, k)) >= kPriorDecides * prior;
+  };
+  if (sigma.principal_point_px > 0.0) {
+    const double prior = sigma.principal_point_px;
+    if (prior > kWidePx && stays_at(column, prior) && stays_at(column + 1, prior))
+      stays = "principal point";
+    column += 2;
+  }
+  const bool has_k1 = sigma.k1 > 0.0 && at.num_columns() > column;
+  if (has_k1 && stays_at(column, sigma.k1)) stays += stays.empty() ? "k1" : " and k1";
+  if (stays.empty()) return;
+  refined->notes.push_back("camera: the evidence cannot tell " + stays +
+                           ", the prior alone decides");
+}
+
 void FillFocal(const JointProblem& problem, const State& state, const Linearization& at,
                const Eigen::MatrixXd& T, Refined* refined) {
   if (!problem.camera_is_estimated()) return;
   PoseHypothesis* h = &refined->hypothesis;
   // The manifold leaves out what is held; the focal length comes first.
   const int column = at.column(JointProblem::kCamera);
-  h->focal_scale =
-      std::exp(state.x[static_cast<std::size_t>(problem.blocks()[JointProblem::kCamera].offset)]);
+  const double* shifts =
+      state.x.data() + problem.blocks()[static_cast<std::size_t>(JointProblem::kCamera)].offset;
+  h->camera = ShiftedCamera(problem.observations().camera, shifts);
+  h->focal_scale = std::exp(shifts[0]);
   h->focal_sigma = h->focal_scale * std::sqrt(std::max(0.0, at.covariance()(column, column)));
   Eigen::Map<Vector6d>(h->focal_covariance.data()) =
       h->focal_scale * T * at.covariance().col(column);
-  // Then the evidence alone tells it no better than three times as badly as the prior does.
-  constexpr double kPriorDecides = 0.95;
-  const double prior = problem.camera_sigma().log_focal;
-  const char* remark = "";
+  const CameraSigma& sigma = problem.camera_sigma();
+  const double off = shifts[0] - StatedLogFocal(problem.observations());
+  const bool is_doubted =
+      sigma.doubtful_log_focal > 0.0 && std::abs(off) > kInlierSigmas * sigma.log_focal;
+  const double prior = is_doubted ? sigma.doubtful_log_focal : sigma.log_focal;
+  const char* remark = is_doubted ? "; the figure given is a placeholder" : "";
   if (!(h->focal_sigma < kPriorDecides * prior * h->focal_scale)) {
-    remark = std::abs(std::log(h->focal_scale)) < prior
-                 ? "; the evidence cannot tell, the prior alone decides"
-                 : "; the evidence contradicts the prior but does not fix it";
+    remark = std::abs(off) < prior ? "; the evidence cannot tell, the prior alone decides"
+                                   : "; the evidence contradicts the prior but does not fix it";
   }
   char text[160];
   std::snprintf(text, sizeof(text), "focal length: %.4f times the camera's, +- %.4f%s",
-                h->focal_scale, h->focal_sigma, remark);
+                std::exp(off), std::exp(off) * h->focal_sigma / h->focal_scale, remark);
   refined->notes.push_back(text);
+  NoteWhatStays(problem, at, refined);
 }
 
 // In words, what a hypothesis leaves out.

@@ -134,19 +134,20 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
                                                   : -1 - (own_columns_[block] + c));
   }
   rows.twice_cost = rows.f.squaredNorm();
-  if (term.loss != nullptr && weighing.inliers_only) TakeLoss(*term.loss, &rows);
+  if (term.loss != nullptr && weighing.inliers_only) TakeLoss(term, &rows);
   AddRows(std::move(rows));
   return true;
 }
 
 // The loss counts its residuals W times as much as their variance of 1 asks for: the estimate has
 // the covariance A^-1 (A + (W^2 - W) J^T J) A^-1, A with W J^T J.
-void Linearization::TakeLoss(const ceres::LossFunction& loss, Rows* rows) {
+void Linearization::TakeLoss(const Term& term, Rows* rows) {
   double rho[3];
-  loss.Evaluate(rows->twice_cost, rho);
+  term.loss->Evaluate(rows->twice_cost, rho);
   const double W = std::max(1.0, rho[1]);
-  for (std::size_t a = 0; a < rows->columns.size(); ++a) {
-    for (std::size_t b = 0; b < rows->columns.size(); ++b) {
+  const std::size_t counted = term.is_mostly_exact ? rows->columns.size() : 0;
+  for (std::size_t a = 0; a < counted; ++a) {
+    for (std::size_t b = 0; b < counted; ++b) {
       const auto i = static_cast<Eigen::Index>(a), j = static_cast<Eigen::Index>(b);
       overcounted_(rows->columns[a], rows->columns[b]) +=
           (W * W - W) * rows->J.col(i).dot(rows->J.col(j));

@@ -60,7 +60,7 @@ class Linearization {
 
   void LayOut();
   bool AddTerm(const Term& term, const Weighing& weighing);
-  void TakeLoss(const ceres::LossFunction& loss, Rows* rows);
+  void TakeLoss(const Term& term, Rows* rows);
   void AddRows(Rows rows);
   bool EliminateGroups();
   const Eigen::MatrixXd& PlusJacobian(int block);  // Of the block's manifold, worked out once.

@@ -1,4 +1,4 @@
-// The prior of what is mostly exact. Internal: not installed.
+// Priors that are two Gaussians. Internal: not installed.
 #ifndef CIRCLINE_REFINE_MOSTLY_EXACT_H_
 #define CIRCLINE_REFINE_MOSTLY_EXACT_H_
 
@@ -8,24 +8,40 @@
 
 namespace circline {
 
+// The mixture of a narrow Gaussian, with its share, and a wide one; standard deviations in those of
+// the residual.
+class TwoGaussians : public ceres::LossFunction {
+ public:
+  TwoGaussians(double narrow_share, double narrow, double wide)
+      : steep_(1.0 / (narrow * narrow)),
+        flat_(1.0 / (wide * wide)),
+        narrow_peak_(narrow_share / narrow),
+        wide_peak_((1.0 - narrow_share) / wide) {}
+
+  void Evaluate(double s, double* rho) const override {
+    const double exact = narrow_peak_ * std::exp(-0.5 * (steep_ - flat_) * s);
+    const double sum = exact + wide_peak_, p = exact / sum;
+    rho[0] = flat_ * s - 2.0 * std::log(sum / (narrow_peak_ + wide_peak_));
+    rho[1] = flat_ + (steep_ - flat_) * p;
+    rho[2] = -0.5 * (steep_ - flat_) * (steep_ - flat_) * p * (1.0 - p);
+  }
+
+ private:
+  double steep_, flat_, narrow_peak_, wide_peak_;
+};
+
 // Most axes and lines, of boards and doors, are exact, most prints do not bleed; the walls of old
 // houses lean by a degree. Of a residual in standard deviations, the mixture of a Gaussian so many
 // times as narrow and one somewhat wider: where all are near, exact; where they contradict each
 // other, a compromise. The covariance is that of the residual's Gaussian all the same.
-class MostlyExact final : public ceres::LossFunction {
+class MostlyExact final : public TwoGaussians {
  public:
-  void Evaluate(double s, double* rho) const override {
-    constexpr double kNarrower = 8.0;  // Of 3, 6 and 8, on photographs of boards.
-    // Of 0.1 to 0.8, and 1 to 3, on streets (scene-lund, -more) and a bent sheet (robot10x10).
-    constexpr double kExact = 0.5, kWider = 1.5;
-    constexpr double kSteep = kNarrower * kNarrower, kFlat = 1.0 / (kWider * kWider);
-    constexpr double kWide = (1.0 - kExact) / kWider, kPeak = kExact * kNarrower;
-    const double exact = kPeak * std::exp(-0.5 * (kSteep - kFlat) * s), sum = exact + kWide;
-    const double p = exact / sum;
-    rho[0] = kFlat * s - 2.0 * std::log(sum / (kPeak + kWide));
-    rho[1] = kFlat + (kSteep - kFlat) * p;
-    rho[2] = -0.5 * (kSteep - kFlat) * (kSteep - kFlat) * p * (1.0 - p);
-  }
+  MostlyExact() : TwoGaussians(kExact, 1.0 / kNarrower, kWider) {}
+
+ private:
+  static constexpr double kNarrower = 8.0;  // Of 3, 6 and 8, on photographs of boards.
+  // Of 0.1 to 0.8, and 1 to 3, on streets (scene-lund, -more) and a bent sheet (robot10x10).
+  static constexpr double kExact = 0.5, kWider = 1.5;
 };
 
 }  // namespace circline

@@ -1,5 +1,6 @@
 #include "circline/refine/readings.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -78,15 +79,24 @@ std::vector<double> FocalStarts(const JointProblem& problem, const Observations&
   constexpr std::size_t kMostClosedForms = 3;
   constexpr double kReach = 3.0;       // Standard deviations of the prior.
   constexpr double kAnySigmaPx = 0.5;  // Every feature has its own.
-  const double sigma = problem.camera_sigma().log_focal;
+  const double sigma = problem.camera_sigma().LargestLogFocal();
+  const double mean = StatedLogFocal(resolved);
+  constexpr double kSameStart = 0.02;  // Near the camera's own, which is one in any case.
+  std::size_t num_closed_forms = 0;
   std::vector<double> starts;
-  for (const double start : kFocalStarts) starts.push_back(start * sigma);
+  if (resolved.stated_focal_px > 0.0) {  // The structure has been compared over the prior.
+    if (std::abs(mean) > kSameStart) starts.push_back(mean);
+  } else {
+    for (const double start : kFocalStarts) starts.push_back(start * sigma);
+  }
   NoiseModel noise = problem.options().noise_model;
   noise.camera = problem.camera_sigma();
   for (const FocalStart& start : FocalLengthStarts(resolved, kAnySigmaPx, noise)) {
     const double log_focal = std::log(start.focal_px / resolved.camera.fx);
-    if (starts.size() == std::size(kFocalStarts) + kMostClosedForms) break;
-    if (std::abs(log_focal) <= kReach * sigma) starts.push_back(log_focal);
+    if (num_closed_forms == kMostClosedForms) break;
+    if (std::abs(log_focal - mean) > kReach * sigma || std::abs(log_focal) <= kSameStart) continue;
+    starts.push_back(log_focal);
+    ++num_closed_forms;
   }
   return starts;
 }
@@ -125,7 +135,8 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
                            std::vector<std::string>* reasons) {
   std::vector<Seed> seeds = CollectSeeds(resolved, seeders, 0.0, reasons);
   AddSecondDirections(resolved, seeders, &seeds);
-  if (!problem.camera_is_estimated() || problem.camera_sigma().log_focal < kWideFocal) return seeds;
+  if (!problem.camera_is_estimated() || problem.camera_sigma().LargestLogFocal() < kWideFocal)
+    return seeds;
   for (const double start : FocalStarts(problem, resolved)) {
     std::vector<std::string> unused;
     const std::vector<Seed> more =
@@ -187,6 +198,21 @@ bool IsSameMinimum(const JointProblem& problem, const Refined& a, const Refined&
   return IsSamePose(problem, a.state, b.state, tolerance);
 }
 
+// Where the focal length is an unknown the posterior can be so flat that refinements stop at many
+// places: those within a standard deviation of each other are one.
+bool IsSameHump(const PoseHypothesis& a, const PoseHypothesis& b) {
+  if (!(a.focal_sigma > 0.0) || !(b.focal_sigma > 0.0) || a.structure != b.structure) return false;
+  const double sigma = std::min(a.focal_sigma / a.focal_scale, b.focal_sigma / b.focal_scale);
+  if (!(std::abs(std::log(a.focal_scale / b.focal_scale)) <= sigma)) return false;
+  const Eigen::Matrix3d &A = a.cam_from_world.rotation, &B = b.cam_from_world.rotation;
+  // Of a rotation that is free about the normal the normals are compared.
+  const Eigen::Vector3d turn = a.RotationIsFree() ? Eigen::Vector3d(A.col(2).cross(B.col(2)))
+                                                  : LogRotation(A * B.transpose());
+  const Eigen::Vector3d variance =
+      a.Covariance().diagonal().head<3>().cwiseMin(b.Covariance().diagonal().head<3>());
+  return (turn.array().square() <= variance.array()).all();
+}
+
 // Hypotheses of all minima that compete, ranked.
 Status FillHypotheses(const JointProblem& problem, const std::vector<State>& minima,
                       PoseEstimate* estimate) {
@@ -206,7 +232,15 @@ Status FillHypotheses(const JointProblem& problem, const std::vector<State>& min
     const bool known = std::any_of(all.begin(), all.end(), [&](const Refined& r) {
       return IsSameMinimum(problem, r, refined);
     });
-    if (!known) all.push_back(std::move(refined));
+    if (known) continue;
+    const auto hump = std::find_if(all.begin(), all.end(), [&](const Refined& r) {
+      return IsSameHump(r.hypothesis, refined.hypothesis);
+    });
+    if (hump == all.end()) {
+      all.push_back(std::move(refined));
+    } else if (refined.hypothesis.cost < hump->hypothesis.cost) {
+      *hump = std::move(refined);
+    }
   }
   if (all.empty()) return last;
   const auto cheapest = std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {

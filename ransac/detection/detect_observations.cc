@@ -12,6 +12,7 @@
 #include "circline/ransac/detection/edges.h"
 #include "circline/ransac/detection/ellipse_evidence.h"
 #include "circline/ransac/detection/observe_evidence.h"
+#include "circline/ransac/detection/structure_focal.h"
 
 namespace circline {
 namespace {
@@ -38,16 +39,10 @@ std::vector<CircleEvidence> MakeCircles(const EdgeMap& edges,
   return circles;
 }
 
-Status CollectEvidence(const cv::Mat& image, const Camera& camera, const DetectionOptions& options,
+Status CollectEvidence(const EdgeMap& edges, const Camera& camera, const DetectionOptions& options,
                        PhotoEvidence* evidence) {
-  cv::Mat gray;
-  Status status = ToGray(image, &gray);
-  if (!status.ok()) return status;
-  EdgeMap edges;
-  status = DetectEdges(gray, EdgeOptions(), &edges);
-  if (!status.ok()) return status;
   std::vector<DetectedEllipse> ellipses;
-  status = DetectEllipses(edges, camera, ToEllipseOptions(options), &ellipses);
+  Status status = DetectEllipses(edges, camera, ToEllipseOptions(options), &ellipses);
   if (!status.ok()) return status;
   const std::vector<std::uint8_t> on_ellipses = EllipsePoints(edges, ellipses);
   evidence->num_ellipses = ellipses.size();
@@ -60,6 +55,39 @@ Status CollectEvidence(const cv::Mat& image, const Camera& camera, const Detecti
       DetectLines(edges, camera, line_options, &evidence->lines, &on_ellipses, &evidence->bent);
   if (!status.ok()) return status;
   UndoEdgeShift(edges, camera, &evidence->lines);
+  return Status::Ok();
+}
+
+// From such a standard deviation of log f on the structure of the photo has a say in it: below it
+// right angles are judged right.
+constexpr double kWideFocal = 0.1;
+
+// The camera at the focal length at which the photo's structure is likeliest, and the evidence seen
+// through that.
+Status MoveToLikeliestFocal(const EdgeMap& edges, const DetectionOptions& options,
+                            double diagonal_px, PhotoEvidence* evidence,
+                            Observations* observations) {
+  constexpr double kSame = 0.02;  // Of log f.
+  // Through a lens that bends what is straight, and for pencils, it takes a second look.
+  constexpr int kLooks = 2;
+  Camera& camera = observations->camera;
+  const double stated_px = observations->stated_focal_px = camera.fx;
+  for (int look = 0; look < kLooks; ++look) {
+    std::vector<DetectedPencil> pencils;
+    if (options.max_pencils > 0) {
+      const Status status = DetectPencilsApart(evidence->lines, options.max_pencils, options.seed,
+                                               &pencils, diagonal_px);
+      if (!status.ok()) return status;
+    }
+    const double moved = LikeliestLogFocal(*evidence, pencils, camera, options.noise_model.camera,
+                                           std::log(stated_px / camera.fx));
+    if (std::abs(moved) < kSame) break;
+    camera.fx *= std::exp(moved);
+    camera.fy *= std::exp(moved);
+    *evidence = PhotoEvidence();
+    const Status status = CollectEvidence(edges, camera, options, evidence);
+    if (!status.ok()) return status;
+  }
   return Status::Ok();
 }
 
@@ -89,10 +117,18 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   observations->camera = camera;
   Status status = CheckDetectionInput(image, camera, options);
   if (!status.ok()) return status;
-  PhotoEvidence evidence;
-  status = CollectEvidence(image, camera, options, &evidence);
+  cv::Mat gray;
+  status = ToGray(image, &gray);
   if (!status.ok()) return status;
-  return ObserveEvidence(options, DiagonalPx(image.cols, image.rows), &evidence, observations);
+  EdgeMap edges;
+  status = DetectEdges(gray, EdgeOptions(), &edges);
+  if (!status.ok()) return status;
+  PhotoEvidence evidence;
+  status = CollectEvidence(edges, camera, options, &evidence);
+  const double diagonal_px = DiagonalPx(image.cols, image.rows);
+  if (status.ok() && options.noise_model.camera.LargestLogFocal() >= kWideFocal)
+    status = MoveToLikeliestFocal(edges, options, diagonal_px, &evidence, observations);
+  return status.ok() ? ObserveEvidence(options, diagonal_px, &evidence, observations) : status;
 }
 
 Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::Rect& roi,

@@ -279,6 +279,28 @@ bool IsKnown(const DetectedPencil& pencil, const std::vector<DetectedPencil>& ot
 
 }  // namespace
 
+namespace {
+
+void LongestFirst(std::vector<DetectedPencil>* pencils) {
+  std::stable_sort(
+      pencils->begin(), pencils->end(),
+      [](const DetectedPencil& a, const DetectedPencil& b) { return a.support_px > b.support_px; });
+}
+
+}  // namespace
+
+Status DetectPencilsApart(const std::vector<DetectedLine>& lines, int max_pencils,
+                          std::uint64_t seed, std::vector<DetectedPencil>* pencils,
+                          double diagonal_px) {
+  pencils->clear();
+  const PencilOptions options = SearchOptions(max_pencils, seed);
+  const Status status = options.Validate();
+  if (!status.ok()) return status;
+  *pencils = Search(LineSet(lines, diagonal_px), options);
+  LongestFirst(pencils);
+  return Status::Ok();
+}
+
 Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, std::uint64_t seed,
                      std::vector<DetectedPencil>* pencils, double diagonal_px) {
   pencils->clear();
@@ -287,17 +309,14 @@ Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, st
   if (!status.ok()) return status;
   const LineSet set(lines, diagonal_px);
   *pencils = Search(set, options);
-  const auto longer = [](const DetectedPencil& a, const DetectedPencil& b) {
-    return a.support_px > b.support_px;
-  };
-  std::stable_sort(pencils->begin(), pencils->end(), longer);
+  LongestFirst(pencils);
   const std::size_t num_around = std::min(kMaxSearchedAround, pencils->size());
   for (std::size_t k = 0; k < num_around; ++k) {
     for (DetectedPencil& found : SearchAround(set, (*pencils)[k])) {
       if (!IsKnown(found, *pencils)) pencils->push_back(std::move(found));
     }
   }
-  std::stable_sort(pencils->begin(), pencils->end(), longer);
+  LongestFirst(pencils);
   return Status::Ok();
 }
 

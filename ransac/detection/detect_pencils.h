@@ -30,6 +30,11 @@ struct DetectedPencil {
 Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, std::uint64_t seed,
                      std::vector<DetectedPencil>* pencils, double diagonal_px = kUsualDiagonalPx);
 
+// The first half of that: without those around the longest, which are looked for at right angles.
+Status DetectPencilsApart(const std::vector<DetectedLine>& lines, int max_pencils,
+                          std::uint64_t seed, std::vector<DetectedPencil>* pencils,
+                          double diagonal_px = kUsualDiagonalPx);
+
 // Fits the pencil again, to all of lines[candidates] that share its direction within up to half a
 // degree (standard deviation, estimated): for lines that are known to be of one thing, whose sides
 // may bend or be badly printed. False, and nothing changed, where none do.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -215,6 +216,36 @@ TEST(FocalTest, OneCircleLeavesItToThePrior) {
   EXPECT_EQ(known.hypotheses[0].focal_sigma, 0.0);
   EXPECT_GT(estimate.hypotheses[0].Covariance().trace(),
             1.5 * known.hypotheses[0].Covariance().trace());
+}
+
+// A figure that one camera in ten invents: believed where nothing speaks against it, given up where
+// the evidence does, and then the answer is no surer than the evidence.
+TEST(FocalTest, DoubtfulFigureIsGivenUp) {
+  for (const double mistake : {1.0, 1.5}) {
+    PlaneScene scene(0.8, 0.2, 3);
+    Observations observations = Grid(&scene);
+    Mistake(mistake, &observations);
+    EstimationOptions options = WithFocal();
+    options.camera_sigma->log_focal = 0.05;
+    options.camera_sigma->doubtful_log_focal = 0.5;
+    const PoseEstimate doubted = EstimatePose(observations, options);
+    options.camera_sigma->log_focal = 0.5;
+    options.camera_sigma->doubtful_log_focal = 0.0;
+    const PoseEstimate open = EstimatePose(observations, options);
+    ASSERT_TRUE(doubted.status.ok() && open.status.ok());
+    const PoseHypothesis &best = doubted.hypotheses[0], &free = open.hypotheses[0];
+    EXPECT_NEAR(mistake * best.focal_scale, 1.0, 3.0 * free.focal_sigma) << mistake;
+    // Near the figure both speak, far from it the evidence alone.
+    const double precision =
+        1.0 / std::pow(free.focal_sigma / free.focal_scale, 2) + (mistake > 1.0 ? 0.0 : 400.0);
+    EXPECT_NEAR(best.focal_sigma / best.focal_scale, 1.0 / std::sqrt(precision),
+                0.05 / std::sqrt(precision))
+        << mistake;
+    const bool said = std::any_of(doubted.notes.begin(), doubted.notes.end(), [](const auto& note) {
+      return note.find("is a placeholder") != std::string::npos;
+    });
+    EXPECT_EQ(said, mistake > 1.0);
+  }
 }
 
 // Outliers do not keep it from being found.

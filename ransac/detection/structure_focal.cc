@@ -1,0 +1,259 @@
+#include "circline/ransac/detection/structure_focal.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "circline/estimators/conic.h"
+#include "circline/ransac/detection/circle_grid.h"
+#include "circline/ransac/detection/uncertain_direction.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// Steps of log focal length: a third of what a degree of a right angle is worth at 30 degrees of
+// tilt.
+constexpr double kStep = 0.02;
+constexpr double kLatticeStep = 0.15;
+// The prior is searched over so many of its standard deviations.
+constexpr double kReach = 2.5;
+// Half the longer side of the photo over the focal length: tangents of 5 and 60 degrees.
+constexpr double kNarrowest = 0.0874887, kWidest = 1.7320508;
+// More circles, and more pencils, add little but accidents.
+constexpr std::size_t kMaxCircles = 16, kMaxSeeds = 6, kMaxPencils = 4;
+// Of circles that are of the plane that most are of.
+constexpr double kPlaneShare = 0.5;
+// Errors of normals that no covariance knows (uncertain_direction.cc), radians.
+constexpr double kModelSigmaRad = 0.5 * 3.14159265358979323846 / 180.0;
+// Pencils nearer than this (a sine; 3 degrees) are one.
+constexpr double kDistinctSine = 0.0523;
+
+// Calibrated coordinates at another focal length: x' = A x.
+Vector3d Scale(double log_focal) {
+  const double s = std::exp(-log_focal);
+  return {s, s, 1.0};
+}
+
+UncertainDirection Refocused(const UncertainDirection& direction, const Vector3d& scale) {
+  UncertainDirection out;
+  const Vector3d moved = scale.cwiseProduct(direction.vector);
+  out.vector = moved.normalized();
+  const Matrix3d J = (Matrix3d::Identity() - out.vector * out.vector.transpose()) *
+                     scale.asDiagonal() / moved.norm();
+  out.covariance = J * direction.covariance * J.transpose();
+  return out;
+}
+
+ConicFit Refocused(const ConicFit& fit, const Vector3d& scale) {
+  const Matrix3d inverse = scale.cwiseInverse().asDiagonal();
+  ConicFit out = fit;
+  out.conic = inverse * fit.conic * inverse;
+  Matrix6d J;
+  for (int k = 0; k < 6; ++k)
+    J.col(k) = ConicToVector(inverse * VectorToConic(Vector6d::Unit(k)) * inverse);
+  Eigen::Map<Matrix6d>(out.covariance.data()) = J * fit.Covariance() * J.transpose();
+  return out;
+}
+
+// Covariance of the difference of two normals, across the first.
+Eigen::Matrix2d Across(const UncertainDirection& a, const UncertainDirection& b,
+                       Eigen::Vector2d* difference) {
+  Eigen::Matrix<double, 3, 2> tangent;
+  tangent.col(0) = a.vector.unitOrthogonal();
+  tangent.col(1) = a.vector.cross(tangent.col(0));
+  *difference = (a.vector.dot(b.vector) < 0.0 ? -1.0 : 1.0) * tangent.transpose() * b.vector;
+  return tangent.transpose() * (a.covariance + b.covariance) * tangent +
+         kModelSigmaRad * kModelSigmaRad * Eigen::Matrix2d::Identity();
+}
+
+// By how many standard deviations two normals are not those of one plane, squared.
+double Distance(const UncertainDirection& a, const UncertainDirection& b) {
+  Eigen::Vector2d difference;
+  const Eigen::Matrix2d covariance = Across(a, b, &difference);
+  return difference.dot(covariance.inverse() * difference);
+}
+
+// The normals that a circle can have.
+struct Normals {
+  std::array<UncertainDirection, 2> normals;
+  int count = 0;
+
+  // The nearest of them to that of a plane; null where there is none.
+  const UncertainDirection* Nearest(const UncertainDirection& plane, double* distance) const {
+    const UncertainDirection* nearest = nullptr;
+    for (int k = 0; k < count; ++k) {
+      const double d = Distance(plane, normals[static_cast<std::size_t>(k)]);
+      if (nearest != nullptr && !(d < *distance)) continue;
+      *distance = d;
+      nearest = &normals[static_cast<std::size_t>(k)];
+    }
+    return nearest;
+  }
+};
+
+class StructureEvidence {
+ public:
+  StructureEvidence(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
+                    const Camera& camera)
+      : camera_(camera) {
+    for (const CircleEvidence& circle : evidence.circles) {
+      conics_.push_back(&*circle.observation.fit);
+      Eigen::Vector2d unused;
+      // Of the hemisphere's 2 pi against the Gaussian's.
+      peaks_.push_back(
+          circle.num_normals > 0
+              ? 1.0 / std::sqrt(Across(circle.normals[0], circle.normals[0], &unused).determinant())
+              : 0.0);
+    }
+    for (const DetectedPencil& pencil : pencils) {
+      const UncertainDirection direction{pencil.observation.fit->direction,
+                                         pencil.observation.fit->covariance};
+      const bool is_new = std::none_of(directions_.begin(), directions_.end(), [&](const auto& d) {
+        return d.vector.cross(direction.vector).norm() < kDistinctSine;
+      });
+      if (is_new && directions_.size() < kMaxPencils) directions_.push_back(direction);
+    }
+  }
+
+  bool IsEmpty() const { return conics_.size() < 2 && directions_.size() < 2; }
+
+  // Logarithm of the evidence at a focal length, against that of no structure.
+  double At(double log_focal) {
+    const Vector3d scale = Scale(log_focal);
+    std::vector<UncertainDirection> directions;
+    for (const UncertainDirection& d : directions_) directions.push_back(Refocused(d, scale));
+    return RightAngles(directions) + Circles(log_focal, scale);
+  }
+
+ private:
+  static double RightAngles(const std::vector<UncertainDirection>& directions) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      for (std::size_t j = i + 1; j < directions.size(); ++j) {
+        sum += std::log(0.5 + 0.5 * std::exp(LogOddsOfRightAngle(directions[i], directions[j])));
+      }
+    }
+    return sum;
+  }
+
+  // Of the plane that explains most of them, and of the lattice that they have in it.
+  double Circles(double log_focal, const Vector3d& scale) {
+    if (conics_.size() < 2) return 0.0;
+    std::vector<Normals> all(std::min(conics_.size(), kMaxCircles));
+    for (std::size_t i = 0; i < all.size(); ++i)
+      all[i].count = CircleNormals(Refocused(*conics_[i], scale), &all[i].normals);
+    double best = 0.0;
+    UncertainDirection plane;
+    for (std::size_t seed = 0; seed < std::min(all.size(), kMaxSeeds); ++seed) {
+      for (int k = 0; k < all[seed].count; ++k) {
+        const UncertainDirection mean =
+            MeanOfPlane(all, all[seed].normals[static_cast<std::size_t>(k)]);
+        const double evidence = PlaneEvidence(all, mean);
+        if (!(evidence > best)) continue;
+        best = evidence;
+        plane = mean;
+      }
+    }
+    return best > 0.0 ? best + Lattice(log_focal, scale, plane.vector) : 0.0;
+  }
+
+  static UncertainDirection MeanOfPlane(const std::vector<Normals>& all,
+                                        const UncertainDirection& seed) {
+    std::vector<const UncertainDirection*> members;
+    for (const Normals& circle : all) {
+      double distance;
+      const UncertainDirection* nearest = circle.Nearest(seed, &distance);
+      if (nearest != nullptr && distance <= kInlierSigmas * kInlierSigmas)
+        members.push_back(nearest);
+    }
+    return MeanDirection(seed, members);
+  }
+
+  // How much likelier circles are as those of one plane than as any. What a circle's normal is
+  // known to changes with the focal length, what its contour is known to does not: that alone
+  // counts, so that all focal lengths are compared by the same data.
+  double PlaneEvidence(const std::vector<Normals>& all, const UncertainDirection& plane) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      double distance;
+      if (all[i].Nearest(plane, &distance) == nullptr) continue;
+      sum += std::log(1.0 - kPlaneShare + kPlaneShare * peaks_[i] * std::exp(-0.5 * distance));
+    }
+    return sum;
+  }
+
+  // Its rows and columns hardly depend on the focal length: they are looked for anew after
+  // kLatticeStep.
+  double Lattice(double log_focal, const Vector3d& scale, const Vector3d& normal) {
+    if (!(std::abs(log_focal - lattice_at_) <= kLatticeStep)) {
+      lattice_ = FindLatticeAt(log_focal, scale, normal);
+      lattice_at_ = log_focal;
+    }
+    std::vector<UncertainDirection> directions;
+    for (const UncertainDirection& direction : lattice_)
+      directions.push_back(Refocused(direction, Scale(log_focal - lattice_at_)));
+    return RightAngles(directions);
+  }
+
+  std::vector<UncertainDirection> FindLatticeAt(double log_focal, const Vector3d& scale,
+                                                const Vector3d& normal) const {
+    Camera camera = camera_;
+    camera.fx *= std::exp(log_focal);
+    camera.fy *= std::exp(log_focal);
+    const Matrix3d inverse = scale.cwiseInverse().asDiagonal();
+    std::vector<Matrix3d> conics;
+    for (const ConicFit* fit : conics_) conics.push_back(inverse * fit->conic * inverse);
+    std::vector<UncertainDirection> directions;
+    for (const DetectedPencil& pencil : FindGridPencils(camera, conics, normal)) {
+      directions.push_back({pencil.observation.fit->direction, pencil.observation.fit->covariance});
+    }
+    return directions;
+  }
+
+  const Camera& camera_;
+  std::vector<const ConicFit*> conics_;
+  std::vector<double> peaks_;  // Of each circle's likelihood, against that of any plane.
+  std::vector<UncertainDirection> directions_;
+  std::vector<UncertainDirection> lattice_;
+  double lattice_at_ = std::numeric_limits<double>::infinity();
+};
+
+double LogPrior(double off, const CameraSigma& sigma) {
+  const auto gaussian = [off](double s) { return std::exp(-0.5 * off * off / (s * s)) / s; };
+  if (!(sigma.doubtful_log_focal > sigma.log_focal)) {
+    return -0.5 * off * off / (sigma.log_focal * sigma.log_focal);
+  }
+  return std::log((1.0 - kDoubtfulShare) * gaussian(sigma.log_focal) +
+                  kDoubtfulShare * gaussian(sigma.doubtful_log_focal));
+}
+
+}  // namespace
+
+double LikeliestLogFocal(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
+                         const Camera& camera, const CameraSigma& sigma, double prior_log_focal) {
+  StructureEvidence structure(evidence, pencils, camera);
+  if (structure.IsEmpty()) return prior_log_focal;
+  const double half = 0.5 * std::max(camera.width, camera.height) / camera.fx;
+  const double reach = kReach * sigma.LargestLogFocal();
+  double low = prior_log_focal - reach, high = prior_log_focal + reach;
+  if (half > 0.0) {
+    low = std::max(low, std::log(half / kWidest));
+    high = std::min(high, std::log(half / kNarrowest));
+  }
+  double best = -std::numeric_limits<double>::infinity(), likeliest = prior_log_focal;
+  for (double log_focal = low; log_focal <= high; log_focal += kStep) {
+    const double evidence_here =
+        structure.At(log_focal) + LogPrior(log_focal - prior_log_focal, sigma);
+    if (!(evidence_here > best)) continue;
+    best = evidence_here;
+    likeliest = log_focal;
+  }
+  return likeliest;
+}
+
+}  // namespace circline

@@ -1,0 +1,107 @@
+#include "circline/ransac/detection/structure_focal.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/ransac/detection/detected_line_scene.h"
+#include "tests/ransac/detection/detection_test_util.h"
+#include "tests/ransac/detection/observations_test_util.h"
+
+namespace circline {
+namespace {
+
+using detection_test::LookAt;
+using detection_test::TestCamera;
+
+CameraSigma Wide(double log_focal) {
+  CameraSigma sigma;
+  sigma.log_focal = log_focal;
+  return sigma;
+}
+
+Camera Guess(double factor) {
+  Camera camera = TestCamera();
+  camera.fx *= factor;
+  camera.fy *= factor;
+  return camera;
+}
+
+// Edges along two or three directions at right angles, seen through a camera that is guessed.
+PhotoEvidence Edges(const Eigen::Matrix3d& axes, int num_directions, double factor) {
+  Random random(3);
+  PhotoEvidence evidence;
+  for (int k = 0; k < 60; ++k) {
+    const double u = random.Uniform(120.0, 360.0), v = random.Uniform(80.0, 260.0);
+    const DetectedLine line = detection_test::MakeLine(
+        TestCamera(), u, v, axes.col(k % num_directions), 90.0, 0.0, 0.1, &random);
+    evidence.lines.emplace_back();
+    EXPECT_TRUE(LineFromSegment(Guess(factor), line.ends, 0.1, &evidence.lines.back()).ok());
+  }
+  return evidence;
+}
+
+double FromEdges(const Eigen::Matrix3d& axes, int num_directions, double factor,
+                 const CameraSigma& sigma) {
+  const PhotoEvidence evidence = Edges(axes, num_directions, factor);
+  std::vector<DetectedPencil> pencils;
+  EXPECT_TRUE(DetectPencilsApart(evidence.lines, 3, 1, &pencils, 600.0).ok());
+  return LikeliestLogFocal(evidence, pencils, Guess(factor), sigma, 0.0);
+}
+
+// Whatever the guess, right angles are found where they are.
+TEST(LikeliestLogFocal, RightAnglesTell) {
+  const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.5, 0.6, 0.1));
+  for (const int num_directions : {2, 3}) {
+    for (const double factor : {0.6, 1.0, 1.6}) {
+      EXPECT_NEAR(FromEdges(axes, num_directions, factor, Wide(0.5)), -std::log(factor), 0.05)
+          << num_directions << " " << factor;
+    }
+  }
+}
+
+// What faces the camera says nothing, and the prior stays.
+TEST(LikeliestLogFocal, FrontalEdgesLeaveThePrior) {
+  const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.0, 0.0, 0.2));
+  for (const double factor : {0.6, 1.6}) {
+    EXPECT_NEAR(FromEdges(axes, 2, factor, Wide(0.5)), 0.0, 0.15) << factor;
+  }
+}
+
+// A narrow prior is not given up for a right angle, a doubtful one is for three of them.
+TEST(LikeliestLogFocal, PriorsCount) {
+  const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.5, 0.6, 0.1));
+  EXPECT_NEAR(FromEdges(axes, 3, 1.6, Wide(0.02)), 0.0, 0.06);
+  CameraSigma doubtful = Wide(0.05);
+  doubtful.doubtful_log_focal = 0.5;
+  EXPECT_NEAR(FromEdges(axes, 3, 1.6, doubtful), -std::log(1.6), 0.05);
+}
+
+// Twelve discs of one sheet, all of a photo: the camera at which they have one plane, and what it
+// was told stands beside.
+TEST(DetectObservations, DiscsOfASheetHaveTheirPlaneAtAnyGuess) {
+  const CameraPose pose = LookAt(35.0, 25.0, 10.0, 9.0);
+  const auto discs = [](double x, double y) {
+    const double i = std::round(x), j = std::round(y);
+    const bool is_disc = std::abs(i) <= 2.0 && std::abs(j) <= 1.0;
+    return is_disc && std::hypot(x - i, y - j) < 0.35 ? 30.0 : 220.0;
+  };
+  const cv::Mat image = detection_test::Develop(
+      detection_test::RenderPlane(TestCamera(), pose, 220.0, discs), 0.7, 2.0);
+  for (const double factor : {0.65, 1.0, 1.5}) {
+    DetectionOptions options;
+    const Observations sure = detection_test::Detect(image, Guess(factor), options);
+    EXPECT_EQ(sure.camera.fx, Guess(factor).fx);
+    EXPECT_EQ(sure.stated_focal_px, 0.0);
+    options.noise_model.camera = Wide(0.5);
+    const Observations found = detection_test::Detect(image, Guess(factor), options);
+    EXPECT_NEAR(std::log(found.camera.fx / TestCamera().fx), 0.0, 0.1) << factor;
+    EXPECT_NEAR(StatedLogFocal(found), std::log(Guess(factor).fx / found.camera.fx), 1e-12);
+    int on_plane = 0;
+    for (const CircleObservation& circle : found.circles) on_plane += circle.plane == "p0" ? 1 : 0;
+    EXPECT_GE(on_plane, 14) << factor;
+  }
+}
+
+}  // namespace
+}  // namespace circline
