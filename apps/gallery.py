@@ -80,7 +80,8 @@ def main():
     names = [match['name'] for match in map(ROW.match, lines) if match]
     photos = [next(p for p in (os.path.join(f, name) for f in folders) if os.path.exists(p)) for name in names]
     shutil.rmtree(output, ignore_errors=True)
-    subprocess.run(['build/release/bin/circline_compare', '--images=' + ','.join(photos), '--fov_deg=60', '--output=' + output],
+    subprocess.run(['build/release/bin/circline_compare', '--images=' + ','.join(photos), '--fov_deg=60', '--focal_sigma=0',
+                    '--output=' + output],
                    check=True, stdout=subprocess.DEVNULL)
     observed = {os.path.basename(o['image']): o for o in json_lines(f'{output}/observations.jsonl')}
     answers = collections.defaultdict(list)

@@ -22,11 +22,7 @@
 #include "apps/compare/options.h"
 #include "circline/refine/adjust_photos.h"
 
-DECLARE_string(images);
-DECLARE_string(camera);
 DECLARE_string(scene);
-DECLARE_double(focal_px);
-DECLARE_double(fov_deg);
 
 DEFINE_string(model, "",
               "Camera model: pinhole, opencv or fisheye; empty: that of the camera given, opencv "
@@ -125,11 +121,6 @@ Status ParametersFromFlags(CalibrateOptions* options) {
 }
 
 Status FromFlags(CalibrateOptions* options) {
-  // Nothing known of the camera: something to start from.
-  if (!FLAGS_images.empty() && FLAGS_camera.empty() && FLAGS_focal_px == 0.0 &&
-      FLAGS_fov_deg == 0.0) {
-    FLAGS_fov_deg = 60.0;
-  }
   Status status = OptionsFromFlags(&options->compare);
   if (status.ok()) status = ModelFromFlag(&options->model);
   if (status.ok()) status = ParametersFromFlags(options);
@@ -178,6 +169,7 @@ CameraSigma PriorOf(const CalibrateOptions& options, const SceneImage& image,
                     const Camera& camera) {
   const EstimationOptions& estimation = options.compare.losses.front().estimation;
   CameraSigma sigma = image.camera_sigma.Over(UnknownCamera(camera));
+  if (image.guessed_sigma) sigma.log_focal = image.guessed_sigma->LargestLogFocal();
   if (estimation.camera_sigma) sigma.log_focal = estimation.camera_sigma->log_focal;
   if (options.fix_principal_point) sigma.principal_point_px = 0.0;
   if (options.aspect_sigma) sigma.log_aspect = *options.aspect_sigma;
@@ -262,6 +254,8 @@ int Calibrate() {
   if (status.ok()) status = ImagesFromFlags(options.compare.inputs, &set);
   if (!status.ok()) return Refuse(status);
   if (!set.rigid().empty()) RigidWorldFromName(set.rigid(), &options.adjust.rigid);
+  if (options.compare.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.compare.inputs.guess));
+  options.compare.structure_tells_focal = false;  // All photos together do.
   const bool with_pictures = options.compare.overlays;
   options.compare.overlays = false;  // Photos are read for detection only.
   std::vector<SceneImage> images;

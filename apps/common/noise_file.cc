@@ -48,7 +48,8 @@ Status ReadNoiseModel(const std::string& path, NoiseModel* model) {
                {{"log_focal", &read.camera.log_focal},
                 {"log_aspect", &read.camera.log_aspect},
                 {"principal_point_px", &read.camera.principal_point_px},
-                {"k1", &read.camera.k1}},
+                {"k1", &read.camera.k1},
+                {"doubtful_log_focal", &read.camera.doubtful_log_focal}},
                {});
   }
   if (status.ok()) status = read.Validate();

@@ -58,7 +58,8 @@ struct SceneImage {
   std::string stem;                // Of file names that belong to it, unique in the whole set.
   Observations observations;       // Camera, and what is annotated; nothing fitted or detected yet.
   StatedCameraSigma camera_sigma;  // Of that camera.
-  bool detect_everything = false;  // No circle and no pencil is annotated.
+  std::optional<CameraSigma> guessed_sigma;  // The same, where nobody has calibrated it.
+  bool detect_everything = false;            // No circle and no pencil is annotated.
   std::vector<CircleRoi> rois;
   std::optional<Truth> truth;
   std::vector<KnownPoint> points;

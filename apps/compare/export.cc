@@ -38,8 +38,8 @@ Status WriteExports(const std::string& folder, const std::vector<std::string>& f
     ++num_poses;
     num_metric += best.metric ? 1 : 0;
     for (const auto& exporter : exporters) {
-      exporter->Add({record.name, record.index, Refocused(record.camera, best.focal_scale),
-                     best.rotation, best.translation, std::nullopt});
+      exporter->Add({record.name, record.index, best.camera.value_or(record.camera), best.rotation,
+                     best.translation, std::nullopt});
     }
   }
   for (const auto& exporter : exporters) {

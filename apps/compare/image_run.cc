@@ -44,8 +44,12 @@ void TakeOverFrame(const Observations& scene, Observations* detected) {
 
 void DetectAll(const CompareOptions& options, ImageRun* run) {
   const Stopwatch watch;
-  const Status status = DetectObservations(run->photo, run->image->observations.camera,
-                                           options.detection, &run->observations);
+  DetectionOptions detection = options.detection;
+  if (options.structure_tells_focal) {
+    detection.noise_model.camera = CameraSigmaOf(options.losses.front().estimation, *run->image);
+  }
+  const Status status = DetectObservations(run->photo, run->image->observations.camera, detection,
+                                           &run->observations);
   run->stages.emplace_back("detect", watch.Microseconds());
   if (!status.ok()) run->read_error = status.message;
   TakeOverFrame(run->image->observations, &run->observations);
@@ -134,10 +138,18 @@ CompareOptions WithCamera(CompareOptions options, const SceneImage& image) {
   return options;
 }
 
+void TakeGuess(const CompareOptions& options, SceneImage* image, ImageRun* run) {
+  GuessedCamera guess =
+      options.inputs.guess.ForPhoto(image->path, run->photo.cols, run->photo.rows,
+                                    options.losses.front().estimation.noise_model.camera);
+  image->observations.camera = std::move(guess.camera);
+  image->guessed_sigma = guess.sigma;
+  run->problems.push_back(std::move(guess.words));
+}
+
 void ObserveRead(const CompareOptions& options, SceneImage* image, ImageRun* run) {
   if (!run->photo.empty()) {
-    if (options.inputs.guess.given())
-      image->observations.camera = options.inputs.guess.ForPhoto(run->photo.cols, run->photo.rows);
+    if (options.inputs.guess.wanted) TakeGuess(options, image, run);
     run->read_error = SizeError(run->photo, image->observations.camera);
   }
   if (run->read_error.empty()) Observe(options, run);
@@ -157,7 +169,8 @@ void RunSolvers(const CompareOptions& options, const SolverSet& solvers, ImageRu
   const SceneImage& image = *run->image;
   LossEvidence evidence(*run);
   std::optional<SolverSet> own_solvers;
-  if (image.camera_sigma.IsAny()) own_solvers.emplace(WithCamera(options, image));
+  if (image.camera_sigma.IsAny() || image.guessed_sigma)
+    own_solvers.emplace(WithCamera(options, image));
   for (const SolverSet::Task& task : (own_solvers ? *own_solvers : solvers).tasks()) {
     run->solvers.push_back(RunSolver(task, options, *run, &evidence));
   }
@@ -181,6 +194,7 @@ int SetLargestRadius(double radius, Observations* observations) {
 }
 
 CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image) {
+  if (image.guessed_sigma) return *image.guessed_sigma;
   const CameraSigma common = options.camera_sigma.value_or(options.noise_model.camera);
   CameraSigma sigma = image.camera_sigma.Over(common);
   if (options.camera_sigma) sigma.log_focal = common.log_focal;

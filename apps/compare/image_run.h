@@ -71,8 +71,8 @@ struct ImageRun {
       stages;  // "read", "detect", "fit", "overlay"; microseconds.
 };
 
-// How well an image's camera is known: as --focal_sigma says, else the scene file, else the noise
-// model.
+// How well an image's camera is known: a guess says so itself; else as --focal_sigma says, else the
+// scene file, else the noise model.
 CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image);
 
 // The photo read and everything in it detected or fitted; no solver. Never throws. Image and

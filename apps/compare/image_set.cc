@@ -15,6 +15,11 @@ bool SameCamera(const Camera& a, const Camera& b) {
   return tie(a) == tie(b);
 }
 
+bool SameSigma(const StatedCameraSigma& a, const StatedCameraSigma& b) {
+  return std::tie(a.log_focal, a.principal_point_px, a.k1) ==
+         std::tie(b.log_focal, b.principal_point_px, b.k1);
+}
+
 // Nothing but the photo, its camera and perhaps a truth.
 bool IsPlain(const SceneImage& image) {
   const FrameObservation& frame = image.observations.frame;
@@ -42,10 +47,11 @@ ImageSet::ImageSet(std::vector<SceneImage> images, int shard_index, int num_shar
     entry.index = i;
     if (IsPlain(image)) {
       const Camera& camera = image.observations.camera;
-      const auto known = std::find_if(cameras_.begin(), cameras_.end(),
-                                      [&](const auto& c) { return SameCamera(c.first, camera); });
+      const auto known = std::find_if(cameras_.begin(), cameras_.end(), [&](const StatedCamera& c) {
+        return SameCamera(c.camera, camera) && SameSigma(c.sigma, image.camera_sigma);
+      });
       entry.camera = static_cast<std::size_t>(known - cameras_.begin());
-      if (known == cameras_.end()) cameras_.emplace_back(camera, image.camera_sigma);
+      if (known == cameras_.end()) cameras_.push_back({camera, image.camera_sigma});
       if (image.truth) entry.truth = std::make_unique<Truth>(std::move(*image.truth));
     } else {
       entry.annotated = std::make_unique<SceneImage>(std::move(image));
@@ -62,8 +68,8 @@ SceneImage ImageSet::At(std::size_t i) const {
   } else {
     image.name = entry.name;
     image.path = path(i);
-    image.observations.camera = cameras_[entry.camera].first;
-    image.camera_sigma = cameras_[entry.camera].second;
+    image.observations.camera = cameras_[entry.camera].camera;
+    image.camera_sigma = cameras_[entry.camera].sigma;
     image.detect_everything = true;
     if (entry.truth != nullptr) image.truth = *entry.truth;
   }

@@ -39,7 +39,12 @@ class ImageSet {
   };
 
   std::vector<Entry> entries_;
-  std::vector<std::pair<Camera, StatedCameraSigma>> cameras_;
+  struct StatedCamera {
+    Camera camera;
+    StatedCameraSigma sigma;
+  };
+
+  std::vector<StatedCamera> cameras_;
   std::string rigid_;
   std::size_t set_size_ = 0;
 };

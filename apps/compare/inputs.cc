@@ -12,16 +12,12 @@ DEFINE_string(scene, "", "Scene file (YAML or JSON): photos and what is known of
 DEFINE_string(
     images, "",
     "Instead of --scene: photos to detect everything in; files, folders and quoted wildcards, "
-    "separated by commas. Needs --camera, --focal_px or --fov_deg.");
+    "separated by commas. Without --camera the camera is guessed, and what the photo shows "
+    "counts.");
 DEFINE_string(
     camera, "",
     "Camera: an OpenCV calibration file (camera_matrix, distortion_coefficients, image_width, "
     "image_height) or a COLMAP cameras.txt.");
-DEFINE_double(focal_px, 0.0,
-              "Where there is no calibration: focal length, pixels; no distortion, principal point "
-              "in the middle.");
-DEFINE_double(fov_deg, 0.0,
-              "The same from the field of view along the longer side of the photo, degrees.");
 DEFINE_string(roi, "",
               "With --images: x,y,width,height, pixels; detect one circle inside it and nothing "
               "else.");
@@ -35,23 +31,17 @@ DEFINE_string(merge, "",
               "Instead of --scene or --images: folders of all the shards of a set, separated by "
               "commas, to be joined in --output.");
 
+DECLARE_double(focal_px);
+DECLARE_double(fov_deg);
+
 namespace circline::apps {
 namespace {
-
-constexpr double kRadiansPerDegree = 0.017453292519943295;
-
-constexpr char kNoCamera[] =
-    "--images needs --camera: an OpenCV calibration file, which OpenCV's calibration sample makes "
-    "of ten photos of a chessboard, or the cameras.txt that COLMAP makes of the photos themselves. "
-    "Where neither can be had, --fov_deg or --focal_px make do (focal length in millimetres / "
-    "width "
-    "of the sensor in millimetres x width of the photo in pixels)";
 
 Status CheckSources() {
   const std::vector<std::string> given = {FLAGS_scene, FLAGS_images, FLAGS_merge};
   const auto missing = std::count(given.begin(), given.end(), "");
   if (missing == 3) {
-    return Status::Invalid("give --scene, or --images with --camera (--help says more)");
+    return Status::Invalid("give --scene or --images (--help says more)");
   }
   if (missing < 2) return Status::Invalid("give --scene, --images or --merge, not both");
   if (!FLAGS_images.empty()) return Status::Ok();
@@ -64,18 +54,12 @@ Status CheckSources() {
 }
 
 Status ReadGuess(CameraGuess* guess) {
-  guess->focal_px = FLAGS_focal_px;
-  guess->fov_deg = FLAGS_fov_deg;
-  if (!(guess->focal_px >= 0.0) || !std::isfinite(guess->focal_px)) {
-    return Status::Invalid("--focal_px must be positive");
-  }
-  if (!(guess->fov_deg >= 0.0) || !(guess->fov_deg < 180.0)) {
-    return Status::Invalid("--fov_deg must be between 0 and 180");
-  }
-  const int given = (FLAGS_camera.empty() ? 0 : 1) + (guess->focal_px > 0.0 ? 1 : 0) +
-                    (guess->fov_deg > 0.0 ? 1 : 0);
-  if (!FLAGS_images.empty() && given == 0) return Status::Invalid(kNoCamera);
-  return given > 1 ? Status::Invalid("give one of --camera, --focal_px, --fov_deg") : Status::Ok();
+  const Status status = CameraGuessFromFlags(guess);
+  const bool is_guess = guess->focal_px > 0.0 || guess->fov_deg > 0.0;
+  guess->wanted = !FLAGS_images.empty() && FLAGS_camera.empty();
+  return status.ok() && is_guess && !FLAGS_camera.empty()
+             ? Status::Invalid("give one of --camera, --focal_px, --fov_deg")
+             : status;
 }
 
 Status ReadRoi(std::optional<std::array<int, 4>>* roi) {
@@ -129,26 +113,13 @@ Status ReadImages(const InputOptions& options, std::vector<SceneImage>* images,
   if (!status.ok()) return status;
   if (!FLAGS_scene.empty()) return ReadScene(FLAGS_scene, cameras, images, rigid);
   Camera camera;
-  if (!options.guess.given()) status = OneCamera(cameras, &camera);
+  if (!options.guess.wanted) status = OneCamera(cameras, &camera);
   if (status.ok()) status = ListPhotos(FLAGS_images, camera, images);
   if (status.ok() && options.roi) SetRoi(*options.roi, options.circle_radius, images);
   return status;
 }
 
 }  // namespace
-
-Camera CameraGuess::ForPhoto(int width, int height) const {
-  Camera camera;
-  camera.id = "guessed";
-  camera.width = width;
-  camera.height = height;
-  camera.cx = 0.5 * (width - 1);
-  camera.cy = 0.5 * (height - 1);
-  const double half = 0.5 * std::max(width, height);
-  camera.fx = focal_px > 0.0 ? focal_px : half / std::tan(0.5 * fov_deg * kRadiansPerDegree);
-  camera.fy = camera.fx;
-  return camera;
-}
 
 Status InputsFromFlags(InputOptions* options) {
   Status status = ReadShard(&options->shard_index, &options->num_shards);

@@ -7,20 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "apps/compare/camera_guess.h"
 #include "apps/compare/image_set.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/status.h"
 
 namespace circline::apps {
-
-// What stands in for a calibration: a pinhole camera that looks through the middle of the photo.
-struct CameraGuess {
-  double fov_deg = 0.0;   // Field of view along the longer side of the photo; 0 = not given.
-  double focal_px = 0.0;  // 0 = not given.
-
-  bool given() const { return fov_deg > 0.0 || focal_px > 0.0; }
-  Camera ForPhoto(int width, int height) const;
-};
 
 struct InputOptions {
   CameraGuess guess;

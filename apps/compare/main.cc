@@ -44,6 +44,8 @@ int Compare(const Ranks& ranks) {
   } else {
     circline::apps::ImageSet images;
     status = circline::apps::ImagesFromFlags(options.inputs, &images);
+    if (status.ok() && options.inputs.guess.wanted && ranks.is_first())
+      circline::apps::SayOnStderr(circline::apps::DescribeGuess(options.inputs.guess));
     if (status.ok()) status = circline::apps::RunComparison(images, options, ranks, &result);
   }
   if (status.code == circline::StatusCode::kInvalidArgument) return Refuse(status, ranks);

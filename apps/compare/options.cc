@@ -288,6 +288,8 @@ Status OptionsFromFlags(CompareOptions* options) {
     return CheckFlag("threads", Status::Invalid("must be between 0 and 1024"));
   }
   status = InputsFromFlags(&options->inputs);
+  const std::optional<CameraSigma>& stated = options->losses.front().estimation.camera_sigma;
+  if (stated) options->inputs.guess.focal_sigma = stated->log_focal;
   if (status.ok()) status = ReadExports(&options->finish.exports);
   if (!status.ok()) return status;
   if (FLAGS_output.empty())

@@ -31,6 +31,7 @@ struct CompareOptions {
   ClosedFormOptions closed_form;
   int threads = 0;  // 0 = as many as the machine has.
   bool overlays = true;
+  bool structure_tells_focal = true;  // Detection looks for the focal length where it is wide.
   bool resume = false;
   bool peers = false;  // Also run PeerSolvers().
   InputOptions inputs;

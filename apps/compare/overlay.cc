@@ -225,7 +225,7 @@ Eigen::Vector3d AxesOrigin(const WorldDrawing& world, const Eigen::AlignedBox2d&
 
 void DrawPose(const Observations& observations, const PoseEstimate& estimate, Canvas* canvas) {
   const PoseHypothesis& best = estimate.hypotheses.front();
-  const Camera camera = Refocused(observations.camera, best.focal_scale);
+  const Camera camera = CameraOf(best, observations.camera);
   const WorldDrawing world{camera, best.cam_from_world};
   const Eigen::AlignedBox2d box = EvidenceOnPlane(observations, camera, best.cam_from_world);
   if (!box.isEmpty()) {

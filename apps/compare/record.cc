@@ -63,7 +63,15 @@ PoseErrors ReadErrors(const Json& line) {
   return errors;
 }
 
-HypothesisRecord ReadHypothesis(const Json& line) {
+void ReadIntrinsics(const Json& json, Camera* camera) {
+  camera->fx = json.at("fx").get<double>();
+  camera->fy = json.at("fy").get<double>();
+  camera->cx = json.at("cx").get<double>();
+  camera->cy = json.at("cy").get<double>();
+  camera->distortion = json.at("distortion").get<std::array<double, 8>>();
+}
+
+HypothesisRecord ReadHypothesis(const Json& line, const Camera& given) {
   HypothesisRecord h;
   h.probability = NumberOr(line, "probability", kUnknown);
   for (std::size_t i = 0; i < 9; ++i) {
@@ -73,7 +81,7 @@ HypothesisRecord ReadHypothesis(const Json& line) {
   h.translation = ReadVector(line.at("translation"));
   h.metric = line.at("metric").get<bool>();
   h.origin_observed = line.at("origin_observed").get<bool>();
-  h.focal_scale = NumberOr(line, "focal_scale", 1.0);
+  if (line.contains("camera")) ReadIntrinsics(line.at("camera"), &h.camera.emplace(given));
   h.rms_px = NumberOr(line, "rms_px", kUnknown);
   h.num_inliers = line.at("num_inliers").get<int>();
   h.num_observations = line.at("num_observations").get<int>();
@@ -100,7 +108,8 @@ void ReadResults(const std::string& text, ImageRecord* record) {
       solver.notes = Texts(json, "notes");
       record->solvers.push_back(std::move(solver));
     }
-    if (has_hypothesis) record->solvers.back().hypotheses.push_back(ReadHypothesis(json));
+    if (!has_hypothesis) continue;
+    record->solvers.back().hypotheses.push_back(ReadHypothesis(json, record->camera));
   }
 }
 
@@ -127,11 +136,7 @@ Camera ReadCamera(const Json& json) {
                                      : CameraModel::kPinhole;
   camera.width = json.at("width").get<int>();
   camera.height = json.at("height").get<int>();
-  camera.fx = json.at("fx").get<double>();
-  camera.fy = json.at("fy").get<double>();
-  camera.cx = json.at("cx").get<double>();
-  camera.cy = json.at("cy").get<double>();
-  camera.distortion = json.at("distortion").get<std::array<double, 8>>();
+  ReadIntrinsics(json, &camera);
   return camera;
 }
 
@@ -168,13 +173,6 @@ std::string SolverKey::Name() const {
 bool SolverKey::operator==(const SolverKey& other) const {
   return std::tie(solver, stage, loss, scale_px) ==
          std::tie(other.solver, other.stage, other.loss, other.scale_px);
-}
-
-Camera Refocused(const Camera& camera, double focal_scale) {
-  Camera refocused = camera;
-  refocused.fx *= focal_scale;
-  refocused.fy *= focal_scale;
-  return refocused;
 }
 
 Status ParseRecord(const ImageLines& lines, ImageRecord* record) {

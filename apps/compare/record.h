@@ -39,7 +39,7 @@ struct HypothesisRecord {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   bool metric = false, origin_observed = false, rotation_is_free = false;
-  double focal_scale = 1.0;  // As PoseHypothesis::focal_scale.
+  std::optional<Camera> camera;  // As it was estimated, where it was.
   double rms_px = kUnknown;
   int num_inliers = 0, num_observations = 0;
   Eigen::Vector3d sigma_rotation_deg = Eigen::Vector3d::Zero();
@@ -76,9 +76,6 @@ struct ImageRecord {
 struct ImageLines {
   std::string results, observations, timings;
 };
-
-// The camera with focal lengths `focal_scale` times as long, as a hypothesis sees through it.
-Camera Refocused(const Camera& camera, double focal_scale);
 
 // Not ok: a sentence that says what is not as this program writes it. `timings` may be empty.
 Status ParseRecord(const ImageLines& lines, ImageRecord* record);

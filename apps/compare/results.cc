@@ -72,6 +72,14 @@ void AddErrors(const PoseErrors& errors, const Truth& truth, Json* line) {
   (*line)["direction_error_deg"] = directions;
 }
 
+Json Intrinsics(const Camera& camera) {
+  return {{"fx", camera.fx},
+          {"fy", camera.fy},
+          {"cx", camera.cx},
+          {"cy", camera.cy},
+          {"distortion", camera.distortion}};
+}
+
 Json HypothesisLine(const ImageRun& image, const SolverRun& run, std::size_t index) {
   const PoseHypothesis& h = run.estimate.hypotheses[index];
   Json line = ResultHead(image, run);
@@ -94,11 +102,13 @@ Json HypothesisLine(const ImageRun& image, const SolverRun& run, std::size_t ind
   line["left_out"] = h.left_out;
   line["structure"] = h.structure;
   if (h.focal_sigma > 0.0) {
-    line["focal_scale"] = Number(h.focal_scale);
-    line["focal_sigma"] = Number(h.focal_sigma);
     const Camera& camera = image.observations.camera;
+    const double moved = std::exp(-StatedLogFocal(image.observations));  // Against the one given.
+    line["focal_scale"] = Number(h.focal_scale * moved);
+    line["focal_sigma"] = Number(h.focal_sigma * moved);
     line["focal_px"] = Number(h.focal_scale * camera.fx);
     line["focal_sigma_px"] = Number(h.focal_sigma * camera.fx);
+    if (h.camera) line["camera"] = Intrinsics(*h.camera);
   }
   line["decided_by"] = run.estimate.decided_by;
   line["notes"] = run.estimate.notes;
@@ -193,11 +203,7 @@ Json CameraJson(const ImageRun& run) {
   };
   json["width"] = size(camera.width, run.photo.cols, camera.cx);
   json["height"] = size(camera.height, run.photo.rows, camera.cy);
-  json["fx"] = camera.fx;
-  json["fy"] = camera.fy;
-  json["cx"] = camera.cx;
-  json["cy"] = camera.cy;
-  json["distortion"] = camera.distortion;
+  json.update(Intrinsics(camera));
   return json;
 }
 

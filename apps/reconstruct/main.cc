@@ -128,13 +128,15 @@ Status ChoosePose(const ImageRun& run, const PoseHypothesis** hypothesis) {
   return Status::Ok();
 }
 
-// From this on the focal length is refined (EstimationOptions::camera_sigma).
-constexpr double kEstimatedFocal = 0.01;
-
-Status CheckFocalLength(const CompareOptions& options, const SceneImage& image) {
-  const CameraSigma sigma = CameraSigmaOf(options.losses.front().estimation, image);
-  if (sigma.log_focal < kEstimatedFocal) return Status::Ok();
-  return Status::Invalid("--focal_sigma: a model needs the focal length as the camera says it");
+// The evidence fitted anew, where the photo itself has told the camera.
+void SeeThrough(const Camera& camera, Observations* observations) {
+  observations->camera = camera;
+  for (CircleObservation& circle : observations->circles) circle.fit.reset();
+  for (PencilObservation& pencil : observations->pencils) {
+    pencil.fit.reset();
+    for (LineObservation& line : pencil.lines) line.fit.reset();
+  }
+  FitDirect(FLAGS_point_sigma_px, observations);
 }
 
 int Refuse(const Status& status) {
@@ -151,14 +153,15 @@ int Reconstruct() {
   if (status.ok()) status = ModelFromFlags(&model_options);
   if (status.ok()) status = ImagesFromFlags(options.inputs, &images);
   if (status.ok()) status = FindImage(images, &image);
-  if (status.ok()) status = CheckFocalLength(options, image);
   if (!status.ok()) return Refuse(status);
+  if (options.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.inputs.guess));
   options.overlays = true;  // The photo is needed.
   const SolverSet solvers(options);
-  const ImageRun run = RunImage(options, solvers, &image);
+  ImageRun run = RunImage(options, solvers, &image);
   const PoseHypothesis* hypothesis = nullptr;
   status = ChoosePose(run, &hypothesis);
   if (!status.ok()) return Refuse({status.code, image.path + ": " + status.message});
+  if (hypothesis->camera) SeeThrough(*hypothesis->camera, &run.observations);
   const Model model = BuildModel(run.photo, run.observations, *hypothesis, model_options);
   if (model.patches.empty()) {
     return Refuse(Status::Refused(image.path + ": no evidence lies in the world's plane"));

@@ -50,10 +50,11 @@ TEST_F(CompareInputs, FocalLengthOrFieldOfViewStandInForACalibration) {
   const std::string calibration = folder_.Write("cameras.txt", "1 PINHOLE 320 240 300 300 160 120");
   ASSERT_EQ(Run("--camera='" + calibration + "'").exit_code, 0);
   const std::string calibrated = Results();
-  ASSERT_EQ(Run("--focal_px=300").exit_code, 0);
+  // As well known as a calibration, it is one.
+  ASSERT_EQ(Run("--focal_px=300 --focal_sigma=0.002").exit_code, 0);
   EXPECT_EQ(Results(), calibrated);
   const double fov = 2.0 * std::atan(0.5 * kWidth / kFocal) * 180.0 / 3.14159265358979323846;
-  ASSERT_EQ(Run("--fov_deg=" + std::to_string(fov)).exit_code, 0);
+  ASSERT_EQ(Run("--focal_sigma=0.002 --fov_deg=" + std::to_string(fov)).exit_code, 0);
   const Json guessed = Best("joint");
   std::istringstream lines(calibrated);
   ASSERT_EQ(Run("--camera='" + calibration + "'").exit_code, 0);
@@ -63,12 +64,27 @@ TEST_F(CompareInputs, FocalLengthOrFieldOfViewStandInForACalibration) {
   }
 }
 
-TEST_F(CompareInputs, WithoutACalibrationSaysHowToGetOne) {
-  ExpectUnusable("", "--images needs --camera");
-  const Outcome outcome = Run("");
-  for (const char* way : {"chessboard", "COLMAP", "--fov_deg", "--focal_px"}) {
-    EXPECT_CONTAINS(outcome.err, way);
-  }
+// What is known of the camera, and where that is from, stands in all that is written.
+TEST_F(CompareInputs, SaysHowWellAGuessIsKnown) {
+  const auto check = [&](const std::string& flags, const char* on_stderr, const char* words,
+                         double sigma) {
+    const Outcome outcome = Run(flags + " --solvers=single_circle");
+    ASSERT_EQ(outcome.exit_code, 0) << flags;
+    EXPECT_CONTAINS(outcome.err, on_stderr);
+    const std::string problems =
+        ReadJsonLines(folder_ / "out/observations.jsonl").at(0)["problems"].dump();
+    EXPECT_CONTAINS(problems, words);
+    EXPECT_CONTAINS(ReadAll(folder_ / "out/report.html"), words);
+    const Json best = Best("single_circle");
+    ASSERT_TRUE(best.contains("focal_px")) << flags;
+    // One circle does not tell.
+    EXPECT_NEAR(best["focal_sigma"], sigma, 0.15 * sigma) << flags;
+    EXPECT_NEAR(best["focal_px"].get<double>(), best["camera"]["fx"].get<double>(), 1e-9);
+  };
+  check("", "no camera is given", "60.0 degrees, as nothing is known, +- 50.0 %", 0.5);
+  check("--fov_deg=50", "good to 25.0 %", "--fov_deg=50.0, +- 25.0 %", 0.25);
+  check("--focal_px=300", "good to 25.0 %", "--focal_px=300, +- 25.0 %", 0.25);
+  check("--focal_px=300 --focal_sigma=0.1", "good to 10.0 %", "+- 10.0 %", 0.1);
 }
 
 TEST_F(CompareInputs, FolderThatIsNotThere) {
@@ -80,7 +96,12 @@ TEST_F(CompareInputs, FolderThatIsNotThere) {
 }
 
 TEST_F(CompareInputs, BadValuesAreNamed) {
-  ExpectUnusable("--fov_deg=180", "--fov_deg must be between 0 and 180");
+  for (const char* bad : {"180", "-3", "nan", "1e-300"})
+    ExpectUnusable(std::string("--fov_deg=") + bad, "--fov_deg must be between 0.01 and 179");
+  for (const char* bad : {"1e308", "nan", "inf"})
+    ExpectUnusable(std::string("--focal_px=") + bad, "--focal_px must be positive, and no more");
+  for (const char* bad : {"-0.5", "nan", "inf"})
+    ExpectUnusable(std::string("--focal_sigma=") + bad, "--focal_sigma must be 0 or more");
   ExpectUnusable("--focal_px=-1", "--focal_px must be positive");
   ExpectUnusable("--focal_px=300 --fov_deg=60", "give one of --camera, --focal_px, --fov_deg");
   ExpectUnusable("--focal_px=300 --roi=1,2,3", "--roi=1,2,3: must be x,y,width,height");
@@ -91,7 +112,8 @@ TEST_F(CompareInputs, BadValuesAreNamed) {
 // Length of the translation to the disc's centre is that of the board, not 1.
 TEST_F(CompareInputs, RadiusMakesTheTranslationMetric) {
   const double distance = board_.translation.norm();
-  ASSERT_EQ(Run("--focal_px=300 --roi=40,20,230,210 --circle_radius=0.5").exit_code, 0);
+  ASSERT_EQ(Run("--focal_px=300 --focal_sigma=0 --roi=40,20,230,210 --circle_radius=0.5").exit_code,
+            0);
   Json best = Best("single_circle");
   ASSERT_FALSE(best.is_null());
   EXPECT_EQ(best["metric"], true);
@@ -103,7 +125,8 @@ TEST_F(CompareInputs, RadiusMakesTheTranslationMetric) {
   EXPECT_EQ(observations.at(0)["ellipses"].size(), 1U);  // Nothing else is detected.
   EXPECT_EQ(observations.at(0)["pencils"].size(), 0U);
 
-  ASSERT_EQ(Run("--focal_px=300 --circle_radius=0.5").exit_code, 0);  // The largest one.
+  ASSERT_EQ(Run("--focal_px=300 --focal_sigma=0 --circle_radius=0.5").exit_code,
+            0);  // The largest one.
   best = Best("single_circle");
   ASSERT_FALSE(best.is_null());
   EXPECT_EQ(best["metric"], true);

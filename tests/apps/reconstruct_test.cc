@@ -229,7 +229,6 @@ TEST_F(Reconstruct, SaysWhatItCannotDo) {
   expect("--image=box.png --texture_px=1", 2, "--texture_px must be");
   expect("--image=box.png --margin=nan", 2, "--margin must be");
   expect("--image=box.png --hypothesis=9", 1, "--hypothesis=9: there are");
-  expect("--image=box.png --focal_sigma=0.1", 2, "--focal_sigma: a model needs");
   expect("--image=box.png --bogus", 2, "unknown flag --bogus");
   std::filesystem::remove(folder_ / "box.png");
   expect("--image=box.png", 1, "the file does not exist");

@@ -1,0 +1,86 @@
+#include "apps/common/exif.h"
+
+#include <libexif/exif-data.h>
+#include <libexif/exif-utils.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+namespace circline::apps {
+namespace {
+
+// Of 36 mm x 24 mm.
+constexpr double kFilmDiagonalMm = 43.266615305567875;
+constexpr double kMmPerInch = 25.4, kMmPerCentimetre = 10.0;
+// Of focal length to the photo's longer side: a fisheye's, and a long telescope's. Beyond lies what
+// no lens has.
+constexpr double kShortest = 0.2, kLongest = 60.0;
+
+using ExifPointer = std::unique_ptr<ExifData, void (*)(ExifData*)>;
+
+// The first number of an entry; 0 where there is none.
+double Number(ExifData* data, ExifIfd ifd, ExifTag tag) {
+  const ExifEntry* entry = exif_content_get_entry(data->ifd[ifd], tag);
+  if (entry == nullptr || entry->data == nullptr || entry->components < 1 ||
+      entry->size < exif_format_get_size(entry->format)) {
+    return 0.0;
+  }
+  const ExifByteOrder order = exif_data_get_byte_order(data);
+  switch (entry->format) {
+    case EXIF_FORMAT_SHORT:
+      return exif_get_short(entry->data, order);
+    case EXIF_FORMAT_LONG:
+      return exif_get_long(entry->data, order);
+    case EXIF_FORMAT_RATIONAL: {
+      const ExifRational value = exif_get_rational(entry->data, order);
+      return value.denominator == 0 ? 0.0
+                                    : static_cast<double>(value.numerator) / value.denominator;
+    }
+    default:
+      return 0.0;
+  }
+}
+
+// Pixels of the photo as taken for a millimetre of the sensor; 0 where it does not say.
+double PixelsPerMm(ExifData* data) {
+  const double resolution = Number(data, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_PLANE_X_RESOLUTION);
+  const double unit = Number(data, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_PLANE_RESOLUTION_UNIT);
+  return resolution / (unit == 3.0 ? kMmPerCentimetre : kMmPerInch);
+}
+
+std::string Millimetres(const char* tag, double mm) {
+  char text[80];
+  std::snprintf(text, sizeof(text), "EXIF's %s of %.4g mm", tag, mm);
+  return text;
+}
+
+}  // namespace
+
+ExifFocalLength ReadExifFocalLength(const std::string& path, int width, int height) {
+  ExifFocalLength focal;
+  const ExifPointer data(exif_data_new_from_file(path.c_str()), exif_data_unref);
+  if (data == nullptr) return focal;
+  const double longer = std::max(width, height);
+  const double film = Number(data.get(), EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
+  const double mm = Number(data.get(), EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH);
+  const double per_mm = PixelsPerMm(data.get());
+  if (film > 0.0) {
+    focal.focal_px = film / kFilmDiagonalMm * std::hypot(width, height);
+    focal.words = Millimetres("FocalLengthIn35mmFilm", film);
+  } else if (mm > 0.0 && per_mm > 0.0) {
+    const double taken = std::max(Number(data.get(), EXIF_IFD_EXIF, EXIF_TAG_PIXEL_X_DIMENSION),
+                                  Number(data.get(), EXIF_IFD_EXIF, EXIF_TAG_PIXEL_Y_DIMENSION));
+    focal.focal_px = mm * per_mm * (taken > 0.0 ? longer / taken : 1.0);
+    focal.words = Millimetres("FocalLength and focal plane", mm);
+  }
+  const double share = focal.focal_px / longer;
+  if (focal.focal_px > 0.0 && !(share >= kShortest && share <= kLongest)) {
+    focal.words += " is no lens's";
+    focal.focal_px = 0.0;
+  }
+  return focal;
+}
+
+}  // namespace circline::apps
