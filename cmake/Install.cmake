@@ -23,7 +23,7 @@ foreach(module estimators ransac detection refine)
   install(FILES ${headers} DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/circline/${folder}")
 endforeach()
 
-foreach(app calibrate compare reconstruct simulate)
+foreach(app calibrate compare reconstruct simulate track)
   if(TARGET circline_${app})
     install(TARGETS circline_${app} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
   endif()

@@ -19,7 +19,7 @@ struct ExportedPose {
   Camera camera;  // Of the refined focal length, where that was refined.
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation;
-  std::optional<double> time_s;  // Where it is known otherwise than by the name.
+  std::optional<double> time_s = std::nullopt;  // Where it is known otherwise than by the name.
 };
 
 class Exporter {

@@ -71,8 +71,14 @@ ImageRun FrameObserver::Follow(const PoseHypothesis* last, const PoseHypothesis*
 Status FrameObserver::SettleCamera(Frame* frame) {
   Camera& camera = frame->image.observations.camera;
   if (!camera_) {
-    if (!frame->photo.empty() && options_.compare.inputs.guess.given())
-      camera = options_.compare.inputs.guess.ForPhoto(frame->photo.cols, frame->photo.rows);
+    const CameraGuess& guess = options_.compare.inputs.guess;
+    if (!frame->photo.empty() && guess.wanted) {
+      const EstimationOptions& estimation = options_.compare.losses.front().estimation;
+      GuessedCamera guessed = guess.ForPhoto(frame->image.path, frame->photo.cols,
+                                             frame->photo.rows, estimation.noise_model.camera);
+      camera = std::move(guessed.camera);
+      guessed_sigma_ = guessed.sigma;
+    }
     camera_ = camera;
     if (camera_->width == 0) camera_->width = frame->photo.cols;
     if (camera_->height == 0) camera_->height = frame->photo.rows;
@@ -85,6 +91,7 @@ Status FrameObserver::SettleCamera(Frame* frame) {
                            std::to_string(camera_->height));
   }
   camera = *camera_;
+  frame->image.guessed_sigma = guessed_sigma_;
   return Status::Ok();
 }
 
