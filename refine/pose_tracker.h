@@ -24,10 +24,11 @@
 //
 // The world frame is that of the first frame (EstimatePose; docs/conventions.md) and stays: what
 // later frames say of FrameObservation::origin, known angles and known lengths is not used. A turn
-// about the normal that nothing fixes is zero in the first frame and then follows the motion.
-// Unit: that of the first frame's pose; where that is not metric, the distance of its origin, so
-// that later translations have other lengths than 1 though `metric` is false. Without any circle
-// only the rotation is tracked, and the translation stays that of the first frame.
+// about the normal that nothing fixes is zero in the first frame and then follows the motion. That
+// a new pencil runs along X, Y or Z counts in frames that have a known one along its axis. Unit:
+// that of the first frame's pose; where that is not metric, the distance of its origin, so that
+// later translations have other lengths than 1 though `metric` is false. Without any circle only
+// the rotation is tracked, and the translation stays that of the first frame.
 //
 // Loss. A frame that contradicts all hypotheses, or has nothing of the map but other features, is
 // not used (predicted_only). After TrackerOptions::lost_after of them in a row, or a gap longer

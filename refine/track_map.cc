@@ -41,11 +41,7 @@ class MapBuilder {
  public:
   MapBuilder(const Observations& frame, const TrackerOptions& options, TrackMap* map,
              std::vector<TrackState>* states)
-      : frame_(frame),
-        options_(options),
-        noise_(options.estimation.noise_model),
-        map_(*map),
-        states_(*states) {}
+      : frame_(frame), noise_(options.estimation.noise_model), map_(*map), states_(*states) {}
 
   // `is_first`: it fixes the origin and the unit.
   void AddCircle(const CircleObservation& circle, bool is_first) {
@@ -111,7 +107,7 @@ class MapBuilder {
       if (is_constant) covariance.resize(0, 0);
       state.Append(map_, block, d.data(), covariance);
     }
-    map_.directions.push_back({id, block});
+    map_.directions.push_back({id, block, role});
   }
 
  private:
@@ -173,7 +169,6 @@ class MapBuilder {
   }
 
   const Observations& frame_;
-  const TrackerOptions& options_;
   const NoiseModel& noise_;
   TrackMap& map_;
   std::vector<TrackState>& states_;
@@ -219,19 +214,31 @@ bool InPlane(const std::string& plane, const TrackMap& map) {
   return !plane.empty() && plane == map.plane;
 }
 
-void AddDirections(const Observations& frame, const TrackMap& map, MapBuilder* builder) {
+// Whether the axes of a later frame are the tracker's: where a pencil that the map knows has the
+// same role in it. A detector names the axes of each frame's world anew, and a turn that nothing
+// fixed in the first frame has a convention since.
+bool SharesAxes(const Observations& frame, const TrackMap& map) {
+  return std::any_of(
+      map.directions.begin(), map.directions.end(), [&](const TrackMap::Direction& d) {
+        const int index = d.role == PencilDirection::kFree ? -1 : FindPencil(frame, d.id);
+        return index >= 0 && frame.pencils[static_cast<std::size_t>(index)].direction == d.role;
+      });
+}
+
+void AddDirections(const Observations& frame, const TrackMap& map, bool shares_axes,
+                   MapBuilder* builder) {
   const auto is_known = [&](const std::string& id) {
     return std::any_of(map.directions.begin(), map.directions.end(),
                        [&](const TrackMap::Direction& d) { return d.id == id; });
   };
-  if (frame.frame.x_axis && !is_known(kXAxisId))
+  if (shares_axes && frame.frame.x_axis && !is_known(kXAxisId))
     builder->AddDirection(kXAxisId, PencilDirection::kX, true, Eigen::Vector3d::UnitX());
-  if (frame.frame.y_axis && !is_known(kYAxisId))
+  if (shares_axes && frame.frame.y_axis && !is_known(kYAxisId))
     builder->AddDirection(kYAxisId, PencilDirection::kY, true, Eigen::Vector3d::UnitY());
   for (const PencilObservation& pencil : frame.pencils) {
-    if (is_known(pencil.id) || (pencil.direction == PencilDirection::kFree && !pencil.fit))
-      continue;
-    builder->AddDirection(pencil.id, pencil.direction, InPlane(pencil.plane, map),
+    const PencilDirection role = shares_axes ? pencil.direction : PencilDirection::kFree;
+    if (is_known(pencil.id) || (role == PencilDirection::kFree && !pencil.fit)) continue;
+    builder->AddDirection(pencil.id, role, InPlane(pencil.plane, map),
                           pencil.fit ? pencil.fit->direction : Eigen::Vector3d::UnitX());
   }
 }
@@ -265,7 +272,7 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
       if (c != base && takes_part(*c)) builder.AddCircle(*c, false);
     }
   }
-  AddDirections(resolved, *map, &builder);
+  AddDirections(resolved, *map, true, &builder);
 }
 
 void ExtendMap(const Observations& fitted, const TrackerOptions& options, TrackMap* map,
@@ -277,7 +284,7 @@ void ExtendMap(const Observations& fitted, const TrackerOptions& options, TrackM
     if (!is_known && map->has_position() && circle.fit && InPlane(circle.plane, *map))
       builder.AddCircle(circle, false);
   }
-  AddDirections(fitted, *map, &builder);
+  AddDirections(fitted, *map, SharesAxes(fitted, *map), &builder);
 }
 
 }  // namespace circline

@@ -34,6 +34,7 @@ class TrackMap {
   struct Direction {
     std::string id;  // Of its pencil; "frame.x_axis", "frame.y_axis".
     int block = -1;
+    PencilDirection role = PencilDirection::kFree;
   };
 
   void Reset(bool has_position, const Camera& camera, const CameraSigma& sigma);

@@ -208,6 +208,30 @@ TEST(PoseTrackerTest, LearnsCirclesAndUsesThem) {
   }
 }
 
+// A detector that looks anew may call another axis of the world X: the track goes on.
+TEST(PoseTrackerTest, AxesThatAreNamedAnewAreDirectionsLikeOthers) {
+  TrajectoryOptions trajectory;
+  trajectory.pencil = true;
+  trajectory.occluded = 0.0;
+  trajectory.num_frames = 20;
+  constexpr std::size_t kAnew = 10;
+  const Trajectory sequence(trajectory, 4);
+  PoseTracker tracker(ExactOptions(trajectory));
+  Random noise(6);
+  for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
+    Observations seen = sequence.Observe(sequence.frames[k], &noise);
+    if (k >= kAnew) {
+      seen.pencils[0].id = "another";
+      seen.pencils[0].direction = PencilDirection::kY;
+    }
+    const TrackedPose tracked = tracker.Update(seen, static_cast<double>(k) / trajectory.fps);
+    ASSERT_TRUE(tracked.estimate.status.ok()) << tracked.estimate.status.message;
+    EXPECT_EQ(tracked.reinitialized, k == 0) << k;
+    EXPECT_FALSE(tracked.predicted_only) << k;
+    EXPECT_TRUE(tracked.estimate.hypotheses.front().left_out.empty()) << k;
+  }
+}
+
 TEST(PoseTrackerTest, LeavesOutWhatContradicts) {
   TrajectoryOptions trajectory;
   trajectory.second_circle = trajectory.pencil = true;
