@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
@@ -48,8 +49,9 @@ double LogAdd(double a, double b) {
   return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
 }
 
-// Minima that several starts lead to are one; of different hypotheses the probabilities add up.
-void Merge(const TrackMap& map, std::vector<TrackFit>* fits) {
+// Minima that several starts lead to are one. What `both` makes of two log weights: the larger one
+// of two starts of a hypothesis, the sum of the probabilities of two hypotheses.
+void Merge(const TrackMap& map, double (*both)(double, double), std::vector<TrackFit>* fits) {
   std::vector<TrackFit> merged;
   for (TrackFit& fit : *fits) {
     const auto same = std::find_if(merged.begin(), merged.end(),
@@ -59,31 +61,41 @@ void Merge(const TrackMap& map, std::vector<TrackFit>* fits) {
       continue;
     }
     const double a = same->state.log_weight, b = fit.state.log_weight;
-    const double both = fit.state.parent == same->state.parent ? std::max(a, b) : LogAdd(a, b);
     if (b > a) *same = std::move(fit);
-    same->state.log_weight = both;
+    same->state.log_weight = both(a, b);
   }
   *fits = std::move(merged);
 }
 
+double LogWeight(const TrackState& state) { return state.log_weight; }
+double LogWeight(const TrackFit& fit) { return fit.state.log_weight; }
+double& LogWeight(TrackState& state) { return state.log_weight; }
+double& LogWeight(TrackFit& fit) { return fit.state.log_weight; }
+
+template <typename T>
+void Normalize(std::vector<T>* all) {
+  double sum = -std::numeric_limits<double>::infinity();
+  for (const T& one : *all) sum = LogAdd(sum, LogWeight(one));
+  for (T& one : *all) LogWeight(one) -= sum;
+}
+
 // Log weights to log probabilities; drops what is improbable and orders the rest. The first stays
 // first unless another one is clearly more probable.
-void Rank(const TrackerOptions& options, std::vector<TrackFit>* fits) {
-  const auto weight = [](const TrackFit& fit) { return fit.state.log_weight; };
-  double sum = -std::numeric_limits<double>::infinity();
-  for (const TrackFit& fit : *fits) sum = LogAdd(sum, weight(fit));
-  for (TrackFit& fit : *fits) fit.state.log_weight -= sum;
-  const auto is_more = [&](const TrackFit& a, const TrackFit& b) { return weight(a) > weight(b); };
-  const auto best = std::min_element(fits->begin(), fits->end(), is_more);
-  if (weight(*best) > weight(fits->front()) + std::log(options.flip_odds))
-    std::rotate(fits->begin(), best, best + 1);
-  std::stable_sort(fits->begin() + 1, fits->end(), is_more);
+template <typename T>
+void Rank(const TrackerOptions& options, std::vector<T>* all) {
+  Normalize(all);
+  const auto is_more = [](const T& a, const T& b) { return LogWeight(a) > LogWeight(b); };
+  const auto best = std::min_element(all->begin(), all->end(), is_more);
+  if (LogWeight(*best) > LogWeight(all->front()) + std::log(options.flip_odds))
+    std::rotate(all->begin(), best, best + 1);
+  std::stable_sort(all->begin() + 1, all->end(), is_more);
   const double least = std::log(options.min_probability);
-  fits->erase(std::remove_if(fits->begin() + 1, fits->end(),
-                             [&](const TrackFit& fit) { return weight(fit) < least; }),
-              fits->end());
+  all->erase(std::remove_if(all->begin() + 1, all->end(),
+                            [&](const T& one) { return LogWeight(one) < least; }),
+             all->end());
   const auto most = static_cast<std::size_t>(options.max_hypotheses);
-  if (fits->size() > most) fits->resize(most);
+  if (all->size() > most) all->erase(all->begin() + options.max_hypotheses, all->end());
+  Normalize(all);
 }
 
 std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
@@ -156,6 +168,10 @@ class PoseTracker::Implementation {
     if (!status.ok()) return tracked;
 
     const double dt = states_.empty() ? 0.0 : time - time_;
+    if (!states_.empty() && motion.relative && !(dt > 0.0)) {
+      tracked.estimate.status = Status::Invalid("a relative motion takes time: give a later one");
+      return tracked;
+    }
     time_ = time;
     Prepare(observations);
     if (states_.empty() || time - used_ > options_.max_gap_s) {
@@ -178,7 +194,8 @@ class PoseTracker::Implementation {
   }
 
   std::optional<PoseHypothesis> Predict(double time) const {
-    if (states_.empty() || !(time >= time_) || !std::isfinite(time)) return {};
+    // Beyond the gap the next frame begins anew: nothing is expected.
+    if (states_.empty() || !(time >= time_) || !(time - used_ <= options_.max_gap_s)) return {};
     TrackState state = states_.front();
     MoveOn(map_, options_, time - time_, &state);
     PoseHypothesis h = HypothesisOf(map_, state, fitted_.camera);
@@ -221,6 +238,7 @@ class PoseTracker::Implementation {
     for (const TrackState& state : states_) {
       TrackFit fit;
       if (!frame.RefineHere(state, options_, &fit)) continue;
+      ConditionOnPriors(&fit.state);
       fit.state.log_weight = state.log_weight;  // Its evidence has been counted.
       fits.push_back(std::move(fit));
     }
@@ -229,6 +247,23 @@ class PoseTracker::Implementation {
     states_.clear();
     for (TrackFit& fit : fits) states_.push_back(std::move(fit.state));
     if (fitted_.frame.plane.empty()) map_.plane = NamedPlane(fitted_, map_.plane);
+  }
+
+  // What is known of the first pose counts in those that follow.
+  void ConditionOnPriors(TrackState* state) const {
+    const EstimationOptions& known = options_.estimation;
+    if (known.pose_prior) {
+      PosePrior prior = *known.pose_prior;
+      if (!map_.metric || !map_.origin_observed) {  // t has no part in it.
+        constexpr double kNothing = 1e6;            // Standard deviation that says nothing.
+        Eigen::Map<Matrix6d> P(prior.covariance.data());
+        P.topRightCorner<3, 3>().setZero();
+        P.bottomLeftCorner<3, 3>().setZero();
+        P.bottomRightCorner<3, 3>() = kNothing * kNothing * Eigen::Matrix3d::Identity();
+      }
+      Condition(map_, prior, state);
+    }
+    if (known.gravity_prior) Condition(map_, *known.gravity_prior, state);
   }
 
   // The name of the world's plane if the caller gave it, else none: a conventional name means
@@ -251,10 +286,7 @@ class PoseTracker::Implementation {
       if (motion.absolute) Condition(map_, *motion.absolute, &state);
       if (motion.gravity) Condition(map_, *motion.gravity, &state);
     }
-    // Log probabilities again, for a frame that says nothing more.
-    double sum = -std::numeric_limits<double>::infinity();
-    for (const TrackState& state : states_) sum = LogAdd(sum, state.log_weight);
-    for (TrackState& state : states_) state.log_weight -= sum;
+    Rank(options_, &states_);  // For a frame that says nothing more.
   }
 
   // Fills fits_, ranked; empty where the frame says nothing or contradicts all hypotheses.
@@ -264,8 +296,11 @@ class PoseTracker::Implementation {
     is_blank_ = frame_->empty();
     if (is_blank_) return;
     for (std::size_t i = 0; i < states_.size(); ++i) {
-      states_[i].parent = static_cast<int>(i);
-      frame_->Refine(states_[i], options_, &fits_);
+      std::vector<TrackFit> own;
+      frame_->Refine(states_[i], options_, &own);
+      Merge(
+          map_, [](double a, double b) { return std::max(a, b); }, &own);
+      std::move(own.begin(), own.end(), std::back_inserter(fits_));
     }
     if (std::none_of(fits_.begin(), fits_.end(), [&](const TrackFit& fit) {
           return fit.misfit <= ChiSquareLimit(std::max(1, fit.dof), options_.gate_probability);
@@ -273,7 +308,7 @@ class PoseTracker::Implementation {
       fits_.clear();
       return;
     }
-    Merge(map_, &fits_);
+    Merge(map_, LogAdd, &fits_);
     Rank(options_, &fits_);
     states_.clear();
     for (const TrackFit& fit : fits_) states_.push_back(fit.state);

@@ -4,8 +4,8 @@
 //     PoseTracker tracker(options);
 //     for (const Frame& frame : frames) {
 //       const TrackedPose tracked = tracker.Update(frame.observations, frame.seconds);
-//       if (!tracked.estimate.status.ok()) continue;  // Nothing is known yet; the message says
-//       why. Use(tracked.estimate.hypotheses.front());     // Best first; probabilities sum to 1.
+//       if (!tracked.estimate.status.ok()) continue;  // Its message says why.
+//       Use(tracked.estimate.hypotheses.front());     // Best first; probabilities sum to 1.
 //     }
 //
 // What is carried. Several hypotheses, each a Gaussian with a probability: the pose, its velocity,
@@ -79,7 +79,7 @@ struct TrackerOptions {
   double gate_probability = 1e-7;
   int lost_after = 3;      // Frames in a row that contradict all hypotheses; 1 or more.
   double max_gap_s = 1.0;  // Seconds without evidence that can be used.
-  // Evaluations of the evidence (with derivatives) that one hypothesis may take in a call.
+  // Evaluations of the evidence (with derivatives) from one start; a hypothesis has two at most.
   int max_evaluations = 20;
 
   Status Validate() const;
@@ -130,8 +130,8 @@ class PoseTracker {
                      const MotionPrior& motion);
 
   // The best hypothesis moved on to that time, with the circles of the map (camera frame) and its
-  // directions: where a detector may look. None where nothing is tracked or the time is not after
-  // the last one. Changes nothing.
+  // directions: where a detector may look. None where nothing is tracked, the time is before the
+  // last one, or so late that the next frame will begin anew (max_gap_s). Changes nothing.
   std::optional<PoseHypothesis> Predict(double timestamp_s) const;
 
   // Forgets everything but the options.

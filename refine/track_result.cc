@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "circline/refine/camera_shifts.h"
+
 namespace circline {
 namespace {
 
@@ -80,6 +82,22 @@ void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& c
   }
 }
 
+// The camera, where its error is estimated and not only counted.
+void FillCamera(const TrackMap& map, const TrackState& state, const Camera& camera,
+                PoseHypothesis* h) {
+  if (map.camera_is_considered || !map.has_camera()) return;
+  const double* shifts = state.x.data() + map.block(TrackMap::kCamera).offset;
+  const int column = map.tangent(TrackMap::kCamera);  // The focal length comes first.
+  h->camera = ShiftedCamera(camera, shifts);
+  h->focal_scale = std::exp(shifts[0]);
+  h->focal_sigma = h->focal_scale * std::sqrt(std::max(0.0, state.covariance(column, column)));
+  const Eigen::Index rows = map.has_position() ? 6 : 3;
+  Vector6d across = Vector6d::Zero();
+  across.head(rows) = state.covariance.col(column).head(rows);
+  across.head<3>() = (h->cam_from_world.rotation * across.head<3>()).eval();
+  Eigen::Map<Vector6d>(h->focal_covariance.data()) = h->focal_scale * across;
+}
+
 }  // namespace
 
 PoseHypothesis HypothesisOf(const TrackMap& map, const TrackState& state, const Camera& camera) {
@@ -90,6 +108,7 @@ PoseHypothesis HypothesisOf(const TrackMap& map, const TrackState& state, const 
   h.structure = map.plane;
   FillCovariance(map, state, &h);
   FillLandmarks(map, state, camera, &h);
+  FillCamera(map, state, camera, &h);
   return h;
 }
 

@@ -70,7 +70,6 @@ struct TrackState {
   Eigen::VectorXd x;
   Eigen::MatrixXd covariance;
   double log_weight = 0.0;
-  int parent = 0;  // Index among the hypotheses of the frame before.
 
   Eigen::Map<const Eigen::Vector3d> Vector(const TrackMap& map, int block) const {
     return Eigen::Map<const Eigen::Vector3d>(x.data() + map.block(block).offset);

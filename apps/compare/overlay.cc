@@ -261,7 +261,8 @@ cv::Mat WithCaption(const ImageRun& run, const SolverRun* shown, const Canvas& c
   if (error) title += "    error " + FormatShort(*error, 2) + " deg";
   const std::size_t count = shown->estimate.hypotheses.size();
   return canvas.WithCaption(
-      title, {"rms " + FormatShort(best.rms_px, 2) + " px", SigmaText(best),
+      title, {best.num_inliers > 0 ? "rms " + FormatShort(best.rms_px, 2) + " px" : "predicted",
+              SigmaText(best),
               "probability " + FormatFixed(best.probability, 2) + " (" + std::to_string(count) +
                   (count == 1 ? " hypothesis)" : " hypotheses)")});
 }

@@ -89,7 +89,7 @@ Json HypothesisLine(const ImageRun& image, const SolverRun& run, std::size_t ind
   line["rotation"] = Array(h.cam_from_world.rotation);
   line["translation"] = Array(h.cam_from_world.translation);
   line["metric"] = h.metric;
-  line["rms_px"] = Number(h.rms_px);
+  line["rms_px"] = h.num_inliers > 0 ? Number(h.rms_px) : Json();  // Null: a prediction.
   line["num_inliers"] = h.num_inliers;
   line["num_observations"] = h.num_observations;
   line["sigma_rotation_deg"] = Array((h.SigmaRotation() * kDegreesPerRadian).eval());

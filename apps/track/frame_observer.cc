@@ -48,7 +48,13 @@ ImageRun FrameObserver::Follow(const PoseHypothesis* last, const PoseHypothesis*
   run.photo = frame->photo;
   const Stopwatch watch;
   try {
-    if (!follower_) follower_.emplace(*camera_, options_.follow);
+    if (!follower_) {
+      FollowOptions follow = options_.follow;
+      follow.detection.noise_model.camera =
+          CameraSigmaOf(options_.tracker.estimation, frame->image);
+      follower_.emplace(*camera_, follow);
+      if (!guessed_words_.empty()) run.problems.push_back(guessed_words_);
+    }
     // After so long a gap the tracker begins anew, and nothing is where it was.
     if (frame->time_s - last_s_ > options_.tracker.max_gap_s && !has_given_) follower_->Reset();
     last_s_ = std::max(last_s_, frame->time_s);
@@ -78,6 +84,7 @@ Status FrameObserver::SettleCamera(Frame* frame) {
                                              frame->photo.rows, estimation.noise_model.camera);
       camera = std::move(guessed.camera);
       guessed_sigma_ = guessed.sigma;
+      guessed_words_ = std::move(guessed.words);
     }
     camera_ = camera;
     if (camera_->width == 0) camera_->width = frame->photo.cols;

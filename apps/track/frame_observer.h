@@ -33,6 +33,7 @@ class FrameObserver {
   const TrackOptions& options_;
   std::optional<Camera> camera_;              // Of all frames, since the first one.
   std::optional<CameraSigma> guessed_sigma_;  // Of the same, where it is a guess.
+  std::string guessed_words_;                 // What there is to say of it, once.
   std::optional<FeatureFollower> follower_;
   bool has_given_ = false;        // The circle in --roi was found and is followed.
   std::string circle_of_radius_;  // Id of the one that --circle_radius speaks of.

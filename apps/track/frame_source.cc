@@ -42,7 +42,8 @@ class VideoSource : public FrameSource {
       if (!capture_.retrieve(frame->photo) || frame->photo.empty())
         frame->read_error = "the frame cannot be decoded";
     } catch (const std::exception& error) {
-      frame->read_error = std::string("the frame cannot be decoded: ") + error.what();
+      frame->read_error = std::string("the video ends here: ") + error.what();
+      capture_.release();  // It may throw for ever.
     }
     return true;
   }

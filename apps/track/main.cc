@@ -54,6 +54,12 @@ Status OpenSource(const TrackOptions& options, ImageSet* images,
   }
   std::vector<double> times_s;
   if (status.ok() && !options.timestamps.empty()) status = ReadTimes(options.timestamps, &times_s);
+  const int num_frames = status.ok() ? (*source)->num_frames() : 0;
+  if (!times_s.empty() && static_cast<int>(times_s.size()) < num_frames) {
+    return Status::Invalid("--timestamps=" + options.timestamps + ": has " +
+                           std::to_string(times_s.size()) + " times for " +
+                           std::to_string(num_frames) + " frames");
+  }
   if (status.ok()) (*source)->SetTimes(std::move(times_s));
   return status;
 }
@@ -65,6 +71,7 @@ int TrackFrames() {
   Status status = TrackOptionsFromFlags(&options);
   if (status.ok()) status = OpenSource(options, &images, &source);
   if (!status.ok()) return Refuse(status);
+  if (options.compare.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.compare.inputs.guess));
   if (options.compare.threads > 0)
     cv::setNumThreads(std::min(options.compare.threads, cv::getNumberOfCPUs()));
   const std::string& output = options.compare.output;

@@ -6,13 +6,8 @@
 
 DECLARE_string(images);
 DECLARE_string(scene);
-DECLARE_string(merge);
-DECLARE_bool(resume);
 
-DEFINE_string(
-    video, "",
-    "Instead of --images or --scene: a video file, any that OpenCV reads. Needs --camera, "
-    "--focal_px or --fov_deg.");
+DEFINE_string(video, "", "Instead of --images or --scene: a video file, any that OpenCV reads.");
 DEFINE_double(fps, 0.0, "Frames per second; 0 = as the video says, 25 for photos.");
 DEFINE_string(timestamps, "",
               "A file with the seconds of every frame, one a line, where they are not evenly "
@@ -40,9 +35,14 @@ bool EndsWith(const std::string& text, const std::string& end) {
   return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
+// A track is made in one go, from its first frame, and by one solver.
 Status CheckSource() {
-  if (!FLAGS_merge.empty() || FLAGS_resume)
-    return Status::Invalid("--merge and --resume: a track is made in one go, from its first frame");
+  for (const char* name : {"merge", "resume", "shard", "solvers", "peers", "export_as",
+                           "save_options", "list_solvers"}) {
+    gflags::CommandLineFlagInfo info;
+    if (gflags::GetCommandLineFlagInfo(name, &info) && info.current_value != info.default_value)
+      return Status::Invalid(std::string("--") + name + ": is not a flag of circline_track");
+  }
   if (FLAGS_video.empty()) return Status::Ok();
   if (!FLAGS_images.empty() || !FLAGS_scene.empty())
     return Status::Invalid("give one of --video, --images and --scene");

@@ -77,8 +77,22 @@ Status FeatureFollower::Next(const cv::Mat& image, Observations* observations) {
 }
 
 Status FeatureFollower::Cold(const cv::Mat& image, Observations* found, Observations* expect) {
-  const Status status = DetectObservations(image, camera_, options_.detection, found);
+  DetectionOptions detection = options_.detection;
+  // One camera took all frames: the first one with something in it says which.
+  if (is_settled_) {
+    constexpr double kSettled = 0.01;  // Of log f: nothing is looked for any more.
+    CameraSigma& sigma = detection.noise_model.camera;
+    sigma.log_focal = std::min(sigma.log_focal, kSettled);
+    sigma.doubtful_log_focal = 0.0;
+  }
+  const Status status = DetectObservations(image, camera_, detection, found);
   if (!status.ok()) return status;
+  if (!is_settled_ && CountFeatures(*found) > 0) {
+    camera_ = found->camera;
+    stated_focal_px_ = found->stated_focal_px;
+    is_settled_ = true;
+  }
+  found->stated_focal_px = stated_focal_px_;
   const NextNames before = next_;
   const int kept = KeepNames(held_, SearchPx(), &next_, found);
   was_cold_ = true;
@@ -124,6 +138,12 @@ bool FeatureFollower::IsTimeForCold() const {
 
 void FeatureFollower::Start(const Observations& given) {
   held_ = given;
+  for (PencilObservation& pencil : held_.pencils) {  // Lines without ends have no place.
+    std::vector<LineObservation>& lines = pencil.lines;
+    lines.erase(std::remove_if(lines.begin(), lines.end(),
+                               [](const LineObservation& line) { return line.points.size() < 2; }),
+                lines.end());
+  }
   is_given_ = true;
   num_at_look_ = CountFeatures(given);
   num_circles_at_look_ = static_cast<int>(given.circles.size());

@@ -15,8 +15,7 @@
 // looked at anew, and what is found is named after the features that it continues,
 // - every `cold_every` frames, for new features, and
 // - where less than `min_found_share` of the circles, or of all features, that were there at the
-// last
-//   look are found.
+//   last look are found.
 #ifndef CIRCLINE_RANSAC_DETECTION_FEATURE_FOLLOWER_H_
 #define CIRCLINE_RANSAC_DETECTION_FEATURE_FOLLOWER_H_
 
@@ -84,6 +83,8 @@ class FeatureFollower {
   double SearchPx() const;
 
   Camera camera_;
+  double stated_focal_px_ = 0.0;  // Observations::stated_focal_px of the frame that settled it.
+  bool is_settled_ = false;
   FollowOptions options_;
   Observations held_;  // Where the features are expected.
   bool is_given_ = false, was_cold_ = false, was_cut_ = false;

@@ -184,6 +184,7 @@ Status FollowObservations(const cv::Mat& image, const Observations& predicted, d
   *expect = predicted;
   *found = Observations();
   found->camera = predicted.camera;
+  found->stated_focal_px = predicted.stated_focal_px;
   cv::Mat gray;
   Status status = CheckDetectionInput(image, predicted.camera, options);
   if (status.ok()) status = ToGray(image, &gray);

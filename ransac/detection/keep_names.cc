@@ -164,7 +164,10 @@ void NameFeatures(const std::vector<Feature>& predicted, const std::vector<int>&
     if (continued[k] >= 0) {
       Continue(predicted[static_cast<std::size_t>(continued[k])], &feature);
     } else {
-      feature.id = letter + std::to_string((*number)++);
+      do {
+        feature.id = letter + std::to_string((*number)++);
+      } while (std::any_of(predicted.begin(), predicted.end(),
+                           [&](const Feature& other) { return other.id == feature.id; }));
     }
   }
 }

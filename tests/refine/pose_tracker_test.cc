@@ -183,6 +183,25 @@ TEST(PoseTrackerTest, KnownRadiusIsMetric) {
 }
 
 // A circle of the plane that turns up later carries the pose where the first one is hidden.
+// The turn about a lone circle's normal is known from the prior alone, in every frame.
+TEST(PoseTrackerTest, APriorOfTheFirstPoseCountsInTheNextFrames) {
+  TrajectoryOptions trajectory;
+  trajectory.occluded = 0.0;
+  trajectory.num_frames = 3;
+  const Trajectory sequence(trajectory, 3);
+  TrackerOptions options = ExactOptions(trajectory);
+  constexpr double kSigma = 0.01;
+  options.estimation.pose_prior.emplace();
+  options.estimation.pose_prior->mean = sequence.frames[0].pose;
+  for (std::size_t k = 0; k < 6; ++k)
+    options.estimation.pose_prior->covariance[7 * k] = kSigma * kSigma;
+  Track(sequence, options, 7, false,
+        [](std::size_t k, const Trajectory::Frame&, const TrackedPose& tracked) {
+          EXPECT_LT(tracked.estimate.hypotheses.front().SigmaRotation().maxCoeff(), 5.0 * kSigma)
+              << k;
+        });
+}
+
 TEST(PoseTrackerTest, LearnsCirclesAndUsesThem) {
   TrajectoryOptions trajectory;
   trajectory.second_circle = true;
@@ -373,9 +392,18 @@ TEST_F(OneTrackTest, PredictsWhereToLook) {
       sequence_.frames[10].pose, sequence_.Circles()[1].x, sequence_.Circles()[1].y);
   EXPECT_LT((predicted->circles[1].center_px - center).norm(), 10.0);
   EXPECT_FALSE(tracker_.Predict(0.0));
+  for (const double beyond_the_gap : {1000.0, 1e160})
+    EXPECT_FALSE(tracker_.Predict(beyond_the_gap));
   tracker_.Reset();
   EXPECT_FALSE(tracker_.Predict(1.0));
   EXPECT_TRUE(Update(0).reinitialized);  // Earlier times are new ones.
+}
+
+TEST_F(OneTrackTest, ARelativeMotionTakesTime) {
+  const CameraPose& pose = sequence_.frames[9].pose;
+  const TrackedPose tracked = tracker_.Update(Seen(9), 9 / 30.0, Gyroscope(pose, pose));
+  EXPECT_EQ(tracked.estimate.status.code, StatusCode::kInvalidArgument);
+  EXPECT_TRUE(Update(10).estimate.status.ok());
 }
 
 TEST_F(OneTrackTest, WhatIsKnownOfThePoseCounts) {
