@@ -146,6 +146,9 @@ std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<Scen
       const auto index = static_cast<std::size_t>(i);
       runs[index] = ObserveImage(options, &(*images)[index]);
       Camera& camera = runs[index].observations.camera;
+      // Not the one that the photo alone makes likeliest: the prior is about the one given.
+      camera = (*images)[index].observations.camera;
+      runs[index].observations.stated_focal_px = 0.0;
       if (camera.width == 0) camera.width = runs[index].photo.cols;
       if (camera.height == 0) camera.height = runs[index].photo.rows;
       runs[index].photo.release();
@@ -229,6 +232,9 @@ Status CalibrateInPasses(CalibrateOptions* options, std::vector<SceneImage>* ima
   const bool detects = std::any_of(images->begin(), images->end(),
                                    [](const SceneImage& image) { return image.detect_everything; });
   for (int pass = 0;; ++pass) {
+    // At first what belongs together is judged where each photo makes the focal length likeliest,
+    // afterwards where all do.
+    options->compare.structure_tells_focal = pass == 0;
     const Status status = CalibrateOnce(options, images, &given, calibration);
     if (!status.ok() || !detects || pass + 1 == kPasses) return status;
     bool same = true;
@@ -255,7 +261,6 @@ int Calibrate() {
   if (!status.ok()) return Refuse(status);
   if (!set.rigid().empty()) RigidWorldFromName(set.rigid(), &options.adjust.rigid);
   if (options.compare.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.compare.inputs.guess));
-  options.compare.structure_tells_focal = false;  // All photos together do.
   const bool with_pictures = options.compare.overlays;
   options.compare.overlays = false;  // Photos are read for detection only.
   std::vector<SceneImage> images;

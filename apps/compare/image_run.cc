@@ -45,9 +45,9 @@ void TakeOverFrame(const Observations& scene, Observations* detected) {
 void DetectAll(const CompareOptions& options, ImageRun* run) {
   const Stopwatch watch;
   DetectionOptions detection = options.detection;
-  if (options.structure_tells_focal) {
-    detection.noise_model.camera = CameraSigmaOf(options.losses.front().estimation, *run->image);
-  }
+  detection.noise_model.camera = options.structure_tells_focal
+                                     ? CameraSigmaOf(options.losses.front().estimation, *run->image)
+                                     : CameraSigma();
   const Status status = DetectObservations(run->photo, run->image->observations.camera, detection,
                                            &run->observations);
   run->stages.emplace_back("detect", watch.Microseconds());

@@ -66,5 +66,20 @@ TEST_F(PhotographsTest, ChessboardsWithEverythingDetected) {
   EXPECT_LE(Median(errors_["line_pairs refined"]), 1.0);
 }
 
+// Nothing is known of the camera, 495.7 px, nor that the discs form a grid.
+TEST_F(PhotographsTest, FourPhotographsOfDiscsCalibrate) {
+  const std::string photos = DataFolder() + "/circles-discocal-rgb";
+  if (DataFolder().empty() || !std::filesystem::is_directory(photos))
+    GTEST_SKIP() << "no photographs here: set CIRCLINE_DATA";
+  const Outcome outcome =
+      RunProgram(CIRCLINE_CALIBRATE, "--images='" + photos + "/circle_left_raw_00[0-3].jpg' " +
+                                         "--overlays=false --output='" + folder_ / "out" + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto made = nlohmann::json::parse(ReadAll(folder_ / "out/calibration.json"));
+  const double fx = made["cameras"][0]["fx"], sigma = made["cameras"][0]["sigma"]["fx"];
+  EXPECT_NEAR(fx, 495.7, 3.0 * sigma);
+  EXPECT_LT(sigma, 5.0);
+}
+
 }  // namespace
 }  // namespace circline::apps
