@@ -13,7 +13,7 @@ namespace {
 
 // Of 36 mm x 24 mm.
 constexpr double kFilmDiagonalMm = 43.266615305567875;
-constexpr double kMmPerInch = 25.4, kMmPerCentimetre = 10.0;
+constexpr double kMmPerInch = 25.4, kMmPerCentimetre = 10.0, kMmPerMicrometre = 1e-3;
 // Of focal length to the photo's longer side: a fisheye's, and a long telescope's. Beyond lies what
 // no lens has.
 constexpr double kShortest = 0.2, kLongest = 60.0;
@@ -47,7 +47,13 @@ double Number(ExifData* data, ExifIfd ifd, ExifTag tag) {
 double PixelsPerMm(ExifData* data) {
   const double resolution = Number(data, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_PLANE_X_RESOLUTION);
   const double unit = Number(data, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_PLANE_RESOLUTION_UNIT);
-  return resolution / (unit == 3.0 ? kMmPerCentimetre : kMmPerInch);
+  // EXIF knows 2 and 3, and takes 2 where nothing is said; 4 and 5 are usual besides.
+  const double mm = unit == 0.0 || unit == 2.0 ? kMmPerInch
+                    : unit == 3.0              ? kMmPerCentimetre
+                    : unit == 4.0              ? 1.0
+                    : unit == 5.0              ? kMmPerMicrometre
+                                               : 0.0;
+  return mm > 0.0 ? resolution / mm : 0.0;
 }
 
 std::string Millimetres(const char* tag, double mm) {

@@ -82,6 +82,12 @@ TEST_F(Exif, FocalPlaneGivesPixelsForAMillimetre) {
   EXPECT_NEAR(Read(Jpeg(inches)).focal_px, 800.0, 1e-6);
   const std::vector<Tag> centimetres = {{kFocal, 8, 1}, {kResolution, 10000, 1}, {kUnit, 3, {}}};
   EXPECT_NEAR(Read(Jpeg(centimetres)).focal_px, 8000.0, 1e-6);
+  const std::vector<Tag> millimetres = {{kFocal, 8, 1}, {kResolution, 100, 1}, {kUnit, 4, {}}};
+  EXPECT_NEAR(Read(Jpeg(millimetres)).focal_px, 800.0, 1e-6);
+  const std::vector<Tag> micrometres = {{kFocal, 8, 1}, {kResolution, 1, 5}, {kUnit, 5, {}}};
+  EXPECT_NEAR(Read(Jpeg(micrometres)).focal_px, 1600.0, 1e-6);
+  const std::vector<Tag> unitless = {{kFocal, 80, 10}, {kResolution, 2540, 1}, {kUnit, 1, {}}};
+  EXPECT_EQ(Read(Jpeg(unitless)).focal_px, 0.0);  // 1: no unit of length.
   // Made half as large since.
   const std::vector<Tag> smaller = {{kFocal, 80, 10}, {kResolution, 2540, 1}, {kPixelX, 8000, {}}};
   EXPECT_NEAR(Read(Jpeg(smaller)).focal_px, 0.0, 1e-6);  // 400 px is no lens's.
