@@ -32,6 +32,10 @@ std::vector<std::vector<std::uint8_t>> CalibrationPictures(const CompareOptions&
   joint.solvers = {"joint"};
   joint.overlays = true;
   joint.inputs.guess = CameraGuess();
+  // Seen through the camera that was estimated, whatever was known of it before.
+  joint.closed_form.noise_model.camera = CameraSigma();
+  for (LossSetting& loss : joint.losses)
+    loss.estimation.camera_sigma = loss.estimation.noise_model.camera = CameraSigma();
   const SolverSet solvers(joint);
   const std::vector<std::size_t> chosen = ChoosePhotos(adjusted);
   std::vector<std::vector<std::uint8_t>> pictures(images.size());
@@ -43,6 +47,7 @@ std::vector<std::vector<std::uint8_t>> CalibrationPictures(const CompareOptions&
           adjusted.cameras[static_cast<std::size_t>(adjusted.photos[i].camera)];
       image.observations.camera = made.camera;
       image.camera_sigma = StatedCameraSigma();
+      image.guessed_sigma.reset();
       const ImageRun run = RunImage(joint, solvers, &image);
       if (!run.photo.empty()) pictures[i] = EncodeJpeg(DrawOverlay(run), kWidth);
     }
