@@ -90,7 +90,8 @@ struct AdjustedResidual {
 };
 
 struct AdjustedPhoto {
-  Status status;  // Not ok: it has no part in the rest, and this says why.
+  Status status;     // Not ok: it has no part in the rest, and this says why.
+  int same_as = -1;  // The photo that shows nearly the same, where that is why; else -1.
   int camera = 0;
   CameraPose cam_from_world;  // Of its world; its unit is that of the world's.
   // Of [delta, delta_t], 6x6 row-major, as in PoseHypothesis; the cameras' uncertainty is in it. Of

@@ -77,9 +77,9 @@ void Adjustment::SetAsideEqualViews() {
   for (std::size_t i = 0; i < equal.size(); ++i) {
     if (equal[i] < 0 || is_valid_[i] == 0) continue;
     is_valid_[i] = 0;
+    out_.photos[i].same_as = equal[i];
     out_.photos[i].status =
-        Status::Refused("it shows nearly the same as photo " + std::to_string(equal[i]) +
-                        " (counted from 0), whose errors it shares");
+        Status::Refused("it shows nearly the same as another photo, whose errors it shares");
   }
   if (count > 0) {
     out_.notes.push_back(std::to_string(count) + " of " + std::to_string(equal.size()) +

@@ -27,6 +27,12 @@ std::vector<double> Distortion(const Camera& camera) {
   return d;
 }
 
+std::string WhyLeftOut(const AdjustedPhoto& photo, const std::vector<std::string>& names) {
+  if (photo.same_as < 0) return photo.status.message;
+  return "it shows nearly the same as " + names[static_cast<std::size_t>(photo.same_as)] +
+         ", whose errors it shares";
+}
+
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -85,10 +91,11 @@ Json CameraJson(const AdjustedCamera& adjusted) {
           {"rms_px", adjusted.rms_px}};
 }
 
-Json PhotoJson(const AdjustedPhoto& photo, const std::string& name) {
-  Json out = {{"file", name},
+Json PhotoJson(const AdjustedPhoto& photo, std::size_t index,
+               const std::vector<std::string>& names) {
+  Json out = {{"file", names[index]},
               {"status", photo.status.ok() ? "ok" : "refused"},
-              {"message", photo.status.message}};
+              {"message", WhyLeftOut(photo, names)}};
   if (!photo.status.ok()) return out;
   Json rotation = Json::array(), translation = Json::array();
   for (int i = 0; i < 3; ++i) {
@@ -109,7 +116,7 @@ Json PhotoJson(const AdjustedPhoto& photo, const std::string& name) {
 Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observations>& photos,
                         const std::vector<std::string>& names,
                         const std::vector<std::vector<std::uint8_t>>& pictures,
-                        const std::string& folder) {
+                        const std::string& folder, std::string* note) {
   Json json = {{"rigid", adjusted.rigid}, {"metric", adjusted.metric}, {"cameras", Json::array()}};
   Status status;
   for (std::size_t c = 0; c < adjusted.cameras.size() && status.ok(); ++c) {
@@ -122,7 +129,7 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
   json["images"] = Json::array();
   for (std::size_t i = 0; i < photos.size(); ++i) {
     const AdjustedPhoto& photo = adjusted.photos[i];
-    json["images"].push_back(PhotoJson(photo, names[i]));
+    json["images"].push_back(PhotoJson(photo, i, names));
     if (!photo.status.ok()) continue;
     colmap->Add({names[i], i, adjusted.cameras[static_cast<std::size_t>(photo.camera)].camera,
                  photo.cam_from_world.rotation, photo.cam_from_world.translation, std::nullopt});
@@ -132,6 +139,7 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
     status = WriteFile(folder + "/calibration.json",
                        json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   if (status.ok()) status = colmap->Finish();
+  *note = colmap->Note();
   if (status.ok())
     status = WriteFile(folder + "/report.html", CalibrationReport(adjusted, names, pictures));
   return status;
@@ -174,9 +182,10 @@ std::string CalibrationTable(const AdjustedPhotos& adjusted,
   constexpr int kMostNamed = 20;  // All are in calibration.json and the report.
   int left_out = 0;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const std::string& message = adjusted.photos[i].status.message;
     if (adjusted.photos[i].status.ok() || ++left_out > kMostNamed) continue;
-    out << names[i] << ": left out, " << message.substr(0, message.find(" (")) << "\n";
+    const std::string why = WhyLeftOut(adjusted.photos[i], names);
+    const std::size_t detail = adjusted.photos[i].same_as < 0 ? why.find(" (") : std::string::npos;
+    out << names[i] << ": left out, " << why.substr(0, detail) << "\n";
   }
   if (left_out > kMostNamed) out << "and " << left_out - kMostNamed << " more are left out\n";
   return out.str();

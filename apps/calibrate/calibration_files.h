@@ -19,11 +19,14 @@ std::vector<double> Distortion(const Camera& camera);
 
 // calibration.yml (one more for each further camera, after its id), calibration.json, cameras.txt
 // and images.txt, report.html in `folder`. `names`: of the photos; `pictures`: of them, JPEG, may
-// be empty.
+// be empty. `note`: what the files could not take, a sentence; or empty.
 Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observations>& photos,
                         const std::vector<std::string>& names,
                         const std::vector<std::vector<std::uint8_t>>& pictures,
-                        const std::string& folder);
+                        const std::string& folder, std::string* note);
+
+// Why a photo is left out, the other one by its name where it shows nearly the same.
+std::string WhyLeftOut(const AdjustedPhoto& photo, const std::vector<std::string>& names);
 
 // The same for the eye.
 std::string CalibrationTable(const AdjustedPhotos& adjusted, const std::vector<std::string>& names);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "apps/calibrate/calibration_files.h"
 #include "apps/common/svg_plot.h"
 #include "apps/common/text.h"
 #include "apps/compare/report_image.h"
@@ -176,8 +177,8 @@ std::string PhotoTable(const AdjustedPhotos& adjusted, const std::vector<std::st
            << "</td><td>" << photo.residuals.size() << "</td><td class=\"say\">"
            << EscapeHtml(JoinList(photo.left_out, ", ")) << "</td></tr>";
     } else {
-      html << "<td>-</td><td>-</td><td>-</td><td class=\"say\">" << EscapeHtml(photo.status.message)
-           << "</td></tr>";
+      html << "<td>-</td><td>-</td><td>-</td><td class=\"say\">"
+           << EscapeHtml(WhyLeftOut(photo, names)) << "</td></tr>";
     }
   }
   html << "</tbody></table></div>";

@@ -272,13 +272,14 @@ int Calibrate() {
   status = CalibrateInPasses(&options, &images, &calibration);
   for (const std::string& error : calibration.errors) SayOnStderr(error);
   if (!status.ok()) return Refuse(status);
+  std::string note;
   status = CreateFolder(options.compare.output);
   if (status.ok()) {
     std::vector<std::vector<std::uint8_t>> pictures;
     if (with_pictures)
       pictures = CalibrationPictures(options.compare, calibration.adjusted, calibration.images);
     status = WriteCalibration(calibration.adjusted, calibration.photos, calibration.names, pictures,
-                              options.compare.output);
+                              options.compare.output, &note);
   }
   if (status.ok()) {
     status = WriteCalibratedScene(FLAGS_scene, calibration.adjusted, images,
@@ -286,6 +287,7 @@ int Calibrate() {
   }
   if (!status.ok()) return Refuse(status);
   std::cout << CalibrationTable(calibration.adjusted, calibration.names);
+  if (!note.empty()) std::cout << note << "\n";
   return calibration.errors.empty() ? kExitOk : kExitUnreadable;
 }
 

@@ -229,6 +229,17 @@ TEST_F(CalibrateTest, NamesWhatCannotBeRead) {
   EXPECT_TRUE(std::filesystem::exists(Output() + "/calibration.json"));
 }
 
+// Counted among the readable photos or not, the other one has a name; and COLMAP is told of less.
+TEST_F(CalibrateTest, NamesThePhotoThatAnotherOneRepeats) {
+  folder_.Write("board00.png", "no picture");
+  std::filesystem::copy(folder_ / "board0.png", folder_ / "board again.png");
+  const Outcome run = Calibrate(Photos() + " --output=" + Output());
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_CONTAINS(run.out, "board0.png: left out, it shows nearly the same as ");
+  EXPECT_CONTAINS(run.out, "board again.png, whose errors it shares");
+  EXPECT_CONTAINS(run.out, "names COLMAP cannot read, for their spaces: ");
+}
+
 TEST_F(CalibrateTest, UnusableFlagsWriteNothing) {
   for (const char* flag :
        {"--model=round", "--fix=k9", "--free=k1", "--rigid=perhaps", "--robust_loss=none",
