@@ -239,14 +239,17 @@ double LikeliestLogFocal(const PhotoEvidence& evidence, const std::vector<Detect
   StructureEvidence structure(evidence, pencils, camera);
   if (structure.IsEmpty()) return prior_log_focal;
   const double half = 0.5 * std::max(camera.width, camera.height) / camera.fx;
-  const double reach = kReach * sigma.LargestLogFocal();
+  // No lens is further from another one than that, however little is known.
+  const double reach = std::min(kReach * sigma.LargestLogFocal(), std::log(kWidest / kNarrowest));
   double low = prior_log_focal - reach, high = prior_log_focal + reach;
   if (half > 0.0) {
     low = std::max(low, std::log(half / kWidest));
     high = std::min(high, std::log(half / kNarrowest));
   }
   double best = -std::numeric_limits<double>::infinity(), likeliest = prior_log_focal;
-  for (double log_focal = low; log_focal <= high; log_focal += kStep) {
+  const int steps = high >= low ? static_cast<int>((high - low) / kStep) : -1;
+  for (int k = 0; k <= steps; ++k) {
+    const double log_focal = low + k * kStep;
     const double evidence_here =
         structure.At(log_focal) + LogPrior(log_focal - prior_log_focal, sigma);
     if (!(evidence_here > best)) continue;

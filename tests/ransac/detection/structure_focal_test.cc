@@ -75,6 +75,7 @@ TEST(LikeliestLogFocal, PriorsCount) {
   CameraSigma doubtful = Wide(0.05);
   doubtful.doubtful_log_focal = 0.5;
   EXPECT_NEAR(FromEdges(axes, 3, 1.6, doubtful), -std::log(1.6), 0.05);
+  EXPECT_NEAR(FromEdges(axes, 3, 1.6, Wide(1e20)), -std::log(1.6), 0.05);  // And it ends.
 }
 
 // Twelve discs of one sheet, all of a photo: the camera at which they have one plane, and what it
