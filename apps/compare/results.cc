@@ -80,6 +80,22 @@ Json Intrinsics(const Camera& camera) {
           {"distortion", camera.distortion}};
 }
 
+// The camera that the pose is of, where it may be another one than that given: it was estimated, or
+// looked for in the photo's structure.
+void AddCamera(const Observations& observations, const PoseHypothesis& h, Json* line) {
+  const Camera& seen = observations.camera;
+  const bool is_estimated = h.focal_sigma > 0.0;
+  const bool has_own = h.camera || observations.stated_focal_px > 0.0;
+  if (is_estimated) {
+    const double moved = std::exp(-StatedLogFocal(observations));  // Against the one given.
+    (*line)["focal_scale"] = Number(h.focal_scale * moved);
+    (*line)["focal_sigma"] = Number(h.focal_sigma * moved);
+  }
+  if (is_estimated || has_own) (*line)["focal_px"] = Number(h.focal_scale * seen.fx);
+  if (is_estimated) (*line)["focal_sigma_px"] = Number(h.focal_sigma * seen.fx);
+  if (has_own) (*line)["camera"] = Intrinsics(CameraOf(h, seen));
+}
+
 Json HypothesisLine(const ImageRun& image, const SolverRun& run, std::size_t index) {
   const PoseHypothesis& h = run.estimate.hypotheses[index];
   Json line = ResultHead(image, run);
@@ -101,15 +117,7 @@ Json HypothesisLine(const ImageRun& image, const SolverRun& run, std::size_t ind
   line["origin_observed"] = h.origin_observed;
   line["left_out"] = h.left_out;
   line["structure"] = h.structure;
-  if (h.focal_sigma > 0.0) {
-    const Camera& camera = image.observations.camera;
-    const double moved = std::exp(-StatedLogFocal(image.observations));  // Against the one given.
-    line["focal_scale"] = Number(h.focal_scale * moved);
-    line["focal_sigma"] = Number(h.focal_sigma * moved);
-    line["focal_px"] = Number(h.focal_scale * camera.fx);
-    line["focal_sigma_px"] = Number(h.focal_sigma * camera.fx);
-    if (h.camera) line["camera"] = Intrinsics(*h.camera);
-  }
+  AddCamera(image.observations, h, &line);
   line["decided_by"] = run.estimate.decided_by;
   line["notes"] = run.estimate.notes;
   if (image.image->truth) AddErrors(run.errors[index], *image.image->truth, &line);
@@ -216,6 +224,8 @@ std::string ObservationLine(const ImageRun& run, const std::string& overlay,
   line["set_size"] = run.image->set_size;
   line["detected"] = run.image->detect_everything;
   line["camera"] = CameraJson(run);
+  if (run.observations.stated_focal_px > 0.0)
+    line["calibrated_with"] = Intrinsics(run.observations.camera);
   for (const char* key : {"ellipses", "segments", "pencils"}) line[key] = Json::array();
   for (const CircleObservation& circle : run.observations.circles) {
     line["ellipses"].push_back(EllipseJson(circle));

@@ -87,6 +87,24 @@ TEST_F(CompareInputs, SaysHowWellAGuessIsKnown) {
   check("--focal_px=300 --focal_sigma=0.1", "good to 10.0 %", "+- 10.0 %", 0.1);
 }
 
+// Conics and closed forms are of the camera that the photo was seen through, and say so.
+TEST_F(CompareInputs, StatesTheCameraThatAPhotoWasSeenThrough) {
+  ASSERT_EQ(Run("--focal_px=420").exit_code, 0);
+  const Json photo = ReadJsonLines(folder_ / "out/observations.jsonl").at(0);
+  ASSERT_TRUE(photo.contains("calibrated_with"));
+  int closed_forms = 0;
+  for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
+    if (line["stage"] != "closed_form" || line["status"] != "ok") continue;
+    EXPECT_EQ(line["camera"], photo["calibrated_with"]);
+    EXPECT_EQ(line["focal_px"], photo["calibrated_with"]["fx"]);
+    EXPECT_FALSE(line.contains("focal_sigma_px"));
+    ++closed_forms;
+  }
+  EXPECT_GT(closed_forms, 0);
+  ASSERT_EQ(Run("--focal_px=300 --focal_sigma=0.002").exit_code, 0);
+  EXPECT_FALSE(ReadJsonLines(folder_ / "out/observations.jsonl").at(0).contains("calibrated_with"));
+}
+
 TEST_F(CompareInputs, FolderThatIsNotThere) {
   const Outcome outcome = RunCompare("--images='" + folder_ / "photos" + "' --focal_px=300" +
                                      " --output='" + folder_ / "out" + "'");
@@ -101,7 +119,8 @@ TEST_F(CompareInputs, BadValuesAreNamed) {
   for (const char* bad : {"1e308", "nan", "inf"})
     ExpectUnusable(std::string("--focal_px=") + bad, "--focal_px must be positive, and no more");
   for (const char* bad : {"-0.5", "nan", "inf"})
-    ExpectUnusable(std::string("--focal_sigma=") + bad, "--focal_sigma must be 0 or more");
+    ExpectUnusable(std::string("--focal_sigma=") + bad,
+                   "--focal_sigma must be a finite number of 0 or more, or -1: by where");
   ExpectUnusable("--focal_px=-1", "--focal_px must be positive");
   ExpectUnusable("--focal_px=300 --fov_deg=60", "give one of --camera, --focal_px, --fov_deg");
   ExpectUnusable("--focal_px=300 --roi=1,2,3", "--roi=1,2,3: must be x,y,width,height");
