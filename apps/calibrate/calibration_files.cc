@@ -140,6 +140,7 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
                        json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   if (status.ok()) status = colmap->Finish();
   *note = colmap->Note();
+  if (!note->empty()) *note += "\n";
   if (status.ok())
     status = WriteFile(folder + "/report.html", CalibrationReport(adjusted, names, pictures));
   return status;

@@ -19,7 +19,7 @@ std::vector<double> Distortion(const Camera& camera);
 
 // calibration.yml (one more for each further camera, after its id), calibration.json, cameras.txt
 // and images.txt, report.html in `folder`. `names`: of the photos; `pictures`: of them, JPEG, may
-// be empty. `note`: what the files could not take, a sentence; or empty.
+// be empty. `note`: what the files could not take, a line; or empty.
 Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observations>& photos,
                         const std::vector<std::string>& names,
                         const std::vector<std::vector<std::uint8_t>>& pictures,

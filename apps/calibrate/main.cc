@@ -127,6 +127,7 @@ Status FromFlags(CalibrateOptions* options) {
   if (status.ok() && !RigidWorldFromName(FLAGS_rigid, &options->adjust.rigid))
     status = Status::Invalid("--rigid=" + FLAGS_rigid + ": must be auto, yes or no");
   if (!status.ok()) return status;
+  options->compare.inputs.guess.is_exact = false;  // The camera is what is to be found.
   const EstimationOptions& estimation = options->compare.losses.front().estimation;
   options->adjust.conic_loss = estimation.conic_loss;
   options->adjust.line_loss = estimation.line_loss;
@@ -286,8 +287,7 @@ int Calibrate() {
                                   options.compare.output + "/scene.yaml");
   }
   if (!status.ok()) return Refuse(status);
-  std::cout << CalibrationTable(calibration.adjusted, calibration.names);
-  if (!note.empty()) std::cout << note << "\n";
+  std::cout << CalibrationTable(calibration.adjusted, calibration.names) << note;
   return calibration.errors.empty() ? kExitOk : kExitUnreadable;
 }
 

@@ -229,8 +229,10 @@ Status ReadCameraFile(const std::string& path, std::vector<Camera>* cameras) {
 
 CameraSigma StatedCameraSigma::Over(CameraSigma sigma) const {
   sigma.log_focal = log_focal.value_or(sigma.log_focal);
+  sigma.log_aspect = log_aspect.value_or(sigma.log_aspect);
   sigma.principal_point_px = principal_point_px.value_or(sigma.principal_point_px);
   sigma.k1 = k1.value_or(sigma.k1);
+  sigma.doubtful_log_focal = doubtful_log_focal.value_or(sigma.doubtful_log_focal);
   return sigma;
 }
 

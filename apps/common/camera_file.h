@@ -21,9 +21,11 @@ Status ReadCameraFile(const std::string& path, std::vector<Camera>* cameras);
 
 // How well a scene file says that a camera is known; what it does not say is left to others.
 struct StatedCameraSigma {
-  std::optional<double> log_focal, principal_point_px, k1;
+  std::optional<double> log_focal, log_aspect, principal_point_px, k1, doubtful_log_focal;
 
-  bool IsAny() const { return log_focal || principal_point_px || k1; }
+  bool IsAny() const {
+    return log_focal || log_aspect || principal_point_px || k1 || doubtful_log_focal;
+  }
   // `sigma` with what is stated in its place.
   CameraSigma Over(CameraSigma sigma) const;
 };

@@ -1,5 +1,6 @@
 #include "apps/common/noise_file.h"
 
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -8,9 +9,9 @@
 namespace circline::apps {
 namespace {
 
-using Fields = std::vector<std::pair<std::string, double*>>;
-
-void ReadFields(const StorageNode& node, const Fields& fields,
+// `Value` is a double, or an optional one that stays empty where the file does not name it.
+template <typename Value>
+void ReadFields(const StorageNode& node, const std::vector<std::pair<std::string, Value*>>& fields,
                 const std::vector<std::string>& other_keys) {
   std::vector<std::string> keys = other_keys;
   for (const auto& field : fields) keys.push_back(field.first);
@@ -23,41 +24,44 @@ void ReadFields(const StorageNode& node, const Fields& fields,
 
 }  // namespace
 
-Status ReadNoiseModel(const std::string& path, NoiseModel* model) {
+Status ReadNoiseModel(const std::string& path, NoiseModel* model, StatedCameraSigma* stated) {
   StorageDocument document;
   Status status = document.Open(path);
   if (!status.ok()) return status;
   NoiseModel read = *model;
   const StorageNode root(document.root(), "", &status);
-  ReadFields(root,
-             {{"contour_px", &read.contour_px},
-              {"line_px", &read.line_px},
-              {"correlation_px", &read.correlation_px},
-              {"contour_offset_px", &read.contour_offset_px},
-              {"circle_tilt_rad", &read.circle_tilt_rad},
-              {"circle_height", &read.circle_height},
-              {"line_direction_rad", &read.line_direction_rad},
-              {"pencil_axis_rad", &read.pencil_axis_rad},
-              {"radius", &read.radius},
-              {"length", &read.length},
-              {"spread", &read.spread}},
-             {"camera"});
+  ReadFields<double>(root,
+                     {{"contour_px", &read.contour_px},
+                      {"line_px", &read.line_px},
+                      {"correlation_px", &read.correlation_px},
+                      {"contour_offset_px", &read.contour_offset_px},
+                      {"circle_tilt_rad", &read.circle_tilt_rad},
+                      {"circle_height", &read.circle_height},
+                      {"line_direction_rad", &read.line_direction_rad},
+                      {"pencil_axis_rad", &read.pencil_axis_rad},
+                      {"radius", &read.radius},
+                      {"length", &read.length},
+                      {"spread", &read.spread}},
+                     {"camera"});
+  StatedCameraSigma of_camera;
   const StorageNode camera = root.Get("camera");
   if (camera.Exists()) {
-    ReadFields(camera,
-               {{"log_focal", &read.camera.log_focal},
-                {"log_aspect", &read.camera.log_aspect},
-                {"principal_point_px", &read.camera.principal_point_px},
-                {"k1", &read.camera.k1},
-                {"doubtful_log_focal", &read.camera.doubtful_log_focal}},
-               {});
+    ReadFields<std::optional<double>>(camera,
+                                      {{"log_focal", &of_camera.log_focal},
+                                       {"log_aspect", &of_camera.log_aspect},
+                                       {"principal_point_px", &of_camera.principal_point_px},
+                                       {"k1", &of_camera.k1},
+                                       {"doubtful_log_focal", &of_camera.doubtful_log_focal}},
+                                      {});
   }
+  read.camera = of_camera.Over(read.camera);
   if (status.ok()) status = read.Validate();
   if (!status.ok()) {
     const std::string separator = status.message.compare(0, 2, ": ") == 0 ? "" : ": ";
     return Status::Invalid(path + separator + status.message);
   }
   *model = read;
+  if (stated != nullptr) *stated = of_camera;
   return status;
 }
 

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "apps/common/camera_file.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/status.h"
 
@@ -11,7 +12,9 @@ namespace circline::apps {
 
 // The file's keys are the fields of NoiseModel; what it does not name stays as it is in `model`.
 // Not ok: one line that names the file, the key and what is wrong there; `model` is then untouched.
-Status ReadNoiseModel(const std::string& path, NoiseModel* model);
+// `stated`: what it says of the camera.
+Status ReadNoiseModel(const std::string& path, NoiseModel* model,
+                      StatedCameraSigma* stated = nullptr);
 
 }  // namespace circline::apps
 

@@ -43,6 +43,13 @@ std::string SureTo(double sigma, double doubtful) {
 
 }  // namespace
 
+StatedCameraSigma CameraGuess::Stated() const {
+  if (!is_exact || !(focal_px > 0.0 || fov_deg > 0.0)) return stated;
+  const CameraSigma sigma = stated.Over(CameraSigma::Exact());
+  return {sigma.log_focal, sigma.log_aspect, sigma.principal_point_px, sigma.k1,
+          sigma.doubtful_log_focal};
+}
+
 GuessedCamera CameraGuess::ForPhoto(const std::string& path, int width, int height,
                                     const CameraSigma& calibrated) const {
   GuessedCamera guess;
@@ -72,11 +79,12 @@ GuessedCamera CameraGuess::ForPhoto(const std::string& path, int width, int heig
     if (is_stated) camera.id += "_" + FormatShort(exif.focal_px);
   }
   camera.fy = camera.fx;
-  if (focal_sigma) doubtful = 0.0;
-  sigma = focal_sigma.value_or(sigma);
+  const StatedCameraSigma known = Stated();
+  doubtful = known.doubtful_log_focal.value_or(known.log_focal ? 0.0 : doubtful);
+  sigma = known.log_focal.value_or(sigma);
   const bool is_known = std::max(sigma, doubtful) < kEstimatedFocal;
   if (!is_known) camera.model = CameraModel::kOpenCV;
-  guess.sigma = is_known ? calibrated : UnknownCamera(camera);
+  guess.sigma = is_known ? calibrated : known.Over(UnknownCamera(camera));
   guess.sigma.log_focal = sigma;
   guess.sigma.doubtful_log_focal = doubtful;
   guess.words = "camera: focal length " + FormatShort(camera.fx) + " px from " + guess.words +
@@ -87,7 +95,7 @@ GuessedCamera CameraGuess::ForPhoto(const std::string& path, int width, int heig
 std::string DescribeGuess(const CameraGuess& guess) {
   if (guess.fov_deg > 0.0 || guess.focal_px > 0.0) {
     return "the camera is a guess, its focal length good to " +
-           FormatShort(100.0 * guess.focal_sigma.value_or(kGuessSigma)) +
+           FormatShort(100.0 * guess.Stated().log_focal.value_or(kGuessSigma)) +
            " % (--focal_sigma); what the photo says of it counts";
   }
   return "no camera is given: each photo has the focal length of its EXIF data, else that of " +

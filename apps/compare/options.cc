@@ -272,7 +272,7 @@ std::string Lines(const std::vector<std::string>& texts) {
 
 Status OptionsFromFlags(CompareOptions* options) {
   NoiseModel noise;
-  Status status = NoiseFromFlags(&noise);
+  Status status = NoiseFromFlags(&noise, &options->inputs.guess);
   options->detection.noise_model = options->fit.noise_model = options->closed_form.noise_model =
       noise;
   if (status.ok()) status = ReadFitOptions(&options->fit);
@@ -289,7 +289,7 @@ Status OptionsFromFlags(CompareOptions* options) {
   }
   status = InputsFromFlags(&options->inputs);
   const std::optional<CameraSigma>& stated = options->losses.front().estimation.camera_sigma;
-  if (stated) options->inputs.guess.focal_sigma = stated->log_focal;
+  if (stated) options->inputs.guess.stated.log_focal = stated->log_focal;
   if (status.ok()) status = ReadExports(&options->finish.exports);
   if (!status.ok()) return status;
   if (FLAGS_output.empty())

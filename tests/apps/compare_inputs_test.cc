@@ -87,6 +87,21 @@ TEST_F(CompareInputs, SaysHowWellAGuessIsKnown) {
   check("--focal_px=300 --focal_sigma=0.1", "good to 10.0 %", "+- 10.0 %", 0.1);
 }
 
+// A noise model that says how well the camera is known says so of a guess too.
+TEST_F(CompareInputs, NoiseModelCountsForAGuess) {
+  ASSERT_EQ(Run("--focal_px=300 --noise=exact --focal_sigma=0").exit_code, 0);
+  const std::string exact = Results();
+  ASSERT_EQ(Run("--focal_px=300 --noise=exact").exit_code, 0);
+  EXPECT_EQ(Results(), exact);
+  EXPECT_FALSE(Best("single_circle").contains("focal_sigma"));
+  const std::string noise = folder_.Write("noise.yml", "camera: { log_focal: 0.1 }\n");
+  ASSERT_EQ(Run("--focal_px=300 --noise_model='" + noise + "'").exit_code, 0);
+  EXPECT_NEAR(Best("single_circle")["focal_sigma"], 0.1, 0.015);
+  // Nothing is known exactly of a camera that nobody has given.
+  ASSERT_EQ(Run("--noise=exact").exit_code, 0);
+  EXPECT_GT(Best("single_circle")["focal_sigma"].get<double>(), 0.1);
+}
+
 // Conics and closed forms are of the camera that the photo was seen through, and say so.
 TEST_F(CompareInputs, StatesTheCameraThatAPhotoWasSeenThrough) {
   ASSERT_EQ(Run("--focal_px=420").exit_code, 0);
