@@ -49,7 +49,8 @@ class TrackFrame::Information {
     if (c > 0) add(TrackMap::kCamera);
     // The prior's residual, and how it follows what is considered.
     Eigen::MatrixXd J(n, n + c);
-    J << prior.llt.matrixL().solve(turn), -prior.llt.matrixL().solve(prior.follow);
+    J.leftCols(n) = prior.llt.matrixL().solve(turn);
+    if (c > 0) J.rightCols(c) = -prior.llt.matrixL().solve(prior.follow);
     H = J.transpose() * J;
   }
 
@@ -118,7 +119,8 @@ bool TrackFrame::Update(const TrackState& before, const TrackPrior& prior, Track
   const Eigen::LLT<Eigen::MatrixXd> llt(information.H.topLeftCorner(n, n));
   if (llt.info() != Eigen::Success) return false;
   const double log_det = information.log_det + LogDet(llt) + LogDet(prior.llt);
-  const Eigen::MatrixXd S = -llt.solve(information.H.topRightCorner(n, c));
+  Eigen::MatrixXd S(n, c);
+  if (c > 0) S = -llt.solve(information.H.topRightCorner(n, c));
   const Eigen::MatrixXd SC = S * prior.considered_covariance;
   Eigen::MatrixXd posterior(n + c, n + c), turn = Eigen::MatrixXd::Identity(n + c, n + c);
   posterior << llt.solve(Eigen::MatrixXd::Identity(n, n)) + SC * S.transpose(), SC, SC.transpose(),
@@ -133,17 +135,20 @@ bool TrackFrame::Update(const TrackState& before, const TrackPrior& prior, Track
     if (is_used[static_cast<std::size_t>(r)] == 0) others.push_back(r);
   }
   Eigen::MatrixXd& P = fit->state.covariance;
-  const Eigen::LLT<Eigen::MatrixXd> all(before.covariance(rows, rows));
-  if (all.info() != Eigen::Success) return false;
-  const Eigen::MatrixXd across = before.covariance(rows, others);
-  const Eigen::MatrixXd gain = all.solve(across).transpose(), moved = gain * turn;
-  const Eigen::MatrixXd with = moved * posterior;
-  P(others, others) = before.covariance(others, others) - gain * across + with * moved.transpose();
-  P(others, rows) = with;
-  P(rows, others) = with.transpose();
   P(rows, rows) = posterior;
+  if (!others.empty()) {
+    const Eigen::LLT<Eigen::MatrixXd> all(before.covariance(rows, rows));
+    if (all.info() != Eigen::Success) return false;
+    const Eigen::MatrixXd across = before.covariance(rows, others);
+    const Eigen::MatrixXd gain = all.solve(across).transpose(), moved = gain * turn;
+    const Eigen::MatrixXd with = moved * posterior;
+    P(others, others) =
+        before.covariance(others, others) - gain * across + with * moved.transpose();
+    P(others, rows) = with;
+    P(rows, others) = with.transpose();
+    MoveOthers(others, gain.leftCols(n) * prior.Moved(map_, fit->state.x), &fit->state);
+  }
   P = 0.5 * (P + P.transpose()).eval();
-  MoveOthers(others, gain.leftCols(n) * prior.Moved(map_, fit->state.x), &fit->state);
   fit->state.log_weight = before.log_weight - fit->cost - 0.5 * log_det;
   return fit->state.x.allFinite() && P.allFinite() && std::isfinite(fit->state.log_weight);
 }

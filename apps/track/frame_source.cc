@@ -90,8 +90,9 @@ Status OpenVideo(const std::string& path, const SceneImage& pattern, double fps,
   cv::VideoCapture capture;
   bool is_open = false;
   try {
-    is_open = capture.open(path) && capture.isOpened();
-  } catch (const std::exception&) {  // Not a video, as far as OpenCV knows any.
+    // FFmpeg alone: other back ends would look for cameras.
+    is_open = capture.open(path, cv::CAP_FFMPEG) && capture.isOpened();
+  } catch (const std::exception&) {  // Not a video, as far as FFmpeg knows any.
   }
   if (!is_open) return Status::Invalid("--video=" + path + ": is not a video that can be read");
   *source = std::make_unique<VideoSource>(capture, pattern, fps);

@@ -7,7 +7,7 @@
 DECLARE_string(images);
 DECLARE_string(scene);
 
-DEFINE_string(video, "", "Instead of --images or --scene: a video file, any that OpenCV reads.");
+DEFINE_string(video, "", "Instead of --images or --scene: a video file, any that FFmpeg reads.");
 DEFINE_double(fps, 0.0, "Frames per second; 0 = as the video says, 25 for photos.");
 DEFINE_string(timestamps, "",
               "A file with the seconds of every frame, one a line, where they are not evenly "

@@ -127,7 +127,7 @@ TEST_F(Exif, BrokenDataGiveNone) {
     for (int k = 0; k < 3; ++k) {
       const auto at =
           static_cast<std::size_t>(random.Uniform() * static_cast<double>(whole.size()));
-      broken[std::min(at, whole.size() - 1)] = static_cast<char>(random.Uniform() * 255.0);
+      broken[std::min(at, whole.size() - 1)] = static_cast<char>(random.UniformInt(256));
     }
     const double focal = Read(broken).focal_px;
     EXPECT_TRUE(std::isfinite(focal) && focal >= 0.0) << i;

@@ -118,7 +118,7 @@ TEST(PoseTangentTest, AgreesWithTheOtherRetractionOfGtsam) {
     const CameraPose moved = {R * ExpRotation(xi.head<3>()),
                               kept.topRightCorner<3, 1>() + R * xi.tail<3>()};
     EXPECT_LT((Homogeneous(moved) - Kept(Changed(pose, change), kGtsamPose3)).norm(),
-              50.0 * kStep * kStep);
+              100.0 * kStep * kStep);  // Second order; poses are some units away.
   }
 }
 
