@@ -206,8 +206,8 @@ bool IsSameHump(const PoseHypothesis& a, const PoseHypothesis& b) {
   if (!(std::abs(std::log(a.focal_scale / b.focal_scale)) <= sigma)) return false;
   const Eigen::Matrix3d &A = a.cam_from_world.rotation, &B = b.cam_from_world.rotation;
   // Of a rotation that is free about the normal the normals are compared.
-  const Eigen::Vector3d turn = a.RotationIsFree() ? Eigen::Vector3d(A.col(2).cross(B.col(2)))
-                                                  : LogRotation(A * B.transpose());
+  Eigen::Vector3d turn = LogRotation(A * B.transpose());
+  if (a.RotationIsFree()) turn = A.col(2).cross(B.col(2));
   const Eigen::Vector3d variance =
       a.Covariance().diagonal().head<3>().cwiseMin(b.Covariance().diagonal().head<3>());
   return (turn.array().square() <= variance.array()).all();

@@ -68,7 +68,7 @@ bool IsSpecial(const std::string& path) {
 
 }  // namespace
 
-OutputFile::OutputFile(std::string path)
+OutputFile::OutputFile(const std::string& path)
     : path_(Followed(path)),
       temporary_path_(IsSpecial(path_) ? path_ : path_ + ".part"),
       stream_(temporary_path_, std::ios::binary) {}
