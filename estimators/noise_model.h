@@ -22,6 +22,7 @@ namespace circline {
 // Residuals within this many standard deviations are inliers: 99.8 % of a Gaussian's.
 constexpr double kInlierSigmas = 3.09;
 
+// Of the figures that cameras write into their photos: placeholders.
 constexpr double kDoubtfulShare = 0.1;
 
 // How well a camera is known. Standard deviations; 0 = exact. The defaults are those of a good
@@ -38,6 +39,11 @@ struct CameraSigma {
   static CameraSigma Exact() { return {0.0, 0.0, 0.0, 0.0, 0.0}; }
   // The wider of the two of log f: how far the focal length is to be looked for.
   double LargestLogFocal() const { return std::max(log_focal, doubtful_log_focal); }
+  // Known so badly that the camera is an unknown of every refinement; known better it is only
+  // counted in covariances.
+  bool IsEstimated() const { return LargestLogFocal() >= 0.01; }
+  // So badly that right angles may look wrong: the focal length is searched for.
+  bool IsWide() const { return LargestLogFocal() >= 0.1; }
   Status Validate() const;
 };
 

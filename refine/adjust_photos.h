@@ -96,7 +96,8 @@ struct AdjustedPhoto {
   CameraPose cam_from_world;  // Of its world; its unit is that of the world's.
   // Of [delta, delta_t], 6x6 row-major, as in PoseHypothesis; the cameras' uncertainty is in it. Of
   // its world the first photo is held where nothing else ties it: its translation, or the length
-  // of that, and its turn about the plane's normal.
+  // of that, and its turn about the plane's normal. What nothing speaks of in any photo (the
+  // translation where lines alone are seen) has no variance either.
   std::array<double, 36> covariance{};
   double rms_px = 0.0;                // Of the inlier residuals, pixels.
   double misfit = 0.0;                // Median chi^2 of its features by residual; 1 or less.

@@ -159,12 +159,11 @@ void Adjustment::FindCamera(std::size_t c) {
 }
 
 Status Adjustment::Start() {
-  constexpr double kWide = 0.1;  // Of log f: from here on it is searched.
   if (start_ != nullptr) cameras_.front() = *start_;
   for (std::size_t c = 0; c < cameras_.size() && start_ == nullptr; ++c) {
     if (options_.progress)
       options_.progress("cameras", static_cast<int>(c), static_cast<int>(cameras_.size()));
-    if (priors_[c].log_focal >= kWide) FindCamera(c);
+    if (priors_[c].IsWide()) FindCamera(c);
   }
   return StartHere();
 }

@@ -79,7 +79,7 @@ void JointProblemBuilder::Build() {
   sigmas[2] = sigmas[3] = sigma.principal_point_px;
   sigmas[4] = has_distortion ? sigma.k1 : 0.0;
   has_camera_ = std::any_of(sigmas.begin(), sigmas.end(), [](double s) { return s > 0.0; });
-  p_.camera_is_estimated_ = sigma.LargestLogFocal() >= kEstimatedFocal;
+  p_.camera_is_estimated_ = sigma.IsEstimated();
 
   AddBlock(4, {0.0, 0.0, 0.0, 1.0});
   AddBlock(3, {0.0, 0.0, 1.0});

@@ -31,9 +31,6 @@
 
 namespace circline {
 
-// Of log f. From here on a camera is estimated, below it is only counted in the covariance.
-constexpr double kEstimatedFocal = 0.01;
-
 // One parameter block.
 struct Block {
   int offset, size;                           // In State::x.

@@ -244,6 +244,19 @@ void NoteWhatStays(const JointProblem& problem, const Linearization& at, Refined
                            ", the prior alone decides");
 }
 
+// Where the prior alone decides, that the figure is a placeholder is as likely as it was before:
+// the variance is that of both Gaussians, and the pose's follows along the focal length.
+void CountPlaceholder(const CameraSigma& sigma, PoseHypothesis* h) {
+  const double narrow = h->focal_sigma, wide = h->focal_scale * sigma.doubtful_log_focal;
+  const double variance = (1.0 - kDoubtfulShare) * narrow * narrow + kDoubtfulShare * wide * wide;
+  const double ratio = variance / (narrow * narrow);
+  const Eigen::Map<Vector6d> across(h->focal_covariance.data());
+  Eigen::Map<Matrix6d>(h->covariance.data()) +=
+      (ratio - 1.0) / (narrow * narrow) * across * across.transpose();
+  Eigen::Map<Vector6d>(h->focal_covariance.data()) *= ratio;
+  h->focal_sigma = std::sqrt(variance);
+}
+
 void FillFocal(const JointProblem& problem, const State& state, const Linearization& at,
                const Eigen::MatrixXd& T, Refined* refined) {
   if (!problem.camera_is_estimated()) return;
@@ -266,6 +279,7 @@ void FillFocal(const JointProblem& problem, const State& state, const Linearizat
   if (!(h->focal_sigma < kPriorDecides * prior * h->focal_scale)) {
     remark = std::abs(off) < prior ? "; the evidence cannot tell, the prior alone decides"
                                    : "; the evidence contradicts the prior but does not fix it";
+    if (sigma.doubtful_log_focal > 0.0 && !is_doubted) CountPlaceholder(sigma, h);
   }
   char text[160];
   std::snprintf(text, sizeof(text), "focal length: %.4f times the camera's, +- %.4f%s",

@@ -23,7 +23,6 @@ namespace circline {
 namespace {
 
 // Wide priors of the focal length are searched at these, in standard deviations.
-constexpr double kWideFocal = 0.1;
 constexpr double kFocalStarts[] = {-1.6, -0.8, 0.8, 1.6};
 constexpr int kForScales = 2;  // Iterations: near enough to see how far features miss each other.
 
@@ -135,8 +134,7 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
                            std::vector<std::string>* reasons) {
   std::vector<Seed> seeds = CollectSeeds(resolved, seeders, 0.0, reasons);
   AddSecondDirections(resolved, seeders, &seeds);
-  if (!problem.camera_is_estimated() || problem.camera_sigma().LargestLogFocal() < kWideFocal)
-    return seeds;
+  if (!problem.camera_is_estimated() || !problem.camera_sigma().IsWide()) return seeds;
   for (const double start : FocalStarts(problem, resolved)) {
     std::vector<std::string> unused;
     const std::vector<Seed> more =
@@ -187,13 +185,13 @@ void FillNoise(const EstimationOptions& options, const PointNoise& noise, Observ
   }
 }
 
-// Where the evidence is flat, solutions stop some hundredths of a standard deviation apart.
+// Where the evidence is flat, solutions stop up to a tenth of a standard deviation apart.
 bool IsSameMinimum(const JointProblem& problem, const Refined& a, const Refined& b) {
-  constexpr double kHundredths = 0.1, kSameCost = 0.01;
+  constexpr double kSameSigmas = 0.1, kSameCost = 0.01;
   double tolerance = kSamePose;
   if (std::abs(a.hypothesis.cost - b.hypothesis.cost) < kSameCost) {
     const Eigen::Matrix3d covariance = a.hypothesis.Covariance().topLeftCorner<3, 3>();
-    tolerance = std::max(tolerance, kHundredths * std::sqrt(covariance.diagonal().maxCoeff()));
+    tolerance = std::max(tolerance, kSameSigmas * std::sqrt(covariance.diagonal().maxCoeff()));
   }
   return IsSamePose(problem, a.state, b.state, tolerance);
 }

@@ -72,7 +72,7 @@ void TrackMap::Reset(bool has_position, const Camera& camera, const CameraSigma&
     if (k >= 5 || !(sigmas[k] > 0.0)) held.push_back(k);
   }
   const bool is_exact = held.size() == kCameraSize;
-  camera_is_considered = sigma.LargestLogFocal() < kEstimatedFocal;
+  camera_is_considered = !sigma.IsEstimated();
   AddBlock(kCameraSize,
            is_exact ? nullptr : std::make_unique<ceres::SubsetManifold>(kCameraSize, held),
            is_exact);

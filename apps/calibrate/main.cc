@@ -205,6 +205,9 @@ Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
     SetModel(options->model, &photo.camera);
     SetApartBySize(*given, &photo.camera);
     (*images)[i].observations.camera.id = photo.camera.id;
+    const bool is_new = given->count(photo.camera.id) == 0;
+    if (is_new && !(*images)[i].camera_from.empty())
+      SayOnStderr("camera '" + photo.camera.id + "': " + (*images)[i].camera_from);
     photo.camera = given->insert({photo.camera.id, photo.camera}).first->second;
     options->adjust.camera_sigma[photo.camera.id] = PriorOf(*options, (*images)[i], photo.camera);
     calibration->names.push_back((*images)[i].name);

@@ -59,7 +59,8 @@ struct SceneImage {
   Observations observations;       // Camera, and what is annotated; nothing fitted or detected yet.
   StatedCameraSigma camera_sigma;  // Of that camera.
   std::optional<CameraSigma> guessed_sigma;  // The same, where nobody has calibrated it.
-  bool detect_everything = false;            // No circle and no pencil is annotated.
+  std::string camera_from;         // Where the focal length is from then, and how sure it is.
+  bool detect_everything = false;  // No circle and no pencil is annotated.
   std::vector<CircleRoi> rois;
   std::optional<Truth> truth;
   std::vector<KnownPoint> points;

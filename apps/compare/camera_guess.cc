@@ -23,8 +23,6 @@ constexpr double kUsualFovDeg = 60.0;
 // Of log f: of a guess that somebody makes, of EXIF's figure where it is the lens's, and of no
 // figure at all.
 constexpr double kGuessSigma = 0.25, kExifSigma = 0.05, kUnknownSigma = 0.5;
-// From here on the camera is estimated (EstimationOptions::camera_sigma).
-constexpr double kEstimatedFocal = 0.01;
 // Beyond lies what no lens has, pixels.
 constexpr double kMostPixels = 1e7;
 
@@ -82,12 +80,14 @@ GuessedCamera CameraGuess::ForPhoto(const std::string& path, int width, int heig
   const StatedCameraSigma known = Stated();
   doubtful = known.doubtful_log_focal.value_or(known.log_focal ? 0.0 : doubtful);
   sigma = known.log_focal.value_or(sigma);
-  const bool is_known = std::max(sigma, doubtful) < kEstimatedFocal;
-  if (!is_known) camera.model = CameraModel::kOpenCV;
-  guess.sigma = is_known ? calibrated : known.Over(UnknownCamera(camera));
+  CameraSigma focal;
+  focal.log_focal = sigma;
+  focal.doubtful_log_focal = doubtful;
+  if (focal.IsEstimated()) camera.model = CameraModel::kOpenCV;
+  guess.sigma = focal.IsEstimated() ? known.Over(UnknownCamera(camera)) : calibrated;
   guess.sigma.log_focal = sigma;
   guess.sigma.doubtful_log_focal = doubtful;
-  guess.words = "camera: focal length " + FormatShort(camera.fx) + " px from " + guess.words +
+  guess.words = "focal length " + FormatShort(camera.fx) + " px from " + guess.words +
                 SureTo(sigma, doubtful);
   return guess;
 }

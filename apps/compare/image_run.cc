@@ -138,18 +138,9 @@ CompareOptions WithCamera(CompareOptions options, const SceneImage& image) {
   return options;
 }
 
-void TakeGuess(const CompareOptions& options, SceneImage* image, ImageRun* run) {
-  GuessedCamera guess =
-      options.inputs.guess.ForPhoto(image->path, run->photo.cols, run->photo.rows,
-                                    options.losses.front().estimation.noise_model.camera);
-  image->observations.camera = std::move(guess.camera);
-  image->guessed_sigma = guess.sigma;
-  run->problems.push_back(std::move(guess.words));
-}
-
 void ObserveRead(const CompareOptions& options, SceneImage* image, ImageRun* run) {
   if (!run->photo.empty()) {
-    if (options.inputs.guess.wanted) TakeGuess(options, image, run);
+    TakeGuess(options, run->photo.size(), image);
     run->read_error = SizeError(run->photo, image->observations.camera);
   }
   if (run->read_error.empty()) Observe(options, run);
@@ -178,6 +169,15 @@ void RunSolvers(const CompareOptions& options, const SolverSet& solvers, ImageRu
 }
 
 }  // namespace
+
+void TakeGuess(const CompareOptions& options, cv::Size photo, SceneImage* image) {
+  if (!options.inputs.guess.wanted) return;
+  GuessedCamera guess = options.inputs.guess.ForPhoto(
+      image->path, photo.width, photo.height, options.losses.front().estimation.noise_model.camera);
+  image->observations.camera = std::move(guess.camera);
+  image->guessed_sigma = guess.sigma;
+  image->camera_from = std::move(guess.words);
+}
 
 int SetLargestRadius(double radius, Observations* observations) {
   if (!(radius > 0.0)) return -1;

@@ -71,6 +71,9 @@ struct ImageRun {
       stages;  // "read", "detect", "fit", "overlay"; microseconds.
 };
 
+// The camera of a photo that has no calibration, where the flags want a guess.
+void TakeGuess(const CompareOptions& options, cv::Size photo, SceneImage* image);
+
 // How well an image's camera is known: a guess says so itself; else as --focal_sigma says, else the
 // scene file, else the noise model.
 CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image);

@@ -82,6 +82,8 @@ HypothesisRecord ReadHypothesis(const Json& line, const Camera& given) {
   h.metric = line.at("metric").get<bool>();
   h.origin_observed = line.at("origin_observed").get<bool>();
   if (line.contains("camera")) ReadIntrinsics(line.at("camera"), &h.camera.emplace(given));
+  h.focal_px = NumberOr(line, "focal_px", kUnknown);
+  h.focal_sigma_px = NumberOr(line, "focal_sigma_px", kUnknown);
   h.rms_px = NumberOr(line, "rms_px", kUnknown);
   h.num_inliers = line.at("num_inliers").get<int>();
   h.num_observations = line.at("num_observations").get<int>();
@@ -152,6 +154,7 @@ void ReadObservations(const std::string& text, ImageRecord* record) {
   record->num_segments = line.at("segments").size();
   record->num_pencils = line.at("pencils").size();
   record->camera = ReadCamera(line.at("camera"));
+  record->camera_from = TextOr(line, "camera_from");
   record->problems = Texts(line, "problems");
   record->flags = Texts(line, "flags");
 }

@@ -39,7 +39,8 @@ struct HypothesisRecord {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   bool metric = false, origin_observed = false, rotation_is_free = false;
-  std::optional<Camera> camera;  // As it was estimated, where it was.
+  std::optional<Camera> camera;                           // As it was estimated, where it was.
+  double focal_px = kUnknown, focal_sigma_px = kUnknown;  // Where they are stated.
   double rms_px = kUnknown;
   int num_inliers = 0, num_observations = 0;
   Eigen::Vector3d sigma_rotation_deg = Eigen::Vector3d::Zero();
@@ -66,6 +67,7 @@ struct ImageRecord {
   bool detected = false;
   std::size_t num_ellipses = 0, num_segments = 0, num_pencils = 0;
   Camera camera;
+  std::string camera_from;  // SceneImage::camera_from.
   std::vector<std::string> problems;
   std::vector<std::string> flags;                      // CompareOptions::unusual_flags.
   std::vector<std::pair<std::string, double>> stages;  // "read", "detect", "fit"; microseconds.

@@ -5,14 +5,10 @@
 #include <utility>
 
 #include "apps/common/text.h"
+#include "apps/compare/report_tables.h"
 
 namespace circline::apps {
 namespace {
-
-std::string Cell(const std::string& text, const char* css = nullptr) {
-  return std::string("<td") + (css == nullptr ? "" : std::string(" class='") + css + "'") + ">" +
-         EscapeHtml(text) + "</td>";
-}
 
 std::string StageText(const SolverRecord& run) {
   return run.key.stage == "refined" ? "refined" : "closed form";
@@ -34,6 +30,13 @@ std::string ErrorText(const std::optional<double>& error) {
   return error ? FormatShort(*error) : "-";
 }
 
+std::string FocalText(const HypothesisRecord& h) {
+  if (!std::isfinite(h.focal_px)) return "-";
+  const std::string sigma =
+      std::isfinite(h.focal_sigma_px) ? " \u00b1 " + FormatShort(h.focal_sigma_px, 2) : "";
+  return FormatFixed(h.focal_px, 1) + sigma;
+}
+
 std::string DirectionText(const PoseErrors& errors) {
   std::vector<std::string> parts;
   for (const auto& [id, error] : errors.directions_deg)
@@ -49,10 +52,10 @@ std::string Sentences(const SolverRecord& solver) {
   return JoinList(sentences, " | ");
 }
 
-// Which errors some hypothesis of the image has.
-struct TruthColumns {
-  bool rotation = false, normal = false, translation = false, directions = false;
-  explicit TruthColumns(const ImageRecord& record) {
+// What some hypothesis of the image has: errors, a focal length of its own.
+struct Columns {
+  bool rotation = false, normal = false, translation = false, directions = false, focal = false;
+  explicit Columns(const ImageRecord& record) {
     for (const SolverRecord& solver : record.solvers) {
       for (const HypothesisRecord& hypothesis : solver.hypotheses) {
         const PoseErrors& errors = hypothesis.errors;
@@ -60,25 +63,27 @@ struct TruthColumns {
         normal = normal || errors.normal_deg;
         translation = translation || errors.translation_deg;
         directions = directions || !errors.directions_deg.empty();
+        focal = focal || std::isfinite(hypothesis.focal_px);
       }
     }
   }
 };
 
-std::string SolverHead(const TruthColumns& truth) {
+std::string SolverHead(const Columns& columns) {
   std::string html =
       "<tr><th class='l'>solver</th><th class='l'>stage</th><th class='l'>loss, scale px</th>"
       "<th>hypothesis</th><th>probability</th>";
-  if (truth.rotation) html += "<th>rotation<br>error &deg;</th>";
-  if (truth.normal) html += "<th>normal<br>error &deg;</th>";
-  if (truth.translation) html += "<th>translation<br>error &deg;</th>";
-  if (truth.directions) html += "<th class='l'>direction error &deg;</th>";
+  if (columns.rotation) html += "<th>rotation<br>error &deg;</th>";
+  if (columns.normal) html += "<th>normal<br>error &deg;</th>";
+  if (columns.translation) html += "<th>translation<br>error &deg;</th>";
+  if (columns.directions) html += "<th class='l'>direction error &deg;</th>";
+  if (columns.focal) html += "<th>focal<br>length px</th>";
   return html +
          "<th>rms px</th><th>inliers</th><th>sigma of<br>rotation &deg;</th><th>time</th>"
          "<th class='l'>remarks</th></tr>";
 }
 
-std::string HypothesisRow(const SolverRecord& run, std::size_t i, const TruthColumns& truth,
+std::string HypothesisRow(const SolverRecord& run, std::size_t i, const Columns& columns,
                           bool shown) {
   const HypothesisRecord& h = run.hypotheses[i];
   const PoseErrors& errors = h.errors;
@@ -88,10 +93,11 @@ std::string HypothesisRow(const SolverRecord& run, std::size_t i, const TruthCol
             : Cell(run.key.solver, "l") + Cell(StageText(run), "l") + Cell(run.key.LossText(), "l");
   html += Cell(std::to_string(i + 1) + " of " + std::to_string(run.hypotheses.size())) +
           Cell(FormatFixed(h.probability, 3));
-  if (truth.rotation) html += Cell(ErrorText(errors.rotation_deg));
-  if (truth.normal) html += Cell(ErrorText(errors.normal_deg));
-  if (truth.translation) html += Cell(ErrorText(errors.translation_deg));
-  if (truth.directions) html += Cell(DirectionText(errors), "l");
+  if (columns.rotation) html += Cell(ErrorText(errors.rotation_deg));
+  if (columns.normal) html += Cell(ErrorText(errors.normal_deg));
+  if (columns.translation) html += Cell(ErrorText(errors.translation_deg));
+  if (columns.directions) html += Cell(DirectionText(errors), "l");
+  if (columns.focal) html += Cell(FocalText(h));
   html += Cell(FormatShort(h.rms_px)) +
           Cell(std::to_string(h.num_inliers) + " / " + std::to_string(h.num_observations)) +
           Cell(SigmaText(h));
@@ -103,13 +109,13 @@ std::string HypothesisRow(const SolverRecord& run, std::size_t i, const TruthCol
 std::string SolverTable(const ImageRecord& record, const std::vector<SolverKey>& keys) {
   const SolverRecord* shown = SolverToShow(record);
   if (shown == nullptr) return "";
-  const TruthColumns truth(record);
-  std::string html = "<div class='scroll'><table><thead>" + SolverHead(truth) + "</thead><tbody>";
+  const Columns columns(record);
+  std::string html = "<div class='scroll'><table><thead>" + SolverHead(columns) + "</thead><tbody>";
   for (const SolverRecord& solver : record.solvers) {
     const bool wanted = std::find(keys.begin(), keys.end(), solver.key) != keys.end();
     if (!wanted && &solver != shown) continue;
     for (std::size_t i = 0; i < solver.hypotheses.size(); ++i) {
-      html += HypothesisRow(solver, i, truth, &solver == shown);
+      html += HypothesisRow(solver, i, columns, &solver == shown);
     }
   }
   return html + "</tbody></table></div>";
@@ -183,6 +189,8 @@ std::string ImageSection(const ImageRecord& record, const std::vector<SolverKey>
   html += "<div class='two'>";
   if (!picture.empty()) html += Picture(record.name, picture);
   html += "<div><p class='lead'>" + EscapeHtml(EvidenceText(record)) + ".</p>";
+  if (!record.camera_from.empty())
+    html += "<p class='lead'>Camera: " + EscapeHtml(record.camera_from) + ".</p>";
   if (!record.overlay.empty()) {
     html += "<p class='lead'>Full picture: " + EscapeHtml(record.overlay) + "</p>";
   }

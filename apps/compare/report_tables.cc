@@ -9,11 +9,6 @@
 namespace circline::apps {
 namespace {
 
-std::string Cell(const std::string& text, const char* css = nullptr) {
-  return std::string("<td") + (css == nullptr ? "" : std::string(" class='") + css + "'") + ">" +
-         EscapeHtml(text) + "</td>";
-}
-
 constexpr double kRounding = 1e-6;  // Degrees.
 
 // A name that may go on in the next line after an underscore.
@@ -36,6 +31,11 @@ std::string SweepText(const SummaryRow* row) {
 }
 
 }  // namespace
+
+std::string Cell(const std::string& text, const char* css) {
+  return std::string("<td") + (css == nullptr ? "" : std::string(" class='") + css + "'") + ">" +
+         EscapeHtml(text) + "</td>";
+}
 
 std::string SummaryTable(const Summary& summary) {
   std::vector<SummaryColumn> columns = summary.Columns();

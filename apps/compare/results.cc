@@ -224,6 +224,7 @@ std::string ObservationLine(const ImageRun& run, const std::string& overlay,
   line["set_size"] = run.image->set_size;
   line["detected"] = run.image->detect_everything;
   line["camera"] = CameraJson(run);
+  if (!run.image->camera_from.empty()) line["camera_from"] = run.image->camera_from;
   if (run.observations.stated_focal_px > 0.0)
     line["calibrated_with"] = Intrinsics(run.observations.camera);
   for (const char* key : {"ellipses", "segments", "pencils"}) line[key] = Json::array();

@@ -53,7 +53,6 @@ ImageRun FrameObserver::Follow(const PoseHypothesis* last, const PoseHypothesis*
       follow.detection.noise_model.camera =
           CameraSigmaOf(options_.tracker.estimation, frame->image);
       follower_.emplace(*camera_, follow);
-      if (!guessed_words_.empty()) run.problems.push_back(guessed_words_);
     }
     // After so long a gap the tracker begins anew, and nothing is where it was.
     if (frame->time_s - last_s_ > options_.tracker.max_gap_s && !has_given_) follower_->Reset();
@@ -77,15 +76,9 @@ ImageRun FrameObserver::Follow(const PoseHypothesis* last, const PoseHypothesis*
 Status FrameObserver::SettleCamera(Frame* frame) {
   Camera& camera = frame->image.observations.camera;
   if (!camera_) {
-    const CameraGuess& guess = options_.compare.inputs.guess;
-    if (!frame->photo.empty() && guess.wanted) {
-      const EstimationOptions& estimation = options_.compare.losses.front().estimation;
-      GuessedCamera guessed = guess.ForPhoto(frame->image.path, frame->photo.cols,
-                                             frame->photo.rows, estimation.noise_model.camera);
-      camera = std::move(guessed.camera);
-      guessed_sigma_ = guessed.sigma;
-      guessed_words_ = std::move(guessed.words);
-    }
+    if (!frame->photo.empty()) TakeGuess(options_.compare, frame->photo.size(), &frame->image);
+    guessed_sigma_ = frame->image.guessed_sigma;
+    camera_from_ = frame->image.camera_from;
     camera_ = camera;
     if (camera_->width == 0) camera_->width = frame->photo.cols;
     if (camera_->height == 0) camera_->height = frame->photo.rows;
@@ -99,7 +92,15 @@ Status FrameObserver::SettleCamera(Frame* frame) {
   }
   camera = *camera_;
   frame->image.guessed_sigma = guessed_sigma_;
+  frame->image.camera_from = camera_from_;
   return Status::Ok();
+}
+
+bool FrameObserver::SettleRadius(Observations* observations) {
+  if (circle_of_radius_.empty() || FindCircle(*observations, circle_of_radius_) >= 0) return false;
+  circle_of_radius_.clear();
+  SetRadius(observations);
+  return !circle_of_radius_.empty();
 }
 
 // The largest circle of the first frame of a world, then the same one wherever it is seen.

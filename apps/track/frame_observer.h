@@ -22,6 +22,10 @@ class FrameObserver {
   // this one, in one world and unit; either may be absent.
   ImageRun Observe(const PoseHypothesis* last, const PoseHypothesis* expected, Frame* frame);
 
+  // The circle that --circle_radius speaks of, in a frame that begins a world without it: the
+  // largest one there is. False where none had to be, or can be, chosen.
+  bool SettleRadius(Observations* observations);
+
   bool was_cold() const { return was_cold_; }  // The whole frame was looked at.
   bool was_cut() const { return was_cut_; }    // Nothing of the frames before was found in it.
 
@@ -33,7 +37,7 @@ class FrameObserver {
   const TrackOptions& options_;
   std::optional<Camera> camera_;              // Of all frames, since the first one.
   std::optional<CameraSigma> guessed_sigma_;  // Of the same, where it is a guess.
-  std::string guessed_words_;                 // What there is to say of it, once.
+  std::string camera_from_;                   // SceneImage::camera_from.
   std::optional<FeatureFollower> follower_;
   bool has_given_ = false;        // The circle in --roi was found and is followed.
   std::string circle_of_radius_;  // Id of the one that --circle_radius speaks of.

@@ -101,6 +101,11 @@ class Track {
       }
       if (observer_.was_cut()) tracker_->Reset();  // Another scene: another world.
       pose = tracker_->Update(run->observations, frame.time_s);
+      if (pose.reinitialized && !observer_.was_cut() &&
+          observer_.SettleRadius(&run->observations)) {
+        tracker_->Reset();  // The new world has its unit from another circle.
+        pose = tracker_->Update(run->observations, frame.time_s);
+      }
       if (pose.estimate.status.code == StatusCode::kInvalidArgument)
         run->read_error = pose.estimate.status.message;  // Such as a time that runs backwards.
     } else {

@@ -58,10 +58,6 @@ Status CollectEvidence(const EdgeMap& edges, const Camera& camera, const Detecti
   return Status::Ok();
 }
 
-// From such a standard deviation of log f on the structure of the photo has a say in it: below it
-// right angles are judged right.
-constexpr double kWideFocal = 0.1;
-
 // The camera at the focal length at which the photo's structure is likeliest, and the evidence seen
 // through that.
 Status MoveToLikeliestFocal(const EdgeMap& edges, const DetectionOptions& options,
@@ -126,7 +122,7 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   PhotoEvidence evidence;
   status = CollectEvidence(edges, camera, options, &evidence);
   const double diagonal_px = DiagonalPx(image.cols, image.rows);
-  if (status.ok() && options.noise_model.camera.LargestLogFocal() >= kWideFocal)
+  if (status.ok() && options.noise_model.camera.IsWide())
     status = MoveToLikeliestFocal(edges, options, diagonal_px, &evidence, observations);
   return status.ok() ? ObserveEvidence(options, diagonal_px, &evidence, observations) : status;
 }

@@ -188,11 +188,17 @@ class StructureEvidence {
   }
 
   // Its rows and columns hardly depend on the focal length: they are looked for anew after
-  // kLatticeStep.
+  // kLatticeStep, and in another plane.
   double Lattice(double log_focal, const Vector3d& scale, const Vector3d& normal) {
-    if (!(std::abs(log_focal - lattice_at_) <= kLatticeStep)) {
+    constexpr double kOtherPlane = 0.3;  // Sine.
+    const bool is_near = std::abs(log_focal - lattice_at_) <= kLatticeStep;
+    const Vector3d moved =
+        is_near ? Scale(log_focal - lattice_at_).cwiseInverse().cwiseProduct(lattice_normal_).eval()
+                : normal;
+    if (!is_near || !(moved.normalized().cross(normal).norm() <= kOtherPlane)) {
       lattice_ = FindLatticeAt(log_focal, scale, normal);
       lattice_at_ = log_focal;
+      lattice_normal_ = normal;
     }
     std::vector<UncertainDirection> directions;
     for (const UncertainDirection& direction : lattice_)
@@ -221,6 +227,7 @@ class StructureEvidence {
   std::vector<UncertainDirection> directions_;
   std::vector<UncertainDirection> lattice_;
   double lattice_at_ = std::numeric_limits<double>::infinity();
+  Vector3d lattice_normal_ = Vector3d::Zero();
 };
 
 double LogPrior(double off, const CameraSigma& sigma) {

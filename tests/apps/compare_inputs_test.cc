@@ -71,9 +71,9 @@ TEST_F(CompareInputs, SaysHowWellAGuessIsKnown) {
     const Outcome outcome = Run(flags + " --solvers=single_circle");
     ASSERT_EQ(outcome.exit_code, 0) << flags;
     EXPECT_CONTAINS(outcome.err, on_stderr);
-    const std::string problems =
-        ReadJsonLines(folder_ / "out/observations.jsonl").at(0)["problems"].dump();
-    EXPECT_CONTAINS(problems, words);
+    const std::string from =
+        ReadJsonLines(folder_ / "out/observations.jsonl").at(0)["camera_from"].dump();
+    EXPECT_CONTAINS(from, words);
     EXPECT_CONTAINS(ReadAll(folder_ / "out/report.html"), words);
     const Json best = Best("single_circle");
     ASSERT_TRUE(best.contains("focal_px")) << flags;
