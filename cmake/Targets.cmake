@@ -18,6 +18,26 @@ function(circline_own_target target)
   endif()
 endfunction()
 
+# What a library shows and is called where it is shared. Hidden is all but what public headers
+# declare (estimators/export.h); of what other libraries' templates leave in our objects the linker's
+# script hides the rest. Tests and benchmarks reach inside: for theirs everything is shown.
+if(BUILD_SHARED_LIBS AND (CIRCLINE_BUILD_TESTS OR CIRCLINE_BUILD_BENCHMARKS))
+  set(CIRCLINE_HIDE OFF)
+else()
+  set(CIRCLINE_HIDE ON)
+endif()
+set(CIRCLINE_EXPORTS "${CMAKE_CURRENT_LIST_DIR}/exports.map")
+function(circline_shared_library target)
+  set_target_properties(${target} PROPERTIES VERSION ${PROJECT_VERSION}
+                                             SOVERSION ${CIRCLINE_SOVERSION}
+                                             INSTALL_RPATH "$ORIGIN")
+  if(CIRCLINE_HIDE AND UNIX AND NOT APPLE)
+    target_link_options(${target} PRIVATE
+      $<$<STREQUAL:$<TARGET_PROPERTY:${target},TYPE>,SHARED_LIBRARY>:LINKER:--version-script=${CIRCLINE_EXPORTS}>)
+    set_target_properties(${target} PROPERTIES LINK_DEPENDS "${CIRCLINE_EXPORTS}")
+  endif()
+endfunction()
+
 # circline_module(<folder> PUBLIC <targets> PRIVATE <targets> PRIVATE_HEADERS <files>): the library
 # of a folder, circline_<name> after the last part of its path, known to users as circline::<name>.
 # Its headers are public and get installed, except for PRIVATE_HEADERS.
@@ -38,12 +58,35 @@ function(circline_module folder)
 
   add_library(${target} ${sources})
   circline_own_target(${target})
+  circline_shared_library(${target})
+  if(CIRCLINE_HIDE)
+    set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden
+                                               VISIBILITY_INLINES_HIDDEN ON)
+  endif()
   target_include_directories(${target} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   add_library(circline::${module} ALIAS ${target})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${module})
+endfunction()
+
+# Sets <headers> to the public headers of a module, or of all of them.
+function(circline_public_headers headers)
+  set(modules ${ARGN})
+  if(NOT modules)
+    set(modules estimators ransac detection refine)
+  endif()
+  set(found)
+  foreach(module ${modules})
+    get_property(folder GLOBAL PROPERTY CIRCLINE_${module}_FOLDER)
+    file(GLOB files CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*.h")
+    get_property(private_headers GLOBAL PROPERTY CIRCLINE_${module}_PRIVATE_HEADERS)
+    list(TRANSFORM private_headers PREPEND "${PROJECT_SOURCE_DIR}/${folder}/")
+    list(REMOVE_ITEM files ${private_headers})
+    list(APPEND found ${files})
+  endforeach()
+  set(${headers} "${found}" PARENT_SCOPE)
 endfunction()
 
 # circline_app(<name> <targets>): the program circline_<name> of the folder <name>, if that has a
@@ -66,6 +109,11 @@ function(circline_app name)
     target_link_libraries(circline_${name} PRIVATE ${ARGN})
     if(sources)
       target_link_libraries(circline_${name} PRIVATE circline_${name}_lib)
+    endif()
+    set_property(GLOBAL APPEND PROPERTY CIRCLINE_APPS circline_${name})
+    if(BUILD_SHARED_LIBS)  # An installation finds its own libraries, wherever it is moved.
+      file(RELATIVE_PATH libraries "/${CMAKE_INSTALL_BINDIR}" "/${CMAKE_INSTALL_LIBDIR}")
+      set_target_properties(circline_${name} PROPERTIES INSTALL_RPATH "$ORIGIN/${libraries}")
     endif()
   endif()
 endfunction()

@@ -13,9 +13,10 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/status.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 enum class CameraModel {
   kPinhole,  // No distortion.

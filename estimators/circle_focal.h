@@ -7,9 +7,10 @@
 #include <array>
 
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/focal_length.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // A circle and the image of its centre (homogeneous, with covariance): the vanishing line is its
 // polar, C o (proposition 3). One solution. Refuses a frontal plane (the polar is at infinity) and

@@ -5,7 +5,9 @@
 #include <Eigen/Core>
 #include <array>
 
-namespace circline {
+#include "circline/estimators/export.h"
+
+namespace CIRCLINE_EXPORT circline {
 
 // A circle in space, camera frame, lengths in units of its radius.
 struct CirclePose {

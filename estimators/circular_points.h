@@ -10,7 +10,9 @@
 #include <array>
 #include <complex>
 
-namespace circline {
+#include "circline/estimators/export.h"
+
+namespace CIRCLINE_EXPORT circline {
 
 // The conjugate pair real +- i imag. Any complex multiple is the same point; of all multiples, real
 // and imag are orthogonal and of equal length.

@@ -3,10 +3,11 @@
 #ifndef CIRCLINE_ESTIMATORS_CLOSED_FORM_SOLVERS_H_
 #define CIRCLINE_ESTIMATORS_CLOSED_FORM_SOLVERS_H_
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/solver_registry.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct ClosedFormOptions {
   // Standard deviation of a point where a feature states none, pixels; > 0.

@@ -6,8 +6,9 @@
 #include <array>
 
 #include "circline/estimators/camera.h"
+#include "circline/estimators/export.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;

@@ -8,9 +8,10 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/status.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct ConicFit {
   Eigen::Matrix3d conic = Eigen::Matrix3d::Zero();  // Calibrated, normalised (NormalizeEllipse).

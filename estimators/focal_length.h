@@ -19,9 +19,10 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/vanishing_point.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct FocalSolution {
   double focal = 0.0;     // In units of g.

@@ -6,10 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/observations.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct FocalStart {
   double focal_px = 0.0;   // Of fx; fy keeps its ratio to it.

@@ -4,7 +4,9 @@
 
 #include <Eigen/Core>
 
-namespace circline {
+#include "circline/estimators/export.h"
+
+namespace CIRCLINE_EXPORT circline {
 
 // kLanes measured points and what a pixel is worth at each: x(u) = x + J u for pixels u about it.
 template <int kLanes>

@@ -12,9 +12,10 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/foot_points.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Gradient of |GradientPerPixel(g)| with respect to g, given h = GradientPerPixel(g) / |...|.
 inline Eigen::Vector2d NormGradient(const CalibratedPoint& p, const Eigen::Vector2d& h) {

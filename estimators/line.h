@@ -7,9 +7,10 @@
 #include <vector>
 
 #include "circline/estimators/camera.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/status.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct LineFit {
   Eigen::Vector3d line = Eigen::Vector3d::Zero();  // Unit; its sign has no meaning.

@@ -6,7 +6,9 @@
 #include <Eigen/Core>
 #include <array>
 
-namespace circline {
+#include "circline/estimators/export.h"
+
+namespace CIRCLINE_EXPORT circline {
 
 // R = [r1 r2 r3] with r1 along `x_direction` and r3 along the plane normal x_direction x
 // y_direction: proposition 5, for any angle between the two. Signs as given. False where the

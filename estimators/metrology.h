@@ -18,9 +18,10 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/pose.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Into space, world frame: a point is seen along a ray, a line in a plane, a conic in a cone.
 struct WorldRay {

@@ -15,9 +15,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/status.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Residuals within this many standard deviations are inliers: 99.8 % of a Gaussian's.
 constexpr double kInlierSigmas = 3.09;

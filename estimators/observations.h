@@ -12,12 +12,13 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/status.h"
 #include "circline/estimators/vanishing_point.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Two pixels of the photo. As an axis it is oriented from [0] to [1]; elsewhere it has no sense.
 using Segment = std::array<Eigen::Vector2d, 2>;

@@ -7,10 +7,11 @@
 #include <vector>
 
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/focal_length.h"
 #include "circline/estimators/vanishing_point.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct PlaneEvidence {
   std::vector<const ConicFit*> circles;  // One or more, the best-measured first.

@@ -4,10 +4,11 @@
 
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/observations.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Standard deviations of each coordinate of a point, pixels of the photo; all positive.
 struct PointNoise {

@@ -22,9 +22,10 @@
 #define CIRCLINE_ESTIMATORS_POSE_TANGENT_H_
 
 #include "circline/estimators/conic.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/pose.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct PoseTangent {
   bool world_from_cam = false;  // The pose that is kept: T^-1, else T.

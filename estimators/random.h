@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdint>
 
-namespace circline {
+#include "circline/estimators/export.h"
+
+namespace CIRCLINE_EXPORT circline {
 
 // SplitMix64 (Steele, Lea, Flood 2014): 8 bytes of state, passes BigCrush, 1 ns a draw.
 class Random {

@@ -9,7 +9,9 @@
 #include <string>
 #include <vector>
 
-namespace circline {
+#include "circline/estimators/export.h"
+
+namespace CIRCLINE_EXPORT circline {
 
 enum class LossType { kTrivial, kHuber, kSoftLOne, kCauchy, kArctan, kTukey, kGemanMcClure };
 

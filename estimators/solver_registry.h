@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 enum class SolverStage { kClosedForm, kRefined };
 const char* SolverStageName(SolverStage stage);  // "closed_form", "refined".

@@ -5,7 +5,9 @@
 #include <string>
 #include <utility>
 
-namespace circline {
+#include "circline/estimators/export.h"
+
+namespace CIRCLINE_EXPORT circline {
 
 enum class StatusCode {
   kOk,

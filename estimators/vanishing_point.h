@@ -6,10 +6,11 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/status.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct VanishingPointFit {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();   // Unit, camera frame, without sense.

@@ -9,11 +9,12 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/ransac.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Which ellipses are worth a look. They keep out what explains a straight edge or a blob of
 // clutter.

@@ -7,11 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/status.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct FitOptions {
   // A point farther than kInlierSigmas standard deviations of its noise from its curve is an

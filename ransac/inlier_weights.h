@@ -4,7 +4,9 @@
 
 #include <vector>
 
-namespace circline {
+#include "circline/estimators/export.h"
+
+namespace CIRCLINE_EXPORT circline {
 
 // Inlier weights for a final, statistically efficient fit: the posterior probability that a datum
 // belongs to the Gaussian about the model rather than to a uniform background, whose density is

@@ -8,11 +8,12 @@
 #include <vector>
 
 #include "circline/estimators/camera.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/ransac.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // The line that most of the points support, as a maximum-likelihood fit of its inliers with
 // covariance; options.ransac.threshold in pixels of the photo. `mask` (optional) receives one value

@@ -11,9 +11,10 @@
 #include <array>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/line.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Lines at a smaller angle are one line, radians: far below any noise, far above rounding.
 constexpr double kCoincidentRad = 1e-9;

@@ -47,12 +47,13 @@
 #include <type_traits>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/random.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/sampler.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 constexpr int kRansacBlock = 32;
 

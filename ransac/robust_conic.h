@@ -7,11 +7,12 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/conic_model.h"
 #include "circline/ransac/ransac.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // The ellipse that the points support best, as a maximum-likelihood fit of its inliers with
 // covariance; options.ransac.threshold in pixels of the photo. `mask` (optional) receives one value

@@ -6,12 +6,13 @@
 #include <cstdint>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/status.h"
 #include "circline/estimators/vanishing_point.h"
 #include "circline/ransac/ransac.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct PencilOptions {
   // A line farther than `ransac.threshold` standard deviations from the direction is an outlier.

@@ -5,9 +5,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/random.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // A permutation of 0..n-1, the same on every machine.
 std::vector<int> RandomOrder(int n, std::uint64_t seed);

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "circline/estimators/camera.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
@@ -22,7 +23,7 @@
 #include "circline/refine/camera_shifts.h"
 #include "circline/refine/estimate_pose.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Whether a circle's id means the same circle in all photos: one world seen from many sides; or
 // every photo has a world of its own, and only the camera is common.

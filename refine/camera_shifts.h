@@ -5,8 +5,9 @@
 #include <Eigen/Core>
 
 #include "circline/estimators/camera.h"
+#include "circline/estimators/export.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Shifts against the camera as given, so that zeros are that camera. 0: of
 // log f (both focal lengths); 1: of log (fy / fx); 2, 3: of the principal point, pixels; from 4 on:

@@ -33,9 +33,10 @@
 #include <vector>
 
 #include "circline/estimators/conic.h"
+#include "circline/estimators/export.h"
 #include "circline/refine/image_points.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // A feature of a photo. Its residuals may be weighed anew: by their losses as ceres calls it, or as
 // inliers alone, for covariances.

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
@@ -14,7 +15,7 @@
 #include "circline/estimators/status.h"
 #include "circline/refine/image_points.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // How one kind of residual is weighed. Points that a robust fit has marked as outliers take no
 // part.

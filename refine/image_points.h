@@ -15,11 +15,12 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/robust_loss.h"
 #include "circline/refine/camera_shifts.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // How far a contour point is from a circle's image: to first order (Sampson), or orthogonally, in
 // twice the time. By itself: orthogonally where the first order does not suffice, that is where the

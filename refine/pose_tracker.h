@@ -49,12 +49,13 @@
 #include <memory>
 #include <optional>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
 #include "circline/refine/estimate_pose.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct TrackerOptions {
   // Losses, noise model and camera, as for a single photo. Its pose_prior, gravity_prior and prior

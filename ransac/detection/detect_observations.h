@@ -22,11 +22,12 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/status.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct DetectionOptions {
   double min_ellipse_axis_px = 3.0;     // Smallest semi-minor axis; > 0.

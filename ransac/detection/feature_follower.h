@@ -21,12 +21,13 @@
 
 #include <opencv2/core.hpp>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/detection/detect_observations.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct FollowOptions {
   DetectionOptions detection;

@@ -1,16 +1,18 @@
 // From evidence to Observations: what DetectObservations does once it has looked at the photo.
-// Segments that come from elsewhere, without a photo, go in here. Internal: not installed.
+// Segments that come from elsewhere, without a photo, go in here. Internal: not
+// installed, but exported, for circline_simulate.
 #ifndef CIRCLINE_RANSAC_DETECTION_OBSERVE_EVIDENCE_H_
 #define CIRCLINE_RANSAC_DETECTION_OBSERVE_EVIDENCE_H_
 
 #include <cstddef>
 #include <vector>
 
+#include "circline/estimators/export.h"
 #include "circline/ransac/detection/assemble_observations.h"
 #include "circline/ransac/detection/detect_lines.h"
 #include "circline/ransac/detection/detect_observations.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct PhotoEvidence {
   std::vector<CircleEvidence> circles;  // Best first.

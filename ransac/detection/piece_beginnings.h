@@ -10,8 +10,9 @@
 #include <vector>
 
 #include "circline/estimators/camera.h"
+#include "circline/estimators/export.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // The first points of pieces, calibrated. All are compared with all lines: in blocks of single
 // precision, which the compiler turns into vectors.
