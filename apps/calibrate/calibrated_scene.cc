@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
-#include "apps/calibrate/calibration_files.h"
+#include "apps/common/camera_file.h"
 #include "apps/common/output_file.h"
 #include "apps/common/storage_node.h"
 

@@ -7,25 +7,12 @@
 #include <sstream>
 
 #include "apps/calibrate/calibration_report.h"
+#include "apps/common/camera_file.h"
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
 #include "apps/compare/export.h"
 
 namespace circline::apps {
-
-const char* ModelName(CameraModel model) {
-  return model == CameraModel::kPinhole  ? "pinhole"
-         : model == CameraModel::kOpenCV ? "opencv"
-                                         : "fisheye";
-}
-
-std::vector<double> Distortion(const Camera& camera) {
-  if (camera.model == CameraModel::kPinhole) return std::vector<double>(4, 0.0);
-  std::vector<double> d(camera.distortion.begin(), camera.distortion.end());
-  const std::size_t least = camera.model == CameraModel::kFisheye ? 4 : 5;
-  while (d.size() > least && d.back() == 0.0) d.pop_back();
-  return d;
-}
 
 std::string WhyLeftOut(const AdjustedPhoto& photo, const std::vector<std::string>& names) {
   if (photo.same_as < 0) return photo.status.message;

@@ -12,11 +12,6 @@
 
 namespace circline::apps {
 
-// As in scene files.
-const char* ModelName(CameraModel model);
-// In OpenCV's order; the rational terms only where they are there.
-std::vector<double> Distortion(const Camera& camera);
-
 // calibration.yml (one more for each further camera, after its id), calibration.json, cameras.txt
 // and images.txt, report.html in `folder`. `names`: of the photos; `pictures`: of them, JPEG, may
 // be empty. `note`: what the files could not take, a line; or empty.

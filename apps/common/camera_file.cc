@@ -216,6 +216,20 @@ bool LooksLikeStorage(const std::string& text) {
 
 }  // namespace
 
+const char* ModelName(CameraModel model) {
+  return model == CameraModel::kPinhole  ? "pinhole"
+         : model == CameraModel::kOpenCV ? "opencv"
+                                         : "fisheye";
+}
+
+std::vector<double> Distortion(const Camera& camera) {
+  if (camera.model == CameraModel::kPinhole) return std::vector<double>(4, 0.0);
+  std::vector<double> d(camera.distortion.begin(), camera.distortion.end());
+  const std::size_t least = camera.model == CameraModel::kFisheye ? 4 : 5;
+  while (d.size() > least && d.back() == 0.0) d.pop_back();
+  return d;
+}
+
 Status ReadCameraFile(const std::string& path, std::vector<Camera>* cameras) {
   cameras->clear();
   std::string text;
@@ -238,7 +252,7 @@ CameraSigma StatedCameraSigma::Over(CameraSigma sigma) const {
 
 Camera ReadSceneCamera(const StorageNode& node, StatedCameraSigma* sigma) {
   node.AllowKeys({"id", "model", "width", "height", "camera_matrix", "distortion", "focal_sigma",
-                  "principal_point_sigma_px", "k1_sigma"});
+                  "focal_sigma_doubtful", "principal_point_sigma_px", "k1_sigma"});
   Camera camera;
   camera.id = node.Require("id").Text();
   StorageNode named = node;
@@ -264,6 +278,7 @@ Camera ReadSceneCamera(const StorageNode& node, StatedCameraSigma* sigma) {
   SetIntrinsics(matrix, &camera);
   SetDistortion(named.Get("distortion"), &camera);
   ReadSigma(named.Get("focal_sigma"), &sigma->log_focal);
+  ReadSigma(named.Get("focal_sigma_doubtful"), &sigma->doubtful_log_focal);
   ReadSigma(named.Get("principal_point_sigma_px"), &sigma->principal_point_px);
   ReadSigma(named.Get("k1_sigma"), &sigma->k1);
   CheckCamera(named, camera);

@@ -13,6 +13,11 @@
 
 namespace circline::apps {
 
+// As in scene files.
+const char* ModelName(CameraModel model);
+// In OpenCV's order; the rational terms only where they are there.
+std::vector<double> Distortion(const Camera& camera);
+
 // Every camera of the file; which kind of file it is shows in its content. COLMAP's pixel centres
 // lie at half integers, ours at integers: the principal point moves by half a pixel. An OpenCV file
 // gives one camera, with the id "camera"; `fisheye_model: 1` there means the fisheye model. Not ok:
@@ -31,7 +36,7 @@ struct StatedCameraSigma {
 };
 
 // A camera of a scene file: id, model, width, height, camera_matrix, distortion; focal_sigma,
-// principal_point_sigma_px, k1_sigma.
+// focal_sigma_doubtful, principal_point_sigma_px, k1_sigma.
 Camera ReadSceneCamera(const StorageNode& node, StatedCameraSigma* sigma);
 
 }  // namespace circline::apps

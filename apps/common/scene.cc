@@ -314,20 +314,11 @@ SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
   return image;
 }
 
-bool IsPhotoName(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  static const auto* const known = new std::set<std::string>{
-      ".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".webp", ".jp2"};
-  return known->count(extension) > 0;
-}
-
 std::vector<std::string> PhotosInFolder(const std::string& folder) {
   std::vector<std::string> paths;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (!entry.is_directory(error) && IsPhotoName(entry.path())) {
+    if (!entry.is_directory(error) && IsPhotoName(entry.path().string())) {
       paths.push_back(entry.path().string());
     }
   }
@@ -365,19 +356,39 @@ Status ExpandPattern(const std::string& pattern, std::vector<std::string>* paths
 
 }  // namespace
 
+bool IsPhotoName(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  static const auto* const known = new std::set<std::string>{
+      ".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".webp", ".jp2"};
+  return known->count(extension) > 0;
+}
+
 Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
                  std::vector<SceneImage>* images, std::string* rigid) {
   images->clear();
+  std::string text;
+  const Status status = ReadTextFile(path, &text);
+  if (!status.ok()) return status;
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  return ParseScene(path, text, folder, cameras, images, rigid);
+}
+
+Status ParseScene(const std::string& name, const std::string& text, const std::string& folder,
+                  const std::vector<Camera>& cameras, std::vector<SceneImage>* images,
+                  std::string* rigid) {
+  images->clear();
   StorageDocument document;
-  Status status = document.Open(path);
+  Status status = document.Parse(name, text);
   if (!status.ok()) return status;
   const StorageNode root(document.root(), "", &status);
   root.AllowKeys({"cameras", "images", "rigid"});
   const StorageNode stated = root.Get("rigid");
-  const std::string text = stated.Exists() ? stated.Text() : "";
-  if (stated.Exists() && text != "auto" && text != "yes" && text != "no")
+  const std::string choice = stated.Exists() ? stated.Text() : "";
+  if (stated.Exists() && choice != "auto" && choice != "yes" && choice != "no")
     stated.Fail("must be auto, yes or no");
-  if (rigid != nullptr) *rigid = text;
+  if (rigid != nullptr) *rigid = choice;
   std::vector<SceneCamera> all;
   for (const Camera& camera : cameras) all.push_back({camera, {}});
   for (const StorageNode& item : root.Get("cameras").Items()) {
@@ -389,7 +400,6 @@ Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
     if (twice) item.Fail("camera '" + id + "' is there twice");
     all.push_back(std::move(read));
   }
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   for (const StorageNode& item : root.Require("images").Items()) {
     if (!status.ok()) break;
     images->push_back(ReadImage(item, folder, all));
@@ -398,7 +408,7 @@ Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
   if (!status.ok()) {
     images->clear();
     const std::string separator = status.message.compare(0, 2, ": ") == 0 ? "" : ": ";
-    return Status::Invalid(path + separator + status.message);
+    return Status::Invalid(name + separator + status.message);
   }
   return Status::Ok();
 }

@@ -73,6 +73,14 @@ struct SceneImage {
 Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
                  std::vector<SceneImage>* images, std::string* rigid = nullptr);
 
+// The same of a text, which messages call `name`; photos are relative to `folder`.
+Status ParseScene(const std::string& name, const std::string& text, const std::string& folder,
+                  const std::vector<Camera>& cameras, std::vector<SceneImage>* images,
+                  std::string* rigid = nullptr);
+
+// Whether photos have names that end like this one; letters' case does not count.
+bool IsPhotoName(const std::string& path);
+
 // The photos that a comma-separated list of files, folders and wildcards names, sorted within each;
 // to be detected. A plain file name need not exist (reading it will tell); a wildcard that matches
 // nothing, or a folder without photos, is an error.

@@ -68,10 +68,15 @@ Status ReadTextFile(const std::string& path, std::string* text) {
 }
 
 Status StorageDocument::Open(const std::string& path) {
-  const Status status = ReadTextFile(path, &text_);
-  if (!status.ok()) return status;
+  std::string text;
+  const Status status = ReadTextFile(path, &text);
+  return status.ok() ? Parse(path, std::move(text)) : status;
+}
+
+Status StorageDocument::Parse(const std::string& name, std::string text) {
+  text_ = std::move(text);
   if (text_.find_first_not_of(" \t\r\n") == std::string::npos) {
-    return Status::Invalid(path + ": is empty");
+    return Status::Invalid(name + ": is empty");
   }
   const int added_lines = AddMissingHeader(&text_);
   try {
@@ -79,11 +84,11 @@ Status StorageDocument::Open(const std::string& path) {
     if (storage_.isOpened() && storage_.root().isMap()) return Status::Ok();
   } catch (const cv::Exception& error) {
     return Status::Invalid(
-        path + ": not valid YAML or JSON: " + OneLine(ParserMessage(error, added_lines)));
+        name + ": not valid YAML or JSON: " + OneLine(ParserMessage(error, added_lines)));
   } catch (const std::exception& error) {
-    return Status::Invalid(path + ": not valid YAML or JSON: " + error.what());
+    return Status::Invalid(name + ": not valid YAML or JSON: " + error.what());
   }
-  return Status::Invalid(path + ": not a YAML or JSON document with keys and values");
+  return Status::Invalid(name + ": not a YAML or JSON document with keys and values");
 }
 
 void StorageNode::Fail(const std::string& message) const {

@@ -53,6 +53,8 @@ class StorageDocument {
  public:
   // Not ok: one line that names the file, and the line in it where the parser can tell.
   Status Open(const std::string& path);
+  // The same of a text; messages call it `name`.
+  Status Parse(const std::string& name, std::string text);
   cv::FileNode root() const { return storage_.root(); }
 
  private:

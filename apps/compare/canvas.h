@@ -17,6 +17,7 @@ class Canvas {
  public:
   explicit Canvas(const cv::Mat& photo);
 
+  int width() const { return image_.cols; }
   int height() const { return image_.rows; }
   // A width given for a photo 960 pixels wide, on this one.
   double Scaled(double width) const { return width * stroke_; }

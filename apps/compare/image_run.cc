@@ -256,6 +256,15 @@ ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, Scene
   });
 }
 
+ImageRun RunPhoto(const CompareOptions& options, const SolverSet& solvers, const cv::Mat& photo,
+                  SceneImage* image) {
+  return Guarded(image, [&](ImageRun* run) {
+    run->photo = photo;
+    ObserveRead(options, image, run);
+    RunSolvers(options, solvers, run);
+  });
+}
+
 std::vector<SolverKey> SolverSet::Keys(const CompareOptions& options) const {
   std::vector<SolverKey> keys;
   for (const Task& task : tasks_) {

@@ -92,6 +92,10 @@ int SetLargestRadius(double radius, Observations* observations);
 // The same, and all solvers, which outlive the result.
 ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image);
 
+// The same of a photo that is at hand.
+ImageRun RunPhoto(const CompareOptions& options, const SolverSet& solvers, const cv::Mat& photo,
+                  SceneImage* image);
+
 // The run to show in a picture (see ShowRank). Null if every solver refused.
 const SolverRun* RunToShow(const ImageRun& run);
 

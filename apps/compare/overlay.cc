@@ -7,7 +7,7 @@
 #include "apps/common/text.h"
 #include "apps/compare/canvas.h"
 #include "apps/compare/pixel_ellipse.h"
-#include "apps/compare/plane_evidence.h"
+#include "apps/compare/pose_curves.h"
 
 namespace circline::apps {
 namespace {
@@ -33,21 +33,6 @@ int PiecesOfEllipse(double semi_axis_px) {
 // px.
 int PiecesOfLine(double length_px) {
   return static_cast<int>(std::clamp(0.5 * std::sqrt(length_px), 1.0, 50.0));
-}
-
-// A curve of the camera frame as pixels of the photo; not finite where it cannot be seen.
-template <typename Curve>
-std::vector<Eigen::Vector2d> ProjectCurve(const Camera& camera, int samples, double t0, double t1,
-                                          const Curve& curve) {
-  std::vector<Eigen::Vector2d> pixels;
-  pixels.reserve(static_cast<std::size_t>(samples) + 1);
-  for (int i = 0; i <= samples; ++i) {
-    const Eigen::Vector3d point = curve(t0 + (t1 - t0) * i / samples);
-    Eigen::Vector2d pixel;
-    const bool seen = point.allFinite() && CameraToPixel(camera, point, &pixel);
-    pixels.push_back(seen ? pixel : Eigen::Vector2d::Constant(NAN));
-  }
-  return pixels;
 }
 
 // ---- Evidence ----
@@ -104,101 +89,41 @@ void DrawPencils(const Observations& observations, Canvas* canvas) {
 
 // ---- The pose ----
 
-struct WorldDrawing {
-  const Camera& camera;
-  const CameraPose& pose;
-
-  std::vector<Eigen::Vector2d> Line(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
-    return ProjectCurve(camera, 16, 0.0, 1.0, [&](double t) {
-      return (pose.rotation * ((1.0 - t) * from + t * to) + pose.translation).eval();
-    });
-  }
-  bool Pixel(const Eigen::Vector3d& point, Eigen::Vector2d* pixel) const {
-    return CameraToPixel(camera, pose.rotation * point + pose.translation, pixel);
-  }
-};
-
-void DrawGrid(const WorldDrawing& world, Eigen::AlignedBox2d box, const cv::Scalar& color,
-              int thickness, Canvas* canvas) {
-  constexpr int kCells = 8;
-  const double longest = box.sizes().maxCoeff();
-  if (!(longest > 0.0) || !std::isfinite(longest)) return;
-  box.min().array() -= 0.06 * longest;
-  box.max().array() += 0.06 * longest;
-  const double step = box.sizes().maxCoeff() / kCells;
-  for (const int axis : {0, 1}) {
-    const int other = 1 - axis;
-    const int count = std::max(1, static_cast<int>(std::lround(box.sizes()[axis] / step)));
-    for (int i = 0; i <= count; ++i) {
-      Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = Eigen::Vector3d::Zero();
-      from[axis] = to[axis] = box.min()[axis] + box.sizes()[axis] * i / count;
-      from[other] = box.min()[other];
-      to[other] = box.max()[other];
-      canvas->Polyline(world.Line(from, to), color, thickness);
-    }
-  }
+void DrawGrid(const PoseCurves& curves, const cv::Scalar& color, int thickness, Canvas* canvas) {
+  for (const PixelCurve& line : curves.grid) canvas->Polyline(line, color, thickness);
 }
 
-void DrawVanishingLine(const Camera& camera, const Eigen::Vector3d& normal, Canvas* canvas) {
-  const Eigen::Vector3d sideways =
-      (std::abs(normal.z()) > 0.999 ? Eigen::Vector3d::UnitX()
-                                    : Eigen::Vector3d::UnitZ().cross(normal))
-          .normalized();
-  const Eigen::Vector3d forward = sideways.cross(normal).normalized();
-  const double sign = forward.z() < 0.0 ? -1.0 : 1.0;
-  const auto pixels = ProjectCurve(camera, 120, -1.55, 1.55, [&](double t) {
-    return (std::sin(t) * sideways + sign * std::cos(t) * forward).eval();
-  });
+void DrawVanishingLine(const PixelCurve& pixels, Canvas* canvas) {
   canvas->Dashes(pixels, kHorizon, 2);
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (!canvas->IsInside(pixels[i], 24.0)) continue;
-    canvas->Label(pixels[i] + Eigen::Vector2d(0.0, canvas->Scaled(-8.0)), "vanishing line",
-                  kHorizon, 0.5);
+  for (const Eigen::Vector2d& pixel : pixels) {
+    if (!canvas->IsInside(pixel, 24.0)) continue;
+    canvas->Label(pixel + Eigen::Vector2d(0.0, canvas->Scaled(-8.0)), "vanishing line", kHorizon,
+                  0.5);
     return;
   }
 }
 
-// World length at which the longest visible axis takes up a sixth of the photo's height.
-double AxisLength(const WorldDrawing& world, const Eigen::Vector3d& origin, const Canvas& canvas) {
-  const double wanted = 0.17 * canvas.height();
-  Eigen::Vector2d start;
-  if (!world.Pixel(origin, &start)) return 0.0;
-  double length = 0.1 * (world.pose.rotation * origin + world.pose.translation).norm();
-  for (int pass = 0; pass < 6; ++pass) {
-    double longest = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-      Eigen::Vector2d end;
-      if (world.Pixel(origin + length * Eigen::Vector3d::Unit(axis), &end)) {
-        longest = std::max(longest, (end - start).norm());
-      }
-    }
-    if (!(longest > 0.0)) return 0.0;
-    length *= std::clamp(wanted / longest, 0.25, 4.0);
-  }
-  return length;
-}
-
-void DrawAxes(const WorldDrawing& world, const Eigen::Vector3d& origin, bool rotation_is_free,
-              Canvas* canvas) {
-  const double length = AxisLength(world, origin, *canvas);
-  Eigen::Vector2d start;
-  if (!(length > 0.0) || !world.Pixel(origin, &start)) return;
+void DrawAxes(const PoseCurves& curves, const PoseHypothesis& hypothesis, Canvas* canvas) {
+  if (curves.axes[0].empty()) return;
+  const Eigen::Matrix3d& rotation = hypothesis.cam_from_world.rotation;
+  const bool rotation_is_free = hypothesis.RotationIsFree();
   // The farthest first, so that nearer ones lie on top.
   std::array<int, 3> order = {0, 1, 2};
   std::sort(order.begin(), order.end(),
-            [&](int a, int b) { return world.pose.rotation(2, a) > world.pose.rotation(2, b); });
+            [&](int a, int b) { return rotation(2, a) > rotation(2, b); });
   static constexpr std::array<const char*, 3> kNames = {"X", "Y", "Z"};
   for (const int axis : order) {
     if (rotation_is_free && axis != 2) continue;  // A convention, nothing that was seen.
-    const auto pixels = world.Line(origin, origin + length * Eigen::Vector3d::Unit(axis));
     const auto index = static_cast<std::size_t>(axis);
+    const PixelCurve& pixels = curves.axes[index];
     canvas->Arrow(pixels, kAxes[index], 3);
     if (!pixels.back().allFinite()) continue;
-    const Eigen::Vector2d ahead = (pixels.back() - start).stableNormalized() * canvas->Scaled(15.0);
+    const Eigen::Vector2d ahead =
+        (pixels.back() - curves.origin).stableNormalized() * canvas->Scaled(15.0);
     canvas->Label(pixels.back() + ahead, rotation_is_free ? "normal" : kNames[index], kAxes[index],
                   0.75, true);
   }
-  canvas->Dot(start, 4.5, kWhite);
+  canvas->Dot(curves.origin, 4.5, kWhite);
 }
 
 void DrawCenters(const PoseEstimate& estimate, Canvas* canvas) {
@@ -214,27 +139,16 @@ void DrawCenters(const PoseEstimate& estimate, Canvas* canvas) {
   }
 }
 
-// World axes at the origin, or where the evidence is if the origin is not in the picture.
-Eigen::Vector3d AxesOrigin(const WorldDrawing& world, const Eigen::AlignedBox2d& box,
-                           const Canvas& canvas) {
-  Eigen::Vector2d pixel;
-  const bool visible = world.Pixel(Eigen::Vector3d::Zero(), &pixel) && canvas.IsInside(pixel, 0.0);
-  if (visible || box.isEmpty()) return Eigen::Vector3d::Zero();
-  return {box.center().x(), box.center().y(), 0.0};
-}
-
 void DrawPose(const Observations& observations, const PoseEstimate& estimate, Canvas* canvas) {
   const PoseHypothesis& best = estimate.hypotheses.front();
-  const Camera camera = CameraOf(best, observations.camera);
-  const WorldDrawing world{camera, best.cam_from_world};
-  const Eigen::AlignedBox2d box = EvidenceOnPlane(observations, camera, best.cam_from_world);
-  if (!box.isEmpty()) {
-    canvas->Blend(0.35, [&] { DrawGrid(world, box, kGridRim, 3, canvas); });
-    canvas->Blend(0.7, [&] { DrawGrid(world, box, kGrid, 1, canvas); });
+  const PoseCurves curves = CurvesOfPose(observations, best, canvas->width(), canvas->height());
+  if (!curves.grid.empty()) {
+    canvas->Blend(0.35, [&] { DrawGrid(curves, kGridRim, 3, canvas); });
+    canvas->Blend(0.7, [&] { DrawGrid(curves, kGrid, 1, canvas); });
   }
-  DrawVanishingLine(camera, best.cam_from_world.rotation.col(2), canvas);
+  DrawVanishingLine(curves.vanishing_line, canvas);
   DrawCenters(estimate, canvas);
-  DrawAxes(world, AxesOrigin(world, box, *canvas), best.RotationIsFree(), canvas);
+  DrawAxes(curves, best, canvas);
 }
 
 // ---- The caption ----

@@ -201,9 +201,7 @@ Json CameraJson(const ImageRun& run) {
   const Camera& camera = run.image->observations.camera;
   Json json;
   json["id"] = camera.id;
-  json["model"] = camera.model == CameraModel::kPinhole  ? "pinhole"
-                  : camera.model == CameraModel::kOpenCV ? "opencv"
-                                                         : "fisheye";
+  json["model"] = ModelName(camera.model);
   const auto size = [](int stated, int photo, double center) {
     return stated > 0  ? stated
            : photo > 0 ? photo
