@@ -48,7 +48,7 @@ track() {
 }
 
 install_packages "${BUILD_PACKAGES[@]}"
-build release circline_compare circline_reconstruct circline_calibrate circline_track
+build release circline_compare circline_reconstruct circline_calibrate circline_track circline_studio
 
 find_folder opencv-doc /usr/share/doc/opencv-doc/examples/data
 compare chessboard "$found"
@@ -85,3 +85,7 @@ echo "  $PWD/build/demo/track/out/report.html"
 for side in left right; do
   echo "  $PWD/build/demo/calibration/$side/report.html"
 done
+
+echo
+say "next, to click for yourself: a page on this machine that shows the pose of what you click"
+echo "  build/release/bin/circline_studio --images=build/demo/disc --camera=build/demo/track/camera.yml"

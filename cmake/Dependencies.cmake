@@ -30,6 +30,13 @@ if(CIRCLINE_BUILD_APPS)
     message(FATAL_ERROR "circline needs libexif, which was not found. "
                         "On Debian: apt-get install libexif-dev")
   endif()
+  # Nor has cpp-httplib, whose flags must be those that its library was built with.
+  circline_find(PkgConfig pkg-config)
+  pkg_check_modules(HTTPLIB QUIET IMPORTED_TARGET cpp-httplib)
+  if(NOT HTTPLIB_FOUND)
+    message(FATAL_ERROR "circline needs cpp-httplib, which was not found. "
+                        "On Debian: apt-get install libcpp-httplib-dev")
+  endif()
   mark_as_advanced(CIRCLINE_EXIF_LIBRARY CIRCLINE_EXIF_INCLUDE_DIR)
 endif()
 if(CIRCLINE_BUILD_APPS AND CIRCLINE_WITH_MPI)

@@ -1,0 +1,158 @@
+#include "apps/studio/answer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+
+#include "apps/compare/pose_curves.h"
+#include "apps/compare/results.h"
+#include "circline/estimators/metrology.h"
+
+namespace circline::apps {
+namespace {
+
+constexpr double kDegreesPerRadian = 57.295779513082323;
+constexpr std::size_t kMaxMeasurements = 200;
+
+double Rounded(double value, double steps) { return std::round(value * steps) / steps; }
+
+Json PixelJson(const Eigen::Vector2d& pixel) {
+  if (!pixel.allFinite()) return nullptr;
+  return {Rounded(pixel.x(), 100.0), Rounded(pixel.y(), 100.0)};
+}
+
+Json CurveJson(const PixelCurve& curve) {
+  Json json = Json::array();
+  for (const Eigen::Vector2d& pixel : curve) json.push_back(PixelJson(pixel));
+  return json;
+}
+
+template <typename Curves>
+Json CurvesJson(const Curves& curves) {
+  Json json = Json::array();
+  for (const PixelCurve& curve : curves) json.push_back(CurveJson(curve));
+  return json;
+}
+
+Json VectorJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Json DrawingJson(const ImageRun& run, const PoseHypothesis& hypothesis) {
+  const PoseCurves curves =
+      CurvesOfPose(run.observations, hypothesis, run.photo.cols, run.photo.rows);
+  Json circles = Json::array();
+  for (const CircleEstimate& circle : hypothesis.circles) {
+    const bool seen = circle.center_px.allFinite() && !circle.center_px.isZero();
+    circles.push_back({{"id", circle.id},
+                       {"center_px", seen ? PixelJson(circle.center_px) : Json()},
+                       {"center", VectorJson(circle.center)},
+                       {"normal", VectorJson(circle.normal)},
+                       {"radius", circle.radius}});
+  }
+  return {{"grid", CurvesJson(curves.grid)},
+          {"horizon", CurveJson(curves.vanishing_line)},
+          {"origin", curves.axes[0].empty() ? Json() : PixelJson(curves.origin)},
+          {"axes", CurvesJson(curves.axes)},
+          {"box", CurvesJson(curves.box)},
+          {"rotation_is_free", hypothesis.RotationIsFree()},
+          {"circles", circles}};
+}
+
+std::vector<Eigen::Vector2d> Points(const Json& asked, std::size_t count) {
+  const auto list = asked.find("points");
+  if (list == asked.end() || !list->is_array() || list->size() != 2 * count) {
+    throw RequestError(400, "a measurement must have " + std::to_string(count) + " points");
+  }
+  std::vector<Eigen::Vector2d> points;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Json &u = (*list)[2 * i], &v = (*list)[2 * i + 1];
+    if (!u.is_number() || !v.is_number())
+      throw RequestError(400, "a measurement's points must be numbers");
+    points.emplace_back(u.get<double>(), v.get<double>());
+  }
+  return points;
+}
+
+bool Measure(const std::string& kind, const std::vector<Eigen::Vector2d>& p, double sigma_px,
+             const PoseHypothesis& hypothesis, const Camera& camera, Measurement* value) {
+  if (kind == "length") return LengthOnPlane(hypothesis, camera, {p[0], p[1]}, sigma_px, value);
+  if (kind == "height") return HeightOverPlane(hypothesis, camera, {p[0], p[1]}, sigma_px, value);
+  if (!AngleOnPlane(hypothesis, camera, {p[0], p[1], p[2], p[3]}, sigma_px, value)) return false;
+  value->value *= kDegreesPerRadian;
+  value->sigma *= kDegreesPerRadian;
+  return true;
+}
+
+}  // namespace
+
+Json DetectionJson(const ImageRun& run, const NoiseModel& noise) {
+  Json line = Json::parse(WriteLines(run, "", {}, noise).observations);
+  Json contours = Json::object(), sigmas = Json::object();
+  for (const CircleObservation& circle : run.observations.circles) {
+    Json contour = Json::array();
+    for (std::size_t i = 0; i < circle.points.size(); ++i) {
+      if (!circle.inliers.empty() && circle.inliers[i] == 0) continue;
+      contour.push_back(Rounded(circle.points[i].x(), 1000.0));
+      contour.push_back(Rounded(circle.points[i].y(), 1000.0));
+    }
+    contours[circle.id] = std::move(contour);
+    sigmas[circle.id] = circle.sigma_px > 0.0 ? Json(circle.sigma_px) : Json();
+  }
+  line["contours"] = std::move(contours);
+  line["contour_sigma_px"] = std::move(sigmas);
+  line["width"] = run.photo.cols;
+  line["height"] = run.photo.rows;
+  return line;
+}
+
+Json Measured(const Json& asked, const PoseHypothesis& hypothesis, const Camera& camera) {
+  const std::string kind = asked.is_object() ? asked.value("kind", "") : "";
+  if (kind != "length" && kind != "height" && kind != "angle")
+    throw RequestError(400, "a measurement's kind must be length, height or angle");
+  const std::vector<Eigen::Vector2d> points = Points(asked, kind == "angle" ? 4 : 2);
+  const double sigma_px = asked.value("sigma_px", 1.0);
+  if (!(sigma_px > 0.0 && sigma_px <= 100.0))
+    throw RequestError(400, "a measurement's sigma_px must be positive, and at most 100");
+  Json json = {{"what", kind}};
+  json["unit"] = kind == "angle" ? "deg" : hypothesis.metric ? "world" : "distance";
+  Measurement measured;
+  if (Measure(kind, points, sigma_px, hypothesis, camera, &measured)) {
+    json["value"] = measured.value;
+    json["sigma"] = measured.sigma;
+  } else {
+    json["value"] = json["sigma"] = nullptr;
+    json["error"] = "it is not on this side of the plane's horizon";
+  }
+  return json;
+}
+
+Json EstimateJson(const ImageRun& run, const NoiseModel& noise, std::size_t chosen,
+                  const Json& asked) {
+  if (!run.read_error.empty()) throw RequestError(422, run.read_error);
+  if (run.solvers.empty()) throw RequestError(500, "there is no solver");
+  const PoseEstimate& estimate = run.solvers.front().estimate;
+  const bool ok = estimate.status.ok() && !estimate.hypotheses.empty();
+  Json json = {{"status", ok ? "ok" : StatusCodeName(estimate.status.code)},
+               {"message", estimate.status.message},
+               {"notes", estimate.notes}};
+  for (const std::string& problem : run.problems) json["notes"].push_back(problem);
+  json["decided_by"] = estimate.decided_by;
+  json["camera"] = CameraEntry(run.image->observations.camera, {});
+  for (const char* list : {"hypotheses", "drawings", "measurements"}) json[list] = Json::array();
+  if (!ok) return json;
+  std::istringstream lines(WriteLines(run, "", {}, noise).results);
+  for (std::string line; std::getline(lines, line);)
+    json["hypotheses"].push_back(Json::parse(line));
+  for (const PoseHypothesis& hypothesis : estimate.hypotheses)
+    json["drawings"].push_back(DrawingJson(run, hypothesis));
+  if (!asked.is_array()) return json;
+  if (asked.size() > kMaxMeasurements) throw RequestError(413, "more than 200 measurements");
+  const PoseHypothesis& hypothesis =
+      estimate.hypotheses[std::min(chosen, estimate.hypotheses.size() - 1)];
+  for (const Json& item : asked) {
+    json["measurements"].push_back(Measured(item, hypothesis, run.observations.camera));
+  }
+  return json;
+}
+
+}  // namespace circline::apps

@@ -1,0 +1,130 @@
+// circline_studio: a page in the browser to look at photos and to say what is what in them.
+#include <gflags/gflags.h>
+#include <pthread.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <iostream>
+#include <string>
+#include <thread>
+
+#include "apps/common/flags_util.h"
+#include "apps/compare/options.h"
+#include "apps/studio/server.h"
+#include "apps/studio/studio.h"
+
+DECLARE_string(images);
+DECLARE_string(output);
+DECLARE_string(scene);
+
+DEFINE_int32(port, 8642, "Where on the loopback address the page is; 0 = any port that is free.");
+
+namespace circline::apps {
+namespace {
+
+constexpr char kUsage[] =
+    "circline_studio: a page in the browser: click circles, lines and axes, see the pose at once.\n"
+    "\n"
+    "  circline_studio --images=photos [--camera=calib.yml] [--port=8642]\n"
+    "\n"
+    "Serves a folder of photos on the loopback address until it is interrupted. Writes scene.json "
+    "(a scene\n"
+    "file for circline_compare), scene.draft.json and export/ into that folder, nothing else. "
+    "Flags for the\n"
+    "camera, detection and losses are those of circline_compare.\n"
+    "Exit code 0: interrupted; 1: the server stopped by itself; 2: unusable flags, folder or port.";
+
+// One folder, one solver, one loss.
+Status CheckFlags() {
+  for (const char* name :
+       {"scene", "output", "merge", "resume", "shard", "solvers", "peers", "export_as", "roi",
+        "save_options", "list_solvers", "circle_radius", "overlays", "threads"}) {
+    gflags::CommandLineFlagInfo info;
+    if (gflags::GetCommandLineFlagInfo(name, &info) && info.current_value != info.default_value)
+      return Status::Invalid(std::string("--") + name + ": is not a flag of circline_studio");
+  }
+  if (FLAGS_images.empty()) return Status::Invalid("--images is missing: a folder with photos");
+  return FLAGS_port >= 0 && FLAGS_port <= 65535 ? Status::Ok()
+                                                : Status::Invalid("--port must be 0 to 65535");
+}
+
+Status ReadOptions(CompareOptions* options) {
+  FLAGS_output = FLAGS_images;  // Nothing is written elsewhere.
+  const Status status = OptionsFromFlags(options);
+  if (!status.ok()) return status;
+  options->solvers = {"joint"};
+  options->overlays = false;
+  return options->losses.size() == 1
+             ? status
+             : Status::Invalid("--robust_loss and --loss_scale_px: circline_studio takes one each");
+}
+
+Status ReadCamera(const CompareOptions& options, Camera* camera) {
+  ImageSet images;
+  const Status status = ImagesFromFlags(options.inputs, &images);
+  if (status.ok()) *camera = images.At(0).observations.camera;
+  return status;
+}
+
+int Refuse(const Status& status) {
+  SayOnStderr("circline_studio: " + status.message);
+  return kExitUsage;
+}
+
+// Until SIGINT or SIGTERM, for which this thread alone waits.
+int ServeUntilSignal(const sigset_t& signals, StudioServer* server) {
+  std::atomic<bool> asked{false}, ended{false};
+  std::thread serving([&] {
+    server->Serve();
+    ended = true;
+    if (!asked) kill(getpid(), SIGTERM);
+  });
+  int signal = 0;
+  sigwait(&signals, &signal);
+  const bool by_itself = ended;
+  asked = true;
+  while (!ended) {  // It may not have begun yet.
+    server->Stop();
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  serving.join();
+  if (by_itself) SayOnStderr("circline_studio: the server stopped");
+  return by_itself ? kExitUnreadable : kExitOk;
+}
+
+int Serve() {
+  CompareOptions options;
+  PhotoFolder folder;
+  Camera camera;
+  Status status = CheckFlags();
+  if (status.ok()) status = folder.Open(FLAGS_images);
+  if (status.ok()) status = ReadOptions(&options);
+  if (status.ok()) status = ReadCamera(options, &camera);
+  if (!status.ok()) return Refuse(status);
+  const bool guess = options.inputs.guess.wanted;
+  options.inputs.guess.wanted = false;  // The studio has a camera for each photo.
+  Studio studio(options, folder, guess ? nullptr : &camera);
+  status = studio.ReadFiles();
+  if (!status.ok()) SayOnStderr("circline_studio: " + status.message);
+  StudioServer server(&studio);
+  status = server.Bind(FLAGS_port);
+  if (!status.ok()) return Refuse(status);
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // In all threads to come.
+  std::cout << "circline_studio: " << folder.size()
+            << " photos at http://127.0.0.1:" << server.port() << "/ (Ctrl-C ends it)" << std::endl;
+  return ServeUntilSignal(signals, &server);
+}
+
+}  // namespace
+}  // namespace circline::apps
+
+int main(int argc, char** argv) {
+  return circline::apps::RunApp(argc, argv, "circline_studio", circline::apps::kUsage,
+                                circline::apps::Serve);
+}

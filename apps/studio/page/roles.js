@@ -1,0 +1,86 @@
+// The bar beside a line that was drawn: drop it on a direction, an axis, a known length.
+import {app, change, changed} from './store.js';
+import {DIRECTIONS, lineSigma, sayLine} from './scene.js';
+import {toScreen, view} from './view.js';
+
+const bar = document.getElementById('roles'), canvas = document.getElementById('photo');
+const WORDS = {x: ['x', 'A line along x (X)'], y: ['y', 'A line along y (Y)'],
+               z: ['z', 'A line along z, out of the plane (Z)'],
+               free: ['∥', 'A line parallel to others; click again for the next of the group (P)']};
+
+let group = '';  // The free lines that the last one joined.
+
+export function dropLoose(role) {
+  const line = app.loose;
+  if (!line) return;
+  app.loose = null;
+  if (DIRECTIONS.includes(role)) {
+    const joined = role === 'free' ? line.group || group : '';
+    change((doc) => {
+      app.selection = sayLine(doc, line.points, role, lineSigma(line, view.scale), joined);
+      if (role === 'free') group = doc.scene.pencils[app.selection.pencil].id;
+    });
+  } else {
+    change(({scene}) => {
+      scene.frame[role] = line.points;
+      app.selection = {kind: role};
+    });
+  }
+}
+
+function dropLength(value) {
+  const line = app.loose;
+  app.loose = null;
+  change(({scene}) => {
+    scene.known.length.push({points: line.points, value});
+    app.selection = {kind: 'known', index: scene.known.length.length - 1};
+  });
+}
+
+// A found line stands for its whole group.
+function dropGroup() {
+  const {group: id} = app.loose, of = app.detection.pencils.find((p) => p.id === id);
+  const segments = app.detection.segments.filter((s) => s[4] === id);
+  const line = app.loose;
+  app.loose = null;
+  change((doc) => {
+    for (const segment of segments) {
+      app.selection = sayLine(doc, segment.slice(0, 4), of.along, lineSigma(line, view.scale), id);
+    }
+  });
+}
+
+function button(text, title, work, className = '') {
+  const element = document.createElement('button');
+  Object.assign(element, {textContent: text, title, className});
+  element.dataset.role = text;
+  element.addEventListener('click', work);
+  bar.append(element);
+}
+
+export function showRoles() {
+  const wanted = app.loose && ['select', 'line'].includes(app.tool);
+  bar.hidden = !wanted;
+  if (!wanted) return;
+  bar.replaceChildren();
+  for (const role of DIRECTIONS) {
+    button(WORDS[role][0], WORDS[role][1], () => dropLoose(role), `role-${role}`);
+  }
+  button('X axis', 'The image of the X axis, in this sense', () => dropLoose('x_axis'), 'role-x');
+  button('Y axis', 'The image of the Y axis, in this sense', () => dropLoose('y_axis'), 'role-y');
+  const length = document.createElement('input');
+  Object.assign(length, {type: 'number', step: 'any', min: '0', placeholder: 'length',
+                         title: 'Its known length on the plane (Enter)'});
+  length.addEventListener('keydown', (event) => {
+    event.stopPropagation();
+    if (event.key === 'Enter' && Number(length.value) > 0) dropLength(Number(length.value));
+  });
+  bar.append(length);
+  const size = app.loose.group
+    ? app.detection.segments.filter((s) => s[4] === app.loose.group).length : 0;
+  if (size > 1) button(`all ${size}`, 'This line and all that were found parallel to it', dropGroup);
+  button('✕', 'Drop it (Esc)', () => { app.loose = null; changed('view'); });
+  const [x0, y0, x1, y1] = app.loose.points, end = toScreen([Math.max(x0, x1), (y0 + y1) / 2]);
+  bar.style.left = `${Math.max(8, Math.min(end[0] + 14, canvas.clientWidth - bar.offsetWidth - 8))}px`;
+  bar.style.top = `${Math.max(8, Math.min(end[1] - 18, canvas.clientHeight - bar.offsetHeight - 8))}px`;
+}

@@ -1,0 +1,123 @@
+// What can be said of a photo, as changes of a doc (store.js). Pixels are those of the photo.
+
+// Standard deviation of the end of a line that was found, pixels: 0.20 on chessboards (README).
+const FOUND_SIGMA_PX = 0.2;
+
+export const DIRECTIONS = ['x', 'y', 'z', 'free'];
+
+function freshId(list, stem) {
+  const ids = new Set(list.map((item) => item.id));
+  for (let i = 1; ; ++i) if (!ids.has(stem + i)) return stem + i;
+}
+
+// The sigma of a point that a person sets, pixels: about one pixel of the screen.
+export const handSigma = (scale) => Math.max(0.3, Math.round(10 / scale) / 10);
+
+export const ellipseOf = (detection, id) => detection.ellipses.find((e) => e.id === id);
+
+export function isCircleSaid(doc, id) {
+  return doc.scene.circles.some((circle) => circle.id === id);
+}
+
+export function sayCircle(doc, detection, id) {
+  const ellipse = ellipseOf(detection, id);
+  const circle = {id, contour: detection.contours[id]};
+  if (detection.contour_sigma_px[id]) circle.sigma_px = detection.contour_sigma_px[id];
+  if (ellipse.plane) circle.plane = ellipse.plane;
+  if (ellipse.concentric) circle.concentric = ellipse.concentric;
+  doc.scene.circles.push(circle);
+}
+
+// The line joins those of its direction; free ones make a new group, unless one is named.
+export function sayLine(doc, points, direction, sigmaPx, group = '') {
+  const pencils = doc.scene.pencils;
+  let pencil = pencils.find((p) => group ? p.id === group
+                                         : direction !== 'free' && p.direction === direction);
+  if (!pencil) {
+    const stem = direction === 'free' ? 'lines' : direction;
+    pencil = {id: group || freshId(pencils, stem), segments: [], direction, sigma_px: 0};
+    pencils.push(pencil);
+  }
+  pencil.segments.push(...points);
+  pencil.sigma_px = Math.max(pencil.sigma_px || 0, sigmaPx);
+  return {kind: 'line', pencil: pencils.indexOf(pencil), segment: pencil.segments.length / 4 - 1};
+}
+
+export const lineSigma = (line, scale) => line.snapped ? FOUND_SIGMA_PX : handSigma(scale);
+
+export function dropLine(doc, pencil, segment) {
+  const list = doc.scene.pencils;
+  list[pencil].segments.splice(4 * segment, 4);
+  if (!list[pencil].segments.length) dropPencil(doc, pencil);
+}
+
+export function dropPencil(doc, index) {
+  const [gone] = doc.scene.pencils.splice(index, 1);
+  const angles = doc.scene.known.angle_deg;
+  if (angles) doc.scene.known.angle_deg = angles.filter((a) => !a.pencils.includes(gone.id));
+  dropUnknownPlane(doc);
+}
+
+export function dropCircle(doc, index) {
+  const [gone] = doc.scene.circles.splice(index, 1);
+  if (doc.scene.frame.origin_is_center === gone.id) delete doc.scene.frame.origin_is_center;
+  dropUnknownPlane(doc);
+}
+
+// A frame or a length in a plane that nothing names any longer.
+export function dropUnknownPlane(doc) {
+  const {circles, pencils, frame, known} = doc.scene;
+  const planes = new Set([...circles, ...pencils].map((item) => item.plane));
+  if (frame.plane && !planes.has(frame.plane)) delete frame.plane;
+  for (const length of known.length) if (!planes.has(length.plane)) delete length.plane;
+}
+
+export function planesOf(doc) {
+  const {circles, pencils} = doc.scene;
+  return [...new Set([...circles, ...pencils].map((item) => item.plane).filter(Boolean))].sort();
+}
+
+export function sayAllFound(doc, detection) {
+  doc.scene.circles = [];
+  doc.scene.pencils = [];
+  for (const ellipse of detection.ellipses) {
+    if (detection.contours[ellipse.id].length >= 10) sayCircle(doc, detection, ellipse.id);
+  }
+  for (const pencil of detection.pencils) {
+    const segments = detection.segments.filter((s) => s[4] === pencil.id).flatMap((s) => s.slice(0, 4));
+    if (segments.length < 4) continue;
+    const said = {id: pencil.id, segments, direction: pencil.along, sigma_px: FOUND_SIGMA_PX};
+    if (pencil.plane) said.plane = pencil.plane;
+    doc.scene.pencils.push(said);
+  }
+}
+
+// Every point that can be dragged: {selection, list, at}: list[at], list[at + 1] are its pixels.
+export function handlesOf(doc) {
+  const {circles, pencils, frame, known} = doc.scene, handles = [];
+  const add = (selection, list) => {
+    for (let at = 0; list && at + 1 < list.length; at += 2) handles.push({selection, list, at});
+  };
+  circles.forEach((circle, index) => add({kind: 'circle', index}, circle.center));
+  pencils.forEach((pencil, index) => {
+    for (let at = 0; at < pencil.segments.length; at += 2) {
+      handles.push({selection: {kind: 'line', pencil: index, segment: Math.floor(at / 4)},
+                    list: pencil.segments, at});
+    }
+  });
+  for (const key of ['origin', 'x_axis', 'y_axis']) add({kind: key}, frame[key]);
+  known.length.forEach((length, index) => add({kind: 'known', index}, length.points));
+  doc.measure.forEach((item, index) => add({kind: 'measure', index}, item.points));
+  return handles;
+}
+
+export function dropSelected(doc, selection) {
+  const {kind, index} = selection;
+  if (kind === 'circle') dropCircle(doc, index);
+  if (kind === 'line') dropLine(doc, selection.pencil, selection.segment);
+  if (kind === 'known') doc.scene.known.length.splice(index, 1);
+  if (kind === 'measure') doc.measure.splice(index, 1);
+  if (['origin', 'x_axis', 'y_axis'].includes(kind)) delete doc.scene.frame[kind];
+}
+
+export const sameSelection = (a, b) => JSON.stringify(a) === JSON.stringify(b);

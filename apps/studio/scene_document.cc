@@ -1,0 +1,172 @@
+#include "apps/studio/scene_document.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "apps/common/camera_file.h"
+#include "apps/common/storage_node.h"
+
+namespace circline::apps {
+namespace {
+
+// What OpenCV's reader takes: letters of a string are checked, as it knows few escapes.
+constexpr std::size_t kMaxText = 1000, kMaxValues = 2'000'000;
+constexpr int kMaxDepth = 8;
+
+void CheckText(const std::string& text) {
+  const auto is_odd = [](char c) {
+    return c == '"' || c == '\\' || static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+  };
+  if (text.size() > kMaxText) throw RequestError(400, "a text is longer than 1000 letters");
+  if (std::any_of(text.begin(), text.end(), is_odd)) {
+    throw RequestError(400, "a text has a quotation mark, a backslash or a control character");
+  }
+}
+
+// Numbers become what the file's reader takes for the same number.
+Json Checked(const Json& value, int depth, std::size_t* count) {
+  if (depth > kMaxDepth) throw RequestError(400, "the scene is nested too deeply");
+  if (++*count > kMaxValues) throw RequestError(413, "the scene has too many values");
+  if (value.is_object()) {
+    Json map = Json::object();
+    for (const auto& [key, item] : value.items()) {
+      CheckText(key);
+      if (!item.is_null()) map[key] = Checked(item, depth + 1, count);
+    }
+    return map;
+  }
+  if (value.is_array()) {
+    Json list = Json::array();
+    for (const Json& item : value) list.push_back(Checked(item, depth + 1, count));
+    return list;
+  }
+  if (value.is_string()) {
+    CheckText(value.get_ref<const std::string&>());
+    return value;
+  }
+  if (!value.is_number()) throw RequestError(400, "the scene has a value that no scene file has");
+  const double number = value.get<double>();
+  if (!std::isfinite(number)) throw RequestError(400, "the scene has a number that is not finite");
+  return value.is_number_integer() && std::abs(number) < 1e9 ? value : Json(number);
+}
+
+Json FromNode(const cv::FileNode& node) {
+  if (node.isMap()) {
+    Json map = Json::object();
+    for (const cv::FileNode& child : node) map[child.name()] = FromNode(child);
+    return map;
+  }
+  if (node.isSeq()) {
+    Json list = Json::array();
+    for (const cv::FileNode& child : node) list.push_back(FromNode(child));
+    return list;
+  }
+  if (node.isInt()) return static_cast<int>(node);
+  if (node.isReal()) return node.real();
+  return node.isString() ? Json(node.string()) : Json();
+}
+
+std::string Dump(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+// The parts of a list, or the keys of a map, a line each down to `depth`; numbers side by side.
+std::string Lines(const Json& value, const std::string& indent, int depth) {
+  const bool is_map = value.is_object(), is_list = value.is_array();
+  if (depth == 0 || !(is_map || is_list) || value.empty()) return Dump(value);
+  if (is_list && !value.front().is_structured()) return Dump(value);
+  std::string text = is_map ? "{" : "[", separator = "\n";
+  for (const auto& [key, item] : value.items()) {
+    text += separator + indent + "  ";
+    if (is_map) text += Dump(key) + ": ";
+    text += Lines(item, indent + "  ", depth - 1);
+    separator = ",\n";
+  }
+  return text + "\n" + indent + (is_map ? "}" : "]");
+}
+
+}  // namespace
+
+Json CameraEntry(const Camera& camera, const StatedCameraSigma& sigma) {
+  Json json = {{"id", camera.id}, {"model", ModelName(camera.model)}};
+  if (camera.width > 0) json["width"] = camera.width;
+  if (camera.height > 0) json["height"] = camera.height;
+  json["camera_matrix"] = {camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0};
+  if (camera.model != CameraModel::kPinhole) json["distortion"] = Distortion(camera);
+  const auto state = [&json](const char* key, const std::optional<double>& value) {
+    if (value) json[key] = *value;
+  };
+  state("focal_sigma", sigma.log_focal);
+  state("focal_sigma_doubtful", sigma.doubtful_log_focal);
+  state("principal_point_sigma_px", sigma.principal_point_px);
+  state("k1_sigma", sigma.k1);
+  return json;
+}
+
+Json OneImageDocument(const Json& entry, const std::string& file, const Json& camera) {
+  if (!entry.is_object())
+    throw RequestError(400, "'scene' must be an image's entry of a scene file");
+  std::size_t count = 0;
+  Json image = {{"file", file}, {"camera", camera.at("id")}};
+  CheckText(file);
+  const Json checked = Checked(entry, 0, &count);
+  for (const auto& [key, value] : checked.items()) {
+    if (key == "file" && value != image["file"])
+      throw RequestError(400, "the scene is of another file than " + file);
+    if (key != "file" && key != "camera") image[key] = value;
+  }
+  return {{"cameras", Json::array({camera})}, {"images", Json::array({image})}};
+}
+
+SceneImage ReadDocument(const Json& document, const std::string& folder) {
+  std::vector<SceneImage> images;
+  const Status status = ParseScene("scene", Dump(document), folder, {}, &images);
+  if (!status.ok()) throw RequestError(400, status.message);
+  return images.front();
+}
+
+Json WithImage(const Json& scene, const Json& document) {
+  const Json& image = document["images"][0];
+  Json images = scene.is_object() && scene.contains("images") ? scene["images"] : Json::array();
+  const auto place = std::find_if(images.begin(), images.end(), [&](const Json& other) {
+    return other.contains("file") && other["file"] == image["file"];
+  });
+  if (place != images.end()) {
+    *place = image;
+  } else {
+    images.push_back(image);
+  }
+  Json cameras = Json::array();
+  const Json before =
+      scene.is_object() && scene.contains("cameras") ? scene["cameras"] : Json::array();
+  std::set<std::string> used, seen;
+  for (Json& other : images) {
+    // It may go without where there is one camera, which there may be no longer.
+    if (!other.contains("camera") && before.size() == 1) other["camera"] = before[0]["id"];
+    used.insert(other.value("camera", ""));
+  }
+  for (const Json* list : {&document["cameras"], &before}) {
+    for (const Json& camera : *list) {
+      const std::string id = camera.value("id", "");
+      if (used.count(id) > 0 && seen.insert(id).second) cameras.push_back(camera);
+    }
+  }
+  Json whole = scene.is_object() ? scene : Json::object();
+  whole["cameras"] = cameras;
+  whole["images"] = images;
+  return whole;
+}
+
+std::string SceneText(const Json& scene) { return Lines(scene, "", 5) + "\n"; }
+
+Status ReadSceneJson(const std::string& path, Json* scene) {
+  std::vector<SceneImage> images;
+  Status status = ReadScene(path, {}, &images);
+  StorageDocument document;
+  if (status.ok()) status = document.Open(path);
+  if (status.ok()) *scene = FromNode(document.root());
+  return status;
+}
+
+}  // namespace circline::apps

@@ -1,0 +1,53 @@
+// Scene files (docs: scene files) as the page makes and the studio keeps them: JSON, image by
+// image.
+#ifndef CIRCLINE_APPS_STUDIO_SCENE_DOCUMENT_H_
+#define CIRCLINE_APPS_STUDIO_SCENE_DOCUMENT_H_
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/common/scene.h"
+#include "circline/estimators/camera.h"
+#include "circline/estimators/noise_model.h"
+#include "circline/estimators/status.h"
+
+namespace circline::apps {
+
+using Json = nlohmann::ordered_json;
+
+// A request that cannot be answered, with the HTTP status that says so.
+class RequestError : public std::runtime_error {
+ public:
+  RequestError(int status, const std::string& sentence)
+      : std::runtime_error(sentence), status_(status) {}
+  int status() const { return status_; }
+
+ private:
+  int status_;
+};
+
+// An entry of `cameras`; what `sigma` leaves open is not stated.
+Json CameraEntry(const Camera& camera, const StatedCameraSigma& sigma);
+
+// A document of one image: `entry` (which may lack file and camera) with them. Throws RequestError
+// where it has what no scene file can: other values than short plain texts, finite numbers, lists
+// and maps, or too many of them.
+Json OneImageDocument(const Json& entry, const std::string& file, const Json& camera);
+
+// Read by the reader of scene files. Throws RequestError with its sentence.
+SceneImage ReadDocument(const Json& document, const std::string& folder);
+
+// `scene`, a document or null, with the image of `document` in the place of the one of the same
+// file, and without cameras that no image is of.
+Json WithImage(const Json& scene, const Json& document);
+
+// With a line for each circle, pencil and key, so that people can read and change it.
+std::string SceneText(const Json& scene);
+
+// A scene file as it stands, YAML or JSON.
+Status ReadSceneJson(const std::string& path, Json* scene);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_STUDIO_SCENE_DOCUMENT_H_

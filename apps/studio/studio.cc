@@ -1,0 +1,219 @@
+#include "apps/studio/studio.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/common/output_file.h"
+#include "apps/common/storage_node.h"
+#include "apps/compare/encode.h"
+#include "apps/studio/answer.h"
+#include "apps/studio/export_pose.h"
+
+namespace circline::apps {
+namespace {
+
+// Up to here a photo goes to the page without loss.
+constexpr std::size_t kLosslessPixels = 3'000'000;
+// Wider ones are shown smaller; what is said of them is in their own pixels all the same.
+constexpr int kShownWidth = 6000;
+constexpr std::size_t kMaxDraftBytes = std::size_t{64} << 20;
+
+// The entry of a scene file for that photo, or null.
+Json EntryOf(const Json& scene, const std::string& name) {
+  if (!scene.is_object()) return nullptr;
+  for (const Json& image : scene.value("images", Json::array())) {
+    if (image.is_object() && image.value("file", "") == name) return image;
+  }
+  return nullptr;
+}
+
+Json SavedCamera(const Json& scene, const std::string& name) {
+  const Json entry = EntryOf(scene, name);
+  if (!entry.is_object()) return nullptr;
+  const Json cameras = scene.value("cameras", Json::array());
+  for (const Json& camera : cameras) {
+    if (camera.value("id", "") == entry.value("camera", "")) return camera;
+  }
+  return nullptr;
+}
+
+Status Write(const PhotoFolder& folder, const std::string& name, const std::string& text) {
+  std::string path;
+  const Status status = folder.OwnPath(name, &path);
+  return status.ok() ? WriteFile(path, text) : status;
+}
+
+// A text that is not UTF-8, as names may be, must not stop an answer.
+std::string Utf8(const std::string& text) {
+  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+}  // namespace
+
+Studio::Studio(const CompareOptions& options, const PhotoFolder& folder, const Camera* camera)
+    : options_(options), solvers_(options_), folder_(folder), photos_(&folder_) {
+  if (camera != nullptr) given_camera_ = CameraEntry(*camera, {});
+}
+
+Status Studio::ReadFiles() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::error_code error;
+  std::string path;
+  Status status = folder_.OwnPath(kSceneFile, &path);
+  if (status.ok() && std::filesystem::exists(path, error)) status = ReadSceneJson(path, &scene_);
+  if (!status.ok()) scene_error_ = status.message;
+  std::string text;
+  draft_ = Json::object();
+  const Status found = folder_.OwnPath(kDraftFile, &path);
+  if (found.ok() && std::filesystem::exists(path, error) && ReadTextFile(path, &text).ok()) {
+    const Json draft = Json::parse(text, nullptr, false);
+    if (draft.is_object()) draft_ = draft;
+  }
+  return status;
+}
+
+std::size_t Studio::Index(const Json& request) const {
+  const auto image = request.find("image");
+  std::size_t n = folder_.size();
+  if (image != request.end() && image->is_string()) n = folder_.Find(image->get<std::string>());
+  if (image != request.end() && image->is_number_unsigned()) n = image->get<std::size_t>();
+  if (n < folder_.size()) return n;
+  throw RequestError(404, "there is no such image; /api/images lists them");
+}
+
+Json Studio::Images() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Json images = Json::array();
+  for (std::size_t n = 0; n < folder_.size(); ++n) {
+    const std::string& name = folder_.name(n);
+    images.push_back({{"image", n},
+                      {"name", Utf8(name)},
+                      {"saved", EntryOf(scene_, name).is_object()},
+                      {"draft", draft_.contains(Utf8(name))}});
+  }
+  return {{"folder", Utf8(folder_.path())},
+          {"scene", kSceneFile},
+          {"problem", scene_error_},
+          {"images", images}};
+}
+
+ShownPhoto Studio::Photo(std::size_t n) {
+  const auto photo = photos_.Get(Index({{"image", n}}));
+  ShownPhoto shown;
+  shown.width = photo->pixels.cols;
+  shown.height = photo->pixels.rows;
+  const bool lossless = photo->pixels.total() <= kLosslessPixels;
+  const std::vector<std::uint8_t> bytes =
+      lossless ? EncodePng(photo->pixels) : EncodeJpeg(photo->pixels, kShownWidth);
+  shown.bytes.assign(bytes.begin(), bytes.end());
+  shown.type = lossless ? "image/png" : "image/jpeg";
+  return shown;
+}
+
+// The one given, else that of the scene file, else a guess.
+Json Studio::CameraOfPhoto(const LoadedPhoto& photo) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!given_camera_.is_null()) return given_camera_;
+  const auto known = cameras_.find(photo.index);
+  if (known != cameras_.end()) return known->second;
+  Json camera = SavedCamera(scene_, folder_.name(photo.index));
+  if (camera.is_null()) {
+    const int width = photo.pixels.cols, height = photo.pixels.rows;
+    GuessedCamera guess = options_.inputs.guess.ForPhoto(
+        photo.path, width, height, options_.losses.front().estimation.noise_model.camera);
+    guess.camera.id += "_" + std::to_string(width) + "x" + std::to_string(height);
+    const CameraSigma& sigma = guess.sigma;
+    camera = CameraEntry(
+        guess.camera,
+        {sigma.log_focal, {}, sigma.principal_point_px, sigma.k1, sigma.doubtful_log_focal});
+  }
+  cameras_[photo.index] = camera;
+  return camera;
+}
+
+// What would be saved, and is estimated: so that circline_compare finds the same of the file.
+Json Studio::Document(const Json& scene, const LoadedPhoto& photo) {
+  const std::string& name = folder_.name(photo.index);
+  if (Utf8(name) != name) {
+    throw RequestError(422, "the photo's name is not UTF-8: no scene file can hold it");
+  }
+  return OneImageDocument(scene, name, CameraOfPhoto(photo));
+}
+
+Json Studio::Session(std::size_t n) {
+  const std::string& name = folder_.name(Index({{"image", n}}));
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto draft = draft_.find(Utf8(name));
+  return {{"image", n},
+          {"name", Utf8(name)},
+          {"saved", EntryOf(scene_, name)},
+          {"draft", draft != draft_.end() ? *draft : Json()}};
+}
+
+Json Studio::Detect(const Json& request) {
+  const auto photo = photos_.Get(Index(request));
+  SceneImage image = ReadDocument(Document(Json::object(), *photo), folder_.path());
+  const ImageRun run = ObservePhoto(options_, photo->pixels, &image);
+  if (!run.read_error.empty()) throw RequestError(422, run.read_error);
+  return DetectionJson(run, options_.fit.noise_model);
+}
+
+Json Studio::Estimate(const Json& request) {
+  const auto photo = photos_.Get(Index(request));
+  const Json scene = request.value("scene", Json::object());
+  SceneImage image = ReadDocument(Document(scene, *photo), folder_.path());
+  const ImageRun run = RunPhoto(options_, solvers_, photo->pixels, &image);
+  return EstimateJson(run, options_.fit.noise_model, request.value("hypothesis", std::size_t{0}),
+                      request.value("measure", Json()));
+}
+
+Json Studio::Save(const Json& request) {
+  const auto photo = photos_.Get(Index(request));
+  const Json document = Document(request.at("scene"), *photo);
+  ReadDocument(document, folder_.path());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!scene_error_.empty()) {
+    throw RequestError(409, std::string(kSceneFile) + " is not written over: " + scene_error_);
+  }
+  Json whole = WithImage(scene_, document);
+  const Status status = Write(folder_, kSceneFile, SceneText(whole));
+  if (!status.ok()) throw RequestError(409, status.message);
+  scene_ = std::move(whole);
+  return {{"file", Utf8(folder_.path()) + "/" + kSceneFile}};
+}
+
+Json Studio::Draft(const Json& request) {
+  const std::string name = Utf8(folder_.name(Index(request)));
+  const Json& state = request.at("state");
+  if (!state.is_object() && !state.is_null()) throw RequestError(400, "'state' must be an object");
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Json draft = draft_;
+  draft.erase(name);
+  if (state.is_object()) draft[name] = state;
+  const std::string text = draft.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  if (text.size() > kMaxDraftBytes)
+    throw RequestError(413, "the draft would exceed 64 MB: save it");
+  const Status status = Write(folder_, kDraftFile, text);
+  if (!status.ok()) throw RequestError(409, status.message);
+  draft_ = std::move(draft);
+  return {{"file", Utf8(folder_.path()) + "/" + kDraftFile}};
+}
+
+Json Studio::Export(const Json& request) {
+  const auto photo = photos_.Get(Index(request));
+  SceneImage image = ReadDocument(Document(request.at("scene"), *photo), folder_.path());
+  const ImageRun run = RunPhoto(options_, solvers_, photo->pixels, &image);
+  const std::string stem = std::filesystem::path(folder_.name(photo->index)).stem().string();
+  const std::string below = std::string(kExportFolder) + "/" + stem;
+  std::string path;
+  Status status = folder_.OwnPath(below, &path);
+  if (status.ok()) status = CreateFolder(path);
+  for (const std::string& name : ExportedFiles(request.at("format").get<std::string>())) {
+    std::string unused;
+    if (status.ok()) status = folder_.OwnPath(below + "/" + name, &unused);
+  }
+  if (!status.ok()) throw RequestError(409, status.message);
+  return ExportPose(run, request, path);
+}
+
+}  // namespace circline::apps

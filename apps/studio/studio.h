@@ -1,0 +1,66 @@
+// What the page asks for, answered in JSON; knows nothing of HTTP.
+#ifndef CIRCLINE_APPS_STUDIO_STUDIO_H_
+#define CIRCLINE_APPS_STUDIO_STUDIO_H_
+
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "apps/compare/image_run.h"
+#include "apps/compare/options.h"
+#include "apps/studio/photo_cache.h"
+#include "apps/studio/photo_folder.h"
+#include "apps/studio/scene_document.h"
+
+namespace circline::apps {
+
+// A photo as browsers show it.
+struct ShownPhoto {
+  std::string bytes, type;
+  int width = 0, height = 0;  // Of the photo itself; what is shown may be smaller.
+};
+
+// Many threads may use one. Answers and requests: docs/studio.md. Throws RequestError.
+class Studio {
+ public:
+  static constexpr const char* kSceneFile = "scene.json";
+  static constexpr const char* kDraftFile = "scene.draft.json";
+  static constexpr const char* kExportFolder = "export";
+
+  // `camera`: of all photos; null where it is guessed, or in the scene file.
+  Studio(const CompareOptions& options, const PhotoFolder& folder, const Camera* camera);
+  Studio(const Studio&) = delete;
+  Studio& operator=(const Studio&) = delete;
+  // Reads the scene file and the draft of the folder, where they are. Not ok: a sentence; the
+  // studio works without, and saves nothing over what it could not read.
+  Status ReadFiles();
+
+  Json Images() const;
+  ShownPhoto Photo(std::size_t n);
+  Json Session(std::size_t n);         // What was said of photo n: draft and saved entry.
+  Json Detect(const Json& request);    // {image}
+  Json Estimate(const Json& request);  // {image, scene, hypothesis, measure}
+  Json Save(const Json& request);      // {image, scene}
+  Json Draft(const Json& request);     // {image, state}: any object; null drops it.
+  Json Export(const Json& request);    // {image, scene, hypothesis, measure, format}
+
+ private:
+  std::size_t Index(const Json& request) const;
+  Json CameraOfPhoto(const LoadedPhoto& photo);
+  Json Document(const Json& scene, const LoadedPhoto& photo);
+
+  CompareOptions options_;
+  SolverSet solvers_;
+  PhotoFolder folder_;
+  PhotoCache photos_;
+  Json given_camera_;         // Null where none is given.
+  mutable std::mutex mutex_;  // Of what follows.
+  Json scene_, draft_;        // As in their files.
+  std::string scene_error_;   // Why the file that is there could not be read.
+  std::map<std::size_t, Json> cameras_;
+};
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_STUDIO_STUDIO_H_
