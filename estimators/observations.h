@@ -53,8 +53,8 @@ struct CircleObservation {
   // Added by a fit.
   std::optional<ConicFit> fit;
   std::vector<std::uint8_t> inliers;  // One per point, 1 = inlier; empty = all.
-  // A less likely ellipse, through points that `fit` leaves out: of two rims the other one. For the
-  // caller: no solver takes it by itself.
+  // A less likely ellipse, through points that `fit` leaves out: of two rims the other one. The
+  // refinement reads the contour so, too, where `fit` contradicts the rest.
   std::optional<ConicReading> second;
 };
 

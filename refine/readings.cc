@@ -259,6 +259,74 @@ Status FillHypotheses(const JointProblem& problem, const std::vector<State>& min
   return Status::Ok();
 }
 
+bool IsLeftOut(const std::string& id, const PoseHypothesis& hypothesis) {
+  const std::vector<std::string>& out = hypothesis.left_out;
+  return std::find(out.begin(), out.end(), id) != out.end();
+}
+
+// What it costs that a circle is none of the world's.
+double StrangerCost(const JointProblem& problem, std::size_t circle) {
+  State state;
+  for (const Feature& f : problem.features()) {
+    const bool is_it =
+        f.kind == Feature::Kind::kCircle && f.observation == static_cast<int>(circle);
+    state.active.push_back(is_it ? 0 : 1);
+  }
+  return LeftOutCost(problem, state);
+}
+
+// Hypotheses that take the second ellipse of a contour for the circle.
+std::vector<PoseHypothesis> ReadSecond(const JointProblem& problem, const PointNoise& noise,
+                                       const std::vector<std::shared_ptr<const Solver>>& seeders,
+                                       std::size_t circle) {
+  Observations other = problem.observations();
+  CircleObservation& read = other.circles[circle];
+  read.fit = read.second->fit;
+  read.inliers = read.second->inliers;
+  const JointProblem rival(other, problem.options(), noise);
+  std::vector<std::string> unused;
+  std::vector<State> minima;
+  PoseEstimate estimate;
+  if (!FindMinima(rival, AllSeeds(rival, other, seeders, &unused), &minima).ok() ||
+      !FillHypotheses(rival, minima, &estimate).ok()) {
+    return {};
+  }
+  // Both ellipses are in the photo: whichever is not taken is a stranger.
+  const double other_stranger = StrangerCost(problem, circle) - StrangerCost(rival, circle);
+  std::vector<PoseHypothesis> hypotheses;
+  for (PoseHypothesis& h : estimate.hypotheses) {
+    if (IsLeftOut(read.id, h)) continue;
+    h.cost += other_stranger;
+    h.structure += " + second of " + read.id;
+    hypotheses.push_back(std::move(h));
+  }
+  return hypotheses;
+}
+
+// A circle that contradicts the rest may have been misread: of two rims on one contour the wrong
+// one.
+void AddSecondReadings(const JointProblem& problem, const PointNoise& noise,
+                       const std::vector<std::shared_ptr<const Solver>>& seeders,
+                       PoseEstimate* estimate) {
+  std::vector<PoseHypothesis>& all = estimate->hypotheses;
+  const std::vector<PoseHypothesis> first = all;
+  for (std::size_t i = 0; i < problem.observations().circles.size(); ++i) {
+    const CircleObservation& circle = problem.observations().circles[i];
+    const auto contradicts = [&](const PoseHypothesis& h) { return IsLeftOut(circle.id, h); };
+    if (!circle.second || std::none_of(first.begin(), first.end(), contradicts)) continue;
+    const std::vector<PoseHypothesis> more = ReadSecond(problem, noise, seeders, i);
+    all.insert(all.end(), more.begin(), more.end());
+    estimate->notes.push_back("circle '" + circle.id +
+                              "': tried as the second ellipse through its points, too");
+  }
+  if (all.size() == first.size()) return;
+  RankHypotheses(&all);
+  const double most = all.front().cost + problem.options().max_cost_gap;
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [most](const PoseHypothesis& h) { return h.cost > most; }),
+            all.end());
+}
+
 Status RefineResolved(const Observations& resolved, const PointNoise& noise,
                       const std::vector<std::shared_ptr<const Solver>>& seeders,
                       const EstimationOptions& options, PoseEstimate* estimate) {
@@ -282,7 +350,9 @@ Status RefineResolved(const Observations& resolved, const PointNoise& noise,
     reasons.insert(reasons.begin(), "no pose agrees with all evidence: " + status.message);
     return NoSeed(resolved, reasons);
   }
-  return FillHypotheses(problem, minima, estimate);
+  const Status filled = FillHypotheses(problem, minima, estimate);
+  if (filled.ok()) AddSecondReadings(problem, noise, seeders, estimate);
+  return filled;
 }
 
 }  // namespace

@@ -157,6 +157,53 @@ TEST(ReadingsTest, TwoContradictingCirclesGiveBothReadings) {
   }
 }
 
+// The ellipse through the contour's points from `begin` on.
+ConicReading Reading(const PlaneScene& scene, const CircleObservation& circle, std::size_t begin,
+                     std::size_t end) {
+  std::vector<Vector2d> pixels(circle.points.begin() + static_cast<std::ptrdiff_t>(begin),
+                               circle.points.begin() + static_cast<std::ptrdiff_t>(end));
+  std::vector<CalibratedPoint> points;
+  PixelsToCalibrated(scene.camera, pixels, &points);
+  ConicReading reading;
+  EXPECT_TRUE(FitConic(points, scene.sigma(), &reading.fit).ok());
+  reading.inliers.assign(circle.points.size(), 0);
+  std::fill_n(reading.inliers.begin() + static_cast<std::ptrdiff_t>(begin), end - begin, 1);
+  return reading;
+}
+
+// A contour of two rims, of which the fit has taken the one that is not of the plane.
+CircleObservation TwoRims(PlaneScene* scene) {
+  CircleObservation circle =
+      Tilted(scene, "c1", {1.5, 0.5}, 1.0, 15.0 * kDegree, scene->random.Uniform(0.0, 6.28));
+  const std::size_t count = circle.points.size();
+  for (const Vector2d& p : scene->Circle("", 1.5, 0.5, 0.7, 40).points) circle.points.push_back(p);
+  const ConicReading first = Reading(*scene, circle, 0, count);
+  circle.fit = first.fit;
+  circle.inliers = first.inliers;
+  circle.second = Reading(*scene, circle, count, circle.points.size());
+  return circle;
+}
+
+// Where the second ellipse agrees with the rest, the first is known to be misread.
+TEST(ReadingsTest, TheSecondRimIsReadWhereTheFirstContradicts) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlaneScene scene(0.7, 0.2, seed);
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", -1.5, -0.5, 1.0), TwoRims(&scene)};
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    EXPECT_TRUE(HasNote(estimate, "circle 'c1': tried as the second ellipse"));
+    double read = 0.0;
+    for (const PoseHypothesis& h : estimate.hypotheses)
+      read += h.structure == "p0 + second of c1" && h.left_out.empty() ? h.probability : 0.0;
+    EXPECT_GT(read, 0.9) << seed;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_LT(NormalError(h, scene), 5.0 * SigmaNormal(h)) << seed;
+    ASSERT_EQ(h.circles.size(), 2U);
+    EXPECT_NEAR(h.circles[1].radius / h.circles[0].radius, 0.7, 0.01) << seed;
+  }
+}
+
 // The free conic of a short arc says nothing of its centre and radius; all four agree.
 TEST(ReadingsTest, ThreeCirclesAndAShortArcAgree) {
   constexpr int kScenes = Trials(100);
