@@ -168,6 +168,7 @@ class EllipseDetector {
 struct SeenPose {
   Vector3d normal;
   Vector2d center;
+  double distance;  // Over the circle's radius.
 };
 
 std::vector<SeenPose> SeenPoses(const DetectedEllipse& ellipse, const Camera& camera) {
@@ -177,7 +178,8 @@ std::vector<SeenPose> SeenPoses(const DetectedEllipse& ellipse, const Camera& ca
   for (int i = 0; i < n; ++i) {
     const CirclePose& pose = poses[static_cast<std::size_t>(i)];
     Vector2d pixel;
-    if (CameraToPixel(camera, pose.center, &pixel)) seen.push_back({pose.normal, pixel});
+    if (CameraToPixel(camera, pose.center, &pixel))
+      seen.push_back({pose.normal, pixel, pose.center.norm()});
   }
   return seen;
 }
@@ -186,15 +188,18 @@ bool CanBeConcentric(const std::vector<SeenPose>& a, const std::vector<SeenPose>
   // Both centres within this many pixels. The centre of a well-seen rim is good to a tenth of one.
   constexpr double kMaxCentrePx = 1.5;
   constexpr double kMinNormalCosineConcentric = 0.966;  // 15 degrees: normals are less certain.
-  for (const SeenPose& p : a) {
-    for (const SeenPose& q : b) {
-      if ((p.center - q.center).squaredNorm() < kMaxCentrePx * kMaxCentrePx &&
-          p.normal.dot(q.normal) >= kMinNormalCosineConcentric) {
-        return true;
-      }
-    }
-  }
-  return false;
+  // Two rims so near in size are mostly the edges of one thick or rounded rim (a tyre, a saucer, a
+  // collar): circles about one axis, but at different heights, which put their centres where those
+  // of the other pose of the rim would be.
+  constexpr double kSameRimRatio = 0.85;
+  const auto agree = [](const SeenPose& p, const SeenPose& q) {
+    return (p.center - q.center).squaredNorm() < kMaxCentrePx * kMaxCentrePx &&
+           p.normal.dot(q.normal) >= kMinNormalCosineConcentric &&
+           std::min(p.distance, q.distance) < kSameRimRatio * std::max(p.distance, q.distance);
+  };
+  return std::any_of(a.begin(), a.end(), [&](const SeenPose& p) {
+    return std::any_of(b.begin(), b.end(), [&](const SeenPose& q) { return agree(p, q); });
+  });
 }
 
 // Numbers the groups in the order of their best members.

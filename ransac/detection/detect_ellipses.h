@@ -48,8 +48,9 @@ struct DetectedEllipse {
   double normal_deg = 0.0;    // Median angle between gradients and the contour's normal.
   double contrast = 0.0;      // Mean gradient there, grey levels per pixel.
   BrightSide bright = BrightSide::kOutside;
-  int concentric =
-      -1;  // Ellipses with the same number can be circles about one centre; -1 = alone.
+  // Ellipses with the same number can be circles about one centre, and differ by more in size than
+  // the two edges of one thick rim do; -1 = alone.
+  int concentric = -1;
 };
 
 // Best supported first. `camera` must be valid. About 4 ms for a 640x480 photo.

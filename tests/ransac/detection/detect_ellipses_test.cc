@@ -115,6 +115,15 @@ TEST(DetectEllipses, GroupsTheRimsOfARing) {
   EXPECT_EQ(found[1].bright, BrightSide::kOutside);
 }
 
+// Of a thick rim's two edges nothing says that they lie in one plane.
+TEST(DetectEllipses, LeavesTheEdgesOfOneRimApart) {
+  const Camera camera = TestCamera();
+  const std::vector<DetectedEllipse> found =
+      Detect(Disc(camera, LookAt(40.0, 0.0, 0.0, 6.0), 1.12), camera);
+  ASSERT_EQ(found.size(), 2U);
+  for (const DetectedEllipse& e : found) EXPECT_EQ(e.concentric, -1);
+}
+
 TEST(DetectEllipses, KeepsNeighboursApart) {
   const Camera camera = TestCamera();
   const CameraPose pose = LookAt(30.0, 5.0, 10.0, 14.0);
