@@ -68,7 +68,7 @@ class Assembler {
   void Assemble(Observations* observations) {
     AddGrid(observations->camera);
     Plane plane = ChoosePlane();
-    RefitOnPlane(&plane);
+    while (!RefitOnPlane(&plane)) plane = ChoosePlane();
     const bool has_box = AddBox(&plane);
     SetPlane(plane);
     if (!has_box) SetRoles(plane);
@@ -194,19 +194,25 @@ class Assembler {
   }
 
   // The two pencils that span the plane may be of one thing, whose lines tell more than those of
-  // the whole photo.
-  void RefitOnPlane(Plane* plane) {
-    if (plane->pencils[0] < 0) return;
+  // the whole photo. False where these lines tell that the two are one pencil: there is no such
+  // plane, and the one with less support is no more.
+  bool RefitOnPlane(Plane* plane) {
+    if (plane->pencils[0] < 0) return true;
     PlacedPencil& first = pencils_[static_cast<std::size_t>(plane->pencils[0])];
     PlacedPencil& second = pencils_[static_cast<std::size_t>(plane->pencils[1])];
-    if (first.of_grid || second.of_grid) return;
+    if (first.of_grid || second.of_grid) return true;
     std::array<DetectedPencil, 2> pair = {first, second};
-    if (!RefitWhereTheyMeet(lines_, &pair, options_.diagonal_px)) return;
-    first = PlacedPencil(std::move(pair[0]));
-    second = PlacedPencil(std::move(pair[1]));
-    if (!SpannedNormal(first.direction, second.direction, &plane->normal)) return;
+    if (!RefitWhereTheyMeet(lines_, &pair, options_.diagonal_px)) return true;
+    const PlacedPencil a(std::move(pair[0])), b(std::move(pair[1]));
+    if (!SpannedNormal(a.direction, b.direction, &plane->normal)) {
+      pencils_.erase(pencils_.begin() + plane->pencils[1]);
+      return false;
+    }
+    first = a;
+    second = b;
     plane->circles.clear();
     AddCircles(plane);
+    return true;
   }
 
   // Where circles are all that the plane has: a box on it, whose edges become its axes.
@@ -233,7 +239,8 @@ class Assembler {
     return true;
   }
 
-  // The plane with most support of circles alone.
+  // The plane with most support of circles alone; where it is likelier that they agree by accident,
+  // that of the best supported circle.
   Plane FindCirclesPlane() const {
     Plane best;
     for (std::size_t i = 0; i < std::min(circles_.size(), kMaxSeeds); ++i) {
@@ -243,7 +250,26 @@ class Assembler {
         if (plane.support_px > best.support_px) best = std::move(plane);
       }
     }
-    return best;
+    if (best.circles.size() < 2 || LogOdds(best.normal) > 0.0) return best;
+    Plane lone;
+    lone.normal = circles_[0].normals[0];
+    lone.circles = {0};
+    lone.support_px = kCircleWeight * circles_[0].support_px;
+    return lone;
+  }
+
+  // Logarithm of the odds that circles share a plane with this normal to that all lie any way: a
+  // mixture over all circles, each with two normals of which either may be its own, integrated over
+  // the plane's normal (Laplace), which is uniform before.
+  double LogOdds(const UncertainDirection& normal) const {
+    std::vector<double> ratios;
+    for (const CircleEvidence& circle : circles_) {
+      double ratio = 0.0;
+      for (int k = 0; k < circle.num_normals; ++k)
+        ratio += LikelihoodRatio(circle.normals[static_cast<std::size_t>(k)], normal.vector);
+      ratios.push_back(ratio / circle.num_normals);
+    }
+    return LogOddsOfMixture(ratios) + std::log(ShareOfHemisphere(normal));
   }
 
   void SetPlane(const Plane& plane) {

@@ -6,7 +6,8 @@
 //
 // What comes out: circles "c0", "c1", ... and pencils "L0", "L1", ..., the best supported of the
 // world's plane first, each with its pixels and its fit. Plane "p0", the plane Z = 0, is the one
-// that has most support: of two pencils and the circles that agree with them, or of circles alone.
+// that has most support: of two pencils and the circles that agree with them, or of circles alone,
+// where it is likelier that they share a plane than that some of them agree by accident.
 // Two pencils in it that are likelier to be at right angles, as walls are to about 0.7 degrees,
 // than at any angle become its axes x and y, a third one orthogonal to both z; others stay free.
 // How far they lean from their axes is for the estimate to find (NoiseModel::pencil_axis_rad).

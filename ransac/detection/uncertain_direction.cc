@@ -144,6 +144,42 @@ UncertainDirection MeanDirection(const UncertainDirection& about,
   return mean;
 }
 
+double LikelihoodRatio(const UncertainDirection& normal, const Vector3d& plane) {
+  constexpr double kNearby = 0.5;  // Cosine of an angle that no standard deviation spans.
+  const double cosine = normal.vector.dot(plane);
+  if (std::abs(cosine) < kNearby) return 0.0;
+  Eigen::Matrix<double, 3, 2> across;
+  across.col(0) = plane.unitOrthogonal();
+  across.col(1) = plane.cross(across.col(0));
+  const double model = kModelSigmaDeg * kRadians;
+  const Eigen::Matrix2d covariance =
+      across.transpose() * normal.covariance * across + model * model * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d miss = across.transpose() * normal.vector;
+  // Of a hemisphere, 2 pi: the Gaussian's own factor.
+  return std::exp(-0.5 * miss.dot(covariance.inverse() * miss)) /
+         std::sqrt(covariance.determinant());
+}
+
+// The product of the two eigenvalues that are not zero is (trace(C)^2 - trace(C^2)) / 2.
+double ShareOfHemisphere(const UncertainDirection& direction) {
+  const Matrix3d& C = direction.covariance;
+  const double product = 0.5 * (C.trace() * C.trace() - (C * C).trace());
+  return std::sqrt(std::max(0.0, product));
+}
+
+double LogOddsOfMixture(const std::vector<double>& ratios) {
+  constexpr int kShares = 32;  // That the integral over the share is summed at.
+  std::array<double, kShares> log_odds{};
+  for (std::size_t k = 0; k < kShares; ++k) {
+    const double share = (static_cast<double>(k) + 0.5) / kShares;
+    for (const double ratio : ratios) log_odds[k] += std::log(1.0 - share + share * ratio);
+  }
+  const double most = *std::max_element(log_odds.begin(), log_odds.end());
+  double sum = 0.0;
+  for (const double l : log_odds) sum += std::exp(l - most);
+  return most + std::log(sum / kShares);
+}
+
 int CircleNormals(const ConicFit& fit, std::array<UncertainDirection, 2>* normals) {
   std::array<CirclePose, 2> poses;
   const int count = CirclePoses(fit.conic, &poses);

@@ -45,6 +45,17 @@ bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
 UncertainDirection MeanDirection(const UncertainDirection& about,
                                  const std::vector<const UncertainDirection*>& directions);
 
+// How much likelier it is to measure `normal` where a plane has the normal `plane`, but for what no
+// covariance knows, than where planes lie any way.
+double LikelihoodRatio(const UncertainDirection& normal, const Eigen::Vector3d& plane);
+
+// Area of a standard deviation's ellipse about a direction, over that of a hemisphere.
+double ShareOfHemisphere(const UncertainDirection& direction);
+
+// Logarithm of the odds that some of the features have something in common to that none have, from
+// the likelihood ratios of all: any share of them is as likely before.
+double LogOddsOfMixture(const std::vector<double>& ratios);
+
 // The normals of the planes that a circle can lie in, with covariances: those of the conic's own
 // covariance, by differences. Returns how many: 0, 1 or 2.
 int CircleNormals(const ConicFit& fit, std::array<UncertainDirection, 2>* normals);

@@ -3,7 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <utility>
+#include <vector>
 
 #include "circline/estimators/circle_pose.h"
 #include "tests/ransac/detection/detected_line_scene.h"
@@ -33,14 +37,14 @@ DetectedPencil Pencil(const Vector3d& direction, double support) {
 
 // A circle of the plane with this normal, its conic known as a rim of 100 px radius would be.
 CircleEvidence Circle(const Vector3d& normal, double support,
-                      const Vector3d& center = Vector3d(0.5, 0.2, 6.0)) {
+                      const Vector3d& center = Vector3d(0.5, 0.2, 6.0), double variance = 1e-10) {
   CirclePose pose;
   pose.normal = normal.z() > 0.0 ? Vector3d(-normal.normalized()) : normal.normalized();
   pose.center = center;
   ConicFit fit;
   fit.conic = ProjectCircle(pose);
   const Vector6d v = ConicToVector(fit.conic);
-  const Matrix6d c = 1e-10 * (Matrix6d::Identity() - v * v.transpose());
+  const Matrix6d c = variance * (Matrix6d::Identity() - v * v.transpose());
   for (int i = 0; i < 36; ++i) fit.covariance[static_cast<std::size_t>(i)] = c(i / 6, i % 6);
   CircleEvidence circle;
   circle.observation.fit = fit;
@@ -131,6 +135,42 @@ TEST(AssembleObservations, CirclesAloneAgreeOnAPlane) {
   EXPECT_EQ(found.circles[0].plane, "p0");
   EXPECT_EQ(found.circles[1].plane, "p0");
   EXPECT_TRUE(found.circles[2].plane.empty());
+}
+
+// How many of so many small rims share the plane that is found, where the first `on_plane` of them
+// lie in one and the others any way.
+std::size_t SharingAPlane(int circles, int on_plane, Random* random) {
+  constexpr double kVariance = 1e-9;  // Of conics; normals are good to about 2 degrees.
+  std::vector<CircleEvidence> evidence;
+  for (int i = 0; i < circles; ++i) {
+    Vector3d normal = -kFrame.col(2);
+    if (i >= on_plane) {
+      const double x = random->Normal(), y = random->Normal(), z = random->Normal();
+      normal = Vector3d(x, y, -std::abs(z));
+    }
+    const double u = random->Uniform(-2.0, 2.0), v = random->Uniform(-1.5, 1.5);
+    CircleEvidence circle = Circle(normal, 100.0, {u, v, 6.0}, kVariance);
+    if (circle.num_normals > 0) evidence.push_back(std::move(circle));
+  }
+  const Observations found = Assemble(std::move(evidence), {});
+  return static_cast<std::size_t>(
+      std::count_if(found.circles.begin(), found.circles.end(),
+                    [](const CircleObservation& c) { return c.plane == "p0"; }));
+}
+
+// Of many, some agree by accident: that is no plane.
+TEST(AssembleObservations, CirclesThatLieAnyWayShareNoPlane) {
+  constexpr int kTrials = 100;
+  Random random(1);
+  int accidents = 0, planes = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    accidents += SharingAPlane(30, 0, &random) > 1 ? 1 : 0;
+    planes += SharingAPlane(12, 4, &random) >= 4 ? 1 : 0;
+  }
+  EXPECT_LE(accidents, 5);
+  EXPECT_GE(planes, 90);
+  std::printf("planes of 30 circles that lie any way: %d of 100; of 4 of 12: %d\n", accidents,
+              planes);
 }
 
 // A lone circle leaves two normals, and nothing says where x is; a box on its plane says both.
