@@ -2,6 +2,7 @@
 // conic of a short arc says nothing of its circle; its points in the plane do.)
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -102,7 +103,8 @@ bool JointProblem::PlaceOrigin(const Placed& placed, const double* camera, State
   } else if (frame.origin && center_at_origin_ < 0) {
     if (!Ray(*frame.origin, camera, &ray) || !PlanePoint(*state, ray, xy)) return false;
   } else if (frame.x_axis && frame.y_axis && center_at_origin_ < 0) {
-    Eigen::Vector3d ends[4];
+    std::array<Eigen::Vector3d, 4> ends;
+    ends.fill(Eigen::Vector3d::Zero());
     const bool seen =
         Ray((*frame.x_axis)[0], camera, &ends[0]) && Ray((*frame.x_axis)[1], camera, &ends[1]) &&
         Ray((*frame.y_axis)[0], camera, &ends[2]) && Ray((*frame.y_axis)[1], camera, &ends[3]);
