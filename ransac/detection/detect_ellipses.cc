@@ -24,6 +24,12 @@ constexpr std::array<std::array<int, 2>, 4> kArcParts = {{{0, 5}, {1, 6}, {0, 3}
 constexpr int kMinPartPoints = 12;
 // A candidate with this much of its contour is accepted before pairs are looked at.
 constexpr double kSureCoverage = 0.7;
+// Rims about the centre of one that is known are looked for up to this many times larger and
+// smaller, in steps of this share; in both planes that it can have unless these put its centre
+// within so many pixels.
+constexpr double kMaxRimRatio = 2.7;
+constexpr double kRimStep = 0.05;
+constexpr double kSameCenterPx = 1.0;
 // Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
 constexpr double kDuplicatePx = 2.5;
 
@@ -33,7 +39,7 @@ using Eigen::Vector3d;
 class EllipseDetector {
  public:
   EllipseDetector(const EdgeMap& map, const Camera& camera, const EllipseOptions& options)
-      : map_(map), options_(options), fitter_(map, camera, options) {}
+      : map_(map), camera_(camera), options_(options), fitter_(map, camera, options) {}
 
   std::vector<DetectedEllipse> Detect() {
     arcs_ = FindArcs(map_);
@@ -48,6 +54,11 @@ class EllipseDetector {
     AcceptBest(kSureCoverage);
     AddPairs();
     AcceptBest(0.0);
+    // (By index: what is found is looked around as well.)
+    for (std::size_t k = 0; k < accepted_.size(); ++k) {
+      AddRims(accepted_[k].fit.conic);
+      AcceptBest(0.0);
+    }
     Rank();
     return std::move(accepted_);
   }
@@ -100,6 +111,30 @@ class EllipseDetector {
         ++tried;
         AddCandidate({arcs[i], arcs[j]});
       }
+    }
+  }
+
+  // Where one rim is known, circles about its centre in its plane need no arc that determines them:
+  // those that edges lie along.
+  void AddRims(const Eigen::Matrix3d& rim) {
+    std::array<CirclePose, 2> poses;
+    const int n = CirclePoses(rim, &poses);
+    Vector2d first_center, center;
+    for (int i = 0; i < n; ++i) {
+      const CirclePose& pose = poses[static_cast<std::size_t>(i)];
+      if (!CameraToPixel(camera_, pose.center, i == 0 ? &first_center : &center)) continue;
+      // Where perspective is weak both planes show the same rims.
+      if (i > 0 && (center - first_center).norm() < kSameCenterPx) break;
+      AddRimsOf(pose);
+    }
+  }
+
+  void AddRimsOf(const CirclePose& pose) {
+    for (double ratio = 1.0 / kMaxRimRatio; ratio < kMaxRimRatio; ratio *= 1.0 + kRimStep) {
+      CirclePose other = pose;
+      other.center /= ratio;  // In its own radii.
+      EllipseCandidate candidate;
+      if (fitter_.FindAlong(ProjectCircle(other), &candidate)) candidates_.push_back(candidate);
     }
   }
 
@@ -157,6 +192,7 @@ class EllipseDetector {
   }
 
   const EdgeMap& map_;
+  const Camera& camera_;
   const EllipseOptions& options_;
   EllipseFitter fitter_;
   std::vector<Arc> arcs_;

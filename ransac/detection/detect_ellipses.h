@@ -6,7 +6,8 @@
 // coordinates, so that lens distortion neither bends a candidate away from its contour nor biases
 // it, and what is fitted is always a general ellipse: nothing is ever rounded to a circle. The
 // final fit is to edge points from which the bias of a bent edge has been taken (CurvatureBias). A
-// contour too ragged for an ellipse gets a second look through a wider Gaussian.
+// contour too ragged for an ellipse gets a second look through a wider Gaussian. Around each ellipse
+// found, other rims about its centre are looked for, whose arcs may be too short to tell an ellipse.
 #ifndef CIRCLINE_RANSAC_DETECTION_DETECT_ELLIPSES_H_
 #define CIRCLINE_RANSAC_DETECTION_DETECT_ELLIPSES_H_
 

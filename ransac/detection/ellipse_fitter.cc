@@ -120,6 +120,18 @@ bool EllipseFitter::FitArcs(std::initializer_list<const Arc*> arcs, EllipseCandi
   return ArcsAgree(*candidate);
 }
 
+bool EllipseFitter::FindAlong(const Matrix3d& conic, EllipseCandidate* candidate) {
+  if (!contour_.Project(conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
+  if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
+  const std::array<double, 3> across = supporter_.QuickLook(samples_, kQuickPx).across;
+  if (across[static_cast<std::size_t>(BrightSide::kEither)] < kQuickShare) return false;
+  constexpr auto kIn = static_cast<std::size_t>(BrightSide::kInside),
+                 kOut = static_cast<std::size_t>(BrightSide::kOutside);
+  candidate->conic = conic;
+  candidate->bright = across[kIn] > across[kOut] ? BrightSide::kInside : BrightSide::kOutside;
+  return Improve(candidate);
+}
+
 bool EllipseFitter::Improve(EllipseCandidate* candidate) {
   const EllipseCandidate rough = *candidate;
   if (!contour_.Project(rough.conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;

@@ -33,6 +33,10 @@ class EllipseFitter {
   // The ellipse through one arc or two; false if they are not on one ellipse.
   bool FitArcs(std::initializer_list<const Arc*> arcs, EllipseCandidate* candidate);
 
+  // The candidate that edges along a contour support, with the bright side of most of them; false
+  // where there is none.
+  bool FindAlong(const Eigen::Matrix3d& conic, EllipseCandidate* candidate);
+
   // Refits a candidate to all edges along its contour; false if these are too few or too unlike an
   // ellipse.
   bool Improve(EllipseCandidate* candidate);

@@ -22,6 +22,7 @@ using detection_test::Develop;
 using detection_test::DistortedCamera;
 using detection_test::FisheyeCamera;
 using detection_test::HasSet;
+using detection_test::kDegrees;
 using detection_test::kPi;
 using detection_test::LookAt;
 using detection_test::Noise;
@@ -113,6 +114,23 @@ TEST(DetectEllipses, GroupsTheRimsOfARing) {
   EXPECT_GT(found[0].length_px, found[1].length_px);
   EXPECT_EQ(found[0].bright, BrightSide::kInside);
   EXPECT_EQ(found[1].bright, BrightSide::kOutside);
+}
+
+// A rim in pieces of 9 degrees, too short to tell an ellipse, about the centre of another that is
+// whole.
+TEST(DetectEllipses, FindsARimInPiecesBesideAWholeOne) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(40.0, 0.0, 0.0, 4.0);
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [](double x, double y) {
+    const double r = std::hypot(x, y), sector = std::atan2(y, x) * kDegrees / 18.0;
+    const double edge = sector - std::floor(sector) < 0.5 ? 0.7 : 0.0;
+    return r < edge ? 200.0 : r < 1.2 ? 30.0 : 200.0;
+  }));
+  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_LT(BetterNormalDeg(found[1], pose.rotation.col(2)), 1.0);
+  EXPECT_EQ(found[0].concentric, found[1].concentric);
+  EXPECT_GE(found[0].concentric, 0);
 }
 
 // Of a thick rim's two edges nothing says that they lie in one plane.
