@@ -97,6 +97,10 @@ AdjustProblem::Covariances AdjustProblem::Covariance(int end) const {
     all_free_[c]->PlusJacobian(cameras_[c], plus.data());
     out.cameras[c] = plus * small * plus.transpose();
   }
+  if (!given_.empty()) {
+    const int at = offsets.at(given_[2]);
+    out.log_scale = inverse(at, at);
+  }
   for (std::size_t i = 0; i < photos_.size(); ++i) {
     if (rotations_[i] != nullptr && static_cast<int>(i) < end)
       out.poses[i] = PoseCovariance(static_cast<int>(i), inverse, offsets);

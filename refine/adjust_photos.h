@@ -10,6 +10,7 @@
 #include <array>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -50,6 +51,15 @@ struct AdjustOptions {
   // photo's diagonal, the first one takes part. 0: all do. Of the 58 photographs of five sets here
   // no two of one camera are nearer than 0.01.
   double nearly_equal = 0.005;
+  // Poses that are known from elsewhere (structure from motion), cam_from_anywhere, in any unit:
+  // one for each photo, or none at all. Photos without one take no part. The photos' world is one,
+  // circles are found again by where they lie, and where the world lies among the given poses is
+  // estimated, too: AdjustedPhotos::given.
+  std::vector<std::optional<CameraPose>> given_poses;
+  // Their standard deviations: of rotations, radians; of translations, of the distance to the
+  // world's origin. COLMAP's poses of 6 rendered photos of 640 x 480 are good to 0.0001 in both;
+  // photographs have lenses that no model fits.
+  double given_rotation_sigma = 0.001, given_translation_sigma = 0.001;
   int max_iterations = 100;    // Of the joint problem, each time it is solved; 1 or more.
   int num_threads = 1;         // Photos are started on so many; the same bits with any number.
   int num_solver_threads = 1;  // Of the joint problem; above 1 runs are equal to 1e-9 only.
@@ -114,11 +124,28 @@ struct AdjustedCircle {
   double radius = 0.0;
 };
 
+// A pencil's direction in a world, without sense.
+struct AdjustedDirection {
+  std::string id;
+  int photo = -1;  // As AdjustedCircle::photo.
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();
+};
+
+// Where the world lies in the frame of given poses: X_given = scale * rotation * X + translation.
+struct GivenFrame {
+  double scale = 1.0;  // Their units for one of the world's: for a metre, where that is metric.
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  double log_scale_sigma = 0.0;  // Meaningful where the world is metric.
+};
+
 struct AdjustedPhotos {
   Status status;
   std::vector<AdjustedCamera> cameras;  // In the order in which photos name them (Camera::id).
   std::vector<AdjustedPhoto> photos;    // One for each of the input.
   std::vector<AdjustedCircle> circles;
+  std::vector<AdjustedDirection> directions;
+  std::optional<GivenFrame> given;  // Where poses were given.
   bool rigid = false, metric = false;
   std::vector<std::string> notes;
 };

@@ -9,13 +9,15 @@
 #include <utility>
 
 #include "circline/refine/evidence_points.h"
+#include "circline/refine/given_poses.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/mostly_exact.h"
 
 namespace circline {
 
 AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
-                             const std::vector<CameraPrior>& priors, const AdjustOptions& options)
+                             const std::vector<CameraPrior>& priors, const AdjustOptions& options,
+                             const GivenFrame* given)
     : photos_(photos), options_(options) {
   for (const CameraPrior& prior : priors) {
     for (int k = 4; k < kCameraSize; ++k) {
@@ -30,6 +32,7 @@ AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
     if (photos[i].takes_part) AddPhoto(static_cast<int>(i));
   }
   SetGauge();
+  if (given != nullptr) AddGivenPoses(*given);
 }
 
 double* AdjustProblem::NewBlock(int size, std::initializer_list<double> values,
@@ -74,6 +77,21 @@ void AdjustProblem::AddCameras(const std::vector<CameraPrior>& priors) {
     AddPrior(NewGaussianPrior({prior.sigma.begin(), prior.sigma.end()},
                               {prior.mean.begin(), prior.mean.end()}),
              {cameras_.back()});
+  }
+}
+
+void AdjustProblem::AddGivenPoses(const GivenFrame& given) {
+  const Eigen::Quaterniond q(given.rotation);
+  const Eigen::Vector3d& t = given.translation;
+  given_ = {NewBlock(4, {q.x(), q.y(), q.z(), q.w()}, NewManifold<WorldRotationManifold>(3)),
+            NewBlock(3, {t.x(), t.y(), t.z()}), NewBlock(1, {std::log(given.scale)})};
+  for (std::size_t i = 0; i < photos_.size(); ++i) {
+    if (rotations_[i] == nullptr || photos_[i].given == nullptr) continue;
+    const double distance = photos_[i].pose.translation.norm();
+    AddPrior(NewGivenPosePrior(photos_[i].given->rotation, photos_[i].given->translation,
+                               options_.given_rotation_sigma,
+                               options_.given_translation_sigma * distance),
+             {rotations_[i], translations_[i], given_[0], given_[1], given_[2]});
   }
 }
 

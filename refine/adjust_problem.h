@@ -42,6 +42,7 @@ struct AdjustInput {
   std::map<std::string, std::string> names;
   std::set<std::string> left_out;  // Ids of features that have no part in it.
   bool takes_part = true;
+  const CameraPose* given = nullptr;  // In the given frame; null: none.
 
   const std::string& NameOf(const std::string& id) const {
     const auto name = names.find(id);
@@ -56,9 +57,10 @@ struct CameraPrior {
 
 class AdjustProblem {
  public:
-  // `priors`: by camera.
+  // `priors`: by camera. `given`: where the world lies in the frame of given poses; null: there are
+  // none.
   AdjustProblem(const std::vector<AdjustInput>& photos, const std::vector<CameraPrior>& priors,
-                const AdjustOptions& options);
+                const AdjustOptions& options, const GivenFrame* given);
 
   // Runs ceres with the losses `stretch` times as wide; of the cameras only the first distortion
   // coefficient and the focal length are free where `coarse`.
@@ -87,6 +89,7 @@ class AdjustProblem {
     // Of the shifts; zero rows where one is held; the prior's where the problem is singular.
     std::vector<Eigen::Matrix<double, kCameraSize, kCameraSize>> cameras;
     std::vector<Matrix6d> poses;  // Of [delta, delta_t], as PoseHypothesis has them.
+    double log_scale = 0.0;       // Variance, of GivenFrame::scale.
   };
   Covariances Covariance(int end) const;
 
@@ -95,6 +98,8 @@ class AdjustProblem {
   CameraPose PoseAt(int photo) const;
   std::vector<std::vector<AdjustedResidual>> Residuals() const;  // Of the inliers; by photo.
   std::vector<AdjustedCircle> Circles() const;
+  std::vector<AdjustedDirection> Directions() const;
+  GivenFrame GivenFrameAt() const;
   bool metric() const { return metric_; }
 
  private:
@@ -123,6 +128,7 @@ class AdjustProblem {
   void AddCameras(const std::vector<CameraPrior>& priors);
   void AddPhoto(int photo);
   void SetGauge();
+  void AddGivenPoses(const GivenFrame& given);
   void AddCircle(int photo, const CircleObservation& circle, double sigma_px);
   Circle* CircleOf(int photo, const CircleObservation& circle);
   void AddKnownRadius(int world, const CircleObservation& circle, double* radius);
@@ -153,6 +159,8 @@ class AdjustProblem {
   std::map<double*, Block> blocks_;
   std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
   std::vector<double*> cameras_, rotations_, translations_;
+  std::vector<double*>
+      given_;  // Where poses are given, GivenFrame: rotation, translation, log scale.
   std::vector<std::array<double, kCameraSize>> camera_sigmas_;  // Of the priors.
   std::vector<const ceres::Manifold*> all_free_, coarse_free_;  // Of the cameras.
   std::map<std::pair<int, std::string>, Circle> circles_;

@@ -39,6 +39,7 @@ void AdjustProblem::Fill(const std::vector<const ceres::Manifold*>& cameras, int
     add(feature.blocks);
     problem->AddResidualBlock(feature.cost, nullptr, feature.blocks);
   }
+  add(given_);
   for (const Prior& prior : priors_) {
     if (IsOf(prior, *problem))
       problem->AddResidualBlock(prior.cost.get(), prior.loss.get(), prior.blocks);
@@ -206,6 +207,17 @@ std::vector<std::vector<AdjustedResidual>> AdjustProblem::Residuals() const {
     }
   }
   return out;
+}
+
+std::vector<AdjustedDirection> AdjustProblem::Directions() const {
+  std::vector<AdjustedDirection> out;
+  for (const auto& [key, block] : directions_)
+    out.push_back({key.second, key.first - 1, Eigen::Vector3d(block)});
+  return out;
+}
+
+GivenFrame AdjustProblem::GivenFrameAt() const {
+  return {std::exp(*given_[2]), RotationFromBlock(given_[0]), Eigen::Vector3d(given_[1])};
 }
 
 std::vector<AdjustedCircle> AdjustProblem::Circles() const {

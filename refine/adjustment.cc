@@ -27,7 +27,8 @@ void Adjustment::SolveOnce() {
     priors.push_back(
         {ShiftsBetween(cameras_[c], guesses_[c]), ShiftSigmas(cameras_[c], priors_[c], options_)});
   }
-  problem_ = std::make_unique<AdjustProblem>(inputs_, priors, options_);
+  problem_ = std::make_unique<AdjustProblem>(inputs_, priors, options_,
+                                             given_frame_ ? &*given_frame_ : nullptr);
   double width = std::min(problem_->LargestMiss(), kWidest);
   for (bool first = true; width > kNear && out_.status.ok(); width *= kNarrower, first = false)
     out_.status = problem_->Solve(width, first, kIterations);
@@ -109,6 +110,7 @@ void Adjustment::SeeAnew() {
     found[static_cast<std::size_t>(circle.photo + 1)][circle.id] = {circle.center.head<2>(),
                                                                     circle.radius};
   layouts_ = std::move(found);
+  if (given_frame_) given_frame_ = problem_->GivenFrameAt();
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (problem_->IsUsed(static_cast<int>(c)))
       cameras_[c] = problem_->CameraAt(static_cast<int>(c));
@@ -209,6 +211,11 @@ void Adjustment::Report() {
   }
   if (start_ == nullptr) ReportSigmas(scale);
   out_.circles = problem_->Circles();
+  out_.directions = problem_->Directions();
+  if (given_frame_) {
+    out_.given = problem_->GivenFrameAt();
+    out_.given->log_scale_sigma = std::sqrt(scale * covariances.log_scale);
+  }
   out_.metric = problem_->metric();
 }
 

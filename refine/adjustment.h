@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "circline/refine/adjust_layout.h"
@@ -45,6 +46,7 @@ class Adjustment {
 
  private:
   Status FindCameras();
+  Status CheckGivenPoses();
   void SetAsideEqualViews();
   EstimationOptions PoseOptions() const;
   void Estimate();
@@ -52,6 +54,7 @@ class Adjustment {
   Status Start();
   Status StartHere();
   bool PlaceWorlds();
+  bool PlaceByPoses();
   void ShareWorld(const SharedLayout& shared, bool by_id);
   void ScaleWorlds();
   void SolveWithoutGross();
@@ -76,7 +79,8 @@ class Adjustment {
   std::vector<PreparedPhoto> prepared_;
   std::vector<AdjustInput> inputs_;
   std::vector<PoseEstimate> estimates_;
-  std::vector<Layout> layouts_;  // By world.
+  std::vector<Layout> layouts_;            // By world.
+  std::optional<GivenFrame> given_frame_;  // Where poses are given; as it stands.
   std::unique_ptr<AdjustProblem> problem_;
   AdjustedPhotos out_;
 };

@@ -66,7 +66,7 @@ Status Adjustment::FindCameras() {
     is_valid_[i] = out_.photos[i].status.ok() ? 1 : 0;
   }
   guesses_ = cameras_;
-  return Status::Ok();
+  return CheckGivenPoses();
 }
 
 void Adjustment::SetAsideEqualViews() {
@@ -146,6 +146,7 @@ void Adjustment::FindCamera(std::size_t c) {
     AdjustOptions coarse = options_;
     coarse.max_iterations = kCoarseIterations;
     coarse.progress = nullptr;
+    coarse.given_poses.clear();
     for (Camera& candidate : candidates) {
       Adjustment alone(used, coarse);
       alone.start_ = &candidate;
@@ -170,8 +171,11 @@ Status Adjustment::Start() {
 
 Status Adjustment::StartHere() {
   Estimate();
-  if (!PlaceWorlds())
+  if (!PlaceWorlds()) {
+    if (std::any_of(inputs_.begin(), inputs_.end(), [](const auto& in) { return in.takes_part; }))
+      return Status::Refused("no circle is found in two photos where their given poses have it");
     return Status::Refused("no photo gives a pose: " + estimates_.front().status.message);
+  }
   ScaleWorlds();
   return Status::Ok();
 }
@@ -194,6 +198,7 @@ bool Adjustment::PlaceWorlds() {
     layouts_[i + 1] = LayoutOf(estimates_[i].hypotheses.front());
     inputs_[i].layout = &layouts_[i + 1];
   }
+  if (any && !options_.given_poses.empty()) return PlaceByPoses();
   if (!any || options_.rigid == RigidWorld::kNo) return any;
   const auto with_pose = std::count_if(inputs_.begin(), inputs_.end(),
                                        [](const AdjustInput& input) { return input.takes_part; });
@@ -237,6 +242,7 @@ void Adjustment::ScaleWorlds() {
     for (AdjustInput& input : inputs_) {
       if (input.takes_part && input.world == world) input.pose.translation *= *middle;
     }
+    if (world == 0 && given_frame_) given_frame_->scale /= *middle;
   }
 }
 

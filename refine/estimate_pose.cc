@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "circline/estimators/closed_form_solvers.h"
+#include "circline/refine/is_rotation.h"
 #include "circline/refine/readings.h"
 
 namespace circline {
@@ -36,10 +37,7 @@ bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type) {
 namespace {
 
 bool IsPose(const CameraPose& pose) {
-  constexpr double kTolerance = 1e-6;
-  return (pose.rotation * pose.rotation.transpose()).isIdentity(kTolerance) &&
-         pose.rotation.determinant() > 0.0 && pose.translation.allFinite() &&
-         pose.translation.norm() > 0.0;
+  return IsRotation(pose.rotation) && pose.translation.allFinite() && pose.translation.norm() > 0.0;
 }
 
 bool IsUnit(const Eigen::Vector3d& v) {

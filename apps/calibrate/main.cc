@@ -9,31 +9,19 @@
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <optional>
-#include <set>
 
+#include "apps/calibrate/calibrate_options.h"
 #include "apps/calibrate/calibrated_scene.h"
 #include "apps/calibrate/calibration_files.h"
 #include "apps/calibrate/calibration_pictures.h"
+#include "apps/calibrate/import_model.h"
 #include "apps/common/flags_util.h"
 #include "apps/common/output_file.h"
 #include "apps/common/progress.h"
-#include "apps/common/text.h"
 #include "apps/compare/image_run.h"
-#include "apps/compare/options.h"
 #include "circline/refine/adjust_photos.h"
 
 DECLARE_string(scene);
-
-DEFINE_string(model, "",
-              "Camera model: pinhole, opencv or fisheye; empty: that of the camera given, opencv "
-              "where it has no distortion.");
-DEFINE_string(fix, "",
-              "What is held as it is given, of: principal_point, aspect, k1, k2, k3, tangential; a "
-              "list. Without, pixels are square to 0.1 % and tangential distortion is 0.0005.");
-DEFINE_string(free, "", "What may be far from that, of: aspect, tangential; a list.");
-DEFINE_string(rigid, circline::RigidWorldName(circline::AdjustOptions().rigid),
-              "Whether all photos show one sheet: yes, no (only the camera is common), or auto: "
-              "where the circles of one id lie alike, or circles do whatever their ids.");
 
 namespace circline::apps {
 namespace {
@@ -43,98 +31,32 @@ constexpr char kUsage[] =
     "\n"
     "  circline_calibrate --images='photos/*.jpg' --output=out    # nothing known\n"
     "  circline_calibrate --scene=set/scene.yaml --output=out     # annotated\n"
+    "  circline_calibrate --images='photos/*.jpg' --import=sparse/0 --circle_radius=0.1 "
+    "--output=out\n"
+    "                                                # scale and axes for a model of COLMAP's\n"
     "\n"
     "Writes calibration.yml (for OpenCV and --camera), calibration.json, cameras.txt and "
     "images.txt\n"
-    "(COLMAP), scene.yaml (the scene with the estimated cameras) and report.html. Flags for "
+    "(COLMAP), scene.yaml (the scene with the estimated cameras) and report.html; with --import "
+    "landmarks.json and "
+    "transform.txt, too. Flags for "
     "inputs, detection and losses are those of "
     "circline_compare.\n"
     "Exit code 0: done; 1: some photo could not be read, or no camera came out; 2: unusable flags "
     "or scene file.";
-
-struct CalibrateOptions {
-  CompareOptions compare;
-  AdjustOptions adjust;
-  std::optional<CameraModel> model;
-  bool fix_principal_point = false;
-  std::optional<double> aspect_sigma;
-};
 
 int Refuse(const Status& status) {
   SayOnStderr("circline_calibrate: " + status.message);
   return status.code == StatusCode::kInvalidArgument ? kExitUsage : kExitUnreadable;
 }
 
-Status ModelFromFlag(std::optional<CameraModel>* model) {
-  const std::map<std::string, CameraModel> models = {{"pinhole", CameraModel::kPinhole},
-                                                     {"opencv", CameraModel::kOpenCV},
-                                                     {"fisheye", CameraModel::kFisheye}};
-  const auto named = models.find(FLAGS_model);
-  if (named != models.end()) *model = named->second;
-  return named != models.end() || FLAGS_model.empty()
-             ? Status::Ok()
-             : Status::Invalid("--model=" + FLAGS_model + ": must be pinhole, opencv or fisheye");
-}
-
-// Of another model a camera has another distortion.
-void SetModel(std::optional<CameraModel> asked, Camera* camera) {
+// Of another model a camera has another distortion; one that comes with poses is what it is.
+void SetModel(const CalibrateOptions& options, Camera* camera) {
+  if (!options.import.empty()) return;
   const bool has_none = camera->model == CameraModel::kPinhole;
-  const CameraModel model = asked.value_or(has_none ? CameraModel::kOpenCV : camera->model);
+  const CameraModel model = options.model.value_or(has_none ? CameraModel::kOpenCV : camera->model);
   if (model != camera->model) camera->distortion = {};
   camera->model = model;
-}
-
-// The names in a list flag.
-Status NamesFromFlag(const char* flag, const std::string& text,
-                     const std::vector<std::string>& known, std::set<std::string>* names) {
-  if (text.empty()) return Status::Ok();
-  for (const std::string& name : SplitList(text)) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      return Status::Invalid(std::string("--") + flag + ": there is no '" + name + "'" +
-                             DidYouMean(name, known));
-    }
-    names->insert(name);
-  }
-  return Status::Ok();
-}
-
-Status ParametersFromFlags(CalibrateOptions* options) {
-  std::set<std::string> fixed, free;
-  Status status = NamesFromFlag(
-      "fix", FLAGS_fix, {"principal_point", "aspect", "k1", "k2", "k3", "tangential"}, &fixed);
-  if (status.ok()) status = NamesFromFlag("free", FLAGS_free, {"aspect", "tangential"}, &free);
-  if (!status.ok()) return status;
-  for (const std::string& name : free) {
-    if (fixed.count(name) > 0) return Status::Invalid("--fix and --free both name '" + name + "'");
-  }
-  constexpr double kFreeAspect = 0.02, kFreeTangential = 0.01;
-  options->fix_principal_point = fixed.count("principal_point") > 0;
-  if (fixed.count("aspect") > 0) options->aspect_sigma = 0.0;
-  if (free.count("aspect") > 0) options->aspect_sigma = kFreeAspect;
-  if (fixed.count("tangential") > 0) options->adjust.tangential_sigma = 0.0;
-  if (free.count("tangential") > 0) options->adjust.tangential_sigma = kFreeTangential;
-  options->adjust.num_radial = fixed.count("k1") > 0   ? 0
-                               : fixed.count("k2") > 0 ? 1
-                               : fixed.count("k3") > 0 ? 2
-                                                       : 3;
-  return Status::Ok();
-}
-
-Status FromFlags(CalibrateOptions* options) {
-  Status status = OptionsFromFlags(&options->compare);
-  if (status.ok()) status = ModelFromFlag(&options->model);
-  if (status.ok()) status = ParametersFromFlags(options);
-  if (status.ok() && !RigidWorldFromName(FLAGS_rigid, &options->adjust.rigid))
-    status = Status::Invalid("--rigid=" + FLAGS_rigid + ": must be auto, yes or no");
-  if (!status.ok()) return status;
-  options->compare.inputs.guess.is_exact = false;  // The camera is what is to be found.
-  const EstimationOptions& estimation = options->compare.losses.front().estimation;
-  options->adjust.conic_loss = estimation.conic_loss;
-  options->adjust.line_loss = estimation.line_loss;
-  options->adjust.noise_model = estimation.noise_model;
-  if (options->compare.threads > 0) cv::setNumThreads(options->compare.threads);
-  options->adjust.num_threads = std::max(1, cv::getNumThreads());
-  return status;
 }
 
 // The photos, each read and observed, on all threads.
@@ -192,9 +114,11 @@ void SetApartBySize(const std::map<std::string, Camera>& given, Camera* camera) 
 }
 
 // `given`: the cameras as they came, by id; filled where they are not in it.
-Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
-                     std::map<std::string, Camera>* given, Calibration* calibration) {
+Status CalibrateOnce(CalibrateOptions* options, const GivenPoses& poses,
+                     std::vector<SceneImage>* images, std::map<std::string, Camera>* given,
+                     Calibration* calibration) {
   *calibration = Calibration();
+  options->adjust.given_poses.clear();
   std::vector<ImageRun> runs = ObserveAll(options->compare, images);
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (!runs[i].read_error.empty()) {
@@ -202,7 +126,7 @@ Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
       continue;
     }
     Observations& photo = calibration->photos.emplace_back(std::move(runs[i].observations));
-    SetModel(options->model, &photo.camera);
+    SetModel(*options, &photo.camera);
     SetApartBySize(*given, &photo.camera);
     (*images)[i].observations.camera.id = photo.camera.id;
     const bool is_new = given->count(photo.camera.id) == 0;
@@ -210,6 +134,8 @@ Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
       SayOnStderr("camera '" + photo.camera.id + "': " + (*images)[i].camera_from);
     photo.camera = given->insert({photo.camera.id, photo.camera}).first->second;
     options->adjust.camera_sigma[photo.camera.id] = PriorOf(*options, (*images)[i], photo.camera);
+    const auto pose = poses.find((*images)[i].index);
+    if (pose != poses.end()) options->adjust.given_poses.emplace_back(pose->second);
     calibration->names.push_back((*images)[i].name);
     calibration->images.push_back((*images)[i]);
   }
@@ -228,8 +154,8 @@ Status CalibrateOnce(CalibrateOptions* options, std::vector<SceneImage>* images,
 
 // What belongs together on a photo is judged through its camera: photos in which everything is
 // detected are looked at again through the camera that they have led to.
-Status CalibrateInPasses(CalibrateOptions* options, std::vector<SceneImage>* images,
-                         Calibration* calibration) {
+Status CalibrateInPasses(CalibrateOptions* options, const GivenPoses& poses,
+                         std::vector<SceneImage>* images, Calibration* calibration) {
   constexpr int kPasses = 3;
   constexpr double kSame = 0.02;  // Of log f.
   std::map<std::string, Camera> given;
@@ -237,10 +163,10 @@ Status CalibrateInPasses(CalibrateOptions* options, std::vector<SceneImage>* ima
                                    [](const SceneImage& image) { return image.detect_everything; });
   for (int pass = 0;; ++pass) {
     // At first what belongs together is judged where each photo makes the focal length likeliest,
-    // afterwards where all do.
-    options->compare.structure_tells_focal = pass == 0;
-    const Status status = CalibrateOnce(options, images, &given, calibration);
-    if (!status.ok() || !detects || pass + 1 == kPasses) return status;
+    // afterwards where all do; cameras that come with poses are known.
+    options->compare.structure_tells_focal = pass == 0 && poses.empty();
+    const Status status = CalibrateOnce(options, poses, images, &given, calibration);
+    if (!status.ok() || !detects || !poses.empty() || pass + 1 == kPasses) return status;
     bool same = true;
     std::map<std::string, Camera> found;
     for (const AdjustedCamera& made : calibration->adjusted.cameras)
@@ -257,23 +183,42 @@ Status CalibrateInPasses(CalibrateOptions* options, std::vector<SceneImage>* ima
   }
 }
 
+Status Import(CalibrateOptions* options, std::vector<SceneImage>* images, GivenPoses* poses) {
+  std::vector<std::string> notes;
+  const CameraSigma sigma = options->adjust.noise_model.camera;
+  const Status status = ImportModel(options->import, sigma, images, poses, &notes);
+  for (const std::string& note : notes) SayOnStderr(note);
+  options->compare.inputs.guess.wanted = false;
+  options->adjust.num_radial = 0;  // Distortion is the model's.
+  return status;
+}
+
+// Scale, axes and planes of an imported model.
+Status FinishImport(const CalibrateOptions& options, const Calibration& calibration) {
+  const std::vector<WorldPlane> planes =
+      PlanesOf(calibration.photos, options.adjust, calibration.adjusted);
+  std::cout << LandmarkTable(calibration.adjusted, planes);
+  return WriteLandmarks(calibration.adjusted, planes, options.compare.output);
+}
+
 int Calibrate() {
   CalibrateOptions options;
   ImageSet set;
-  Status status = FromFlags(&options);
+  Status status = CalibrateOptionsFromFlags(&options);
   if (status.ok()) status = ImagesFromFlags(options.compare.inputs, &set);
   if (!status.ok()) return Refuse(status);
   if (!set.rigid().empty()) RigidWorldFromName(set.rigid(), &options.adjust.rigid);
+  std::vector<SceneImage> images;
+  for (std::size_t i = 0; i < set.size(); ++i) images.push_back(set.At(i));
+  GivenPoses poses;
+  if (!options.import.empty()) status = Import(&options, &images, &poses);
+  if (!status.ok()) return Refuse(status);
   if (options.compare.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.compare.inputs.guess));
   const bool with_pictures = options.compare.overlays;
   options.compare.overlays = false;  // Photos are read for detection only.
-  std::vector<SceneImage> images;
-  for (std::size_t i = 0; i < set.size(); ++i) {
-    images.push_back(set.At(i));
-    SetModel(options.model, &images.back().observations.camera);
-  }
+  for (SceneImage& image : images) SetModel(options, &image.observations.camera);
   Calibration calibration;
-  status = CalibrateInPasses(&options, &images, &calibration);
+  status = CalibrateInPasses(&options, poses, &images, &calibration);
   for (const std::string& error : calibration.errors) SayOnStderr(error);
   if (!status.ok()) return Refuse(status);
   std::string note;
@@ -289,6 +234,7 @@ int Calibrate() {
     status = WriteCalibratedScene(FLAGS_scene, calibration.adjusted, images,
                                   options.compare.output + "/scene.yaml");
   }
+  if (status.ok() && calibration.adjusted.given) status = FinishImport(options, calibration);
   if (!status.ok()) return Refuse(status);
   std::cout << CalibrationTable(calibration.adjusted, calibration.names) << note;
   return calibration.errors.empty() ? kExitOk : kExitUnreadable;

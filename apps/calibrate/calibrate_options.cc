@@ -1,0 +1,107 @@
+#include "apps/calibrate/calibrate_options.h"
+
+#include <gflags/gflags.h>
+
+#include <algorithm>
+#include <map>
+#include <opencv2/core/utility.hpp>
+#include <set>
+#include <vector>
+
+#include "apps/common/text.h"
+
+DECLARE_string(camera);
+
+DEFINE_string(model, "",
+              "Camera model: pinhole, opencv or fisheye; empty: that of the camera given, opencv "
+              "where it has no distortion.");
+DEFINE_string(fix, "",
+              "What is held as it is given, of: principal_point, aspect, k1, k2, k3, tangential; a "
+              "list. Without, pixels are square to 0.1 % and tangential distortion is 0.0005.");
+DEFINE_string(free, "", "What may be far from that, of: aspect, tangential; a list.");
+DEFINE_string(rigid, circline::RigidWorldName(circline::AdjustOptions().rigid),
+              "Whether all photos show one sheet: yes, no (only the camera is common), or auto: "
+              "where the circles of one id lie alike, or circles do whatever their ids.");
+DEFINE_string(
+    import, "",
+    "Folder of a COLMAP model (cameras and images, .bin or .txt) of the photos: its cameras "
+    "and poses are taken as they are known, circles and directions are found in its "
+    "world, and a known radius gives that its scale.");
+
+namespace circline::apps {
+namespace {
+
+Status ModelFromFlag(std::optional<CameraModel>* model) {
+  const std::map<std::string, CameraModel> models = {{"pinhole", CameraModel::kPinhole},
+                                                     {"opencv", CameraModel::kOpenCV},
+                                                     {"fisheye", CameraModel::kFisheye}};
+  const auto named = models.find(FLAGS_model);
+  if (named != models.end()) *model = named->second;
+  return named != models.end() || FLAGS_model.empty()
+             ? Status::Ok()
+             : Status::Invalid("--model=" + FLAGS_model + ": must be pinhole, opencv or fisheye");
+}
+
+// The names in a list flag.
+Status NamesFromFlag(const char* flag, const std::string& text,
+                     const std::vector<std::string>& known, std::set<std::string>* names) {
+  if (text.empty()) return Status::Ok();
+  for (const std::string& name : SplitList(text)) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      return Status::Invalid(std::string("--") + flag + ": there is no '" + name + "'" +
+                             DidYouMean(name, known));
+    }
+    names->insert(name);
+  }
+  return Status::Ok();
+}
+
+Status ParametersFromFlags(CalibrateOptions* options) {
+  std::set<std::string> fixed, free;
+  Status status = NamesFromFlag(
+      "fix", FLAGS_fix, {"principal_point", "aspect", "k1", "k2", "k3", "tangential"}, &fixed);
+  if (status.ok()) status = NamesFromFlag("free", FLAGS_free, {"aspect", "tangential"}, &free);
+  if (!status.ok()) return status;
+  for (const std::string& name : free) {
+    if (fixed.count(name) > 0) return Status::Invalid("--fix and --free both name '" + name + "'");
+  }
+  constexpr double kFreeAspect = 0.02, kFreeTangential = 0.01;
+  options->fix_principal_point = fixed.count("principal_point") > 0;
+  if (fixed.count("aspect") > 0) options->aspect_sigma = 0.0;
+  if (free.count("aspect") > 0) options->aspect_sigma = kFreeAspect;
+  if (fixed.count("tangential") > 0) options->adjust.tangential_sigma = 0.0;
+  if (free.count("tangential") > 0) options->adjust.tangential_sigma = kFreeTangential;
+  options->adjust.num_radial = fixed.count("k1") > 0   ? 0
+                               : fixed.count("k2") > 0 ? 1
+                               : fixed.count("k3") > 0 ? 2
+                                                       : 3;
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status CalibrateOptionsFromFlags(CalibrateOptions* options) {
+  Status status = OptionsFromFlags(&options->compare);
+  if (status.ok()) status = ModelFromFlag(&options->model);
+  if (status.ok()) status = ParametersFromFlags(options);
+  if (status.ok() && !RigidWorldFromName(FLAGS_rigid, &options->adjust.rigid))
+    status = Status::Invalid("--rigid=" + FLAGS_rigid + ": must be auto, yes or no");
+  if (!status.ok()) return status;
+  const CameraGuess& guess = options->compare.inputs.guess;
+  if (!FLAGS_import.empty() && (!FLAGS_camera.empty() || !FLAGS_model.empty() ||
+                                guess.focal_px > 0.0 || guess.fov_deg > 0.0)) {
+    return Status::Invalid(
+        "--import brings its own cameras: leave out --camera, --model, --focal_px and --fov_deg");
+  }
+  options->import = FLAGS_import;
+  options->compare.inputs.guess.is_exact = false;  // The camera is what is to be found.
+  const EstimationOptions& estimation = options->compare.losses.front().estimation;
+  options->adjust.conic_loss = estimation.conic_loss;
+  options->adjust.line_loss = estimation.line_loss;
+  options->adjust.noise_model = estimation.noise_model;
+  if (options->compare.threads > 0) cv::setNumThreads(options->compare.threads);
+  options->adjust.num_threads = std::max(1, cv::getNumThreads());
+  return status;
+}
+
+}  // namespace circline::apps

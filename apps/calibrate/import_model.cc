@@ -1,0 +1,196 @@
+#include "apps/calibrate/import_model.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "apps/common/colmap_file.h"
+#include "apps/common/output_file.h"
+#include "apps/common/text.h"
+
+namespace circline::apps {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+bool EndsWith(const std::string& path, const std::string& name) {
+  return path == name || (path.size() > name.size() &&
+                          path.compare(path.size() - name.size(), name.size(), name) == 0 &&
+                          path[path.size() - name.size() - 1] == '/');
+}
+
+// Whether the path ends with the whole name; the longest one that it ends with. Null: none.
+const ColmapImage* Find(const ColmapModel& model, const std::string& path) {
+  const std::string whole = std::filesystem::path(path).lexically_normal().generic_string();
+  const ColmapImage* best = nullptr;
+  for (const ColmapImage& image : model.images) {
+    if (EndsWith(whole, image.name) && (best == nullptr || image.name.size() > best->name.size()))
+      best = &image;
+  }
+  return best;
+}
+
+Json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+// Of the world in units of the model, the other way round: X = scale * rotation * X_model + t.
+struct Inverse {
+  double scale;
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d translation;
+
+  explicit Inverse(const GivenFrame& given)
+      : scale(1.0 / given.scale),
+        rotation(given.rotation.transpose()),
+        translation(-scale * (rotation * given.translation)) {}
+};
+
+}  // namespace
+
+Status ImportModel(const std::string& folder, const CameraSigma& sigma,
+                   std::vector<SceneImage>* images, GivenPoses* poses,
+                   std::vector<std::string>* notes) {
+  ColmapModel model;
+  Status status = ReadColmapModel(folder, &model);
+  if (!status.ok()) return status;
+  std::map<const ColmapImage*, std::string> taken;
+  std::vector<SceneImage> posed;
+  for (SceneImage& image : *images) {
+    const ColmapImage* of = Find(model, image.path);
+    if (of == nullptr) {
+      notes->push_back(image.name + ": the model has no pose of it");
+      continue;
+    }
+    const auto [other, is_new] = taken.insert({of, image.path});
+    if (!is_new) {
+      return Status::Invalid(folder + ": " + other->second + " and " + image.path +
+                             " are both its image " + of->name);
+    }
+    image.observations.camera = model.cameras[of->camera];
+    image.camera_sigma = {};
+    image.camera_sigma.log_focal = sigma.log_focal;
+    image.camera_sigma.log_aspect = sigma.log_aspect;
+    image.camera_sigma.principal_point_px = sigma.principal_point_px;
+    image.camera_sigma.k1 = sigma.k1;
+    image.guessed_sigma.reset();
+    (*poses)[image.index] = of->cam_from_world;
+    posed.push_back(std::move(image));
+  }
+  if (posed.empty()) {
+    return Status::Invalid(folder + ": no photo is one of its " +
+                           std::to_string(model.images.size()) + " images, of which one is " +
+                           model.images.front().name);
+  }
+  *images = std::move(posed);
+  return Status::Ok();
+}
+
+std::vector<WorldPlane> PlanesOf(const std::vector<Observations>& photos,
+                                 const AdjustOptions& options, const AdjustedPhotos& adjusted) {
+  std::set<std::string> others;
+  for (const Observations& photo : photos) {
+    const std::string own = ResolveWorld(photo).frame.plane;
+    for (const CircleObservation& circle : photo.circles) {
+      if (!circle.plane.empty() && circle.plane != own) others.insert(circle.plane);
+    }
+  }
+  std::vector<WorldPlane> planes(1);
+  planes.front().id = ResolveWorld(photos.front()).frame.plane;
+  planes.front().circles = adjusted.circles;
+  const Inverse world(*adjusted.given);
+  for (const std::string& id : others) {
+    std::vector<Observations> seen = photos;
+    for (Observations& photo : seen) {
+      photo.frame = {};
+      photo.frame.plane = id;
+    }
+    const AdjustedPhotos own = AdjustPhotos(seen, options);
+    if (!own.status.ok() || !own.given) continue;  // Too few photos show it.
+    const Eigen::Matrix3d R = world.rotation * own.given->rotation;
+    const double scale = world.scale * own.given->scale;
+    const auto moved = [&](const Eigen::Vector3d& X) -> Eigen::Vector3d {
+      return scale * (R * X) + world.scale * (world.rotation * own.given->translation) +
+             world.translation;
+    };
+    WorldPlane plane;
+    plane.id = id;
+    plane.origin = moved(Eigen::Vector3d::Zero());
+    plane.normal = R.col(2);
+    for (AdjustedCircle circle : own.circles) {
+      circle.center = moved(circle.center);
+      circle.normal = R * circle.normal;
+      circle.radius *= scale;
+      plane.circles.push_back(std::move(circle));
+    }
+    planes.push_back(std::move(plane));
+  }
+  return planes;
+}
+
+Status WriteLandmarks(const AdjustedPhotos& adjusted, const std::vector<WorldPlane>& planes,
+                      const std::string& folder) {
+  const Inverse world(*adjusted.given);
+  Json rotation = Json::array();
+  for (int i = 0; i < 9; ++i) rotation.push_back(world.rotation(i / 3, i % 3));
+  Json json = {
+      {"metric", adjusted.metric},
+      {"world_from_model",
+       {{"scale", world.scale},
+        {"scale_sigma", adjusted.metric ? world.scale * adjusted.given->log_scale_sigma : 0.0},
+        {"rotation", rotation},
+        {"translation", Vector(world.translation)}}},
+      {"planes", Json::array()},
+      {"directions", Json::array()}};
+  for (const WorldPlane& plane : planes) {
+    Json circles = Json::array();
+    for (const AdjustedCircle& circle : plane.circles) {
+      circles.push_back({{"id", circle.id},
+                         {"center", Vector(circle.center)},
+                         {"normal", Vector(circle.normal)},
+                         {"radius", circle.radius}});
+    }
+    json["planes"].push_back({{"id", plane.id},
+                              {"origin", Vector(plane.origin)},
+                              {"normal", Vector(plane.normal)},
+                              {"circles", circles}});
+  }
+  for (const AdjustedDirection& direction : adjusted.directions)
+    json["directions"].push_back(
+        {{"id", direction.id}, {"direction", Vector(direction.direction)}});
+  Status status = WriteFile(folder + "/landmarks.json",
+                            json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+  if (!status.ok()) return status;
+  std::ostringstream text;
+  text.precision(17);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) text << world.scale * world.rotation(i, j) << " ";
+    text << world.translation[i] << "\n";
+  }
+  text << "0 0 0 1\n";
+  return WriteFile(folder + "/transform.txt", text.str());
+}
+
+std::string LandmarkTable(const AdjustedPhotos& adjusted, const std::vector<WorldPlane>& planes) {
+  std::ostringstream out;
+  const double scale = 1.0 / adjusted.given->scale;
+  if (adjusted.metric) {
+    out << "one unit of the model is " << FormatShort(scale, 5) << " +- "
+        << FormatShort(scale * adjusted.given->log_scale_sigma, 2)
+        << " in the unit of the known radius\n";
+  } else {
+    out << "no radius is known: the scale is the model's own up to " << FormatShort(scale, 5)
+        << "\n";
+  }
+  for (const WorldPlane& plane : planes) {
+    out << "plane '" << plane.id << "': " << plane.circles.size()
+        << (plane.circles.size() == 1 ? " circle" : " circles") << ", normal "
+        << FormatFixed(plane.normal.x(), 4) << " " << FormatFixed(plane.normal.y(), 4) << " "
+        << FormatFixed(plane.normal.z(), 4) << "\n";
+  }
+  if (!adjusted.directions.empty())
+    out << adjusted.directions.size() << " directions of parallel lines\n";
+  return out.str();
+}
+
+}  // namespace circline::apps

@@ -1,0 +1,139 @@
+// Photos whose poses come from elsewhere: circles are landmarks of that world, and a known radius
+// gives its scale.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/sheet_photos.h"
+#include "tests/trials.h"
+
+namespace circline {
+namespace {
+
+constexpr double kRotationSigma = 5e-4, kTranslationSigma = 1e-3;  // Radians; of the distance.
+
+// The frame that poses are given in: X_given = kScale kTurn X + kShift.
+constexpr double kScale = 3.7;
+const Eigen::Matrix3d kTurn = ExpRotation({0.7, -1.1, 0.4});
+const Eigen::Vector3d kShift(5.0, -2.0, 1.0);
+
+struct GivenSheet {
+  explicit GivenSheet(int count, std::uint64_t seed = 1, double noise = 0.0)
+      : sheet(Photos(count, seed).WithCircles()) {
+    Random random(seed);
+    const auto draw = [&](double sigma) {
+      const double x = random.Normal(), y = random.Normal(), z = random.Normal();
+      return Eigen::Vector3d(noise * sigma * Eigen::Vector3d(x, y, z));
+    };
+    for (std::size_t i = 0; i < sheet.photos.size(); ++i) {
+      sheet.photos[i].camera = sheet.truth();
+      CameraPose pose = sheet.poses[i];
+      pose.rotation = ExpRotation(draw(kRotationSigma)) * pose.rotation;
+      pose.translation += draw(kTranslationSigma) * pose.translation.norm();
+      const Eigen::Matrix3d R = pose.rotation * kTurn.transpose();
+      options.given_poses.emplace_back(CameraPose{R, kScale * pose.translation - R * kShift});
+    }
+    options.noise_model = NoiseModel::Exact();
+    options.camera_sigma["cam"] = CameraSigma::Exact();
+    options.num_radial = 0;
+    options.given_rotation_sigma = kRotationSigma;
+    options.given_translation_sigma = kTranslationSigma;
+  }
+  // Leaves one circle in each photo, the middle one of the sheet.
+  void KeepOneCircle() {
+    for (Observations& photo : sheet.photos) photo.circles = {photo.circles[4]};
+  }
+  AdjustedPhotos Run() const { return AdjustPhotos(sheet.photos, options); }
+
+  Photos sheet;
+  AdjustOptions options;
+};
+
+// One of a circle's two poses is right in each photo; which, and where the circle is, the given
+// poses tell.
+TEST(GivenPoses, OneCircleOfKnownRadiusGivesScaleAndPlane) {
+  GivenSheet given(5);
+  given.KeepOneCircle();
+  given.sheet.photos[2].circles[0].radius = 0.05;  // A tenth of what it is.
+  const AdjustedPhotos adjusted = given.Run();
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  ASSERT_TRUE(adjusted.given.has_value());
+  EXPECT_TRUE(adjusted.metric);
+  EXPECT_NEAR(adjusted.given->scale, 10.0 * kScale, 0.005 * 10.0 * kScale);
+  EXPECT_GT(std::abs(adjusted.given->rotation.col(2).dot(kTurn.col(2))), std::cos(0.003));
+  ASSERT_EQ(adjusted.circles.size(), 1U);
+  // Its centre, which is the origin of the sheet, in the given frame.
+  const Eigen::Vector3d center =
+      adjusted.given->scale * (adjusted.given->rotation * adjusted.circles[0].center) +
+      adjusted.given->translation;
+  EXPECT_LT((center - kShift).norm(), 0.02 * kScale);
+}
+
+TEST(GivenPoses, ScaleIsAsGoodAsItsSigma) {
+  const int trials = Trials(20);
+  double sum = 0.0;
+  for (int trial = 0; trial < trials; ++trial) {
+    GivenSheet given(5, static_cast<std::uint64_t>(100 + trial), 1.0);
+    given.KeepOneCircle();
+    given.sheet.photos[0].circles[0].radius = 0.5;
+    const AdjustedPhotos adjusted = given.Run();
+    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const double error = std::log(adjusted.given->scale / kScale);
+    EXPECT_GT(adjusted.given->log_scale_sigma, 0.0);
+    sum += std::pow(error / adjusted.given->log_scale_sigma, 2);
+  }
+  if (kSanitized) return;
+  EXPECT_GT(sum / trials, 0.4);  // 0.48 to 1.71 in 95 % of runs, of 20.
+  EXPECT_LT(sum / trials, 1.8);
+}
+
+TEST(GivenPoses, CirclesAreFoundAgainWhateverTheirIds) {
+  GivenSheet given(5);
+  for (std::size_t i = 0; i < given.sheet.photos.size(); ++i) {
+    for (std::size_t k = 0; k < 9; ++k)
+      given.sheet.photos[i].circles[k].id = "c" + std::to_string((k + 2 * i) % 9);
+  }
+  const AdjustedPhotos adjusted = given.Run();
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  EXPECT_EQ(adjusted.circles.size(), 9U);
+  EXPECT_FALSE(adjusted.metric);
+  EXPECT_GT(std::abs(adjusted.given->rotation.col(2).dot(kTurn.col(2))), std::cos(0.001));
+}
+
+TEST(GivenPoses, APhotoOfAnotherPlaceIsLeftOutAndNamed) {
+  GivenSheet given(6);
+  std::optional<CameraPose>& wrong = given.options.given_poses[3];
+  wrong->rotation = ExpRotation({0.0, 0.05, 0.0}) * wrong->rotation;
+  const AdjustedPhotos adjusted = given.Run();
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  for (std::size_t i = 0; i < 6; ++i)
+    EXPECT_EQ(adjusted.photos[i].status.ok(), i != 3) << i << adjusted.photos[i].status.message;
+}
+
+TEST(GivenPoses, WhatIsMissingIsSaidInWords) {
+  GivenSheet given(4);
+  given.options.given_poses[1].reset();
+  AdjustedPhotos adjusted = given.Run();
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  EXPECT_EQ(adjusted.photos[1].status.message, "no pose is given for it");
+
+  given.options.given_poses[1] = CameraPose{2.0 * Eigen::Matrix3d::Identity(), {0.0, 0.0, 1.0}};
+  EXPECT_EQ(given.Run().status.code, StatusCode::kInvalidArgument);
+  given.options.given_poses.pop_back();
+  EXPECT_EQ(given.Run().status.code, StatusCode::kInvalidArgument);
+
+  // Photos that look elsewhere.
+  GivenSheet apart(4);
+  for (std::size_t i = 0; i < 4; ++i)
+    apart.options.given_poses[i]->translation.x() += 100.0 * static_cast<double>(i);
+  adjusted = apart.Run();
+  EXPECT_EQ(adjusted.status.code, StatusCode::kRefused);
+  EXPECT_NE(adjusted.status.message.find("given poses"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace circline
