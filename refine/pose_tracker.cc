@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 #include <limits>
 #include <string>
@@ -14,140 +13,12 @@
 #include "circline/refine/chi_square.h"
 #include "circline/refine/track_frame.h"
 #include "circline/refine/track_map.h"
+#include "circline/refine/track_ranking.h"
+#include "circline/refine/track_relocate.h"
 #include "circline/refine/track_result.h"
 #include "circline/refine/track_state.h"
 
 namespace circline {
-namespace {
-
-bool IsPositiveDefinite(const std::array<double, 36>& covariance) {
-  const Eigen::Map<const Matrix6d> P(covariance.data());
-  return P.allFinite() && Eigen::LLT<Matrix6d>(P).info() == Eigen::Success;
-}
-
-bool IsRotation(const Eigen::Matrix3d& R) {
-  constexpr double kTolerance = 1e-6;
-  return (R * R.transpose()).isIdentity(kTolerance) && R.determinant() > 0.0;
-}
-
-// Whether two fits of a frame are one minimum, or so near that it does not matter: the squared
-// distance of their poses under both covariances.
-bool IsSame(const TrackMap& map, const TrackFit& a, const TrackFit& b) {
-  constexpr double kSame = 0.25;  // Half a standard deviation.
-  const CameraPose p = a.state.Pose(map), q = b.state.Pose(map);
-  const int size = map.tangent(TrackMap::kTurnRate);
-  Eigen::VectorXd e(size);
-  e.head<3>() = LogRotation(p.rotation.transpose() * q.rotation);
-  if (size == 6) e.tail<3>() = q.translation - p.translation;
-  const Eigen::LLT<Eigen::MatrixXd> llt(a.state.covariance.topLeftCorner(size, size) +
-                                        b.state.covariance.topLeftCorner(size, size));
-  return llt.info() == Eigen::Success && e.dot(llt.solve(e)) < kSame;
-}
-
-double LogAdd(double a, double b) {
-  if (std::isinf(a)) return b;
-  return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
-}
-
-// Minima that several starts lead to are one. What `both` makes of two log weights: the larger one
-// of two starts of a hypothesis, the sum of the probabilities of two hypotheses.
-void Merge(const TrackMap& map, double (*both)(double, double), std::vector<TrackFit>* fits) {
-  std::vector<TrackFit> merged;
-  for (TrackFit& fit : *fits) {
-    const auto same = std::find_if(merged.begin(), merged.end(),
-                                   [&](const TrackFit& other) { return IsSame(map, fit, other); });
-    if (same == merged.end()) {
-      merged.push_back(std::move(fit));
-      continue;
-    }
-    const double a = same->state.log_weight, b = fit.state.log_weight;
-    if (b > a) *same = std::move(fit);
-    same->state.log_weight = both(a, b);
-  }
-  *fits = std::move(merged);
-}
-
-double LogWeight(const TrackState& state) { return state.log_weight; }
-double LogWeight(const TrackFit& fit) { return fit.state.log_weight; }
-double& LogWeight(TrackState& state) { return state.log_weight; }
-double& LogWeight(TrackFit& fit) { return fit.state.log_weight; }
-
-template <typename T>
-void Normalize(std::vector<T>* all) {
-  double sum = -std::numeric_limits<double>::infinity();
-  for (const T& one : *all) sum = LogAdd(sum, LogWeight(one));
-  for (T& one : *all) LogWeight(one) -= sum;
-}
-
-// Log weights to log probabilities; drops what is improbable and orders the rest. The first stays
-// first unless another one is clearly more probable.
-template <typename T>
-void Rank(const TrackerOptions& options, std::vector<T>* all) {
-  Normalize(all);
-  const auto is_more = [](const T& a, const T& b) { return LogWeight(a) > LogWeight(b); };
-  const auto best = std::min_element(all->begin(), all->end(), is_more);
-  if (LogWeight(*best) > LogWeight(all->front()) + std::log(options.flip_odds))
-    std::rotate(all->begin(), best, best + 1);
-  std::stable_sort(all->begin() + 1, all->end(), is_more);
-  const double least = std::log(options.min_probability);
-  all->erase(std::remove_if(all->begin() + 1, all->end(),
-                            [&](const T& one) { return LogWeight(one) < least; }),
-             all->end());
-  const auto most = static_cast<std::size_t>(options.max_hypotheses);
-  if (all->size() > most) all->erase(all->begin() + options.max_hypotheses, all->end());
-  Normalize(all);
-}
-
-std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
-  if (hypotheses.size() < 2) return "only one pose fits the evidence of all frames";
-  constexpr double kSure = 0.95;
-  if (hypotheses[0].probability < kSure)
-    return "nothing decides: several poses explain the evidence of all frames";
-  char text[120];
-  std::snprintf(text, sizeof(text), "all frames so far: odds of %.3g to the second pose",
-                hypotheses[0].probability / std::max(hypotheses[1].probability, 1e-300));
-  return text;
-}
-
-}  // namespace
-
-Status TrackerOptions::Validate() const {
-  const Status status = estimation.Validate();
-  if (!status.ok()) return status;
-  const std::pair<double, const char*> positive[] = {
-      {turn_rate_sigma, "turn_rate_sigma"},
-      {velocity_sigma, "velocity_sigma"},
-      {initial_turn_rate_sigma, "initial_turn_rate_sigma"},
-      {initial_velocity_sigma, "initial_velocity_sigma"},
-      {max_gap_s, "max_gap_s"}};
-  for (const auto& [value, name] : positive) {
-    if (!(value > 0.0) || !std::isfinite(value))
-      return Status::Invalid(std::string(name) + " must be positive");
-  }
-  for (const auto& [value, name] : {std::pair(min_probability, "min_probability"),
-                                    std::pair(gate_probability, "gate_probability")}) {
-    if (!(value > 0.0 && value < 1.0))
-      return Status::Invalid(std::string(name) + " must be between 0 and 1");
-  }
-  if (!(flip_odds >= 1.0)) return Status::Invalid("flip_odds must be 1 or more");
-  if (max_hypotheses < 1) return Status::Invalid("max_hypotheses must be 1 or more");
-  if (lost_after < 1) return Status::Invalid("lost_after must be 1 or more");
-  if (max_evaluations < 2) return Status::Invalid("max_evaluations must be 2 or more");
-  return Status::Ok();
-}
-
-Status MotionPrior::Validate() const {
-  if (relative && (!IsRotation(relative->now_from_before.rotation) ||
-                   !relative->now_from_before.translation.allFinite() ||
-                   !IsPositiveDefinite(relative->covariance))) {
-    return Status::Invalid(
-        "relative must be a rotation, a finite translation and a positive definite covariance");
-  }
-  EstimationOptions options;
-  if (absolute) options.pose_prior = *absolute;
-  if (gravity) options.gravity_prior = *gravity;
-  return options.Validate();
-}
 
 class PoseTracker::Implementation {
  public:
@@ -176,7 +47,6 @@ class PoseTracker::Implementation {
     Prepare(observations);
     if (states_.empty() || time - used_ > options_.max_gap_s) {
       Start(observations, &tracked);
-      if (!tracked.estimate.status.ok()) states_.clear();
       return tracked;
     }
     Move(dt, motion);
@@ -185,11 +55,7 @@ class PoseTracker::Implementation {
       Predicted(observations, &tracked);
       return tracked;
     }
-    contradictions_ = 0;
-    used_ = time;
-    tracked.frames_since_start = ++frames_;
-    Answer(&tracked);
-    ExtendMap(fitted_, options_, &map_, &states_);
+    Use(&tracked);
     return tracked;
   }
 
@@ -226,7 +92,7 @@ class PoseTracker::Implementation {
     PoseEstimate& estimate = tracked->estimate;
     estimate = EstimatePose(observations, options_.estimation);
     estimate.solver = "tracker";
-    if (!estimate.status.ok()) return;
+    if (!estimate.status.ok() || Relocalize(tracked)) return;
     if (!states_.empty()) estimate.notes.emplace_back("the track was lost and starts anew");
     tracked->reinitialized = true;
     contradictions_ = frames_ = 0;
@@ -235,9 +101,11 @@ class PoseTracker::Implementation {
     StartMap(resolved, estimate.hypotheses, options_, &map_, &states_);
     const TrackFrame frame(resolved, noise_, options_.estimation, map_);
     std::vector<TrackFit> fits;
-    for (const TrackState& state : states_) {
+    for (std::size_t i = 0; i < states_.size(); ++i) {
+      const TrackState& state = states_[i];
+      const double log_focal = std::log(estimate.hypotheses[i].focal_scale);
       TrackFit fit;
-      if (!frame.RefineHere(state, options_, &fit)) continue;
+      if (!frame.RefineHere(state, log_focal, options_, &fit)) continue;
       ConditionOnPriors(&fit.state);
       fit.state.log_weight = state.log_weight;  // Its evidence has been counted.
       fits.push_back(std::move(fit));
@@ -247,6 +115,46 @@ class PoseTracker::Implementation {
     states_.clear();
     for (TrackFit& fit : fits) states_.push_back(std::move(fit.state));
     if (fitted_.frame.plane.empty()) map_.plane = NamedPlane(fitted_, map_.plane);
+  }
+
+  // Goes on in the known map, where the frame, whose own poses `tracked` has, shows some of it and
+  // agrees with the rest.
+  bool Relocalize(TrackedPose* tracked) {
+    const std::vector<TrackState> starts =
+        Relocated(map_, states_, tracked->estimate.hypotheses, options_);
+    if (starts.empty()) return false;
+    fits_.clear();
+    frame_ = std::make_unique<TrackFrame>(fitted_, noise_, options_.estimation, map_);
+    for (const TrackState& start : starts) {
+      const double log_focal = start.x[map_.block(TrackMap::kCamera).offset];
+      TrackFit fit;
+      if (frame_->RefineHere(start, log_focal, options_, &fit) && Agrees(fit))
+        fits_.push_back(std::move(fit));
+    }
+    if (fits_.empty()) return false;
+    Merge(
+        map_, [](double a, double b) { return std::max(a, b); }, &fits_);
+    Rank(options_, &fits_);
+    states_.clear();
+    for (const TrackFit& fit : fits_) states_.push_back(fit.state);
+    tracked->estimate.hypotheses.clear();
+    tracked->relocalized = true;
+    Use(tracked);
+    tracked->estimate.notes.emplace_back("the track was lost, and is back in its world");
+    return true;
+  }
+
+  bool Agrees(const TrackFit& fit) const {
+    return fit.misfit <= ChiSquareLimit(std::max(1, fit.dof), options_.gate_probability);
+  }
+
+  // The frame's part is in states_ and fits_.
+  void Use(TrackedPose* tracked) {
+    contradictions_ = 0;
+    used_ = time_;
+    tracked->frames_since_start = ++frames_;
+    Answer(tracked);
+    ExtendMap(fitted_, options_, &map_, &states_);
   }
 
   // What is known of the first pose counts in those that follow.
@@ -302,9 +210,8 @@ class PoseTracker::Implementation {
           map_, [](double a, double b) { return std::max(a, b); }, &own);
       std::move(own.begin(), own.end(), std::back_inserter(fits_));
     }
-    if (std::none_of(fits_.begin(), fits_.end(), [&](const TrackFit& fit) {
-          return fit.misfit <= ChiSquareLimit(std::max(1, fit.dof), options_.gate_probability);
-        })) {
+    if (std::none_of(fits_.begin(), fits_.end(),
+                     [&](const TrackFit& fit) { return Agrees(fit); })) {
       fits_.clear();
       return;
     }

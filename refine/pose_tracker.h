@@ -32,8 +32,9 @@
 //
 // Loss. A frame that contradicts all hypotheses, or has nothing of the map but other features, is
 // not used (predicted_only). After TrackerOptions::lost_after of them in a row, or a gap longer
-// than max_gap_s, the tracker starts anew from the frame that it is given, with a new world and
-// `reinitialized` set.
+// than max_gap_s, the track is lost. A frame with circles of the map, by their ids, that agrees
+// with it brings it back into the same world (`relocalized`), however long the gap was; any other
+// one with a pose starts it anew, with a new world (`reinitialized`).
 //
 // Errors are statuses. Wrong input (a time that is not finite or runs backwards, observations or
 // options that do not pass their Validate) is refused in words and changes nothing. A frame without
@@ -113,6 +114,7 @@ struct TrackedPose {
   PoseEstimate estimate;
   double timestamp_s = 0.0;
   bool reinitialized = false;   // The track starts with this frame, with a world frame of its own.
+  bool relocalized = false;     // Lost before this frame, and found again in the same world.
   bool predicted_only = false;  // Moved on from earlier frames; this one has no part in it.
   int frames_since_start = 0;   // 0 for the one with which the track starts.
 };

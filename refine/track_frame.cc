@@ -236,9 +236,12 @@ double PriorCost(const TrackMap& map, const TrackState& prior, const CameraPose&
 
 }  // namespace
 
-bool TrackFrame::RefineHere(const TrackState& prior, const TrackerOptions& options,
-                            TrackFit* fit) const {
-  return Begin(prior, prior.Pose(map_), fit) && RefineFrom(prior, options, fit);
+bool TrackFrame::RefineHere(const TrackState& prior, double log_focal,
+                            const TrackerOptions& options, TrackFit* fit) const {
+  // From this camera, through which lines are placed, too.
+  TrackState start = prior;
+  if (!map_.camera_is_considered) start.x[map_.block(TrackMap::kCamera).offset] = log_focal;
+  return Begin(start, prior.Pose(map_), fit) && RefineFrom(prior, options, fit);
 }
 
 void TrackFrame::Refine(const TrackState& prior, const TrackerOptions& options,

@@ -44,8 +44,10 @@ class TrackFrame {
   void Refine(const TrackState& prior, const TrackerOptions& options,
               std::vector<TrackFit>* fits) const;
 
-  // Refines one from where it is. False where that fails.
-  bool RefineHere(const TrackState& prior, const TrackerOptions& options, TrackFit* fit) const;
+  // Refines one from where it is, but from this focal length (shift of log f). False where that
+  // fails.
+  bool RefineHere(const TrackState& prior, double log_focal, const TrackerOptions& options,
+                  TrackFit* fit) const;
 
   struct Term {
     std::unique_ptr<FeatureCost> cost;

@@ -175,8 +175,9 @@ class MapBuilder {
 };
 
 // Pose, velocities and camera of a hypothesis, as a first frame's evidence finds them.
+// `log_focal`: the prior's mean, against the camera that the frame comes with.
 TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const TrackerOptions& options,
-                      const CameraSigma& sigma) {
+                      const CameraSigma& sigma, double log_focal) {
   TrackState state;
   const double distance = h.cam_from_world.translation.norm();
   const Eigen::Quaterniond q(h.cam_from_world.rotation);
@@ -205,7 +206,9 @@ TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const Tracke
     const Eigen::MatrixXd chart = ChartOf(block, zeros.data());
     covariance = chart * camera.cwiseAbs2().asDiagonal() * chart.transpose();
   }
-  state.Append(map, TrackMap::kCamera, zeros.data(), covariance);
+  Eigen::VectorXd mean = zeros;
+  if (block.tangent_size() > 0) mean[0] = log_focal;
+  state.Append(map, TrackMap::kCamera, mean.data(), covariance);
   state.log_weight = std::log(std::max(h.probability, 1e-300));
   return state;
 }
@@ -259,7 +262,9 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
   map->origin_observed = hypotheses.front().origin_observed;
   map->plane = resolved.frame.plane;
   states->clear();
-  for (const PoseHypothesis& h : hypotheses) states->push_back(FirstState(*map, h, options, sigma));
+  const double log_focal = sigma.log_focal > 0.0 ? StatedLogFocal(resolved) : 0.0;
+  for (const PoseHypothesis& h : hypotheses)
+    states->push_back(FirstState(*map, h, options, sigma, log_focal));
   MapBuilder builder(resolved, options, map, states);
   if (has_position) {
     const auto is_at_origin = [&](const CircleObservation& c) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "circline/refine/camera_shifts.h"
 
@@ -99,6 +100,17 @@ void FillCamera(const TrackMap& map, const TrackState& state, const Camera& came
 }
 
 }  // namespace
+
+std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
+  if (hypotheses.size() < 2) return "only one pose fits the evidence of all frames";
+  constexpr double kSure = 0.95;
+  if (hypotheses[0].probability < kSure)
+    return "nothing decides: several poses explain the evidence of all frames";
+  char text[120];
+  std::snprintf(text, sizeof(text), "all frames so far: odds of %.3g to the second pose",
+                hypotheses[0].probability / std::max(hypotheses[1].probability, 1e-300));
+  return text;
+}
 
 PoseHypothesis HypothesisOf(const TrackMap& map, const TrackState& state, const Camera& camera) {
   PoseHypothesis h;

@@ -15,6 +15,9 @@ namespace circline {
 // probability and what a frame says of it.
 PoseHypothesis HypothesisOf(const TrackMap& map, const TrackState& state, const Camera& camera);
 
+// PoseEstimate::decided_by, of ranked hypotheses.
+std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses);
+
 // What a frame says of a hypothesis: inliers, cost, what was left out and in words why.
 void FillFrame(const TrackFrame& frame, const TrackFit& fit, PoseHypothesis* hypothesis,
                std::vector<std::string>* notes);

@@ -30,6 +30,7 @@ std::string TrackLine(const std::string& best_line, const Frame& frame, const Tr
   line["frame"] = frame.index;
   line["time_s"] = frame.time_s;
   line["reinitialized"] = pose.reinitialized;
+  line["relocalized"] = pose.relocalized;
   line["predicted_only"] = pose.predicted_only;
   line["cold"] = cold;
   line["num_hypotheses"] = pose.estimate.hypotheses.size();
