@@ -29,7 +29,7 @@ class TrackFrame::Information {
     const TrackMap& map = frame.map_;
     const auto n = static_cast<Eigen::Index>(prior.rows.size()),
                c = static_cast<Eigen::Index>(prior.considered.size());
-    turn.setZero(n, n);
+    Eigen::MatrixXd plus = Eigen::MatrixXd::Zero(prior.charts.cols(), n);
     Eigen::Index column = 0, ambient = 0;
     const auto add = [&](int b) {
       const Block& block = map.block(b);
@@ -41,11 +41,11 @@ class TrackFrame::Information {
       const Block& block = map.block(b);
       add(b);
       const Eigen::Index first = columns_[static_cast<std::size_t>(b)];
-      turn.block(first, first, block.tangent_size(), block.tangent_size()) =
-          prior.charts.block(first, ambient, block.tangent_size(), block.size) *
+      plus.block(ambient, first, block.size, block.tangent_size()) =
           plus_[static_cast<std::size_t>(b)];
       ambient += block.size;
     }
+    turn = prior.ChartsAt(map, fit.state.x) * plus;
     if (c > 0) add(TrackMap::kCamera);
     // The prior's residual, and how it follows what is considered.
     Eigen::MatrixXd J(n, n + c);

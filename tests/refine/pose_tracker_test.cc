@@ -266,7 +266,9 @@ TEST(PoseTrackerTest, TheCamerasPriorIsAboutTheStatedFocalLength) {
     const TrackedPose tracked = tracker.Update(seen, static_cast<double>(k) / 30.0);
     ASSERT_TRUE(tracked.estimate.status.ok()) << tracked.estimate.status.message;
     // One circle from afar says next to nothing of it.
-    EXPECT_NEAR(tracked.estimate.hypotheses.front().focal_scale, kStated, 0.05) << k;
+    const PoseHypothesis& first = tracked.estimate.hypotheses.front();
+    EXPECT_NEAR(first.focal_scale, kStated, 0.05) << k;
+    EXPECT_GT(first.focal_sigma, 0.85 * kSigma * first.focal_scale) << k;
   }
 }
 
