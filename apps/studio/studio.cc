@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
 #include "apps/common/output_file.h"
 #include "apps/common/storage_node.h"
@@ -18,11 +19,16 @@ constexpr std::size_t kLosslessPixels = 3'000'000;
 constexpr int kShownWidth = 6000;
 constexpr std::size_t kMaxDraftBytes = std::size_t{64} << 20;
 
+// A list of a scene file; none: empty.
+const Json& ListOf(const Json& scene, const char* key) {
+  static const auto* const empty = new Json(Json::array());
+  return scene.is_object() && scene.contains(key) ? scene[key] : *empty;
+}
+
 // The entry of a scene file for that photo, or null.
 Json EntryOf(const Json& scene, const std::string& name) {
-  if (!scene.is_object()) return nullptr;
-  for (const Json& image : scene.value("images", Json::array())) {
-    if (image.is_object() && image.value("file", "") == name) return image;
+  for (const Json& image : ListOf(scene, "images")) {
+    if (image.value("file", "") == name) return image;
   }
   return nullptr;
 }
@@ -30,8 +36,7 @@ Json EntryOf(const Json& scene, const std::string& name) {
 Json SavedCamera(const Json& scene, const std::string& name) {
   const Json entry = EntryOf(scene, name);
   if (!entry.is_object()) return nullptr;
-  const Json cameras = scene.value("cameras", Json::array());
-  for (const Json& camera : cameras) {
+  for (const Json& camera : ListOf(scene, "cameras")) {
     if (camera.value("id", "") == entry.value("camera", "")) return camera;
   }
   return nullptr;
@@ -76,19 +81,22 @@ std::size_t Studio::Index(const Json& request) const {
   const auto image = request.find("image");
   std::size_t n = folder_.size();
   if (image != request.end() && image->is_string()) n = folder_.Find(image->get<std::string>());
-  if (image != request.end() && image->is_number_unsigned()) n = image->get<std::size_t>();
+  if (image != request.end() && image->is_number_integer() && *image >= 0)
+    n = image->get<std::size_t>();
   if (n < folder_.size()) return n;
   throw RequestError(404, "there is no such image; /api/images lists them");
 }
 
 Json Studio::Images() const {
   const std::lock_guard<std::mutex> lock(mutex_);
+  std::set<std::string> saved;
+  for (const Json& image : ListOf(scene_, "images")) saved.insert(image.value("file", ""));
   Json images = Json::array();
   for (std::size_t n = 0; n < folder_.size(); ++n) {
     const std::string& name = folder_.name(n);
     images.push_back({{"image", n},
                       {"name", Utf8(name)},
-                      {"saved", EntryOf(scene_, name).is_object()},
+                      {"saved", saved.count(name) > 0},
                       {"draft", draft_.contains(Utf8(name))}});
   }
   return {{"folder", Utf8(folder_.path())},

@@ -1,0 +1,343 @@
+// The studio's server as a stranger meets it: who may ask, what may be read and written, and what
+// becomes of requests that are malformed, huge or hostile.
+// clang-format off: httplib.h includes resolv.h, which has a macro _res, a name of Eigen's.
+#include "apps/studio/server.h"
+// clang-format on
+
+#include <gtest/gtest.h>
+#include <httplib.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <thread>
+
+#include "apps/studio/studio.h"
+#include "tests/apps/test_files.h"
+
+namespace circline::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A bright disc, tilted, on a dark ground.
+cv::Mat DiscPhoto(int width, int height) {
+  cv::Mat photo(height, width, CV_8UC1, cv::Scalar(40));
+  cv::ellipse(photo, {width / 2, height / 2}, {width / 5, height / 7}, 20.0, 0.0, 360.0,
+              cv::Scalar(220), cv::FILLED, cv::LINE_AA);
+  cv::GaussianBlur(photo, photo, {5, 5}, 1.0);
+  return photo;
+}
+
+CompareOptions Options() {
+  CompareOptions options;
+  options.solvers = {"joint"};
+  options.overlays = false;
+  options.losses.resize(1);
+  return options;
+}
+
+class StudioServerTest : public testing::Test {
+ protected:
+  StudioServerTest() { cv::imwrite(folder_ / "disc.png", DiscPhoto(320, 240)); }
+  ~StudioServerTest() override { Stop(); }
+
+  void Start() {
+    PhotoFolder photos;
+    ASSERT_TRUE(photos.Open(folder_.path()).ok());
+    studio_ = std::make_unique<Studio>(Options(), photos, nullptr);
+    studio_->ReadFiles();
+    server_ = std::make_unique<StudioServer>(studio_.get());
+    ASSERT_TRUE(server_->Bind(0).ok());
+    thread_ = std::thread([this] { server_->Serve(); });
+    client_ = std::make_unique<httplib::Client>("127.0.0.1", server_->port());
+    while (!client_->Get("/")) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  void Stop() {
+    if (!thread_.joinable()) return;
+    client_.reset();
+    server_->Stop();
+    thread_.join();
+  }
+
+  // The answer; `status` receives its status, 0 where the connection was cut.
+  Json Post(const std::string& address, const std::string& body, int* status) {
+    const httplib::Result result = client_->Post(address, body, "application/json");
+    *status = result ? result->status : 0;
+    return result ? Json::parse(result->body, nullptr, false) : Json();
+  }
+  Json Ask(const std::string& address, const Json& request, int expected = 200) {
+    int status = 0;
+    Json answer = Post(address, request.dump(), &status);
+    EXPECT_EQ(status, expected) << answer;
+    if (expected != 200) {
+      EXPECT_TRUE(answer.contains("error")) << answer;
+    }
+    return answer;
+  }
+  // The first found ellipse as a scene file's circle.
+  Json SceneOfDisc() {
+    const Json found = Ask("/api/detect", {{"image", 0}});
+    const std::string id = found["ellipses"][0]["id"];
+    const Json circle = {
+        {"id", id}, {"contour", found["contours"][id]}, {"radius", 2.0}, {"plane", "p"}};
+    return {{"circles", Json::array({circle})}};
+  }
+  bool IsAlive() {
+    const httplib::Result result = client_->Get("/api/images");
+    return result && result->status == 200;
+  }
+
+  TestFolder folder_;
+  std::unique_ptr<Studio> studio_;
+  std::unique_ptr<StudioServer> server_;
+  std::unique_ptr<httplib::Client> client_;
+  std::thread thread_;
+};
+
+TEST_F(StudioServerTest, DetectsEstimatesAndSavesAScene) {
+  Start();
+  const Json scene = SceneOfDisc();
+  const Json estimate = Ask("/api/estimate", {{"image", "disc.png"}, {"scene", scene}});
+  EXPECT_EQ(estimate["status"], "ok");
+  ASSERT_GE(estimate["hypotheses"].size(), 2U);  // For each focal length that it may be.
+  EXPECT_EQ(estimate["hypotheses"][0]["rotation"].size(), 9U);
+  EXPECT_EQ(estimate["drawings"][0]["circles"][0]["id"], scene["circles"][0]["id"]);
+  const Json saved = Ask("/api/save", {{"image", 0}, {"scene", scene}});
+  std::vector<SceneImage> images;
+  const Status status = ReadScene(saved["file"].get<std::string>(), {}, &images);
+  ASSERT_TRUE(status.ok()) << status.message;
+  ASSERT_EQ(images.size(), 1U);
+  EXPECT_EQ(images[0].observations.circles[0].radius, 2.0);
+  // A guessed camera is written with how little it is known.
+  EXPECT_GE(images[0].camera_sigma.log_focal.value_or(0.0), 0.25);
+}
+
+TEST_F(StudioServerTest, KeepsDraftAndSceneOverARestart) {
+  Start();
+  const Json state = {{"scene", SceneOfDisc()}, {"hypothesis", 1}};
+  Ask("/api/draft", {{"image", 0}, {"state", state}});
+  Ask("/api/save", {{"image", 0}, {"scene", state["scene"]}});
+  Stop();
+  Start();
+  const httplib::Result result = client_->Get("/api/session/0");
+  ASSERT_TRUE(result);
+  const Json session = Json::parse(result->body);
+  EXPECT_EQ(session["draft"], state);
+  EXPECT_EQ(session["saved"]["circles"], state["scene"]["circles"]);
+}
+
+TEST_F(StudioServerTest, DoesNotWriteOverASceneThatItCannotRead) {
+  folder_.Write("scene.json", "{ \"pictures\": [] }");
+  Start();
+  const Json answer = Ask("/api/save", {{"image", 0}, {"scene", Json::object()}}, 409);
+  EXPECT_CONTAINS(answer["error"].get<std::string>(), "pictures");
+  EXPECT_EQ(ReadAll(folder_ / "scene.json"), "{ \"pictures\": [] }");
+}
+
+TEST_F(StudioServerTest, AnswersOnlyItsOwnPage) {
+  Start();
+  const std::string port = std::to_string(server_->port());
+  const auto status = [&](const httplib::Headers& headers) {
+    const httplib::Result result = client_->Get("/api/images", headers);
+    return result ? result->status : 0;
+  };
+  EXPECT_EQ(status({{"Host", "localhost:" + port}}), 200);
+  EXPECT_EQ(status({{"Host", "example.org"}}), 403);
+  EXPECT_EQ(status({{"Host", "example.org:" + port}}), 403);
+  EXPECT_EQ(status({{"Host", "127.0.0.1.example.org:" + port}}), 403);
+  EXPECT_EQ(status({{"Origin", "http://127.0.0.1:" + port}}), 200);
+  for (const std::string origin : {"http://example.org", "null", "https://127.0.0.1", "file://",
+                                   "http://127.0.0.1:1", "http://localhost.example.org"}) {
+    EXPECT_EQ(status({{"Origin", origin}}), 403) << origin;
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "scene.json"));
+}
+
+TEST_F(StudioServerTest, RefusesWhatLeadsOutOfTheFolder) {
+  const TestFolder outside;
+  cv::imwrite(outside / "secret.png", DiscPhoto(64, 64));
+  fs::create_symlink(outside / "secret.png", folder_ / "link.png");
+  fs::create_symlink(outside / "scene.json", folder_ / "scene.json");
+  fs::create_directory_symlink(outside.path(), folder_ / "export");
+  Start();
+  const httplib::Result link = client_->Get("/api/image/1");
+  ASSERT_TRUE(link);
+  EXPECT_EQ(link->status, 403);
+  EXPECT_CONTAINS(link->body, "leads out");
+  const Json scene = SceneOfDisc();
+  Ask("/api/save", {{"image", 0}, {"scene", scene}}, 409);
+  Ask("/api/export", {{"image", 0}, {"scene", scene}, {"format", "gltf"}}, 409);
+  for (const std::string address :
+       {"/../secret.png", "/api/image/../../secret.png", "/api/image/%2e%2e%2fsecret.png",
+        "/etc/passwd", "/api/image/-1", "/api/image/99999999999999999999", "/api/image/7"}) {
+    const httplib::Result result = client_->Get(address);
+    ASSERT_TRUE(result) << address;
+    EXPECT_EQ(result->status, 404) << address;
+  }
+  Json away = scene;
+  away["file"] = "../secret.png";
+  Ask("/api/estimate", {{"image", 0}, {"scene", away}}, 400);
+  Ask("/api/detect", {{"image", "../secret.png"}}, 404);
+  EXPECT_EQ(std::distance(fs::directory_iterator(outside.path()), fs::directory_iterator()), 1);
+}
+
+TEST_F(StudioServerTest, SaysWhatIsWrongWithAPhoto) {
+  folder_.Write("a_broken.jpg", "no photo");
+  folder_.Write("b_empty.png", "");
+  Start();
+  for (const char* name : {"a_broken.jpg", "b_empty.png"}) {
+    const Json answer = Ask("/api/detect", {{"image", name}}, 422);
+    EXPECT_CONTAINS(answer["error"].get<std::string>(), name);
+  }
+  Ask("/api/detect", {{"image", "disc.png"}});
+}
+
+TEST_F(StudioServerTest, SurvivesMalformedAndHugeRequests) {
+  Start();
+  const std::string image = "{\"image\":0,\"scene\":";
+  const std::vector<std::string> bodies = {
+      "",
+      "{",
+      "[]",
+      "null",
+      "\"",
+      "{\"image\":-1}",
+      "{\"image\":0.5}",
+      "{\"image\":{}}",
+      "{\"image\":18446744073709551615}",
+      "\xff\xfe",
+      std::string("{\0}", 3),
+      std::string(100000, '['),
+      image + std::string(100000, '{') + "}",
+      image + "{\"circles\":[{\"id\":\"c\",\"contour\":[1e999,1]}]}}",
+      image + "{\"circles\":[{\"id\":\"c\",\"contour\":\"no\"}]}}",
+      image + "{\"circles\":[{\"id\":\"c\",\"contour\":[1,2,3,4,5,6,7,8,9,10]}]}}",
+      image + "{\"circles\":[{\"id\":\"c\",\"roi\":[-1e5,-1e5,1e6,1e6]}]}}",
+      image + "{\"pencils\":[{\"id\":\"\\\"\\\\\\n\",\"segments\":[1,2,3,4]}]}}",
+      image + "{\"pencils\":[{\"id\":\"x\",\"segments\":[]}]}}",
+      image + "[]}",
+      image + "7}",
+      image + "{},\"hypothesis\":-1}",
+      image + "{},\"hypothesis\":1e300}",
+      image + "{},\"measure\":[{\"kind\":\"length\",\"points\":[1]}]}",
+      image + "{},\"measure\":{\"kind\":7}}"};
+  for (const char* address :
+       {"/api/detect", "/api/estimate", "/api/save", "/api/draft", "/api/export"}) {
+    for (const std::string& body : bodies) {
+      int status = 0;
+      const Json answer = Post(address, body, &status);
+      EXPECT_TRUE(status == 200 || (status >= 400 && status < 500 && answer.contains("error")))
+          << address << " " << body.substr(0, 80) << " " << status << " " << answer;
+    }
+  }
+  int status = 0;
+  Post("/api/draft", "{\"image\":0,\"state\":{\"a\":\"" + std::string(9 << 20, 'x') + "\"}}",
+       &status);
+  EXPECT_TRUE(status == 413 || status == 0) << status;
+  // The same without a stated length.
+  std::size_t sent = 0;
+  const std::string piece(1 << 16, ' ');
+  client_->Post(
+      "/api/draft",
+      [&](std::size_t, httplib::DataSink& sink) {
+        sink.write(piece.data(), piece.size());
+        sent += piece.size();
+        if (sent > (std::size_t{64} << 20)) sink.done();
+        return true;
+      },
+      "application/json");
+  EXPECT_LT(sent, std::size_t{32} << 20);
+  EXPECT_TRUE(IsAlive());
+}
+
+// Requests with bytes changed at random.
+TEST_F(StudioServerTest, SurvivesFuzzedRequests) {
+  Start();
+  const char* const given = std::getenv("CIRCLINE_FUZZ_REQUESTS");
+  const int count = given != nullptr ? std::atoi(given) : 300;
+  Json scene = SceneOfDisc();
+  // Fewer points, so that most changes fall on what is between them.
+  Json contour = Json::array();
+  for (std::size_t i = 0; i + 1 < scene["circles"][0]["contour"].size(); i += 40) {
+    contour.push_back(scene["circles"][0]["contour"][i]);
+    contour.push_back(scene["circles"][0]["contour"][i + 1]);
+  }
+  scene["circles"][0]["contour"] = contour;
+  scene["pencils"] = {{{"id", "x"}, {"segments", {10, 10, 200, 12}}, {"direction", "x"}}};
+  scene["frame"] = {{"x_axis", {160, 120, 200, 120}}, {"plane", "p"}};
+  scene["known"] = {{"length", {{{"points", {10, 10, 90, 12}}, {"value", 3.0}}}}};
+  const std::string whole =
+      Json({{"image", 0}, {"scene", scene}, {"hypothesis", 0}, {"measure", Json::array()}}).dump();
+  std::mt19937 random(7);
+  const auto below = [&](std::size_t n) { return random() % n; };
+  for (int i = 0; i < count; ++i) {
+    std::string body = whole;
+    for (std::size_t k = 0; k < 1 + below(4); ++k) {
+      const std::size_t at = below(body.size());
+      if (below(2) == 0)
+        body[at] = "{}[]\":,-9e. \\"[below(13)];
+      else if (below(2) == 0)
+        body.erase(at, below(20));
+      else
+        body.insert(at, body.substr(below(body.size()), below(20)));
+    }
+    int status = 0;
+    const Json answer = Post("/api/estimate", body, &status);
+    ASSERT_TRUE(status == 200 || (status >= 400 && status < 500)) << status << " " << body;
+  }
+  EXPECT_TRUE(IsAlive());
+}
+
+TEST_F(StudioServerTest, TwoCannotHaveOnePort) {
+  Start();
+  StudioServer second(studio_.get());
+  const Status status = second.Bind(server_->port());
+  EXPECT_FALSE(status.ok());
+  EXPECT_CONTAINS(status.message, "another program uses it");
+}
+
+TEST(StudioFolder, OfFiveThousandPhotosIsListedAtOnce) {
+  const TestFolder folder;
+  for (int i = 0; i < 5000; ++i) folder.Write("photo" + std::to_string(10000 + i) + ".jpg", "");
+  PhotoFolder photos;
+  ASSERT_TRUE(photos.Open(folder.path()).ok());
+  Studio studio(Options(), photos, nullptr);
+  ASSERT_TRUE(studio.ReadFiles().ok());
+  EXPECT_EQ(studio.Images()["images"].size(), 5000U);
+  EXPECT_EQ(photos.Find("photo14999.jpg"), 4999U);
+  EXPECT_EQ(photos.Find("other.jpg"), 5000U);
+}
+
+TEST(StudioFolder, APhotoOfFiftyMegapixelsCanBeUsed) {
+  const TestFolder folder;
+  cv::imwrite(folder / "large.jpg", DiscPhoto(8660, 5774));
+  PhotoFolder photos;
+  ASSERT_TRUE(photos.Open(folder.path()).ok());
+  Studio studio(Options(), photos, nullptr);
+  const ShownPhoto shown = studio.Photo(0);
+  EXPECT_EQ(shown.width, 8660);
+  EXPECT_EQ(shown.type, "image/jpeg");
+  EXPECT_EQ(studio.Detect({{"image", 0}})["ellipses"].size(), 1U);
+}
+
+TEST(StudioFolder, SaysThatThereIsNone) {
+  PhotoFolder photos;
+  const TestFolder empty;
+  EXPECT_CONTAINS(photos.Open(empty / "none").message, "must be a folder");
+  EXPECT_CONTAINS(photos.Open(empty.path()).message, "has no photo");
+}
+
+TEST(StudioServer, KnowsTheLoopbackAddress) {
+  for (const char* host : {"127.0.0.1", "localhost", "[::1]", "127.0.0.1:80", "localhost:80"})
+    EXPECT_TRUE(IsLoopback(host, 80)) << host;
+  for (const char* host : {"", "127.0.0.1:81", "127.0.0.2", "localhost.org", "localhost:80:80",
+                           "LOCALHOST.", "0.0.0.0", "127.0.0.1:080"}) {
+    EXPECT_FALSE(IsLoopback(host, 80)) << host;
+  }
+}
+
+}  // namespace
+}  // namespace circline::apps
