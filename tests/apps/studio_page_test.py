@@ -9,6 +9,7 @@ Exit code 77: Chromium, its driver, selenium or the photographs are not there.
 import argparse
 import base64
 import json
+import math
 import os
 import re
 import shutil
@@ -21,6 +22,8 @@ import urllib.request
 
 SKIPPED = 77
 NAMES = ['image.0007.pgm', 'image.0049.pgm', 'image.0091.pgm']
+TRUE_NORMAL = (-0.05940087, 0.7557466, 0.6521645)  # Of NAMES[0], up to sign, by the dots.
+RADIUS, DISTANCE = 31.7455, 620.1  # Of the disc, millimetres; from the camera to its centre.
 DISC, CENTER = (166.3, 175.0), (166.34, 186.09)  # A point within it, and its centre, by the dots.
 # Along the front and the left edge of the plate on NAMES[0]; the page snaps to what was found there.
 FRONT, LEFT = (90.0, 257.5, 260.0, 234.8), (61.0, 165.0, 69.0, 243.0)
@@ -223,6 +226,17 @@ def check_undo_and_reload(page):
     check(page.doc() == said and far(page.pose(), pose) == 0.0, 'a reload loses nothing')
 
 
+def check_truth(page):
+    rotation, _ = page.pose()
+    cosine = abs(sum(rotation[3 * i + 2] * TRUE_NORMAL[i] for i in range(3)))
+    check(cosine > math.cos(math.radians(1.0)), 'the normal is within 1 degree of the truth')
+    field = page.driver.find_element(By.CSS_SELECTOR, '#panel li input')
+    field.send_keys(str(RADIUS), Keys.TAB)
+    page.settle()
+    check(abs(math.hypot(*page.pose()[1]) / DISTANCE - 1) < 0.02, 'a known radius gives the distance, within 2 %')
+    page.control('z')
+
+
 def check_exports(page, folder):
     for name, file in (('gltf', 'cameras.gltf'), ('colmap', 'images.txt'), ('csv', 'measurements.csv')):
         page.driver.execute_script(
@@ -292,6 +306,7 @@ def main():
             page.open()
             say_disc_and_edges(page)
             check_against_compare(page, args, folder)
+            check_truth(page)
             check_undo_and_reload(page)
             check_exports(page, folder)
             check_rest(page)

@@ -18,9 +18,10 @@ export const detect = (image) => post('api/detect', {image});
 export const estimate = (request) => post('api/estimate', request);
 export const save = (image, scene) => post('api/save', {image, scene});
 export const exportPose = (request) => post('api/export', request);
-// `leaving`: the page is about to go, and the request must outlive it.
+// `leaving`: the page is about to go, and the request is to outlive it, which browsers promise of
+// small ones only.
 export const draft = (image, state, leaving = false) =>
-  post('api/draft', {image, state}, {keepalive: leaving});
+  post('api/draft', {image, state}, {keepalive: leaving && JSON.stringify(state).length < 60000});
 
 // {bitmap, width, height}: a large photo's bitmap has fewer pixels than the photo.
 export async function photo(image) {

@@ -92,6 +92,7 @@ async function open(image) {
     const saved = session.saved ? docOfEntry(session.saved) : emptyDoc();
     app.doc = session.draft || saved;
     setSaved(entryOf(saved));
+    app.images[image].draft = !isSaved();
     app.photo = photo;
     fit();
     changed('view');

@@ -218,11 +218,24 @@ function showLens(screen) {
   drawLens(lens, toPhoto(screen));
 }
 
+// What was found, and what the detection takes it for.
+function nameOf({kind, id}) {
+  if (kind === 'found-circle') {
+    const {plane} = app.detection.ellipses.find((e) => e.id === id);
+    return `circle ${id}${plane ? `, plane ${plane}` : ''}`;
+  }
+  const pencil = app.detection.pencils.find((p) => p.id === app.detection.segments[id][4]);
+  if (!pencil) return 'line';
+  const along = pencil.along === 'free' ? '' : ` along ${pencil.along}`;
+  return `line of group ${pencil.id}${along}${pencil.plane ? `, plane ${pencil.plane}` : ''}`;
+}
+
 function hover(screen) {
   const found = app.tool === 'select' || app.tool === 'line' ? foundAt(toPhoto(screen)) : null;
   const over = handleAt(screen) ? null : found;
   if (JSON.stringify(over) !== JSON.stringify(app.hover)) {
     app.hover = over;
+    canvas.title = over ? nameOf(over) : '';
     draw();
   }
   canvas.style.cursor = app.tool !== 'select' ? 'crosshair'
