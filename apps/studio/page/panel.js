@@ -101,7 +101,11 @@ function item(selection, color, name, ...children) {
 function field(value, placeholder, title, set) {
   return make('input', {type: 'number', step: 'any', min: '0', value: value || '', placeholder, title,
     onclick: (event) => event.stopPropagation(),
-    onkeydown: (event) => event.stopPropagation(),
+    onkeydown: (event) => {
+      event.stopPropagation();
+      if (event.key === 'Enter') event.target.blur();
+    },
+    onblur: () => changed('view'),
     onchange: (event) => {
       const typed = Number(event.target.value);
       change((doc) => set(doc, typed > 0 ? typed : undefined));
@@ -194,10 +198,8 @@ const orbit = make('canvas', {id: 'orbit', title: 'Drag to turn'});
 watchOrbit(orbit);
 
 export function showPanel() {
-  // A field that is being typed in stays.
-  if (panel.contains(document.activeElement) && document.activeElement.tagName === 'INPUT') {
-    document.activeElement.blur();
-  }
+  // A field that is being typed in stays until it is left.
+  if (panel.contains(document.activeElement) && document.activeElement.tagName === 'INPUT') return;
   const scrolled = panel.scrollTop;
   const parts = [poseSection(), saidSection(), measureSection(), section('From outside', orbit), notesSection()];
   panel.replaceChildren(...parts.filter(Boolean));

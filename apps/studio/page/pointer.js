@@ -126,7 +126,7 @@ function drawLine(start) {
     move(point, event) {
       const points = round([...start, ...point]);
       const reach = SNAP_PX / view.scale, found = app.detection ? app.detection.segments : [];
-      app.loose = {points, snapped: event.altKey ? null : snap(points, found, reach)};
+      app.loose = {points, snapped: event.altKey ? null : snap(points, found, reach), drawing: true};
       changed('view');
     },
     end(point) {
@@ -136,6 +136,7 @@ function drawLine(start) {
         if (found) takeFound(found); else changed('view');
       } else {
         if (app.loose.snapped) app.loose.points = app.loose.snapped;
+        app.loose.drawing = false;
         finishLine();
       }
     },

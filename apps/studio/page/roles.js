@@ -58,10 +58,17 @@ function button(text, title, work, className = '') {
   bar.append(element);
 }
 
+let shown = null;  // The line that the bar is of.
+
 export function showRoles() {
-  const wanted = app.loose && ['select', 'line'].includes(app.tool);
+  const wanted = app.loose && !app.loose.drawing && ['select', 'line'].includes(app.tool);
   bar.hidden = !wanted;
-  if (!wanted) return;
+  if (wanted && shown !== app.loose) fillBar();
+  shown = wanted ? app.loose : null;
+  if (wanted) placeBar();
+}
+
+function fillBar() {
   bar.replaceChildren();
   for (const role of DIRECTIONS) {
     button(WORDS[role][0], WORDS[role][1], () => dropLoose(role), `role-${role}`);
@@ -80,6 +87,9 @@ export function showRoles() {
     ? app.detection.segments.filter((s) => s[4] === app.loose.group).length : 0;
   if (size > 1) button(`all ${size}`, 'This line and all that were found parallel to it', dropGroup);
   button('✕', 'Drop it (Esc)', () => { app.loose = null; changed('view'); });
+}
+
+function placeBar() {
   const [x0, y0, x1, y1] = app.loose.points, end = toScreen([Math.max(x0, x1), (y0 + y1) / 2]);
   bar.style.left = `${Math.max(8, Math.min(end[0] + 14, canvas.clientWidth - bar.offsetWidth - 8))}px`;
   bar.style.top = `${Math.max(8, Math.min(end[1] - 18, canvas.clientHeight - bar.offsetHeight - 8))}px`;
