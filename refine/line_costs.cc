@@ -7,21 +7,13 @@
 
 #include "circline/refine/block_chain.h"
 #include "circline/refine/cost_functions.h"
+#include "circline/refine/line_root.h"
 #include "circline/refine/mostly_exact.h"
-#include "circline/refine/square_root.h"
 
 namespace circline {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-using LineRoot = SquareRoot<CurveModel::kMaxSize>;
-
-// A variable lens can do what no line can; the camera's other shifts cannot, but for what the lens
-// bends.
-int RankOf(const ImagePoints& points, bool camera) {
-  return 2 + (camera ? points.options().num_distortion : 0);
-}
-
 // A residual under MostlyExact, as one that is squared: its value, and that by the residual.
 struct AsSquare {
   double value, slope;
@@ -37,14 +29,6 @@ struct AsSquare {
     slope = rho[1] * r / value;
   }
 };
-
-LineRoot WriteLine(const CurveModel& model, int rank, int num_rows, double* residuals) {
-  const LineRoot root = SquareRootOf<CurveModel::kMaxSize>(model, rank, 3, 2);
-  std::fill(residuals, residuals + num_rows, 0.0);
-  Eigen::Map<Eigen::VectorXd>(residuals, root.f.size()) = root.f;
-  residuals[num_rows - 1] = root.rest;
-  return root;
-}
 
 }  // namespace
 
@@ -72,7 +56,8 @@ DirectionLineCost::DirectionLineCost(ImagePoints points, const Eigen::Vector3d& 
   for (const int size : {4, 3, options.direction_sigma > 0.0 ? 2 : 1})
     mutable_parameter_block_sizes()->push_back(size);
   if (options.camera) mutable_parameter_block_sizes()->push_back(kCameraSize);
-  set_num_residuals(RankOf(points_, options.camera) + 1 + (options.direction_sigma > 0.0 ? 1 : 0));
+  set_num_residuals(LineRank(points_, options.camera) + 1 +
+                    (options.direction_sigma > 0.0 ? 1 : 0));
 }
 
 bool DirectionLineCost::Place(const double* const* parameters, Placed* placed) const {
@@ -135,7 +120,7 @@ bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* con
     CostOnly(twice_cost, line_rows, residuals);
     return true;
   }
-  const LineRoot root = WriteLine(model, RankOf(points_, camera_variable), line_rows, residuals);
+  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), line_rows, residuals);
   const auto U = root.U.leftCols(3);
   const Eigen::Matrix3d by_direction = p.ByDirection(fit_);
   WriteJacobian(
@@ -160,7 +145,7 @@ PlaneLineCost::PlaneLineCost(ImagePoints points, bool camera)
     : points_(std::move(points)), has_camera_(camera) {
   for (const int size : {4, 3, 2, 1}) mutable_parameter_block_sizes()->push_back(size);
   if (camera) mutable_parameter_block_sizes()->push_back(kCameraSize);
-  set_num_residuals(RankOf(points_, camera) + 1);
+  set_num_residuals(LineRank(points_, camera) + 1);
 }
 
 namespace {
@@ -200,7 +185,7 @@ bool PlaneLineCost::EvaluateWith(const Weighing& weighing, const double* const* 
     CostOnly(twice_cost, rows, residuals);
     return true;
   }
-  const LineRoot root = WriteLine(model, RankOf(points_, camera_variable), rows, residuals);
+  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), rows, residuals);
   const auto U = root.U.leftCols(3);
   const Eigen::Matrix3d by_p = -CrossMatrix(line.d), by_d = CrossMatrix(line.p);
   WriteJacobian(

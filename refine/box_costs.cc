@@ -1,0 +1,100 @@
+// The cost function of a box's edges.
+#include <Eigen/Dense>
+#include <cmath>
+#include <utility>
+
+#include "circline/refine/block_chain.h"
+#include "circline/refine/cost_functions.h"
+#include "circline/refine/line_root.h"
+
+namespace circline {
+namespace {
+
+enum Block { kRotation, kTranslation, kLength, kSkew = kLength + 3, kCamera };
+
+// d (S v) / d skew, S = I + half the skew, symmetric: strain without rotation.
+Eigen::Matrix3d BySkew(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d by;
+  by << 0.0, v.z(), v.y(),  //
+      v.z(), 0.0, v.x(),    //
+      v.y(), v.x(), 0.0;
+  return 0.5 * by;
+}
+
+}  // namespace
+
+// The edge's image is the line p x d, in the camera frame: p a point of the edge, d its direction.
+struct BoxEdgeCost::Placed {
+  Eigen::Matrix3d R;
+  Eigen::Vector3d corner, along;                // In the box's axes, before the skew.
+  Eigen::Vector3d skewed_corner, skewed_along;  // The same after it.
+  Eigen::Vector3d p, d;
+
+  Placed(const BoxEdgeCost& cost, const double* const* parameters)
+      : R(RotationFromBlock(parameters[kRotation])),
+        corner(Eigen::Vector3d::Zero()),
+        along(Eigen::Vector3d::Unit(cost.axis_)) {
+    for (int k = 0; k < 3; ++k) {
+      if (k != cost.axis_ && cost.far_[static_cast<std::size_t>(k)])
+        corner[k] = parameters[kLength + k][0];
+    }
+    const Eigen::Map<const Eigen::Vector3d> skew(parameters[kSkew]);
+    skewed_corner = corner + BySkew(corner) * skew;
+    skewed_along = along + BySkew(along) * skew;
+    p = R * skewed_corner + Eigen::Map<const Eigen::Vector3d>(parameters[kTranslation]);
+    d = R * skewed_along;
+  }
+};
+
+BoxEdgeCost::BoxEdgeCost(ImagePoints points, int axis, const std::array<bool, 3>& far, bool camera)
+    : points_(std::move(points)), axis_(axis), far_(far), has_camera_(camera) {
+  for (const int size : {4, 3, 1, 1, 1, 3}) mutable_parameter_block_sizes()->push_back(size);
+  if (camera) mutable_parameter_block_sizes()->push_back(kCameraSize);
+  set_num_residuals(LineRank(points_, camera) + 1);
+}
+
+void BoxEdgeCost::Distances(const double* const* parameters, std::vector<double>* distances) const {
+  const Placed placed(*this, parameters);
+  points_.LineDistances(placed.p.cross(placed.d), has_camera_ ? parameters[kCamera] : nullptr,
+                        distances);
+}
+
+bool BoxEdgeCost::EvaluateWith(const Weighing& weighing, const double* const* parameters,
+                               double* residuals, double** jacobians) const {
+  const Placed e(*this, parameters);
+  const bool camera_variable = has_camera_ && jacobians != nullptr && jacobians[kCamera] != nullptr;
+  CurveModel model;
+  const double twice_cost =
+      points_.SumLine(e.p.cross(e.d), has_camera_ ? parameters[kCamera] : nullptr, weighing,
+                      camera_variable, jacobians != nullptr ? &model : nullptr);
+  if (!std::isfinite(twice_cost)) return false;
+  const int rows = num_residuals();
+  if (jacobians == nullptr) {
+    CostOnly(twice_cost, rows, residuals);
+    return true;
+  }
+  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), rows, residuals);
+  const auto U = root.U.leftCols(3);
+  const Eigen::Matrix3d by_p = -CrossMatrix(e.d), by_d = CrossMatrix(e.p);
+  const Eigen::Matrix3d by_corner = by_p * e.R, by_along = by_d * e.R;
+  WriteJacobian(
+      -U * (by_corner * CrossMatrix(e.skewed_corner) + by_along * CrossMatrix(e.skewed_along)) *
+          DeltaFromQuaternion(parameters[kRotation]),
+      rows, kRotation, jacobians);
+  WriteJacobian(U * by_p, rows, kTranslation, jacobians);
+  const Eigen::Map<const Eigen::Vector3d> skew(parameters[kSkew]);
+  for (int k = 0; k < 3; ++k) {
+    const bool counts = k != axis_ && far_[static_cast<std::size_t>(k)];
+    const Eigen::Vector3d unit = Eigen::Vector3d::Unit(k);
+    const Eigen::Vector3d by_length =
+        counts ? by_corner * (unit + BySkew(unit) * skew) : Eigen::Vector3d::Zero().eval();
+    WriteJacobian(U * by_length, rows, kLength + k, jacobians);
+  }
+  WriteJacobian(U * (by_corner * BySkew(e.corner) + by_along * BySkew(e.along)), rows, kSkew,
+                jacobians);
+  if (camera_variable)
+    WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, kCamera, jacobians);
+  return true;
+}
+
+}  // namespace circline
