@@ -29,7 +29,7 @@ endif()
 set(CIRCLINE_EXPORTS "${CMAKE_CURRENT_LIST_DIR}/exports.map")
 function(circline_shared_library target)
   set_target_properties(${target} PROPERTIES VERSION ${PROJECT_VERSION}
-                                             SOVERSION ${CIRCLINE_SOVERSION}
+                                             SOVERSION ${CIRCLINE_SOVERSION} DEFINE_SYMBOL ""
                                              INSTALL_RPATH "$ORIGIN")
   if(CIRCLINE_HIDE AND UNIX AND NOT APPLE)
     target_link_options(${target} PRIVATE

@@ -8,6 +8,9 @@
 #include "circline/estimators/observations.h"
 #include "circline/ransac/fit_observations.h"
 #include "circline/refine/estimate_pose.h"
+#include "circline/version.h"
+
+static_assert(CIRCLINE_VERSION >= 100 && sizeof(CIRCLINE_VERSION_STRING) > 5);
 
 int main() {
   circline::Observations observations;

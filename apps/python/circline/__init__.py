@@ -1,0 +1,100 @@
+"""Camera pose from circles and parallel lines in photos.
+
+    observations = circline.detect(image, camera)
+    estimate = circline.estimate(observations)
+    pose = estimate.hypotheses[0].cam_from_world
+
+Names, defaults and units are those of the C++ library; frames and conventions: docs/conventions.md.
+What the evidence does not determine is raised as circline.Refused, wrong input as ValueError, both
+with the library's sentence. Every function may run in many threads at once.
+"""
+
+from ._circline import (
+    AdjustedCamera,
+    AdjustedCircle,
+    AdjustedPhoto,
+    AdjustedPhotos,
+    Camera,
+    CameraPose,
+    CameraSigma,
+    CircleEstimate,
+    CirclePose,
+    ConicFit,
+    ConicReading,
+    GravityPrior,
+    LineFit,
+    NoiseModel,
+    PencilEstimate,
+    PoseEstimate,
+    PoseHypothesis,
+    PosePrior,
+    Refused,
+    VanishingPointFit,
+    __version__,
+    adjust,
+    circle_poses,
+    detect,
+    detect_circle,
+    estimate,
+    fit,
+    load_cameras,
+    load_scene,
+    project_circle,
+    rotation_from_circle_and_frame,
+    rotation_from_line_pairs,
+    simulate,
+)
+from .observations import (
+    CircleObservation,
+    FrameObservation,
+    KnownAngle,
+    KnownLength,
+    LineObservation,
+    Observations,
+    PencilObservation,
+)
+from .scene import SceneImage
+
+__all__ = [
+    "AdjustedCamera",
+    "AdjustedCircle",
+    "AdjustedPhoto",
+    "AdjustedPhotos",
+    "Camera",
+    "CameraPose",
+    "CameraSigma",
+    "CircleEstimate",
+    "CircleObservation",
+    "CirclePose",
+    "ConicFit",
+    "ConicReading",
+    "FrameObservation",
+    "GravityPrior",
+    "KnownAngle",
+    "KnownLength",
+    "LineFit",
+    "LineObservation",
+    "NoiseModel",
+    "Observations",
+    "PencilEstimate",
+    "PencilObservation",
+    "PoseEstimate",
+    "PoseHypothesis",
+    "PosePrior",
+    "Refused",
+    "SceneImage",
+    "VanishingPointFit",
+    "__version__",
+    "adjust",
+    "circle_poses",
+    "detect",
+    "detect_circle",
+    "estimate",
+    "fit",
+    "load_cameras",
+    "load_scene",
+    "project_circle",
+    "rotation_from_circle_and_frame",
+    "rotation_from_line_pairs",
+    "simulate",
+]

@@ -1,0 +1,30 @@
+"""An image of a scene file (docs/scene_files.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Dict, List, Optional
+
+import numpy as np
+
+from .observations import Observations
+
+
+@dataclass(eq=False)
+class SceneImage:
+    """A photo and what is known of it; nothing is fitted or detected yet."""
+
+    name: str
+    """As the scene file writes it."""
+    path: str
+    """Where it is."""
+    observations: Observations
+    """Camera, and what is annotated."""
+    detect_everything: bool = False
+    """No circle and no pencil is annotated."""
+    rois: Dict[int, List[int]] = field(default_factory=dict)
+    """By index in observations.circles: where to detect it, [x, y, width, height], pixels."""
+    true_rotation: Optional[np.ndarray] = None
+    """cam_from_world, (3, 3)."""
+    true_translation: Optional[np.ndarray] = None
+    """cam_from_world, (3,)."""

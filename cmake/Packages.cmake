@@ -1,0 +1,52 @@
+# `cpack` in the build folder: Debian packages. `cmake --preset package` configures for them (shared
+# libraries, man pages, /usr); apt takes what they need from `dpkg-shlibdeps`.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME circline)
+set(CPACK_PACKAGE_CONTACT "The circline authors <circline@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_PACKAGING_INSTALL_PREFIX "/usr")
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+
+set(packages "")
+# circline_package(<component> <name> <section> <depends> <summary>)
+macro(circline_package component name section depends summary)
+  string(TOUPPER ${component} upper)
+  list(APPEND packages ${component})
+  set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${name})
+  set(CPACK_DEBIAN_${upper}_PACKAGE_SECTION ${section})
+  set(CPACK_DEBIAN_${upper}_PACKAGE_DEPENDS "${depends}")
+  set(CPACK_COMPONENT_${upper}_DESCRIPTION "${PROJECT_DESCRIPTION}: ${summary}")
+  install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" RENAME copyright COMPONENT ${component}
+          DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/${name}")
+endmacro()
+
+set(library "")
+if(BUILD_SHARED_LIBS)
+  set(library libcircline${CIRCLINE_SOVERSION})
+  circline_package(runtime ${library} libs "" "the shared libraries")
+  set(CPACK_DEBIAN_RUNTIME_PACKAGE_GENERATE_SHLIBS ON)
+  # The other packages' need of these libraries, which no package has yet when that is looked up.
+  foreach(module estimators ransac detection refine)
+    get_target_property(folder circline_${module} BINARY_DIR)
+    list(APPEND CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${folder}")
+  endforeach()
+  string(APPEND library " (= ${PROJECT_VERSION}), ")
+endif()
+circline_package(dev libcircline-dev libdevel
+                 "${library}libeigen3-dev (>= 3.4), libceres-dev (>= 2.1), libopencv-dev (>= 4.6)"
+                 "headers, CMake package and pkg-config files")
+get_property(apps GLOBAL PROPERTY CIRCLINE_APPS)
+if(apps)
+  string(REGEX REPLACE ", $" "" tools_need "${library}")
+  circline_package(tools circline-tools science "${tools_need}" "the programs")
+endif()
+if(TARGET circline_python)
+  circline_package(python python3-circline python "${library}python3, python3-numpy"
+                   "the Python package")
+endif()
+set(CPACK_COMPONENTS_ALL ${packages})
+include(CPack)

@@ -1,0 +1,214 @@
+"""The Python package against the truth of scenes made here, and its promises."""
+
+import gc
+import os
+import threading
+import time
+
+import numpy as np
+import pytest
+import scenes
+
+import circline
+
+SOURCE = os.path.join(os.path.dirname(__file__), "..", "..")
+
+
+def angle_between(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.arccos(np.clip((np.trace(a @ b.T) - 1) / 2, -1, 1)))
+
+
+def test_estimates_the_true_pose():
+    observations = circline.fit(scenes.observations(noise_px=0.0))
+    best = circline.estimate(observations, noise_model=circline.NoiseModel.exact()).hypotheses[0]
+    assert best.metric and best.probability > 0.9
+    # The senses of the axes are the convention's.
+    assert min(
+        angle_between(best.cam_from_world.rotation, scenes.rotation() @ np.diag(signs))
+        for signs in ([1, 1, 1], [-1, -1, 1], [1, -1, -1], [-1, 1, -1])
+    ) < 1e-6
+    np.testing.assert_allclose(best.cam_from_world.translation, scenes.TRANSLATION, atol=1e-5)
+
+
+def test_states_an_error_that_holds():
+    chi2 = []
+    for seed in range(20):
+        observations = circline.fit(
+            scenes.observations(seed=seed), noise_model=circline.NoiseModel.exact()
+        )
+        best = circline.estimate(
+            observations, noise_model=circline.NoiseModel.exact(), conic_loss="trivial",
+            line_loss="trivial",
+        ).hypotheses[0]
+        assert best.covariance.shape == (6, 6) and best.rank == 6
+        error = best.circles[0].center - scenes.TRANSLATION
+        chi2.append(error @ np.linalg.solve(best.covariance[3:, 3:], error))
+    # 60 degrees of freedom: 0.1 % on either side.
+    assert 30.3 < sum(chi2) < 99.6
+
+
+def test_a_circle_alone_has_two_poses():
+    observations = scenes.observations()
+    observations.pencils = []
+    estimate = circline.estimate(circline.fit(observations))
+    assert len(estimate.hypotheses) == 2
+    best = estimate.hypotheses[0]
+    assert best.rotation_is_free and best.free_directions.shape == (1, 6)
+    assert np.isinf(best.sigma_rotation).any()
+
+
+def test_says_what_is_missing():
+    with pytest.raises(circline.Refused, match="circle|pencil|evidence"):
+        circline.estimate(circline.Observations(camera=scenes.camera()))
+
+
+@pytest.mark.parametrize(
+    "spoil, said",
+    [
+        (lambda o: setattr(o.circles[0], "points", np.zeros((3, 3))), "shape \\(N, 2\\)"),
+        (lambda o: setattr(o.circles[0], "points", "rim"), "not an array"),
+        (lambda o: setattr(o.circles[0], "sigma_px", "much"), "sigma_px cannot be"),
+        (lambda o: setattr(o.pencils[0], "direction", "up"), "x, y, z or free"),
+        (lambda o: setattr(o.camera, "fx", -1.0), "focal"),
+        (lambda o: setattr(o.pencils[1], "id", "x"), "'x'"),
+    ],
+)
+def test_wrong_input_is_a_value_error(spoil, said):
+    observations = scenes.observations()
+    spoil(observations)
+    with pytest.raises(ValueError, match=said):
+        circline.fit(observations)
+
+
+def test_wrong_options_are_named():
+    observations = scenes.observations()
+    with pytest.raises(ValueError, match="max_iterations"):
+        circline.estimate(observations, max_iterations=0)
+    with pytest.raises(ValueError, match="no loss"):
+        circline.estimate(observations, conic_loss="hubert")
+    with pytest.raises(TypeError):
+        circline.estimate(observations, losses="huber")
+    with pytest.raises(TypeError, match="focal"):
+        circline.Camera(focal=3.0)
+
+
+def test_results_are_views_that_keep_their_owner():
+    observations = circline.fit(scenes.observations())
+    best = circline.estimate(observations).hypotheses[0]
+    rotation, covariance = best.cam_from_world.rotation, best.covariance
+    assert rotation.base is not None and not rotation.flags.writeable
+    assert not covariance.flags.writeable
+    kept = rotation.copy()
+    del best
+    gc.collect()
+    np.testing.assert_array_equal(rotation, kept)
+    with pytest.raises(ValueError):
+        rotation[0, 0] = 2.0
+
+
+def test_detects_without_copying_the_photo():
+    photo = scenes.disc_photo()
+    found = circline.detect(photo, scenes.photo_camera())
+    assert len(found.circles) == 1
+    contour = np.asarray(found.circles[0].points)
+    distance = np.hypot((contour[:, 0] - 330) / 120, (contour[:, 1] - 250) / 70)
+    np.testing.assert_allclose(distance, 1.0, atol=0.01)
+    # A part of a larger array, rows apart; and one whose pixels lie apart, which is copied.
+    wide = np.zeros((480, 700), np.uint8)
+    wide[:, :640] = photo
+    for same in (wide[:, :640], np.asfortranarray(photo), np.dstack([photo] * 3)):
+        again = circline.detect(same, scenes.photo_camera())
+        np.testing.assert_allclose(again.circles[0].points, contour, atol=0.05)
+    in_box = circline.detect_circle(photo, scenes.photo_camera(), (180, 150, 300, 200))
+    np.testing.assert_allclose(in_box.points, contour, atol=0.05)
+
+
+def test_wrong_photos_are_named():
+    for photo in (np.zeros((4, 4)), np.zeros((0, 0), np.uint8), np.zeros((4, 4, 2), np.uint8)):
+        with pytest.raises(ValueError, match="image"):
+            circline.detect(photo, scenes.photo_camera())
+
+
+def test_fits_leave_outliers_out():
+    observations = scenes.observations()
+    points = np.array(observations.circles[0].points)
+    points[::5] += 25.0
+    observations.circles[0].points = points
+    problems: list = []
+    fitted = circline.fit(observations, problems=problems)
+    inliers = np.asarray(fitted.circles[0].inliers, bool)
+    assert not inliers[::5].any() and inliers.sum() > 75
+    assert fitted.circles[0].fit.conic.shape == (3, 3)
+    assert observations.circles[0].fit is None  # The one given is as it was.
+
+
+def test_closed_forms_give_back_what_was_projected():
+    circle = circline.CirclePose([0.3, 0.2, -0.932737905308882], [0.1, 0.2, 5.0])
+    conic = circline.project_circle(circle)
+    poses = circline.circle_poses(conic)
+    assert len(poses) == 2
+    assert min(np.abs(p.normal - circle.normal).max() for p in poses) < 1e-9
+    with pytest.raises(circline.Refused):
+        circline.circle_poses(np.eye(3))
+    R = scenes.rotation()
+    C = R @ [0, 0, 1]
+    line = lambda p, d: np.cross(p, d)  # noqa: E731: the plane of a point and a direction.
+    p0, p1 = np.array([0, 0, 5.0]), np.array([0.4, 0.1, 5.0])
+    x_lines = [line(p0, R[:, 0]), line(p1, R[:, 0])]
+    y_lines = [line(p0, R[:, 1]), line(p1, R[:, 1])]
+    found = circline.rotation_from_line_pairs(x_lines, y_lines)
+    assert np.abs(np.abs(found.T @ R) - np.eye(3)).max() < 1e-9
+    conic = circline.project_circle(circline.CirclePose(C * -np.sign(C[2]), [0.2, 0.1, 6.0]))
+    best, deviation = circline.rotation_from_circle_and_frame(conic, x_lines[0], y_lines[0])[0]
+    assert deviation < 1e-9 and np.abs(np.abs(best.T @ R) - np.eye(3)).max() < 1e-7
+
+
+def test_calibrates_there_and_back():
+    camera = scenes.camera()
+    pixels = np.array([[100.0, 200.0], [640.0, 480.0], [1e9, 0.0]])
+    rays = camera.calibrate(pixels)
+    assert np.isnan(rays[2]).all()
+    back = camera.project(np.column_stack([rays[:2], np.ones(2)]))
+    np.testing.assert_allclose(back, pixels[:2], atol=1e-8)
+
+
+def test_reads_scene_files():
+    images = circline.load_scene(os.path.join(SOURCE, "apps/demo/disc.yaml"))
+    assert len(images) > 1 and images[0].observations.camera.fx > 0
+    assert images[0].true_rotation is not None and images[0].true_rotation.shape == (3, 3)
+    with pytest.raises(ValueError, match="no_such"):
+        circline.load_scene("no_such.yaml")
+
+
+def test_adjusts_many_photos():
+    with pytest.raises((circline.Refused, ValueError)):
+        circline.adjust([])
+    with pytest.raises(ValueError, match="rigid"):
+        circline.adjust([scenes.observations()], rigid="perhaps")
+
+
+def test_simulates_the_paper():
+    rows = circline.simulate(trials=4, noise_px=[1.0])
+    assert {row["method"] for row in rows} >= {"circle_frame", "line_pairs", "joint"}
+    assert all(row["trials"] == 4 for row in rows)
+
+
+def test_lets_other_threads_run():
+    """While one thread computes, Python runs on in another."""
+    photo, camera = np.tile(scenes.disc_photo(), (3, 3)), scenes.photo_camera()
+    camera.width, camera.height = photo.shape[1], photo.shape[0]
+    ticks, done = [], threading.Event()
+
+    def tick():
+        while not done.is_set():
+            ticks.append(time.perf_counter())
+            time.sleep(0.001)
+
+    ticker = threading.Thread(target=tick)
+    ticker.start()
+    started = time.perf_counter()
+    circline.detect(photo, camera)
+    ended = time.perf_counter()
+    done.set()
+    ticker.join()
+    assert sum(started < t < ended for t in ticks) >= 3
