@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -44,34 +45,8 @@ void ChangeCoordinates(const Eigen::Matrix3d& A, Inputs* inputs) {
   inputs->rough = (A * inputs->rough).eval();
 }
 
-// The errors of focal length, aspect and principal point.
-void AddCamera(const CameraSigma& sigma, const Camera& camera, std::vector<Perturbation>* all) {
-  const auto add = [all](double deviation, double x_scale, double y_scale, double x, double y) {
-    if (deviation == 0.0) return;
-    all->push_back([=](double part, Inputs* inputs) {
-      const double s = part * deviation;
-      Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
-      A(0, 0) = std::exp(s * x_scale);
-      A(1, 1) = std::exp(s * y_scale);
-      A(0, 2) = s * x;
-      A(1, 2) = s * y;
-      ChangeCoordinates(A, inputs);
-    });
-  };
-  add(sigma.log_focal, 1.0, 1.0, 0.0, 0.0);
-  add(sigma.log_aspect, 0.0, 1.0, 0.0, 0.0);
-  add(sigma.principal_point_px, 0.0, 0.0, 1.0 / camera.fx, 0.0);
-  add(sigma.principal_point_px, 0.0, 0.0, 0.0, 1.0 / camera.fy);
-}
-
-// Both semi-axes grow alike: of the curve at a distance from an ellipse, the ellipse nearest to it.
 void Grow(double by, Measured* conic) {
-  Ellipse ellipse;
-  if (!ConicToEllipse(VectorToConic(Vector6d(conic->value)), &ellipse) || !(ellipse.b + by > 0.0))
-    return;
-  ellipse.a += by;
-  ellipse.b += by;
-  conic->value = ConicToVector(EllipseToConic(ellipse));
+  conic->value = ConicToVector(GrownEllipse(VectorToConic(Vector6d(conic->value)), by));
 }
 
 void AddOffsets(double sigma_px, const Camera& camera, const Inputs& inputs,
@@ -166,26 +141,50 @@ std::vector<Perturbation> Perturbations(const Inputs& inputs, const NoiseModel& 
     all.push_back([](double part, Inputs* in) { in->radius *= 1.0 + part * in->radius_sigma; });
   if (inputs.length > 0.0 && inputs.length_sigma > 0.0)
     all.push_back([](double part, Inputs* in) { in->length *= 1.0 + part * in->length_sigma; });
-  AddCamera(noise.camera, camera, &all);
+  for (const CoordinateChange& change : CameraErrors(noise.camera, camera))
+    all.push_back([change](double part, Inputs* in) { ChangeCoordinates(change(part), in); });
   AddOffsets(noise.contour_offset_px, camera, inputs, &all);
   return all;
 }
 
-std::vector<Eigen::MatrixXd> Sensitivities(const Evaluate& evaluate, const Inputs& inputs,
-                                           const std::vector<Perturbation>& perturbations,
+std::vector<CoordinateChange> CameraErrors(const CameraSigma& sigma, const Camera& camera) {
+  std::vector<CoordinateChange> all;
+  const auto add = [&all](double deviation, double x_scale, double y_scale, double x, double y) {
+    if (deviation == 0.0) return;
+    all.push_back([=](double part) {
+      const double s = part * deviation;
+      Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
+      A(0, 0) = std::exp(s * x_scale);
+      A(1, 1) = std::exp(s * y_scale);
+      A(0, 2) = s * x;
+      A(1, 2) = s * y;
+      return A;
+    });
+  };
+  add(sigma.log_focal, 1.0, 1.0, 0.0, 0.0);
+  add(sigma.log_aspect, 0.0, 1.0, 0.0, 0.0);
+  add(sigma.principal_point_px, 0.0, 0.0, 1.0 / camera.fx, 0.0);
+  add(sigma.principal_point_px, 0.0, 0.0, 0.0, 1.0 / camera.fy);
+  return all;
+}
+
+Eigen::Matrix3d GrownEllipse(const Eigen::Matrix3d& conic, double by) {
+  Ellipse ellipse;
+  if (!ConicToEllipse(conic, &ellipse) || !(ellipse.b + by > 0.0)) return conic;
+  ellipse.a += by;
+  ellipse.b += by;
+  return EllipseToConic(ellipse);
+}
+
+std::vector<Eigen::MatrixXd> Sensitivities(const PerturbedCandidates& perturbed,
+                                           std::size_t num_errors,
                                            const std::vector<Candidate>& candidates) {
   constexpr double kShrink = 0.1, kSmallestPart = 1e-4;
   std::vector<std::vector<Eigen::VectorXd>> columns(candidates.size());
-  Inputs perturbed;
-  const auto evaluate_at = [&](const Perturbation& perturb, double part) {
-    perturbed = inputs;
-    perturb(part, &perturbed);
-    return evaluate(perturbed);
-  };
-  for (const Perturbation& perturb : perturbations) {
+  for (std::size_t error = 0; error < num_errors; ++error) {
     for (double part = 1.0; part > kSmallestPart; part *= kShrink) {
-      const std::vector<Candidate> plus = evaluate_at(perturb, part);
-      const std::vector<Candidate> minus = evaluate_at(perturb, -part);
+      const std::vector<Candidate> plus = perturbed(error, part);
+      const std::vector<Candidate> minus = perturbed(error, -part);
       if (plus.empty() || minus.empty()) continue;
       for (std::size_t i = 0; i < candidates.size(); ++i) {
         columns[i].push_back(HalfDifference(Nearest(plus, candidates[i]),
@@ -199,6 +198,39 @@ std::vector<Eigen::MatrixXd> Sensitivities(const Evaluate& evaluate, const Input
   for (std::size_t i = 0; i < candidates.size(); ++i)
     matrices.push_back(FromColumns(columns[i], 6 + candidates[i].contradiction.size()));
   return matrices;
+}
+
+PoseHypothesis UncertainPose(const Candidate& candidate, bool metric, bool spin_is_free) {
+  PoseHypothesis h;
+  h.cam_from_world = candidate.pose;
+  h.metric = metric;
+  if (!spin_is_free) return h;
+  std::array<double, 6> spin{};
+  Eigen::Map<Vector6d>(spin.data()).head<3>() = candidate.pose.rotation.col(2);
+  h.free_directions.push_back(spin);
+  return h;
+}
+
+void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseHypothesis* h) {
+  Matrix6d covariance = S.topRows<6>() * S.topRows<6>().transpose();
+  const auto leave_out = [&covariance](const Vector6d& free) {
+    const Matrix6d project = Matrix6d::Identity() - free * free.transpose();
+    covariance = project * covariance * project;
+  };
+  for (const std::array<double, 6>& direction : h->free_directions)
+    leave_out(Eigen::Map<const Vector6d>(direction.data()));
+  Vector6d length = Vector6d::Zero();
+  length.tail<3>() = h->cam_from_world.translation;
+  if (!h->metric) leave_out(length);
+  Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
+  h->rank = CovarianceRank(covariance);
+  if (candidate.contradiction.size() > 0) {
+    const Eigen::MatrixXd tail = S.bottomRows(candidate.contradiction.size());
+    const Eigen::MatrixXd C = tail * tail.transpose();
+    h->cost = 0.5 * candidate.contradiction.dot(
+                        C.completeOrthogonalDecomposition().solve(candidate.contradiction));
+    if (!std::isfinite(h->cost)) h->cost = 0.5 * std::numeric_limits<double>::max();
+  }
 }
 
 }  // namespace circline

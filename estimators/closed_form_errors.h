@@ -3,6 +3,7 @@
 #define CIRCLINE_ESTIMATORS_CLOSED_FORM_ERRORS_H_
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <functional>
 #include <vector>
 
@@ -24,12 +25,31 @@ void AddModelErrors(const NoiseModel& noise, Inputs* inputs);
 std::vector<Perturbation> Perturbations(const Inputs& inputs, const NoiseModel& noise,
                                         const Camera& camera);
 
-// Statistical linearisation: every perturbation, one standard deviation up and down, through the
-// closed form itself; a part of that where it would lead to no pose (beyond the ellipses). Returns
-// for each candidate columns of [delta, delta_t, contradiction].
-std::vector<Eigen::MatrixXd> Sensitivities(const Evaluate& evaluate, const Inputs& inputs,
-                                           const std::vector<Perturbation>& perturbations,
+// A change of calibrated coordinates, x' = A x, by `part` of a standard deviation.
+using CoordinateChange = std::function<Eigen::Matrix3d(double part)>;
+// What the errors of focal length, aspect and principal point do.
+std::vector<CoordinateChange> CameraErrors(const CameraSigma& sigma, const Camera& camera);
+
+// Both semi-axes longer by so much: of the curve at a distance from an ellipse, the ellipse nearest
+// to it. The same conic where that is none.
+Eigen::Matrix3d GrownEllipse(const Eigen::Matrix3d& conic, double by);
+
+// All candidates with one error, by its index, at `part` of its standard deviation.
+using PerturbedCandidates = std::function<std::vector<Candidate>(std::size_t error, double part)>;
+
+// Statistical linearisation: every error, one standard deviation up and down, through the closed
+// form itself; a part of that where it would lead to no pose (beyond the ellipses). Returns for
+// each candidate columns of [delta, delta_t, contradiction].
+std::vector<Eigen::MatrixXd> Sensitivities(const PerturbedCandidates& perturbed,
+                                           std::size_t num_errors,
                                            const std::vector<Candidate>& candidates);
+
+// A candidate as a hypothesis without uncertainty; where `spin_is_free` the turn about the plane's
+// normal is a free direction.
+PoseHypothesis UncertainPose(const Candidate& candidate, bool metric, bool spin_is_free);
+
+// Covariance, rank and cost, of the candidate's sensitivity `S`.
+void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseHypothesis* h);
 
 }  // namespace circline
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <utility>
 
 #include "circline/estimators/closed_form_errors.h"
@@ -14,38 +13,9 @@ namespace {
 
 // The pose; where neither an axis nor a direction is known, the spin about the normal is free.
 PoseHypothesis HypothesisOf(const Candidate& candidate, const Inputs& inputs) {
-  PoseHypothesis h;
-  h.cam_from_world = candidate.pose;
-  h.metric = inputs.IsMetric();
-  if (inputs.x_line.present() || inputs.y_line.present() || inputs.directions[0].present())
-    return h;
-  std::array<double, 6> spin{};
-  Eigen::Map<Vector6d>(spin.data()).head<3>() = candidate.pose.rotation.col(2);
-  h.free_directions.push_back(spin);
-  return h;
-}
-
-// `S`: the candidate's sensitivity.
-void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseHypothesis* h) {
-  Matrix6d covariance = S.topRows<6>() * S.topRows<6>().transpose();
-  const auto leave_out = [&covariance](const Vector6d& free) {
-    const Matrix6d project = Matrix6d::Identity() - free * free.transpose();
-    covariance = project * covariance * project;
-  };
-  for (const std::array<double, 6>& direction : h->free_directions)
-    leave_out(Eigen::Map<const Vector6d>(direction.data()));
-  Vector6d length = Vector6d::Zero();
-  length.tail<3>() = h->cam_from_world.translation;
-  if (!h->metric) leave_out(length);
-  Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
-  h->rank = CovarianceRank(covariance);
-  if (candidate.contradiction.size() > 0) {
-    const Eigen::MatrixXd tail = S.bottomRows(candidate.contradiction.size());
-    const Eigen::MatrixXd C = tail * tail.transpose();
-    h->cost = 0.5 * candidate.contradiction.dot(
-                        C.completeOrthogonalDecomposition().solve(candidate.contradiction));
-    if (!std::isfinite(h->cost)) h->cost = 0.5 * std::numeric_limits<double>::max();
-  }
+  return UncertainPose(
+      candidate, inputs.IsMetric(),
+      !inputs.x_line.present() && !inputs.y_line.present() && !inputs.directions[0].present());
 }
 
 // The first few problems, to be added to a sentence.
@@ -144,9 +114,16 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   if (!estimate.status.ok()) return estimate;
 
   const std::vector<Candidate> candidates = recipe_.evaluate(inputs);
-  const std::vector<Eigen::MatrixXd> sensitivities =
-      Sensitivities(recipe_.evaluate, inputs,
-                    Perturbations(inputs, options_.noise_model, evidence.camera), candidates);
+  const std::vector<Perturbation> errors =
+      Perturbations(inputs, options_.noise_model, evidence.camera);
+  Inputs moved;
+  const std::vector<Eigen::MatrixXd> sensitivities = Sensitivities(
+      [&](std::size_t error, double part) {
+        moved = inputs;
+        errors[error](part, &moved);
+        return recipe_.evaluate(moved);
+      },
+      errors.size(), candidates);
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Candidate& candidate = candidates[i];
     PoseHypothesis h = HypothesisOf(candidate, inputs);

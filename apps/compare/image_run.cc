@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "apps/common/photo_file.h"
+#include "apps/common/plugins.h"
 #include "apps/compare/other_planes.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/record.h"
@@ -205,6 +206,7 @@ SolverSet::SolverSet(const CompareOptions& options) {
   for (const LossSetting& loss : options.losses) {
     SolverRegistry registry;
     AddClosedFormSolvers(&registry, options.closed_form);
+    AddPluginSolvers(options.closed_form, &registry);
     AddRefinedSolvers(&registry, loss.estimation);
     registries_.push_back(std::move(registry));
   }

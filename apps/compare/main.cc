@@ -75,7 +75,8 @@ bool Answer(const CommandLine& command_line) {
 
 int ParseAndCompare(int argc, char** argv, const Ranks& ranks) {
   CommandLine command_line;
-  const Status status = circline::apps::ParseCommandLine(argc, argv, &command_line);
+  Status status = circline::apps::ParseCommandLine(argc, argv, &command_line);
+  if (status.ok()) status = circline::apps::PluginsFromFlags();
   if (!status.ok()) return Refuse(status, ranks);
   return Answer(command_line) ? circline::apps::kExitOk : Compare(ranks);
 }

@@ -8,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "apps/common/plugins.h"
 #include "apps/common/text.h"
 #include "apps/compare/noise_flags.h"
 #include "apps/compare/peers.h"
@@ -65,6 +66,9 @@ DEFINE_string(save_options, "",
 DEFINE_string(export_as, "",
               "Also write the poses of the answers shown: colmap (images.txt, cameras.txt), gltf "
               "(cameras.gltf), tum (trajectory.txt); a list. Not metric poses have unit distance.");
+DEFINE_string(plugin, "",
+              "Shared libraries with solvers of your own, separated by commas; see "
+              "circline/estimators/solver_plugin.h.");
 DEFINE_bool(list_solvers, false, "List the solvers and what each needs, and do nothing else.");
 
 namespace circline::apps {
@@ -220,6 +224,7 @@ Status ReadExports(std::vector<std::string>* exports) {
 SolverRegistry AllSolvers() {
   SolverRegistry registry;
   AddClosedFormSolvers(&registry);
+  AddPluginSolvers(ClosedFormOptions(), &registry);
   AddRefinedSolvers(&registry);
   return registry;
 }
@@ -272,7 +277,8 @@ std::string Lines(const std::vector<std::string>& texts) {
 
 Status OptionsFromFlags(CompareOptions* options) {
   NoiseModel noise;
-  Status status = NoiseFromFlags(&noise, &options->inputs.guess);
+  Status status = PluginsFromFlags();
+  if (status.ok()) status = NoiseFromFlags(&noise, &options->inputs.guess);
   options->detection.noise_model = options->fit.noise_model = options->closed_form.noise_model =
       noise;
   if (status.ok()) status = ReadFitOptions(&options->fit);
@@ -300,7 +306,8 @@ Status OptionsFromFlags(CompareOptions* options) {
   options->resume = FLAGS_resume;
   options->peers = FLAGS_peers;
   options->result_flags =
-      Lines(FlagTexts({"solvers", "robust_loss", "loss_scale_px", "shard", "overlays"}, Any)) +
+      Lines(FlagTexts({"plugin", "solvers", "robust_loss", "loss_scale_px", "shard", "overlays"},
+                      Any)) +
       Lines(FlagTexts(TuningFlags(), Any)) + Lines(FlagTexts(InputFlags(), Any));
   options->unusual_flags = FlagTexts(TuningFlags(), IsUnusual);
   for (std::string& text : FlagTexts(InputFlags(), IsUnusual))
@@ -345,6 +352,8 @@ std::string ListSolvers() {
   }
   return text.str();
 }
+
+Status PluginsFromFlags() { return LoadPlugins(FLAGS_plugin); }
 
 bool ListSolversAsked() { return FLAGS_list_solvers; }
 

@@ -41,9 +41,12 @@ struct CompareOptions {
   std::vector<std::string> unusual_flags;
 };
 
-// From the flags; not ok: one line that names the flag. Nothing but the file of --noise_model is
-// read.
+// From the flags; not ok: one line that names the flag. Nothing but the file of --noise_model
+// and the libraries of --plugin is read.
 Status OptionsFromFlags(CompareOptions* options);
+
+// Loads the libraries of --plugin, whose solvers then are among the others (LoadPlugins).
+Status PluginsFromFlags();
 
 // Names of all solvers, closed form and refined, in the order of the registry.
 std::vector<std::string> SolverNames();

@@ -37,7 +37,7 @@ bool EndsWith(const std::string& text, const std::string& end) {
 
 // A track is made in one go, from its first frame, and by one solver.
 Status CheckSource() {
-  for (const char* name : {"merge", "resume", "shard", "solvers", "peers", "export_as",
+  for (const char* name : {"merge", "plugin", "resume", "shard", "solvers", "peers", "export_as",
                            "save_options", "list_solvers"}) {
     gflags::CommandLineFlagInfo info;
     if (gflags::GetCommandLineFlagInfo(name, &info) && info.current_value != info.default_value)

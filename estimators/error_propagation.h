@@ -1,0 +1,68 @@
+// Covariances for a closed form of your own, as the built-in ones have theirs: each independent
+// error of its inputs and of the camera, one standard deviation up and down, through the closed
+// form itself (statistical linearisation). docs/examples/own_solver is a solver made with it.
+#ifndef CIRCLINE_ESTIMATORS_ERROR_PROPAGATION_H_
+#define CIRCLINE_ESTIMATORS_ERROR_PROPAGATION_H_
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "circline/estimators/conic_fit.h"
+#include "circline/estimators/export.h"
+#include "circline/estimators/line.h"
+#include "circline/estimators/noise_model.h"
+#include "circline/estimators/pose.h"
+#include "circline/estimators/vanishing_point.h"
+
+namespace CIRCLINE_EXPORT circline {
+
+// What a number is in the image, which says how an error of the camera moves it.
+enum class InputKind { kPoint, kLine, kConic, kNumber };
+
+// One measured input of a closed form, calibrated, with its covariance.
+struct MeasuredInput {
+  InputKind kind = InputKind::kNumber;
+  std::vector<double> value;       // 3 of a point, direction or line; 6 of a conic; 1.
+  std::vector<double> covariance;  // Of `value`, square, row-major.
+  int contrast = 0;                // Of a conic: CircleObservation::contrast.
+
+  static MeasuredInput Point(const Eigen::Vector3d& point, const Eigen::Matrix3d& covariance);
+  static MeasuredInput Direction(const VanishingPointFit& fit);
+  static MeasuredInput Line(const LineFit& fit);
+  static MeasuredInput Conic(const ConicFit& fit, int contrast = 0);
+  static MeasuredInput Number(double value, double sigma);
+
+  Eigen::Vector3d AsVector() const { return {value[0], value[1], value[2]}; }
+  Eigen::Matrix3d AsConic() const;
+};
+
+// A pose that a closed form finds, and how far it contradicts the inputs that it was not computed
+// from: numbers that are zero where all of them agree, as many for every pose; or none.
+struct ClosedFormPose {
+  CameraPose pose;
+  std::vector<double> contradiction;
+};
+
+// All poses of the inputs, in any order; none where they are degenerate.
+using ClosedForm = std::function<std::vector<ClosedFormPose>(const std::vector<MeasuredInput>&)>;
+
+// What of a pose its closed form does not know.
+struct UnknownOfPose {
+  bool scale = true;  // The translation is a unit vector; else it is metric.
+  bool spin = false;  // The turn about the plane's normal is a convention.
+};
+
+// The poses of the closed form as hypotheses: covariance, rank and free directions of each, cost
+// from the contradictions (1/2 chi^2), ranked, with probabilities. Of the noise model the camera's
+// part and the contours' offset count; what else it holds belongs into the inputs' covariances.
+// Calls the closed form twice for each error: some 50 times. Empty where it finds no pose.
+// Thread-safe if `closed_form` is.
+std::vector<PoseHypothesis> PropagateErrors(const ClosedForm& closed_form,
+                                            const std::vector<MeasuredInput>& inputs,
+                                            const Camera& camera, const NoiseModel& noise_model,
+                                            const UnknownOfPose& unknown);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_ERROR_PROPAGATION_H_
