@@ -4,6 +4,7 @@ import json
 import math
 import os
 import statistics
+import struct
 import sys
 
 DEMO = sys.argv[1] if len(sys.argv) > 1 else 'build/demo'
@@ -129,7 +130,19 @@ def check_track():
     check('track: files', not missing, 'missing: ' + ', '.join(missing) if missing else 'all there')
 
 
+def check_model():
+    folder = os.path.join(DEMO, 'disc', 'model')
+    files = ['model.glb', 'model.obj', 'model.mtl', 'texture.png', 'views.png', 'measurements.csv']
+    missing = [f for f in files if not os.path.exists(os.path.join(folder, f))]
+    check('disc: files of the model', not missing, 'missing: ' + ', '.join(missing) if missing else 'all there')
+    with open(os.path.join(folder, 'model.glb'), 'rb') as file:
+        glb = file.read()
+    magic, version, length = struct.unpack('<4sII', glb[:12])
+    check('disc: model.glb is binary glTF 2, whole', (magic, version, length) == (b'glTF', 2, len(glb)), f'{len(glb)} bytes')
+
+
 check_track()
+check_model()
 for scene in ('chessboard', 'disc', 'box', 'dots'):
     check_files(scene)
     check_lines(scene)

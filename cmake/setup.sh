@@ -4,8 +4,8 @@
 # Debian packages: what builds circline, its apps, tests and benchmarks.
 # shellcheck disable=SC2034
 BUILD_PACKAGES=(g++ cmake ninja-build libeigen3-dev libceres-dev libopencv-dev libgoogle-glog-dev
-                libgflags-dev nlohmann-json3-dev libexif-dev libcpp-httplib-dev pkg-config libgtest-dev
-                libbenchmark-dev)
+                libgflags-dev nlohmann-json3-dev libexif-dev libcpp-httplib-dev libtinygltf-dev pkg-config
+                libgtest-dev libbenchmark-dev)
 
 say() { echo "circline: $*"; }
 fail() { echo "circline: $*" >&2; exit 1; }

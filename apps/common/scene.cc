@@ -10,6 +10,7 @@
 #include <set>
 
 #include "apps/common/camera_file.h"
+#include "apps/common/scene_solids.h"
 #include "apps/common/storage_node.h"
 #include "apps/common/text.h"
 
@@ -291,7 +292,8 @@ SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
     image.name = node.Get("file").Text();
     node.set_place(place + " (\"" + image.name + "\")");
   }
-  node.AllowKeys({"file", "camera", "circles", "pencils", "frame", "known", "truth", "points"});
+  node.AllowKeys({"file", "camera", "circles", "pencils", "frame", "known", "truth", "points",
+                  "faces", "solids"});
   if (node.Require("file").Exists() && image.name.empty()) node.Get("file").Fail("is empty");
   image.path = (folder / image.name).lexically_normal().string();
   const SceneCamera* camera = ChooseCamera(node, cameras);
@@ -307,6 +309,7 @@ SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
   ReadKnown(node.Get("known"), image.detect_everything, &image.observations);
   ReadTruth(node.Get("truth"), &image);
   ReadPoints(node.Get("points"), &image);
+  image.solids = ReadSolids(node, image.observations);
   if (node.ok() && !image.detect_everything && image.rois.empty()) {
     const Status status = image.observations.Validate();
     if (!status.ok()) node.Fail(status.message);

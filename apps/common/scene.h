@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "apps/common/camera_file.h"
+#include "apps/common/solids.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/status.h"
@@ -64,6 +65,7 @@ struct SceneImage {
   std::vector<CircleRoi> rois;
   std::optional<Truth> truth;
   std::vector<KnownPoint> points;
+  Solids solids;  // To be modelled; no evidence of the pose.
 };
 
 // Reads and checks a scene file. Cameras of the file come beside `cameras` (from a camera file; may

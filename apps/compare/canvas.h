@@ -40,6 +40,7 @@ class Canvas {
   // What `draw` draws shows with this opacity.
   void Blend(double opacity, const std::function<void()>& draw);
 
+  const cv::Mat& Image() const { return image_; }
   // The picture with text on a dark strip below: a title, then parts in as many rows as they need.
   cv::Mat WithCaption(const std::string& title, const std::vector<std::string>& parts) const;
 

@@ -1,27 +1,22 @@
-#include <Eigen/Geometry>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "apps/common/output_file.h"
 #include "apps/compare/export.h"
+#include "apps/compare/gltf_pose.h"
 
 namespace circline::apps {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-// glTF cameras look along -Z with Y up, ours along +Z with Y down.
-const Eigen::DiagonalMatrix<double, 3>& OurFromGltf() {
-  static const Eigen::DiagonalMatrix<double, 3> turn(1.0, -1.0, -1.0);
-  return turn;
-}
-
 Json CameraJson(const Camera& camera) {
-  const double half_x = 0.5 * camera.width / camera.fx, half_y = 0.5 * camera.height / camera.fy;
+  const GltfPerspective perspective = GltfPerspectiveOf(camera);
   return {{"type", "perspective"},
           {"name", camera.id},
           {"perspective",
-           {{"yfov", 2.0 * std::atan(half_y)}, {"aspectRatio", half_x / half_y}, {"znear", 1e-3}}}};
+           {{"yfov", perspective.yfov},
+            {"aspectRatio", perspective.aspect_ratio},
+            {"znear", kGltfNear}}}};
 }
 
 class GltfExporter : public Exporter {
@@ -33,21 +28,17 @@ class GltfExporter : public Exporter {
     std::size_t id = 0;
     while (id < cameras_.size() && cameras_[id] != camera) ++id;
     if (id == cameras_.size()) cameras_.push_back(camera);
-    const Eigen::Vector3d center = -(pose.rotation.transpose() * pose.translation);
-    const Eigen::Matrix3d world_from_gltf = pose.rotation.transpose() * OurFromGltf();
-    const Eigen::Quaterniond q(world_from_gltf);
+    const GltfNode node = GltfCameraNode({pose.rotation, pose.translation});
     nodes_.push_back({{"name", pose.name},
                       {"camera", id},
-                      {"translation", {center.x(), center.y(), center.z()}},
-                      {"rotation", {q.x(), q.y(), q.z(), q.w()}}});
+                      {"translation", node.translation},
+                      {"rotation", node.rotation}});
   }
 
-  // The first node turns our Z, the plane's normal, into glTF's Y, which is up.
   Status Finish() override {
     Json children = Json::array();
     for (std::size_t i = 0; i < nodes_.size(); ++i) children.push_back(i + 1);
-    const double half = std::sqrt(0.5);
-    Json root = {{"name", "world"}, {"rotation", {-half, 0.0, 0.0, half}}};
+    Json root = {{"name", "world"}, {"rotation", GltfUpright()}};
     if (!nodes_.empty()) root["children"] = children;
     Json nodes = Json::array({root});
     nodes.insert(nodes.end(), nodes_.begin(), nodes_.end());

@@ -24,9 +24,9 @@ bool SameSigma(const StatedCameraSigma& a, const StatedCameraSigma& b) {
 bool IsPlain(const SceneImage& image) {
   const FrameObservation& frame = image.observations.frame;
   return image.detect_everything && image.rois.empty() && image.points.empty() &&
-         image.observations.known_angles.empty() && image.observations.known_lengths.empty() &&
-         frame.plane.empty() && !frame.origin && !frame.x_axis && !frame.y_axis &&
-         frame.origin_is_center.empty();
+         image.solids.empty() && image.observations.known_angles.empty() &&
+         image.observations.known_lengths.empty() && frame.plane.empty() && !frame.origin &&
+         !frame.x_axis && !frame.y_axis && frame.origin_is_center.empty();
 }
 
 }  // namespace

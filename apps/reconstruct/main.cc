@@ -1,29 +1,31 @@
-// circline_reconstruct: from one photo a textured model of what it shows of its plane and of what
-// stands on it, with measurements.
+// circline_reconstruct: from one photo a textured model of a box, or of a plane and of what stands
+// on it, with measurements.
 #include <gflags/gflags.h>
 
 #include <cmath>
 #include <iostream>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "apps/common/flags_util.h"
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
-#include "apps/compare/canvas.h"
 #include "apps/compare/encode.h"
 #include "apps/compare/image_run.h"
 #include "apps/compare/options.h"
 #include "apps/compare/overlay.h"
+#include "apps/reconstruct/box_picture.h"
+#include "apps/reconstruct/glb_file.h"
 #include "apps/reconstruct/measurements.h"
 #include "apps/reconstruct/model.h"
 #include "apps/reconstruct/obj_file.h"
+#include "apps/reconstruct/trace_box.h"
+#include "apps/reconstruct/views.h"
 
 DEFINE_string(image, "",
               "Which image of the scene file, by its name there; the only one if empty.");
 DEFINE_int32(hypothesis, 0, "Which pose, where several explain the photo; 0 = the most probable.");
 DEFINE_int32(texture_px, circline::apps::ModelOptions().texture_px,
-             "Longer side of the plane's texture, pixels; 16 to 8192.");
+             "Longer side of the plane's texture, pixels; 16 to 8192; 0: as the photo has it.");
 DEFINE_double(margin, circline::apps::ModelOptions().margin,
               "Part of the plane shown about the evidence, share of its longer side; 0 to 10.");
 DEFINE_double(point_sigma_px, 0.3,
@@ -38,7 +40,9 @@ constexpr char kUsage[] =
     "\n"
     "  circline_reconstruct --scene=set/scene.yaml --image=img01.jpg --output=out\n"
     "\n"
-    "Writes model.obj, model.mtl and textures (Z is up), measurements.csv and views.png. The flags "
+    "Writes model.glb, model.obj, model.mtl and textures (Z is up), measurements.csv and "
+    "views.png. "
+    "The flags "
     "for inputs,\n"
     "detection and losses are those of circline_compare; its others have no meaning here.\n"
     "Exit code 0: done; 1: the photo could not be read or gives no pose; 2: unusable flags or "
@@ -47,8 +51,8 @@ constexpr char kUsage[] =
 Status ModelFromFlags(ModelOptions* options) {
   options->texture_px = FLAGS_texture_px;
   options->margin = FLAGS_margin;
-  if (FLAGS_texture_px < 16 || FLAGS_texture_px > 8192) {
-    return Status::Invalid("--texture_px must be between 16 and 8192");
+  if (FLAGS_texture_px != 0 && (FLAGS_texture_px < 16 || FLAGS_texture_px > 8192)) {
+    return Status::Invalid("--texture_px must be 0 or between 16 and 8192");
   }
   if (!(FLAGS_margin >= 0.0 && FLAGS_margin <= 10.0)) {
     return Status::Invalid("--margin must be between 0 and 10");
@@ -73,40 +77,50 @@ Status FindImage(const ImageSet& images, SceneImage* image) {
                                                DidYouMean(FLAGS_image, names));
 }
 
-// Side by side: the photo with what was found, and the plane seen from above.
-cv::Mat Views(const ImageRun& run, const Model& model, const std::string& unit) {
-  const Patch& plane = model.patches.front();
-  cv::Mat left = DrawOverlay(run);
-  cv::Mat right = Canvas(plane.texture)
-                      .WithCaption("the plane, rectified", {FormatShort(plane.u.norm()) + " x " +
-                                                            FormatShort(plane.v.norm()) + unit});
-  const double scale = static_cast<double>(left.rows) / right.rows;
-  cv::resize(right, right, cv::Size(static_cast<int>(right.cols * scale), left.rows), 0.0, 0.0,
-             scale < 1.0 ? cv::INTER_AREA : cv::INTER_CUBIC);
-  cv::Mat views;
-  cv::hconcat(left, right, views);
-  return views;
+cv::Mat ColorPhoto(const cv::Mat& photo) {
+  cv::Mat color = photo;
+  if (photo.channels() == 1) cv::cvtColor(photo, color, cv::COLOR_GRAY2BGR);
+  if (photo.channels() == 4) cv::cvtColor(photo, color, cv::COLOR_BGRA2BGR);
+  return color;
 }
 
-Status WriteAll(const ImageRun& run, const PoseHypothesis& hypothesis, const Model& model,
+// What is written: a model and how it is seen.
+struct Reconstruction {
+  Model model;
+  Camera camera;
+  CameraPose pose;
+  std::vector<MeasuredValue> measured;
+  cv::Mat picture;  // The photo, drawn upon.
+  std::string title;
+};
+
+Status WriteAll(const cv::Mat& photo, Reconstruction* made, const ModelOptions& options,
                 const std::string& folder) {
-  Camera camera = run.observations.camera;
-  camera.width = run.photo.cols;
-  camera.height = run.photo.rows;
-  Status status = WriteObj(model, camera, hypothesis.cam_from_world, folder);
-  if (!status.ok()) return status;
-  const std::vector<MeasuredValue> measured =
-      Measure(run.observations, hypothesis, model, FLAGS_point_sigma_px);
-  status = WriteFile(folder + "/measurements.csv", MeasurementsCsv(measured));
-  if (!status.ok()) return status;
+  made->camera.width = photo.cols;
+  made->camera.height = photo.rows;
+  FaceTheCamera(made->pose, &made->model);
+  TextureModel(photo, made->camera, made->pose, options, &made->model);
+  std::vector<std::string> caption;
+  for (const MeasuredValue& value : made->measured) {
+    if (value.what != "length" && value.what != "height") continue;
+    caption.push_back(value.id + " " + FormatShort(value.value) + " +- " +
+                      FormatShort(value.sigma));
+  }
+  constexpr std::size_t kMaxCaption = 6;
+  if (caption.size() > kMaxCaption) caption.resize(kMaxCaption);
   const std::vector<std::uint8_t> png =
-      EncodePng(Views(run, model, hypothesis.metric ? "" : " distances to the origin"));
-  return WriteFile(folder + "/views.png", std::string(png.begin(), png.end()));
+      EncodePng(ModelViews(made->picture, made->model, made->pose, made->title, caption));
+  Status status = CreateFolder(folder);
+  if (status.ok()) status = WriteObj(made->model, made->camera, made->pose, folder);
+  if (status.ok()) status = WriteGlb(made->model, made->camera, made->pose, folder + "/model.glb");
+  if (status.ok())
+    status = WriteFile(folder + "/measurements.csv", MeasurementsCsv(made->measured));
+  if (status.ok()) status = WriteFile(folder + "/views.png", std::string(png.begin(), png.end()));
+  return status;
 }
 
 // The pose to take of those that explain the photo.
 Status ChoosePose(const ImageRun& run, const PoseHypothesis** hypothesis) {
-  if (!run.read_error.empty()) return Status::Failed(run.read_error);
   const SolverRun* shown = RunToShow(run);
   if (shown == nullptr) {
     return Status::Refused("no pose: " + (run.solvers.empty()
@@ -144,6 +158,86 @@ int Refuse(const Status& status) {
   return status.code == StatusCode::kInvalidArgument ? kExitUsage : kExitUnreadable;
 }
 
+// --- A box ---
+
+// Axes that the hypotheses of the photo's pose have, the most probable first; where the rotation is
+// free the normal is right all the same.
+std::vector<Eigen::Matrix3d> CandidateAxes(const ImageRun& run) {
+  constexpr std::size_t kMost = 8;
+  std::vector<Eigen::Matrix3d> axes;
+  const SolverRun* shown = RunToShow(run);
+  if (shown == nullptr) return axes;
+  for (const PoseHypothesis& hypothesis : shown->estimate.hypotheses) {
+    if (axes.size() < kMost) axes.push_back(hypothesis.cam_from_world.rotation);
+  }
+  return axes;
+}
+
+Status ReconstructBox(const CompareOptions& options, const ImageRun& run, BoxObservation box,
+                      Reconstruction* made) {
+  const EstimationOptions& estimation = options.losses.front().estimation;
+  BoxOptions box_options;
+  box_options.noise = estimation.noise_model;
+  box_options.camera = CameraSigmaOf(estimation, *run.image);
+  box_options.point_sigma_px = FLAGS_point_sigma_px;
+  BoxFit fit;
+  Status status;
+  if (box.edges.empty()) {
+    const SolverRun* shown = RunToShow(run);
+    const Camera camera =
+        shown == nullptr || shown->estimate.hypotheses.empty()
+            ? run.observations.camera
+            : CameraOf(shown->estimate.hypotheses.front(), run.observations.camera);
+    status = TraceBox(run.photo, camera, box_options, CandidateAxes(run), &box, &fit);
+  } else {
+    status = FitBox(run.image->observations.camera, box, box_options, {}, &fit);
+  }
+  if (!status.ok()) return status;
+  made->model = BoxModel(fit);
+  if (made->model.patches.empty())
+    return Status::Refused("the box '" + box.id + "': none of its faces is seen from outside");
+  for (const std::string& note : fit.notes) SayOnStderr("circline_reconstruct: " + note);
+  made->camera = fit.camera;
+  made->pose = fit.cam_from_box;
+  made->measured = MeasureBox(fit, box, run.observations, estimation);
+  made->picture = DrawBox(ColorPhoto(run.photo), box, fit);
+  made->title = fit.metric ? "a box" : "a box, in units of the distance to its origin";
+  return status;
+}
+
+// --- A plane and what stands on it ---
+
+Status ReconstructPlane(const ModelOptions& options, ImageRun* run, Reconstruction* made) {
+  const PoseHypothesis* hypothesis = nullptr;
+  Status status = ChoosePose(*run, &hypothesis);
+  if (!status.ok()) return status;
+  if (hypothesis->camera) SeeThrough(*hypothesis->camera, &run->observations);
+  made->model = PlaneModel(run->photo, run->observations, *hypothesis, options);
+  if (made->model.patches.empty()) return Status::Refused("no evidence lies in the world's plane");
+  status = AddSolids(run->image->solids, run->observations, *hypothesis, &made->model);
+  made->camera = run->observations.camera;
+  made->pose = hypothesis->cam_from_world;
+  made->measured = Measure(run->observations, *hypothesis, made->model, FLAGS_point_sigma_px);
+  made->picture = DrawOverlay(*run);
+  cv::resize(made->picture, made->picture, run->photo.size(), 0.0, 0.0, cv::INTER_AREA);
+  made->title = hypothesis->metric ? "a plane" : "a plane, in units of the distance to its origin";
+  return status;
+}
+
+Status ReconstructImage(const CompareOptions& options, const ModelOptions& model_options,
+                        ImageRun* run, Reconstruction* made) {
+  if (!run->read_error.empty()) return Status::Failed(run->read_error);
+  const Solids& solids = run->image->solids;
+  if (!solids.boxes.empty()) return ReconstructBox(options, *run, solids.boxes.front(), made);
+  if (solids.empty() && run->image->detect_everything) {
+    BoxObservation box;
+    box.id = "box";
+    if (ReconstructBox(options, *run, box, made).ok()) return Status::Ok();
+    *made = Reconstruction();
+  }
+  return ReconstructPlane(model_options, run, made);
+}
+
 int Reconstruct() {
   CompareOptions options;
   ModelOptions model_options;
@@ -153,23 +247,19 @@ int Reconstruct() {
   if (status.ok()) status = ModelFromFlags(&model_options);
   if (status.ok()) status = ImagesFromFlags(options.inputs, &images);
   if (status.ok()) status = FindImage(images, &image);
+  if (status.ok() && image.solids.boxes.size() > 1)
+    status = Status::Invalid(image.path + ": one box a photo can be modelled");
   if (!status.ok()) return Refuse(status);
   if (options.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.inputs.guess));
   options.overlays = true;  // The photo is needed.
   const SolverSet solvers(options);
   ImageRun run = RunImage(options, solvers, &image);
-  const PoseHypothesis* hypothesis = nullptr;
-  status = ChoosePose(run, &hypothesis);
+  Reconstruction made;
+  status = ReconstructImage(options, model_options, &run, &made);
   if (!status.ok()) return Refuse({status.code, image.path + ": " + status.message});
-  if (hypothesis->camera) SeeThrough(*hypothesis->camera, &run.observations);
-  const Model model = BuildModel(run.photo, run.observations, *hypothesis, model_options);
-  if (model.patches.empty()) {
-    return Refuse(Status::Refused(image.path + ": no evidence lies in the world's plane"));
-  }
-  status = CreateFolder(options.output);
-  if (status.ok()) status = WriteAll(run, *hypothesis, model, options.output);
+  status = WriteAll(run.photo, &made, model_options, options.output);
   if (!status.ok()) return Refuse(status);
-  std::cout << "model: " << options.output << "/model.obj\n";
+  std::cout << "model: " << options.output << "/model.glb\n";
   return kExitOk;
 }
 

@@ -79,7 +79,7 @@ std::vector<MeasuredValue> Measure(const Observations& observations,
                        const std::vector<Eigen::Vector2d>& pixels, double sigma_px) {
     Measurement m;
     if (MeasureOnPlane(function, hypothesis, camera, pixels, sigma_px, &m))
-      all.push_back({what, id, m.value, m.sigma, unit});
+      all.push_back({what, id, m.value, m.sigma, unit, 0.0});
   };
   add("distance", "camera", Distance, {}, 0.0);
   for (std::size_t i = 0; i < resolved.known_lengths.size(); ++i) {
@@ -105,11 +105,11 @@ std::vector<MeasuredValue> Measure(const Observations& observations,
     Measurement radius;
     const double sigma_px = circle.sigma_px > 0.0 ? circle.sigma_px : point_sigma_px;
     if (MeasureRadius(hypothesis, circle, sigma_px, camera, &radius))
-      all.push_back({"radius", circle.id, radius.value, radius.sigma, unit});
+      all.push_back({"radius", circle.id, radius.value, radius.sigma, unit, 0.0});
   }
   for (std::size_t i = 0; i < resolved.pencils.size(); ++i) {
     for (std::size_t j = i + 1; j < resolved.pencils.size(); ++j) {
-      MeasuredValue angle{"angle", "", 0.0, 0.0, "deg"};
+      MeasuredValue angle{"angle", "", 0.0, 0.0, "deg", 0.0};
       if (MeasureAngle(resolved.pencils[i], resolved.pencils[j], &angle)) all.push_back(angle);
     }
   }
@@ -118,13 +118,19 @@ std::vector<MeasuredValue> Measure(const Observations& observations,
 
 std::string MeasurementsCsv(const std::vector<MeasuredValue>& measurements) {
   std::ostringstream csv;
-  csv << std::setprecision(9) << "what,id,value,sigma,unit\n";
+  csv << std::setprecision(9) << "what,id,value,sigma,unit,truth,relative_error\n";
   for (const MeasuredValue& m : measurements) {
     std::string id = m.id;
     for (std::size_t at = 0; (at = id.find('"', at)) != std::string::npos; at += 2) {
       id.insert(at, 1, '"');
     }
-    csv << m.what << ",\"" << id << "\"," << m.value << "," << m.sigma << "," << m.unit << "\n";
+    csv << m.what << ",\"" << id << "\"," << m.value << "," << m.sigma << "," << m.unit << ",";
+    if (m.truth > 0.0) {
+      csv << m.truth << "," << m.value / m.truth - 1.0;
+    } else {
+      csv << ",";
+    }
+    csv << "\n";
   }
   return csv.str();
 }

@@ -5,7 +5,6 @@
 #include <cctype>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "apps/compare/pixel_ellipse.h"
@@ -33,36 +32,13 @@ struct View {
   }
 };
 
-// The photo as seen on the patch; grey where the photo does not show it.
-cv::Mat Texture(const View& view, const Patch& patch, double pixels_per_unit) {
-  const auto pixels = [&](const Eigen::Vector3d& side) {
-    return std::clamp(static_cast<int>(std::lround(side.norm() * pixels_per_unit)), 2, 8192);
-  };
-  cv::Mat map(pixels(patch.v), pixels(patch.u), CV_32FC2);
-  for (int row = 0; row < map.rows; ++row) {
-    for (int column = 0; column < map.cols; ++column) {
-      const double s = (column + 0.5) / map.cols, t = 1.0 - (row + 0.5) / map.rows;
-      const Eigen::Vector3d world = patch.corner + s * patch.u + t * patch.v;
-      Eigen::Vector2d pixel(-1e6, -1e6);
-      const Eigen::Vector3d seen = view.pose.rotation * world + view.pose.translation;
-      if (!CameraToPixel(view.camera, seen, &pixel)) pixel.setConstant(-1e6);
-      map.at<cv::Vec2f>(row, column) = {static_cast<float>(pixel.x()),
-                                        static_cast<float>(pixel.y())};
-    }
-  }
-  cv::Mat texture;
-  cv::remap(view.photo, texture, map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_CONSTANT,
-            cv::Scalar::all(128));
-  return texture;
-}
-
 Patch PlanePatch(const Eigen::AlignedBox2d& box) {
-  return {"plane",
-          {box.min().x(), box.min().y(), 0.0},
-          {box.sizes().x(), 0.0, 0.0},
-          {0.0, box.sizes().y(), 0.0},
-          false,
-          {}};
+  Patch patch;
+  patch.name = "plane";
+  patch.corner = {box.min().x(), box.min().y(), 0.0};
+  patch.u = {box.sizes().x(), 0.0, 0.0};
+  patch.v = {0.0, box.sizes().y(), 0.0};
+  return patch;
 }
 
 // The square about each circle on a plane parallel to the world's; those on it are lifted by a hair
@@ -76,12 +52,13 @@ std::vector<Patch> DiscPatches(const PoseHypothesis& hypothesis, double lift) {
     const double side = (pose.rotation.transpose() * pose.translation).z() < 0.0 ? 1.0 : -1.0;
     if (std::abs(center.z()) < lift) center.z() += side * lift;
     const double r = circle.radius;
-    patches.push_back({"circle_" + FileSafe(circle.id),
-                       center - Eigen::Vector3d(r, r, 0.0),
-                       {2.0 * r, 0.0, 0.0},
-                       {0.0, 2.0 * r, 0.0},
-                       true,
-                       {}});
+    Patch patch;
+    patch.name = "circle_" + FileSafe(circle.id);
+    patch.shape = PatchShape::kDisc;
+    patch.corner = center - Eigen::Vector3d(r, r, 0.0);
+    patch.u = {2.0 * r, 0.0, 0.0};
+    patch.v = {0.0, 2.0 * r, 0.0};
+    patches.push_back(patch);
   }
   return patches;
 }
@@ -159,12 +136,12 @@ std::vector<Patch> Faces(const View& view, const Observations& resolved,
     const UprightEdge* b = EdgeAt(edges, segment.ends[1], near_px);
     if (a == nullptr || b == nullptr || a == b) continue;
     const double height = 0.5 * (a->height + b->height);
-    faces.push_back({"face_" + FileSafe(segment.name),
-                     a->foot,
-                     b->foot - a->foot,
-                     {0.0, 0.0, height},
-                     false,
-                     {}});
+    Patch patch;
+    patch.name = "face_" + FileSafe(segment.name);
+    patch.corner = a->foot;
+    patch.u = b->foot - a->foot;
+    patch.v = {0.0, 0.0, height};
+    faces.push_back(patch);
   }
   return faces;
 }
@@ -180,7 +157,7 @@ std::string FileSafe(const std::string& name) {
   return safe;
 }
 
-Model BuildModel(const cv::Mat& photo, const Observations& observations,
+Model PlaneModel(const cv::Mat& photo, const Observations& observations,
                  const PoseHypothesis& hypothesis, const ModelOptions& options) {
   Model model;
   const View view{photo, observations.camera, hypothesis.cam_from_world};
@@ -197,9 +174,33 @@ Model BuildModel(const cv::Mat& photo, const Observations& observations,
     model.patches.push_back(std::move(patch));
   }
   for (Patch& patch : Faces(view, resolved, model.edges)) model.patches.push_back(std::move(patch));
-  const double pixels_per_unit = options.texture_px / box.sizes().maxCoeff();
-  for (Patch& patch : model.patches) patch.texture = Texture(view, patch, pixels_per_unit);
   return model;
+}
+
+void FaceTheCamera(const CameraPose& pose, Model* model) {
+  const Eigen::Vector3d eye = -(pose.rotation.transpose() * pose.translation);
+  for (Patch& patch : model->patches) {
+    if (patch.shape == PatchShape::kMantle) continue;
+    if (patch.u.cross(patch.v).dot(eye - patch.corner) >= 0.0) continue;
+    // What stands has its texture upright.
+    Eigen::Vector3d& side = patch.v.z() < 0.0 ? patch.v : patch.u;
+    patch.corner += side;
+    side = -side;
+  }
+}
+
+void TextureModel(const cv::Mat& photo, const Camera& camera, const CameraPose& pose,
+                  const ModelOptions& options, Model* model) {
+  std::vector<Patch> solid;  // What can hide something: a disc in a plane cannot.
+  for (const Patch& patch : model->patches) {
+    if (patch.shape != PatchShape::kDisc || patch.corner.z() > 0.01 * model->size)
+      solid.push_back(patch);
+  }
+  for (Patch& patch : model->patches) {
+    const bool is_plane = patch.name == "plane";
+    patch.texture =
+        PatchTexture(photo, camera, pose, patch, solid, is_plane ? options.texture_px : 0);
+  }
 }
 
 }  // namespace circline::apps

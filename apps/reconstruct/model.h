@@ -9,19 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "apps/common/solids.h"
+#include "apps/reconstruct/fit_box.h"
+#include "apps/reconstruct/patch.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 
 namespace circline::apps {
-
-// A parallelogram in the world: corner + s u + t v, s and t from 0 to 1. The texture has s to the
-// right and t upwards.
-struct Patch {
-  std::string name;  // Of files and materials, too: letters, digits, "_", "-", "." only.
-  Eigen::Vector3d corner, u, v;
-  bool is_disc = false;  // Only the disc that touches all sides.
-  cv::Mat texture;
-};
 
 // An edge that stands upright on the plane.
 struct UprightEdge {
@@ -31,23 +25,46 @@ struct UprightEdge {
   double height = 0.0;   // Negative where it hangs below the plane.
 };
 
+// Of a round box.
+struct SolidHeight {
+  std::string id;
+  double height = 0.0, truth = 0.0;  // `truth`: 0 = not known.
+};
+
 struct Model {
-  std::vector<Patch> patches;  // The plane first.
+  std::vector<Patch> patches;
   std::vector<UprightEdge> edges;
-  double size = 0.0;  // Diagonal of the plane's part.
+  std::vector<SolidHeight> heights;
+  double size = 0.0;  // Diagonal of the plane's part, or of the box.
 };
 
 struct ModelOptions {
-  int texture_px = 1024;  // Longer side of the plane's texture; 16 to 8192. Others in its scale.
-  double margin = 0.1;    // Of the plane's part about the evidence, share of its longer side.
+  int texture_px = 0;   // Longer side of the plane's texture; 16 to 8192; 0: as the photo has it.
+  double margin = 0.1;  // Of the plane's part about the evidence, share of its longer side.
 };
 
-// `observations` as fitted. The part of the plane is that of the evidence, with the margin. Pencils
-// along z give upright edges, where one end of a segment is that of a segment in the plane; two
-// such at both ends of a segment in the plane bound a face. Empty where no evidence lies in the
-// plane.
-Model BuildModel(const cv::Mat& photo, const Observations& observations,
+// What one photo shows of its plane; the plane comes first. `observations` as fitted. The part of
+// the plane is that of the evidence, with the margin. Pencils along z give upright edges, where one
+// end of a segment is that of a segment in the plane; two such at both ends of a segment in the
+// plane bound a face. Empty where no evidence lies in the plane. No textures yet.
+Model PlaneModel(const cv::Mat& photo, const Observations& observations,
                  const PoseHypothesis& hypothesis, const ModelOptions& options);
+
+// Adds round boxes and pieces of planes that are marked. Refused, in words, where a rim is not seen
+// above its base or a corner lies beyond the horizon.
+Status AddSolids(const Solids& solids, const Observations& observations,
+                 const PoseHypothesis& hypothesis, Model* model);
+
+// The visible faces of the box, in its own frame: "box_x0" is the one at the origin across x,
+// "box_x1" the one at the far end. Edges are shared to the bit. Empty where the camera is inside.
+Model BoxModel(const BoxFit& fit);
+
+// Turns patches so that their outside is where the camera is.
+void FaceTheCamera(const CameraPose& pose, Model* model);
+
+// Textures for all patches, without what other patches hide.
+void TextureModel(const cv::Mat& photo, const Camera& camera, const CameraPose& pose,
+                  const ModelOptions& options, Model* model);
 
 // A name that can be part of a file name.
 std::string FileSafe(const std::string& name);

@@ -1,6 +1,5 @@
 #include "apps/reconstruct/obj_file.h"
 
-#include <cmath>
 #include <iomanip>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
@@ -11,40 +10,29 @@
 namespace circline::apps {
 namespace {
 
-constexpr int kDiscCorners = 64;
-
 std::string TextureName(const Patch& patch) {
   return patch.name == "plane" ? "texture.png" : "texture_" + patch.name + ".png";
 }
 
-// The outline in (s, t) of the patch, counterclockwise.
-std::vector<Eigen::Vector2d> Outline(const Patch& patch) {
-  if (!patch.is_disc) return {{0.0, 0.0}, {1.0, 0.0}, {1.0, 1.0}, {0.0, 1.0}};
-  std::vector<Eigen::Vector2d> corners;
-  for (int i = 0; i < kDiscCorners; ++i) {
-    const double angle = 2.0 * 3.14159265358979323846 * i / kDiscCorners;
-    corners.emplace_back(0.5 + 0.5 * std::cos(angle), 0.5 + 0.5 * std::sin(angle));
-  }
-  return corners;
-}
-
 class ObjText {
  public:
-  ObjText() { text_ << std::setprecision(9) << "mtllib model.mtl\n"; }
+  ObjText() { text_ << std::setprecision(17) << "mtllib model.mtl\n"; }
 
   void AddPatch(const Patch& patch) {
     text_ << "o " << patch.name << "\n";
-    const std::vector<Eigen::Vector2d> outline = Outline(patch);
-    for (const Eigen::Vector2d& c : outline) {
-      AddVertex(patch.corner + c.x() * patch.u + c.y() * patch.v);
-      text_ << "vt " << c.x() << " " << c.y() << "\n";
+    const std::size_t before = vertices_ + 1, before_texture = texture_vertices_ + 1;
+    const Mesh mesh = MeshOf(patch);
+    for (const Eigen::Vector3d& point : mesh.points) AddVertex(point);
+    for (const Eigen::Vector2d& st : mesh.texture)
+      text_ << "vt " << st.x() << " " << st.y() << "\n";
+    text_ << "usemtl " << patch.name << "\n";
+    for (const std::vector<unsigned>& face : mesh.faces) {
+      text_ << "f";
+      for (const unsigned corner : face)
+        text_ << " " << before + corner << "/" << before_texture + corner;
+      text_ << "\n";
     }
-    text_ << "usemtl " << patch.name << "\nf";
-    for (std::size_t i = 0; i < outline.size(); ++i) {
-      const std::size_t vertex = vertices_ - outline.size() + i + 1;
-      text_ << " " << vertex << "/" << ++texture_vertices_;
-    }
-    text_ << "\n";
+    texture_vertices_ += mesh.texture.size();
   }
 
   // Its base at this depth is what the photo shows there.

@@ -1,0 +1,208 @@
+#include "apps/reconstruct/snap_box.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace circline::apps {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kSpacingPx = 1.0;     // Of samples along an edge.
+constexpr double kCornerShare = 0.05;  // Of an edge at either end, where corners are rounded.
+constexpr double kLeastCosine =
+    0.94;  // Of an edge point's gradient against across the edge: 20 deg.
+constexpr double kOnLinePx = 1.0;
+constexpr double kStepPx = 0.5;       // Of the offsets tried at either end.
+constexpr double kLeastShare = 0.34;  // Of the samples that must have a point on the line.
+constexpr double kRivalShare = 0.6;   // Of the best line's points that one farther out must have.
+constexpr double kLeastSigmaPx = 0.05;
+constexpr double kProlongedShare = 0.6;  // Of an edge, beyond its ends.
+
+// An edge point near a sample.
+struct NearPoint {
+  double share;   // Of the way along the edge.
+  double offset;  // Across it, outwards, pixels.
+  int sample;
+  int index;  // Of the EdgeMap's points.
+};
+
+// An edge as the photo should show it.
+struct ExpectedEdge {
+  std::vector<Vector2d> samples;
+  Vector2d across;  // Unit; of the outline: outwards.
+  bool is_outline = false;
+};
+
+Vector3d Seen(const BoxFit& fit, const Vector3d& x) {
+  return fit.cam_from_box.rotation * x + fit.cam_from_box.translation;
+}
+
+bool FaceIsSeen(const BoxFit& fit, int axis, bool far) {
+  const Vector3d eye = -(fit.cam_from_box.rotation.transpose() * fit.cam_from_box.translation);
+  return far ? eye[axis] > fit.length[axis] : eye[axis] < 0.0;
+}
+
+// False where none of its two faces is seen.
+bool Expect(const BoxFit& fit, int axis, int corner, ExpectedEdge* edge) {
+  int seen = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (k != axis && FaceIsSeen(fit, k, (corner >> k & 1) != 0)) ++seen;
+  }
+  if (seen == 0) return false;
+  edge->is_outline = seen == 1;
+  const Vector3d a = BoxCorner(fit.length, corner), b = BoxCorner(fit.length, corner | 1 << axis);
+  Vector2d from, to, middle;
+  if (!CameraToPixel(fit.camera, Seen(fit, a), &from) ||
+      !CameraToPixel(fit.camera, Seen(fit, b), &to) ||
+      !CameraToPixel(fit.camera, Seen(fit, 0.5 * fit.length), &middle)) {
+    return false;
+  }
+  const Vector2d along = (to - from).normalized();
+  edge->across = {-along.y(), along.x()};
+  if (edge->across.dot(middle - from) > 0.0) edge->across = -edge->across;
+  const int steps = std::max(2, static_cast<int>((to - from).norm() / kSpacingPx));
+  for (int i = 0; i <= steps; ++i) {
+    const double share = kCornerShare + (1.0 - 2.0 * kCornerShare) * i / steps;
+    Vector2d pixel;
+    if (!CameraToPixel(fit.camera, Seen(fit, a + share * (b - a)), &pixel)) return false;
+    edge->samples.push_back(pixel);
+  }
+  return true;
+}
+
+std::vector<NearPoint> PointsNear(const EdgeMap& edges, const ExpectedEdge& edge, double reach_px) {
+  std::vector<NearPoint> near;
+  for (std::size_t i = 0; i < edge.samples.size(); ++i) {
+    int last = -1;
+    for (double offset = -reach_px; offset <= reach_px; offset += 0.5) {
+      const Vector2d at = edge.samples[i] + offset * edge.across;
+      const int index = edges.PointAt(static_cast<int>(std::lround(at.x())),
+                                      static_cast<int>(std::lround(at.y())));
+      if (index < 0 || index == last) continue;
+      last = index;
+      const EdgePoint& point = edges.points[static_cast<std::size_t>(index)];
+      if (std::abs(point.Normal().dot(edge.across)) < kLeastCosine) continue;
+      near.push_back({static_cast<double>(i) / static_cast<double>(edge.samples.size() - 1),
+                      edge.across.dot(point.Position() - edge.samples[i]), static_cast<int>(i),
+                      index});
+    }
+  }
+  return near;
+}
+
+// Samples with a point on the line from offset `a` to offset `b`.
+int CountOnLine(const std::vector<NearPoint>& near, double a, double b) {
+  int count = 0, last = -1;
+  for (const NearPoint& point : near) {
+    if (point.sample == last || std::abs(point.offset - a - point.share * (b - a)) > kOnLinePx)
+      continue;
+    last = point.sample;
+    ++count;
+  }
+  return count;
+}
+
+// The line's offsets at both ends, or none with points on a third of the samples.
+bool FindOffsets(const std::vector<NearPoint>& near, const ExpectedEdge& edge, double reach_px,
+                 double* a, double* b) {
+  struct Candidate {
+    double a, b;
+    int count;
+  };
+  std::vector<Candidate> candidates;
+  int most = 0;
+  for (double p = -reach_px; p <= reach_px; p += kStepPx) {
+    for (double q = -reach_px; q <= reach_px; q += kStepPx) {
+      candidates.push_back({p, q, CountOnLine(near, p, q)});
+      most = std::max(most, candidates.back().count);
+    }
+  }
+  if (most < kLeastShare * static_cast<double>(edge.samples.size())) return false;
+  const double least =
+      edge.is_outline
+          ? std::max(kRivalShare * most, kLeastShare * static_cast<double>(edge.samples.size()))
+          : most;
+  double best = -1e9;
+  for (const Candidate& candidate : candidates) {
+    if (candidate.count < least) continue;
+    // Of the outline how far out, of others how near to where it was expected.
+    const double merit = edge.is_outline ? candidate.a + candidate.b
+                                         : -std::abs(candidate.a) - std::abs(candidate.b);
+    if (merit <= best) continue;
+    best = merit;
+    *a = candidate.a;
+    *b = candidate.b;
+  }
+  // To the middle of its points.
+  for (int pass = 0; pass < 3; ++pass) {
+    Eigen::Matrix2d moments = 1e-6 * Eigen::Matrix2d::Identity();
+    Vector2d sums = 1e-6 * Vector2d(*a, *b);
+    for (const NearPoint& point : near) {
+      if (std::abs(point.offset - *a - point.share * (*b - *a)) > 1.5 * kOnLinePx) continue;
+      const Vector2d row(1.0 - point.share, point.share);
+      moments += row * row.transpose();
+      sums += row * point.offset;
+    }
+    const Vector2d solved = moments.inverse() * sums;
+    *a = solved.x();
+    *b = solved.y();
+  }
+  return true;
+}
+
+// Pixels with an edge point on the prolonged line, from a little beyond either corner on.
+double Overrun(const EdgeMap& edges, const ExpectedEdge& edge, double a, double b) {
+  const Vector2d from = edge.samples.front() + a * edge.across,
+                 to = edge.samples.back() + b * edge.across, along = (to - from).normalized(),
+                 across(-along.y(), along.x());
+  const double length = (to - from).norm();
+  double overrun = 0.0;
+  for (const double sense : {-1.0, 1.0}) {
+    for (double beyond = kCornerShare * length + 4.0; beyond < kProlongedShare * length + 4.0;
+         beyond += 1.0) {
+      const Vector2d at = (sense < 0.0 ? from : to) + sense * beyond * along;
+      const int index = edges.PointAt(static_cast<int>(std::lround(at.x())),
+                                      static_cast<int>(std::lround(at.y())));
+      if (index < 0) continue;
+      const EdgePoint& point = edges.points[static_cast<std::size_t>(index)];
+      if (std::abs(point.Normal().dot(across)) > kLeastCosine) overrun += 1.0;
+    }
+  }
+  return overrun;
+}
+
+}  // namespace
+
+std::vector<BoxEdge> SnapBox(const EdgeMap& edges, const BoxFit& fit, double reach_px,
+                             double* overrun_px) {
+  std::vector<BoxEdge> snapped;
+  if (overrun_px != nullptr) *overrun_px = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int corner = 0; corner < 8; ++corner) {
+      ExpectedEdge expected;
+      if ((corner >> axis & 1) != 0 || !Expect(fit, axis, corner, &expected)) continue;
+      const std::vector<NearPoint> near = PointsNear(edges, expected, reach_px);
+      double a = 0.0, b = 0.0;
+      if (!FindOffsets(near, expected, reach_px, &a, &b)) continue;
+      if (overrun_px != nullptr) *overrun_px += Overrun(edges, expected, a, b);
+      BoxEdge edge;
+      edge.axis = axis;
+      for (int k = 0; k < 3; ++k) edge.far[static_cast<std::size_t>(k)] = (corner >> k & 1) != 0;
+      edge.sigma_px = kLeastSigmaPx;
+      for (const NearPoint& point : near) {
+        if (std::abs(point.offset - a - point.share * (b - a)) > kOnLinePx) continue;
+        const EdgePoint& found = edges.points[static_cast<std::size_t>(point.index)];
+        edge.points.push_back(found.Position());
+        edge.sigma_px = std::max(edge.sigma_px, static_cast<double>(found.sigma_px));
+      }
+      if (edge.points.size() >= 3) snapped.push_back(std::move(edge));
+    }
+  }
+  return snapped;
+}
+
+}  // namespace circline::apps

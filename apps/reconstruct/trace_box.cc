@@ -1,0 +1,165 @@
+#include "apps/reconstruct/trace_box.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "apps/reconstruct/box_tracer.h"
+#include "apps/reconstruct/snap_box.h"
+#include "circline/ransac/detection/edge_shift.h"
+#include "circline/ransac/detection/edges.h"
+
+namespace circline::apps {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr std::size_t kLeastEdges = 6;  // That the photo shows, of the seven or nine visible ones.
+// Least share of the visible edges' length with edge points. Of 19 traces on photos of two boxes
+// the nine with a length more than 12 % off had 0.79 or less (apps/benchmark/boxes.py, which has no
+// photos that were kept out of this).
+constexpr double kLeastCovered = 0.83;
+constexpr std::size_t kMostPolished = 24;  // Traces that are fitted, the best supported ones.
+constexpr double kCoarseReachPx = 8.0;     // From where a trace has an edge, and a fit.
+constexpr double kFineReachPx = 3.0;
+constexpr double kGapWeight = 0.25;  // Of what no edge point covers.
+constexpr char kNoBox[] =
+    "no box is sure enough in the photo: too few edges lie where its own would; mark its edges";
+
+// The same box with axes that a person would name: z upwards, x the longer of the other two.
+BoxFit Named(const TracedBox& box, const Camera& camera) {
+  std::size_t down = 0;
+  double steepest = -2.0;
+  const Vector2d at = camera.fx * box.corner.head<2>() / box.corner.z();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double fall = FlatDirection(box.axis[k], at, camera.fx).normalized().y();
+    if (fall <= steepest) continue;
+    steepest = fall;
+    down = k;
+  }
+  std::size_t x = (down + 1) % 3, y = (down + 2) % 3;
+  if (box.length[x] < box.length[y]) std::swap(x, y);
+  BoxFit fit;
+  fit.camera = camera;
+  fit.length = {box.length[x], box.length[y], box.length[down]};
+  Vector3d origin = box.corner + box.length[down] * box.axis[down], along_y = box.axis[y];
+  if (box.axis[x].cross(along_y).dot(box.axis[down]) > 0.0) {  // Else left-handed.
+    origin += box.length[y] * along_y;
+    along_y = -along_y;
+  }
+  fit.cam_from_box.rotation << box.axis[x], along_y, -box.axis[down];
+  fit.cam_from_box.translation = origin;
+  return fit;
+}
+
+// By the corner nearest to that of `before`.
+TracedBox FromFit(const BoxFit& fit, const TracedBox& before) {
+  int nearest = 0;
+  double best = -2.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3d seen =
+        fit.cam_from_box.rotation * BoxCorner(fit.length, corner) + fit.cam_from_box.translation;
+    const double cosine = seen.normalized().dot(before.corner.normalized());
+    if (cosine <= best) continue;
+    best = cosine;
+    nearest = corner;
+  }
+  TracedBox box;
+  const Vector3d corner =
+      fit.cam_from_box.rotation * BoxCorner(fit.length, nearest) + fit.cam_from_box.translation;
+  box.corner = corner / corner.z();
+  for (int k = 0; k < 3; ++k) {
+    const Vector3d axis = fit.cam_from_box.rotation.col(k);
+    const auto i = static_cast<std::size_t>(k);
+    box.axis[i] = (nearest >> k & 1) != 0 ? Vector3d(-axis) : axis;
+    box.length[i] = fit.length[k] / corner.z();
+    box.faces[i] = box.axis[i].dot(box.corner) > 0.0;
+  }
+  return box;
+}
+
+// Fitted to the edges that the photo has within each reach, one after the other.
+Status SnapAndFit(const EdgeMap& edges, const Camera& camera, const BoxOptions& options,
+                  const std::vector<double>& reaches_px, BoxObservation* box, BoxFit* fit) {
+  for (std::size_t i = 0; i < reaches_px.size(); ++i) {
+    BoxObservation seen;
+    seen.id = box->id;
+    const Eigen::Matrix3d start = fit->cam_from_box.rotation;
+    seen.edges = SnapBox(edges, *fit, reaches_px[i]);
+    if (i + 1 == reaches_px.size()) {
+      box->edges = seen.edges;
+      seen = *box;
+    }
+    const Status status = FitBox(camera, seen, options, start, fit);
+    if (!status.ok()) return status;
+  }
+  return Status::Ok();
+}
+
+Status DetectPhotoLines(const cv::Mat& photo, const Camera& camera, EdgeMap* edge_map,
+                        std::vector<DetectedLine>* lines) {
+  EdgeMap& edges = *edge_map;
+  cv::Mat gray;
+  Status status = ToGray(photo, &gray);
+  if (status.ok()) status = DetectEdges(gray, EdgeOptions(), &edges);
+  std::vector<DetectedLine> bent;  // Worn edges are.
+  if (status.ok()) status = DetectLines(edges, camera, LineOptions(), lines, nullptr, &bent);
+  if (status.ok()) UndoEdgeShift(edges, camera, lines);
+  lines->insert(lines->end(), bent.begin(), bent.end());
+  return status;
+}
+
+// The traces that lines support best, fitted to the photo's edges, and of these the one with most
+// edge points, less gaps and what runs on beyond corners.
+TracedBox Polished(const EdgeMap& edges, const std::vector<FlatLine>& flat, const Camera& camera,
+                   const BoxOptions& options, std::vector<TracedBox> found) {
+  std::stable_sort(found.begin(), found.end(),
+                   [](const TracedBox& a, const TracedBox& b) { return a.score > b.score; });
+  if (found.size() > kMostPolished) found.resize(kMostPolished);
+  TracedBox best;
+  for (const TracedBox& trace : found) {
+    if (!std::isfinite(trace.score)) continue;
+    BoxFit fit = Named(trace, camera);
+    BoxObservation box;
+    if (!SnapAndFit(edges, camera, options, {kCoarseReachPx}, &box, &fit).ok()) continue;
+    TracedBox fitted = FromFit(fit, trace);
+    double overrun_px = 0.0;
+    fitted.score = 0.0;
+    for (const BoxEdge& edge : SnapBox(edges, fit, kFineReachPx, &overrun_px))
+      fitted.score += static_cast<double>(edge.points.size());
+    const double visible_px = VisiblePx(fitted, camera.fx);
+    fitted.score -= kGapWeight * std::max(0.0, visible_px - fitted.score) + overrun_px;
+    if (fitted.score > best.score) best = fitted;
+  }
+  return best;
+}
+
+}  // namespace
+
+Status TraceBox(const cv::Mat& photo, const Camera& camera, const BoxOptions& options,
+                const std::vector<Eigen::Matrix3d>& axes, BoxObservation* box, BoxFit* fit) {
+  std::vector<DetectedLine> lines;
+  EdgeMap edges;
+  Status status = DetectPhotoLines(photo, camera, &edges, &lines);
+  if (!status.ok()) return status;
+  const std::vector<FlatLine> flat = FlatLines(lines, camera);
+  std::vector<TracedBox> found = TraceLines(lines, flat, camera, axes);
+  const TracedBox best = Polished(edges, flat, camera, options, std::move(found));
+  if (!std::isfinite(best.score)) return Status::Refused(kNoBox);
+  *fit = Named(best, camera);
+  status = SnapAndFit(edges, camera, options, {kCoarseReachPx, 5.0, kFineReachPx}, box, fit);
+  if (!status.ok()) return status;
+  double seen_px = 0.0;
+  for (const BoxEdge& edge : SnapBox(edges, *fit, kFineReachPx))
+    seen_px += static_cast<double>(edge.points.size());
+  const TracedBox last = FromFit(*fit, best);
+  const double visible_px = VisiblePx(last, camera.fx);
+  if (fit->edges.size() < kLeastEdges || seen_px < kLeastCovered * visible_px)
+    return Status::Refused(kNoBox);
+  return Status::Ok();
+}
+
+}  // namespace circline::apps

@@ -1,0 +1,97 @@
+// A box with faces of different brightness, painted as a camera sees it.
+#ifndef CIRCLINE_TESTS_APPS_PAINTED_BOX_H_
+#define CIRCLINE_TESTS_APPS_PAINTED_BOX_H_
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+
+#include "circline/estimators/camera.h"
+#include "circline/estimators/pose.h"
+
+namespace circline::apps {
+
+// From (0, 0, 0) to `size`, z up; seen by a pinhole camera of 640 x 480 pixels from above, so that
+// the faces at x = 0, y = 0 and the upper one are seen.
+struct PaintedBox {
+  static constexpr double kFocal = 700.0;
+  static constexpr int kWidth = 640, kHeight = 480;
+  static constexpr int kAround = 30, kTop = 220, kFaceX = 90, kFaceY = 150;
+
+  Eigen::Vector3d size{0.9, 0.6, 0.4};
+  CameraPose pose;
+
+  PaintedBox() {
+    const Eigen::Vector3d eye(-1.3, -1.9, 1.7), at = 0.5 * size;
+    const Eigen::Vector3d z = (at - eye).normalized(),
+                          x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
+    pose.rotation << x.transpose(), z.cross(x).transpose(), z.transpose();
+    pose.translation = -(pose.rotation * eye);
+  }
+
+  Camera camera() const {
+    Camera camera;
+    camera.id = "k";
+    camera.width = kWidth;
+    camera.height = kHeight;
+    camera.fx = camera.fy = kFocal;
+    camera.cx = 0.5 * (kWidth - 1);
+    camera.cy = 0.5 * (kHeight - 1);
+    return camera;
+  }
+  std::string CameraText() const {
+    return "cameras:\n  - { id: \"k\", model: \"pinhole\", width: 640, height: 480, camera_matrix: "
+           "[700., 0., 319.5, 0., 700., 239.5, 0., 0., 1.] }\n";
+  }
+  Eigen::Vector2d Pixel(const Eigen::Vector3d& x) const {
+    Eigen::Vector2d pixel(0.0, 0.0);
+    CameraToPixel(camera(), pose.rotation * x + pose.translation, &pixel);
+    return pixel;
+  }
+  // Of the corner at these shares of the size.
+  Eigen::Vector2d Corner(double x, double y, double z) const {
+    return Pixel(size.cwiseProduct(Eigen::Vector3d(x, y, z)));
+  }
+  int Brightness(double u, double v) const {
+    const Eigen::Vector3d eye = -(pose.rotation.transpose() * pose.translation);
+    const Eigen::Vector3d ray = pose.rotation.transpose() *
+                                Eigen::Vector3d((u - 319.5) / kFocal, (v - 239.5) / kFocal, 1.0);
+    double nearest = std::numeric_limits<double>::infinity();
+    int seen = kAround;
+    const std::array<double, 3> at = {0.0, 0.0, size.z()};
+    const std::array<int, 3> brightness = {kFaceX, kFaceY, kTop};
+    for (int k = 0; k < 3; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const double share = (at[i] - eye[k]) / ray[k];
+      const Eigen::Vector3d hit = eye + share * ray;
+      bool inside = share > 0.0 && share < nearest;
+      for (int j = 0; j < 3; ++j) inside = inside && (j == k || (hit[j] > 0.0 && hit[j] < size[j]));
+      if (!inside) continue;
+      nearest = share;
+      seen = brightness[i];
+    }
+    return seen;
+  }
+  void Paint(const std::string& path) const {
+    constexpr int kFiner = 4;  // Samples along each side of a pixel.
+    cv::Mat photo(kHeight, kWidth, CV_8U);
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        int sum = 0;
+        for (int k = 0; k < kFiner * kFiner; ++k)
+          sum += Brightness(u + (k % kFiner + 0.5) / kFiner - 0.5,
+                            v + (k / kFiner + 0.5) / kFiner - 0.5);
+        photo.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(sum / (kFiner * kFiner));
+      }
+    }
+    cv::imwrite(path, photo);
+  }
+};
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_TESTS_APPS_PAINTED_BOX_H_
