@@ -1,0 +1,61 @@
+#!/usr/bin/env bash
+# tests/packages.sh: the Debian packages, built in build/package, in a bare bookworm chroot: installed
+# by apt, every example built and run against them, and removed. Needs root, debootstrap and a mirror;
+# some ten minutes. tests/run.sh --full runs it; exit code 77: not root.
+#
+#   tests/packages.sh [--keep]      --keep: leaves the chroot, build/chroot, as it is at the end
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. cmake/setup.sh
+
+[ "$(id -u)" -eq 0 ] || { echo "skipped: only root can make a chroot"; exit 77; }
+install_packages "${BUILD_PACKAGES[@]}" help2man debootstrap dpkg-dev fakeroot pybind11-dev python3-dev python3-numpy
+build package
+rm -f build/package/*.deb
+(cd build/package && quietly ../package-cpack.log cpack)
+packages=(build/package/*.deb)
+say "made ${packages[*]##*/}"
+
+chroot_dir=$PWD/build/chroot
+rm -rf "$chroot_dir"
+say "making a chroot (log: build/chroot.log)"
+quietly build/chroot.log debootstrap --variant=minbase bookworm "$chroot_dir"
+# Of the caller's settings none that would have the compiler called by another program.
+inside() {
+  chroot "$chroot_dir" env -u CMAKE_CXX_COMPILER_LAUNCHER DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 "$@"
+}
+# What the host knows of mirrors, the chroot needs, too.
+for settings in apt.conf.d sources.list.d sources.list; do
+  [ ! -e "/etc/apt/$settings" ] || cp -rL "/etc/apt/$settings" "$chroot_dir/etc/apt/"
+done
+quietly build/chroot-update.log inside apt-get update
+before=$(inside find / -xdev -name '*circline*')
+mkdir "$chroot_dir/debs" "$chroot_dir/source"
+cp "${packages[@]}" "$chroot_dir/debs"
+cp -r docs tests apps README.md "$chroot_dir/source"
+quietly build/chroot-install.log inside sh -c 'apt-get install -y --no-install-recommends ./debs/*.deb'
+
+say "what the packages hold"
+inside circline_compare --version
+inside sh -c 'zcat /usr/share/man/man1/circline_compare.1.gz | grep -q "list_solvers"'
+inside python3 -c 'import circline; print("circline", circline.__version__)'
+needed=$(inside sh -c 'ldd /usr/bin/circline_compare | grep circline')
+echo "$needed" | grep -q 'libcircline_refine.so.[0-9]* => /lib\|/usr/lib' || fail "not its own libraries: $needed"
+objdump -p "$chroot_dir/usr/bin/circline_compare" | grep -q 'RUNPATH\|RPATH' && fail "circline_compare has an RPATH"
+
+say "examples against the packages"
+quietly build/chroot-tools.log inside apt-get install -y --no-install-recommends g++ cmake ninja-build pkg-config
+quietly build/chroot-consumer.log inside sh -c '
+  cmake -S /source/tests/consumer -B /tmp/consumer -G Ninja -DCMAKE_BUILD_TYPE=Release &&
+  cmake --build /tmp/consumer && ctest --test-dir /tmp/consumer --output-on-failure'
+quietly build/chroot-pytest.log inside sh -c '
+  apt-get install -y --no-install-recommends python3-pytest python3-matplotlib &&
+  cd /source && python3 -m pytest -q -p no:cacheprovider tests/python'
+
+say "removing the packages"
+rm -rf "$chroot_dir/debs" "$chroot_dir/source" "$chroot_dir/tmp/consumer"
+quietly build/chroot-remove.log inside sh -c 'apt-get purge -y "libcircline*" circline-tools python3-circline'
+after=$(inside find / -xdev -name '*circline*' -not -path "/var/lib/dpkg/*")
+[ "$before" = "$after" ] || fail "left behind: $after"
+[ "${1:-}" = --keep ] || rm -rf "$chroot_dir"
+say "installed, used and removed without a trace"
