@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "apps/common/colmap_file.h"
+#include "apps/common/colmap_camera.h"
 #include "apps/common/text.h"
 
 namespace circline::apps {

@@ -13,10 +13,6 @@
 
 namespace circline::apps {
 
-// The content of a cameras.txt. Not ok: one line that names `path` and the line. (All of these.)
-Status ParseColmapCameras(const std::string& path, const std::string& text,
-                          std::vector<Camera>* cameras);
-
 struct ColmapImage {
   std::string name;        // As COLMAP has it: below its folder of images.
   std::size_t camera = 0;  // Index.
