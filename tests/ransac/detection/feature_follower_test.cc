@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "circline/estimators/conic.h"
 #include "tests/ransac/detection/detection_test_util.h"
@@ -31,6 +33,11 @@ double Board(double x, double y) {
   const int column = static_cast<int>(std::floor((x + 0.6) / 0.2));
   const int row = static_cast<int>(std::floor((y + 0.5) / 0.2));
   return (column + row) % 2 == 0 ? 40.0 : 220.0;
+}
+
+// The same without the disc above.
+double BoardWithoutUpper(double x, double y) {
+  return std::hypot(x - 0.4, y - 0.85) < 0.3 ? 220.0 : Board(x, y);
 }
 
 cv::Mat Photo(const Camera& camera, const CameraPose& pose, std::uint64_t seed) {
@@ -208,6 +215,38 @@ TEST(FeatureFollower, FollowsWhatIsGivenAndNothingElse) {
 }
 
 // Rows and columns of a sheet of discs are lines through their centres: no edges.
+// Its own number comes first for what is new, too: another disc is not the one that was given.
+TEST(FeatureFollower, AStrangerDoesNotTakeTheIdOfWhatWasGiven) {
+  const Camera camera = TestCamera();
+  FeatureFollower follower(camera, FollowOptions());
+  Observations given = Detect(Photo(camera, PoseAt(0), 3), camera);
+  ASSERT_EQ(given.circles.size(), 2U);
+  const auto off = [](const CircleObservation& circle, int frame) {
+    const CameraPose pose = PoseAt(frame);
+    const Eigen::Vector3d upper =
+        pose.rotation * Eigen::Vector3d(0.4, 0.85, 0.0) + pose.translation;
+    return (Centre(circle) - upper.hnormalized()).norm();
+  };
+  if (off(given.circles[1], 0) < off(given.circles[0], 0))
+    std::swap(given.circles[0], given.circles[1]);
+  given.circles.resize(1);
+  given.circles[0].id = "c0";
+  given.pencils.clear();
+  given.frame = {};
+  follower.Start(given);
+  Observations observations;
+  for (int frame = 1; frame < 6; ++frame) {
+    const cv::Mat photo =
+        Develop(RenderPlane(camera, PoseAt(frame), 200.0, BoardWithoutUpper), 0.7, 2.0, 3);
+    ASSERT_TRUE(follower.Next(photo, &observations).ok());
+    EXPECT_TRUE(observations.circles.empty()) << frame;
+  }
+  ASSERT_TRUE(follower.Next(Photo(camera, PoseAt(6), 3), &observations).ok());
+  ASSERT_EQ(observations.circles.size(), 1U);
+  EXPECT_EQ(observations.circles[0].id, "c0");
+  EXPECT_LT(off(observations.circles[0], 6), 0.02);
+}
+
 TEST(FeatureFollower, RowsOfDiscsAreFollowed) {
   const Camera camera = TestCamera();
   FollowOptions options;
