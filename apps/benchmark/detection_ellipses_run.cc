@@ -16,9 +16,7 @@ Timed RunEllipses(const cv::Mat& image, const Camera& camera) {
   DetectEdges(gray, EdgeOptions(), &edges);
   t.edges_ms = Milliseconds(start);
   start = std::clock();
-  EllipseOptions options;
-  options.max_ellipses = 1000;
-  DetectEllipses(edges, camera, options, &t.ellipses);
+  DetectEllipses(edges, camera, EllipseOptions(), &t.ellipses);
   t.ellipses_ms = Milliseconds(start);
   for (const DetectedEllipse& e : t.ellipses)
     t.polygons.push_back(ContourPolygon(camera, e.fit.conic));

@@ -39,7 +39,7 @@ using Eigen::Vector3d;
 class EllipseDetector {
  public:
   EllipseDetector(const EdgeMap& map, const Camera& camera, const EllipseOptions& options)
-      : map_(map), camera_(camera), options_(options), fitter_(map, camera, options) {}
+      : map_(map), camera_(camera), fitter_(map, camera, options) {}
 
   std::vector<DetectedEllipse> Detect() {
     arcs_ = FindArcs(map_);
@@ -186,14 +186,10 @@ class EllipseDetector {
                      [](const DetectedEllipse& a, const DetectedEllipse& b) {
                        return a.length_px * a.coverage_deg > b.length_px * b.coverage_deg;
                      });
-    if (accepted_.size() > static_cast<std::size_t>(options_.max_ellipses)) {
-      accepted_.resize(static_cast<std::size_t>(options_.max_ellipses));
-    }
   }
 
   const EdgeMap& map_;
   const Camera& camera_;
-  const EllipseOptions& options_;
   EllipseFitter fitter_;
   std::vector<Arc> arcs_;
   std::vector<EllipseCandidate> candidates_;
@@ -261,8 +257,6 @@ Status EllipseOptions::Validate() const {
   if (!(min_arc_deg > 0.0 && min_arc_deg <= 360.0)) {
     return Status::Invalid("min_arc_deg must be in (0, 360]");
   }
-  if (max_ellipses < 0) return Status::Invalid("max_ellipses must not be negative");
-  if (!(max_rms_px > 0.0)) return Status::Invalid("max_rms_px must be positive");
   return Status::Ok();
 }
 
@@ -272,7 +266,6 @@ Status DetectEllipses(const EdgeMap& edges, const Camera& camera, const EllipseO
   Status status = options.Validate();
   if (status.ok()) status = camera.Validate();
   if (!status.ok()) return status;
-  if (options.max_ellipses == 0) return Status::Ok();
   *ellipses = EllipseDetector(edges, camera, options).Detect();
   GroupConcentric(camera, ellipses);
   return Status::Ok();

@@ -6,8 +6,9 @@
 // coordinates, so that lens distortion neither bends a candidate away from its contour nor biases
 // it, and what is fitted is always a general ellipse: nothing is ever rounded to a circle. The
 // final fit is to edge points from which the bias of a bent edge has been taken (CurvatureBias). A
-// contour too ragged for an ellipse gets a second look through a wider Gaussian. Around each ellipse
-// found, other rims about its centre are looked for, whose arcs may be too short to tell an ellipse.
+// contour too ragged for an ellipse gets a second look through a wider Gaussian. Around each
+// ellipse found, other rims about its centre are looked for, whose arcs may be too short to tell an
+// ellipse.
 #ifndef CIRCLINE_RANSAC_DETECTION_DETECT_ELLIPSES_H_
 #define CIRCLINE_RANSAC_DETECTION_DETECT_ELLIPSES_H_
 
@@ -23,15 +24,8 @@ namespace circline {
 
 struct EllipseOptions {
   double min_axis_px = 4.0;  // Smallest semi-minor axis; > 0.
-  double min_arc_deg =
-      100.0;              // Smallest share of the contour that edges support, of 360; in (0, 360].
-  int max_ellipses = 64;  // The best supported ones; 0 or more.
-  // Largest root-mean-square distance of the supporting points, pixels; > 0. A contour that is an
-  // ellipse stays below 0.3 px in a fair photo; a blob that resembles one does not.
-  double max_rms_px = 0.6;
-  // How many times smaller than chance allows the support may be: log10 of the number of ellipses
-  // as well supported that are expected in unrelated edges (Desolneux, Moisan, Morel, IJCV 2000).
-  double max_log10_false_alarms = -1.0;
+  // Smallest share of the contour that edges support, of 360; in (0, 360].
+  double min_arc_deg = 100.0;
 
   Status Validate() const;
 };

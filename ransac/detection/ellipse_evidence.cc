@@ -1,7 +1,6 @@
 #include "circline/ransac/detection/ellipse_evidence.h"
 
 #include <cstddef>
-#include <limits>
 #include <string>
 
 namespace circline {
@@ -57,7 +56,6 @@ EllipseOptions ToEllipseOptions(const DetectionOptions& options) {
   EllipseOptions result;
   result.min_axis_px = options.min_ellipse_axis_px;
   result.min_arc_deg = options.min_arc_deg;
-  result.max_ellipses = std::numeric_limits<int>::max();  // Cut later, and said so.
   return result;
 }
 

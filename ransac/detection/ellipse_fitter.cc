@@ -63,6 +63,12 @@ constexpr double kSecondLookLimit = 1.2;
 constexpr double kMaxAxisDiagonals = 2.0;
 // Points beyond this many standard deviations take no part in the final fit.
 constexpr double kOutlierSigmas = 3.5;
+// Largest root-mean-square distance of the supporting points, pixels. A contour that is an ellipse
+// stays below 0.3 px in a fair photo; a blob that resembles one does not.
+constexpr double kMaxRmsPx = 0.6;
+// How many times smaller than chance allows the support may be: log10 of the number of ellipses as
+// well supported that are expected in unrelated edges (Desolneux, Moisan, Morel, IJCV 2000).
+constexpr double kMaxLog10FalseAlarms = -1.0;
 // No contour is known better than this, whatever its scatter says.
 constexpr double kMinSigmaPx = 0.05;
 
@@ -292,7 +298,7 @@ bool EllipseFitter::Refit(EllipseCandidate* candidate) {
       static_cast<double>(trimmed_.size()) / static_cast<double>(fit_points_.size());
   candidate->score *= kept * kept;
   const double rms_px = Rms(trimmed_, candidate->conic);
-  return rms_px <= kShapeSlack * options_.max_rms_px &&
+  return rms_px <= kShapeSlack * kMaxRmsPx &&
          ShapeMiss(rms_px, candidate->conic, fit_indices_) <= kShapeSlack;
 }
 
@@ -334,7 +340,7 @@ void EllipseFitter::CalibrateSupport(std::size_t limit) {
 bool EllipseFitter::Plausible(BrightSide bright, double share, double slack) const {
   if (support_.Coverage() * 360.0 < share * options_.min_arc_deg) return false;
   if (ToDegrees(support_.turn) < share * options_.min_arc_deg) return false;
-  return Log10FalseAlarms(support_, bright) <= options_.max_log10_false_alarms + slack;
+  return Log10FalseAlarms(support_, bright) <= kMaxLog10FalseAlarms + slack;
 }
 
 // What surrounds a contour but is too ragged for an ellipse at the first scale - a penumbra, a
@@ -385,7 +391,7 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   if (!FitSupport(candidate->conic, e)) return kNone;
   candidate->conic = e->fit.conic;
   if (!Plausible(candidate->bright) || contour_.minor_px() < options_.min_axis_px ||
-      e->fit.rms_px > options_.max_rms_px) {
+      e->fit.rms_px > kMaxRmsPx) {
     return kNone;
   }
   e->coverage_deg = 360.0 * support_.Coverage();
