@@ -105,6 +105,12 @@ Json DetectionJson(const ImageRun& run, const NoiseModel& noise) {
   return line;
 }
 
+std::size_t ChosenHypothesis(const Json& request, std::size_t count) {
+  const auto chosen = request.find("hypothesis");
+  const bool said = chosen != request.end() && chosen->is_number_integer() && *chosen >= 0;
+  return said ? std::min(chosen->get<std::size_t>(), count - 1) : 0;
+}
+
 Json Measured(const Json& asked, const PoseHypothesis& hypothesis, const Camera& camera) {
   const std::string kind = asked.is_object() ? asked.value("kind", "") : "";
   if (kind != "length" && kind != "height" && kind != "angle")
@@ -126,8 +132,7 @@ Json Measured(const Json& asked, const PoseHypothesis& hypothesis, const Camera&
   return json;
 }
 
-Json EstimateJson(const ImageRun& run, const NoiseModel& noise, std::size_t chosen,
-                  const Json& asked) {
+Json EstimateJson(const ImageRun& run, const NoiseModel& noise, const Json& request) {
   if (!run.read_error.empty()) throw RequestError(422, run.read_error);
   if (run.solvers.empty()) throw RequestError(500, "there is no solver");
   const PoseEstimate& estimate = run.solvers.front().estimate;
@@ -145,10 +150,11 @@ Json EstimateJson(const ImageRun& run, const NoiseModel& noise, std::size_t chos
     json["hypotheses"].push_back(Json::parse(line));
   for (const PoseHypothesis& hypothesis : estimate.hypotheses)
     json["drawings"].push_back(DrawingJson(run, hypothesis));
-  if (!asked.is_array()) return json;
+  const Json asked = request.value("measure", Json::array());
+  if (!asked.is_array()) throw RequestError(400, "'measure' must be a list");
   if (asked.size() > kMaxMeasurements) throw RequestError(413, "more than 200 measurements");
-  const PoseHypothesis& hypothesis =
-      estimate.hypotheses[std::min(chosen, estimate.hypotheses.size() - 1)];
+  const std::size_t chosen = ChosenHypothesis(request, estimate.hypotheses.size());
+  const PoseHypothesis& hypothesis = estimate.hypotheses[chosen];
   for (const Json& item : asked) {
     json["measurements"].push_back(Measured(item, hypothesis, run.observations.camera));
   }

@@ -18,11 +18,14 @@ Json DetectionJson(const ImageRun& run, const NoiseModel& noise);
 // {status, message, notes, hypotheses: [lines of results.jsonl], drawings, measurements}: of each
 // hypothesis' drawing the `grid`, `horizon`, `origin`, `axes`, `box`: curves in pixels, null where
 // they cannot be seen; `circles`: id, center_px, and center, normal and radius in the camera frame.
-// `asked`: a list of {kind: length | height | angle, points, sigma_px}, measured in `chosen`.
-Json EstimateJson(const ImageRun& run, const NoiseModel& noise, std::size_t chosen,
-                  const Json& asked);
+// The request's `measure`: a list of {kind: length | height | angle, points, sigma_px}, measured in
+// its `hypothesis`.
+Json EstimateJson(const ImageRun& run, const NoiseModel& noise, const Json& request);
 
-// One of them; null with the reason in `error` where it cannot be had.
+// Which hypothesis a request speaks of: the first unless it says so.
+std::size_t ChosenHypothesis(const Json& request, std::size_t count);
+
+// One measurement; null with the reason in `error` where it cannot be had.
 Json Measured(const Json& asked, const PoseHypothesis& hypothesis, const Camera& camera);
 
 }  // namespace circline::apps

@@ -45,8 +45,7 @@ Json ExportPose(const ImageRun& run, const Json& request, const std::string& fol
     throw RequestError(422, "there is no pose: " + run.solvers.front().estimate.status.message);
   }
   const std::vector<PoseHypothesis>& hypotheses = shown->estimate.hypotheses;
-  const auto chosen = request.value("hypothesis", std::size_t{0});
-  const PoseHypothesis& hypothesis = hypotheses[std::min(chosen, hypotheses.size() - 1)];
+  const PoseHypothesis& hypothesis = hypotheses[ChosenHypothesis(request, hypotheses.size())];
   Camera camera = CameraOf(hypothesis, run.observations.camera);
   camera.width = run.photo.cols;
   camera.height = run.photo.rows;

@@ -171,8 +171,7 @@ Json Studio::Estimate(const Json& request) {
   const Json scene = request.value("scene", Json::object());
   SceneImage image = ReadDocument(Document(scene, *photo), folder_.path());
   const ImageRun run = RunPhoto(options_, solvers_, photo->pixels, &image);
-  return EstimateJson(run, options_.fit.noise_model, request.value("hypothesis", std::size_t{0}),
-                      request.value("measure", Json()));
+  return EstimateJson(run, options_.fit.noise_model, request);
 }
 
 Json Studio::Save(const Json& request) {
@@ -211,8 +210,7 @@ Json Studio::Export(const Json& request) {
   const auto photo = photos_.Get(Index(request));
   SceneImage image = ReadDocument(Document(request.at("scene"), *photo), folder_.path());
   const ImageRun run = RunPhoto(options_, solvers_, photo->pixels, &image);
-  const std::string stem = std::filesystem::path(folder_.name(photo->index)).stem().string();
-  const std::string below = std::string(kExportFolder) + "/" + stem;
+  const std::string below = std::string(kExportFolder) + "/" + folder_.name(photo->index);
   std::string path;
   Status status = folder_.OwnPath(below, &path);
   if (status.ok()) status = CreateFolder(path);

@@ -242,7 +242,7 @@ def check_exports(page, folder):
         page.driver.execute_script(
             'const e = document.getElementById("export"); e.value = arguments[0];'
             'e.dispatchEvent(new Event("change"));', name)
-        path = os.path.join(folder, 'photos', 'export', 'image.0007', file)
+        path = os.path.join(folder, 'photos', 'export', NAMES[0], file)
         end = time.time() + 10
         while not os.path.exists(path) and time.time() < end:
             time.sleep(0.05)
