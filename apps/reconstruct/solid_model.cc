@@ -12,7 +12,6 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kParallelCosine = 0.98;  // Of rims that count as parallel to the plane.
 
 bool SeenOnPlane(const Camera& camera, const CameraPose& pose, const Vector2d& pixel,

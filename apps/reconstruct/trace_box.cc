@@ -114,8 +114,8 @@ Status DetectPhotoLines(const cv::Mat& photo, const Camera& camera, EdgeMap* edg
 
 // The traces that lines support best, fitted to the photo's edges, and of these the one with most
 // edge points, less gaps and what runs on beyond corners.
-TracedBox Polished(const EdgeMap& edges, const std::vector<FlatLine>& flat, const Camera& camera,
-                   const BoxOptions& options, std::vector<TracedBox> found) {
+TracedBox Polished(const EdgeMap& edges, const Camera& camera, const BoxOptions& options,
+                   std::vector<TracedBox> found) {
   std::stable_sort(found.begin(), found.end(),
                    [](const TracedBox& a, const TracedBox& b) { return a.score > b.score; });
   if (found.size() > kMostPolished) found.resize(kMostPolished);
@@ -147,7 +147,7 @@ Status TraceBox(const cv::Mat& photo, const Camera& camera, const BoxOptions& op
   if (!status.ok()) return status;
   const std::vector<FlatLine> flat = FlatLines(lines, camera);
   std::vector<TracedBox> found = TraceLines(lines, flat, camera, axes);
-  const TracedBox best = Polished(edges, flat, camera, options, std::move(found));
+  const TracedBox best = Polished(edges, camera, options, std::move(found));
   if (!std::isfinite(best.score)) return Status::Refused(kNoBox);
   *fit = Named(best, camera);
   status = SnapAndFit(edges, camera, options, {kCoarseReachPx, 5.0, kFineReachPx}, box, fit);
