@@ -40,7 +40,7 @@ constexpr char kUsage[] =
 Status CheckFlags() {
   for (const char* name :
        {"scene", "output", "merge", "resume", "shard", "solvers", "peers", "export_as", "roi",
-        "save_options", "list_solvers", "circle_radius", "overlays", "threads"}) {
+        "plugin", "save_options", "list_solvers", "circle_radius", "overlays", "threads"}) {
     gflags::CommandLineFlagInfo info;
     if (gflags::GetCommandLineFlagInfo(name, &info) && info.current_value != info.default_value)
       return Status::Invalid(std::string("--") + name + ": is not a flag of circline_studio");
