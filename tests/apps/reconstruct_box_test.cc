@@ -82,7 +82,7 @@ class ReconstructBox : public testing::Test {
         static_cast<std::size_t>(model.meshes.at(mesh).primitives.at(0).attributes.at("POSITION")));
     const auto& view = model.bufferViews.at(static_cast<std::size_t>(accessor.bufferView));
     std::vector<Eigen::Vector3f> points(accessor.count);
-    std::memcpy(points.data(), model.buffers.at(0).data.data() + view.byteOffset,
+    std::memcpy(points.at(0).data(), model.buffers.at(0).data.data() + view.byteOffset,
                 accessor.count * sizeof(Eigen::Vector3f));
     return points;
   }
