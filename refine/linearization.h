@@ -5,6 +5,8 @@
 #define CIRCLINE_REFINE_LINEARIZATION_H_
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cstddef>
 #include <vector>
 
 #include "circline/refine/joint_problem.h"
@@ -20,7 +22,7 @@ class Linearization {
   // First column of a block in the shared unknowns, tangent space; -1 for constants and for what a
   // feature has of its own. The camera's come last, whether it is estimated or not.
   int column(int block) const { return columns_[static_cast<std::size_t>(block)]; }
-  int num_columns() const { return static_cast<int>(gradient_.size()); }
+  int num_columns() const { return static_cast<int>(information_.rows()); }
 
   // Covariance of the shared unknowns, pseudo-inverse on the observed subspace. A camera that is
   // not estimated is counted by its prior: Sigma_x + S Sigma_camera S^T, S how the others follow it
@@ -41,7 +43,7 @@ class Linearization {
   double OwnVariance(int block, int coordinate) const;
 
  private:
-  // Residuals of one feature or prior, by own columns of the group first, then shared ones.
+  // Residuals of one feature or prior.
   struct Rows {
     int feature, group;
     Eigen::MatrixXd J;         // Rows by local columns.
@@ -49,23 +51,25 @@ class Linearization {
     Eigen::VectorXd f;
     double twice_cost = 0.0;
   };
+  // The own unknowns x of a feature follow the shared ones y: x = -gain y.
   struct Group {
-    int size = 0;                 // Own columns.
-    std::vector<int> shared;      // Columns.
-    Eigen::MatrixXd information;  // Own, then shared.
-    Eigen::VectorXd gradient;
-    Eigen::MatrixXd inverse;  // Of the own part.
-    bool used = false;
+    int size = 0;                   // Own columns.
+    std::vector<std::size_t> rows;  // Index in rows_.
+    std::vector<int> shared;        // Columns.
+    Eigen::MatrixXd inverse, gain;  // Of the information of the own part.
   };
+  static int IndexIn(const std::vector<int>& columns, int column) {
+    return static_cast<int>(std::find(columns.begin(), columns.end(), column) - columns.begin());
+  }
 
   void LayOut();
   bool AddTerm(const Term& term, const Weighing& weighing);
   void TakeLoss(const Term& term, Rows* rows);
-  void AddRows(Rows rows);
-  bool EliminateGroups();
+  bool Eliminate(Group* group);
   const Eigen::MatrixXd& PlusJacobian(int block);  // Of the block's manifold, worked out once.
-  Eigen::MatrixXd LocalCovariance(const Rows& rows) const;
-  std::vector<const Rows*> RowsOf(int feature) const;
+  void Leverage(const std::vector<const Rows*>& parts, Eigen::MatrixXd* S,
+                Eigen::VectorXd* f) const;
+  Misfit MisfitOf(std::size_t feature, const std::vector<const Rows*>& parts) const;
 
   const JointProblem& problem_;
   const State& state_;
@@ -75,8 +79,8 @@ class Linearization {
   std::vector<Group> groups_;
   std::vector<Rows> rows_;
   std::vector<Eigen::MatrixXd> plus_;  // By block.
+  std::vector<double> ambient_;        // Jacobians of one term, as its cost function writes them.
   Eigen::MatrixXd information_, overcounted_, covariance_, null_space_;
-  Eigen::VectorXd gradient_;
 };
 
 }  // namespace circline
