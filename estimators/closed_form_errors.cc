@@ -11,14 +11,17 @@
 namespace circline {
 namespace {
 
-// Adds an isotropic error of a unit vector, or of a line's normal.
-void AddAngularError(double sigma_rad, Measured* m) {
+// Adds an error of a unit vector, or of a line's normal: its covariance across the vector, over the
+// variance `sigma_rad` squared.
+void AddAngularError(double sigma_rad, const Eigen::Matrix3d& shape, Measured* m) {
   if (!m->present() || sigma_rad == 0.0) return;
   const Eigen::Vector3d v = m->value, a = v.unitOrthogonal();
+  Eigen::Matrix<double, 3, 2> across;
+  across << a, v.normalized().cross(a);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(across.transpose() * shape * across);
   const Eigen::Index old = m->columns.cols();
   m->columns.conservativeResize(3, old + 2);
-  m->columns.col(old) = sigma_rad * v.norm() * a;
-  m->columns.col(old + 1) = sigma_rad * v.cross(a);
+  m->columns.rightCols<2>() = sigma_rad * v.norm() * across * eigen.operatorSqrt();
 }
 
 // All inputs after the change of calibrated coordinates x' = A x.
@@ -109,10 +112,12 @@ Eigen::MatrixXd FromColumns(const std::vector<Eigen::VectorXd>& columns, Eigen::
 }  // namespace
 
 void AddModelErrors(const NoiseModel& noise, Inputs* inputs) {
-  for (Measured& direction : inputs->directions) AddAngularError(noise.pencil_axis_rad, &direction);
+  for (std::size_t k = 0; k < inputs->directions.size(); ++k)
+    AddAngularError(noise.pencil_axis_rad, inputs->lean_shapes[k], &inputs->directions[k]);
   // A line that an axis is drawn on is that axis.
-  if (!inputs->x_sense) AddAngularError(noise.pencil_axis_rad, &inputs->x_line);
-  if (!inputs->y_sense) AddAngularError(noise.pencil_axis_rad, &inputs->y_line);
+  const Eigen::Matrix3d alike = Eigen::Matrix3d::Identity();
+  if (!inputs->x_sense) AddAngularError(noise.pencil_axis_rad, alike, &inputs->x_line);
+  if (!inputs->y_sense) AddAngularError(noise.pencil_axis_rad, alike, &inputs->y_line);
   const double tilt_variance = noise.circle_tilt_rad * noise.circle_tilt_rad;
   for (Measured& tilt : inputs->tilts)
     tilt.columns = noise.circle_tilt_rad * Eigen::Matrix2d::Identity();

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/pencil_lean.h"
+
 namespace circline {
 namespace {
 
@@ -178,6 +180,7 @@ void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, In
   const std::array<PencilObservation, 2> pencils = {evidence.pencils[0], evidence.pencils[1]};
   for (std::size_t k = 0; k < 2; ++k) {
     inputs->directions[k] = Measured(pencils[k].fit->direction, pencils[k].fit->covariance);
+    inputs->lean_shapes[k] = LeanShape(pencils[k]);
     inputs->roles[k] = pencils[k].direction;
   }
   std::optional<Angle> angle = KnownAngleBetween(pencils[0].id, pencils[1].id, evidence);
@@ -202,6 +205,7 @@ void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, In
   if (best == nullptr || !best->line) return;
   const std::size_t k = best->on_line;
   inputs->directions[k] = Measured(best->directions[k], Eigen::MatrixXd::Zero(3, 3));
+  inputs->lean_shapes[k] = Eigen::Matrix3d::Identity();
   inputs->rough = best->directions[k];
   inputs->line = FromLine(*best->line);
   inputs->on_line = k;

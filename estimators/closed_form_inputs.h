@@ -38,6 +38,9 @@ struct Inputs {
   Measured center;          // Image of the circle's centre, homogeneous, 3.
   Measured x_line, y_line;  // Images of the axes or of lines parallel to them, 3.
   std::array<Measured, 2> directions;  // Vanishing points of two pencils, 3.
+  // What of a wall's lean turns each of them (LeanShape).
+  std::array<Eigen::Matrix3d, 2> lean_shapes = {Eigen::Matrix3d::Identity(),
+                                                Eigen::Matrix3d::Identity()};
   // Where present, directions[on_line] lies in the plane of this line, 3, and makes `angle`,
   // radians, with the other direction, but for what it differs from `rough` by, near which it is.
   Measured line;

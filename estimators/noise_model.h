@@ -62,8 +62,8 @@ struct NoiseModel {
   // a share of the circle's radius.
   double circle_tilt_rad = 0.003;
   double circle_height = 0.003;
-  // A line against the direction of its pencil, and a pencil's direction against the axis that it
-  // is taken for (each of two components), radians.
+  // A line against the direction of its pencil, and a wall's lines against the axis that they are
+  // taken for (each of two components; LeanShape is what it makes of a pencil), radians.
   double line_direction_rad = 0.003;
   double pencil_axis_rad = 0.004;
   // A known radius or length that states no sigma of its own, relative.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/pencil_lean.h"
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/joint_builder.h"
 #include "circline/refine/manifolds.h"
@@ -77,6 +78,7 @@ int JointProblemBuilder::DirectionBlock(const PencilObservation& pencil) {
                       : NewDirectionPrior(axis, sigma)),
           {block}, feature);
   p_.terms_.back().loss = std::make_unique<MostlyExact>();
+  if (!is_free) p_.terms_.back().lean_shape = LeanShape(pencil);
   return block;
 }
 

@@ -72,6 +72,13 @@ double JointProblem::TwiceCost(const Term& term, const State& state,
   return rho[0];
 }
 
+double JointProblem::FreeCost(const State& state) const {
+  double twice_cost = 0.0;
+  for (std::size_t i = 0; i < features_.size(); ++i)
+    twice_cost += state.active[i] != 0 ? features_[i].free_twice_cost : 0.0;
+  return 0.5 * twice_cost;
+}
+
 double JointProblem::Cost(const State& state, const Weighing& weighing) const {
   double cost = 0.0;
   for (const Term& term : terms_) {

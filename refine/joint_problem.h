@@ -67,6 +67,8 @@ struct Term {
   std::unique_ptr<ceres::LossFunction> loss;
   // The covariance is that of the residuals without the loss; else that which the loss makes of it.
   bool is_mostly_exact = true;
+  // Of a pencil's prior about its axis (LeanShape): counted in the covariance.
+  std::optional<Eigen::Matrix3d> lean_shape = std::nullopt;
 };
 
 // Where a refinement stands.
@@ -74,12 +76,16 @@ struct State {
   std::vector<double> x;             // All parameter blocks.
   std::vector<std::uint8_t> active;  // By feature.
   double cost = 0.0;                 // Of the active terms, priors included.
+  bool is_rough = false;             // Not at a minimum, which would contradict itself.
 };
 
 // A minimum that has been found. Another competes where it costs no more than so much above it.
 struct Rival {
   double cost = std::numeric_limits<double>::infinity();
   double gap = 0.0;
+  // Where the features miss their own free fits by more than this, cost, they contradict each
+  // other: the place of the minimum is enough, roughly.
+  double contradiction = std::numeric_limits<double>::infinity();
 };
 
 class JointProblem {
@@ -103,8 +109,10 @@ class JointProblem {
   // The same from a start that may be far off, where much lies in the tails of the losses: under
   // wide ones first, which narrow to their own width (graduated non-convexity; Black and Rangarajan
   // 1996).
-  Status SolveGraduated(int max_iterations, State* state) const;
+  Status SolveGraduated(int max_iterations, State* state, const Rival& rival = Rival()) const;
 
+  // Of the active features' own free fits: no pose costs less.
+  double FreeCost(const State& state) const;
   // Infinity where it cannot be evaluated.
   double Cost(const State& state, const Weighing& weighing = Weighing()) const;
   CameraPose PoseAt(const State& state) const;

@@ -15,10 +15,15 @@ namespace {
 
 // Ends where a step, taken or not, changes the cost by little, or where the steps that would follow
 // do (near the minimum under a loss they shrink at a constant rate), however large the cost of all
-// points is; and where more steps like it would not lead to what competes.
+// points is; where more steps like it would not lead to what competes; and where features that
+// contradict each other, so that many points lie in the tails of the loss, make the steps creep.
 class Watch : public ceres::IterationCallback {
  public:
-  explicit Watch(const Rival& rival) : most_(rival.cost + rival.gap) {}
+  Watch(const Rival& rival, double free_cost)
+      : most_(rival.cost + rival.gap),
+        contradicted_(free_cost + rival.contradiction),
+        free_cost_(free_cost) {}
+  bool creeps() const { return num_slow_ == kMostSlow; }
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
     constexpr double kMoreSteps = 5.0;
     if (summary.iteration == 0 || !summary.step_is_valid) return ceres::SOLVER_CONTINUE;
@@ -28,14 +33,21 @@ class Watch : public ceres::IterationCallback {
     const double rest = converges ? summary.cost_change * rate / (1.0 - rate) : summary.cost_change;
     if (std::min(std::abs(summary.cost_change), std::abs(rest)) < kLittleCost)
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+    constexpr double kSlow = 0.003;  // Of what is above the free fits.
+    const bool is_slow = summary.cost > contradicted_ && summary.step_is_successful &&
+                         summary.cost_change < kSlow * (summary.cost - free_cost_);
+    num_slow_ = is_slow ? num_slow_ + 1 : 0;
+    if (creeps()) return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     const bool is_hopeless =
         summary.step_is_successful && summary.cost - kMoreSteps * summary.cost_change > most_;
     return is_hopeless ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
   }
 
  private:
-  double most_;
+  static constexpr int kMostSlow = 2;  // Steps, one after the other.
+  double most_, contradicted_, free_cost_;
   double last_change_ = 0.0;
+  int num_slow_ = 0;
 };
 
 }  // namespace
@@ -77,7 +89,7 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
     options.linear_solver_type = ceres::DENSE_SCHUR;
     options.linear_solver_ordering = ordering;
   }
-  Watch watch(rival);
+  Watch watch(rival, FreeCost(*state));
   options.callbacks.push_back(&watch);
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
@@ -86,6 +98,7 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
   if (!summary.IsSolutionUsable() && summary.termination_type != ceres::NO_CONVERGENCE)
     return Status::Failed("the evidence cannot be evaluated at the seed");
   state->cost = summary.final_cost;
+  state->is_rough = watch.creeps();
   for (const double v : state->x) {
     if (!std::isfinite(v)) return Status::Failed("the refinement left the range of numbers");
   }
@@ -115,10 +128,10 @@ double JointProblem::LargestMiss(const State& state) const {
   return std::sqrt(most);
 }
 
-Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
+Status JointProblem::SolveGraduated(int max_iterations, State* state, const Rival& rival) const {
   if (options_.conic_loss.type == LossType::kTrivial &&
       options_.line_loss.type == LossType::kTrivial) {
-    return Solve(max_iterations, state);
+    return Solve(max_iterations, state, rival);
   }
   Weighing weighing;
   constexpr double kWidest = 300.0, kNarrower = 0.25;
@@ -136,7 +149,7 @@ Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
     SetWeighing(Weighing());
     if (!status.ok()) return status;
   }
-  return Solve(max_iterations, state);
+  return Solve(max_iterations, state, rival);
 }
 
 }  // namespace circline

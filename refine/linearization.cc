@@ -157,19 +157,23 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
   return true;
 }
 
-// The loss counts its residuals W times as much as their variance of 1 asks for: the estimate has
-// the covariance A^-1 (A + (W^2 - W) J^T J) A^-1, A with W J^T J.
+// The loss counts its residuals W times as much as their covariance C asks for, 1 or that of
+// leaning walls: the estimate has the covariance A^-1 (A + J^T (W^2 C - W) J) A^-1, A with W J^T J.
 void Linearization::TakeLoss(const Term& term, Rows* rows) {
   double rho[3];
   term.loss->Evaluate(rows->twice_cost, rho);
   const double W = std::max(1.0, rho[1]);
-  const std::size_t counted = term.is_mostly_exact ? rows->columns.size() : 0;
-  for (std::size_t a = 0; a < counted; ++a) {
-    for (std::size_t b = 0; b < counted; ++b) {
-      const auto i = static_cast<Eigen::Index>(a), j = static_cast<Eigen::Index>(b);
-      overcounted_(rows->columns[a], rows->columns[b]) +=
-          (W * W - W) * rows->J.col(i).dot(rows->J.col(j));
+  if (term.is_mostly_exact) {
+    const Eigen::MatrixXd H = rows->J.transpose() * rows->J;
+    Eigen::MatrixXd more = (W * W - W) * H;
+    if (term.lean_shape) {
+      // J^T J is the plus Jacobian's P^T P over the variance of a direction's two components.
+      const Eigen::MatrixXd& P = PlusJacobian(term.blocks.front());
+      const Eigen::MatrixXd in_camera = problem_.PoseAt(state_).rotation * P;
+      const double information = H.trace() / P.squaredNorm();
+      more = W * W * information * in_camera.transpose() * *term.lean_shape * in_camera - W * H;
     }
+    overcounted_(rows->columns, rows->columns) += more;
   }
   rows->J *= std::sqrt(W);
   rows->f *= std::sqrt(W);

@@ -90,6 +90,7 @@ Linearization::Misfit Linearization::MisfitOf(std::size_t feature,
   Eigen::MatrixXd S;
   Eigen::VectorXd f;
   Leverage(parts, &S, &f);
+  if (f.size() == 0) return misfit;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(S);
   for (Eigen::Index k = 0; k < f.size(); ++k) {
     const double s = std::clamp(eigen.eigenvalues()[k], 0.0, 1.0),

@@ -17,6 +17,9 @@ namespace {
 
 constexpr std::size_t kMaxReadings = 16;
 constexpr double kHopeless = 300.0;  // Gaps that no start comes down.
+// Cost: several times what leaving out a feature costs, and its chi-square limit besides.
+constexpr double kContradiction = 100.0;
+constexpr double kNoRival = std::numeric_limits<double>::infinity();
 
 using Reading = std::vector<std::uint8_t>;  // By feature: takes part.
 
@@ -46,6 +49,7 @@ class ReadingSearch {
         }
       }
     }
+    FinishRough();
     return minima_.empty() ? last_ : Status::Ok();
   }
 
@@ -115,9 +119,31 @@ class ReadingSearch {
 
   // A minimum for the answer, with all that agrees with it.
   void Keep(State state) {
+    if (state.is_rough) {
+      rough_.push_back(std::move(state));
+      return;
+    }
     if (HasOutliers(state)) return;
     Grow(&state);
     if (!IsKnown(state, minima_)) minima_.push_back(std::move(state));
+  }
+
+  // What contradicts itself competes where nothing else explains the evidence better.
+  void FinishRough() {
+    double best = std::numeric_limits<double>::infinity();
+    for (const State& minimum : minima_) best = std::min(best, minimum.cost);
+    std::stable_sort(rough_.begin(), rough_.end(),
+                     [](const State& a, const State& b) { return a.cost < b.cost; });
+    for (State& state : rough_) {
+      const double left_out = LeftOutCost(problem_, state);
+      if (problem_.FreeCost(state) + left_out > best + MaxGap()) continue;
+      if (!problem_.Solve(problem_.options().max_iterations, &state, {best - left_out, MaxGap()})
+               .ok())
+        continue;
+      state.cost += left_out;
+      best = std::min(best, state.cost);
+      Keep(std::move(state));
+    }
   }
 
   // The first seed that is as near to the same minimum.
@@ -144,8 +170,9 @@ class ReadingSearch {
   bool SolveFrom(bool is_consistent, double best, State* state) {
     const int max_iterations = problem_.options().max_iterations;
     const double left_out = LeftOutCost(problem_, *state);
-    last_ = is_consistent ? problem_.Solve(max_iterations, state, {best - left_out, MaxGap()})
-                          : problem_.SolveGraduated(max_iterations, state);
+    last_ = is_consistent
+                ? problem_.Solve(max_iterations, state, {best - left_out, MaxGap()})
+                : problem_.SolveGraduated(max_iterations, state, {kNoRival, 0.0, kContradiction});
     if (!last_.ok()) return false;
     state->cost += left_out;
     return true;
@@ -154,10 +181,7 @@ class ReadingSearch {
   // Twice what all features together miss their own free fits by: none contradicts the others by
   // more.
   double TotalMisfit(const State& state) const {
-    double misfit = 2.0 * problem_.Cost(state);
-    for (std::size_t i = 0; i < state.active.size(); ++i)
-      misfit -= state.active[i] != 0 ? problem_.features()[i].free_twice_cost : 0.0;
-    return misfit;
+    return 2.0 * (problem_.Cost(state) - problem_.FreeCost(state));
   }
 
   bool IsConsistent(const State& state) const {
@@ -242,7 +266,7 @@ class ReadingSearch {
 
   const JointProblem& problem_;
   const std::vector<Seed>& seeds_;
-  std::vector<State> minima_;
+  std::vector<State> minima_, rough_;
   Status last_ = Status::Failed("no seed pose could be refined");
 };
 

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "apps/compare/pixel_ellipse.h"
+#include "circline/estimators/pencil_lean.h"
 
 namespace circline::apps {
 namespace {
@@ -168,11 +169,11 @@ Json PencilJson(const PencilObservation& pencil, double pencil_axis_rad) {
   json["direction"] = pencil.fit ? Array(pencil.fit->direction) : Json();
   json["num_segments"] = pencil.lines.size();
   if (pencil.fit) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(pencil.fit->covariance,
-                                                               Eigen::EigenvaluesOnly);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
+        pencil.fit->covariance + pencil_axis_rad * pencil_axis_rad * LeanShape(pencil),
+        Eigen::EigenvaluesOnly);
     const double variance = std::max(0.0, eigen.eigenvalues()[2]);
-    json["sigma_deg"] =
-        Number(std::sqrt(variance + pencil_axis_rad * pencil_axis_rad) * kDegreesPerRadian);
+    json["sigma_deg"] = Number(std::sqrt(variance) * kDegreesPerRadian);
   } else {
     json["sigma_deg"] = nullptr;
   }

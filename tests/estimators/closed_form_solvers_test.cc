@@ -474,8 +474,15 @@ TEST(ClosedFormSolversTest, TheNoiseModelIsInTheCovariance) {
   // Of the mean of two orthogonal directions: each leans by itself, and both turn.
   noise = NoiseModel::Exact();
   noise.pencil_axis_rad = 0.01;
+  // Lines far apart are of walls that lean in their own ways, which turns a direction by more.
+  const Matrix6d apart = covariance("orthogonal_vanishing_points", noise);
+  FitDirect(0.01, &observations);
+  const Observations with_lines = observations;
+  for (PencilObservation& pencil : observations.pencils) pencil.lines.clear();
   const Matrix6d leaning = covariance("orthogonal_vanishing_points", noise);
   EXPECT_NEAR((leaning.topLeftCorner<3, 3>().trace()), 2.5 * 1e-4, 0.3e-4);
+  EXPECT_GT((apart.topLeftCorner<3, 3>().trace()), (leaning.topLeftCorner<3, 3>().trace()));
+  observations = with_lines;
   EXPECT_LT(covariance("orthogonal_vanishing_points", NoiseModel::Exact()).trace(), 1e-5);
 
   // The distance follows the focal length, and the direction to the centre the principal point.

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "circline/estimators/pencil_lean.h"
 #include "circline/refine/estimate_pose.h"
 #include "tests/plane_scene.h"
 #include "tests/trials.h"
@@ -103,16 +104,26 @@ TEST(ImperfectionsTest, PencilsOffTheirAxesAreCountedHonestly) {
   double nees = 0.0;
   for (int i = 0; i < kTrials; ++i) {
     PlaneScene scene(0.8, 0.1, static_cast<std::uint64_t>(i + 1));
-    const auto leaning = [&](const Vector3d& axis) {
-      const Vector3d a = axis.unitOrthogonal(), b = axis.cross(a);
-      const double along_a = scene.random.Normal(), along_b = scene.random.Normal();
-      return Vector3d((axis + model.pencil_axis_rad * (along_a * a + along_b * b)).normalized());
+    // As far as the walls that its lines lie on turn a pencil of this axis.
+    const auto leaning = [&](PencilDirection along, const Vector3d& axis) {
+      PlaneScene straight(0.8, 0.1, static_cast<std::uint64_t>(i + 1));
+      Observations alone = straight.Empty();
+      alone.pencils = {straight.Pencil("L", along, axis, 5, 9)};
+      FitDirect(0.1, &alone);
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shape(LeanShape(alone.pencils[0]));
+      Vector3d lean;
+      for (int k = 0; k < 3; ++k)
+        lean[k] = std::sqrt(std::max(0.0, shape.eigenvalues()[k])) * scene.random.Normal();
+      const Vector3d turn = scene.pose.rotation.transpose() * (shape.eigenvectors() * lean);
+      return Vector3d((axis + model.pencil_axis_rad * turn).normalized());
     };
     Observations observations = scene.Empty();
-    observations.pencils = {
-        scene.Pencil("L1", PencilDirection::kX, leaning(Vector3d::UnitX()), 5, 9),
-        scene.Pencil("L2", PencilDirection::kY, leaning(Vector3d::UnitY()), 5, 9),
-        scene.Pencil("L3", PencilDirection::kZ, leaning(Vector3d::UnitZ()), 5, 9)};
+    observations.pencils = {scene.Pencil("L1", PencilDirection::kX,
+                                         leaning(PencilDirection::kX, Vector3d::UnitX()), 5, 9),
+                            scene.Pencil("L2", PencilDirection::kY,
+                                         leaning(PencilDirection::kY, Vector3d::UnitY()), 5, 9),
+                            scene.Pencil("L3", PencilDirection::kZ,
+                                         leaning(PencilDirection::kZ, Vector3d::UnitZ()), 5, 9)};
     for (PencilObservation& pencil : observations.pencils) pencil.plane.clear();
     observations.pencils[0].plane = observations.pencils[1].plane = "p0";
     const PoseEstimate estimate = EstimatePose(observations, LeastSquares(model));

@@ -1,0 +1,22 @@
+// How the walls that carry a pencil's lines, each of which leans in a way of its own, turn its
+// direction. Internal: not installed.
+#ifndef CIRCLINE_ESTIMATORS_PENCIL_LEAN_H_
+#define CIRCLINE_ESTIMATORS_PENCIL_LEAN_H_
+
+#include <Eigen/Core>
+
+#include "circline/estimators/observations.h"
+
+namespace circline {
+
+// Covariance, rank 2, of a fitted direction against the axis that it is taken for, in units of the
+// variance of one wall's lean (NoiseModel::pencil_axis_rad squared, each of two components). Lines
+// whose planes make small angles about the direction lie on one wall and lean alike; the fit takes
+// leans of different walls for convergence, and turns by a multiple of them where the walls are
+// seen under a small angle: two walls left and right of the view, 20 degrees off its middle, that
+// lean apart by one unit each turn their direction by two. Without lines, of one wall.
+Eigen::Matrix3d LeanShape(const PencilObservation& pencil);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_PENCIL_LEAN_H_
