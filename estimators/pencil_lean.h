@@ -1,13 +1,14 @@
 // How the walls that carry a pencil's lines, each of which leans in a way of its own, turn its
-// direction. Internal: not installed.
+// direction. Internal: not installed, but shown to circline_refine.
 #ifndef CIRCLINE_ESTIMATORS_PENCIL_LEAN_H_
 #define CIRCLINE_ESTIMATORS_PENCIL_LEAN_H_
 
 #include <Eigen/Core>
 
+#include "circline/estimators/export.h"
 #include "circline/estimators/observations.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Covariance, rank 2, of a fitted direction against the axis that it is taken for, in units of the
 // variance of one wall's lean (NoiseModel::pencil_axis_rad squared, each of two components). Lines
