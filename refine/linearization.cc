@@ -198,9 +198,11 @@ bool Linearization::Eliminate(Group* group) {
       target.push_back(column < 0 ? -1 - column : k + IndexIn(group->shared, column));
     AddInformation(rows.J, target, &A);
   }
-  if (k > 0 && !Invert(A.topLeftCorner(k, k), &group->inverse)) return false;
-  group->gain = group->inverse.lazyProduct(A.topRightCorner(k, n));
-  A.bottomRightCorner(n, n) -= A.bottomLeftCorner(n, k).lazyProduct(group->gain);
+  if (k > 0) {
+    if (!Invert(A.topLeftCorner(k, k), &group->inverse)) return false;
+    group->gain = group->inverse.lazyProduct(A.topRightCorner(k, n));
+    A.bottomRightCorner(n, n) -= A.bottomLeftCorner(n, k).lazyProduct(group->gain);
+  }
   for (int a = 0; a < n; ++a) {
     for (int b = 0; b < n; ++b)
       information_(group->shared[static_cast<std::size_t>(a)],

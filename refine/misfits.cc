@@ -50,10 +50,13 @@ void Linearization::Leverage(const std::vector<const Rows*>& parts, Eigen::Matri
   f->conservativeResize(used);
   const auto W = own.topRows(used);
   auto B = by_shared.topRows(used);
-  B.leftCols(group->gain.cols()) -= W.lazyProduct(group->gain);
+  const bool has_own = group->size > 0;
+  if (has_own) B.leftCols(group->gain.cols()) -= W.lazyProduct(group->gain);
   const Eigen::MatrixXd covariance = covariance_(shared, shared);
-  const Eigen::MatrixXd follow = B.lazyProduct(covariance), with = W.lazyProduct(group->inverse);
+  const Eigen::MatrixXd follow = B.lazyProduct(covariance);
   *S = follow.lazyProduct(B.transpose());
+  if (!has_own) return;
+  const Eigen::MatrixXd with = W.lazyProduct(group->inverse);
   *S += with.lazyProduct(W.transpose());
 }
 
