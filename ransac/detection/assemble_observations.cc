@@ -23,10 +23,11 @@ constexpr std::size_t kMaxSeeds = 16;
 // Directions nearer than this (a sine; 3 degrees) are one.
 constexpr double kDistinctSine = 0.0523;
 // Two pencils of one plane cross or form corners, while the edges of a box and the stripes of a
-// cushion behind it do not: this share of either's length meets the other. Of those that are likely
-// at right angles, as those of houses are, any does: few of a front's many uprights may meet the
-// few cornices that are seen.
+// cushion behind it do not: this share of either's length meets the other. If they are at right
+// angles, as those of houses are, the share of one is enough (few of a front's many uprights may
+// meet the few cornices that are seen), or the lower one of both.
 constexpr double kMinSpanningShare = 0.3;
+constexpr double kMinRectangularShare = 0.1;
 // A further pencil of the plane meets its lines over this share of its length.
 constexpr double kMinMeetingShare = 0.4;
 // Or lies in the convex hull of its circles, widened by this factor: a plate reaches beyond them.
@@ -161,8 +162,11 @@ class Assembler {
     const double of_a = MeetingLength(a.ends, b.ends, options_.diagonal_px),
                  of_b = MeetingLength(b.ends, a.ends, options_.diagonal_px);
     const double share = std::min(of_a / a.support_px, of_b / b.support_px);
+    const double larger_share = std::max(of_a / a.support_px, of_b / b.support_px);
     const bool is_plane =
-        share >= kMinSpanningShare || LogOddsOfRightAngle(a.direction, b.direction) > 0.0;
+        share >= kMinSpanningShare ||
+        (share >= kMinRectangularShare && Rectangular(a.direction, b.direction)) ||
+        (larger_share >= kMinSpanningShare && LogOddsOfRightAngle(a.direction, b.direction) > 0.0);
     return is_plane ? 2.0 * std::min(of_a, of_b) * std::sqrt(share) : 0.0;
   }
 
