@@ -21,10 +21,7 @@ const char* StatusText(const Status& status) {
   return status.code == StatusCode::kRefused ? "refused" : "failed";
 }
 
-// A text that is not UTF-8 (a file name) must not stop the run.
-std::string Line(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
-}
+std::string Line(const Json& json) { return JsonText(json) + "\n"; }
 
 Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 Json Number(const std::optional<double>& value) { return value ? Number(*value) : Json(); }
@@ -182,20 +179,6 @@ Json PencilJson(const PencilObservation& pencil, double pencil_axis_rad) {
   return json;
 }
 
-std::string ResultLines(const ImageRun& image) {
-  std::string lines;
-  for (const SolverRun& run : image.solvers) {
-    if (!run.estimate.status.ok() || run.estimate.hypotheses.empty()) {
-      lines += Line(RefusalLine(image, run));
-      continue;
-    }
-    for (std::size_t i = 0; i < run.estimate.hypotheses.size(); ++i) {
-      lines += Line(HypothesisLine(image, run, i));
-    }
-  }
-  return lines;
-}
-
 // Its size that of the photo where the calibration does not say; where nothing read the photo, that
 // which has the principal point in its middle.
 Json CameraJson(const ImageRun& run) {
@@ -212,37 +195,6 @@ Json CameraJson(const ImageRun& run) {
   json["height"] = size(camera.height, run.photo.rows, camera.cy);
   json.update(Intrinsics(camera));
   return json;
-}
-
-std::string ObservationLine(const ImageRun& run, const std::string& overlay,
-                            const std::vector<std::string>& flags, const NoiseModel& noise,
-                            const LineCounts& counts) {
-  Json line;
-  line["image"] = run.image->name;
-  line["index"] = run.image->index;
-  line["set_size"] = run.image->set_size;
-  line["detected"] = run.image->detect_everything;
-  line["camera"] = CameraJson(run);
-  if (!run.image->camera_from.empty()) line["camera_from"] = run.image->camera_from;
-  if (run.observations.stated_focal_px > 0.0)
-    line["calibrated_with"] = Intrinsics(run.observations.camera);
-  for (const char* key : {"ellipses", "segments", "pencils"}) line[key] = Json::array();
-  for (const CircleObservation& circle : run.observations.circles) {
-    line["ellipses"].push_back(EllipseJson(circle));
-  }
-  for (const PencilObservation& pencil : run.observations.pencils) {
-    for (const LineObservation& observed : pencil.lines) {
-      const Segment s = EndPoints(observed);
-      line["segments"].push_back({s[0].x(), s[0].y(), s[1].x(), s[1].y(), pencil.id});
-    }
-    line["pencils"].push_back(PencilJson(pencil, noise.pencil_axis_rad));
-  }
-  line["problems"] = run.problems;
-  line["overlay"] = TextOrNull(overlay);
-  if (!flags.empty()) line["flags"] = flags;
-  line["lines"] = {{"results", counts.results}, {"timings", counts.timings}};
-  if (!run.read_error.empty()) line["error"] = run.read_error;
-  return Line(line);
 }
 
 std::string TimingLines(const ImageRun& run) {
@@ -269,18 +221,67 @@ std::size_t CountLines(const std::string& text) {
 
 }  // namespace
 
+std::string JsonText(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::vector<Json> ResultLines(const ImageRun& image) {
+  std::vector<Json> lines;
+  for (const SolverRun& run : image.solvers) {
+    if (!run.estimate.status.ok() || run.estimate.hypotheses.empty()) {
+      lines.push_back(RefusalLine(image, run));
+      continue;
+    }
+    for (std::size_t i = 0; i < run.estimate.hypotheses.size(); ++i) {
+      lines.push_back(HypothesisLine(image, run, i));
+    }
+  }
+  return lines;
+}
+
+Json ObservationLine(const ImageRun& run, const std::string& overlay,
+                     const std::vector<std::string>& flags, const NoiseModel& noise,
+                     const LineCounts& counts) {
+  Json line;
+  line["image"] = run.image->name;
+  line["index"] = run.image->index;
+  line["set_size"] = run.image->set_size;
+  line["detected"] = run.image->detect_everything;
+  line["camera"] = CameraJson(run);
+  if (!run.image->camera_from.empty()) line["camera_from"] = run.image->camera_from;
+  if (run.observations.stated_focal_px > 0.0)
+    line["calibrated_with"] = Intrinsics(run.observations.camera);
+  for (const char* key : {"ellipses", "segments", "pencils"}) line[key] = Json::array();
+  for (const CircleObservation& circle : run.observations.circles) {
+    line["ellipses"].push_back(EllipseJson(circle));
+  }
+  for (const PencilObservation& pencil : run.observations.pencils) {
+    for (const LineObservation& observed : pencil.lines) {
+      const Segment s = EndPoints(observed);
+      line["segments"].push_back({s[0].x(), s[0].y(), s[1].x(), s[1].y(), pencil.id});
+    }
+    line["pencils"].push_back(PencilJson(pencil, noise.pencil_axis_rad));
+  }
+  line["problems"] = run.problems;
+  line["overlay"] = TextOrNull(overlay);
+  if (!flags.empty()) line["flags"] = flags;
+  line["lines"] = {{"results", counts.results}, {"timings", counts.timings}};
+  if (!run.read_error.empty()) line["error"] = run.read_error;
+  return line;
+}
+
 ImageLines WriteLines(const ImageRun& run, const std::string& overlay,
                       const std::vector<std::string>& flags, const NoiseModel& noise) {
   ImageLines lines;
-  lines.results = ResultLines(run);
+  for (const Json& line : ResultLines(run)) lines.results += Line(line);
   lines.timings = TimingLines(run);
   const LineCounts counts{run.image->index, CountLines(lines.results), CountLines(lines.timings)};
-  lines.observations = ObservationLine(run, overlay, flags, noise, counts);
+  lines.observations = Line(ObservationLine(run, overlay, flags, noise, counts));
   return lines;
 }
 
 std::string TextAsWritten(const std::string& text) {
-  return Json::parse(Line(text)).get<std::string>();
+  return Json::parse(JsonText(text)).get<std::string>();
 }
 
 }  // namespace circline::apps

@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_COMPARE_RESULTS_H_
 #define CIRCLINE_APPS_COMPARE_RESULTS_H_
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,16 @@ namespace circline::apps {
 // pencil counts what walls lean and boards bend (`noise`), as the solvers do.
 ImageLines WriteLines(const ImageRun& run, const std::string& overlay,
                       const std::vector<std::string>& flags, const NoiseModel& noise);
+
+// The same, for who does not write them: the lines of results.jsonl, and that of
+// observations.jsonl.
+std::vector<nlohmann::ordered_json> ResultLines(const ImageRun& run);
+nlohmann::ordered_json ObservationLine(const ImageRun& run, const std::string& overlay,
+                                       const std::vector<std::string>& flags,
+                                       const NoiseModel& noise, const LineCounts& counts);
+
+// Of one line; what is not UTF-8 is replaced, so that a file name cannot stop a run.
+std::string JsonText(const nlohmann::ordered_json& json);
 
 // A text as these lines have it: what is not UTF-8 is replaced.
 std::string TextAsWritten(const std::string& text);
