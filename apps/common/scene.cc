@@ -10,6 +10,7 @@
 #include <set>
 
 #include "apps/common/camera_file.h"
+#include "apps/common/scene_pixels.h"
 #include "apps/common/scene_solids.h"
 #include "apps/common/storage_node.h"
 #include "apps/common/text.h"
@@ -18,11 +19,6 @@ namespace circline::apps {
 namespace {
 
 constexpr double kRadiansPerDegree = 0.017453292519943295;
-
-Eigen::Vector2d ReadPoint(const StorageNode& node) {
-  const std::vector<double> v = node.Numbers(2);
-  return v.empty() ? Eigen::Vector2d::Zero() : Eigen::Vector2d(v[0], v[1]);
-}
 
 std::vector<Segment> ReadSegments(const StorageNode& node) {
   const std::vector<double> v = node.Numbers(0, 4);
@@ -52,16 +48,6 @@ double ReadPositive(const StorageNode& node) {
 
 std::string ReadOptionalText(const StorageNode& node) {
   return node.Exists() ? node.Text() : std::string();
-}
-
-std::vector<Eigen::Vector2d> ReadContour(const StorageNode& node) {
-  const std::vector<double> v = node.Numbers(0, 2);
-  std::vector<Eigen::Vector2d> points;
-  for (std::size_t i = 0; i + 1 < v.size(); i += 2) points.emplace_back(v[i], v[i + 1]);
-  if (points.size() < 5) {
-    node.Fail("must have 5 points or more, has " + std::to_string(points.size()));
-  }
-  return points;
 }
 
 std::array<int, 4> ReadRectangle(const StorageNode& node) {
@@ -94,10 +80,10 @@ void ReadCircle(const StorageNode& node, SceneImage* image) {
   circle.plane = ReadOptionalText(node.Get("plane"));
   circle.concentric = ReadOptionalText(node.Get("concentric"));
   circle.radius_group = ReadOptionalText(node.Get("radius_group"));
-  if (node.Get("center").Exists()) circle.center = ReadPoint(node.Get("center"));
+  if (node.Get("center").Exists()) circle.center = ReadPixel(node.Get("center"));
   if (node.Get("diameters").Exists()) circle.diameters = ReadSegments(node.Get("diameters"));
   if (node.Get("contour").Exists()) {
-    circle.points = ReadContour(node.Get("contour"));
+    circle.points = ReadPixels(node.Get("contour"), 5);  // A conic has five parameters.
   } else if (node.Get("roi").Exists()) {
     image->rois.push_back({image->observations.circles.size(), ReadRectangle(node.Get("roi"))});
   } else {
@@ -151,7 +137,7 @@ void ReadFrame(const StorageNode& node, bool detect_everything, Observations* ob
   FrameObservation& frame = observations->frame;
   frame.plane = ReadOptionalText(node.Get("plane"));
   CheckPlane(node.Get("plane"), frame.plane, *observations, detect_everything);
-  if (node.Get("origin").Exists()) frame.origin = ReadPoint(node.Get("origin"));
+  if (node.Get("origin").Exists()) frame.origin = ReadPixel(node.Get("origin"));
   if (node.Get("x_axis").Exists()) frame.x_axis = ReadSegment(node.Get("x_axis"));
   if (node.Get("y_axis").Exists()) frame.y_axis = ReadSegment(node.Get("y_axis"));
   const StorageNode center = node.Get("origin_is_center");
@@ -317,18 +303,6 @@ SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
   return image;
 }
 
-std::vector<std::string> PhotosInFolder(const std::string& folder) {
-  std::vector<std::string> paths;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (!entry.is_directory(error) && IsPhotoName(entry.path().string())) {
-      paths.push_back(entry.path().string());
-    }
-  }
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
-
 std::vector<std::string> MatchWildcard(const std::string& pattern) {
   std::vector<std::string> paths;
   glob_t found{};
@@ -366,6 +340,18 @@ bool IsPhotoName(const std::string& path) {
   static const auto* const known = new std::set<std::string>{
       ".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".webp", ".jp2"};
   return known->count(extension) > 0;
+}
+
+std::vector<std::string> PhotosInFolder(const std::string& folder) {
+  std::vector<std::string> paths;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    if (!entry.is_directory(error) && IsPhotoName(entry.path().string())) {
+      paths.push_back(entry.path().string());
+    }
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
 }
 
 Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,

@@ -83,6 +83,9 @@ Status ParseScene(const std::string& name, const std::string& text, const std::s
 // Whether photos have names that end like this one; letters' case does not count.
 bool IsPhotoName(const std::string& path);
 
+// Paths of the photos in a folder itself, sorted; none where it cannot be read.
+std::vector<std::string> PhotosInFolder(const std::string& folder);
+
 // The photos that a comma-separated list of files, folders and wildcards names, sorted within each;
 // to be detected. A plain file name need not exist (reading it will tell); a wildcard that matches
 // nothing, or a folder without photos, is an error.

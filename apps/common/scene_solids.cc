@@ -4,24 +4,12 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/common/scene_pixels.h"
+
 namespace circline::apps {
 namespace {
 
 constexpr const char* kAxes[] = {"x", "y", "z"};
-
-std::vector<Eigen::Vector2d> ReadPixels(const StorageNode& node, std::size_t least) {
-  const std::vector<double> v = node.Numbers(0, 2);
-  std::vector<Eigen::Vector2d> points;
-  for (std::size_t i = 0; i + 1 < v.size(); i += 2) points.emplace_back(v[i], v[i + 1]);
-  if (points.size() < least)
-    node.Fail("must have " + std::to_string(least) + " points or more, u, v each");
-  return points;
-}
-
-Eigen::Vector2d ReadPixel(const StorageNode& node) {
-  const std::vector<double> v = node.Numbers(2);
-  return v.empty() ? Eigen::Vector2d::Zero() : Eigen::Vector2d(v[0], v[1]);
-}
 
 double ReadNotNegative(const StorageNode& node) {
   if (!node.Exists()) return 0.0;
@@ -54,7 +42,12 @@ void AddEdge(const StorageNode& node, int axis, const std::array<bool, 3>& far,
 
 // The three edges at the origin, by their far ends.
 void ReadCorner(const StorageNode& node, double sigma_px, BoxObservation* box) {
-  if (!node.Get("corner").Exists()) return;
+  if (!node.Get("corner").Exists()) {
+    for (const char* axis : kAxes) {
+      if (node.Get(axis).Exists()) node.Get(axis).Fail("there is no 'corner' that its edge is at");
+    }
+    return;
+  }
   const Eigen::Vector2d corner = ReadPixel(node.Get("corner"));
   for (int k = 0; k < 3; ++k) {
     const Eigen::Vector2d end = ReadPixel(node.Require(kAxes[k]));
@@ -66,7 +59,10 @@ void ReadCorner(const StorageNode& node, double sigma_px, BoxObservation* box) {
 void ReadBase(const StorageNode& node, const std::vector<FaceObservation>& faces, double sigma_px,
               BoxObservation* box) {
   const StorageNode base = node.Get("base");
-  if (!base.Exists()) return;
+  if (!base.Exists()) {
+    if (node.Get("top").Exists()) node.Get("top").Fail("there is no 'base' that it is above");
+    return;
+  }
   const std::string id = base.Text();
   const auto face = std::find_if(faces.begin(), faces.end(),
                                  [&](const FaceObservation& f) { return f.id == id; });

@@ -194,6 +194,8 @@ TEST_F(ReconstructBox, SaysWhatIsWrong) {
   expect(solid("\"box\", corner: [10., 10.], x: [10., 10.], y: [20., 10.], z: [10., 30.]"), 2,
          "the edge along x has no length");
   expect(solid("\"box\", corner: [10., 10.], x: [50., 10.], y: [20., 10.]"), 2, "z");
+  expect(solid("\"box\", y: [20., 10.]"), 2, "there is no 'corner' that its edge is at");
+  expect(solid("\"box\", top: [20., 10.]"), 2, "there is no 'base' that it is above");
   expect(solid("\"box\", length: [1., -2., 0.]"), 2,
          "must be three lengths, 0 where one is not known");
   expect(solid("\"box\", edges: [ { along: \"x\", far: \"x\", points: [0., 0., 9., 9.] } ]"), 2,
