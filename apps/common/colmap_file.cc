@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -44,7 +43,7 @@ Status AddImage(const std::string& name, const std::string& camera, const Camera
   return Status::Ok();
 }
 
-// Little-endian numbers, as COLMAP writes them.
+// Numbers as COLMAP writes them: little-endian, which this machine is taken to be, too.
 class BinaryFile {
  public:
   explicit BinaryFile(const std::string& path) : file_(path, std::ios::binary) {
@@ -55,11 +54,7 @@ class BinaryFile {
   template <typename T>
   T Read() {
     T value{};
-    std::uint8_t bytes[sizeof(T)] = {};
-    if (!file_.read(reinterpret_cast<char*>(bytes), sizeof(T))) return value;
-    std::uint64_t word = 0;
-    for (std::size_t i = 0; i < sizeof(T); ++i) word |= std::uint64_t{bytes[i]} << (8 * i);
-    std::memcpy(&value, &word, sizeof(T));  // Of a little-endian machine, which Debian's are.
+    file_.read(reinterpret_cast<char*>(&value), sizeof(T));
     return value;
   }
   std::string ReadName() {
