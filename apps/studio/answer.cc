@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <sstream>
 
 #include "apps/compare/pose_curves.h"
 #include "apps/compare/results.h"
@@ -78,7 +77,9 @@ bool Measure(const std::string& kind, const std::vector<Eigen::Vector2d>& p, dou
   if (kind == "length") return LengthOnPlane(hypothesis, camera, {p[0], p[1]}, sigma_px, value);
   if (kind == "height") return HeightOverPlane(hypothesis, camera, {p[0], p[1]}, sigma_px, value);
   if (!AngleOnPlane(hypothesis, camera, {p[0], p[1], p[2], p[3]}, sigma_px, value)) return false;
-  value->value *= kDegreesPerRadian;
+  // Lines have no sense, so that their angle is an acute one.
+  const double degrees = std::abs(value->value) * kDegreesPerRadian;
+  value->value = std::min(degrees, 180.0 - degrees);
   value->sigma *= kDegreesPerRadian;
   return true;
 }
@@ -86,7 +87,7 @@ bool Measure(const std::string& kind, const std::vector<Eigen::Vector2d>& p, dou
 }  // namespace
 
 Json DetectionJson(const ImageRun& run, const NoiseModel& noise) {
-  Json line = Json::parse(WriteLines(run, "", {}, noise).observations);
+  Json line = ObservationLine(run, "", {}, noise, {});
   Json contours = Json::object(), sigmas = Json::object();
   for (const CircleObservation& circle : run.observations.circles) {
     Json contour = Json::array();
@@ -103,6 +104,13 @@ Json DetectionJson(const ImageRun& run, const NoiseModel& noise) {
   line["width"] = run.photo.cols;
   line["height"] = run.photo.rows;
   return line;
+}
+
+Json AskedMeasurements(const Json& request) {
+  Json asked = request.value("measure", Json::array());
+  if (!asked.is_array()) throw RequestError(400, "'measure' must be a list");
+  if (asked.size() > kMaxMeasurements) throw RequestError(413, "more than 200 measurements");
+  return asked;
 }
 
 std::size_t ChosenHypothesis(const Json& request, std::size_t count) {
@@ -132,9 +140,10 @@ Json Measured(const Json& asked, const PoseHypothesis& hypothesis, const Camera&
   return json;
 }
 
-Json EstimateJson(const ImageRun& run, const NoiseModel& noise, const Json& request) {
+Json EstimateJson(const ImageRun& run, const Json& request) {
   if (!run.read_error.empty()) throw RequestError(422, run.read_error);
   if (run.solvers.empty()) throw RequestError(500, "there is no solver");
+  const Json asked = AskedMeasurements(request);
   const PoseEstimate& estimate = run.solvers.front().estimate;
   const bool ok = estimate.status.ok() && !estimate.hypotheses.empty();
   Json json = {{"status", ok ? "ok" : StatusCodeName(estimate.status.code)},
@@ -145,14 +154,9 @@ Json EstimateJson(const ImageRun& run, const NoiseModel& noise, const Json& requ
   json["camera"] = CameraEntry(run.image->observations.camera, {});
   for (const char* list : {"hypotheses", "drawings", "measurements"}) json[list] = Json::array();
   if (!ok) return json;
-  std::istringstream lines(WriteLines(run, "", {}, noise).results);
-  for (std::string line; std::getline(lines, line);)
-    json["hypotheses"].push_back(Json::parse(line));
+  for (Json& line : ResultLines(run)) json["hypotheses"].push_back(std::move(line));
   for (const PoseHypothesis& hypothesis : estimate.hypotheses)
     json["drawings"].push_back(DrawingJson(run, hypothesis));
-  const Json asked = request.value("measure", Json::array());
-  if (!asked.is_array()) throw RequestError(400, "'measure' must be a list");
-  if (asked.size() > kMaxMeasurements) throw RequestError(413, "more than 200 measurements");
   const std::size_t chosen = ChosenHypothesis(request, estimate.hypotheses.size());
   const PoseHypothesis& hypothesis = estimate.hypotheses[chosen];
   for (const Json& item : asked) {

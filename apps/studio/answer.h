@@ -20,7 +20,10 @@ Json DetectionJson(const ImageRun& run, const NoiseModel& noise);
 // they cannot be seen; `circles`: id, center_px, and center, normal and radius in the camera frame.
 // The request's `measure`: a list of {kind: length | height | angle, points, sigma_px}, measured in
 // its `hypothesis`.
-Json EstimateJson(const ImageRun& run, const NoiseModel& noise, const Json& request);
+Json EstimateJson(const ImageRun& run, const Json& request);
+
+// A request's `measure`, checked: a list, and not too long a one; empty where there is none.
+Json AskedMeasurements(const Json& request);
 
 // Which hypothesis a request speaks of: the first unless it says so.
 std::size_t ChosenHypothesis(const Json& request, std::size_t count);

@@ -10,14 +10,22 @@
 namespace circline::apps {
 namespace {
 
+// `note`: how many cannot be had.
 Status WriteMeasurements(const Json& asked, const PoseHypothesis& hypothesis, const Camera& camera,
-                         const std::string& folder) {
+                         const std::string& folder, std::string* note) {
   std::vector<MeasuredValue> values;
+  std::size_t number = 0;
   for (const Json& item : asked) {
+    ++number;
     const Json measured = Measured(item, hypothesis, camera);
     if (!measured["value"].is_number()) continue;
-    values.push_back({measured["what"], item.value("id", std::to_string(values.size() + 1)),
-                      measured["value"], measured["sigma"], measured["unit"]});
+    values.push_back({measured["what"], item.value("id", std::to_string(number)), measured["value"],
+                      measured["sigma"], measured["unit"]});
+  }
+  if (values.size() < number) {
+    *note = std::to_string(number - values.size()) + " of " + std::to_string(number) +
+            " measurements cannot be had, as they are not on this side of the plane's horizon, and "
+            "are left out";
   }
   return WriteFile(folder + "/measurements.csv", MeasurementsCsv(values));
 }
@@ -53,8 +61,8 @@ Json ExportPose(const ImageRun& run, const Json& request, const std::string& fol
   std::string note;
   Status status;
   if (format == "csv") {
-    status = WriteMeasurements(request.value("measure", Json::array()), hypothesis,
-                               run.observations.camera, folder);
+    status = WriteMeasurements(AskedMeasurements(request), hypothesis, run.observations.camera,
+                               folder, &note);
   } else {
     const std::unique_ptr<Exporter> exporter = MakeExporter(format, folder);
     const CameraPose& pose = hypothesis.cam_from_world;

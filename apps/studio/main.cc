@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "apps/common/flags_util.h"
+#include "apps/common/output_file.h"
 #include "apps/compare/options.h"
 #include "apps/studio/server.h"
 #include "apps/studio/studio.h"
@@ -100,6 +101,8 @@ int Serve() {
   Camera camera;
   Status status = CheckFlags();
   if (status.ok()) status = folder.Open(FLAGS_images);
+  FolderLock lock;  // Two studios would each write over what the other one saved.
+  if (status.ok()) status = lock.Take(folder.path());
   if (status.ok()) status = ReadOptions(&options);
   if (status.ok()) status = ReadCamera(options, &camera);
   if (!status.ok()) return Refuse(status);

@@ -28,11 +28,9 @@ Status PhotoFolder::Open(const std::string& path) {
   }
   path_ = folder.string();
   names_.clear();
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (IsPhotoName(name) && !entry.is_directory(error)) names_.push_back(name);
+  for (const std::string& photo : PhotosInFolder(path_)) {
+    names_.push_back(fs::path(photo).filename().string());
   }
-  std::sort(names_.begin(), names_.end());
   return names_.empty() ? Status::Invalid("--images=" + path + ": has no photo in it")
                         : Status::Ok();
 }

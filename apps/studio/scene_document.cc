@@ -6,6 +6,7 @@
 
 #include "apps/common/camera_file.h"
 #include "apps/common/storage_node.h"
+#include "apps/compare/results.h"
 
 namespace circline::apps {
 namespace {
@@ -51,39 +52,72 @@ Json Checked(const Json& value, int depth, std::size_t* count) {
   return value.is_number_integer() && std::abs(number) < 1e9 ? value : Json(number);
 }
 
-Json FromNode(const cv::FileNode& node) {
+// Keys of names, which may be whole numbers in a file ("id: 0"), and are texts all the same.
+bool IsNameKey(const std::string& key) {
+  static const auto* const keys = new std::set<std::string>{
+      "id",      "camera", "plane", "concentric", "radius_group", "origin_is_center",
+      "pencils", "pencil", "base",  "rim",        "file"};
+  return keys->count(key) > 0;
+}
+
+// `key`: that of the node, or of the list that it is in.
+Json FromNode(const cv::FileNode& node, const std::string& key) {
   if (node.isMap()) {
     Json map = Json::object();
-    for (const cv::FileNode& child : node) map[child.name()] = FromNode(child);
+    for (const cv::FileNode& child : node) map[child.name()] = FromNode(child, child.name());
     return map;
   }
   if (node.isSeq()) {
     Json list = Json::array();
-    for (const cv::FileNode& child : node) list.push_back(FromNode(child));
+    for (const cv::FileNode& child : node) list.push_back(FromNode(child, key));
     return list;
   }
+  const bool is_name = node.isInt() && IsNameKey(key);
+  if (is_name) return std::to_string(static_cast<int>(node));
   if (node.isInt()) return static_cast<int>(node);
   if (node.isReal()) return node.real();
   return node.isString() ? Json(node.string()) : Json();
 }
 
-std::string Dump(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 // The parts of a list, or the keys of a map, a line each down to `depth`; numbers side by side.
 std::string Lines(const Json& value, const std::string& indent, int depth) {
   const bool is_map = value.is_object(), is_list = value.is_array();
-  if (depth == 0 || !(is_map || is_list) || value.empty()) return Dump(value);
-  if (is_list && !value.front().is_structured()) return Dump(value);
+  if (depth == 0 || !(is_map || is_list) || value.empty()) return JsonText(value);
+  if (is_list && !value.front().is_structured()) return JsonText(value);
   std::string text = is_map ? "{" : "[", separator = "\n";
   for (const auto& [key, item] : value.items()) {
     text += separator + indent + "  ";
-    if (is_map) text += Dump(key) + ": ";
+    if (is_map) text += JsonText(key) + ": ";
     text += Lines(item, indent + "  ", depth - 1);
     separator = ",\n";
   }
   return text + "\n" + indent + (is_map ? "}" : "]");
+}
+
+bool IsSameButId(const Json& a, const Json& b) {
+  nlohmann::json first = a, second = b;  // In which the order of keys does not count.
+  first.erase("id");
+  second.erase("id");
+  return first == second;
+}
+
+// The camera's own id, or one with a number, where `cameras` has another one under it that images
+// are of (`used`): all OpenCV calibrations have one id, and so have guesses for one size of photo.
+std::string FreeCameraId(const Json& camera, const Json& cameras,
+                         const std::set<std::string>& used) {
+  const std::string stem = camera["id"];
+  for (int i = 1;; ++i) {
+    const std::string id = i == 1 ? stem : stem + "_" + std::to_string(i);
+    const bool is_taken =
+        used.count(id) > 0 && std::any_of(cameras.begin(), cameras.end(), [&](const Json& other) {
+          return other["id"] == id && !IsSameButId(other, camera);
+        });
+    if (!is_taken) return id;
+  }
+}
+
+Json ListOrEmpty(const Json& scene, const char* key) {
+  return scene.is_object() && scene.contains(key) ? scene[key] : Json::array();
 }
 
 }  // namespace
@@ -121,36 +155,33 @@ Json OneImageDocument(const Json& entry, const std::string& file, const Json& ca
 
 SceneImage ReadDocument(const Json& document, const std::string& folder) {
   std::vector<SceneImage> images;
-  const Status status = ParseScene("scene", Dump(document), folder, {}, &images);
+  const Status status = ParseScene("scene", JsonText(document), folder, {}, &images);
   if (!status.ok()) throw RequestError(400, status.message);
   return images.front();
 }
 
 Json WithImage(const Json& scene, const Json& document) {
-  const Json& image = document["images"][0];
-  Json images = scene.is_object() && scene.contains("images") ? scene["images"] : Json::array();
-  const auto place = std::find_if(images.begin(), images.end(), [&](const Json& other) {
-    return other.contains("file") && other["file"] == image["file"];
-  });
-  if (place != images.end()) {
-    *place = image;
-  } else {
-    images.push_back(image);
-  }
-  Json cameras = Json::array();
-  const Json before =
-      scene.is_object() && scene.contains("cameras") ? scene["cameras"] : Json::array();
-  std::set<std::string> used, seen;
-  for (Json& other : images) {
+  Json image = document["images"][0], camera = document["cameras"][0];
+  Json images = ListOrEmpty(scene, "images");
+  const Json before = ListOrEmpty(scene, "cameras");
+  std::set<std::string> used;
+  auto place = images.end();
+  for (auto other = images.begin(); other != images.end(); ++other) {
     // It may go without where there is one camera, which there may be no longer.
-    if (!other.contains("camera") && before.size() == 1) other["camera"] = before[0]["id"];
-    used.insert(other.value("camera", ""));
+    if (!other->contains("camera") && before.size() == 1) (*other)["camera"] = before[0]["id"];
+    if (other->value("file", "") == image["file"])
+      place = other;
+    else
+      used.insert(other->value("camera", ""));
   }
-  for (const Json* list : {&document["cameras"], &before}) {
-    for (const Json& camera : *list) {
-      const std::string id = camera.value("id", "");
-      if (used.count(id) > 0 && seen.insert(id).second) cameras.push_back(camera);
-    }
+  camera["id"] = image["camera"] = FreeCameraId(camera, before, used);
+  if (place != images.end())
+    *place = image;
+  else
+    images.push_back(image);
+  Json cameras = Json::array({camera});
+  for (const Json& other : before) {
+    if (other["id"] != camera["id"] && used.count(other["id"]) > 0) cameras.push_back(other);
   }
   Json whole = scene.is_object() ? scene : Json::object();
   whole["cameras"] = cameras;
@@ -165,7 +196,7 @@ Status ReadSceneJson(const std::string& path, Json* scene) {
   Status status = ReadScene(path, {}, &images);
   StorageDocument document;
   if (status.ok()) status = document.Open(path);
-  if (status.ok()) *scene = FromNode(document.root());
+  if (status.ok()) *scene = FromNode(document.root(), "");
   return status;
 }
 

@@ -39,13 +39,14 @@ Json OneImageDocument(const Json& entry, const std::string& file, const Json& ca
 SceneImage ReadDocument(const Json& document, const std::string& folder);
 
 // `scene`, a document or null, with the image of `document` in the place of the one of the same
-// file, and without cameras that no image is of.
+// file, and without cameras that no image is of. The cameras of the other images stay as they are:
+// the document's gets another id where one of theirs has it.
 Json WithImage(const Json& scene, const Json& document);
 
 // With a line for each circle, pencil and key, so that people can read and change it.
 std::string SceneText(const Json& scene);
 
-// A scene file as it stands, YAML or JSON.
+// A scene file as it stands, YAML or JSON; names are texts, also where they are written as numbers.
 Status ReadSceneJson(const std::string& path, Json* scene);
 
 }  // namespace circline::apps

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "apps/compare/results.h"
 #include "apps/studio/page.h"
 
 namespace circline::apps {
@@ -22,7 +23,7 @@ constexpr int kMaxDepth = 16;
 constexpr char kJsonType[] = "application/json; charset=utf-8";
 
 void SetJson(const Json& json, Response* response) {
-  response->set_content(json.dump(-1, ' ', false, Json::error_handler_t::replace), kJsonType);
+  response->set_content(JsonText(json), kJsonType);
 }
 
 void SetError(int status, const std::string& sentence, Response* response) {
@@ -100,8 +101,10 @@ void ReuseAddress(int socket) {
 }  // namespace
 
 bool IsLoopback(const std::string& host, int port) {
+  constexpr int kHttpPort = 80;  // The one that browsers do not write.
   for (const char* name : {"127.0.0.1", "localhost", "[::1]"}) {
-    if (host == name || host == name + (":" + std::to_string(port))) return true;
+    if (host == name + (":" + std::to_string(port))) return true;
+    if (host == name && port == kHttpPort) return true;
   }
   return false;
 }

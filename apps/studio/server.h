@@ -10,7 +10,7 @@
 namespace circline::apps {
 
 // Whether a Host or the part of an Origin behind "http://" names this machine itself, at this port
-// or at none: 127.0.0.1, localhost, [::1].
+// (80 may go without saying): 127.0.0.1, localhost, [::1].
 bool IsLoopback(const std::string& host, int port);
 
 class StudioServer {

@@ -7,6 +7,7 @@
 #include "apps/common/output_file.h"
 #include "apps/common/storage_node.h"
 #include "apps/compare/encode.h"
+#include "apps/compare/results.h"
 #include "apps/studio/answer.h"
 #include "apps/studio/export_pose.h"
 
@@ -17,6 +18,8 @@ namespace {
 constexpr std::size_t kLosslessPixels = 3'000'000;
 // Wider ones are shown smaller; what is said of them is in their own pixels all the same.
 constexpr int kShownWidth = 6000;
+// Of what was said, which is asked again with each measurement, and of everything found.
+constexpr std::size_t kKeptRuns = 2;
 constexpr std::size_t kMaxDraftBytes = std::size_t{64} << 20;
 
 // A list of a scene file; none: empty.
@@ -36,21 +39,18 @@ Json EntryOf(const Json& scene, const std::string& name) {
 Json SavedCamera(const Json& scene, const std::string& name) {
   const Json entry = EntryOf(scene, name);
   if (!entry.is_object()) return nullptr;
-  for (const Json& camera : ListOf(scene, "cameras")) {
-    if (camera.value("id", "") == entry.value("camera", "")) return camera;
+  const Json& cameras = ListOf(scene, "cameras");
+  if (!entry.contains("camera")) return cameras.size() == 1 ? cameras[0] : Json();
+  for (const Json& camera : cameras) {
+    if (camera["id"] == entry["camera"]) return camera;
   }
   return nullptr;
 }
 
-Status Write(const PhotoFolder& folder, const std::string& name, const std::string& text) {
-  std::string path;
-  const Status status = folder.OwnPath(name, &path);
-  return status.ok() ? WriteFile(path, text) : status;
-}
-
-// A text that is not UTF-8, as names may be, must not stop an answer.
-std::string Utf8(const std::string& text) {
-  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace));
+Status Write(const PhotoFolder& folder, const std::string& name, const std::string& text,
+             std::string* path) {
+  const Status status = folder.OwnPath(name, path);
+  return status.ok() ? WriteFile(*path, text) : status;
 }
 
 }  // namespace
@@ -62,18 +62,45 @@ Studio::Studio(const CompareOptions& options, const PhotoFolder& folder, const C
 
 Status Studio::ReadFiles() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  std::error_code error;
+  FollowScene();
+  const Status draft = ReadDraft();
+  return scene_error_.empty() ? draft : Status::Invalid(scene_error_);
+}
+
+void Studio::FollowScene() {
+  using Time = std::filesystem::file_time_type;
   std::string path;
   Status status = folder_.OwnPath(kSceneFile, &path);
-  if (status.ok() && std::filesystem::exists(path, error)) status = ReadSceneJson(path, &scene_);
-  if (!status.ok()) scene_error_ = status.message;
-  std::string text;
-  draft_ = Json::object();
-  const Status found = folder_.OwnPath(kDraftFile, &path);
-  if (found.ok() && std::filesystem::exists(path, error) && ReadTextFile(path, &text).ok()) {
-    const Json draft = Json::parse(text, nullptr, false);
-    if (draft.is_object()) draft_ = draft;
+  if (!status.ok()) {
+    scene_error_ = status.message;
+    scene_written_.reset();
+    return;
   }
+  std::error_code error;
+  const bool is_there = std::filesystem::exists(path, error);
+  const Time written = is_there ? std::filesystem::last_write_time(path, error) : Time::min();
+  if (scene_written_ == written) return;
+  Json scene;
+  if (is_there) status = ReadSceneJson(path, &scene);
+  scene_error_ = status.message;
+  scene_written_ = written;
+  if (!status.ok()) return;
+  scene_ = std::move(scene);
+  cameras_.clear();
+}
+
+Status Studio::ReadDraft() {
+  std::error_code error;
+  std::string path, text;
+  draft_ = Json::object();
+  Status status = folder_.OwnPath(kDraftFile, &path);
+  if (status.ok() && std::filesystem::exists(path, error)) {
+    status = ReadTextFile(path, &text);
+    Json draft = Json::parse(text, nullptr, false);
+    if (status.ok() && !draft.is_object()) status = Status::Invalid(path + ": is no JSON object");
+    if (status.ok()) draft_ = std::move(draft);
+  }
+  draft_error_ = status.message;
   return status;
 }
 
@@ -87,21 +114,22 @@ std::size_t Studio::Index(const Json& request) const {
   throw RequestError(404, "there is no such image; /api/images lists them");
 }
 
-Json Studio::Images() const {
+Json Studio::Images() {
   const std::lock_guard<std::mutex> lock(mutex_);
+  FollowScene();
   std::set<std::string> saved;
   for (const Json& image : ListOf(scene_, "images")) saved.insert(image.value("file", ""));
   Json images = Json::array();
   for (std::size_t n = 0; n < folder_.size(); ++n) {
     const std::string& name = folder_.name(n);
     images.push_back({{"image", n},
-                      {"name", Utf8(name)},
+                      {"name", TextAsWritten(name)},
                       {"saved", saved.count(name) > 0},
-                      {"draft", draft_.contains(Utf8(name))}});
+                      {"draft", draft_.contains(TextAsWritten(name))}});
   }
-  return {{"folder", Utf8(folder_.path())},
+  return {{"folder", TextAsWritten(folder_.path())},
           {"scene", kSceneFile},
-          {"problem", scene_error_},
+          {"problem", scene_error_.empty() ? draft_error_ : scene_error_},
           {"images", images}};
 }
 
@@ -120,8 +148,9 @@ ShownPhoto Studio::Photo(std::size_t n) {
 
 // The one given, else that of the scene file, else a guess.
 Json Studio::CameraOfPhoto(const LoadedPhoto& photo) {
-  const std::lock_guard<std::mutex> lock(mutex_);
   if (!given_camera_.is_null()) return given_camera_;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  FollowScene();
   const auto known = cameras_.find(photo.index);
   if (known != cameras_.end()) return known->second;
   Json camera = SavedCamera(scene_, folder_.name(photo.index));
@@ -142,7 +171,7 @@ Json Studio::CameraOfPhoto(const LoadedPhoto& photo) {
 // What would be saved, and is estimated: so that circline_compare finds the same of the file.
 Json Studio::Document(const Json& scene, const LoadedPhoto& photo) {
   const std::string& name = folder_.name(photo.index);
-  if (Utf8(name) != name) {
+  if (TextAsWritten(name) != name) {
     throw RequestError(422, "the photo's name is not UTF-8: no scene file can hold it");
   }
   return OneImageDocument(scene, name, CameraOfPhoto(photo));
@@ -151,27 +180,51 @@ Json Studio::Document(const Json& scene, const LoadedPhoto& photo) {
 Json Studio::Session(std::size_t n) {
   const std::string& name = folder_.name(Index({{"image", n}}));
   const std::lock_guard<std::mutex> lock(mutex_);
-  const auto draft = draft_.find(Utf8(name));
+  FollowScene();
+  const auto draft = draft_.find(TextAsWritten(name));
   return {{"image", n},
-          {"name", Utf8(name)},
+          {"name", TextAsWritten(name)},
           {"saved", EntryOf(scene_, name)},
           {"draft", draft != draft_.end() ? *draft : Json()}};
 }
 
+std::shared_ptr<const PhotoRun> Studio::Run(const Json& scene,
+                                            const std::shared_ptr<const LoadedPhoto>& photo) {
+  const Json document = Document(scene, *photo);
+  const std::string text = JsonText(document);
+  std::shared_future<std::shared_ptr<const PhotoRun>> run;
+  {
+    const std::lock_guard<std::mutex> lock(runs_mutex_);
+    const auto known = std::find_if(runs_.begin(), runs_.end(), [&](const KeptRun& kept) {
+      return kept.photo == photo && kept.document == text;
+    });
+    if (known != runs_.end()) {
+      runs_.splice(runs_.begin(), runs_, known);
+    } else {
+      const auto work = [this, document, photo]() -> std::shared_ptr<const PhotoRun> {
+        auto made = std::make_shared<PhotoRun>();
+        made->image = ReadDocument(document, folder_.path());
+        made->run = RunPhoto(options_, solvers_, photo->pixels, &made->image);
+        return made;
+      };
+      // By the first thread that waits for it.
+      runs_.push_front({photo, text, std::async(std::launch::deferred, work).share()});
+      if (runs_.size() > kKeptRuns) runs_.pop_back();
+    }
+    run = runs_.front().run;
+  }
+  return run.get();
+}
+
 Json Studio::Detect(const Json& request) {
-  const auto photo = photos_.Get(Index(request));
-  SceneImage image = ReadDocument(Document(Json::object(), *photo), folder_.path());
-  const ImageRun run = ObservePhoto(options_, photo->pixels, &image);
-  if (!run.read_error.empty()) throw RequestError(422, run.read_error);
-  return DetectionJson(run, options_.fit.noise_model);
+  const auto made = Run(Json::object(), photos_.Get(Index(request)));
+  if (!made->run.read_error.empty()) throw RequestError(422, made->run.read_error);
+  return DetectionJson(made->run, options_.fit.noise_model);
 }
 
 Json Studio::Estimate(const Json& request) {
   const auto photo = photos_.Get(Index(request));
-  const Json scene = request.value("scene", Json::object());
-  SceneImage image = ReadDocument(Document(scene, *photo), folder_.path());
-  const ImageRun run = RunPhoto(options_, solvers_, photo->pixels, &image);
-  return EstimateJson(run, options_.fit.noise_model, request);
+  return EstimateJson(Run(request.value("scene", Json::object()), photo)->run, request);
 }
 
 Json Studio::Save(const Json& request) {
@@ -179,37 +232,44 @@ Json Studio::Save(const Json& request) {
   const Json document = Document(request.at("scene"), *photo);
   ReadDocument(document, folder_.path());
   const std::lock_guard<std::mutex> lock(mutex_);
+  FollowScene();
   if (!scene_error_.empty()) {
     throw RequestError(409, std::string(kSceneFile) + " is not written over: " + scene_error_);
   }
   Json whole = WithImage(scene_, document);
-  const Status status = Write(folder_, kSceneFile, SceneText(whole));
+  std::string path;
+  const Status status = Write(folder_, kSceneFile, SceneText(whole), &path);
   if (!status.ok()) throw RequestError(409, status.message);
+  std::error_code error;
+  scene_written_ = std::filesystem::last_write_time(path, error);
   scene_ = std::move(whole);
-  return {{"file", Utf8(folder_.path()) + "/" + kSceneFile}};
+  return {{"file", TextAsWritten(path)}};
 }
 
 Json Studio::Draft(const Json& request) {
-  const std::string name = Utf8(folder_.name(Index(request)));
+  const std::string name = TextAsWritten(folder_.name(Index(request)));
   const Json& state = request.at("state");
   if (!state.is_object() && !state.is_null()) throw RequestError(400, "'state' must be an object");
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (!draft_error_.empty()) {
+    throw RequestError(409, std::string(kDraftFile) + " is not written over: " + draft_error_);
+  }
   Json draft = draft_;
   draft.erase(name);
   if (state.is_object()) draft[name] = state;
-  const std::string text = draft.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  const std::string text = JsonText(draft) + "\n";
   if (text.size() > kMaxDraftBytes)
     throw RequestError(413, "the draft would exceed 64 MB: save it");
-  const Status status = Write(folder_, kDraftFile, text);
+  std::string path;
+  const Status status = Write(folder_, kDraftFile, text, &path);
   if (!status.ok()) throw RequestError(409, status.message);
   draft_ = std::move(draft);
-  return {{"file", Utf8(folder_.path()) + "/" + kDraftFile}};
+  return {{"file", TextAsWritten(path)}};
 }
 
 Json Studio::Export(const Json& request) {
   const auto photo = photos_.Get(Index(request));
-  SceneImage image = ReadDocument(Document(request.at("scene"), *photo), folder_.path());
-  const ImageRun run = RunPhoto(options_, solvers_, photo->pixels, &image);
+  const auto made = Run(request.at("scene"), photo);
   const std::string below = std::string(kExportFolder) + "/" + folder_.name(photo->index);
   std::string path;
   Status status = folder_.OwnPath(below, &path);
@@ -219,7 +279,7 @@ Json Studio::Export(const Json& request) {
     if (status.ok()) status = folder_.OwnPath(below + "/" + name, &unused);
   }
   if (!status.ok()) throw RequestError(409, status.message);
-  return ExportPose(run, request, path);
+  return ExportPose(made->run, request, path);
 }
 
 }  // namespace circline::apps

@@ -2,10 +2,14 @@
 #ifndef CIRCLINE_APPS_STUDIO_STUDIO_H_
 #define CIRCLINE_APPS_STUDIO_STUDIO_H_
 
+#include <filesystem>
+#include <future>
+#include <list>
 #include <map>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
-#include <vector>
 
 #include "apps/compare/image_run.h"
 #include "apps/compare/options.h"
@@ -21,6 +25,12 @@ struct ShownPhoto {
   int width = 0, height = 0;  // Of the photo itself; what is shown may be smaller.
 };
 
+// One document of a photo, estimated.
+struct PhotoRun {
+  SceneImage image;  // Of which `run` is.
+  ImageRun run;
+};
+
 // Many threads may use one. Answers and requests: docs/studio.md. Throws RequestError.
 class Studio {
  public:
@@ -33,10 +43,11 @@ class Studio {
   Studio(const Studio&) = delete;
   Studio& operator=(const Studio&) = delete;
   // Reads the scene file and the draft of the folder, where they are. Not ok: a sentence; the
-  // studio works without, and saves nothing over what it could not read.
+  // studio works without, and writes nothing over what it could not read. A scene file that
+  // changes later is read again.
   Status ReadFiles();
 
-  Json Images() const;
+  Json Images();
   ShownPhoto Photo(std::size_t n);
   Json Session(std::size_t n);         // What was said of photo n: draft and saved entry.
   Json Detect(const Json& request);    // {image}
@@ -49,15 +60,29 @@ class Studio {
   std::size_t Index(const Json& request) const;
   Json CameraOfPhoto(const LoadedPhoto& photo);
   Json Document(const Json& scene, const LoadedPhoto& photo);
+  void FollowScene();  // Where the file is another one than at the last time. Under mutex_.
+  Status ReadDraft();
+  std::shared_ptr<const PhotoRun> Run(const Json& scene,
+                                      const std::shared_ptr<const LoadedPhoto>& photo);
+
+  // Two requests for one document wait for the same run.
+  struct KeptRun {
+    std::shared_ptr<const LoadedPhoto> photo;
+    std::string document;
+    std::shared_future<std::shared_ptr<const PhotoRun>> run;
+  };
 
   CompareOptions options_;
   SolverSet solvers_;
   PhotoFolder folder_;
   PhotoCache photos_;
-  Json given_camera_;         // Null where none is given.
-  mutable std::mutex mutex_;  // Of what follows.
-  Json scene_, draft_;        // As in their files.
-  std::string scene_error_;   // Why the file that is there could not be read.
+  Json given_camera_;  // Null where none is given.
+  std::mutex runs_mutex_;
+  std::list<KeptRun> runs_;                                       // The last one first.
+  std::mutex mutex_;                                              // Of what follows.
+  Json scene_, draft_;                                            // As in their files.
+  std::optional<std::filesystem::file_time_type> scene_written_;  // Of the file that was read.
+  std::string scene_error_, draft_error_;  // Why the file that is there could not be read.
   std::map<std::size_t, Json> cameras_;
 };
 

@@ -7,21 +7,18 @@ holds the pose that the page shows against circline_compare on the scene that it
 Exit code 77: Chromium, its driver, selenium or the photographs are not there.
 """
 import argparse
-import base64
 import json
 import math
 import os
 import re
 import shutil
-import signal
 import subprocess
-import sys
 import tempfile
 import time
 import urllib.request
 
-SKIPPED = 77
-NAMES = ['image.0007.pgm', 'image.0049.pgm', 'image.0091.pgm']
+from studio_page import By, Keys, NAMES, Page, Studio, skip
+
 TRUE_NORMAL = (-0.05940087, 0.7557466, 0.6521645)  # Of NAMES[0], up to sign, by the dots.
 RADIUS, DISTANCE = 31.7455, 620.1  # Of the disc, millimetres; from the camera to its centre.
 DISC, CENTER = (166.3, 175.0), (166.34, 186.09)  # A point within it, and its centre, by the dots.
@@ -29,144 +26,10 @@ DISC, CENTER = (166.3, 175.0), (166.34, 186.09)  # A point within it, and its ce
 FRONT, LEFT = (90.0, 257.5, 260.0, 234.8), (61.0, 165.0, 69.0, 243.0)
 
 
-def skip(why):
-    print('skipped: ' + why)
-    sys.exit(SKIPPED)
-
-
-try:
-    from selenium import webdriver
-    from selenium.webdriver.common.action_chains import ActionChains
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.common.keys import Keys
-except ImportError:
-    skip('no python3-selenium')
-
-
 def check(condition, what):
     if not condition:
         raise AssertionError(what)
     print('ok: ' + what)
-
-
-class Studio:
-    """The program, with photos and a calibration in a folder of its own."""
-
-    def __init__(self, args, folder):
-        self.photos = os.path.join(folder, 'photos')
-        os.mkdir(self.photos)
-        for name in NAMES:
-            source = os.path.join(args.frames, name)
-            if os.path.exists(source):
-                shutil.copy(source, self.photos)
-            elif os.path.exists(source + '.gz'):
-                with open(os.path.join(self.photos, name), 'wb') as out:
-                    out.write(subprocess.check_output(['gunzip', '-c', source + '.gz']))
-            else:
-                skip('no ' + source)
-        camera = os.path.join(folder, 'camera.yml')
-        with open(args.scene) as scene, open(camera, 'w') as out:
-            text = scene.read()
-            size = re.search(r'width: (\d+), height: (\d+)', text)
-            matrix = re.search(r'camera_matrix: (\[[^]]*\])', text).group(1)
-            distortion = re.search(r'distortion: (\[[^]]*\])', text).group(1)
-            out.write(f'%YAML:1.0\n---\nimage_width: {size.group(1)}\nimage_height: {size.group(2)}\n'
-                      f'camera_matrix: {matrix}\ndistortion_coefficients: {distortion}\n')
-        self.process = subprocess.Popen(
-            [args.studio, '--images=' + self.photos, '--camera=' + camera, '--port=0'],
-            stdout=subprocess.PIPE, text=True)
-        self.address = re.search(r'http://\S+/', self.process.stdout.readline()).group(0)
-
-    def stop(self):
-        self.process.send_signal(signal.SIGINT)
-        return self.process.wait(timeout=10)
-
-
-class Page:
-    def __init__(self, folder, address):
-        options = webdriver.ChromeOptions()
-        options.binary_location = shutil.which('chromium')
-        for flag in ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
-                     '--disable-background-networking', '--disable-component-update', '--disable-sync',
-                     '--window-size=1280,800', '--user-data-dir=' + os.path.join(folder, 'chromium')]:
-            options.add_argument(flag)
-        options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
-        service = webdriver.chrome.service.Service(shutil.which('chromedriver'))
-        self.driver = webdriver.Chrome(options=options, service=service)
-        self.look(1280, False)
-        self.address = address
-
-    def look(self, width, dark):
-        self.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
-            'width': width, 'height': 800, 'deviceScaleFactor': 1, 'mobile': False})
-        self.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': [
-            {'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}]})
-
-    def open(self):
-        self.driver.get(self.address)
-        self.settle()
-
-    def settle(self):
-        """Waits until the page has answered and kept all that was said."""
-        end = time.time() + 60
-        while not self.driver.execute_script(
-                'return !!window.circlineIdle && circlineIdle() && !!window.circlineApp.detection'):
-            if time.time() > end:
-                raise AssertionError('the page does not come to rest')
-            time.sleep(0.02)
-
-    def screen(self, point):
-        """Of a pixel of the photo: where it is on the page."""
-        return self.driver.execute_script(
-            'const b = document.getElementById("photo").getBoundingClientRect(), v = circlineView;'
-            'return [b.left + v.x + (arguments[0] + 0.5) * v.scale,'
-            '        b.top + v.y + (arguments[1] + 0.5) * v.scale];', *point)
-
-    def drag(self, start, end):
-        chain = ActionChains(self.driver, duration=0)
-        x, y = self.screen(start)
-        chain.w3c_actions.pointer_action.move_to_location(round(x), round(y))
-        chain.w3c_actions.pointer_action.pointer_down()
-        x, y = self.screen(end)
-        for share in (0.5, 1.0):
-            at = [a + share * (b - a) for a, b in zip(self.screen(start), (x, y))]
-            chain.w3c_actions.pointer_action.move_to_location(round(at[0]), round(at[1]))
-        chain.w3c_actions.pointer_action.pointer_up()
-        chain.perform()
-
-    def click(self, point):
-        chain = ActionChains(self.driver, duration=0)
-        x, y = self.screen(point)
-        chain.w3c_actions.pointer_action.move_to_location(round(x), round(y))
-        chain.w3c_actions.pointer_action.pointer_down()
-        chain.w3c_actions.pointer_action.pointer_up()
-        chain.perform()
-        self.settle()
-
-    def press(self, *keys):
-        ActionChains(self.driver).send_keys(*keys).perform()
-        self.settle()
-
-    def control(self, key):
-        ActionChains(self.driver).key_down(Keys.CONTROL).send_keys(key).key_up(Keys.CONTROL).perform()
-        self.settle()
-
-    def doc(self):
-        return json.loads(self.driver.execute_script('return JSON.stringify(circlineApp.doc)'))
-
-    def pose(self):
-        """Rotation and translation, as the page shows them."""
-        pose = self.driver.find_element(By.ID, 'pose')
-        return [json.loads(pose.get_attribute('data-' + name)) for name in ('rotation', 'translation')]
-
-    def shoot(self, path):
-        picture = self.driver.execute_cdp_cmd('Page.captureScreenshot', {'format': 'png'})
-        with open(path, 'wb') as out:
-            out.write(base64.b64decode(picture['data']))
-
-    def errors(self):
-        return [entry['message'] for entry in self.driver.get_log('browser')
-                if entry['level'] in ('SEVERE', 'WARNING')]
 
 
 def far(a, b):
@@ -213,13 +76,10 @@ def check_undo_and_reload(page):
     check(len(page.doc()['scene']['pencils']) == 1 and far(page.pose(), pose) > 1e-9, 'undo takes a line back')
     page.control('y')
     check(page.doc() == said and far(page.pose(), pose) == 0.0, 'redo brings it again')
-    page.press('m')
-    page.drag((110.0, 170.0), (210.0, 200.0))
-    page.settle()
-    page.press('v')
+    quarter, half = ([a + share * (b - a) for a, b in zip(FRONT[:2], FRONT[2:])] for share in (0.25, 0.5))
+    page.measure(quarter, half)
     said = page.doc()
-    measured = page.driver.execute_script('return circlineApp.estimate.measurements[0]')
-    check(measured['value'] > 0 and measured['sigma'] > 0, 'a length is measured, with its sigma')
+    check(far([said['measure'][0]['points']], [quarter + half]) < 1.0, 'what is measured is as it was drawn')
     time.sleep(0.6)  # The draft is kept half a second after the last change.
     page.settle()
     page.open()
@@ -234,7 +94,45 @@ def check_truth(page):
     field.send_keys(str(RADIUS), Keys.TAB)
     page.settle()
     check(abs(math.hypot(*page.pose()[1]) / DISTANCE - 1) < 0.02, 'a known radius gives the distance, within 2 %')
+    # From the leftmost point of the rim through the centre's image.
+    contour = page.doc()['scene']['circles'][0]['contour']
+    rim = list(zip(contour[::2], contour[1::2]))
+    center = page.driver.execute_script('return circlineApp.estimate.drawings[0].circles[0].center_px')
+    angle = lambda p: math.atan2(p[1] - center[1], p[0] - center[0])
+    left = min(rim)
+    right = min(rim, key=lambda p: math.cos(angle(p) - angle(left)))
+    measured = page.measure(left, right)
+    value, sigma = measured['value'], measured['sigma']
+    print('the diameter, measured: %.2f +- %.2f mm, of %.2f' % (value, sigma, 2 * RADIUS))
+    check(sigma < 0.05 * value and abs(value - 2 * RADIUS) < 3 * sigma, 'a length is measured within its sigma')
     page.control('z')
+    page.control('z')
+
+
+def check_groups(page):
+    """Groups of found lines, and free ones; all is undone at the end."""
+    lines = lambda doc: sum(len(p['segments']) // 4 for p in doc['scene']['pencils'])
+    before = page.doc()
+    group = page.driver.execute_script('return circlineApp.detection.segments.map(s => s[4])')
+    size, name = max((group.count(g), g) for g in group)
+    page.take_line(group.index(name))
+    page.driver.find_element(By.CSS_SELECTOR, '#roles [data-role^=all]').click()
+    page.settle()
+    count = lines(page.doc())
+    page.take_line(group.index(name))
+    check(2 <= size and lines(before) < count <= lines(before) + size and
+          not page.driver.find_elements(By.CSS_SELECTOR, '#roles [data-role^=all]'),
+          'a group of %d lines is said once' % size)
+    page.press(Keys.ESCAPE)
+    for key in ('p', 'P'):
+        page.press('l')
+        page.drag((20.0, 20.0), (60.0, 25.0))
+        page.press(key)
+    free = [p for p in page.doc()['scene']['pencils'] if p['direction'] == 'free' and p['id'].startswith('lines')]
+    check(len(free) == 2, 'Shift+P begins another group of parallel lines')
+    for _ in range(3):
+        page.control('z')
+    check(page.doc() == before, 'and all of it can be undone')
 
 
 def check_exports(page, folder):
@@ -247,6 +145,18 @@ def check_exports(page, folder):
         while not os.path.exists(path) and time.time() < end:
             time.sleep(0.05)
         check(os.path.getsize(path) > 20, 'export of ' + file)
+
+
+def check_saves_nothing_of_a_photo_to_come(page):
+    """Ctrl+S between the key for another photo and its being there."""
+    session = lambda: json.load(urllib.request.urlopen(page.address + 'api/session/0'))['saved']
+    saved = session()
+    page.press(Keys.PAGE_DOWN)
+    page.driver.execute_script(
+        'const press = (key, ctrlKey) => window.dispatchEvent(new KeyboardEvent("keydown", {key, ctrlKey}));'
+        'press("PageUp", false); press("s", true);')
+    page.settle()
+    check(len(saved['circles']) == 1 and session() == saved, 'what is not there yet is not saved')
 
 
 def check_rest(page):
@@ -302,13 +212,18 @@ def main():
         studio = Studio(args, folder)
         page = None
         try:
+            second = subprocess.run([args.studio, '--images=' + studio.photos, '--port=0'],
+                                    capture_output=True, text=True, timeout=60)
+            check(second.returncode == 2 and 'another run' in second.stderr, 'a folder has one studio at a time')
             page = Page(folder, studio.address)
             page.open()
             say_disc_and_edges(page)
             check_against_compare(page, args, folder)
             check_truth(page)
             check_undo_and_reload(page)
+            check_groups(page)
             check_exports(page, folder)
+            check_saves_nothing_of_a_photo_to_come(page)
             check_rest(page)
             quote_speed(page)
             check(page.errors() == [], 'no error in the console')

@@ -9,35 +9,17 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <random>
 #include <thread>
 
 #include "apps/studio/studio.h"
+#include "tests/apps/studio_disc.h"
 #include "tests/apps/test_files.h"
 
 namespace circline::apps {
 namespace {
 
 namespace fs = std::filesystem;
-
-// A bright disc, tilted, on a dark ground.
-cv::Mat DiscPhoto(int width, int height) {
-  cv::Mat photo(height, width, CV_8UC1, cv::Scalar(40));
-  cv::ellipse(photo, {width / 2, height / 2}, {width / 5, height / 7}, 20.0, 0.0, 360.0,
-              cv::Scalar(220), cv::FILLED, cv::LINE_AA);
-  cv::GaussianBlur(photo, photo, {5, 5}, 1.0);
-  return photo;
-}
-
-CompareOptions Options() {
-  CompareOptions options;
-  options.solvers = {"joint"};
-  options.overlays = false;
-  options.losses.resize(1);
-  return options;
-}
 
 class StudioServerTest : public testing::Test {
  protected:
@@ -47,7 +29,7 @@ class StudioServerTest : public testing::Test {
   void Start() {
     PhotoFolder photos;
     ASSERT_TRUE(photos.Open(folder_.path()).ok());
-    studio_ = std::make_unique<Studio>(Options(), photos, nullptr);
+    studio_ = std::make_unique<Studio>(StudioOptions(), photos, nullptr);
     studio_->ReadFiles();
     server_ = std::make_unique<StudioServer>(studio_.get());
     ASSERT_TRUE(server_->Bind(0).ok());
@@ -77,14 +59,7 @@ class StudioServerTest : public testing::Test {
     }
     return answer;
   }
-  // The first found ellipse as a scene file's circle.
-  Json SceneOfDisc() {
-    const Json found = Ask("/api/detect", {{"image", 0}});
-    const std::string id = found["ellipses"][0]["id"];
-    const Json circle = {
-        {"id", id}, {"contour", found["contours"][id]}, {"radius", 2.0}, {"plane", "p"}};
-    return {{"circles", Json::array({circle})}};
-  }
+  Json DiscScene() { return SceneOfDisc(Ask("/api/detect", {{"image", 0}})); }
   bool IsAlive() {
     const httplib::Result result = client_->Get("/api/images");
     return result && result->status == 200;
@@ -99,7 +74,7 @@ class StudioServerTest : public testing::Test {
 
 TEST_F(StudioServerTest, DetectsEstimatesAndSavesAScene) {
   Start();
-  const Json scene = SceneOfDisc();
+  const Json scene = DiscScene();
   const Json estimate = Ask("/api/estimate", {{"image", "disc.png"}, {"scene", scene}});
   EXPECT_EQ(estimate["status"], "ok");
   ASSERT_GE(estimate["hypotheses"].size(), 2U);  // For each focal length that it may be.
@@ -117,7 +92,7 @@ TEST_F(StudioServerTest, DetectsEstimatesAndSavesAScene) {
 
 TEST_F(StudioServerTest, KeepsDraftAndSceneOverARestart) {
   Start();
-  const Json state = {{"scene", SceneOfDisc()}, {"hypothesis", 1}};
+  const Json state = {{"scene", DiscScene()}, {"hypothesis", 1}};
   Ask("/api/draft", {{"image", 0}, {"state", state}});
   Ask("/api/save", {{"image", 0}, {"scene", state["scene"]}});
   Stop();
@@ -145,12 +120,14 @@ TEST_F(StudioServerTest, AnswersOnlyItsOwnPage) {
     return result ? result->status : 0;
   };
   EXPECT_EQ(status({{"Host", "localhost:" + port}}), 200);
+  EXPECT_EQ(status({{"Host", "localhost"}}), 403);
   EXPECT_EQ(status({{"Host", "example.org"}}), 403);
   EXPECT_EQ(status({{"Host", "example.org:" + port}}), 403);
   EXPECT_EQ(status({{"Host", "127.0.0.1.example.org:" + port}}), 403);
   EXPECT_EQ(status({{"Origin", "http://127.0.0.1:" + port}}), 200);
-  for (const std::string origin : {"http://example.org", "null", "https://127.0.0.1", "file://",
-                                   "http://127.0.0.1:1", "http://localhost.example.org"}) {
+  for (const std::string origin :
+       {"http://example.org", "null", "https://127.0.0.1", "file://", "http://127.0.0.1:1",
+        "http://127.0.0.1", "http://localhost.example.org"}) {
     EXPECT_EQ(status({{"Origin", origin}}), 403) << origin;
   }
   EXPECT_FALSE(fs::exists(folder_ / "scene.json"));
@@ -167,7 +144,7 @@ TEST_F(StudioServerTest, RefusesWhatLeadsOutOfTheFolder) {
   ASSERT_TRUE(link);
   EXPECT_EQ(link->status, 403);
   EXPECT_CONTAINS(link->body, "leads out");
-  const Json scene = SceneOfDisc();
+  const Json scene = DiscScene();
   Ask("/api/save", {{"image", 0}, {"scene", scene}}, 409);
   Ask("/api/export", {{"image", 0}, {"scene", scene}, {"format", "gltf"}}, 409);
   for (const std::string address :
@@ -198,40 +175,49 @@ TEST_F(StudioServerTest, SaysWhatIsWrongWithAPhoto) {
 TEST_F(StudioServerTest, SurvivesMalformedAndHugeRequests) {
   Start();
   const std::string image = "{\"image\":0,\"scene\":";
-  const std::vector<std::string> bodies = {
-      "",
-      "{",
-      "[]",
-      "null",
-      "\"",
-      "{\"image\":-1}",
-      "{\"image\":0.5}",
-      "{\"image\":{}}",
-      "{\"image\":18446744073709551615}",
-      "\xff\xfe",
-      std::string("{\0}", 3),
-      std::string(100000, '['),
-      image + std::string(100000, '{') + "}",
-      image + "{\"circles\":[{\"id\":\"c\",\"contour\":[1e999,1]}]}}",
-      image + "{\"circles\":[{\"id\":\"c\",\"contour\":\"no\"}]}}",
-      image + "{\"circles\":[{\"id\":\"c\",\"contour\":[1,2,3,4,5,6,7,8,9,10]}]}}",
-      image + "{\"circles\":[{\"id\":\"c\",\"roi\":[-1e5,-1e5,1e6,1e6]}]}}",
-      image + "{\"pencils\":[{\"id\":\"\\\"\\\\\\n\",\"segments\":[1,2,3,4]}]}}",
-      image + "{\"pencils\":[{\"id\":\"x\",\"segments\":[]}]}}",
-      image + "[]}",
-      image + "7}",
-      image + "{},\"hypothesis\":-1}",
-      image + "{},\"hypothesis\":1e300}",
-      image + "{},\"measure\":[{\"kind\":\"length\",\"points\":[1]}]}",
-      image + "{},\"measure\":{\"kind\":7}}"};
+  const std::vector<std::string> requests = {"",
+                                             "{",
+                                             "[]",
+                                             "null",
+                                             "\"",
+                                             "{\"image\":-1}",
+                                             "{\"image\":0.5}",
+                                             "{\"image\":{}}",
+                                             "{\"image\":18446744073709551615}",
+                                             "\xff\xfe",
+                                             std::string("{\0}", 3),
+                                             std::string(100000, '['),
+                                             image + std::string(100000, '{') + "}"};
+  const std::vector<std::string> scenes = {
+      "{\"circles\":[{\"id\":\"c\",\"contour\":[1e999,1]}]}}",
+      "{\"circles\":[{\"id\":\"c\",\"contour\":\"no\"}]}}",
+      "{\"circles\":[{\"id\":\"c\",\"contour\":[1,2,3,4]}]}}",
+      "{\"circles\":[{\"id\":\"c\",\"roi\":[-1e9,0,1,1]}]}}",
+      "{\"pencils\":[{\"id\":\"\\\"\\\\\\n\",\"segments\":[1,2,3,4]}]}}",
+      "{\"pencils\":[{\"id\":\"x\",\"segments\":[]}]}}",
+      "[]}",
+      "7}"};
+  const std::vector<std::string> odd = {
+      "{\"circles\":[{\"id\":\"c\",\"contour\":[1,2,3,4,5,6,7,8,9,10]}]}}",
+      "{\"circles\":[{\"id\":\"c\",\"roi\":[-1e5,-1e5,1e6,1e6]}]}}",
+      "{},\"hypothesis\":-1}",
+      "{},\"hypothesis\":1e300}",
+      "{},\"measure\":[{\"kind\":\"length\",\"points\":[1]}]}",
+      "{},\"measure\":{\"kind\":7}}"};
+  const auto expect = [&](const std::string& address, const std::string& body, bool may_do) {
+    int status = 0;
+    const Json answer = Post(address, body, &status);
+    EXPECT_TRUE((may_do && status == 200) ||
+                (status >= 400 && status < 500 && answer.contains("error")))
+        << address << " " << body.substr(0, 80) << " " << status << " " << answer;
+  };
+  for (const char* address : {"/api/estimate", "/api/save", "/api/export"}) {
+    for (const std::string& scene : scenes) expect(address, image + scene, false);
+    for (const std::string& scene : odd) expect(address, image + scene, true);
+  }
   for (const char* address :
        {"/api/detect", "/api/estimate", "/api/save", "/api/draft", "/api/export"}) {
-    for (const std::string& body : bodies) {
-      int status = 0;
-      const Json answer = Post(address, body, &status);
-      EXPECT_TRUE(status == 200 || (status >= 400 && status < 500 && answer.contains("error")))
-          << address << " " << body.substr(0, 80) << " " << status << " " << answer;
-    }
+    for (const std::string& body : requests) expect(address, body, false);
   }
   int status = 0;
   Post("/api/draft", "{\"image\":0,\"state\":{\"a\":\"" + std::string(9 << 20, 'x') + "\"}}",
@@ -258,7 +244,7 @@ TEST_F(StudioServerTest, SurvivesFuzzedRequests) {
   Start();
   const char* const given = std::getenv("CIRCLINE_FUZZ_REQUESTS");
   const int count = given != nullptr ? std::atoi(given) : 300;
-  Json scene = SceneOfDisc();
+  Json scene = DiscScene();
   // Fewer points, so that most changes fall on what is between them.
   Json contour = Json::array();
   for (std::size_t i = 0; i + 1 < scene["circles"][0]["contour"].size(); i += 40) {
@@ -299,12 +285,12 @@ TEST_F(StudioServerTest, TwoCannotHaveOnePort) {
   EXPECT_CONTAINS(status.message, "another program uses it");
 }
 
-TEST(StudioFolder, OfFiveThousandPhotosIsListedAtOnce) {
+TEST(StudioFolder, ListsFiveThousandPhotos) {
   const TestFolder folder;
   for (int i = 0; i < 5000; ++i) folder.Write("photo" + std::to_string(10000 + i) + ".jpg", "");
   PhotoFolder photos;
   ASSERT_TRUE(photos.Open(folder.path()).ok());
-  Studio studio(Options(), photos, nullptr);
+  Studio studio(StudioOptions(), photos, nullptr);
   ASSERT_TRUE(studio.ReadFiles().ok());
   EXPECT_EQ(studio.Images()["images"].size(), 5000U);
   EXPECT_EQ(photos.Find("photo14999.jpg"), 4999U);
@@ -316,7 +302,7 @@ TEST(StudioFolder, APhotoOfFiftyMegapixelsCanBeUsed) {
   cv::imwrite(folder / "large.jpg", DiscPhoto(8660, 5774));
   PhotoFolder photos;
   ASSERT_TRUE(photos.Open(folder.path()).ok());
-  Studio studio(Options(), photos, nullptr);
+  Studio studio(StudioOptions(), photos, nullptr);
   const ShownPhoto shown = studio.Photo(0);
   EXPECT_EQ(shown.width, 8660);
   EXPECT_EQ(shown.type, "image/jpeg");
@@ -337,6 +323,8 @@ TEST(StudioServer, KnowsTheLoopbackAddress) {
                            "LOCALHOST.", "0.0.0.0", "127.0.0.1:080"}) {
     EXPECT_FALSE(IsLoopback(host, 80)) << host;
   }
+  EXPECT_TRUE(IsLoopback("localhost:8642", 8642));
+  EXPECT_FALSE(IsLoopback("localhost", 8642));  // That is port 80, another program's.
 }
 
 }  // namespace

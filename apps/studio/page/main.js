@@ -4,8 +4,8 @@ import {app, canRedo, canUndo, change, changed, docOfEntry, emptyDoc, entryOf, i
         listen, redo, resetHistory, setSaved, undo} from './store.js';
 import {dropSelected, sayAllFound} from './scene.js';
 import {draw, fit, view, zoom} from './view.js';
-import {setTool} from './pointer.js';
-import {dropLoose, showRoles} from './roles.js';
+import {forgetDrag, setTool} from './pointer.js';
+import {dropLoose, forgetGroup, showRoles} from './roles.js';
 import {showPanel} from './panel.js';
 
 const byId = (id) => document.getElementById(id);
@@ -34,6 +34,7 @@ function toast(text, bad = false) {
 let asking = false, askAgain = false;
 
 async function askEstimate() {
+  if (!app.photo) return;
   if (asking) { askAgain = true; return; }
   asking = true;
   const image = app.image, started = performance.now();
@@ -60,14 +61,16 @@ Object.assign(window, {
 
 // ---- The draft ----
 
-let draftTimer = 0;
+let draftTimer = 0, keeping = Promise.resolve();
 
 function keepDraft(leaving = false) {
   if (!draftTimer) return;
   clearTimeout(draftTimer);
   draftTimer = 0;
+  if (!app.photo) return;  // Its doc is not there yet.
   const state = isSaved() && !app.doc.measure.length && !app.doc.hypothesis ? null : app.doc;
-  api.draft(app.image, state, leaving).catch((error) => toast(`The draft is not kept: ${error.message}`, true));
+  keeping = api.draft(app.image, state, leaving)
+    .catch((error) => toast(`The draft is not kept: ${error.message}`, true));
 }
 
 function draftSoon() {
@@ -85,9 +88,13 @@ async function open(image) {
                       doc: emptyDoc(), selection: null, hover: null, loose: null});
   history.replaceState(null, '', `#${image}`);
   resetHistory();
+  setSaved({});
+  forgetDrag();
+  forgetGroup();
   changed('view');
   try {
-    const [photo, session] = await Promise.all([api.photo(image), api.session(image)]);
+    // Not before the draft that was just sent, which may be of this photo.
+    const [photo, session] = await Promise.all([api.photo(image), keeping.then(() => api.session(image))]);
     if (image !== app.image) return;
     const saved = session.saved ? docOfEntry(session.saved) : emptyDoc();
     app.doc = session.draft || saved;
@@ -127,12 +134,17 @@ function showPhotos() {
 // ---- What is done by buttons and keys ----
 
 async function save() {
+  if (!app.photo || isSaved()) return;
+  const {image} = app, entry = entryOf(app.doc);
   try {
-    const entry = entryOf(app.doc), {file} = await api.save(app.image, entry);
-    setSaved(entry);
-    app.images[app.image].saved = true;
-    app.images[app.image].draft = false;
-    draftSoon();
+    const {file} = await api.save(image, entry);
+    const isOpen = image === app.image && app.photo;  // Another photo may be, by now.
+    if (isOpen) {
+      setSaved(entry);
+      draftSoon();
+    }
+    app.images[image].saved = true;
+    if (isOpen) app.images[image].draft = !isSaved();
     toast(`Saved in ${file}`);
   } catch (error) {
     toast(error.message, true);
@@ -170,7 +182,7 @@ window.addEventListener('keydown', (event) => {
   } else if (typing || event.altKey) {
     return;
   } else if (app.loose && ROLE_KEYS[key]) {
-    dropLoose(ROLE_KEYS[key]);
+    dropLoose(ROLE_KEYS[key], event.shiftKey);
   } else if (TOOL_KEYS[key]) {
     setTool(TOOL_KEYS[key]);
   } else if (key >= '1' && key <= '6') {
@@ -208,7 +220,7 @@ function showState() {
   byId('previous').disabled = app.image <= 0;
   byId('next').disabled = app.image >= app.images.length - 1;
   byId('take-all').disabled = !app.detection;
-  byId('clear').disabled = !isSaid(app.doc) && isSaved();
+  byId('clear').disabled = !app.photo || (!isSaid(app.doc) && isSaved());
   byId('export').disabled = !app.estimate || !app.estimate.hypotheses.length;
   byId('save').disabled = !app.photo || isSaved();
   for (const button of document.querySelectorAll('[data-tool]')) {
@@ -235,7 +247,7 @@ async function start() {
   try {
     const {images, problem} = await api.images();
     app.images = images;
-    if (problem) toast(`scene.json is not used, nor written: ${problem}`, true);
+    if (problem) toast(`Not used, nor written: ${problem}`, true);
     const wanted = Number(location.hash.slice(1));
     await open(wanted < images.length ? wanted : 0);
   } catch (error) {

@@ -1,8 +1,7 @@
 // The plane, its circles, the axes and the camera, seen from outside: lines only, so that a canvas
 // and a turn about two axes are all it takes.
-import {app} from './store.js';
+import {app, shownDrawing, shownHypothesis} from './store.js';
 import {COLORS} from './pen.js';
-import {shownDrawing} from './view.js';
 
 const look = {yaw: -0.7, pitch: 0.45, zoom: 1};
 
@@ -58,8 +57,7 @@ export function drawOrbit(canvas) {
   canvas.height = h * ratio;
   const context = canvas.getContext('2d'), drawing = shownDrawing();
   if (!drawing || !w) return;
-  const shown = app.estimate.hypotheses[Math.min(app.doc.hypothesis, app.estimate.hypotheses.length - 1)];
-  const {curves, camera} = worldOf(shown, drawing);
+  const {curves, camera} = worldOf(shownHypothesis(), drawing);
   // +Z is up, seen from the side on which the camera is.
   const up = camera[2] < 0 ? -1 : 1;
   const cy = Math.cos(look.yaw), sy = Math.sin(look.yaw), cp = Math.cos(look.pitch), sp = Math.sin(look.pitch);

@@ -1,5 +1,5 @@
 // The panel beside the photo: the pose and its rivals, the camera, what was said, what was measured.
-import {app, change, changed, isSaid} from './store.js';
+import {app, change, changed, isSaid, shownHypothesis, shownIndex} from './store.js';
 import {dropCircle, dropPencil, dropSelected, dropUnknownPlane, planesOf, sameSelection} from './scene.js';
 import {drawThumbnail, measureText, withSigma} from './view.js';
 import {drawOrbit, watchOrbit} from './orbit.js';
@@ -25,7 +25,7 @@ const row = (name, value, title = '') =>
 // ---- The pose ----
 
 function card(hypothesis, index) {
-  const chosen = index === app.doc.hypothesis;
+  const chosen = index === shownIndex();
   const small = make('canvas', {width: 300, height: 200});
   if (app.photo) drawThumbnail(small, app.estimate.drawings[index]);
   return make('button', {
@@ -60,7 +60,7 @@ function poseSection() {
   if (!estimate.hypotheses.length) {
     return section('Pose', time, make('p', {className: 'problem'}, estimate.message || estimate.status));
   }
-  const shown = estimate.hypotheses[Math.min(app.doc.hypothesis, estimate.hypotheses.length - 1)];
+  const shown = shownHypothesis();
   const cards = make('div', {className: 'cards'}, ...estimate.hypotheses.slice(0, 6).map(card));
   const sigma = shown.sigma_rotation_deg.every((s) => s !== null)
     ? shown.sigma_rotation_deg.map((s) => number(s, 2)).join(', ') + '°' : 'a rotation is free';
@@ -189,7 +189,7 @@ function measureSection() {
 
 function notesSection() {
   const notes = app.estimate ? [...app.estimate.notes] : [];
-  const shown = app.estimate && app.estimate.hypotheses[app.doc.hypothesis];
+  const shown = shownHypothesis();
   if (shown && shown.left_out.length) notes.unshift(`left out, as it contradicts the rest: ${shown.left_out.join(', ')}`);
   return notes.length ? section('Notes', ...notes.map((note) => make('p', {className: 'note'}, note))) : null;
 }

@@ -1,7 +1,7 @@
 // Mouse, pen and finger on the photo: what is under them, and what they do to it.
 import {app, change, changed, remember} from './store.js';
 import {distance, ellipseDistance, segmentDistance, snap} from './geometry.js';
-import {handSigma, handlesOf, isCircleSaid, sayCircle} from './scene.js';
+import {foundOf, handSigma, handlesOf, isEllipseSaid, sayCircle} from './scene.js';
 import {centerOf, draw, drawLens, toPhoto, toScreen, view, zoom} from './view.js';
 
 const canvas = document.getElementById('photo'), lens = document.getElementById('lens');
@@ -50,9 +50,10 @@ function saidAt(photo) {
     const index = list.findIndex(({points}) => segmentDistance(points, photo) < reach);
     if (index >= 0) return {kind, index};
   }
-  const index = scene.circles.findIndex(({id}) => {
-    const ellipse = app.detection && app.detection.ellipses.find((e) => e.id === id);
-    return ellipse && ellipse.center && ellipseDistance(ellipse, photo) < reach;
+  const index = scene.circles.findIndex((circle) => {
+    const ellipse = foundOf(app.detection, circle);
+    if (ellipse && ellipse.center) return ellipseDistance(ellipse, photo) < reach;
+    return (circle.contour || []).some((u, i, all) => i % 2 === 0 && distance([u, all[i + 1]], photo) < reach);
   });
   return index >= 0 ? {kind: 'circle', index} : null;
 }
@@ -63,7 +64,7 @@ function foundAt(photo) {
   const reach = LINE_PX / view.scale;
   let best = null, least = reach;
   for (const ellipse of app.detection.ellipses) {
-    if (!ellipse.center || isCircleSaid(app.doc, ellipse.id)) continue;
+    if (!ellipse.center || isEllipseSaid(app.doc, app.detection, ellipse.id)) continue;
     const d = ellipseDistance(ellipse, photo);
     if (d < least) { least = d; best = {kind: 'found-circle', id: ellipse.id}; }
   }
@@ -73,7 +74,7 @@ function foundAt(photo) {
   });
   if (best) return best;
   const around = app.detection.ellipses
-    .filter((e) => e.center && !isCircleSaid(app.doc, e.id) && isInside(e, photo))
+    .filter((e) => e.center && !isEllipseSaid(app.doc, app.detection, e.id) && isInside(e, photo))
     .sort((a, b) => a.axes[0] * a.axes[1] - b.axes[0] * b.axes[1]);
   return around.length ? {kind: 'found-circle', id: around[0].id} : null;
 }
@@ -126,16 +127,18 @@ function drawLine(start) {
     move(point, event) {
       const points = round([...start, ...point]);
       const reach = SNAP_PX / view.scale, found = app.detection ? app.detection.segments : [];
-      app.loose = {points, snapped: event.altKey ? null : snap(points, found, reach), drawing: true};
+      const isFree = app.tool !== 'line' || event.altKey;  // What is measured is as it was drawn.
+      app.loose = {points, snapped: isFree ? null : snap(points, found, reach), drawing: true};
       changed('view');
     },
     end(point) {
       if (!this.moved) {
-        const found = foundAt(point);
+        const found = app.tool === 'line' ? foundAt(point) : null;
         app.loose = null;
         if (found) takeFound(found); else changed('view');
-      } else {
-        if (app.loose.snapped) app.loose.points = app.loose.snapped;
+      } else if (app.loose) {
+        const {points, snapped} = app.loose;
+        if (snapped) Object.assign(app.loose, {points: snapped, drawn: points});
         app.loose.drawing = false;
         finishLine();
       }
@@ -159,6 +162,12 @@ function finishLine() {
   } else {
     changed('view');
   }
+}
+
+// What was begun on one photo is nothing on the next one.
+export function forgetDrag() {
+  drag = pending = null;
+  lens.hidden = true;
 }
 
 export function setTool(tool) {

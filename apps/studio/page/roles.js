@@ -1,21 +1,23 @@
 // The bar beside a line that was drawn: drop it on a direction, an axis, a known length.
 import {app, change, changed} from './store.js';
-import {DIRECTIONS, lineSigma, sayLine} from './scene.js';
+import {DIRECTIONS, isLineSaid, lineSigma, sayLine} from './scene.js';
 import {toScreen, view} from './view.js';
 
 const bar = document.getElementById('roles'), canvas = document.getElementById('photo');
 const WORDS = {x: ['x', 'A line along x (X)'], y: ['y', 'A line along y (Y)'],
                z: ['z', 'A line along z, out of the plane (Z)'],
-               free: ['∥', 'A line parallel to others; click again for the next of the group (P)']};
+               free: ['∥', 'A line parallel to others: of the same group as the last one (P)']};
 
 let group = '';  // The free lines that the last one joined.
+export function forgetGroup() { group = ''; }
 
-export function dropLoose(role) {
+// `begin`: a free line is the first of a new group.
+export function dropLoose(role, begin = false) {
   const line = app.loose;
   if (!line) return;
   app.loose = null;
   if (DIRECTIONS.includes(role)) {
-    const joined = role === 'free' ? line.group || group : '';
+    const joined = role === 'free' && !begin ? line.group || group : '';
     change((doc) => {
       app.selection = sayLine(doc, line.points, role, lineSigma(line, view.scale), joined);
       if (role === 'free') group = doc.scene.pencils[app.selection.pencil].id;
@@ -32,20 +34,25 @@ function dropLength(value) {
   const line = app.loose;
   app.loose = null;
   change(({scene}) => {
-    scene.known.length.push({points: line.points, value});
+    scene.known.length.push({points: line.drawn || line.points, value});
     app.selection = {kind: 'known', index: scene.known.length.length - 1};
   });
 }
 
+// Of a found line: those of its group that are not said yet.
+const restOfGroup = ({group: id}) =>
+  id ? app.detection.segments.filter((s) => s[4] === id && !isLineSaid(app.doc, s)) : [];
+
 // A found line stands for its whole group.
 function dropGroup() {
-  const {group: id} = app.loose, of = app.detection.pencils.find((p) => p.id === id);
-  const segments = app.detection.segments.filter((s) => s[4] === id);
-  const line = app.loose;
+  const line = app.loose, segments = restOfGroup(line);
+  const of = app.detection.pencils.find((p) => p.id === line.group);
   app.loose = null;
   change((doc) => {
+    let joined = line.group;
     for (const segment of segments) {
-      app.selection = sayLine(doc, segment.slice(0, 4), of.along, lineSigma(line, view.scale), id);
+      app.selection = sayLine(doc, segment.slice(0, 4), of.along, lineSigma(line, view.scale), joined);
+      joined = doc.scene.pencils[app.selection.pencil].id;
     }
   });
 }
@@ -73,6 +80,7 @@ function fillBar() {
   for (const role of DIRECTIONS) {
     button(WORDS[role][0], WORDS[role][1], () => dropLoose(role), `role-${role}`);
   }
+  if (group) button('∥ new', 'The first line of another parallel group (Shift+P)', () => dropLoose('free', true), 'role-free');
   button('X axis', 'The image of the X axis, in this sense', () => dropLoose('x_axis'), 'role-x');
   button('Y axis', 'The image of the Y axis, in this sense', () => dropLoose('y_axis'), 'role-y');
   const length = document.createElement('input');
@@ -83,8 +91,7 @@ function fillBar() {
     if (event.key === 'Enter' && Number(length.value) > 0) dropLength(Number(length.value));
   });
   bar.append(length);
-  const size = app.loose.group
-    ? app.detection.segments.filter((s) => s[4] === app.loose.group).length : 0;
+  const size = restOfGroup(app.loose).length;
   if (size > 1) button(`all ${size}`, 'This line and all that were found parallel to it', dropGroup);
   button('✕', 'Drop it (Esc)', () => { app.loose = null; changed('view'); });
 }

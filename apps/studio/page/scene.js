@@ -13,29 +13,49 @@ function freshId(list, stem) {
 // The sigma of a point that a person sets, pixels: about one pixel of the screen.
 export const handSigma = (scale) => Math.max(0.3, Math.round(10 / scale) / 10);
 
-export const ellipseOf = (detection, id) => detection.ellipses.find((e) => e.id === id);
+// Whether a said contour is one that is found now: its length and ends tell.
+function isSameContour(found, said) {
+  const n = found.length;
+  return Boolean(said) && n === said.length && n > 0 && [0, 1, n - 2, n - 1].every((i) => found[i] === said[i]);
+}
 
-export function isCircleSaid(doc, id) {
-  return doc.scene.circles.some((circle) => circle.id === id);
+// The ellipse found now that a said circle is, or undefined. Not by the id, which tells nothing of
+// circles that were said when the detection or the file was another one.
+export const foundOf = (detection, circle) => detection
+  ? detection.ellipses.find(({id}) => isSameContour(detection.contours[id], circle.contour)) : undefined;
+
+export function isEllipseSaid(doc, detection, id) {
+  return doc.scene.circles.some(({contour}) => isSameContour(detection.contours[id], contour));
 }
 
 export function sayCircle(doc, detection, id) {
-  const ellipse = ellipseOf(detection, id);
-  const circle = {id, contour: detection.contours[id]};
+  const ellipse = detection.ellipses.find((e) => e.id === id), {circles} = doc.scene;
+  const isTaken = circles.some((circle) => circle.id === id);
+  const circle = {id: isTaken ? freshId(circles, `${id}_`) : id, contour: detection.contours[id]};
   if (detection.contour_sigma_px[id]) circle.sigma_px = detection.contour_sigma_px[id];
   if (ellipse.plane) circle.plane = ellipse.plane;
   if (ellipse.concentric) circle.concentric = ellipse.concentric;
-  doc.scene.circles.push(circle);
+  circles.push(circle);
 }
 
-// The line joins those of its direction; free ones make a new group, unless one is named.
+// Whether a segment that was found is a line of some pencil; `segments` of one.
+const isAmong = (segments, [x0, y0, x1, y1]) => {
+  const is = (i, ...points) => points.every((value, k) => segments[i + k] === value);
+  for (let i = 0; i < segments.length; i += 4) if (is(i, x0, y0, x1, y1) || is(i, x1, y1, x0, y0)) return true;
+  return false;
+};
+export const isLineSaid = (doc, points) => doc.scene.pencils.some(({segments}) => isAmong(segments, points));
+
+const directionOf = (pencil) => pencil.direction || 'free';
+
+// The line joins those of its direction; free ones make a new group, unless one is named that is
+// one of free lines still.
 export function sayLine(doc, points, direction, sigmaPx, group = '') {
   const pencils = doc.scene.pencils;
-  let pencil = pencils.find((p) => group ? p.id === group
-                                         : direction !== 'free' && p.direction === direction);
+  let pencil = pencils.find((p) => directionOf(p) === direction && (group ? p.id === group : direction !== 'free'));
   if (!pencil) {
-    const stem = direction === 'free' ? 'lines' : direction;
-    pencil = {id: group || freshId(pencils, stem), segments: [], direction, sigma_px: 0};
+    const stem = direction === 'free' ? 'lines' : direction, isFree = !pencils.some((p) => p.id === group);
+    pencil = {id: group && isFree ? group : freshId(pencils, stem), segments: [], direction, sigma_px: 0};
     pencils.push(pencil);
   }
   pencil.segments.push(...points);

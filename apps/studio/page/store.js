@@ -7,7 +7,8 @@
 export const app = {
   images: [], image: -1, photo: null, detection: null, estimate: null, estimateError: '',
   doc: emptyDoc(), selection: null, hover: null, tool: 'select',
-  loose: null,  // A line that has no role yet: {points, snapped}.
+  loose: null,  // A line that has no role yet: {points, snapped: the found one that it lies along,
+                // drawn: as it was drawn, where it then became that one}.
   milliseconds: 0,  // From the last question to its answer.
   answers: 0, firstPose: 0,
 };
@@ -75,6 +76,12 @@ export function resetHistory() {
   done = [];
 }
 
+// The hypothesis that is shown: its index, itself and its drawing. None: undefined.
+export const shownIndex = () =>
+  Math.min(app.doc.hypothesis, app.estimate ? app.estimate.hypotheses.length - 1 : 0);
+export const shownHypothesis = () => app.estimate ? app.estimate.hypotheses[shownIndex()] : undefined;
+export const shownDrawing = () => app.estimate ? app.estimate.drawings[shownIndex()] : undefined;
+
 // Remembers the doc as it is; before a change, or a drag of many.
 export function remember() {
   done.push(JSON.stringify(app.doc));
@@ -82,7 +89,9 @@ export function remember() {
   undone = [];
 }
 
+// Nothing is said of a photo before what was said of it is there.
 export function change(mutate) {
+  if (!app.photo) return;
   remember();
   mutate(app.doc);
   changed('doc');

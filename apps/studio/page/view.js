@@ -1,8 +1,8 @@
 // The photo and what is drawn on it. Screen and photo are one scale and one shift apart; the centre
 // of a pixel has whole coordinates.
-import {app, isSaid} from './store.js';
+import {app, isSaid, shownDrawing, shownHypothesis} from './store.js';
 import {COLORS, Pen} from './pen.js';
-import {ellipseOf, handlesOf, isCircleSaid, sameSelection} from './scene.js';
+import {foundOf, handlesOf, isEllipseSaid, sameSelection} from './scene.js';
 
 const MANY_HANDLES = 24;  // Beyond, those of what is selected show.
 
@@ -46,8 +46,11 @@ export function drawPose(pen, drawing, all = true) {
   });
 }
 
-export const shownDrawing = () =>
-  app.estimate && app.estimate.drawings[Math.min(app.doc.hypothesis, app.estimate.drawings.length - 1)];
+// What has no part in the pose shown, by name: "c1", "L1[3]" for the fourth line of a pencil.
+function leftOutNames() {
+  const shown = shownHypothesis();
+  return new Set(shown ? shown.left_out : []);
+}
 
 function isHovered(kind, id) {
   return app.hover && app.hover.kind === kind && app.hover.id === id;
@@ -56,42 +59,38 @@ function isHovered(kind, id) {
 // What was found and not said: greyed where it has no part in the pose.
 function drawFound(pen) {
   if (!app.detection) return;
-  const used = !isSaid(app.doc), shown = app.estimate && app.estimate.hypotheses[app.doc.hypothesis];
-  const leftOut = new Set(shown ? shown.left_out : []);
+  const used = !isSaid(app.doc), leftOut = leftOutNames(), counts = {};
   const along = Object.fromEntries(app.detection.pencils.map((p) => [p.id, p.along]));
   const style = (isUsed, hover) => hover ? {alpha: 1} : isUsed ? {alpha: 0.9} : {alpha: 0.55, dash: [5, 4]};
   app.detection.segments.forEach((segment, i) => {
-    const hover = isHovered('found-line', i), isUsed = used && !leftOut.has(segment[4]);
-    pen.line(segment, isUsed ? COLORS[along[segment[4]]] || COLORS.found : COLORS.found, hover ? 3 : 1.5,
+    const id = segment[4], number = counts[id] = (counts[id] ?? -1) + 1;
+    const hover = isHovered('found-line', i), isUsed = used && !leftOut.has(`${id}[${number}]`);
+    pen.line(segment, isUsed ? COLORS[along[id]] || COLORS.found : COLORS.found, hover ? 3 : 1.5,
              style(isUsed, hover));
   });
   for (const ellipse of app.detection.ellipses) {
-    if (isCircleSaid(app.doc, ellipse.id)) continue;
+    if (isEllipseSaid(app.doc, app.detection, ellipse.id)) continue;
     const hover = isHovered('found-circle', ellipse.id), isUsed = used && !leftOut.has(ellipse.id);
     pen.ellipse(ellipse, isUsed ? COLORS.circle : COLORS.found, hover ? 3.5 : 1.5, style(isUsed, hover));
   }
 }
 
-// Whether a said contour is the one found now: its length and ends tell.
-function isSameContour(found, said) {
-  return Boolean(said) && found.length === said.length && found[0] === said[0] &&
-    found[found.length - 1] === said[said.length - 1];
-}
-
 function drawSaid(pen) {
-  const {scene, measure} = app.doc, drawing = shownDrawing();
+  const {scene, measure} = app.doc, drawing = shownDrawing(), leftOut = leftOutNames();
+  const style = (name) => leftOut.has(name) ? {alpha: 0.55, dash: [5, 4]} : {};
   const isSelected = (selection) => app.selection && sameSelection(app.selection, selection);
   scene.pencils.forEach((pencil, p) => {
     for (let s = 0; 4 * s < pencil.segments.length; ++s) {
       const selected = isSelected({kind: 'line', pencil: p, segment: s});
-      pen.line(pencil.segments.slice(4 * s, 4 * s + 4), COLORS[pencil.direction || 'free'], selected ? 4 : 2.5);
+      pen.line(pencil.segments.slice(4 * s, 4 * s + 4), COLORS[pencil.direction || 'free'], selected ? 4 : 2.5,
+               style(`${pencil.id}[${s}]`));
     }
   });
   scene.circles.forEach((circle, index) => {
     const selected = isSelected({kind: 'circle', index});
-    const ellipse = app.detection && ellipseOf(app.detection, circle.id);
-    if (ellipse && isSameContour(app.detection.contours[circle.id], circle.contour)) {
-      pen.ellipse(ellipse, COLORS.circle, selected ? 4 : 2.5);
+    const ellipse = foundOf(app.detection, circle);
+    if (ellipse) {
+      pen.ellipse(ellipse, COLORS.circle, selected ? 4 : 2.5, style(circle.id));
     } else if (circle.contour) {
       for (let i = 0; i < circle.contour.length; i += 2) {
         pen.ring(circle.contour.slice(i, i + 2), 1, COLORS.circle, {width: 1});
@@ -131,7 +130,7 @@ export function centerOf(index) {
   if (circle.center) return circle.center;
   const predicted = drawing && drawing.circles.find((c) => c.id === circle.id);
   if (predicted && predicted.center_px) return predicted.center_px;
-  const ellipse = app.detection && ellipseOf(app.detection, circle.id);
+  const ellipse = foundOf(app.detection, circle);
   return ellipse ? ellipse.center : null;
 }
 

@@ -1,0 +1,40 @@
+// A photo for the studio, and its options.
+#ifndef CIRCLINE_TESTS_APPS_STUDIO_DISC_H_
+#define CIRCLINE_TESTS_APPS_STUDIO_DISC_H_
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "apps/compare/options.h"
+#include "apps/studio/scene_document.h"
+
+namespace circline::apps {
+
+// A bright disc, tilted, on a dark ground.
+inline cv::Mat DiscPhoto(int width, int height) {
+  cv::Mat photo(height, width, CV_8UC1, cv::Scalar(40));
+  cv::ellipse(photo, {width / 2, height / 2}, {width / 5, height / 7}, 20.0, 0.0, 360.0,
+              cv::Scalar(220), cv::FILLED, cv::LINE_AA);
+  cv::GaussianBlur(photo, photo, {5, 5}, 1.0);
+  return photo;
+}
+
+inline CompareOptions StudioOptions() {
+  CompareOptions options;
+  options.solvers = {"joint"};
+  options.overlays = false;
+  options.losses.resize(1);
+  return options;
+}
+
+// The first ellipse of a detection as a scene file's circle.
+inline Json SceneOfDisc(const Json& found) {
+  const std::string id = found["ellipses"][0]["id"];
+  const Json circle = {
+      {"id", id}, {"contour", found["contours"][id]}, {"radius", 2.0}, {"plane", "p"}};
+  return {{"circles", Json::array({circle})}};
+}
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_TESTS_APPS_STUDIO_DISC_H_
