@@ -131,6 +131,8 @@ Status Camera::Validate() const {
     return Status::Invalid(name + ": width and height must not be negative");
   for (double k : distortion) {
     if (!std::isfinite(k)) return Status::Invalid(name + ": distortion must be finite");
+    if (model == CameraModel::kPinhole && k != 0.0)
+      return Status::Invalid(name + ": a pinhole camera has no distortion: say model 'opencv'");
   }
   return Status::Ok();
 }

@@ -3,11 +3,11 @@
 #include <gflags/gflags.h>
 
 #include <algorithm>
-#include <map>
 #include <opencv2/core/utility.hpp>
 #include <set>
 #include <vector>
 
+#include "apps/common/camera_file.h"
 #include "apps/common/text.h"
 
 DECLARE_string(camera);
@@ -32,14 +32,10 @@ namespace circline::apps {
 namespace {
 
 Status ModelFromFlag(std::optional<CameraModel>* model) {
-  const std::map<std::string, CameraModel> models = {{"pinhole", CameraModel::kPinhole},
-                                                     {"opencv", CameraModel::kOpenCV},
-                                                     {"fisheye", CameraModel::kFisheye}};
-  const auto named = models.find(FLAGS_model);
-  if (named != models.end()) *model = named->second;
-  return named != models.end() || FLAGS_model.empty()
+  if (FLAGS_model.empty()) return Status::Ok();
+  return ModelFromName(FLAGS_model, &model->emplace())
              ? Status::Ok()
-             : Status::Invalid("--model=" + FLAGS_model + ": must be pinhole, opencv or fisheye");
+             : Status::Invalid("--model: " + NoSuchModel(FLAGS_model));
 }
 
 // The names in a list flag.

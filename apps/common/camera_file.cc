@@ -10,6 +10,9 @@
 namespace circline::apps {
 namespace {
 
+constexpr std::array<CameraModel, 3> kModels = {CameraModel::kPinhole, CameraModel::kOpenCV,
+                                                CameraModel::kFisheye};
+
 void SetIntrinsics(const StorageNode& matrix_node, Camera* camera) {
   const std::vector<double> k = matrix_node.Numbers(9);
   if (k.empty()) return;
@@ -30,16 +33,13 @@ void SetIntrinsics(const StorageNode& matrix_node, Camera* camera) {
 void SetDistortion(const StorageNode& node, Camera* camera) {
   if (!node.Exists()) return;
   const std::vector<double> d = node.Numbers();
-  const bool all_zero = std::all_of(d.begin(), d.end(), [](double v) { return v == 0.0; });
-  if (camera->model == CameraModel::kPinhole) {
-    if (!all_zero) node.Fail("a pinhole camera has no distortion: say model: \"opencv\"");
-    return;
-  }
   const std::size_t used = camera->model == CameraModel::kFisheye ? 4 : 8;
   const std::vector<std::size_t> sizes = camera->model == CameraModel::kFisheye
                                              ? std::vector<std::size_t>{0, 4}
                                              : std::vector<std::size_t>{0, 4, 5, 8, 12, 14};
-  if (std::find(sizes.begin(), sizes.end(), d.size()) == sizes.end()) {
+  // A pinhole camera may have any number of zeros; that they are is for Camera::Validate to say.
+  if (camera->model != CameraModel::kPinhole &&
+      std::find(sizes.begin(), sizes.end(), d.size()) == sizes.end()) {
     node.Fail(camera->model == CameraModel::kFisheye
                   ? "the fisheye model has 4 coefficients (k1 k2 k3 k4), not " +
                         std::to_string(d.size())
@@ -125,6 +125,21 @@ const char* ModelName(CameraModel model) {
                                          : "fisheye";
 }
 
+bool ModelFromName(const std::string& name, CameraModel* model) {
+  for (const CameraModel known : kModels) {
+    if (name != ModelName(known)) continue;
+    *model = known;
+    return true;
+  }
+  return false;
+}
+
+std::string NoSuchModel(const std::string& name) {
+  std::vector<std::string> names;
+  for (const CameraModel known : kModels) names.emplace_back(ModelName(known));
+  return "'" + name + "' is not one of " + JoinList(names, ", ");
+}
+
 std::vector<double> Distortion(const Camera& camera) {
   if (camera.model == CameraModel::kPinhole) return std::vector<double>(4, 0.0);
   std::vector<double> d(camera.distortion.begin(), camera.distortion.end());
@@ -162,15 +177,7 @@ Camera ReadSceneCamera(const StorageNode& node, StatedCameraSigma* sigma) {
   named.set_place(node.place() + " (\"" + camera.id + "\")");
   const StorageNode model = named.Require("model");
   const std::string name = model.Text();
-  if (name == "pinhole") {
-    camera.model = CameraModel::kPinhole;
-  } else if (name == "opencv") {
-    camera.model = CameraModel::kOpenCV;
-  } else if (name == "fisheye") {
-    camera.model = CameraModel::kFisheye;
-  } else {
-    model.Fail("'" + name + "' is not one of pinhole, opencv, fisheye");
-  }
+  if (!ModelFromName(name, &camera.model)) model.Fail(NoSuchModel(name));
   camera.width = ReadSize(named.Get("width"));
   camera.height = ReadSize(named.Get("height"));
   const StorageNode matrix = named.Get("camera_matrix");

@@ -15,6 +15,10 @@ namespace circline::apps {
 
 // As in scene files.
 const char* ModelName(CameraModel model);
+// False, with `model` untouched, where no model has this name.
+bool ModelFromName(const std::string& name, CameraModel* model);
+// What a message says of one: "'fish' is not one of pinhole, opencv, fisheye".
+std::string NoSuchModel(const std::string& name);
 // In OpenCV's order; the rational terms only where they are there.
 std::vector<double> Distortion(const Camera& camera);
 

@@ -3,8 +3,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 #include <tuple>
 
+#include "apps/common/camera_file.h"
 #include "apps/common/text.h"
 
 namespace circline::apps {
@@ -132,10 +134,8 @@ void ReadTimings(const std::string& text, ImageRecord* record) {
 Camera ReadCamera(const Json& json) {
   Camera camera;
   camera.id = json.at("id").get<std::string>();
-  const std::string model = json.at("model").get<std::string>();
-  camera.model = model == "fisheye"  ? CameraModel::kFisheye
-                 : model == "opencv" ? CameraModel::kOpenCV
-                                     : CameraModel::kPinhole;
+  const auto model = json.at("model").get<std::string>();
+  if (!ModelFromName(model, &camera.model)) throw std::invalid_argument(NoSuchModel(model));
   camera.width = json.at("width").get<int>();
   camera.height = json.at("height").get<int>();
   ReadIntrinsics(json, &camera);
@@ -184,7 +184,7 @@ Status ParseRecord(const ImageLines& lines, ImageRecord* record) {
     ReadObservations(lines.observations, record);
     ReadResults(lines.results, record);
     ReadTimings(lines.timings, record);
-  } catch (const nlohmann::json::exception& error) {
+  } catch (const std::exception& error) {  // Of the JSON, or of a name in it.
     return Status::Invalid(std::string("a line is not as this program writes it: ") + error.what());
   }
   return Status::Ok();

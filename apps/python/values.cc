@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/common/camera_file.h"
 #include "apps/python/bindings.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/pose.h"
@@ -16,23 +17,11 @@ namespace {
 
 namespace py = pybind11;
 
-constexpr std::array<std::pair<CameraModel, const char*>, 3> kModels = {
-    {{CameraModel::kPinhole, "pinhole"},
-     {CameraModel::kOpenCV, "opencv"},
-     {CameraModel::kFisheye, "fisheye"}}};
-
-const char* ModelName(CameraModel model) {
-  for (const auto& [known, name] : kModels) {
-    if (known == model) return name;
-  }
-  return "unknown";
-}
-
-CameraModel ModelFromName(const std::string& wanted) {
-  for (const auto& [model, name] : kModels) {
-    if (wanted == name) return model;
-  }
-  throw py::value_error("model must be pinhole, opencv or fisheye, not " + wanted);
+CameraModel ModelOf(const std::string& name) {
+  CameraModel model = CameraModel::kPinhole;
+  if (!apps::ModelFromName(name, &model))
+    throw py::value_error("model: " + apps::NoSuchModel(name));
+  return model;
 }
 
 // A value with the attributes given by name; an unknown one is a TypeError, as of a Python class.
@@ -93,8 +82,8 @@ void BindCamera(py::module_* module) {
       .def(py::init(&FromKeywords<Camera>))
       .def_readwrite("id", &Camera::id, "Photos with the same id share a camera.")
       .def_property(
-          "model", [](const Camera& camera) { return ModelName(camera.model); },
-          [](Camera& camera, const std::string& name) { camera.model = ModelFromName(name); },
+          "model", [](const Camera& camera) { return apps::ModelName(camera.model); },
+          [](Camera& camera, const std::string& name) { camera.model = ModelOf(name); },
           "pinhole, opencv (k1 k2 p1 p2 [k3 [k4 k5 k6]]) or fisheye (k1 k2 k3 k4).")
       .def_readwrite("width", &Camera::width, "Of the photo, pixels; 0: unknown.")
       .def_readwrite("height", &Camera::height, "Of the photo, pixels; 0: unknown.")
@@ -111,7 +100,7 @@ void BindCamera(py::module_* module) {
            "Calibrated coordinates X/Z, Y/Z (N, 2) of pixels (N, 2); NaN where there are none.")
       .def("__repr__", [](const Camera& camera) {
         std::ostringstream text;
-        text << "Camera(model='" << ModelName(camera.model) << "', width=" << camera.width
+        text << "Camera(model='" << apps::ModelName(camera.model) << "', width=" << camera.width
              << ", height=" << camera.height << ", fx=" << camera.fx << ", fy=" << camera.fy
              << ", cx=" << camera.cx << ", cy=" << camera.cy << ")";
         return text.str();

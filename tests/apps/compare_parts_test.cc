@@ -103,6 +103,11 @@ TEST(Record, NamesALineThatIsNotOfThisProgram) {
   ImageRecord record;
   EXPECT_FALSE(ParseRecord({"", "not json\n", ""}, &record).ok());
   EXPECT_FALSE(ParseRecord({"{\"solver\":1}\n", OneImage(0).observations, ""}, &record).ok());
+  const std::string unknown_model =
+      R"({"index":0,"set_size":1,"image":"a.png","detected":true,"ellipses":[],"segments":[],)"
+      R"("pencils":[],"camera":{"id":"k","model":"fish"}})";
+  EXPECT_NE(ParseRecord({"", unknown_model, ""}, &record).message.find("'fish' is not one of"),
+            std::string::npos);
 }
 
 // The same pose, seen through the camera given and through a wrong one that was refined to it.

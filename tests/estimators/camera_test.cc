@@ -144,7 +144,11 @@ TEST(CameraTest, ValidateNamesTheField) {
   }
   camera.fx = 500.0;
   camera.distortion[3] = std::numeric_limits<double>::infinity();
-  EXPECT_NE(camera.Validate().message.find("distortion"), std::string::npos);
+  EXPECT_NE(camera.Validate().message.find("distortion must be finite"), std::string::npos);
+  camera.distortion[3] = 1e-3;
+  EXPECT_NE(camera.Validate().message.find("pinhole camera has no distortion"), std::string::npos);
+  camera.model = CameraModel::kOpenCV;
+  EXPECT_TRUE(camera.Validate().ok());
 }
 
 }  // namespace
