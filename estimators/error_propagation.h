@@ -13,6 +13,7 @@
 #include "circline/estimators/line.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/pose.h"
+#include "circline/estimators/status.h"
 #include "circline/estimators/vanishing_point.h"
 
 namespace CIRCLINE_EXPORT circline {
@@ -23,7 +24,9 @@ enum class InputKind { kPoint, kLine, kConic, kNumber };
 // One measured input of a closed form, calibrated, with its covariance.
 struct MeasuredInput {
   InputKind kind = InputKind::kNumber;
-  std::vector<double> value;       // 3 of a point, direction or line; 6 of a conic; 1.
+  // 3 of a point, direction or line; 6 of a conic, in ConicToVector's order; 1 of a number, in a
+  // unit of its own.
+  std::vector<double> value;
   std::vector<double> covariance;  // Of `value`, square, row-major.
   int contrast = 0;                // Of a conic: CircleObservation::contrast.
 
@@ -38,7 +41,8 @@ struct MeasuredInput {
 };
 
 // A pose that a closed form finds, and how far it contradicts the inputs that it was not computed
-// from: numbers that are zero where all of them agree, as many for every pose; or none.
+// from: numbers that are zero where all of them agree, as many for every pose; or none. Poses that
+// are not finite do not count.
 struct ClosedFormPose {
   CameraPose pose;
   std::vector<double> contradiction;
@@ -56,12 +60,13 @@ struct UnknownOfPose {
 // The poses of the closed form as hypotheses: covariance, rank and free directions of each, cost
 // from the contradictions (1/2 chi^2), ranked, with probabilities. Of the noise model the camera's
 // part and the contours' offset count; what else it holds belongs into the inputs' covariances.
-// Calls the closed form twice for each error: some 50 times. Empty where it finds no pose.
-// Thread-safe if `closed_form` is.
-std::vector<PoseHypothesis> PropagateErrors(const ClosedForm& closed_form,
-                                            const std::vector<MeasuredInput>& inputs,
-                                            const Camera& camera, const NoiseModel& noise_model,
-                                            const UnknownOfPose& unknown);
+// Calls the closed form twice for each error: some 50 times. Ok and empty where it finds no pose;
+// invalid and empty, with a sentence, where an input has the wrong size or is not finite (which
+// one: its index), where its poses are not contradicted by as many numbers each, or where camera or
+// noise model are wrong. Thread-safe if `closed_form` is.
+Status PropagateErrors(const ClosedForm& closed_form, const std::vector<MeasuredInput>& inputs,
+                       const Camera& camera, const NoiseModel& noise_model,
+                       const UnknownOfPose& unknown, std::vector<PoseHypothesis>* hypotheses);
 
 }  // namespace circline
 

@@ -77,9 +77,9 @@ PoseEstimate CirclePencilSolver::Solve(const Observations& observations) const {
       MeasuredInput::Number(circle.radius, circle.radius * relative)};
   UnknownOfPose unknown;
   unknown.scale = !(circle.radius > 0.0);
-  estimate.hypotheses =
-      PropagateErrors(Poses, inputs, evidence.camera, options_.noise_model, unknown);
-  if (estimate.hypotheses.empty())
+  estimate.status = PropagateErrors(Poses, inputs, evidence.camera, options_.noise_model, unknown,
+                                    &estimate.hypotheses);
+  if (estimate.status.ok() && estimate.hypotheses.empty())
     estimate.status = Status::Refused("the ellipse of circle '" + circle.id + "' is degenerate");
   estimate.decided_by = "the plane that holds the pencil";
   return estimate;

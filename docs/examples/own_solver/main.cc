@@ -1,6 +1,7 @@
 // A closed form of one's own beside the built-in ones, and alone in EstimatePose, on 200 noisy
 // images of a wheel and two kerbs: does it find the pose, and are its errors what it says?
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <utility>
