@@ -204,10 +204,9 @@ Eigen::Matrix3d ReadRotation(const StorageNode& node) {
 Symmetry ReadSymmetry(const StorageNode& node) {
   if (!node.Exists()) return Symmetry::kNone;
   const std::string name = node.Text();
-  if (name == "none") return Symmetry::kNone;
-  if (name == "D2") return Symmetry::kD2;
-  if (name == "D4") return Symmetry::kD4;
-  if (name == "axis") return Symmetry::kAxis;
+  for (const Symmetry known : {Symmetry::kNone, Symmetry::kD2, Symmetry::kD4, Symmetry::kAxis}) {
+    if (name == SymmetryName(known)) return known;
+  }
   node.Fail("'" + name + "' is not one of none, D2, D4, axis");
   return Symmetry::kNone;
 }
@@ -332,6 +331,13 @@ Status ExpandPattern(const std::string& pattern, std::vector<std::string>* paths
 }
 
 }  // namespace
+
+const char* SymmetryName(Symmetry symmetry) {
+  return symmetry == Symmetry::kNone ? "none"
+         : symmetry == Symmetry::kD2 ? "D2"
+         : symmetry == Symmetry::kD4 ? "D4"
+                                     : "axis";
+}
 
 bool IsPhotoName(const std::string& path) {
   std::string extension = std::filesystem::path(path).extension().string();

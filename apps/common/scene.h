@@ -25,6 +25,9 @@ enum class Symmetry {
   kAxis,  // All but the plane's normal, up to sign.
 };
 
+// As in scene files.
+const char* SymmetryName(Symmetry symmetry);
+
 struct TrueDirection {
   std::string pencil;         // Id.
   Eigen::Vector3d direction;  // Unit, camera frame, without sense.

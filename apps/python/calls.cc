@@ -54,11 +54,13 @@ LossOptions Loss(const std::string& name, double scale_px, const char* field) {
   return loss;
 }
 
+// Of cameras these keep a copy: Python may change its own while they compute.
 py::object Detect(const py::array& image, const Camera& camera, const DetectionOptions& options) {
   const py::array rows = Rows(image);
   const cv::Mat mat = MatOf(rows);
   Observations observations;
-  ThrowUnlessOk(Unlocked([&] { return DetectObservations(mat, camera, options, &observations); }));
+  ThrowUnlessOk(
+      Unlocked([&, camera] { return DetectObservations(mat, camera, options, &observations); }));
   return ObservationsToPython(std::move(observations));
 }
 
@@ -68,7 +70,8 @@ py::object DetectCircle(const py::array& image, const Camera& camera, const std:
   const cv::Mat mat = MatOf(rows);
   const cv::Rect box(roi[0], roi[1], roi[2], roi[3]);
   CircleObservation circle;
-  ThrowUnlessOk(Unlocked([&] { return DetectCircleInRoi(mat, camera, box, options, &circle); }));
+  ThrowUnlessOk(
+      Unlocked([&, camera] { return DetectCircleInRoi(mat, camera, box, options, &circle); }));
   return CircleToPython(std::move(circle));
 }
 
@@ -106,14 +109,16 @@ void BindDetect(py::module_* module) {
                           double min_segment_length_px, int max_circles, int max_pencils,
                           double max_shared_plane_deg, std::uint64_t seed,
                           const std::optional<NoiseModel>& noise_model) {
-    return DetectionOptions{min_ellipse_axis_px,
-                            min_arc_deg,
-                            min_segment_length_px,
-                            max_circles,
-                            max_pencils,
-                            max_shared_plane_deg,
-                            seed,
-                            noise_model.value_or(NoiseModel())};
+    DetectionOptions chosen;
+    chosen.min_ellipse_axis_px = min_ellipse_axis_px;
+    chosen.min_arc_deg = min_arc_deg;
+    chosen.min_segment_length_px = min_segment_length_px;
+    chosen.max_circles = max_circles;
+    chosen.max_pencils = max_pencils;
+    chosen.max_shared_plane_deg = max_shared_plane_deg;
+    chosen.seed = seed;
+    if (noise_model) chosen.noise_model = *noise_model;
+    return chosen;
   };
   module->def(
       "detect",
@@ -161,13 +166,14 @@ void BindFit(py::module_* module) {
       [](const py::handle& observations, double inlier_threshold_px, double confidence,
          int max_iterations, std::uint64_t seed, double sigma_px, double direction_sigma_rad,
          const std::optional<NoiseModel>& noise, const std::optional<py::list>& problems) {
-        const FitOptions options{inlier_threshold_px,
-                                 confidence,
-                                 max_iterations,
-                                 seed,
-                                 sigma_px,
-                                 direction_sigma_rad,
-                                 noise.value_or(NoiseModel())};
+        FitOptions options;
+        options.inlier_threshold_px = inlier_threshold_px;
+        options.confidence = confidence;
+        options.max_iterations = max_iterations;
+        options.seed = seed;
+        options.sigma_px = sigma_px;
+        options.direction_sigma_rad = direction_sigma_rad;
+        if (noise) options.noise_model = *noise;
         return Fit(observations, options, problems);
       },
       py::arg("observations"), py::kw_only(),
@@ -194,9 +200,14 @@ void BindEstimateCall(py::module_* module) {
                            "A world direction that is known in the camera.")
       .def(py::init([](const Eigen::Vector3d& in_world, const Eigen::Vector3d& in_camera,
                        double sigma_rad) {
-             return GravityPrior{in_world, in_camera, sigma_rad};
+             GravityPrior prior;
+             prior.in_world = in_world;
+             prior.in_camera = in_camera;
+             prior.sigma_rad = sigma_rad;
+             return prior;
            }),
-           py::arg("in_world"), py::arg("in_camera"), py::arg("sigma_rad") = 0.01,
+           py::arg("in_world"), py::arg("in_camera"),
+           py::arg("sigma_rad") = GravityPrior().sigma_rad,
            "Unit vectors (3,); sigma of each of two components, radians.");
   const EstimationOptions d;
   module->def(
@@ -221,9 +232,11 @@ void BindEstimateCall(py::module_* module) {
         options.max_cost_gap = max_cost_gap;
         return Estimate(observations, options);
       },
-      py::arg("observations"), py::kw_only(), py::arg("conic_loss") = "cauchy",
-      py::arg("conic_loss_scale_px") = d.conic_loss.scale_px, py::arg("line_loss") = "cauchy",
-      py::arg("line_loss_scale_px") = d.line_loss.scale_px, py::arg("conic_distance") = "auto",
+      py::arg("observations"), py::kw_only(), py::arg("conic_loss") = LossName(d.conic_loss.type),
+      py::arg("conic_loss_scale_px") = d.conic_loss.scale_px,
+      py::arg("line_loss") = LossName(d.line_loss.type),
+      py::arg("line_loss_scale_px") = d.line_loss.scale_px,
+      py::arg("conic_distance") = ConicDistanceName(d.conic_distance),
       py::arg("noise_model") = py::none(), py::arg("camera_sigma") = py::none(),
       py::arg("pose_prior") = py::none(), py::arg("gravity_prior") = py::none(),
       py::arg("prior") = py::none(), py::arg("max_iterations") = d.max_iterations,
@@ -259,12 +272,14 @@ void BindAdjustCall(py::module_* module) {
         options.num_solver_threads = num_solver_threads;
         return Adjust(photos, options);
       },
-      py::arg("observations_list"), py::kw_only(), py::arg("conic_loss") = "cauchy",
-      py::arg("conic_loss_scale_px") = d.conic_loss.scale_px, py::arg("line_loss") = "cauchy",
+      py::arg("observations_list"), py::kw_only(),
+      py::arg("conic_loss") = LossName(d.conic_loss.type),
+      py::arg("conic_loss_scale_px") = d.conic_loss.scale_px,
+      py::arg("line_loss") = LossName(d.line_loss.type),
       py::arg("line_loss_scale_px") = d.line_loss.scale_px, py::arg("noise_model") = py::none(),
       py::arg("camera_sigma") = std::map<std::string, CameraSigma>(),
       py::arg("num_radial") = d.num_radial, py::arg("tangential_sigma") = d.tangential_sigma,
-      py::arg("rigid") = "auto", py::arg("nearly_equal") = d.nearly_equal,
+      py::arg("rigid") = RigidWorldName(d.rigid), py::arg("nearly_equal") = d.nearly_equal,
       py::arg("max_iterations") = d.max_iterations, py::arg("num_threads") = d.num_threads,
       py::arg("num_solver_threads") = d.num_solver_threads,
       "The camera (or several), the pose of every photo and what is seen: AdjustedPhotos.\n\n"

@@ -1,4 +1,7 @@
 // Scene files, camera files and the paper's simulation, as the programs have them.
+#include <pybind11/stl/filesystem.h>
+
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,30 +22,33 @@ void ThrowUnlessRead(const Status& status) {
   if (!status.ok()) throw py::value_error(status.message);
 }
 
-py::list LoadScene(const std::string& path) {
+py::list LoadScene(const std::filesystem::path& path) {
   std::vector<apps::SceneImage> images;
-  ThrowUnlessRead(apps::ReadScene(path, {}, &images));
+  ThrowUnlessRead(apps::ReadScene(path.string(), {}, &images));
   const py::object scene_image = py::module_::import("circline.scene").attr("SceneImage");
   py::list loaded;
   for (apps::SceneImage& image : images) {
     py::dict rois;
     for (const apps::CircleRoi& roi : image.rois)
       rois[py::int_(roi.circle)] = py::cast(roi.rectangle);
-    py::object rotation = py::none(), translation = py::none();
+    py::object camera_sigma = py::none(), rotation = py::none(), translation = py::none();
+    if (image.camera_sigma.IsAny()) camera_sigma = py::cast(image.camera_sigma.Over(CameraSigma()));
     if (image.truth && image.truth->rotation) rotation = py::cast(*image.truth->rotation);
     if (image.truth && image.truth->translation) translation = py::cast(*image.truth->translation);
-    loaded.append(
-        scene_image("name"_a = image.name, "path"_a = image.path,
-                    "observations"_a = ObservationsToPython(std::move(image.observations)),
-                    "detect_everything"_a = image.detect_everything, "rois"_a = rois,
-                    "true_rotation"_a = rotation, "true_translation"_a = translation));
+    const apps::Symmetry symmetry = image.truth ? image.truth->symmetry : apps::Symmetry::kNone;
+    loaded.append(scene_image(
+        "name"_a = image.name, "path"_a = image.path,
+        "observations"_a = ObservationsToPython(std::move(image.observations)),
+        "camera_sigma"_a = camera_sigma, "detect_everything"_a = image.detect_everything,
+        "rois"_a = rois, "true_rotation"_a = rotation, "true_translation"_a = translation,
+        "symmetry"_a = apps::SymmetryName(symmetry)));
   }
   return loaded;
 }
 
-std::vector<Camera> LoadCameras(const std::string& path) {
+std::vector<Camera> LoadCameras(const std::filesystem::path& path) {
   std::vector<Camera> cameras;
-  ThrowUnlessRead(apps::ReadCameraFile(path, &cameras));
+  ThrowUnlessRead(apps::ReadCameraFile(path.string(), &cameras));
   return cameras;
 }
 

@@ -61,7 +61,10 @@ void BindHypothesis(py::module_* module) {
           [](const H& h) { return Eigen::Map<const Vector6d>(h.focal_covariance.data()); },
           py::return_value_policy::reference_internal,
           "(6,), of focal_scale with [delta, delta_t].")
-      .def_readonly("camera", &H::camera, "The one it sees through, where that was refined.")
+      // A copy, as in AdjustedCamera: a Camera can be changed, a result cannot.
+      .def_property_readonly(
+          "camera", [](const H& h) { return h.camera; },
+          "The one it sees through, where that was refined; a copy.")
       .def_readonly("left_out", &H::left_out, "Features that contradict the rest.")
       .def_readonly("structure", &H::structure, "Which plane and reading of the evidence.")
       .def_readonly("rms_px", &H::rms_px, "Of the inlier residuals, pixels of the photo.")
@@ -99,7 +102,8 @@ void BindEstimate(py::module_* module) {
 void BindAdjusted(py::module_* module) {
   using C = AdjustedCamera;
   py::class_<C>(*module, "AdjustedCamera", "A camera as many photos tell it.")
-      .def_readonly("camera", &C::camera)
+      .def_property_readonly(
+          "camera", [](const C& c) { return c.camera; }, "A copy.")
       .def_property_readonly(
           "covariance", [](const C& c) { return Square<kCameraSize>(c.covariance); },
           py::return_value_policy::reference_internal,

@@ -1,4 +1,5 @@
-from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
+import os
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -7,6 +8,7 @@ from .observations import CircleObservation, Observations
 from .scene import SceneImage
 
 Array = NDArray[np.float64]
+Path = Union[str, os.PathLike[str]]
 
 __version__: str
 
@@ -21,7 +23,19 @@ class Camera:
     fy: float
     cx: float
     cy: float
-    def __init__(self, **kwargs: Any) -> None: ...
+    def __init__(
+        self,
+        *,
+        id: str = ...,
+        model: str = ...,
+        width: int = ...,
+        height: int = ...,
+        fx: float = ...,
+        fy: float = ...,
+        cx: float = ...,
+        cy: float = ...,
+        distortion: Sequence[float] = ...,
+    ) -> None: ...
     @property
     def distortion(self) -> List[float]: ...
     @distortion.setter
@@ -35,7 +49,15 @@ class CameraSigma:
     principal_point_px: float
     k1: float
     doubtful_log_focal: float
-    def __init__(self, **kwargs: float) -> None: ...
+    def __init__(
+        self,
+        *,
+        log_focal: float = ...,
+        log_aspect: float = ...,
+        principal_point_px: float = ...,
+        k1: float = ...,
+        doubtful_log_focal: float = ...,
+    ) -> None: ...
     @staticmethod
     def exact() -> CameraSigma: ...
 
@@ -52,7 +74,22 @@ class NoiseModel:
     length: float
     camera: CameraSigma
     spread: float
-    def __init__(self, **kwargs: Any) -> None: ...
+    def __init__(
+        self,
+        *,
+        contour_px: float = ...,
+        line_px: float = ...,
+        correlation_px: float = ...,
+        contour_offset_px: float = ...,
+        circle_tilt_rad: float = ...,
+        circle_height: float = ...,
+        line_direction_rad: float = ...,
+        pencil_axis_rad: float = ...,
+        radius: float = ...,
+        length: float = ...,
+        camera: CameraSigma = ...,
+        spread: float = ...,
+    ) -> None: ...
     @staticmethod
     def exact() -> NoiseModel: ...
 
@@ -316,8 +353,8 @@ def adjust(
     num_threads: int = ...,
     num_solver_threads: int = ...,
 ) -> AdjustedPhotos: ...
-def load_scene(path: str) -> List[SceneImage]: ...
-def load_cameras(path: str) -> List[Camera]: ...
+def load_scene(path: Path) -> List[SceneImage]: ...
+def load_cameras(path: Path) -> List[Camera]: ...
 def simulate(
     *,
     trials: int = ...,

@@ -7,6 +7,7 @@ from typing import Dict, List, Optional
 
 import numpy as np
 
+from ._circline import CameraSigma
 from .observations import Observations
 
 
@@ -20,6 +21,8 @@ class SceneImage:
     """Where it is."""
     observations: Observations
     """Camera, and what is annotated."""
+    camera_sigma: Optional[CameraSigma] = None
+    """How well the file says that the camera is known, for `estimate`; None: it does not say."""
     detect_everything: bool = False
     """No circle and no pencil is annotated."""
     rois: Dict[int, List[int]] = field(default_factory=dict)
@@ -28,3 +31,5 @@ class SceneImage:
     """cam_from_world, (3, 3)."""
     true_translation: Optional[np.ndarray] = None
     """cam_from_world, (3,)."""
+    symmetry: str = "none"
+    """What the evidence cannot tell about the true rotation: none, D2, D4 or axis."""
