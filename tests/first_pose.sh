@@ -3,7 +3,8 @@
 # those that are indented, in the folder, with a photo and a calibration made here, against the
 # installation. Without a Python path those of Python are left out.
 set -euo pipefail
-docs=$(cd "$(dirname "$0")/../docs" && pwd)
+tests=$(cd "$(dirname "$0")" && pwd)
+docs=$tests/../docs
 rm -rf "$1" && mkdir -p "$1" && cd "$1"
 export PATH="$2/bin:$PATH" CMAKE_PREFIX_PATH="$2" PYTHONPATH="${3:-}"
 [ -z "${4:-}" ] || { mkdir bin && ln -s "$4" bin/python3 && PATH="$PWD/bin:$PATH"; }
@@ -17,16 +18,7 @@ awk 'BEGIN {
     print int(60 + 140 / (1 + exp(-2 * (inside > 300 ? 300 : inside < -300 ? -300 : inside))))
   }
 }' > photo.pgm
-cat > calib.yml << 'YAML'
-%YAML:1.0
----
-image_width: 640
-image_height: 480
-camera_matrix: !!opencv-matrix
-   { rows: 3, cols: 3, dt: d, data: [600., 0., 320., 0., 600., 240., 0., 0., 1.] }
-distortion_coefficients: !!opencv-matrix
-   { rows: 1, cols: 5, dt: d, data: [0., 0., 0., 0., 0.] }
-YAML
+cp "$tests/disc_calibration.yml" calib.yml
 
 run=0
 while read -r command; do
@@ -34,7 +26,9 @@ while read -r command; do
     python3*) [ -n "${3:-}" ] || continue ;;
   esac
   echo "\$ $command"
-  eval "$command" > said.txt < /dev/null
+  # None may wait for somebody; what takes longest is a build.
+  timeout 240 bash -o pipefail -ec "$command" > said.txt < /dev/null ||
+    { status=$?; cat said.txt; echo "exit code $status (124: not done in 240 s)"; exit 1; }
   run=$((run + 1))
   # Every road ends in the two poses of a circle.
   case "$command" in

@@ -8,25 +8,15 @@ import pytest
 import scenes
 from PIL import Image
 
-EXAMPLES = os.path.join(os.path.dirname(__file__), "..", "..", "docs", "examples", "python")
-
-CALIBRATION = """%YAML:1.0
----
-image_width: 640
-image_height: 480
-camera_matrix: !!opencv-matrix
-   { rows: 3, cols: 3, dt: d, data: [600., 0., 320., 0., 600., 240., 0., 0., 1.] }
-distortion_coefficients: !!opencv-matrix
-   { rows: 1, cols: 5, dt: d, data: [0., 0., 0., 0., 0.] }
-"""
+TESTS = os.path.join(os.path.dirname(__file__), "..")
+EXAMPLES = os.path.join(TESTS, "..", "docs", "examples", "python")
 
 
 @pytest.fixture
 def inputs(tmp_path):
-    photo, calibration = tmp_path / "disc.png", tmp_path / "calib.yml"
+    photo = str(tmp_path / "disc.png")
     Image.fromarray(scenes.disc_photo()).save(photo)
-    calibration.write_text(CALIBRATION)
-    return str(photo), str(calibration)
+    return photo, os.path.join(TESTS, "disc_calibration.yml")
 
 
 def run(name, *arguments):

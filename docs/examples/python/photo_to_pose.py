@@ -7,7 +7,7 @@ from PIL import Image
 
 import circline
 
-photo = np.asarray(Image.open(sys.argv[1]))
+photo = np.asarray(Image.open(sys.argv[1]).convert("L"))
 camera = circline.load_cameras(sys.argv[2])[0]
 estimate = circline.estimate(circline.detect(photo, camera))
 for pose in estimate.hypotheses:

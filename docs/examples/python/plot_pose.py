@@ -13,7 +13,7 @@ import circline
 
 
 def main(photo_file: str, calibration: str, out: str) -> None:
-    photo = np.asarray(Image.open(photo_file))
+    photo = np.asarray(Image.open(photo_file).convert("L"))
     camera = circline.load_cameras(calibration)[0]
     observations = circline.detect(photo, camera)
     estimate = circline.estimate(observations)
