@@ -45,7 +45,10 @@ if(apps)
   circline_package(tools circline-tools science "${tools_need}" "the programs")
 endif()
 if(TARGET circline_python)
-  circline_package(python python3-circline python "${library}python3, python3-numpy"
+  # A module is of one minor version of Python.
+  math(EXPR next "${Python_VERSION_MINOR} + 1")
+  set(python "python3 (>= ${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}), python3 (<< ${Python_VERSION_MAJOR}.${next})")
+  circline_package(python python3-circline python "${library}${python}, python3-numpy"
                    "the Python package")
 endif()
 set(CPACK_COMPONENTS_ALL ${packages})

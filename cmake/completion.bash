@@ -12,5 +12,5 @@ _circline() {
     COMPREPLY=($(compgen -W "$("$1" --help 2> /dev/null | sed -nE 's/^  (--[a-z0-9_]+)( \(.*)?$/\1=/p')" -- "$word"))
   fi
 }
-complete -F _circline circline_calibrate circline_compare circline_reconstruct circline_simulate \
-  circline_studio circline_track
+# It is installed under the name of each program, by which bash finds it.
+complete -F _circline "${BASH_SOURCE[0]##*/}"

@@ -40,8 +40,11 @@ inside circline_compare --version
 inside sh -c 'zcat /usr/share/man/man1/circline_compare.1.gz | grep -q "list_solvers"'
 inside python3 -c 'import circline; print("circline", circline.__version__)'
 needed=$(inside sh -c 'ldd /usr/bin/circline_compare | grep circline')
-echo "$needed" | grep -q 'libcircline_refine.so.[0-9]* => /lib\|/usr/lib' || fail "not its own libraries: $needed"
-objdump -p "$chroot_dir/usr/bin/circline_compare" | grep -q 'RUNPATH\|RPATH' && fail "circline_compare has an RPATH"
+grep -qE 'libcircline_refine\.so\.[0-9]+ => (/usr)?/lib/' <<< "$needed" || fail "not its own libraries: $needed"
+for file in "$chroot_dir/usr/bin/circline_compare" "$chroot_dir"/usr/lib/python3/dist-packages/circline/_circline*.so; do
+  dynamic=$(objdump -p "$file")
+  ! grep -qE 'RUNPATH|RPATH' <<< "$dynamic" || fail "$file has an RPATH"
+done
 
 say "examples against the packages"
 quietly build/chroot-tools.log inside apt-get install -y --no-install-recommends g++ cmake ninja-build pkg-config

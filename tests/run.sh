@@ -8,8 +8,9 @@
 #                             build/sanitize; few trials where many serve a statistic only, and no
 #                             installed package
 #   tests/run.sh --full       the same with long draws where a statistic or a search for rare cases
-#                             takes a sample else, the Debian packages in a bare chroot (as root), and
-#                             the table of compilers; more than an hour more
+#                             takes a sample else, the Debian packages in a bare chroot (as root),
+#                             the Python package by pip, and the table of compilers; more than an
+#                             hour more
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/setup.sh
@@ -50,7 +51,7 @@ read -r failed total < <(sed -nE 's/^[0-9]+% tests passed, ([0-9]+) tests failed
 [ -n "${total:-}" ] || { cat "$log" >&2; fail "no tests were run"; }
 
 if [ "$*" = --full ]; then
-  for script in tests/packages.sh tests/compilers.sh; do
+  for script in tests/packages.sh tests/pip.sh tests/compilers.sh; do
     status=0
     "$script" || status=$?
     total=$((total + 1))

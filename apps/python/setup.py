@@ -1,7 +1,10 @@
-"""pip install --no-build-isolation ./apps/python: builds the module by CMake, libraries within.
+"""Builds the module by CMake, libraries within; in a virtual environment, as Debian's pip asks for:
 
-Needs what the C++ build needs, pybind11-dev, python3-dev and python3-numpy. CIRCLINE_BUILD_DIR names
-a folder to build in that is to be kept.
+    python3 -m venv --system-site-packages venv
+    venv/bin/pip install --no-build-isolation ./apps/python
+
+Needs what the C++ build needs, and pybind11-dev, python3-dev, python3-numpy, python3-setuptools,
+python3-wheel and python3-venv. CIRCLINE_BUILD_DIR names a folder to build in that is to be kept.
 """
 
 import os
