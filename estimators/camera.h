@@ -18,19 +18,21 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// Which lens, and so what Camera::distortion means.
 enum class CameraModel {
   kPinhole,  // No distortion.
   kOpenCV,   // Brown-Conrady, OpenCV's order: k1 k2 p1 p2 [k3 [k4 k5 k6]].
   kFisheye,  // Kannala-Brandt, OpenCV's fisheye module: k1 k2 k3 k4.
 };
 
+// Intrinsics of a camera, as a calibration gives them.
 struct Camera {
-  std::string id;
-  CameraModel model = CameraModel::kPinhole;
-  int width = 0, height = 0;           // Size of the photo, pixels; 0 = unknown.
-  double fx = 0.0, fy = 0.0;           // Focal lengths, pixels; must be positive.
-  double cx = 0.0, cy = 0.0;           // Principal point, pixels.
-  std::array<double, 8> distortion{};  // As the model orders them; unused ones are 0.
+  std::string id;                             // Photos with the same id share the camera.
+  CameraModel model = CameraModel::kPinhole;  // Says what `distortion` means.
+  int width = 0, height = 0;                  // Size of the photo, pixels; 0 = unknown.
+  double fx = 0.0, fy = 0.0;                  // Focal lengths, pixels; must be positive.
+  double cx = 0.0, cy = 0.0;                  // Principal point, pixels.
+  std::array<double, 8> distortion{};         // As the model orders them; unused ones are 0.
 
   // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
@@ -44,7 +46,9 @@ struct CalibratedPoint {
   // the (first-order) distance to the curve f = 0 in pixels of the photo, whatever the lens.
   std::array<double, 4> x_from_pixel{1.0, 0.0, 0.0, 1.0};
 
+  // (x, y, 1): the ray of the pixel, camera frame.
   Eigen::Vector3d Homogeneous() const { return {x.x(), x.y(), 1.0}; }
+  // The gradient on the photo, per pixel, of a function whose gradient is g by x.
   Eigen::Vector2d GradientPerPixel(const Eigen::Vector2d& g) const {
     return {x_from_pixel[0] * g.x() + x_from_pixel[2] * g.y(),
             x_from_pixel[1] * g.x() + x_from_pixel[3] * g.y()};

@@ -17,8 +17,8 @@ namespace CIRCLINE_EXPORT circline {
 // The conjugate pair real +- i imag. Any complex multiple is the same point; of all multiples, real
 // and imag are orthogonal and of equal length.
 struct CircularPoints {
-  Eigen::Vector3d real = Eigen::Vector3d::Zero();
-  Eigen::Vector3d imag = Eigen::Vector3d::Zero();
+  Eigen::Vector3d real = Eigen::Vector3d::Zero();  // Calibrated, homogeneous.
+  Eigen::Vector3d imag = Eigen::Vector3d::Zero();  // Likewise.
 };
 
 // ICPs of the planes with the given normal (any length, either sign): real, imag and the normal are
@@ -65,7 +65,7 @@ double HarmonicDeviation(const CircularPoints& points, const Eigen::Vector3d& x_
 // and y_line meet the vanishing line, both turned by the same angle to be orthogonal (as the paper
 // does; RotationFromOrthogonalDirections weights them). Signs as they come: see SignChoices.
 struct FrameRotation {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // World to camera.
   double deviation = 0.0;  // HarmonicDeviation of the axes: 0 for the true plane.
 };
 // Returns how many were written, the smaller deviation first: at most 2, as CirclePoses; a

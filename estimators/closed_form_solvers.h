@@ -9,12 +9,14 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// What the registered closed forms take for noise.
 struct ClosedFormOptions {
   // Standard deviation of a point where a feature states none, pixels; > 0.
   double sigma_px = 1.0;
   // Beside the noise of points. Its part of the covariance of fits that are already there is in
   // them (FitOptions::noise_model); a circle's height and k1 are left out.
   NoiseModel noise_model;
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 

@@ -10,6 +10,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// Six numbers: of a conic (ConicToVector), or [delta, delta_t] of a pose; and their covariance.
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
@@ -24,10 +25,11 @@ Eigen::Matrix3d VectorToConic(const Vector6d& v);
 // (definite) conics, hyperbolas and parabolas.
 bool NormalizeEllipse(const Eigen::Matrix3d& conic, Eigen::Matrix3d* normalized);
 
+// An ellipse by its axes, in the plane and the unit of the conic that it is of.
 struct Ellipse {
-  Eigen::Vector2d center = Eigen::Vector2d::Zero();
-  double a = 0.0, b = 0.0;  // Semi-axes, a >= b > 0.
-  double angle = 0.0;       // Of the major axis from +x towards +y, radians, in (-pi/2, pi/2].
+  Eigen::Vector2d center = Eigen::Vector2d::Zero();  // Where the axes cross.
+  double a = 0.0, b = 0.0;                           // Semi-axes, a >= b > 0.
+  double angle = 0.0;  // Of the major axis from +x towards +y, radians, in (-pi/2, pi/2].
 };
 
 // Between a conic and the parameters of an ellipse, in whatever plane (calibrated or pixels).

@@ -13,15 +13,18 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// The ellipse of a contour, and how well it is known.
 struct ConicFit {
   Eigen::Matrix3d conic = Eigen::Matrix3d::Zero();  // Calibrated, normalised (NormalizeEllipse).
   // Of ConicToVector(conic), 6x6 row-major, rank 5: the conic itself is its null vector.
   std::array<double, 36> covariance{};
   double rms_px = 0.0;  // Root of the weighted mean squared distance, pixels of the photo.
 
+  // `covariance` as a matrix.
   Eigen::Map<const Matrix6d> Covariance() const {
     return Eigen::Map<const Matrix6d>(covariance.data());
   }
+  // As if the points had sqrt(factor) times the noise.
   void ScaleCovariance(double factor) {
     for (double& entry : covariance) entry *= factor;
   }

@@ -23,20 +23,27 @@ enum class InputKind { kPoint, kLine, kConic, kNumber };
 
 // One measured input of a closed form, calibrated, with its covariance.
 struct MeasuredInput {
-  InputKind kind = InputKind::kNumber;
+  InputKind kind = InputKind::kNumber;  // Says which size `value` has.
   // 3 of a point, direction or line; 6 of a conic, in ConicToVector's order; 1 of a number, in a
   // unit of its own.
   std::vector<double> value;
   std::vector<double> covariance;  // Of `value`, square, row-major.
   int contrast = 0;                // Of a conic: CircleObservation::contrast.
 
+  // A point of the image, homogeneous.
   static MeasuredInput Point(const Eigen::Vector3d& point, const Eigen::Matrix3d& covariance);
+  // The direction of a pencil: its vanishing point.
   static MeasuredInput Direction(const VanishingPointFit& fit);
+  // A line of the image.
   static MeasuredInput Line(const LineFit& fit);
+  // The image of a circle.
   static MeasuredInput Conic(const ConicFit& fit, int contrast = 0);
+  // A radius, an angle: whatever no error of the camera moves.
   static MeasuredInput Number(double value, double sigma);
 
+  // Of a point, a direction or a line.
   Eigen::Vector3d AsVector() const { return {value[0], value[1], value[2]}; }
+  // Of a conic, 3x3.
   Eigen::Matrix3d AsConic() const;
 };
 
@@ -44,8 +51,8 @@ struct MeasuredInput {
 // from: numbers that are zero where all of them agree, as many for every pose; or none. Poses that
 // are not finite do not count.
 struct ClosedFormPose {
-  CameraPose pose;
-  std::vector<double> contradiction;
+  CameraPose pose;                    // World to camera.
+  std::vector<double> contradiction;  // In any unit: its variance is found, too.
 };
 
 // All poses of the inputs, in any order; none where they are degenerate.

@@ -24,6 +24,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// One focal length that the inputs admit.
 struct FocalSolution {
   double focal = 0.0;     // In units of g.
   double variance = 0.0;  // Of log focal, first order, from the covariances of the inputs alone.
@@ -32,6 +33,7 @@ struct FocalSolution {
   double chi2 = 0.0;  // Of the searches: what of the evidence contradicts the rest.
 };
 
+// Why there is none.
 enum class FocalRefusal {
   kNone,
   kNotFinite,
@@ -47,6 +49,7 @@ enum class FocalRefusal {
   kOutOfRange,
   kUndetermined,
 };
+// The same in words, for people.
 const char* FocalRefusalSentence(FocalRefusal why);
 
 // Two directions that make `angle` (0 to pi, radians; they have no sense, so it and its supplement

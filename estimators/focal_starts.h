@@ -12,6 +12,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// A focal length to start from.
 struct FocalStart {
   double focal_px = 0.0;   // Of fx; fy keeps its ratio to it.
   double sigma_log = 0.0;  // Standard deviation of log focal length.

@@ -11,15 +11,16 @@ namespace CIRCLINE_EXPORT circline {
 // kLanes measured points and what a pixel is worth at each: x(u) = x + J u for pixels u about it.
 template <int kLanes>
 struct PixelFrames {
-  using Lanes = Eigen::Array<double, kLanes, 1>;
-  Lanes x, y, j00, j01, j10, j11;
+  using Lanes = Eigen::Array<double, kLanes, 1>;  // One number a point.
+  Lanes x, y, j00, j01, j10, j11;                 // Calibrated x; J row by row.
 };
 
+// The points of an ellipse nearest to kLanes measured ones.
 template <int kLanes>
 struct FootPoints {
-  using Lanes = Eigen::Array<double, kLanes, 1>;
-  Lanes distance;          // Signed, pixels, negative inside.
-  Lanes x, y;              // On the ellipse.
+  using Lanes = Eigen::Array<double, kLanes, 1>;  // One number a point.
+  Lanes distance;                                 // Signed, pixels, negative inside.
+  Lanes x, y;                                     // On the ellipse.
   Lanes inverse_gradient;  // 1 / |gradient| of x^T C x there, by pixels; 0: of no meaning.
 };
 

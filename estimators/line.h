@@ -12,6 +12,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// The line through points, and how well it is known.
 struct LineFit {
   Eigen::Vector3d line = Eigen::Vector3d::Zero();  // Unit; its sign has no meaning.
   Eigen::Matrix3d covariance =

@@ -28,14 +28,17 @@ struct WorldRay {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();     // The camera centre.
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // Unit.
 };
+// The plane in which a line of the image is seen.
 struct WorldPlane {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // Unit.
   double offset = 0.0;                               // normal . X + offset = 0.
 };
+// The cone in which a conic of the image is seen.
 struct WorldCone {
   Eigen::Vector3d apex = Eigen::Vector3d::Zero();  // The camera centre.
   Eigen::Matrix3d form = Eigen::Matrix3d::Zero();  // (X - apex)^T form (X - apex) = 0.
 };
+// The ray, plane or cone of an image point (homogeneous), line or conic, calibrated.
 bool RayOfPoint(const CameraPose& pose, const Eigen::Vector3d& x, WorldRay* ray);
 bool PlaneOfLine(const CameraPose& pose, const Eigen::Vector3d& line, WorldPlane* plane);
 bool ConeOfConic(const CameraPose& pose, const Eigen::Matrix3d& conic, WorldCone* cone);
@@ -75,7 +78,7 @@ bool HeightOverPlane(const CameraPose& pose, const Eigen::Vector3d& foot,
 
 // A measurement and its standard deviation.
 struct Measurement {
-  double value = 0.0, sigma = 0.0;
+  double value = 0.0, sigma = 0.0;  // In the world's unit; radians of an angle.
 };
 // The same of pixels of the photo as taken, with a standard deviation: first-order propagation of
 // the points' noise, `sigma_px` for each coordinate, of the hypothesis' covariance, taken as

@@ -37,6 +37,7 @@ struct CameraSigma {
   // cameras write into their photos is taken to be; 0: it is none.
   double doubtful_log_focal = 0.0;
 
+  // A camera that is known exactly: all zero.
   static CameraSigma Exact() { return {0.0, 0.0, 0.0, 0.0, 0.0}; }
   // The wider of the two of log f: how far the focal length is to be looked for.
   double LargestLogFocal() const { return std::max(log_focal, doubtful_log_focal); }
@@ -45,6 +46,7 @@ struct CameraSigma {
   bool IsEstimated() const { return LargestLogFocal() >= 0.01; }
   // So badly that right angles may look wrong: the focal length is searched for.
   bool IsWide() const { return LargestLogFocal() >= 0.1; }
+  // Ok, or a sentence that names the field that is negative or not finite.
   Status Validate() const;
 };
 
@@ -69,7 +71,7 @@ struct NoiseModel {
   // A known radius or length that states no sigma of its own, relative.
   double radius = 0.001;
   double length = 0.001;
-  CameraSigma camera;
+  CameraSigma camera;  // The camera, where nothing else is said of it.
   // Standard deviation, from photo to photo, of the logarithm of the figures of contours, and of
   // those of lines (shared error, tilt, height, deviation): some worlds are more exact than others,
   // and where a photo has many features they tell. 0: the figures are believed as they are.

@@ -25,13 +25,13 @@ using Segment = std::array<Eigen::Vector2d, 2>;
 
 // A conic and the points that speak for it.
 struct ConicReading {
-  ConicFit fit;
+  ConicFit fit;                       // Calibrated.
   std::vector<std::uint8_t> inliers;  // One per point of the contour, 1 = inlier.
 };
 
 // Image of one circle. All pixels are pixels of the photo as taken.
 struct CircleObservation {
-  std::string id;
+  std::string id;                       // Unique among the circles.
   std::vector<Eigen::Vector2d> points;  // Contour, pixels, any order; 5 or more.
   // Of the edge at each point: unit gradient across the contour, on the photo, its sense without
   // meaning, zero where not known; or empty. A robust fit is faster and surer with them.
@@ -70,19 +70,20 @@ struct LineObservation {
   double sigma_px = 0.0;  // Of each point's coordinates; 0 = that of the pencil.
 };
 
-enum class PencilDirection { kX, kY, kZ, kFree };            // Along a world axis, or unknown.
+// Along a world axis, or unknown.
+enum class PencilDirection { kX, kY, kZ, kFree };
 const char* PencilDirectionName(PencilDirection direction);  // "x", "y", "z", "free".
 
 // Images of lines that are parallel in space.
 struct PencilObservation {
-  std::string id;
-  std::vector<LineObservation> lines;
-  PencilDirection direction = PencilDirection::kFree;
+  std::string id;                                      // Unique among the pencils.
+  std::vector<LineObservation> lines;                  // Two or more say a direction.
+  PencilDirection direction = PencilDirection::kFree;  // Of the world, without sense.
   std::string plane;  // The plane in which the lines lie; empty = none in particular.
   // Of each point's coordinates, where its line says nothing else; 0 = not known.
   double sigma_px = 0.0;
 
-  std::optional<VanishingPointFit> fit;
+  std::optional<VanishingPointFit> fit;  // Added by a fit; camera frame.
 };
 
 // Where the user wants the world frame. All optional; where nothing is said, the plane is the first
@@ -104,22 +105,23 @@ struct KnownAngle {
 
 // The distance between two points of a plane.
 struct KnownLength {
-  Segment points;     // Pixels.
-  std::string plane;  // Empty = the frame's plane; of another plane it is not used.
-  double value = 0.0;
+  Segment points;      // Pixels.
+  std::string plane;   // Empty = the frame's plane; of another plane it is not used.
+  double value = 0.0;  // In the world's unit.
   double sigma = 0.0;  // Of value, relative; 0 = that of the noise model.
 };
 
+// All evidence of one photo.
 struct Observations {
-  Camera camera;
+  Camera camera;  // The one that took the photo.
   // The focal length that is known beforehand, of fx, pixels, where `camera` has another, at which
   // the photo's structure is likelier (DetectObservations); 0 = that of `camera`.
   double stated_focal_px = 0.0;
-  std::vector<CircleObservation> circles;
-  std::vector<PencilObservation> pencils;
-  FrameObservation frame;
-  std::vector<KnownAngle> known_angles;
-  std::vector<KnownLength> known_lengths;
+  std::vector<CircleObservation> circles;  // Images of circles.
+  std::vector<PencilObservation> pencils;  // Images of parallel lines.
+  FrameObservation frame;                  // Where the world frame is to lie.
+  std::vector<KnownAngle> known_angles;    // Between pencils.
+  std::vector<KnownLength> known_lengths;  // On planes.
   int num_dropped_points = 0;  // Pixels that the camera model cannot undistort, counted by fits.
   std::string message;  // What a detection wants to say ("one pencil only: ..."); may be empty.
 

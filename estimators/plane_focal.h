@@ -13,6 +13,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// What of one plane is seen.
 struct PlaneEvidence {
   std::vector<const ConicFit*> circles;  // One or more, the best-measured first.
   // One for each circle, in any one unit, as 1 and 1 for circles of one size; empty: not known.

@@ -17,32 +17,33 @@ namespace CIRCLINE_EXPORT circline {
 
 // X_cam = rotation * X_world + translation.
 struct CameraPose {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::UnitZ();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // World to camera.
+  Eigen::Vector3d translation = Eigen::Vector3d::UnitZ();  // The world origin in the camera frame.
 };
 
 // A circle as a hypothesis places it, camera frame, in the unit of its pose's translation.
 struct CircleEstimate {
-  std::string id;
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // Unit; faces the camera.
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  std::string id;                                       // CircleObservation::id.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();     // Unit; faces the camera.
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();     // Camera frame.
   Eigen::Vector2d center_px = Eigen::Vector2d::Zero();  // Its image (NOT the ellipse's centre);
                                                         // zero where the camera cannot see it.
-  double radius = 0.0;
+  double radius = 0.0;                                  // In the same unit as the centre.
 };
 
 // A pencil as a hypothesis sees it.
 struct PencilEstimate {
-  std::string id;
+  std::string id;                                       // PencilObservation::id.
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // Unit, camera frame, without sense.
   double sigma_deg = 0.0;  // Standard deviation, the larger of the two components; degrees.
 };
 
+// One pose that the evidence admits, with its uncertainty.
 struct PoseHypothesis {
-  CameraPose cam_from_world;
-  bool metric = false;       // Else the translation has unit norm.
-  double probability = 1.0;  // Posterior among the hypotheses of the estimate; they sum to 1.
-  double cost = 0.0;         // 1/2 sum rho(r^2), residuals in standard deviations.
+  CameraPose cam_from_world;  // The pose itself.
+  bool metric = false;        // Else the translation has unit norm.
+  double probability = 1.0;   // Posterior among the hypotheses of the estimate; they sum to 1.
+  double cost = 0.0;          // 1/2 sum rho(r^2), residuals in standard deviations.
   double log_det = 0.0;  // Log determinant of the covariance of all parameters (Laplace's term).
   // Of [delta, delta_t], 6x6 row-major; rotation = exp([delta]x) * estimate, delta in the camera
   // frame, radians. Directions listed in `free_directions` are left out (they carry no variance
@@ -65,9 +66,10 @@ struct PoseHypothesis {
   int num_inliers = 0, num_observations = 0;  // Scalar residuals.
   bool origin_observed =
       false;  // Whether evidence fixes the world origin (else it is a convention).
-  std::vector<CircleEstimate> circles;
-  std::vector<PencilEstimate> pencils;
+  std::vector<CircleEstimate> circles;  // Those that take part.
+  std::vector<PencilEstimate> pencils;  // Likewise.
 
+  // `covariance` as a matrix.
   Eigen::Map<const Matrix6d> Covariance() const {
     return Eigen::Map<const Matrix6d>(covariance.data());
   }
@@ -77,6 +79,7 @@ struct PoseHypothesis {
   Eigen::Vector3d SigmaRotation() const;
 };
 
+// What a solver or EstimatePose returns.
 struct PoseEstimate {
   Status status;       // Not ok: `hypotheses` is empty and the message says what was missing.
   std::string solver;  // Who made it.
@@ -100,6 +103,7 @@ Eigen::Matrix3d ExpRotation(const Eigen::Vector3d& delta);
 Eigen::Vector3d LogRotation(const Eigen::Matrix3d& rotation);
 double RotationAngle(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b);
 
+// [v]x: the matrix of the cross product, [v]x w = v x w.
 Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v);
 
 }  // namespace circline

@@ -27,6 +27,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// In which coordinates a library states small changes xi of a pose.
 struct PoseTangent {
   bool world_from_cam = false;  // The pose that is kept: T^-1, else T.
   bool right = false;           // estimate * exp(xi), else exp(xi) * estimate.

@@ -12,8 +12,10 @@ namespace CIRCLINE_EXPORT circline {
 // SplitMix64 (Steele, Lea, Flood 2014): 8 bytes of state, passes BigCrush, 1 ns a draw.
 class Random {
  public:
+  // Any seed will do, 0 too.
   explicit Random(std::uint64_t seed) : state_(seed) {}
 
+  // All 64 bits at random.
   std::uint64_t Next() {
     std::uint64_t z = (state_ += 0x9E3779B97F4A7C15ULL);
     z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
@@ -26,6 +28,7 @@ class Random {
   }
   // In [0, 1).
   double Uniform() { return static_cast<double>(Next() >> 11) * 0x1.0p-53; }
+  // In [low, high), to rounding.
   double Uniform(double low, double high) { return low + (high - low) * Uniform(); }
   // Standard normal (Box-Muller, one of the two values).
   double Normal() {

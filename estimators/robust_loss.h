@@ -13,11 +13,14 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// Which rho; kTrivial is least squares.
 enum class LossType { kTrivial, kHuber, kSoftLOne, kCauchy, kArctan, kTukey, kGemanMcClure };
 
 // "trivial", "huber", "soft_l_one", "cauchy", "arctan", "tukey", "geman_mcclure".
 const char* LossName(LossType type);
+// False, with `type` untouched, where no loss has this name.
 bool LossFromName(const std::string& name, LossType* type);
+// All of them, in the order of LossType.
 std::vector<std::string> LossNames();
 
 // The constant c at which the loss, on unit Gaussian noise, keeps 95 % of the efficiency of least
@@ -70,7 +73,7 @@ inline double LossRho(LossType type, double s) {
 
 // rho'(s) and rho''(s).
 struct LossSlopes {
-  double first, second;
+  double first, second;  // By s.
 };
 inline LossSlopes LossSlopesAt(LossType type, double s) {
   const double c = LossTuningConstant(type);
@@ -110,8 +113,9 @@ inline LossSlopes LossSlopesAt(LossType type, double s) {
 
 // rho(s) and its derivative.
 struct LossValue {
-  double rho, rho_prime;
+  double rho, rho_prime;  // At s; rho_prime by s.
 };
+// Both, at s.
 inline LossValue EvaluateLoss(LossType type, double s) {
   return {LossRho(type, s), LossSlopesAt(type, s).first};
 }

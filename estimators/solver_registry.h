@@ -13,6 +13,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// A formula as it is, or refined on its own evidence.
 enum class SolverStage { kClosedForm, kRefined };
 const char* SolverStageName(SolverStage stage);  // "closed_form", "refined".
 
@@ -21,8 +22,8 @@ class Solver {
  public:
   virtual ~Solver() = default;
   virtual const std::string& name() const = 0;  // "circle_center", ...
-  virtual SolverStage stage() const = 0;
-  virtual std::string needs() const = 0;  // In words: "a circle and the image of its centre".
+  virtual SolverStage stage() const = 0;        // Of the name there may be one of each.
+  virtual std::string needs() const = 0;        // In words: "a circle and the image of its centre".
   // All hypotheses, best first, or a status that says what was missing or degenerate.
   virtual PoseEstimate Solve(const Observations& observations) const = 0;
   // Where a refinement may start: poses of the plane of `resolved` (fitted, and ResolveWorld'ed),
@@ -37,12 +38,14 @@ class Solver {
   virtual Observations Evidence(const Observations& observations) const = 0;
 };
 
+// Solvers by name and stage; a value, not a global.
 class SolverRegistry {
  public:
   // Replaces a solver of the same name and stage.
   void Add(std::shared_ptr<const Solver> solver);
   // Null if there is none.
   const Solver* Find(const std::string& name, SolverStage stage) const;
+  // All, in the order in which they were added.
   const std::vector<std::shared_ptr<const Solver>>& solvers() const { return solvers_; }
 
  private:

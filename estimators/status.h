@@ -9,6 +9,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// What came of a call.
 enum class StatusCode {
   kOk,
   kRefused,  // The evidence does not determine the answer: something is missing or degenerate.
@@ -20,13 +21,16 @@ enum class StatusCode {
 // "ok", "refused", "failed", "invalid".
 const char* StatusCodeName(StatusCode code);
 
+// A code and its reason in words.
 struct Status {
-  StatusCode code = StatusCode::kOk;
+  StatusCode code = StatusCode::kOk;  // For programs.
   std::string
       message;  // One sentence that names the thing (which circle, which field); empty if ok.
 
+  // Whether there is an answer.
   bool ok() const { return code == StatusCode::kOk; }
 
+  // A status of each kind, with its sentence.
   static Status Ok() { return {}; }
   static Status Refused(std::string message) { return {StatusCode::kRefused, std::move(message)}; }
   static Status Failed(std::string message) { return {StatusCode::kFailed, std::move(message)}; }

@@ -12,6 +12,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// The direction of a pencil, and how well it is known.
 struct VanishingPointFit {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();   // Unit, camera frame, without sense.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Of `direction`, rank 2, rad^2.
