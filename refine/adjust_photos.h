@@ -30,8 +30,10 @@ namespace CIRCLINE_EXPORT circline {
 // every photo has a world of its own, and only the camera is common.
 enum class RigidWorld { kAuto, kYes, kNo };
 const char* RigidWorldName(RigidWorld rigid);  // "auto", "yes", "no".
+// False, with `rigid` untouched, where there is no such name.
 bool RigidWorldFromName(const std::string& name, RigidWorld* rigid);
 
+// How AdjustPhotos weighs, and what it estimates.
 struct AdjustOptions {
   LossOptions conic_loss, line_loss;  // As in EstimationOptions.
   NoiseModel noise_model;             // Its camera is not used here: see camera_sigma.
@@ -45,6 +47,7 @@ struct AdjustOptions {
   // Standard deviation of p1 and p2 about those of the camera, kOpenCV with radial ones only; 0 =
   // held.
   double tangential_sigma = 0.0005;
+  // kAuto: the evidence decides, and `rigid` of the answer says how.
   RigidWorld rigid = RigidWorld::kAuto;
   // Photos of a video that show nearly the same share their errors, and their number makes the
   // camera no better known: of those whose features lie within so much of one another, of the
@@ -67,6 +70,7 @@ struct AdjustOptions {
   // found, then "poses" and of how many photos.
   std::function<void(const char* what, int done, int total)> progress;
 
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 
@@ -78,6 +82,7 @@ CameraSigma UnknownCamera(const Camera& camera);
 // distortion coefficients, "k1" first.
 const char* ShiftName(CameraModel model, int shift);
 
+// A camera as many photos tell it.
 struct AdjustedCamera {
   Camera camera;  // Estimated.
   // Of the shifts of camera_shifts.h (log f, log aspect, principal point, distortion), 12 x 12
@@ -85,69 +90,76 @@ struct AdjustedCamera {
   std::array<double, kCameraSize * kCameraSize> covariance{};
   // Of focal length, principal point and radial distortion: what the photos say next to nothing of.
   std::vector<std::string> at_prior;
-  int num_photos = 0;
+  int num_photos = 0;   // That it took, and that take part.
   double rms_px = 0.0;  // Of the inlier residuals, pixels.
   // The standard deviation of log f (Sigma(0)) that the first photos alone would give, at the same
   // estimate: how many, and that; 1, 2, 4, ... 64 of those that take part, and all.
   std::vector<std::pair<int, double>> sigma_by_photos;
 
+  // Standard deviation of a shift, 0 to kCameraSize - 1.
   double Sigma(int shift) const;
+  // Of fx, pixels.
   double SigmaFocalPx() const { return camera.fx * Sigma(0); }
 };
 
 // An inlier of a contour or a line, and how far it lies from where it should.
 struct AdjustedResidual {
+  // Pixels of the photo.
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero(), offset = Eigen::Vector2d::Zero();
 };
 
+// One photo of them: its pose, and how well it fits.
 struct AdjustedPhoto {
-  Status status;     // Not ok: it has no part in the rest, and this says why.
-  int same_as = -1;  // The photo that shows nearly the same, where that is why; else -1.
-  int camera = 0;
+  Status status;              // Not ok: it has no part in the rest, and this says why.
+  int same_as = -1;           // The photo that shows nearly the same, where that is why; else -1.
+  int camera = 0;             // Index in AdjustedPhotos::cameras.
   CameraPose cam_from_world;  // Of its world; its unit is that of the world's.
   // Of [delta, delta_t], 6x6 row-major, as in PoseHypothesis; the cameras' uncertainty is in it. Of
   // its world the first photo is held where nothing else ties it: its translation, or the length
   // of that, and its turn about the plane's normal. What nothing speaks of in any photo (the
   // translation where lines alone are seen) has no variance either.
   std::array<double, 36> covariance{};
-  double rms_px = 0.0;                // Of the inlier residuals, pixels.
-  double misfit = 0.0;                // Median chi^2 of its features by residual; 1 or less.
-  std::vector<std::string> left_out;  // Features, as PoseHypothesis::left_out.
-  std::vector<AdjustedResidual> residuals;
+  double rms_px = 0.0;                      // Of the inlier residuals, pixels.
+  double misfit = 0.0;                      // Median chi^2 of its features by residual; 1 or less.
+  std::vector<std::string> left_out;        // Features, as PoseHypothesis::left_out.
+  std::vector<AdjustedResidual> residuals;  // Of the points that count.
 };
 
 // A circle of a world.
 struct AdjustedCircle {
-  std::string id;
+  std::string id;  // CircleObservation::id; that of one photo, where they differ.
   int photo = -1;  // Of which world: -1 the one of all photos, else that photo's.
+  // World frame; the normal is a unit vector.
   Eigen::Vector3d center = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
-  double radius = 0.0;
+  double radius = 0.0;  // In the world's unit.
 };
 
 // A pencil's direction in a world, without sense.
 struct AdjustedDirection {
-  std::string id;
-  int photo = -1;  // As AdjustedCircle::photo.
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();
+  std::string id;                                        // PencilObservation::id.
+  int photo = -1;                                        // As AdjustedCircle::photo.
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  // Unit, world frame.
 };
 
 // Where the world lies in the frame of given poses: X_given = scale * rotation * X + translation.
 struct GivenFrame {
   double scale = 1.0;  // Their units for one of the world's: for a metre, where that is metric.
+  // From the world's frame to the given one.
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  double log_scale_sigma = 0.0;  // Meaningful where the world is metric.
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  // In the unit of the given poses.
+  double log_scale_sigma = 0.0;                           // Meaningful where the world is metric.
 };
 
+// What AdjustPhotos returns.
 struct AdjustedPhotos {
-  Status status;
+  Status status;                        // Not ok: no camera, and why.
   std::vector<AdjustedCamera> cameras;  // In the order in which photos name them (Camera::id).
   std::vector<AdjustedPhoto> photos;    // One for each of the input.
-  std::vector<AdjustedCircle> circles;
-  std::vector<AdjustedDirection> directions;
-  std::optional<GivenFrame> given;  // Where poses were given.
-  bool rigid = false, metric = false;
-  std::vector<std::string> notes;
+  std::vector<AdjustedCircle> circles;  // Of all worlds.
+  std::vector<AdjustedDirection> directions;  // Of all worlds.
+  std::optional<GivenFrame> given;            // Where poses were given.
+  bool rigid = false, metric = false;  // Whether there is one world; whether its unit is known.
+  std::vector<std::string> notes;      // What was left out or decided, and why, in words.
 };
 
 // Circles of the world's plane, their centres and radii, and pencils take part; known lengths and

@@ -18,6 +18,7 @@ Camera ShiftedCamera(const Camera& camera, const double* shifts);
 // for the rational ones of kOpenCV (k4 to k6), for which it holds at 0.
 class LensSlope {
  public:
+  // Of coefficient k of this camera's model, 0 the first.
   LensSlope(const Camera& camera, int k);
   // d pixel / d coefficient of a point at calibrated x, and of d pixel / d x (may be null).
   Eigen::Vector2d At(const Camera& camera, const Eigen::Vector2d& x,

@@ -43,12 +43,14 @@ namespace CIRCLINE_EXPORT circline {
 // inliers alone, for covariances.
 class FeatureCost : public ceres::CostFunction {
  public:
+  // As ceres calls it.
   bool Evaluate(const double* const* parameters, double* residuals,
                 double** jacobians) const final {
     return EvaluateWith(weighing_, parameters, residuals, jacobians);
   }
   // How Evaluate weighs: by the losses as they are, unless a graduated refinement stretches them.
   void set_weighing(const Weighing& weighing) { weighing_ = weighing; }
+  // The same, weighed otherwise.
   virtual bool EvaluateWith(const Weighing& weighing, const double* const* parameters,
                             double* residuals, double** jacobians) const = 0;
 
@@ -69,9 +71,11 @@ class FeatureCost : public ceres::CostFunction {
 // [camera].
 class CircleContourCost : public FeatureCost {
  public:
+  // Which of the blocks in brackets there are.
   struct Blocks {
-    bool offset = false, camera = false;
+    bool offset = false, camera = false;  // The contour's offset; the camera's shifts.
   };
+  // Of the points of its contour.
   CircleContourCost(ImagePoints points, Blocks blocks);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
@@ -88,10 +92,12 @@ class CircleContourCost : public FeatureCost {
 // X and Y of its normal, radians) and a height (in radii), which have a Gaussian prior here.
 class PlaneCircleContourCost : public FeatureCost {
  public:
+  // Which of the blocks in brackets there are, and the prior of tilt and height.
   struct Blocks {
-    bool tilt_and_height = false, offset = false, camera = false;
+    bool tilt_and_height = false, offset = false, camera = false;  // In this order.
     double tilt_sigma = 0.0, height_sigma = 0.0;  // Radians, radii; 0: held at its value.
   };
+  // Of the points of its contour.
   PlaneCircleContourCost(ImagePoints points, Blocks blocks);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
@@ -110,12 +116,14 @@ class PlaneCircleContourCost : public FeatureCost {
 // has a prior here of that standard deviation; most lines are more exact.
 class DirectionLineCost : public FeatureCost {
  public:
+  // What else is unknown of the line.
   struct Options {
     double direction_sigma = 0.0;  // Of a line's own direction, radians; 0 = exact.
-    bool camera = false;
+    bool camera = false;           // Whether there is a block of the camera.
   };
   // `fit`: any line near, calibrated coordinates of the camera of the points (FitLine).
   DirectionLineCost(ImagePoints points, const Eigen::Vector3d& fit, Options options);
+  // As FeatureCost says.
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
   const ImagePoints* points() const override { return &points_; }
@@ -139,6 +147,7 @@ class DirectionLineCost : public FeatureCost {
 // angle held; a diameter shares the circle's centre.
 class PlaneLineCost : public FeatureCost {
  public:
+  // Of the points along it.
   explicit PlaneLineCost(ImagePoints points, bool camera = false);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
@@ -158,6 +167,7 @@ class PlaneLineCost : public FeatureCost {
 // are below a right angle, radians, half of it at either edge; cartons lean (NewGaussianPrior).
 class BoxEdgeCost : public FeatureCost {
  public:
+  // Of the points along it.
   BoxEdgeCost(ImagePoints points, int axis, const std::array<bool, 3>& far, bool camera = false);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
@@ -177,12 +187,13 @@ class BoxEdgeCost : public FeatureCost {
 // the reprojection error, its length under the loss.
 class PlanePointCost : public FeatureCost {
  public:
+  // Seen at `pixel`, of which each coordinate has this standard deviation.
   PlanePointCost(const Camera& camera, const Eigen::Vector2d& pixel, double sigma_px, LossType loss,
                  bool camera_block = false);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
 
-  double sigma_px() const { return sigma_px_; }
+  double sigma_px() const { return sigma_px_; }  // Of each coordinate, pixels.
   // How far its image misses the measurement, pixels; infinity where it has none.
   double MissPx(const double* const* parameters) const;
 

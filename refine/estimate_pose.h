@@ -20,7 +20,7 @@ namespace CIRCLINE_EXPORT circline {
 // How one kind of residual is weighed. Points that a robust fit has marked as outliers take no
 // part.
 struct LossOptions {
-  LossType type = LossType::kCauchy;
+  LossType type = LossType::kCauchy;  // kTrivial: least squares.
   // Standard deviation of a point, pixels of the photo, for features that state no sigma_px of
   // their own. The loss multiplies it by its own tuning constant. 0 = "auto": each feature's from
   // the scatter of its points (MeasurePointNoise).
@@ -28,12 +28,13 @@ struct LossOptions {
 };
 
 const char* ConicDistanceName(ConicDistanceType type);  // "auto", "sampson", "orthogonal".
+// False, with `type` untouched, where there is no such name.
 bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type);
 
 // A pose that is known from elsewhere (odometry, the filter's prediction), in the same world frame:
 // evidence like any other, in the estimate, in its covariance and in the ranking.
 struct PosePrior {
-  CameraPose mean;
+  CameraPose mean;  // cam_from_world.
   // Of [delta, delta_t], 6x6 row-major, as PoseHypothesis::covariance; positive definite. Where the
   // scale or the origin of the world are not observed, t has no part in it.
   std::array<double, 36> covariance{};
@@ -46,10 +47,11 @@ struct GravityPrior {
   double sigma_rad = 0.01;                               // Of each of two components; > 0.
 };
 
+// How EstimatePose weighs, and what is known beside the photo.
 struct EstimationOptions {
-  LossOptions conic_loss;  // Contour points of circles.
-  LossOptions line_loss;   // Points of lines.
-  ConicDistanceType conic_distance = ConicDistanceType::kAuto;
+  LossOptions conic_loss;                                       // Contour points of circles.
+  LossOptions line_loss;                                        // Points of lines.
+  ConicDistanceType conic_distance = ConicDistanceType::kAuto;  // Of contour points.
   // What is not exact beside the points; NoiseModel::Exact() for simulated evidence.
   NoiseModel noise_model;
   // How well the camera is known; none = noise_model.camera. Where log_focal is 0.01 or more the
@@ -58,8 +60,8 @@ struct EstimationOptions {
   // prior is about Observations::stated_focal_px. Where the posterior has several humps in it each
   // is a hypothesis.
   std::optional<CameraSigma> camera_sigma;
-  std::optional<PosePrior> pose_prior;
-  std::optional<GravityPrior> gravity_prior;
+  std::optional<PosePrior> pose_prior;        // The pose, known from elsewhere.
+  std::optional<GravityPrior> gravity_prior;  // A direction, known from elsewhere.
   // A pose near the one to find, in the same world frame: that of the frame before. A start and no
   // evidence: where four fifths of the points are inliers under it, circles propose their planes
   // besides, and the other closed forms are not asked. The unit of its translation does not matter.
@@ -69,6 +71,7 @@ struct EstimationOptions {
   // of cost (1/2 chi^2); their probability is below exp(-max_cost_gap).
   double max_cost_gap = 30.0;
 
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 

@@ -31,32 +31,35 @@ enum class ConicDistanceType { kAuto, kSampson, kOrthogonal };
 // (graduated refinement lowers it to 1); or, for covariances, inliers only, without loss, all times
 // `scale`.
 struct Weighing {
-  bool inliers_only = false;
+  bool inliers_only = false;    // Without loss, for covariances.
   double gate = kInlierSigmas;  // Standard deviations.
-  double scale = 1.0;
-  double stretch = 1.0;
+  double scale = 1.0;           // Of residuals, with inliers_only.
+  double stretch = 1.0;         // Of the tuning constant; 1 or more.
 };
 
 // A sum of robust costs about the present place in the local variables of a curve: `twice_cost` =
 // sum rho, g its gradient (of the half), h the Hessian, never indefinite: the losses' curvature is
 // exact or bounded from below, that of the curve is left out.
 struct CurveModel {
-  static constexpr int kMaxSize = 6 + 1 + kCameraSize;
+  static constexpr int kMaxSize = 6 + 1 + kCameraSize;  // Of a conic, its offset, a camera.
+  // They do not allocate.
   using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxSize, 1>;
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxSize, kMaxSize>;
 
-  double twice_cost = 0.0;
-  Vector g;
-  Matrix h;
+  double twice_cost = 0.0;  // Sum rho.
+  Vector g;                 // Gradient of half of it.
+  Matrix h;                 // Its Hessian.
 };
 
+// The points of a feature, as its cost function holds them.
 class ImagePoints {
  public:
+  // How they are weighed.
   struct Options {
-    double sigma_px = 1.0;  // Standard deviation of each coordinate, pixels; > 0.
-    double weight = 1.0;    // What all points together count (NoiseModel::Weight).
-    LossType loss = LossType::kTrivial;
-    ConicDistanceType distance = ConicDistanceType::kAuto;
+    double sigma_px = 1.0;               // Standard deviation of each coordinate, pixels; > 0.
+    double weight = 1.0;                 // What all points together count (NoiseModel::Weight).
+    LossType loss = LossType::kTrivial;  // Of each point.
+    ConicDistanceType distance = ConicDistanceType::kAuto;  // Of contours.
     int num_distortion = 1;  // Distortion coefficients with derivatives; the others are constant.
   };
 
@@ -65,22 +68,24 @@ class ImagePoints {
   ImagePoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
               const std::vector<std::uint8_t>& inliers, const Options& options);
 
-  std::size_t size() const { return points_.size(); }
-  const std::vector<CalibratedPoint>& points() const { return points_; }
+  std::size_t size() const { return points_.size(); }  // Of those that were not left out.
+  const std::vector<CalibratedPoint>& points() const { return points_; }  // Undistorted.
   const std::vector<Eigen::Vector2d>& pixels() const { return pixels_; }  // Of the same points.
-  const Options& options() const { return options_; }
-  void set_weight(double weight) { options_.weight = weight; }
+  const Options& options() const { return options_; }  // As given; no distortion of a pinhole.
+  void set_weight(double weight) { options_.weight = weight; }  // Options::weight.
   // Of the kCameraSize shifts these come first and have derivatives; those of the others are zero.
   int num_camera() const { return 4 + options_.num_distortion; }
+
+  // Which unknowns have derivatives, beside the curve.
+  struct Variables {
+    bool offset = false, camera = false;  // Contour offset; camera shifts.
+  };
 
   // Sum over the points' distances from `conic` (3x3, negative inside an ellipse; its scale has no
   // meaning), moved outwards by `offset_px`. `camera`: kCameraSize shifts, or null for none. Local
   // variables: ConicToVector of Normalized(conic) (6), the offset (1; with offset_variable), the
   // camera's first num_camera() shifts (with camera). `model` may be null. Returns sum rho; not
   // finite where a residual is not.
-  struct Variables {
-    bool offset = false, camera = false;
-  };
   double SumConic(const Eigen::Matrix3d& conic, double offset_px, const double* camera,
                   const Weighing& weighing, const Variables& variables, CurveModel* model) const;
 

@@ -58,6 +58,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// How a PoseTracker weighs, and what it expects of the motion.
 struct TrackerOptions {
   // Losses, noise model and camera, as for a single photo. Its pose_prior, gravity_prior and prior
   // count in first frames only; max_iterations too.
@@ -84,6 +85,7 @@ struct TrackerOptions {
   // Evaluations of the evidence (with derivatives) from one start; a hypothesis has two at most.
   int max_evaluations = 20;
 
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 
@@ -91,8 +93,9 @@ struct TrackerOptions {
 // frames; from odometry or an IMU. The covariance is of [delta, delta_t], 6x6 row-major as
 // PoseHypothesis::covariance; positive definite.
 struct RelativePose {
+  // None by default.
   CameraPose now_from_before = {Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()};
-  std::array<double, 36> covariance{};
+  std::array<double, 36> covariance{};  // Of it; must be given.
   // Whether the translation is in the unit of the tracked poses (that of a metric map). Otherwise
   // it is not used, and the shift follows the constant velocity.
   bool has_translation = true;
@@ -104,25 +107,30 @@ struct MotionPrior {
   std::optional<PosePrior> absolute;     // In the tracker's world frame.
   std::optional<GravityPrior> gravity;   // in_world: in the tracker's world frame.
 
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 
+// What Update returns.
 struct TrackedPose {
   // As EstimatePose's, but for the unit of translations (see above). Covariances and probabilities
   // are those of all frames so far. `status` not ok: no hypotheses, and why; ok with a message: the
   // frame has no part in the pose, and why.
   PoseEstimate estimate;
-  double timestamp_s = 0.0;
+  double timestamp_s = 0.0;     // As given to Update, seconds.
   bool reinitialized = false;   // The track starts with this frame, with a world frame of its own.
   bool relocalized = false;     // Lost before this frame, and found again in the same world.
   bool predicted_only = false;  // Moved on from earlier frames; this one has no part in it.
   int frames_since_start = 0;   // 0 for the one with which the track starts.
 };
 
+// Carries poses from frame to frame, as the top of this file says.
 class PoseTracker {
  public:
+  // Nothing is tracked yet.
   explicit PoseTracker(const TrackerOptions& options = {});
   ~PoseTracker();
+  // Moves; what was moved from may only be assigned to or destroyed.
   PoseTracker(PoseTracker&&) noexcept;
   PoseTracker& operator=(PoseTracker&&) noexcept;
 
