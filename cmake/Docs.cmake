@@ -1,5 +1,5 @@
 # The documentation's site: guides and the reference of all public headers, by Doxygen, where it is
-# there; nothing is downloaded. Warnings are errors.
+# there; nothing is downloaded. Warnings are errors, and what is public needs a comment.
 find_program(CIRCLINE_DOXYGEN doxygen)
 mark_as_advanced(CIRCLINE_DOXYGEN)
 if(CIRCLINE_DOXYGEN)

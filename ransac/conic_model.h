@@ -28,6 +28,7 @@ struct ConicLimits {
   // What the best straight line may explain of the ellipse's inliers, relative to the ellipse; > 0.
   double max_line_share = 0.75;
 
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 
@@ -38,6 +39,7 @@ struct EdgeDirections {
   std::vector<Eigen::Vector2d> normals;
   double sigma_rad = 0.1;  // Standard deviation of a normal's angle, radians; in (0, 0.5].
 
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate(std::size_t num_points) const;
 };
 
@@ -50,13 +52,13 @@ class ConicModel {
  public:
   // a x^2 + 2 b x y + c y^2 + 2 d x + 2 e y + f, unit norm, an ellipse that is negative inside.
   using Value = std::array<double, 6>;
-  static constexpr int kMinSamples = 5;
+  static constexpr int kMinSamples = 5;  // Points of a conic.
 
   // `directions` (optional), one for each point, are read here only; `threshold` as the engine's.
   ConicModel(const std::vector<CalibratedPoint>& points, const ConicLimits& limits,
              const EdgeDirections* directions = nullptr, double threshold = kInlierSigmas);
 
-  int NumData() const { return static_cast<int>(index_.size()); }
+  int NumData() const { return static_cast<int>(index_.size()); }  // All points.
   // Index into the constructor's points of the datum at position i.
   int PointIndex(int i) const { return index_[static_cast<std::size_t>(i)]; }
   // The ellipse in calibrated coordinates, any scale.
@@ -64,9 +66,11 @@ class ConicModel {
   // The reverse; false, where it is not a real ellipse within the limits.
   bool FromConic(const Eigen::Matrix3d& conic, Value* value) const;
 
+  // As the engine asks for it (ransac.h).
   bool Fit(const int* sample, Value* value) const;
   // 0.6 ns a point, 0.9 with directions.
   void SquaredResiduals(const Value& value, int begin, int end, float* r2) const;
+  // As the engine asks for it (ransac.h).
   bool Refine(const float* weights, Value* value) const;
   // Whether the points within the threshold spread over limits.min_arc_deg and are no straight
   // edge.
@@ -82,6 +86,7 @@ class ConicModel {
   const Eigen::Vector2d& Position(int i) const { return x_[static_cast<std::size_t>(i)]; }
   // Standard deviation of the directions, radians; 0 where none are given.
   double sigma_rad() const { return sigma_rad_; }
+  // Whether the direction at datum i is known.
   bool HasDirection(int i) const {
     return !normals_.empty() && !normals_[static_cast<std::size_t>(i)].isZero(0.0);
   }

@@ -14,6 +14,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// How robust fits are made.
 struct FitOptions {
   // A point farther than kInlierSigmas standard deviations of its noise from its curve is an
   // outlier, and one farther than this, pixels of the photo; 0 = no cap.
@@ -30,6 +31,7 @@ struct FitOptions {
   // pencil by: in the covariances, and in what an outlier of a pencil is.
   NoiseModel noise_model;
 
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 

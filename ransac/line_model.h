@@ -26,17 +26,19 @@ Status FitLineRobust(const std::vector<CalibratedPoint>& points, const RobustFit
 // The model for the engine. Coordinates are shifted and scaled so that the points fill [-1, 1].
 class LineModel {
  public:
-  using Value = std::array<double, 3>;  // a x + b y + c = 0, (a, b) of unit length.
-  static constexpr int kMinSamples = 2;
+  using Value = std::array<double, 3>;   // a x + b y + c = 0, (a, b) of unit length.
+  static constexpr int kMinSamples = 2;  // Points of a line.
 
+  // Keeps a copy, in an order of its own.
   explicit LineModel(const std::vector<CalibratedPoint>& points);
 
-  int NumData() const { return static_cast<int>(index_.size()); }
+  int NumData() const { return static_cast<int>(index_.size()); }  // All points.
   // Index into the constructor's points of the datum at position i.
   int PointIndex(int i) const { return index_[static_cast<std::size_t>(i)]; }
   // The line in calibrated coordinates, of unit length.
   Eigen::Vector3d ToLine(const Value& value) const;
 
+  // As the engine asks for it (ransac.h).
   bool Fit(const int* sample, Value* value) const;
   void SquaredResiduals(const Value& value, int begin, int end, float* r2) const;
   bool Refine(const float* weights, Value* value) const;

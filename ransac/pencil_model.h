@@ -26,7 +26,9 @@ std::vector<int> UsableLines(const std::vector<LineFit>& lines);
 // at the current direction.
 class DirectionStep {
  public:
+  // From this unit direction.
   explicit DirectionStep(const Eigen::Vector3d& direction);
+  // A unit line, with the variance of its product with the direction.
   void Add(const Eigen::Vector3d& line, double variance, double weight);
   // False, with `direction` untouched, where the lines do not fix it.
   bool Move(Eigen::Vector3d* direction) const;
@@ -39,14 +41,14 @@ class DirectionStep {
 // The model for the engine: directions from two lines.
 class PencilModel {
  public:
-  using Value = std::array<double, 3>;  // Unit direction.
-  static constexpr int kMinSamples = 2;
+  using Value = std::array<double, 3>;   // Unit direction.
+  static constexpr int kMinSamples = 2;  // Lines of a vanishing point.
 
   // Takes lines[indices[k]] for all k, in an order of its own.
   PencilModel(const std::vector<LineFit>& lines, const std::vector<int>& indices,
               double model_sigma_rad);
 
-  int NumData() const { return static_cast<int>(index_.size()); }
+  int NumData() const { return static_cast<int>(index_.size()); }  // Lines that were taken.
   // Index into `lines` of the datum at position i.
   int LineIndex(int i) const { return index_[static_cast<std::size_t>(i)]; }
 
@@ -54,6 +56,7 @@ class PencilModel {
   const Eigen::Vector3d& Line(int i) const { return lines_[static_cast<std::size_t>(i)]; }
   double Variance(const Eigen::Vector3d& direction, int i) const;
 
+  // As the engine asks for it (ransac.h).
   bool Fit(const int* sample, Value* direction) const;
   void SquaredResiduals(const Value& direction, int begin, int end, float* r2) const;
   bool Refine(const float* weights, Value* direction) const;

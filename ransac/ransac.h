@@ -55,14 +55,16 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// Data whose residuals are asked for at a time.
 constexpr int kRansacBlock = 32;
 
+// When a search stops, and how thorough it is.
 struct RansacOptions {
   double threshold = 1.0;       // Largest residual of an inlier, in the model's unit; > 0.
   double confidence = 0.999;    // That one all-inlier sample was drawn; in (0, 1).
   int min_iterations = 1;       // Draws that are made whatever the confidence; 0 or more.
   int max_iterations = 200000;  // Draws; 1 or more.
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;       // Same seed, same bits.
   int local_start = 30;   // Draws before the first local optimisation (Lebeda 2012); 0 or more.
   int local_samples = 3;  // Inner samples of each local optimisation; 0 = refine the best only.
   int local_steps = 3;    // Reweighted steps from each inner sample; 0 = no local optimisation.
@@ -77,23 +79,26 @@ struct RobustFitOptions {
   double sigma_px = 1.0;  // Standard deviation of a point, for the covariance; > 0.
 
   RobustFitOptions() { ransac.threshold = kInlierSigmas; }
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 
+// Why a search stopped.
 enum class StopReason { kConfident, kMaxIterations, kTooFewData };
 const char* StopReasonName(StopReason reason);  // "confident", "max_iterations", ...
 
+// What a search found.
 template <typename Value>
 struct RansacReport {
   bool success = false;  // A model was found; else the fields below are those of no inliers.
-  Value model{};
-  double score = 0.0;  // Sum of losses, each in [0, 1]: the smaller the better.
-  int num_inliers = 0;
-  std::vector<std::uint8_t> inlier_mask;  // One per datum, in the model's order.
-  int num_iterations = 0;                 // Draws.
-  int num_degenerate = 0;                 // Draws that gave no model.
-  int num_local_optimizations = 0;
-  StopReason stop_reason = StopReason::kTooFewData;
+  Value model{};         // The best.
+  double score = 0.0;    // Sum of losses, each in [0, 1]: the smaller the better.
+  int num_inliers = 0;   // Ones of the mask.
+  std::vector<std::uint8_t> inlier_mask;             // One per datum, in the model's order.
+  int num_iterations = 0;                            // Draws.
+  int num_degenerate = 0;                            // Draws that gave no model.
+  int num_local_optimizations = 0;                   // Each of several steps.
+  StopReason stop_reason = StopReason::kTooFewData;  // See StopReason.
 };
 
 // Draws of `num_samples` of `num_data` without replacement after which, with probability
@@ -106,22 +111,25 @@ int RequiredIterations(int num_data, int num_inliers, int num_samples, double co
 // Model::kGoodSamples, or 1 where a model has none.
 template <typename Model, typename = void>
 struct GoodSamples {
-  static constexpr double kShare = 1.0;
+  static constexpr double kShare = 1.0;  // Of a model that says nothing.
 };
+// The same of a model that has one.
 template <typename Model>
 struct GoodSamples<Model, std::void_t<decltype(Model::kGoodSamples)>> {
-  static constexpr double kShare = Model::kGoodSamples;
+  static constexpr double kShare = Model::kGoodSamples;  // As the model says.
 };
 
+// The engine, for one kind of model.
 template <typename Model>
 class Ransac {
  public:
-  using Value = typename Model::Value;
-  using Report = RansacReport<Value>;
+  using Value = typename Model::Value;  // What is estimated.
+  using Report = RansacReport<Value>;   // What Run fills.
 
   // `options` must be valid.
   explicit Ransac(const RansacOptions& options) : options_(options) {}
 
+  // Searches; `report` is overwritten, its memory used again.
   void Run(const Model& model, Report* report) {
     constexpr int m = Model::kMinSamples;
     SetUp(model, report);

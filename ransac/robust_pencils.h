@@ -14,6 +14,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// What counts as a pencil.
 struct PencilOptions {
   // A line farther than `ransac.threshold` standard deviations from the direction is an outlier.
   RansacOptions ransac;
@@ -30,11 +31,13 @@ struct PencilOptions {
   double max_false_alarms = 0.01;
 
   PencilOptions() { ransac.threshold = kInlierSigmas; }
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 
+// A pencil and its lines.
 struct FoundPencil {
-  VanishingPointFit fit;
+  VanishingPointFit fit;   // Of its lines.
   std::vector<int> lines;  // Indices of its members, ascending.
   // Natural logarithm of the number of pencils this good expected by chance; very negative = sure.
   double log_false_alarms = 0.0;

@@ -16,7 +16,9 @@ std::vector<int> RandomOrder(int n, std::uint64_t seed);
 // Draws samples without repetition, all alike.
 class Sampler {
  public:
+  // Samples of `num_samples` of `num_data` from here on, by a new seed.
   void Reset(int num_data, int num_samples, std::uint64_t seed);
+  // The next of these.
   void Draw(int* sample) { DrawFrom(num_data_, num_samples_, sample); }
   // `count` distinct numbers of 0..n-1.
   void DrawFrom(int n, int count, int* sample);

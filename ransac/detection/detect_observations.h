@@ -30,6 +30,7 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// What is worth detecting.
 struct DetectionOptions {
   double min_ellipse_axis_px = 3.0;     // Smallest semi-minor axis; > 0.
   double min_arc_deg = 100.0;           // Smallest angular coverage of an ellipse; in (0, 360].
@@ -46,6 +47,7 @@ struct DetectionOptions {
   // one given, about which the estimate's prior still is. Twice the time.
   NoiseModel noise_model;
 
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 

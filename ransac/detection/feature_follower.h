@@ -29,8 +29,9 @@
 
 namespace CIRCLINE_EXPORT circline {
 
+// How features are followed.
 struct FollowOptions {
-  DetectionOptions detection;
+  DetectionOptions detection;  // As for a single photo.
   // How far from its prediction a feature is looked for, pixels; in [3, 200]. More follows faster
   // turns, and takes longer. As much again for every frame in a row with too little in it.
   double search_px = 12.0;
@@ -39,18 +40,20 @@ struct FollowOptions {
   // Frames; 1 = every frame is detected cold, 0 = only where too little is found.
   int cold_every = 30;
 
+  // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };
 
 // Numbers of the next new "c0", "L0", "p0", and whether pencils have had the roles x and y.
 struct NextNames {
-  int circle = 0, pencil = 0, plane = 0;
-  bool has_axes = false;
+  int circle = 0, pencil = 0, plane = 0;  // Counted up, never down.
+  bool has_axes = false;                  // Whether x and y are taken.
 };
 
 // Not thread-safe; several of them are, on different threads.
 class FeatureFollower {
  public:
+  // Nothing is followed yet.
   FeatureFollower(const Camera& camera, const FollowOptions& options);
 
   // The features of the next frame, fits included. Not ok as DetectObservations: then nothing was

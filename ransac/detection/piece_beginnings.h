@@ -21,6 +21,7 @@ class PieceBeginnings {
   // A beginning is near a line up to this far off, pixels.
   explicit PieceBeginnings(double reach_px) : reach_px_(reach_px) {}
 
+  // The first point of a further piece.
   void Add(const CalibratedPoint& first) {
     const std::array<double, 4>& j = first.x_from_pixel;
     const double square = j[0] * j[0] + j[1] * j[1] + j[2] * j[2] + j[3] * j[3];
@@ -35,6 +36,7 @@ class PieceBeginnings {
     reach_[size_++] = static_cast<float>(1.001 * reach_px_ * std::sqrt(square) + rounding);
   }
 
+  // Whether the i-th is still there: Remove takes it out.
   bool Has(std::size_t i) const { return reach_[i] != kNone; }
   void Remove(std::size_t i) { reach_[i] = kNone; }
 
@@ -53,6 +55,7 @@ class PieceBeginnings {
     }
     return size_;
   }
+  // How many were added.
   std::size_t size() const { return size_; }
 
  private:
