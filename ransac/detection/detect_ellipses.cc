@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 
 #include "circline/estimators/circle_pose.h"
@@ -119,12 +120,14 @@ class EllipseDetector {
   void AddRims(const Eigen::Matrix3d& rim) {
     std::array<CirclePose, 2> poses;
     const int n = CirclePoses(rim, &poses);
-    Vector2d first_center, center;
+    std::optional<Vector2d> first;
     for (int i = 0; i < n; ++i) {
       const CirclePose& pose = poses[static_cast<std::size_t>(i)];
-      if (!CameraToPixel(camera_, pose.center, i == 0 ? &first_center : &center)) continue;
+      Vector2d center;
+      if (!CameraToPixel(camera_, pose.center, &center)) continue;
       // Where perspective is weak both planes show the same rims.
-      if (i > 0 && (center - first_center).norm() < kSameCenterPx) break;
+      if (first && (center - *first).norm() < kSameCenterPx) break;
+      first = center;
       AddRimsOf(pose);
     }
   }

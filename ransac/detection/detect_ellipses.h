@@ -48,7 +48,7 @@ struct DetectedEllipse {
   int concentric = -1;
 };
 
-// Best supported first. `camera` must be valid. About 4 ms for a 640x480 photo.
+// Best supported first. `camera` must be valid.
 Status DetectEllipses(const EdgeMap& edges, const Camera& camera, const EllipseOptions& options,
                       std::vector<DetectedEllipse>* ellipses);
 

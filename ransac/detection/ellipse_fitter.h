@@ -4,6 +4,7 @@
 #define CIRCLINE_RANSAC_DETECTION_ELLIPSE_FITTER_H_
 
 #include <Eigen/Core>
+#include <array>
 #include <initializer_list>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -56,6 +57,12 @@ class EllipseFitter {
   bool LiesOn(const DetectedEllipse& e, const Eigen::Matrix3d& conic, double reach_px);
 
  private:
+  // Edge points support a contour within this distance, pixels: at first, and after refits.
+  static constexpr std::array<double, 3> kGatherPx = {2.5, 2.0, 1.5};
+  // Largest root-mean-square distance of the supporting points, pixels. A contour that is an
+  // ellipse stays below 0.3 px in a fair photo; a blob that resembles one does not.
+  static constexpr double kMaxRmsPx = 0.6;
+
   void AppendPoints(const Arc& arc);
   bool FitTrimmed(Eigen::Matrix3d* conic, int max_trims);
   void Trim(const Eigen::Matrix3d& conic);

@@ -47,8 +47,6 @@ constexpr double kShapeNormalDeg = 6.0;
 constexpr double kShapeNormalPerNoise = 2.0;
 constexpr double kShapeLimit = 2.5;
 
-double ToDegrees(double radians) { return radians * 180.0 / kPi; }
-
 // Logarithm (base 10) of the upper tail of the binomial distribution by Hoeffding's bound in its
 // Chernoff form: k of n successes or more at probability p.
 double Log10BinomialTail(double n, double k, double p) {
@@ -59,6 +57,8 @@ double Log10BinomialTail(double n, double k, double p) {
 }
 
 }  // namespace
+
+double ToDegrees(double radians) { return radians * 180.0 / kPi; }
 
 double Log10FalseAlarms(const Support& support, BrightSide bright) {
   const double n = support.perimeter_px / kIndependentPx;

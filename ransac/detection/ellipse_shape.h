@@ -12,6 +12,8 @@
 
 namespace circline {
 
+double ToDegrees(double radians);
+
 // Logarithm (base 10) of the number of ellipses as well supported that are expected among unrelated
 // edges.
 double Log10FalseAlarms(const Support& support, BrightSide bright);

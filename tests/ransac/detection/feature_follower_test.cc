@@ -214,7 +214,6 @@ TEST(FeatureFollower, FollowsWhatIsGivenAndNothingElse) {
   EXPECT_EQ(observations.circles.size(), 1U);
 }
 
-// Rows and columns of a sheet of discs are lines through their centres: no edges.
 // Its own number comes first for what is new, too: another disc is not the one that was given.
 TEST(FeatureFollower, AStrangerDoesNotTakeTheIdOfWhatWasGiven) {
   const Camera camera = TestCamera();
@@ -247,6 +246,7 @@ TEST(FeatureFollower, AStrangerDoesNotTakeTheIdOfWhatWasGiven) {
   EXPECT_LT(off(observations.circles[0], 6), 0.02);
 }
 
+// Rows and columns of a sheet of discs are lines through their centres: no edges.
 TEST(FeatureFollower, RowsOfDiscsAreFollowed) {
   const Camera camera = TestCamera();
   FollowOptions options;

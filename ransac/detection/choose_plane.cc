@@ -1,0 +1,186 @@
+#include "circline/ransac/detection/choose_plane.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "circline/ransac/detection/local_pencils.h"
+#include "circline/ransac/detection/segment_meetings.h"
+
+namespace circline {
+namespace {
+
+// Planes of circles alone start from this many of the best supported ones.
+constexpr std::size_t kMaxSeeds = 16;
+// Directions nearer than this (a sine; 3 degrees) are one.
+constexpr double kDistinctSine = 0.0523;
+// Two pencils of one plane cross or form corners, while the edges of a box and the stripes of a
+// cushion behind it do not: this share of either's length meets the other. Of those that are likely
+// at right angles, as those of houses are, any does: few of a front's many uprights may meet the
+// few cornices that are seen.
+constexpr double kMinSpanningShare = 0.3;
+// The rim of a circle that agrees with two pencils counts as much as this many times its length in
+// lines: it is rarer than a line, and fixes both directions.
+constexpr double kCircleWeight = 3.0;
+
+// Old houses have verticals a degree apart: the longest pencil stands for all that are nearly
+// parallel to it.
+bool HasLongerNeighbour(const std::vector<PlacedPencil>& pencils, std::size_t i) {
+  return !pencils[i].of_grid &&
+         std::any_of(pencils.begin(), pencils.end(), [&](const PlacedPencil& other) {
+           return other.support_px > pencils[i].support_px &&
+                  IsNear(pencils[i], other.direction.vector);
+         });
+}
+
+// Length of the lines of two pencils that meet; 0 where these are too few to tell a plane. No
+// better than by the weaker of the two: one long pencil makes no plane. What is one thing meets
+// all over; of a room's long pencils the half that meets may do so by accident.
+double JointSupport(const PlacedPencil& a, const PlacedPencil& b, double diagonal_px) {
+  const double of_a = MeetingLength(a.ends, b.ends, diagonal_px),
+               of_b = MeetingLength(b.ends, a.ends, diagonal_px);
+  const double share = std::min(of_a / a.support_px, of_b / b.support_px);
+  const bool is_plane =
+      share >= kMinSpanningShare || LogOddsOfRightAngle(a.direction, b.direction) > 0.0;
+  return is_plane ? 2.0 * std::min(of_a, of_b) * std::sqrt(share) : 0.0;
+}
+
+}  // namespace
+
+bool IsNear(const PlacedPencil& pencil, const Eigen::Vector3d& direction) {
+  return pencil.direction.vector.cross(direction).norm() < kDistinctSine;
+}
+
+// The normal of a circle that agrees with the plane's, or null.
+const UncertainDirection* PlaneChooser::AgreeingNormal(const CircleEvidence& circle,
+                                                       const UncertainDirection& normal) const {
+  const UncertainDirection* nearest = nullptr;
+  double smallest = options_.max_shared_plane_deg;
+  for (int k = 0; k < circle.num_normals; ++k) {
+    const UncertainDirection& candidate = circle.normals[static_cast<std::size_t>(k)];
+    if (!SamePlane(candidate, normal, options_.max_shared_plane_deg)) continue;
+    const double angle = AngleBetweenDeg(candidate, normal);
+    if (angle > smallest) continue;
+    smallest = angle;
+    nearest = &candidate;
+  }
+  return nearest;
+}
+
+void PlaneChooser::AddCircles(Plane* plane) const {
+  for (std::size_t i = 0; i < circles_.size(); ++i) {
+    if (AgreeingNormal(circles_[i], plane->normal) == nullptr) continue;
+    plane->circles.push_back(static_cast<int>(i));
+    plane->support_px += kCircleWeight * circles_[i].support_px;
+  }
+}
+
+// The plane of circles alone that starts from one circle's normal: the mean of all that agree,
+// weighted by their accuracy, until no more join.
+Plane PlaneChooser::GrowFrom(const UncertainDirection& seed) const {
+  Plane plane;
+  plane.normal = seed;
+  AddCircles(&plane);
+  constexpr int kPasses = 3;
+  for (int pass = 0; pass < kPasses && plane.circles.size() > 1; ++pass) {
+    Plane next;
+    next.normal = MeanNormal(plane);
+    AddCircles(&next);
+    if (next.support_px < plane.support_px) break;
+    plane = next;
+  }
+  return plane;
+}
+
+UncertainDirection PlaneChooser::MeanNormal(const Plane& plane) const {
+  std::vector<const UncertainDirection*> normals;
+  for (const int i : plane.circles) {
+    normals.push_back(AgreeingNormal(circles_[static_cast<std::size_t>(i)], plane.normal));
+  }
+  return MeanDirection(plane.normal, normals);
+}
+
+Plane PlaneChooser::OfCircles() const {
+  Plane best;
+  for (std::size_t i = 0; i < std::min(circles_.size(), kMaxSeeds); ++i) {
+    const CircleEvidence& circle = circles_[i];
+    for (int k = 0; k < circle.num_normals; ++k) {
+      Plane plane = GrowFrom(circle.normals[static_cast<std::size_t>(k)]);
+      if (plane.support_px > best.support_px) best = std::move(plane);
+    }
+  }
+  if (best.circles.size() < 2 || LogOdds(best.normal) > 0.0) return best;
+  Plane lone;
+  lone.normal = circles_[0].normals[0];
+  lone.circles = {0};
+  lone.support_px = kCircleWeight * circles_[0].support_px;
+  return lone;
+}
+
+// Logarithm of the odds that circles share a plane with this normal to that all lie any way: a
+// mixture over all circles, each with two normals of which either may be its own, integrated over
+// the plane's normal (Laplace), which is uniform before.
+double PlaneChooser::LogOdds(const UncertainDirection& normal) const {
+  std::vector<double> ratios;
+  for (const CircleEvidence& circle : circles_) {
+    double ratio = 0.0;
+    for (int k = 0; k < circle.num_normals; ++k)
+      ratio += LikelihoodRatio(circle.normals[static_cast<std::size_t>(k)], normal.vector);
+    ratios.push_back(ratio / circle.num_normals);
+  }
+  return LogOddsOfMixture(ratios) + std::log(ShareOfHemisphere(normal));
+}
+
+// The plane with most support: of two pencils and the circles that agree, or of circles alone.
+Plane PlaneChooser::Best(const Plane& of_circles, const std::vector<PlacedPencil>& pencils) const {
+  Plane best;
+  const auto consider = [&best](const Plane& plane) {
+    if (plane.support_px > best.support_px) best = plane;
+  };
+  for (std::size_t i = 0; i < pencils.size(); ++i) {
+    if (HasLongerNeighbour(pencils, i)) continue;
+    for (std::size_t j = i + 1; j < pencils.size(); ++j) {
+      if (HasLongerNeighbour(pencils, j)) continue;
+      Plane plane;
+      if (!SpannedNormal(pencils[i].direction, pencils[j].direction, &plane.normal)) continue;
+      plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
+      plane.support_px = JointSupport(pencils[i], pencils[j], options_.diagonal_px);
+      if (!(plane.support_px > 0.0)) continue;
+      AddCircles(&plane);
+      consider(plane);
+    }
+  }
+  consider(of_circles);
+  return best;
+}
+
+// The two pencils that span the plane may be of one thing, whose lines tell more than those of
+// the whole photo. False where these lines tell that the two are one pencil: there is no such
+// plane, and the one with less support is no more.
+bool PlaneChooser::Refit(Plane* plane, std::vector<PlacedPencil>* pencils) const {
+  if (plane->pencils[0] < 0) return true;
+  PlacedPencil& first = (*pencils)[static_cast<std::size_t>(plane->pencils[0])];
+  PlacedPencil& second = (*pencils)[static_cast<std::size_t>(plane->pencils[1])];
+  if (first.of_grid || second.of_grid) return true;
+  std::array<DetectedPencil, 2> pair = {first, second};
+  if (!RefitWhereTheyMeet(lines_, &pair, options_.diagonal_px)) return true;
+  const PlacedPencil a(std::move(pair[0])), b(std::move(pair[1]));
+  if (!SpannedNormal(a.direction, b.direction, &plane->normal)) {
+    pencils->erase(pencils->begin() + plane->pencils[1]);
+    return false;
+  }
+  first = a;
+  second = b;
+  plane->circles.clear();
+  AddCircles(plane);
+  return true;
+}
+
+Plane PlaneChooser::Choose(const Plane& of_circles, std::vector<PlacedPencil>* pencils) const {
+  Plane plane = Best(of_circles, *pencils);
+  while (!Refit(&plane, pencils)) plane = Best(of_circles, *pencils);
+  return plane;
+}
+
+}  // namespace circline

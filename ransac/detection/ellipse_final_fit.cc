@@ -1,0 +1,193 @@
+// The last fit of an ellipse, and the second look at what is too ragged for one.
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "circline/estimators/conic.h"
+#include "circline/estimators/conic_fit.h"
+#include "circline/ransac/detection/ellipse_fitter.h"
+#include "circline/ransac/detection/ellipse_shape.h"
+
+namespace circline {
+namespace {
+
+// What a second look needs of the contour.
+constexpr double kSecondCoverage = 0.7;
+// The second look at a ragged contour: smoothing, and the largest part of the photo, pixels.
+constexpr double kSecondSmoothingPx = 1.6;
+constexpr int kMaxSecondLookPx = 200;
+// Up to this miss of the shape the first look has the better place.
+constexpr double kSecondLookLimit = 1.2;
+// Points beyond this many standard deviations take no part in the final fit.
+constexpr double kOutlierSigmas = 3.5;
+// Times that points which stand out are left out of the fit to start from.
+constexpr int kMaxTrims = 10;
+// No contour is known better than this, whatever its scatter says.
+constexpr double kMinSigmaPx = 0.05;
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+
+Vector2d FromPixels(const CalibratedPoint& p, const Vector2d& shift) {
+  return {p.x_from_pixel[0] * shift.x() + p.x_from_pixel[1] * shift.y(),
+          p.x_from_pixel[2] * shift.x() + p.x_from_pixel[3] * shift.y()};
+}
+
+// Curvature, 1 / pixels of the photo, of the level line of a conic through a point, and the unit
+// normal that points outward: t^T H t / |g| with gradient g, Hessian H, unit tangent t.
+double CurvatureAt(const Matrix3d& conic, const CalibratedPoint& p, Vector2d* outward) {
+  const Vector2d g = p.GradientPerPixel((conic * p.Homogeneous()).head<2>());
+  const double length = g.norm();
+  if (!(length > 0.0)) {
+    outward->setZero();
+    return 0.0;
+  }
+  *outward = g / length;
+  const Vector2d along = FromPixels(p, Vector2d(-outward->y(), outward->x()));
+  return along.dot(conic.topLeftCorner<2, 2>() * along) / length;
+}
+
+}  // namespace
+
+bool EllipseFitter::Fit(EllipseCandidate candidate, DetectedEllipse* e) {
+  EllipseCandidate smooth = candidate;
+  const double miss = FinalFit(&candidate, e);
+  if (miss > 1.0) {
+    DetectedEllipse seen;
+    if (!SecondLook(&smooth, &seen)) return false;
+    // A wide Gaussian also takes in what runs beside the contour: it confirms the ellipse, but
+    // where the first scale is not too ragged, that has the better place.
+    if (miss > kSecondLookLimit) *e = std::move(seen);
+  }
+  e->bright = candidate.bright;
+  return true;
+}
+
+// What surrounds a contour but is too ragged for an ellipse at the first scale - a penumbra, a
+// blur by motion, the steps of a bad print - is looked at once more, through a wider Gaussian,
+// which averages over it.
+bool EllipseFitter::SecondLook(EllipseCandidate* candidate, DetectedEllipse* e) {
+  if (!Gather(*candidate, 1.5, kGatherPx.back()) || support_.Coverage() < kSecondCoverage) {
+    return false;
+  }
+  const cv::Rect box = Surroundings();
+  if (box.empty() || box.width > kMaxSecondLookPx || box.height > kMaxSecondLookPx) return false;
+  EdgeOptions edge_options;
+  edge_options.smoothing_px = kSecondSmoothingPx;
+  EdgeMap map;
+  if (!DetectEdges(map_.gray(box), edge_options, &map).ok()) return false;
+  Camera camera = camera_;  // Seen from the corner of the box; fits stay valid.
+  camera.cx -= box.x;
+  camera.cy -= box.y;
+  if (EllipseFitter(map, camera, options_).FinalFit(candidate, e) > 1.0) return false;
+  for (Vector2d& p : e->contour) p += Vector2d(box.x, box.y);
+  // The points of the first scale that it explains.
+  if (!Gather(*candidate, 0.7, kGatherPx[0])) return false;
+  e->points = support_.points;
+  return true;
+}
+
+// The samples at hand with a margin for the smoothing, within the photo.
+cv::Rect EllipseFitter::Surroundings() const {
+  Eigen::AlignedBox2d box;
+  for (const ContourSample& s : samples_) box.extend(s.pixel);
+  constexpr int kMargin = 8;
+  const cv::Point low(static_cast<int>(box.min().x()), static_cast<int>(box.min().y()));
+  const cv::Point high(static_cast<int>(box.max().x()), static_cast<int>(box.max().y()));
+  const cv::Point margin(kMargin, kMargin);
+  return cv::Rect(low - margin, high + margin) & cv::Rect({}, map_.gray.size());
+}
+
+// Maximum likelihood on all points of the contour, outliers left out; from a direct fit to all
+// points, which brings the contour near enough for the nearest points to be its own. Returns the
+// shape's miss; infinite where there is no ellipse at all.
+double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  if (!Gather(*candidate, 0.7, kGatherPx.back())) return kNone;
+  Straighten(candidate->conic, e);
+  if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic, kMaxTrims)) return kNone;
+  const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
+  if (!Gather(*candidate, 0.7, reach)) return kNone;
+  if (!FitSupport(candidate->conic, e)) return kNone;
+  candidate->conic = e->fit.conic;
+  if (!Plausible(candidate->bright) || contour_.minor_px() < options_.min_axis_px ||
+      e->fit.rms_px > kMaxRmsPx) {
+    return kNone;
+  }
+  e->coverage_deg = 360.0 * support_.Coverage();
+  e->length_px = support_.length_px;
+  e->turn_deg = ToDegrees(support_.turn);
+  e->normal_deg = ToDegrees(support_.normal_median);
+  const double miss = ShapeMiss(e->fit.rms_px, candidate->conic, e->points);
+  e->contrast = support_.gradient;
+  return miss;
+}
+
+// The edge points of the support where they would lie if the contour, `conic`, were straight.
+void EllipseFitter::Straighten(const Matrix3d& conic, DetectedEllipse* e) {
+  e->points.clear();
+  e->contour.clear();
+  fit_points_.clear();
+  const double blur = MedianBlur();
+  for (const int i : support_.points) {
+    CalibratedPoint moved;
+    if (!calibrated_.Get(i, &moved)) continue;
+    const EdgePoint& edge = map_.points[static_cast<std::size_t>(i)];
+    Vector2d outward;
+    const double curvature = CurvatureAt(conic, moved, &outward);
+    const Vector2d shift = CurvatureBias(edge, blur, curvature) * outward;
+    moved.x += FromPixels(moved, shift);
+    e->points.push_back(i);
+    e->contour.push_back(edge.Position() + shift);
+    fit_points_.push_back(moved);
+  }
+}
+
+double EllipseFitter::MedianBlur() {
+  sorted_.clear();
+  for (const int i : support_.points) {
+    sorted_.push_back(static_cast<double>(map_.points[static_cast<std::size_t>(i)].blur_px));
+  }
+  return Median(&sorted_);
+}
+
+bool EllipseFitter::FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
+  Straighten(initial, e);
+  if (fit_points_.size() < 6) return false;
+  if (!RefineConic(fit_points_, 1.0, initial, &e->fit).ok()) return false;
+  if (DropOutliers(e)) {
+    if (fit_points_.size() < 6) return false;
+    const Matrix3d conic = e->fit.conic;
+    if (!RefineConic(fit_points_, 1.0, conic, &e->fit).ok()) return false;
+  }
+  // Degrees of freedom: five go into the ellipse.
+  const double n = static_cast<double>(fit_points_.size());
+  e->sigma_px = std::max(kMinSigmaPx, e->fit.rms_px * std::sqrt(n / (n - 5.0)));
+  for (double& c : e->fit.covariance) c *= e->sigma_px * e->sigma_px;
+  return true;
+}
+
+// False if there are none.
+bool EllipseFitter::DropOutliers(DetectedEllipse* e) {
+  MeasureDistances(e->fit.conic);
+  sorted_.clear();
+  for (const double d : distances_) sorted_.push_back(std::abs(d));
+  // 1.4826: median absolute deviation to standard deviation of a Gaussian.
+  const double limit = kOutlierSigmas * std::max(kMinSigmaPx, 1.4826 * Median(&sorted_));
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < distances_.size(); ++k) {
+    if (std::abs(distances_[k]) > limit) continue;
+    fit_points_[kept] = fit_points_[k];
+    e->contour[kept] = e->contour[k];
+    e->points[kept++] = e->points[k];
+  }
+  if (kept == fit_points_.size()) return false;
+  fit_points_.resize(kept);
+  e->contour.resize(kept);
+  e->points.resize(kept);
+  return true;
+}
+
+}  // namespace circline
