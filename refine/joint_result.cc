@@ -279,7 +279,8 @@ void FillFocal(const JointProblem& problem, const State& state, const Linearizat
   if (!(h->focal_sigma < kPriorDecides * prior * h->focal_scale)) {
     remark = std::abs(off) < prior ? "; the evidence cannot tell, the prior alone decides"
                                    : "; the evidence contradicts the prior but does not fix it";
-    if (sigma.doubtful_log_focal > 0.0 && !is_doubted) CountPlaceholder(sigma, h);
+    if (sigma.doubtful_log_focal > 0.0 && !is_doubted && std::abs(off) < prior)
+      CountPlaceholder(sigma, h);
   }
   char text[160];
   std::snprintf(text, sizeof(text), "focal length: %.4f times the camera's, +- %.4f%s",

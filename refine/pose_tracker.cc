@@ -120,11 +120,12 @@ class PoseTracker::Implementation {
   // Goes on in the known map, where the frame, whose own poses `tracked` has, shows some of it and
   // agrees with the rest.
   bool Relocalize(TrackedPose* tracked) {
-    const std::vector<TrackState> starts =
+    std::vector<TrackState> starts =
         Relocated(map_, states_, tracked->estimate.hypotheses, options_);
     if (starts.empty()) return false;
     fits_.clear();
     frame_ = std::make_unique<TrackFrame>(fitted_, noise_, options_.estimation, map_);
+    frame_->KeepCheapest(static_cast<std::size_t>(options_.max_hypotheses), &starts);
     for (const TrackState& start : starts) {
       const double log_focal = start.x[map_.block(TrackMap::kCamera).offset];
       TrackFit fit;
@@ -132,8 +133,7 @@ class PoseTracker::Implementation {
         fits_.push_back(std::move(fit));
     }
     if (fits_.empty()) return false;
-    Merge(
-        map_, [](double a, double b) { return std::max(a, b); }, &fits_);
+    Merge(map_, MergedWeight::kLarger, &fits_);
     Rank(options_, &fits_);
     states_.clear();
     for (const TrackFit& fit : fits_) states_.push_back(fit.state);
@@ -206,8 +206,7 @@ class PoseTracker::Implementation {
     for (std::size_t i = 0; i < states_.size(); ++i) {
       std::vector<TrackFit> own;
       frame_->Refine(states_[i], options_, &own);
-      Merge(
-          map_, [](double a, double b) { return std::max(a, b); }, &own);
+      Merge(map_, MergedWeight::kLarger, &own);
       std::move(own.begin(), own.end(), std::back_inserter(fits_));
     }
     if (std::none_of(fits_.begin(), fits_.end(),
@@ -215,7 +214,7 @@ class PoseTracker::Implementation {
       fits_.clear();
       return;
     }
-    Merge(map_, LogAdd, &fits_);
+    Merge(map_, MergedWeight::kSum, &fits_);
     Rank(options_, &fits_);
     states_.clear();
     for (const TrackFit& fit : fits_) states_.push_back(fit.state);

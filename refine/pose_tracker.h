@@ -34,7 +34,9 @@
 // not used (predicted_only). After TrackerOptions::lost_after of them in a row, or a gap longer
 // than max_gap_s, the track is lost. A frame with circles of the map, by their ids, that agrees
 // with it brings it back into the same world (`relocalized`), however long the gap was; any other
-// one with a pose starts it anew, with a new world (`reinitialized`).
+// one with a pose starts it anew, with a new world (`reinitialized`). A single circle of unknown
+// radius contradicts no map: its id is then believed, the unit is that of its radius in the map,
+// and its turn about its normal, unless a direction of the map is seen too, starts anew as free.
 //
 // Errors are statuses. Wrong input (a time that is not finite or runs backwards, observations or
 // options that do not pass their Validate) is refused in words and changes nothing. A frame without

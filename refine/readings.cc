@@ -1,11 +1,9 @@
 #include "circline/refine/readings.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -17,6 +15,7 @@
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/pose_seeds.h"
+#include "circline/refine/ranked_readings.h"
 #include "circline/refine/reading_search.h"
 
 namespace circline {
@@ -185,148 +184,6 @@ void FillNoise(const EstimationOptions& options, const PointNoise& noise, Observ
   }
 }
 
-// Where the evidence is flat, solutions stop up to a tenth of a standard deviation apart.
-bool IsSameMinimum(const JointProblem& problem, const Refined& a, const Refined& b) {
-  constexpr double kSameSigmas = 0.1, kSameCost = 0.01;
-  double tolerance = kSamePose;
-  if (std::abs(a.hypothesis.cost - b.hypothesis.cost) < kSameCost) {
-    const Eigen::Matrix3d covariance = a.hypothesis.Covariance().topLeftCorner<3, 3>();
-    tolerance = std::max(tolerance, kSameSigmas * std::sqrt(covariance.diagonal().maxCoeff()));
-  }
-  return IsSamePose(problem, a.state, b.state, tolerance);
-}
-
-// Where the focal length is an unknown the posterior can be so flat that refinements stop at many
-// places: those within a standard deviation of each other are one.
-bool IsSameHump(const PoseHypothesis& a, const PoseHypothesis& b) {
-  if (!(a.focal_sigma > 0.0) || !(b.focal_sigma > 0.0) || a.structure != b.structure) return false;
-  const double sigma = std::min(a.focal_sigma / a.focal_scale, b.focal_sigma / b.focal_scale);
-  if (!(std::abs(std::log(a.focal_scale / b.focal_scale)) <= sigma)) return false;
-  const Eigen::Matrix3d &A = a.cam_from_world.rotation, &B = b.cam_from_world.rotation;
-  // Of a rotation that is free about the normal the normals are compared.
-  Eigen::Vector3d turn = LogRotation(A * B.transpose());
-  if (a.RotationIsFree()) turn = A.col(2).cross(B.col(2));
-  const Eigen::Vector3d variance =
-      a.Covariance().diagonal().head<3>().cwiseMin(b.Covariance().diagonal().head<3>());
-  return (turn.array().square() <= variance.array()).all();
-}
-
-// Hypotheses of all minima that compete, ranked.
-Status FillHypotheses(const JointProblem& problem, const std::vector<State>& minima,
-                      PoseEstimate* estimate) {
-  double best = std::numeric_limits<double>::infinity();
-  for (const State& minimum : minima) best = std::min(best, minimum.cost);
-  const double most = best + problem.options().max_cost_gap;
-  std::vector<Refined> all;
-  Status last = Status::Failed("no seed pose could be refined");
-  for (const State& minimum : minima) {
-    if (minimum.cost > most) continue;
-    Refined refined;
-    const Status status = FillRefined(problem, minimum, &refined);
-    if (!status.ok()) {
-      last = status;
-      continue;
-    }
-    const bool known = std::any_of(all.begin(), all.end(), [&](const Refined& r) {
-      return IsSameMinimum(problem, r, refined);
-    });
-    if (known) continue;
-    const auto hump = std::find_if(all.begin(), all.end(), [&](const Refined& r) {
-      return IsSameHump(r.hypothesis, refined.hypothesis);
-    });
-    if (hump == all.end()) {
-      all.push_back(std::move(refined));
-    } else if (refined.hypothesis.cost < hump->hypothesis.cost) {
-      *hump = std::move(refined);
-    }
-  }
-  if (all.empty()) return last;
-  const auto cheapest = std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
-    return a.hypothesis.cost < b.hypothesis.cost;
-  });
-  estimate->notes.insert(estimate->notes.end(), cheapest->notes.begin(), cheapest->notes.end());
-  constexpr double kAnySigmaPx = 0.5;  // Every feature has its own.
-  for (Refined& refined : all) {
-    CameraPose& pose = refined.hypothesis.cam_from_world;
-    // A spin that nothing fixes is settled by convention, whatever the seed's was.
-    if (problem.spin_is_free()) {
-      WorldRotation(problem.observations(), pose.rotation.col(2), pose.translation, kAnySigmaPx,
-                    &pose.rotation);
-    }
-    estimate->hypotheses.push_back(std::move(refined.hypothesis));
-  }
-  RankHypotheses(&estimate->hypotheses);
-  return Status::Ok();
-}
-
-bool IsLeftOut(const std::string& id, const PoseHypothesis& hypothesis) {
-  const std::vector<std::string>& out = hypothesis.left_out;
-  return std::find(out.begin(), out.end(), id) != out.end();
-}
-
-// What it costs that a circle is none of the world's.
-double StrangerCost(const JointProblem& problem, std::size_t circle) {
-  State state;
-  for (const Feature& f : problem.features()) {
-    const bool is_it =
-        f.kind == Feature::Kind::kCircle && f.observation == static_cast<int>(circle);
-    state.active.push_back(is_it ? 0 : 1);
-  }
-  return LeftOutCost(problem, state);
-}
-
-// Hypotheses that take the second ellipse of a contour for the circle.
-std::vector<PoseHypothesis> ReadSecond(const JointProblem& problem, const PointNoise& noise,
-                                       const std::vector<std::shared_ptr<const Solver>>& seeders,
-                                       std::size_t circle) {
-  Observations other = problem.observations();
-  CircleObservation& read = other.circles[circle];
-  read.fit = read.second->fit;
-  read.inliers = read.second->inliers;
-  const JointProblem rival(other, problem.options(), noise);
-  std::vector<std::string> unused;
-  std::vector<State> minima;
-  PoseEstimate estimate;
-  if (!FindMinima(rival, AllSeeds(rival, other, seeders, &unused), &minima).ok() ||
-      !FillHypotheses(rival, minima, &estimate).ok()) {
-    return {};
-  }
-  // Both ellipses are in the photo: whichever is not taken is a stranger.
-  const double other_stranger = StrangerCost(problem, circle) - StrangerCost(rival, circle);
-  std::vector<PoseHypothesis> hypotheses;
-  for (PoseHypothesis& h : estimate.hypotheses) {
-    if (IsLeftOut(read.id, h)) continue;
-    h.cost += other_stranger;
-    h.structure += " + second of " + read.id;
-    hypotheses.push_back(std::move(h));
-  }
-  return hypotheses;
-}
-
-// A circle that contradicts the rest may have been misread: of two rims on one contour the wrong
-// one.
-void AddSecondReadings(const JointProblem& problem, const PointNoise& noise,
-                       const std::vector<std::shared_ptr<const Solver>>& seeders,
-                       PoseEstimate* estimate) {
-  std::vector<PoseHypothesis>& all = estimate->hypotheses;
-  const std::vector<PoseHypothesis> first = all;
-  for (std::size_t i = 0; i < problem.observations().circles.size(); ++i) {
-    const CircleObservation& circle = problem.observations().circles[i];
-    const auto contradicts = [&](const PoseHypothesis& h) { return IsLeftOut(circle.id, h); };
-    if (!circle.second || std::none_of(first.begin(), first.end(), contradicts)) continue;
-    const std::vector<PoseHypothesis> more = ReadSecond(problem, noise, seeders, i);
-    all.insert(all.end(), more.begin(), more.end());
-    estimate->notes.push_back("circle '" + circle.id +
-                              "': tried as the second ellipse through its points, too");
-  }
-  if (all.size() == first.size()) return;
-  RankHypotheses(&all);
-  const double most = all.front().cost + problem.options().max_cost_gap;
-  all.erase(std::remove_if(all.begin(), all.end(),
-                           [most](const PoseHypothesis& h) { return h.cost > most; }),
-            all.end());
-}
-
 Status RefineResolved(const Observations& resolved, const PointNoise& noise,
                       const std::vector<std::shared_ptr<const Solver>>& seeders,
                       const EstimationOptions& options, PoseEstimate* estimate) {
@@ -350,9 +207,7 @@ Status RefineResolved(const Observations& resolved, const PointNoise& noise,
     reasons.insert(reasons.begin(), "no pose agrees with all evidence: " + status.message);
     return NoSeed(resolved, reasons);
   }
-  const Status filled = FillHypotheses(problem, minima, estimate);
-  if (filled.ok()) AddSecondReadings(problem, noise, seeders, estimate);
-  return filled;
+  return RankReadings(problem, noise, minima, estimate);
 }
 
 }  // namespace

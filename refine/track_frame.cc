@@ -244,6 +244,23 @@ bool TrackFrame::RefineHere(const TrackState& prior, double log_focal,
   return Begin(start, prior.Pose(map_), fit) && RefineFrom(prior, options, fit);
 }
 
+void TrackFrame::KeepCheapest(std::size_t most, std::vector<TrackState>* states) const {
+  if (states->size() <= most) return;
+  std::vector<double> costs;
+  TrackFit begun;
+  for (const TrackState& state : *states) {
+    costs.push_back(Begin(state, state.Pose(map_), &begun) ? TermsCost(begun)
+                                                           : std::numeric_limits<double>::max());
+  }
+  std::vector<double> sorted = costs;
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<TrackState> cheapest;
+  for (std::size_t i = 0; i < costs.size() && cheapest.size() < most; ++i) {
+    if (costs[i] <= sorted[most - 1]) cheapest.push_back(std::move((*states)[i]));
+  }
+  *states = std::move(cheapest);
+}
+
 void TrackFrame::Refine(const TrackState& prior, const TrackerOptions& options,
                         std::vector<TrackFit>* fits) const {
   struct Start {

@@ -49,6 +49,9 @@ class TrackFrame {
   bool RefineHere(const TrackState& prior, double log_focal, const TrackerOptions& options,
                   TrackFit* fit) const;
 
+  // Of states where they are, those that the frame's terms cost least, in their order.
+  void KeepCheapest(std::size_t most, std::vector<TrackState>* states) const;
+
   struct Term {
     std::unique_ptr<FeatureCost> cost;
     std::vector<int> blocks;  // Of the map; kOwn: its own unknowns.

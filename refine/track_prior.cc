@@ -40,6 +40,14 @@ struct Charted {
     if (camera >= 0) J->col(camera) += J->middleCols<3>(translation) * slope.col(3);
     J->middleCols<3>(translation) *= slope.leftCols<3>();
   }
+  // The same of one block's columns of A, those from `first` on, which J has.
+  void ToX(const Eigen::VectorXd& x, const Eigen::MatrixXd& A, Eigen::Index first,
+           Eigen::Map<RowMajor>* J) const {
+    if (translation < 0) return;
+    const auto by_phi = A.middleCols<3>(translation);
+    if (first == translation) J->noalias() = by_phi * Slope(x).leftCols<3>();
+    if (first == camera) J->col(0) += by_phi * Slope(x).col(3);
+  }
   void ToPhi(const Eigen::VectorXd& x, Eigen::MatrixXd* J) const {
     if (translation < 0) return;
     const Eigen::Matrix<double, 3, 4> slope = Slope(x);
@@ -70,13 +78,14 @@ class ChartedCost final : public ceres::CostFunction {
     if (!charted_.Map(&phi)) return false;
     Eigen::Map<Eigen::VectorXd>(residuals, A_.rows()).noalias() = A_ * (phi - mean_);
     if (jacobians == nullptr) return true;
-    Eigen::MatrixXd J = A_;
-    charted_.ToX(x, &J);
     first = 0;
     for (std::size_t k = 0; k < parameter_block_sizes().size(); ++k) {
       const int size = parameter_block_sizes()[k];
-      if (jacobians[k] != nullptr)
-        Eigen::Map<RowMajor>(jacobians[k], A_.rows(), size) = J.middleCols(first, size);
+      if (jacobians[k] != nullptr) {
+        Eigen::Map<RowMajor> J(jacobians[k], A_.rows(), size);
+        J = A_.middleCols(first, size);
+        charted_.ToX(x, A_, first, &J);
+      }
       first += size;
     }
     return true;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -14,6 +15,13 @@ namespace circline {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// Root of the sum of those variances of [delta, delta_t].
+double Deviation(const PoseHypothesis& h, const std::array<int, 3>& rows) {
+  double sum = 0.0;
+  for (const int k : rows) sum += h.Covariance()(k, k);
+  return std::sqrt(sum);
+}
 
 class OneTrackTest : public testing::Test {
  protected:
@@ -88,8 +96,11 @@ TEST_F(OneTrackTest, EmptyFramesArePredictedAndSaidToBe) {
 // The same circles from elsewhere: the pose comes back in the same world and unit.
 TEST_F(OneTrackTest, AfterACutThePoseComesBackInItsWorld) {
   const Trajectory other(sequence_.options(), 77);
-  const double unit = last_.estimate.hypotheses.front().cam_from_world.translation.norm() /
-                      sequence_.frames[9].pose.translation.norm();
+  const PoseHypothesis& before = last_.estimate.hypotheses.front();
+  const double unit =
+      before.cam_from_world.translation.norm() / sequence_.frames[9].pose.translation.norm();
+  // The unit is known as well as the pose is that it is taken from.
+  const double unit_sigma = Deviation(before, {3, 4, 5}) / before.cam_from_world.translation.norm();
   int restarts = 0, returns = 0;
   for (int k = 10; k < 30; ++k) {
     const Trajectory::Frame& frame = other.frames[static_cast<std::size_t>(k)];
@@ -100,11 +111,13 @@ TEST_F(OneTrackTest, AfterACutThePoseComesBackInItsWorld) {
     if (k < 20) continue;
     EXPECT_FALSE(tracked.predicted_only);
     const PoseHypothesis& first = tracked.estimate.hypotheses.front();
-    EXPECT_LT(NormalError(frame.pose, first), 0.05);
     // Turn and place, too: those of the world before.
-    EXPECT_LT(RotationError(frame.pose, first), 0.1);
+    constexpr double kSigmas = 4.0;
+    EXPECT_LT(RotationError(frame.pose, first), kSigmas * Deviation(first, {0, 1, 2})) << k;
     EXPECT_LT((first.cam_from_world.translation - unit * frame.pose.translation).norm(),
-              0.1 * unit * frame.pose.translation.norm());
+              kSigmas * std::hypot(Deviation(first, {3, 4, 5}),
+                                   unit_sigma * first.cam_from_world.translation.norm()))
+        << k;
   }
   EXPECT_EQ(restarts, 0);
   EXPECT_EQ(returns, 1);

@@ -1,0 +1,219 @@
+#include "circline/refine/ranked_readings.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "circline/estimators/closed_form_solvers.h"
+#include "circline/refine/joint_result.h"
+#include "circline/refine/pose_seeds.h"
+#include "circline/refine/reading_search.h"
+
+namespace circline {
+namespace {
+
+// Where the evidence is flat, solutions stop up to a tenth of a standard deviation apart.
+bool IsSameMinimum(const JointProblem& problem, const Refined& a, const Refined& b) {
+  constexpr double kSameSigmas = 0.1, kSameCost = 0.01;
+  double tolerance = kSamePose;
+  if (std::abs(a.hypothesis.cost - b.hypothesis.cost) < kSameCost) {
+    const Eigen::Matrix3d covariance = a.hypothesis.Covariance().topLeftCorner<3, 3>();
+    tolerance = std::max(tolerance, kSameSigmas * std::sqrt(covariance.diagonal().maxCoeff()));
+  }
+  return IsSamePose(problem, a.state, b.state, tolerance);
+}
+
+// Where the focal length is an unknown the posterior can be so flat that refinements stop at many
+// places: those within a standard deviation of each other are one.
+bool IsSameHump(const PoseHypothesis& a, const PoseHypothesis& b) {
+  if (!(a.focal_sigma > 0.0) || !(b.focal_sigma > 0.0) || a.structure != b.structure) return false;
+  const double sigma = std::min(a.focal_sigma / a.focal_scale, b.focal_sigma / b.focal_scale);
+  if (!(std::abs(std::log(a.focal_scale / b.focal_scale)) <= sigma)) return false;
+  const Eigen::Matrix3d &A = a.cam_from_world.rotation, &B = b.cam_from_world.rotation;
+  // Of a rotation that is free about the normal the normals are compared.
+  Eigen::Vector3d turn = LogRotation(A * B.transpose());
+  if (a.RotationIsFree()) turn = A.col(2).cross(B.col(2));
+  const Eigen::Vector3d variance =
+      a.Covariance().diagonal().head<3>().cwiseMin(b.Covariance().diagonal().head<3>());
+  return (turn.array().square() <= variance.array()).all();
+}
+
+// Hypotheses of all minima that compete.
+Status FillHypotheses(const JointProblem& problem, const std::vector<State>& minima,
+                      std::vector<Refined>* hypotheses) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const State& minimum : minima) best = std::min(best, minimum.cost);
+  const double most = best + problem.options().max_cost_gap;
+  std::vector<Refined>& all = *hypotheses;
+  all.clear();
+  Status last = Status::Failed("no seed pose could be refined");
+  for (const State& minimum : minima) {
+    if (minimum.cost > most) continue;
+    Refined refined;
+    const Status status = FillRefined(problem, minimum, &refined);
+    if (!status.ok()) {
+      last = status;
+      continue;
+    }
+    const bool known = std::any_of(all.begin(), all.end(), [&](const Refined& r) {
+      return IsSameMinimum(problem, r, refined);
+    });
+    if (known) continue;
+    const auto hump = std::find_if(all.begin(), all.end(), [&](const Refined& r) {
+      return IsSameHump(r.hypothesis, refined.hypothesis);
+    });
+    if (hump == all.end()) {
+      all.push_back(std::move(refined));
+    } else if (refined.hypothesis.cost < hump->hypothesis.cost) {
+      *hump = std::move(refined);
+    }
+  }
+  if (all.empty()) return last;
+  constexpr double kAnySigmaPx = 0.5;  // Every feature has its own.
+  for (Refined& refined : all) {
+    CameraPose& pose = refined.hypothesis.cam_from_world;
+    // A spin that nothing fixes is settled by convention, whatever the seed's was.
+    if (problem.spin_is_free()) {
+      WorldRotation(problem.observations(), pose.rotation.col(2), pose.translation, kAnySigmaPx,
+                    &pose.rotation);
+    }
+  }
+  return Status::Ok();
+}
+
+std::vector<PoseHypothesis> Ranked(const std::vector<Refined>& all) {
+  std::vector<PoseHypothesis> hypotheses;
+  for (const Refined& refined : all) hypotheses.push_back(refined.hypothesis);
+  RankHypotheses(&hypotheses);
+  return hypotheses;
+}
+
+double LeastCost(const std::vector<Refined>& all) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Refined& refined : all) least = std::min(least, refined.hypothesis.cost);
+  return least;
+}
+
+// In PoseHypothesis::structure.
+std::string SecondOf(const std::string& id) { return " + second of " + id; }
+
+bool IsLeftOut(const std::string& id, const PoseHypothesis& hypothesis) {
+  const std::vector<std::string>& out = hypothesis.left_out;
+  return std::find(out.begin(), out.end(), id) != out.end();
+}
+
+// What it costs that a circle is none of the world's.
+double StrangerCost(const JointProblem& problem, std::size_t circle) {
+  State state;
+  for (const Feature& f : problem.features()) {
+    const bool is_it =
+        f.kind == Feature::Kind::kCircle && f.observation == static_cast<int>(circle);
+    state.active.push_back(is_it ? 0 : 1);
+  }
+  return LeftOutCost(problem, state);
+}
+
+// Hypotheses that take the second ellipse of a contour for the circle, from the poses that are
+// known.
+std::vector<Refined> ReadSecond(const JointProblem& problem, const PointNoise& noise,
+                                const std::vector<Refined>& known, std::size_t circle) {
+  Observations other = problem.observations();
+  CircleObservation& read = other.circles[circle];
+  read.fit = read.second->fit;
+  read.inliers = read.second->inliers;
+  const JointProblem rival(other, problem.options(), noise);
+  std::vector<Seed> seeds;
+  for (const Refined& refined : known)
+    seeds.push_back({problem.PoseAt(refined.state), problem.LogFocalAt(refined.state), 1});
+  std::vector<State> minima;
+  std::vector<Refined> all, made;
+  if (!FindMinima(rival, seeds, &minima).ok() || !FillHypotheses(rival, minima, &all).ok())
+    return made;
+  // Both ellipses are in the photo: whichever is not taken is a stranger.
+  const double other_stranger = StrangerCost(problem, circle) - StrangerCost(rival, circle);
+  for (Refined& refined : all) {
+    if (IsLeftOut(read.id, refined.hypothesis)) continue;
+    refined.hypothesis.cost += other_stranger;
+    refined.hypothesis.structure += SecondOf(read.id);
+    made.push_back(std::move(refined));
+  }
+  return made;
+}
+
+// The circles with a second ellipse that hypotheses leave out, the most probably left out first.
+std::vector<std::size_t> LeftOutWithSecond(const JointProblem& problem,
+                                           const std::vector<PoseHypothesis>& hypotheses) {
+  constexpr double kNegligible = 1e-3;     // Probability of being left out.
+  constexpr std::size_t kMostCircles = 3;  // Each is solved anew.
+  std::vector<std::pair<double, std::size_t>> found;
+  for (std::size_t i = 0; i < problem.observations().circles.size(); ++i) {
+    const CircleObservation& circle = problem.observations().circles[i];
+    double probability = 0.0;
+    for (const PoseHypothesis& h : hypotheses)
+      probability += circle.second && IsLeftOut(circle.id, h) ? h.probability : 0.0;
+    if (probability > kNegligible) found.emplace_back(probability, i);
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::size_t> circles;
+  for (const auto& [probability, i] : found) {
+    if (circles.size() < kMostCircles) circles.push_back(i);
+  }
+  return circles;
+}
+
+// A circle that contradicts the rest may have been misread: of two rims on one contour the wrong
+// one. Returns the circles that were read again.
+std::vector<std::size_t> AddSecondReadings(const JointProblem& problem, const PointNoise& noise,
+                                           std::vector<Refined>* all) {
+  const std::vector<CircleObservation>& observed = problem.observations().circles;
+  if (std::none_of(observed.begin(), observed.end(),
+                   [](const CircleObservation& circle) { return circle.second.has_value(); })) {
+    return {};
+  }
+  const std::vector<Refined> first = *all;
+  const std::vector<std::size_t> circles = LeftOutWithSecond(problem, Ranked(first));
+  for (const std::size_t i : circles) {
+    std::vector<Refined> more = ReadSecond(problem, noise, first, i);
+    std::move(more.begin(), more.end(), std::back_inserter(*all));
+  }
+  const double most = LeastCost(*all) + problem.options().max_cost_gap;
+  all->erase(std::remove_if(all->begin(), all->end(),
+                            [most](const Refined& r) { return r.hypothesis.cost > most; }),
+             all->end());
+  return circles;
+}
+
+}  // namespace
+
+Status RankReadings(const JointProblem& problem, const PointNoise& noise,
+                    const std::vector<State>& minima, PoseEstimate* estimate) {
+  std::vector<Refined> all;
+  const Status status = FillHypotheses(problem, minima, &all);
+  if (!status.ok()) return status;
+  const std::vector<std::size_t> read_again = AddSecondReadings(problem, noise, &all);
+  estimate->hypotheses = Ranked(all);
+  const PoseHypothesis& best = estimate->hypotheses.front();
+  const auto notes_of = std::find_if(all.begin(), all.end(), [&](const Refined& r) {
+    return r.hypothesis.cost == best.cost && r.hypothesis.structure == best.structure;
+  });
+  if (notes_of != all.end()) {
+    estimate->notes.insert(estimate->notes.end(), notes_of->notes.begin(), notes_of->notes.end());
+  }
+  for (const std::size_t i : read_again) {
+    const std::string& id = problem.observations().circles[i].id;
+    const bool is_best = best.structure.find(SecondOf(id)) != std::string::npos;
+    estimate->notes.push_back("circle '" + id +
+                              "': tried as the second ellipse through its points, too, which the "
+                              "best pose " +
+                              (is_best ? "takes" : "does not take"));
+  }
+  return Status::Ok();
+}
+
+}  // namespace circline
