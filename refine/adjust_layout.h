@@ -28,6 +28,8 @@ struct SharedLayout {
   std::vector<CameraPose> poses;
   std::vector<bool> placed;  // False: shares too few circles with the others, or contradicts them.
   std::vector<std::map<std::string, std::string>> names;  // By photo: own id to the shared one.
+  // Of pencils, where photos can tell; else they are each photo's own.
+  std::vector<std::map<std::string, std::string>> pencil_names;
   double misfit = 0.0;  // Median distance of circles from their place, radii.
 };
 // Circles are the same where their ids are; or, without `by_id`, where they lie alike: a pattern of

@@ -37,6 +37,11 @@ Status AdjustOptions::Validate() const {
     return Status::Invalid("given_rotation_sigma must be positive");
   if (!(given_translation_sigma > 0.0) || !std::isfinite(given_translation_sigma))
     return Status::Invalid("given_translation_sigma must be positive");
+  if (!given_poses.empty() && rigid != RigidWorld::kAuto) {
+    return Status::Invalid(
+        "rigid must be auto where poses are given: their world is one, and circles are the same "
+        "where they lie, whatever their ids");
+  }
   if (num_radial < 0 || num_radial > 4) return Status::Invalid("num_radial must be from 0 to 4");
   if (max_iterations < 1) return Status::Invalid("max_iterations must be 1 or more");
   if (num_solver_threads < 1) return Status::Invalid("num_solver_threads must be 1 or more");

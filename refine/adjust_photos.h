@@ -55,13 +55,12 @@ struct AdjustOptions {
   // no two of one camera are nearer than 0.01.
   double nearly_equal = 0.005;
   // Poses that are known from elsewhere (structure from motion), cam_from_anywhere, in any unit:
-  // one for each photo, or none at all. Photos without one take no part. The photos' world is one,
-  // circles are found again by where they lie, and where the world lies among the given poses is
-  // estimated, too: AdjustedPhotos::given.
+  // one for each photo, or none at all. Photos without one take no part. The photos' world is one
+  // (`rigid` stays kAuto), circles and directions are found again by where they lie, and where the
+  // world lies among the given poses is estimated, too: AdjustedPhotos::given.
   std::vector<std::optional<CameraPose>> given_poses;
   // Their standard deviations: of rotations, radians; of translations, of the distance to the
-  // world's origin. COLMAP's poses of 6 rendered photos of 640 x 480 are good to 0.0001 in both;
-  // photographs have lenses that no model fits.
+  // world's origin.
   double given_rotation_sigma = 0.001, given_translation_sigma = 0.001;
   int max_iterations = 100;    // Of the joint problem, each time it is solved; 1 or more.
   int num_threads = 1;         // Photos are started on so many; the same bits with any number.
@@ -136,9 +135,11 @@ struct AdjustedCircle {
 
 // A pencil's direction in a world, without sense.
 struct AdjustedDirection {
-  std::string id;                                        // PencilObservation::id.
-  int photo = -1;                                        // As AdjustedCircle::photo.
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  // Unit, world frame.
+  std::string id;  // PencilObservation::id.
+  // -1: of the world of all photos; else of that photo alone, in its world. Where photos share a
+  // world but match circles by place, and no poses were given, that is the world of all.
+  int photo = -1;
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  // Unit.
 };
 
 // Where the world lies in the frame of given poses: X_given = scale * rotation * X + translation.

@@ -236,9 +236,15 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle, double
 double* AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   constexpr double kAlong = 0.98;  // Cosine: it is that axis, not one turned against it.
   const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
-  const std::string id = input.names.empty() ? pencil.id : std::to_string(photo) + ":" + pencil.id;
-  double*& block = directions_[{input.world, id}];
+  const auto named = input.pencil_names.find(pencil.id);
+  const bool is_own =
+      named == input.pencil_names.end() && (!input.names.empty() || input.given != nullptr);
+  std::string id = is_own ? std::to_string(photo) + ":" + pencil.id : pencil.id;
+  if (named != input.pencil_names.end()) id = named->second;
+  Direction& made = directions_[{input.world, id}];
+  double*& block = made.block;
   if (block != nullptr) return block;
+  made.photo = is_own ? photo : input.world - 1;
   const double sigma = std::max(options_.noise_model.pencil_axis_rad, 1e-6);
   Eigen::Vector3d d = input.pose.rotation.transpose() * pencil.fit->direction;
   const bool is_free = pencil.direction == PencilDirection::kFree;

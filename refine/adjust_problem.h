@@ -38,8 +38,9 @@ struct AdjustInput {
   int world = 0;                   // Photos of one world share circles and pencils of one id.
   CameraPose pose;                 // To start from, of that world.
   const Layout* layout = nullptr;  // Circles of that world.
-  // What the world calls its circles, by own id; empty: the same. Pencils are then its own, too.
-  std::map<std::string, std::string> names;
+  // What the world calls its circles, by own id; empty: the same. What it calls its pencils; where
+  // it does not say and circles have other names, or poses are given, each photo has its own.
+  std::map<std::string, std::string> names, pencil_names;
   std::set<std::string> left_out;  // Ids of features that have no part in it.
   bool takes_part = true;
   const CameraPose* given = nullptr;  // In the given frame; null: none.
@@ -119,6 +120,11 @@ class AdjustProblem {
     double *center = nullptr, *radius = nullptr, *tilt = nullptr;
   };
 
+  struct Direction {
+    int photo = -1;  // As AdjustedDirection::photo.
+    double* block = nullptr;
+  };
+
   double* NewBlock(int size, std::initializer_list<double> values,
                    const ceres::Manifold* manifold = nullptr, bool constant = false);
   template <typename M, typename... Args>
@@ -164,7 +170,8 @@ class AdjustProblem {
   std::vector<std::array<double, kCameraSize>> camera_sigmas_;  // Of the priors.
   std::vector<const ceres::Manifold*> all_free_, coarse_free_;  // Of the cameras.
   std::map<std::pair<int, std::string>, Circle> circles_;
-  std::map<std::pair<int, std::string>, double*> radius_groups_, centers_, directions_;
+  std::map<std::pair<int, std::string>, Direction> directions_;
+  std::map<std::pair<int, std::string>, double*> radius_groups_, centers_;
   std::map<std::pair<int, int>, double*> offsets_;
   std::map<int, bool> x_is_fixed_, has_scale_;  // By world.
   std::set<const double*> known_radii_;

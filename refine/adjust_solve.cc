@@ -211,8 +211,8 @@ std::vector<std::vector<AdjustedResidual>> AdjustProblem::Residuals() const {
 
 std::vector<AdjustedDirection> AdjustProblem::Directions() const {
   std::vector<AdjustedDirection> out;
-  for (const auto& [key, block] : directions_)
-    out.push_back({key.second, key.first - 1, Eigen::Vector3d(block)});
+  for (const auto& [key, direction] : directions_)
+    out.push_back({key.second, direction.photo, Eigen::Vector3d(direction.block)});
   return out;
 }
 

@@ -261,6 +261,7 @@ void Adjustment::ShareWorld(const SharedLayout& shared, bool by_id) {
     input.pose = shared.poses[i];
     input.layout = &layouts_[0];
     input.names = by_id ? std::map<std::string, std::string>() : shared.names[i];
+    if (!shared.pencil_names.empty()) input.pencil_names = shared.pencil_names[i];
   }
 }
 

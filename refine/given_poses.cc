@@ -4,9 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <string>
 #include <utility>
+
+#include "circline/estimators/noise_model.h"
+#include "circline/refine/layout_alignment.h"
 
 namespace circline {
 namespace {
@@ -15,6 +20,9 @@ namespace {
 constexpr double kApart = 0.5;    // Radii.
 constexpr double kLarger = 1.3;   // Radius, times.
 constexpr double kTurned = 0.94;  // Cosine of the angle between normals: 20 degrees.
+// What two sights of one line group differ by beside their own deviations, degrees: old houses have
+// verticals so far apart.
+constexpr double kLeanDeg = 1.0;
 
 // A circle as a pose of its photo has it, in the frame of the given poses but for the photo's unit.
 struct Sight {
@@ -76,9 +84,10 @@ class Placer {
     for (const Seed& seed : seeds) {
       const GivenFrame world = WorldOf(seed);
       const Layout layout = LayoutOf(*seed.sight->pose);
+      const Places there = PlacesOf(layout);
       std::size_t count = 0;
       for (std::size_t k = 0; k < given_.size(); ++k) {
-        if (k != seed.sight->photo) count += Best(k, world, layout).names.size();
+        if (k != seed.sight->photo) count += Best(k, world, there).names.size();
       }
       if (count <= most) continue;
       most = count;
@@ -96,9 +105,19 @@ class Placer {
     const PoseHypothesis* pose = nullptr;
   };
 
+  // A line group in the world, as the first photo that shows it has it.
+  struct Known {
+    std::string name;
+    Eigen::Vector3d direction;
+    double sigma_deg = 0.0;
+  };
+
   std::vector<Seed> Seeds() const;
   GivenFrame WorldOf(const Seed& seed) const;
-  Match Best(std::size_t photo, const GivenFrame& world, const Layout& layout) const;
+  Match Best(std::size_t photo, const GivenFrame& world, const Places& there) const;
+  static void TakeIn(std::size_t photo, const Match& match, GivenPlacement* out);
+  static void NamePencils(std::size_t photo, const PoseHypothesis& h, std::vector<Known>* known,
+                          SharedLayout* shared);
   GivenPlacement Assemble(const Seed& seed) const;
 
   const std::vector<PoseEstimate>& estimates_;
@@ -106,15 +125,30 @@ class Placer {
   std::vector<Sight> sights_;  // By photo.
 };
 
-// Of photos that are near one another in the list, the closest meetings.
+// The closest meetings, of photos near one another in the list first (those of a video see the
+// same), then of photos farther and farther apart until there are enough.
 std::vector<Seed> Placer::Seeds() const {
   constexpr std::size_t kNeighbours = 8, kMostSeeds = 300;
+  constexpr std::size_t kMostPairs = 5000000;  // Of sights, where neighbours are too few.
+  std::vector<std::size_t> begins;             // Of each photo with sights, in sights_.
+  for (std::size_t k = 0; k < sights_.size(); ++k) {
+    if (k == 0 || sights_[k].photo != sights_[k - 1].photo) begins.push_back(k);
+  }
+  const std::size_t count = begins.size();
+  begins.push_back(sights_.size());
   std::vector<Seed> seeds;
   Seed seed;
-  for (const Sight& a : sights_) {
-    for (const Sight& b : sights_) {
-      if (b.photo > a.photo && b.photo <= a.photo + kNeighbours && Meet(a, b, &seed))
-        seeds.push_back(seed);
+  std::size_t pairs = 0;
+  for (std::size_t apart = 1; apart < count; ++apart) {
+    if (apart > kNeighbours && (seeds.size() >= kMostSeeds || pairs > kMostPairs)) break;
+    for (std::size_t p = 0; p + apart < count; ++p) {
+      const std::size_t q = p + apart;
+      for (std::size_t a = begins[p]; a < begins[p + 1]; ++a) {
+        for (std::size_t b = begins[q]; b < begins[q + 1]; ++b) {
+          if (Meet(sights_[a], sights_[b], &seed)) seeds.push_back(seed);
+        }
+      }
+      pairs += (begins[p + 1] - begins[p]) * (begins[q + 1] - begins[q]);
     }
   }
   std::stable_sort(seeds.begin(), seeds.end(),
@@ -135,7 +169,7 @@ GivenFrame Placer::WorldOf(const Seed& seed) const {
 }
 
 // The photo's pose that finds most of the layout.
-Placer::Match Placer::Best(std::size_t photo, const GivenFrame& world, const Layout& layout) const {
+Placer::Match Placer::Best(std::size_t photo, const GivenFrame& world, const Places& there) const {
   Match best;
   if (!given_[photo]) return best;
   const CameraPose pose = PoseInWorld(world, *given_[photo]);
@@ -149,29 +183,68 @@ Placer::Match Placer::Best(std::size_t photo, const GivenFrame& world, const Lay
       const Eigen::Vector3d ray = back * circle.center;
       const double along = -eye.z() / ray.z();  // To Z = 0.
       if (!(circle.radius > 0.0) || !(along > 0.0) || !std::isfinite(along)) continue;
-      const LayoutCircle own = {(eye + along * ray).head<2>(), along * circle.radius};
-      match.own[circle.id] = own;
-      for (const auto& [id, there] : layout) {
-        const double larger = own.radius / there.radius;
-        if ((own.center - there.center).norm() < kApart * there.radius && larger < kLarger &&
-            larger > 1.0 / kLarger) {
-          match.names[circle.id] = id;
-          break;
-        }
-      }
+      match.own[circle.id] = {(eye + along * ray).head<2>(), along * circle.radius};
     }
+    const Places own = PlacesOf(match.own);
+    for (const auto& [mine, shared] :
+         Matches(own, there, Similarity(), {kApart, std::log(kLarger)}))
+      match.names[*own[mine].id] = *there[shared].id;
     if (best.pose == nullptr || match.names.size() > best.names.size()) best = std::move(match);
   }
   return best;
 }
 
-// Whether a photo's pencils are those that others have under their ids; takes in what is new.
-bool HasSamePencils(const CameraPose& in_world, const PoseHypothesis& h,
-                    std::map<std::string, Eigen::Vector3d>* pencils) {
-  return std::all_of(h.pencils.begin(), h.pencils.end(), [&](const PencilEstimate& d) {
-    const Eigen::Vector3d own = in_world.rotation.transpose() * d.direction;
-    return IsSamePlane(own, pencils->insert({d.id, own}).first->second);
-  });
+// Names a photo's line groups by their directions; takes in what is new.
+void Placer::NamePencils(std::size_t photo, const PoseHypothesis& h, std::vector<Known>* known,
+                         SharedLayout* shared) {
+  constexpr double kDegree = 0.017453292519943295;
+  const Eigen::Matrix3d back = shared->poses[photo].rotation.transpose();
+  std::vector<std::uint8_t> is_taken(known->size(), 0);
+  for (const PencilEstimate& pencil : h.pencils) {
+    const Eigen::Vector3d own = back * pencil.direction;
+    std::size_t same = known->size();
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < is_taken.size(); ++k) {
+      const Known& other = (*known)[k];
+      const double angle_deg =
+                       std::asin(std::min(1.0, own.cross(other.direction).norm())) / kDegree,
+                   gate = kInlierSigmas * std::hypot(pencil.sigma_deg, other.sigma_deg, kLeanDeg);
+      if (is_taken[k] != 0 || !IsSamePlane(own, other.direction) || !(angle_deg < gate) ||
+          !(angle_deg < least)) {
+        continue;
+      }
+      least = angle_deg;
+      same = k;
+    }
+    if (same < is_taken.size()) {
+      is_taken[same] = 1;
+    } else {
+      same = known->size();
+      const bool is_free = std::none_of(known->begin(), known->end(),
+                                        [&](const Known& k) { return k.name == pencil.id; });
+      known->push_back(
+          {is_free ? pencil.id : std::to_string(photo) + ":" + pencil.id, own, pencil.sigma_deg});
+    }
+    shared->pencil_names[photo][pencil.id] = (*known)[same].name;
+  }
+}
+
+// A photo, and those of its circles that are new.
+void Placer::TakeIn(std::size_t photo, const Match& match, GivenPlacement* out) {
+  SharedLayout& shared = out->shared;
+  shared.placed[photo] = true;
+  shared.names[photo] = match.names;
+  for (const auto& [id, circle] : match.own) {
+    if (match.names.count(id) > 0) {
+      out->by_id = out->by_id && match.names.at(id) == id;
+      continue;
+    }
+    const bool is_free = shared.circles.count(id) == 0;
+    const std::string name = is_free ? id : std::to_string(photo) + ":" + id;
+    out->by_id = out->by_id && is_free;
+    shared.names[photo][id] = name;
+    shared.circles[name] = circle;
+  }
 }
 
 GivenPlacement Placer::Assemble(const Seed& seed) const {
@@ -183,25 +256,20 @@ GivenPlacement Placer::Assemble(const Seed& seed) const {
   shared.poses.resize(given_.size());
   shared.placed.assign(given_.size(), false);
   shared.names.resize(given_.size());
-  std::map<std::string, Eigen::Vector3d> pencils;
-  for (std::size_t k = 0; k < given_.size(); ++k) {
-    const Match match = Best(k, out.world, shared.circles);
-    if (match.names.empty()) continue;
-    shared.placed[k] = true;
-    shared.poses[k] = PoseInWorld(out.world, *given_[k]);
-    shared.names[k] = match.names;
-    for (const auto& [id, circle] : match.own) {
-      if (match.names.count(id) > 0) {
-        out.by_id = out.by_id && match.names.at(id) == id;
-        continue;
-      }
-      const bool is_free = shared.circles.count(id) == 0;
-      const std::string name = is_free ? id : std::to_string(k) + ":" + id;
-      out.by_id = out.by_id && is_free;
-      shared.names[k][id] = name;
-      shared.circles[name] = circle;
+  shared.pencil_names.resize(given_.size());
+  std::vector<Known> pencils;
+  // What shared nothing is looked at again: the layout may have grown towards it.
+  for (bool has_grown = true; has_grown;) {
+    has_grown = false;
+    for (std::size_t k = 0; k < given_.size(); ++k) {
+      if (shared.placed[k]) continue;
+      const Match match = Best(k, out.world, PlacesOf(shared.circles));
+      if (match.names.empty()) continue;
+      has_grown = true;
+      shared.poses[k] = PoseInWorld(out.world, *given_[k]);
+      TakeIn(k, match, &out);
+      NamePencils(k, *match.pose, &pencils, &shared);
     }
-    out.by_id = out.by_id && HasSamePencils(shared.poses[k], *match.pose, &pencils);
   }
   return out;
 }

@@ -27,7 +27,7 @@ CameraPose PoseInWorld(const GivenFrame& world, const CameraPose& given);
 struct GivenPlacement {
   SharedLayout shared;
   GivenFrame world;
-  bool by_id = false;  // Circles and pencils of one id are the same.
+  bool by_id = false;  // Circles of one id are the same.
 };
 
 // `estimates`: each photo's own, the unit of each another one. None where no circle is found in two

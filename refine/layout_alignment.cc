@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <utility>
@@ -46,10 +47,12 @@ bool Fit(const Places& from, const Places& to, const Pairs& pairs, Similarity* o
   return true;
 }
 
-// In place and in size, radii.
-double Miss(const LayoutCircle& from, const LayoutCircle& to, const Similarity& similarity) {
+// In place and in size, radii; or of the reach.
+double Miss(const LayoutCircle& from, const LayoutCircle& to, const Similarity& similarity,
+            const Reach& reach = {1.0, 1.0}) {
   const double size = std::log(similarity.scale * from.radius / to.radius);
-  return std::hypot((similarity(from.center) - to.center).norm() / to.radius, size);
+  return std::hypot((similarity(from.center) - to.center).norm() / (to.radius * reach.place),
+                    size / reach.size);
 }
 
 bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
@@ -80,35 +83,42 @@ Pairs NeighbourPairs(const Places& places) {
   return pairs;
 }
 
-// The circles of `from` that lie on one of `to`, each on another.
-Pairs Matches(const Places& from, const Places& to, const Similarity& similarity) {
-  constexpr double kNear = 0.3;  // Radii.
+}  // namespace
+
+Pairs Matches(const Places& from, const Places& to, const Similarity& similarity,
+              const Reach& reach) {
+  struct Match {
+    double miss;
+    std::size_t own, shared;
+  };
   double largest = 0.0;
   for (const Place& place : to) largest = std::max(largest, place.circle.radius);
-  Pairs pairs;
-  std::vector<bool> taken(to.size(), false);
+  const double farthest = reach.place * largest;
+  std::vector<Match> near;
   for (std::size_t own = 0; own < from.size(); ++own) {
     const Eigen::Vector2d at = similarity(from[own].circle.center);
-    const double reach = kNear * largest;
     const auto first =
-        std::lower_bound(to.begin(), to.end(), at.x() - reach,
+        std::lower_bound(to.begin(), to.end(), at.x() - farthest,
                          [](const Place& place, double x) { return place.circle.center.x() < x; });
     for (auto k = static_cast<std::size_t>(first - to.begin());
-         k < to.size() && to[k].circle.center.x() <= at.x() + reach; ++k) {
+         k < to.size() && to[k].circle.center.x() <= at.x() + farthest; ++k) {
       const LayoutCircle& circle = to[k].circle;
-      if (taken[k] || std::abs(circle.center.y() - at.y()) > reach ||
-          !(Miss(from[own].circle, circle, similarity) < kNear)) {
-        continue;
-      }
-      pairs.push_back({own, k});
-      taken[k] = true;
-      break;
+      if (std::abs(circle.center.y() - at.y()) > farthest) continue;
+      const double miss = Miss(from[own].circle, circle, similarity, reach);
+      if (miss < 1.0) near.push_back({miss, own, k});
     }
+  }
+  std::stable_sort(near.begin(), near.end(),
+                   [](const Match& a, const Match& b) { return a.miss < b.miss; });
+  Pairs pairs;
+  std::vector<std::uint8_t> is_matched(from.size(), 0), is_taken(to.size(), 0);
+  for (const Match& match : near) {
+    if (is_matched[match.own] != 0 || is_taken[match.shared] != 0) continue;
+    is_matched[match.own] = is_taken[match.shared] = 1;
+    pairs.push_back({match.own, match.shared});
   }
   return pairs;
 }
-
-}  // namespace
 
 bool AlignById(const Places& from, const Places& to, Alignment* alignment) {
   std::map<std::string, std::size_t> shared;

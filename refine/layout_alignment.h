@@ -38,6 +38,16 @@ struct Alignment {
   double misfit = 0.0;  // Median distance of these after it, in place and size; radii.
 };
 
+// How far two sights of one circle may lie from each other: in place, radii, and in size, the
+// logarithm of its ratio; where both are off, together no more than either.
+struct Reach {
+  double place = 0.3, size = 0.3;
+};
+
+// The circles of `from` that lie on one of `to`, each on another: the nearest pairs first.
+Pairs Matches(const Places& from, const Places& to, const Similarity& similarity,
+              const Reach& reach = {});
+
 // All false where too few circles, or none, are those of the other. By their ids:
 bool AlignById(const Places& from, const Places& to, Alignment* alignment);
 // The similarity under which most circles coincide, of those that a few pairs of neighbours ask

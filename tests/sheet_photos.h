@@ -37,7 +37,7 @@ class Photos {
     }
   }
 
-  // Nine circles of the sheet, not quite in a lattice.
+  // Nine circles of the sheet, not quite in a lattice; or one about its origin.
   Photos& WithCircles() {
     for (std::size_t i = 0; i < photos.size(); ++i) {
       scene_.pose = poses[i];
@@ -45,6 +45,13 @@ class Photos {
         const double x = 2.0 * (k % 3 - 1) + 0.1 * (k % 2), y = 1.6 * (k / 3 - 1) - 0.07 * (k % 4);
         photos[i].circles.push_back(scene_.Circle("c" + std::to_string(k), x, y, 0.5));
       }
+    }
+    return *this;
+  }
+  Photos& WithCircle(const std::string& id, double radius) {
+    for (std::size_t i = 0; i < photos.size(); ++i) {
+      scene_.pose = poses[i];
+      photos[i].circles.push_back(scene_.Circle(id, 0.0, 0.0, radius));
     }
     return *this;
   }

@@ -89,6 +89,15 @@ Status CalibrateOptionsFromFlags(CalibrateOptions* options) {
     return Status::Invalid(
         "--import brings its own cameras: leave out --camera, --model, --focal_px and --fov_deg");
   }
+  if (!FLAGS_import.empty() && (!FLAGS_fix.empty() || !FLAGS_free.empty())) {
+    return Status::Invalid(
+        "--import brings its own cameras: leave out --fix and --free; --noise_model and "
+        "--focal_sigma say how sure they are");
+  }
+  if (!FLAGS_import.empty() && options->adjust.rigid != RigidWorld::kAuto) {
+    return Status::Invalid("--import brings its own poses, of one world: leave out --rigid=" +
+                           FLAGS_rigid);
+  }
   options->import = FLAGS_import;
   options->compare.inputs.guess.is_exact = false;  // The camera is what is to be found.
   const EstimationOptions& estimation = options->compare.losses.front().estimation;

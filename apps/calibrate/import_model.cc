@@ -87,7 +87,8 @@ Status ImportModel(const std::string& folder, const CameraSigma& sigma,
 }
 
 std::vector<WorldPlane> PlanesOf(const std::vector<Observations>& photos,
-                                 const AdjustOptions& options, const AdjustedPhotos& adjusted) {
+                                 const AdjustOptions& options, const AdjustedPhotos& adjusted,
+                                 std::vector<std::string>* notes) {
   std::set<std::string> others;
   for (const Observations& photo : photos) {
     const std::string own = ResolveWorld(photo).frame.plane;
@@ -99,14 +100,17 @@ std::vector<WorldPlane> PlanesOf(const std::vector<Observations>& photos,
   planes.front().id = ResolveWorld(photos.front()).frame.plane;
   planes.front().circles = adjusted.circles;
   const Inverse world(*adjusted.given);
+  std::vector<Observations> seen = photos;
   for (const std::string& id : others) {
-    std::vector<Observations> seen = photos;
     for (Observations& photo : seen) {
       photo.frame = {};
       photo.frame.plane = id;
     }
     const AdjustedPhotos own = AdjustPhotos(seen, options);
-    if (!own.status.ok() || !own.given) continue;  // Too few photos show it.
+    if (!own.status.ok()) {
+      notes->push_back("plane '" + id + "': left out: " + own.status.message);
+      continue;
+    }
     const Eigen::Matrix3d R = world.rotation * own.given->rotation;
     const double scale = world.scale * own.given->scale;
     const auto moved = [&](const Eigen::Vector3d& X) -> Eigen::Vector3d {

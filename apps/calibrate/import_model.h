@@ -34,9 +34,10 @@ struct WorldPlane {
 };
 
 // The planes of the photos' circles, the world's own first: each one's circles are adjusted on
-// their own, to the same given poses.
+// their own, to the same given poses. `notes`: planes that come to nothing, and why.
 std::vector<WorldPlane> PlanesOf(const std::vector<Observations>& photos,
-                                 const AdjustOptions& options, const AdjustedPhotos& adjusted);
+                                 const AdjustOptions& options, const AdjustedPhotos& adjusted,
+                                 std::vector<std::string>* notes);
 
 // `landmarks.json`: circles, directions, planes and the similarity; `transform.txt`: the same as a
 // matrix of 4 x 4, for `colmap model_transformer --transform_path`, which moves a whole model.

@@ -195,8 +195,10 @@ Status Import(CalibrateOptions* options, std::vector<SceneImage>* images, GivenP
 
 // Scale, axes and planes of an imported model.
 Status FinishImport(const CalibrateOptions& options, const Calibration& calibration) {
+  std::vector<std::string> notes;
   const std::vector<WorldPlane> planes =
-      PlanesOf(calibration.photos, options.adjust, calibration.adjusted);
+      PlanesOf(calibration.photos, options.adjust, calibration.adjusted, &notes);
+  for (const std::string& note : notes) SayOnStderr(note);
   std::cout << LandmarkTable(calibration.adjusted, planes);
   return WriteLandmarks(calibration.adjusted, planes, options.compare.output);
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -149,8 +150,6 @@ Eigen::Vector3d Eye(const CameraPose& pose) {
 class ColmapImport : public testing::Test {
  protected:
   void SetUp() override {
-    if (RunProgram("colmap", "help").exit_code != 0)
-      GTEST_SKIP() << "COLMAP is not installed: apt-get install colmap";
     std::filesystem::create_directory(folder_ / "photos");
     std::filesystem::create_directory(folder_ / "sparse");
     const Room room;
@@ -207,6 +206,8 @@ class ColmapImport : public testing::Test {
 
 // Distances between cameras in the model that COLMAP has moved as we say, against the truth.
 TEST_F(ColmapImport, ADiscOfKnownRadiusGivesScaleAndAxes) {
+  if (RunProgram("colmap", "help").exit_code != 0)
+    GTEST_SKIP() << "COLMAP is not installed: apt-get install colmap";
   ASSERT_NO_FATAL_FAILURE(Reconstruct());
   const Outcome run = Import(Photos() + "--circle_radius=" + std::to_string(kLargest));
   ASSERT_EQ(run.exit_code, 0) << run.err;
@@ -227,6 +228,7 @@ TEST_F(ColmapImport, ADiscOfKnownRadiusGivesScaleAndAxes) {
   ASSERT_EQ(model.images.size(), truth.size());
   const ColmapImage& first = model.images.front();
   const CameraPose& first_truth = truth.at(std::stoul(first.name));
+  double sum = 0.0;  // Of logarithms of distances from the first camera, against the truth.
   for (const ColmapImage& image : model.images) {
     const CameraPose& expected = truth.at(std::stoul(image.name));
     // The floor is Z = 0, and up is up.
@@ -235,7 +237,14 @@ TEST_F(ColmapImport, ADiscOfKnownRadiusGivesScaleAndAxes) {
     const double distance = (Eye(image.cam_from_world) - Eye(first.cam_from_world)).norm(),
                  true_distance = (Eye(expected) - Eye(first_truth)).norm();
     EXPECT_NEAR(distance, true_distance, 0.01 * true_distance);
+    sum += std::log(distance / true_distance);
   }
+  const double off = std::abs(sum / static_cast<double>(truth.size() - 1)),
+               sigma = made["world_from_model"]["scale_sigma"].get<double>() /
+                       made["world_from_model"]["scale"].get<double>();
+  std::printf("scale off by %.2f %%, stated to %.2f %%\n", 100.0 * off, 100.0 * sigma);
+  EXPECT_LT(off, 3.0 * sigma);
+  EXPECT_LT(sigma, 0.01);
 
   // A disc of each plane, boxes drawn about them.
   const Outcome annotated = Import("--scene='" + WriteScene() + "'");
@@ -258,9 +267,11 @@ TEST_F(ColmapImport, WhatDoesNotFitIsNamed) {
   run = Import(Photos());
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_CONTAINS(run.err, "no photo is one of its 1 images");
-  run = Import(Photos() + "--fov_deg=60");
-  EXPECT_EQ(run.exit_code, 2);
-  EXPECT_CONTAINS(run.err, "--import brings its own cameras");
+  for (const std::string flag : {"--fov_deg=60", "--fix=k1", "--free=aspect", "--rigid=no"}) {
+    run = Import(Photos() + flag);
+    EXPECT_EQ(run.exit_code, 2) << flag;
+    EXPECT_CONTAINS(run.err, "--import brings its own");
+  }
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 

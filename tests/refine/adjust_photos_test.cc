@@ -125,6 +125,14 @@ TEST(AdjustPhotos, CirclesAreMatchedByHowTheyLie) {
   EXPECT_EQ(found.circles.size(), 9U);
   EXPECT_NEAR(found.cameras[0].camera.fx, named.cameras[0].camera.fx, 1e-2);
   EXPECT_NEAR(found.cameras[0].Sigma(0), named.cameras[0].Sigma(0), 1e-5);
+
+  // Pencils are then each photo's own.
+  sheet.WithPencils();
+  const AdjustedPhotos with_pencils = AdjustPhotos(sheet.photos, PointNoiseOnly());
+  ASSERT_TRUE(with_pencils.status.ok()) << with_pencils.status.message;
+  EXPECT_EQ(with_pencils.directions.size(), 12U);
+  for (const AdjustedDirection& direction : with_pencils.directions)
+    EXPECT_EQ(direction.id.find(std::to_string(direction.photo) + ":"), 0U) << direction.id;
 }
 
 TEST(AdjustPhotos, RowsAndColumnsOfUnknownSpacingSuffice) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/sheet_photos.h"
@@ -46,6 +47,12 @@ struct GivenSheet {
   // Leaves one circle in each photo, the middle one of the sheet.
   void KeepOneCircle() {
     for (Observations& photo : sheet.photos) photo.circles = {photo.circles[4]};
+  }
+  // Leaves those circles in a photo.
+  void Keep(std::size_t photo, const std::vector<std::size_t>& circles) {
+    std::vector<CircleObservation> kept;
+    for (const std::size_t k : circles) kept.push_back(sheet.photos[photo].circles[k]);
+    sheet.photos[photo].circles = kept;
   }
   AdjustedPhotos Run() const { return AdjustPhotos(sheet.photos, options); }
 
@@ -104,6 +111,66 @@ TEST(GivenPoses, CirclesAreFoundAgainWhateverTheirIds) {
   EXPECT_GT(std::abs(adjusted.given->rotation.col(2).dot(kTurn.col(2))), std::cos(0.001));
 }
 
+// Two rims about one centre, so near in size that each may be a sight of the other.
+TEST(GivenPoses, EachOfTwoRimsIsALandmark) {
+  GivenSheet given(5);
+  for (Observations& photo : given.sheet.photos) photo.circles.clear();
+  given.sheet.WithCircle("a", 1.0).WithCircle("b", 1.2);
+  given.sheet.photos[1].circles[1].radius = 0.12;  // A tenth of what it is.
+  const AdjustedPhotos adjusted = given.Run();
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  ASSERT_EQ(adjusted.circles.size(), 2U);
+  EXPECT_NEAR(adjusted.circles[0].radius, 0.1, 0.0005);
+  EXPECT_NEAR(adjusted.circles[1].radius, 0.12, 1e-6);
+  EXPECT_NEAR(adjusted.given->scale, 10.0 * kScale, 0.005 * 10.0 * kScale);
+}
+
+// Each photo shares a circle with the next one only; the one at the end of the chain is first.
+TEST(GivenPoses, TheOrderOfPhotosLosesNone) {
+  GivenSheet given(4);
+  given.Keep(0, {8});
+  given.Keep(1, {0, 1});
+  given.Keep(2, {1, 4});
+  given.Keep(3, {4, 8});
+  const AdjustedPhotos adjusted = given.Run();
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_TRUE(adjusted.photos[i].status.ok()) << i << adjusted.photos[i].status.message;
+  EXPECT_EQ(adjusted.circles.size(), 4U);
+}
+
+// Between two photos of one circle others show none, or others.
+TEST(GivenPoses, PhotosFarApartInTheListAreFound) {
+  for (const bool are_blank : {true, false}) {
+    GivenSheet given(10);
+    given.Keep(0, {0});
+    given.Keep(9, {0});
+    for (std::size_t i = 1; i < 9; ++i)
+      given.Keep(i, are_blank ? std::vector<std::size_t>() : std::vector<std::size_t>{i});
+    const AdjustedPhotos adjusted = given.Run();
+    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    EXPECT_TRUE(adjusted.photos[0].status.ok()) << adjusted.photos[0].status.message;
+    EXPECT_TRUE(adjusted.photos[9].status.ok()) << adjusted.photos[9].status.message;
+    EXPECT_EQ(adjusted.circles.size(), 1U);
+  }
+}
+
+// Line groups are the same where their directions are, whatever the photos call them.
+TEST(GivenPoses, DirectionsAreFoundAgainWhateverTheirIds) {
+  GivenSheet given(4);
+  given.sheet.WithPencils();
+  for (std::size_t i = 0; i < given.sheet.photos.size(); ++i) {
+    Observations& photo = given.sheet.photos[i];
+    if (i % 2 == 1) std::swap(photo.pencils[0].id, photo.pencils[1].id);
+    for (std::size_t k = 0; k < 9; ++k) photo.circles[k].id = "c" + std::to_string((k + 2 * i) % 9);
+  }
+  const AdjustedPhotos adjusted = given.Run();
+  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  ASSERT_EQ(adjusted.directions.size(), 2U);
+  EXPECT_EQ(adjusted.directions[0].photo, -1);
+  EXPECT_LT(std::abs(adjusted.directions[0].direction.dot(adjusted.directions[1].direction)), 0.01);
+}
+
 TEST(GivenPoses, APhotoOfAnotherPlaceIsLeftOutAndNamed) {
   GivenSheet given(6);
   std::optional<CameraPose>& wrong = given.options.given_poses[3];
@@ -112,6 +179,9 @@ TEST(GivenPoses, APhotoOfAnotherPlaceIsLeftOutAndNamed) {
   ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
   for (std::size_t i = 0; i < 6; ++i)
     EXPECT_EQ(adjusted.photos[i].status.ok(), i != 3) << i << adjusted.photos[i].status.message;
+  EXPECT_NE(adjusted.photos[3].status.message.find("contradicts the other photos"),
+            std::string::npos)
+      << adjusted.photos[3].status.message;
 }
 
 TEST(GivenPoses, WhatIsMissingIsSaidInWords) {
@@ -120,6 +190,12 @@ TEST(GivenPoses, WhatIsMissingIsSaidInWords) {
   AdjustedPhotos adjusted = given.Run();
   ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
   EXPECT_EQ(adjusted.photos[1].status.message, "no pose is given for it");
+
+  given.options.rigid = RigidWorld::kYes;
+  adjusted = given.Run();
+  EXPECT_EQ(adjusted.status.code, StatusCode::kInvalidArgument);
+  EXPECT_NE(adjusted.status.message.find("rigid"), std::string::npos);
+  given.options.rigid = RigidWorld::kAuto;
 
   given.options.given_poses[1] = CameraPose{2.0 * Eigen::Matrix3d::Identity(), {0.0, 0.0, 1.0}};
   EXPECT_EQ(given.Run().status.code, StatusCode::kInvalidArgument);
