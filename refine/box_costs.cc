@@ -1,6 +1,6 @@
 // The cost function of a box's edges.
 #include <Eigen/Dense>
-#include <cmath>
+#include <optional>
 #include <utility>
 
 #include "circline/refine/block_chain.h"
@@ -63,18 +63,13 @@ bool BoxEdgeCost::EvaluateWith(const Weighing& weighing, const double* const* pa
                                double* residuals, double** jacobians) const {
   const Placed e(*this, parameters);
   const bool camera_variable = has_camera_ && jacobians != nullptr && jacobians[kCamera] != nullptr;
-  CurveModel model;
-  const double twice_cost =
-      points_.SumLine(e.p.cross(e.d), has_camera_ ? parameters[kCamera] : nullptr, weighing,
-                      camera_variable, jacobians != nullptr ? &model : nullptr);
-  if (!std::isfinite(twice_cost)) return false;
   const int rows = num_residuals();
-  if (jacobians == nullptr) {
-    CostOnly(twice_cost, rows, residuals);
-    return true;
-  }
-  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), rows, residuals);
-  const auto U = root.U.leftCols(3);
+  std::optional<LineRoot> root;
+  if (!LineResiduals(points_, e.p.cross(e.d), has_camera_ ? parameters[kCamera] : nullptr, weighing,
+                     camera_variable, rows, residuals, jacobians != nullptr ? &root : nullptr))
+    return false;
+  if (!root) return true;
+  const auto U = root->U.leftCols(3);
   const Eigen::Matrix3d by_p = -CrossMatrix(e.d), by_d = CrossMatrix(e.p);
   const Eigen::Matrix3d by_corner = by_p * e.R, by_along = by_d * e.R;
   WriteJacobian(
@@ -93,7 +88,7 @@ bool BoxEdgeCost::EvaluateWith(const Weighing& weighing, const double* const* pa
   WriteJacobian(U * (by_corner * BySkew(e.corner) + by_along * BySkew(e.along)), rows, kSkew,
                 jacobians);
   if (camera_variable)
-    WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, kCamera, jacobians);
+    WriteCameraJacobian(root->U.rightCols(root->U.cols() - 3), rows, kCamera, jacobians);
   return true;
 }
 

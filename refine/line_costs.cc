@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "circline/refine/block_chain.h"
@@ -107,27 +108,23 @@ bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* con
   if (!Place(parameters, &p)) return false;
   const bool soft = options_.direction_sigma > 0.0;
   const bool camera_variable = options_.camera && jacobians != nullptr && jacobians[3] != nullptr;
-  CurveModel model;
-  const double twice_cost =
-      points_.SumLine(p.line, options_.camera ? parameters[3] : nullptr, weighing, camera_variable,
-                      jacobians != nullptr ? &model : nullptr);
-  if (!std::isfinite(twice_cost)) return false;
   const int rows = num_residuals(), line_rows = rows - (soft ? 1 : 0);
+  std::optional<LineRoot> root;
+  if (!LineResiduals(points_, p.line, options_.camera ? parameters[3] : nullptr, weighing,
+                     camera_variable, line_rows, residuals, jacobians != nullptr ? &root : nullptr))
+    return false;
   const double deviation = soft ? p.e / options_.direction_sigma : 0.0;
   const AsSquare prior(deviation);
   if (soft) residuals[line_rows] = weighing.inliers_only ? deviation : prior.value;
-  if (jacobians == nullptr) {
-    CostOnly(twice_cost, line_rows, residuals);
-    return true;
-  }
-  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), line_rows, residuals);
-  const auto U = root.U.leftCols(3);
+  if (!root) return true;
+  const auto U = root->U.leftCols(3);
   const Eigen::Matrix3d by_direction = p.ByDirection(fit_);
   WriteJacobian(
       U * (by_direction * (-p.R * CrossMatrix(p.in_world))) * DeltaFromQuaternion(parameters[0]),
       rows, 0, jacobians);
   WriteJacobian(U * (by_direction * p.R), rows, 1, jacobians);
-  if (camera_variable) WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, 3, jacobians);
+  if (camera_variable)
+    WriteCameraJacobian(root->U.rightCols(root->U.cols() - 3), rows, 3, jacobians);
   if (jacobians[2] == nullptr) return true;
   Eigen::Matrix<double, 3, 2> by_own;
   by_own << p.by_angle, p.d;
@@ -175,18 +172,13 @@ bool PlaneLineCost::EvaluateWith(const Weighing& weighing, const double* const* 
                                  double* residuals, double** jacobians) const {
   const PlaneLine line(parameters);
   const bool camera_variable = has_camera_ && jacobians != nullptr && jacobians[4] != nullptr;
-  CurveModel model;
-  const double twice_cost =
-      points_.SumLine(line.p.cross(line.d), has_camera_ ? parameters[4] : nullptr, weighing,
-                      camera_variable, jacobians != nullptr ? &model : nullptr);
-  if (!std::isfinite(twice_cost)) return false;
   const int rows = num_residuals();
-  if (jacobians == nullptr) {
-    CostOnly(twice_cost, rows, residuals);
-    return true;
-  }
-  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), rows, residuals);
-  const auto U = root.U.leftCols(3);
+  std::optional<LineRoot> root;
+  if (!LineResiduals(points_, line.p.cross(line.d), has_camera_ ? parameters[4] : nullptr, weighing,
+                     camera_variable, rows, residuals, jacobians != nullptr ? &root : nullptr))
+    return false;
+  if (!root) return true;
+  const auto U = root->U.leftCols(3);
   const Eigen::Matrix3d by_p = -CrossMatrix(line.d), by_d = CrossMatrix(line.p);
   WriteJacobian(
       U * (by_p * (-line.R * CrossMatrix(line.X)) + by_d * (-line.R * CrossMatrix(line.D))) *
@@ -196,7 +188,8 @@ bool PlaneLineCost::EvaluateWith(const Weighing& weighing, const double* const* 
   WriteJacobian(U * by_p * line.R.leftCols<2>(), rows, 2, jacobians);
   const Eigen::Vector3d turned(-line.D.y(), line.D.x(), 0.0);
   WriteJacobian(U * (by_d * (line.R * turned)), rows, 3, jacobians);
-  if (camera_variable) WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, 4, jacobians);
+  if (camera_variable)
+    WriteCameraJacobian(root->U.rightCols(root->U.cols() - 3), rows, 4, jacobians);
   return true;
 }
 

@@ -3,7 +3,10 @@
 #define CIRCLINE_REFINE_LINE_ROOT_H_
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
+#include "circline/refine/block_chain.h"
 #include "circline/refine/image_points.h"
 #include "circline/refine/square_root.h"
 
@@ -23,6 +26,24 @@ inline LineRoot WriteLine(const CurveModel& model, int rank, int num_rows, doubl
   Eigen::Map<Eigen::VectorXd>(residuals, root.f.size()) = root.f;
   residuals[num_rows - 1] = root.rest;
   return root;
+}
+
+// The residuals of the points about the line; in `root`, unless it is null (no Jacobians are asked
+// for), what their Jacobians are made of. `camera` may be null, and is a variable if
+// `camera_variable`. False where a point has no finite cost.
+inline bool LineResiduals(const ImagePoints& points, const Eigen::Vector3d& line,
+                          const double* camera, const Weighing& weighing, bool camera_variable,
+                          int num_rows, double* residuals, std::optional<LineRoot>* root) {
+  CurveModel model;
+  const double twice_cost =
+      points.SumLine(line, camera, weighing, camera_variable, root != nullptr ? &model : nullptr);
+  if (!std::isfinite(twice_cost)) return false;
+  if (root == nullptr) {
+    CostOnly(twice_cost, num_rows, residuals);
+  } else {
+    *root = WriteLine(model, LineRank(points, camera_variable), num_rows, residuals);
+  }
+  return true;
 }
 
 }  // namespace circline
