@@ -16,7 +16,8 @@ using Eigen::Vector3d;
 
 constexpr double kRadiansPerDegree = 0.017453292519943295;
 const cv::Vec3b kGround(245, 243, 240), kBehind(170, 170, 170);
-constexpr int kFiner = 2;  // Rendered so many times as large, then averaged.
+constexpr int kFiner = 2;      // Rendered so many times as large, then averaged.
+constexpr int kMostPx = 1600;  // Longer side of the photo in the picture, and of each view.
 
 struct Corner {
   Vector2d pixel;
@@ -31,7 +32,7 @@ class Renderer {
         pose_(pose),
         picture_(camera.height, camera.width, CV_8UC3,
                  cv::Scalar(kGround[0], kGround[1], kGround[2])),
-        inverse_depth_(camera.height, camera.width, CV_64F, cv::Scalar(0.0)) {}
+        inverse_depth_(camera.height, camera.width, CV_32F, cv::Scalar(0.0)) {}
 
   void Draw(const Patch& patch) {
     const Mesh mesh = MeshOf(patch);
@@ -74,14 +75,15 @@ class Renderer {
         const Vector2d p = Vector2d(x, y) - a;
         const double w1 = Cross(p, ac) / area, w2 = Cross(ab, p) / area, w0 = 1.0 - w1 - w2;
         if (w0 < 0.0 || w1 < 0.0 || w2 < 0.0) continue;
-        const double near =
+        const double inverse =
             w0 * c[0].inverse_depth + w1 * c[1].inverse_depth + w2 * c[2].inverse_depth;
-        double& nearest = inverse_depth_.at<double>(y, x);
+        const auto near = static_cast<float>(inverse);
+        float& nearest = inverse_depth_.at<float>(y, x);
         if (near <= nearest) continue;
         const Vector2d st =
             (w0 * c[0].inverse_depth * c[0].texture + w1 * c[1].inverse_depth * c[1].texture +
              w2 * c[2].inverse_depth * c[2].texture) /
-            near;
+            inverse;
         cv::Vec3b color;
         if (!Color(texture, st, area > 0.0, &color)) continue;
         picture_.at<cv::Vec3b>(y, x) = color;
@@ -104,7 +106,7 @@ class Renderer {
   cv::Mat picture_, inverse_depth_;
 };
 
-// What of the model lies within the solids, or all of it where there is none.
+// The middle of the model, and half of its diagonal.
 void Extent(const Model& model, Vector3d* center, double* radius) {
   std::vector<Vector3d> points;
   for (const Patch& patch : model.patches) {
@@ -141,6 +143,9 @@ cv::Mat RenderModel(const Model& model, const Camera& camera, const CameraPose& 
 
 cv::Mat ModelViews(const cv::Mat& photo, const Model& model, const CameraPose& pose,
                    const std::string& title, const std::vector<std::string>& caption) {
+  const double scale = static_cast<double>(kMostPx) / std::max(photo.cols, photo.rows);
+  cv::Mat shown = photo;
+  if (scale < 1.0) cv::resize(photo, shown, cv::Size(), scale, scale, cv::INTER_AREA);
   Vector3d center;
   double radius;
   Extent(model, &center, &radius);
@@ -148,20 +153,20 @@ cv::Mat ModelViews(const cv::Mat& photo, const Model& model, const CameraPose& p
   const double azimuth = std::atan2(back.y(), back.x());
   const double side = back.z() < 0.0 ? -1.0 : 1.0;  // Seen from below in the photo and here.
   Camera camera;
-  camera.width = kFiner * photo.cols;
-  camera.height = kFiner * photo.rows;
+  camera.width = kFiner * shown.cols;
+  camera.height = kFiner * shown.rows;
   constexpr double kDistance = 3.5;  // In radii of the model, which then fills the picture.
   camera.fx = camera.fy = 0.48 * kDistance * std::min(camera.width, camera.height);
   camera.cx = 0.5 * (camera.width - 1);
   camera.cy = 0.5 * (camera.height - 1);
-  std::vector<cv::Mat> pictures = {photo};
+  std::vector<cv::Mat> pictures = {shown};
   // From the photo's own azimuth, and over the plane; degrees.
   constexpr double kSides[3][2] = {{-35.0, 30.0}, {35.0, 30.0}, {0.0, 70.0}};
   for (const auto& from : kSides) {
     const CameraPose view = LookAt(center, azimuth + from[0] * kRadiansPerDegree,
                                    side * from[1] * kRadiansPerDegree, kDistance * radius);
     cv::Mat small;
-    cv::resize(RenderModel(model, camera, view), small, photo.size(), 0.0, 0.0, cv::INTER_AREA);
+    cv::resize(RenderModel(model, camera, view), small, shown.size(), 0.0, 0.0, cv::INTER_AREA);
     pictures.push_back(small);
   }
   cv::Mat above, below, all;

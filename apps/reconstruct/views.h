@@ -16,8 +16,9 @@ namespace circline::apps {
 // behind it. Surfaces seen from behind are grey.
 cv::Mat RenderModel(const Model& model, const Camera& camera, const CameraPose& pose);
 
-// Four pictures of one size: `photo` (BGR), then the model from the left of where the photo was
-// taken, from the right, and from above, with `caption` below.
+// Four pictures of one size, at most 1600 pixels along the longer side: `photo` (BGR), then the
+// model from the left of where the photo was taken, from the right, and from above, with `caption`
+// below.
 cv::Mat ModelViews(const cv::Mat& photo, const Model& model, const CameraPose& pose,
                    const std::string& title, const std::vector<std::string>& caption);
 
