@@ -20,20 +20,23 @@ import tempfile
 
 import cv2
 
-# Along x, y, z as the program names a box that it finds (z upright, x the longer of the others), and the set's own axes for these.
+# Lengths along x, y, z as the program names a box that it finds: z upright, x the longer of the others; mm.
 SETS = {
-    'box-camprodon': ((259.0, 191.0, 79.0), 'yxz'),
-    'box-camprodon-more': ((259.0, 191.0, 79.0), 'yxz'),
-    'turntable-teabox': ((165.0, 68.0, 80.0), None),
+    'box-camprodon': (259.0, 191.0, 79.0),
+    'box-camprodon-more': (259.0, 191.0, 79.0),
+    'turntable-teabox': (165.0, 68.0, 80.0),
 }
-# Where the measured edges of the biscuit box lie: at the far end of which axes, from the front lower left corner, by the set's names
-# (top or bottom, front or back, left or right).
 AXES = 'xyz'
 
 
+def number(value):
+    """With a point or an exponent: the scene file's readers take `9` for an integer."""
+    text = f'{float(value):.9g}'
+    return text if '.' in text or 'e' in text else text + '.'
+
+
 def numbers(values):
-    return '[' + ', '.join(f'{float(v):.9g}' if '.' in f'{float(v):.9g}' or 'e' in f'{float(v):.9g}' else f'{float(v):.9g}.'
-                           for v in values) + ']'
+    return '[' + ', '.join(map(number, values)) + ']'
 
 
 def nodes(node, key):
@@ -50,7 +53,7 @@ def camera_line(node, ident, size):
 
 
 def edges_of(image):
-    """Of the biscuit box: `top_back_long`, `front_left_vertical`, ..."""
+    """Of the biscuit box, whose names (`top_back_long`, `front_left_vertical`, ...) say where each edge lies."""
     edges = []
     for line in nodes(image, 'lines'):
         words = line.getNode('name').string().split('_')
@@ -91,19 +94,19 @@ def reconstruct(program, scene, out):
 
 class Table:
     def __init__(self):
-        self.relative, self.sigmas, self.photos, self.refused = [], [], 0, 0
+        self.relative, self.sigmas, self.photos, self.found = [], [], 0, 0
         self.agreement = []
 
     def row(self):
         inside = sum(s <= 3.0 for s in self.sigmas)
-        return (f'{len(self.relative):5d} {self.photos - self.refused:3d} of {self.photos:2d} '
+        return (f'{len(self.relative):5d} {self.found:3d} of {self.photos:2d} '
                 f'{100 * statistics.median(self.relative):7.2f} {100 * max(self.relative):7.2f} '
                 f'{inside:4d} {100.0 * inside / len(self.sigmas):5.1f} '
                 f'{100.0 * sum(s <= 2.0 for s in self.sigmas) / len(self.sigmas):5.1f}')
 
 
 def measure(args, data_set, evidence, scratch):
-    truth, _ = SETS[data_set]
+    truth = SETS[data_set]
     folder = os.path.join(args.data, data_set)
     storage = cv2.FileStorage(os.path.join(folder, 'groundtruth.yml'), cv2.FILE_STORAGE_READ)
     root = storage.root()
@@ -112,16 +115,17 @@ def measure(args, data_set, evidence, scratch):
         edges = edges_of(image) if evidence == 'annotated' else []
         table.photos += 1
         name = os.path.splitext(image.getNode('file').string())[0]
+        found = False
         for axis in range(3):
             given = [truth[k] if k == axis else 0.0 for k in range(3)]
             base = os.path.join(args.output or scratch, f'{data_set}_{evidence}_{name}_{AXES[axis]}')
             write_scene(base + '.yaml', folder, root, image, edges, given)
             rows, reason = reconstruct(args.reconstruct, base + '.yaml', base)
             if rows is None:
-                table.refused += axis == 0
                 if args.verbose:
-                    print(f'  {name}: {reason}')
-                break
+                    print(f'  {name} given {AXES[axis]}: {reason}')
+                continue
+            found = True
             for row in rows:
                 k = AXES.index(row['id'][-1]) if row['what'] == 'length' else axis
                 if k != axis:
@@ -133,11 +137,12 @@ def measure(args, data_set, evidence, scratch):
                               f'{100 * (value / truth[k] - 1):+.1f} %, {(value - truth[k]) / sigma:+.1f} sigma')
             if axis == 0:
                 # The rim of the disc is the circle whose normal is sure; small ones on the box are not discs.
-                found = [(float(r['sigma']), float(r['value']), r['id']) for r in rows if r['what'] == 'agreement']
-                if found:
-                    table.agreement.append(min(found))
+                circles = [(float(r['sigma']), float(r['value']), r['id']) for r in rows if r['what'] == 'agreement']
+                if circles:
+                    table.agreement.append(min(circles))
                     if args.verbose:
-                        print(f'  {name}: ' + '; '.join(f'{i} {v:.2f} +- {s:.2f}' for s, v, i in sorted(found)))
+                        print(f'  {name}: ' + '; '.join(f'{i} {v:.2f} +- {s:.2f}' for s, v, i in sorted(circles)))
+        table.found += found
     return table
 
 

@@ -134,6 +134,7 @@ CylinderObservation ReadCylinder(const StorageNode& node, const Observations& ob
 
 Solids ReadSolids(const StorageNode& image, const Observations& observations) {
   Solids solids;
+  std::vector<std::string> bases;  // Faces that mark edges of a box are no faces of their own.
   for (const StorageNode& node : image.Get("faces").Items()) {
     node.AllowKeys({"id", "corners", "plane"});
     FaceObservation face;
@@ -146,12 +147,18 @@ Solids ReadSolids(const StorageNode& image, const Observations& observations) {
     const std::string kind = node.Require("kind").Text();
     if (kind == "box") {
       solids.boxes.push_back(ReadBox(node, solids.faces));
+      if (node.Get("base").Exists()) bases.push_back(node.Get("base").Text());
     } else if (kind == "cylinder") {
       solids.cylinders.push_back(ReadCylinder(node, observations));
     } else {
       node.Get("kind").Fail("'" + kind + "' is not one of box, cylinder");
     }
   }
+  const auto is_base = [&](const FaceObservation& face) {
+    return std::find(bases.begin(), bases.end(), face.id) != bases.end();
+  };
+  solids.faces.erase(std::remove_if(solids.faces.begin(), solids.faces.end(), is_base),
+                     solids.faces.end());
   return solids;
 }
 

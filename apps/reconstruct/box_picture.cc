@@ -6,6 +6,7 @@
 
 #include "apps/common/text.h"
 #include "apps/compare/canvas.h"
+#include "apps/reconstruct/box_geometry.h"
 
 namespace circline::apps {
 namespace {
@@ -30,11 +31,9 @@ std::vector<Eigen::Vector2d> EdgeCurve(const BoxFit& fit, int from, int to) {
 
 // An edge is seen where one of its two faces is.
 bool IsSeen(const BoxFit& fit, int corner, int axis) {
-  const Eigen::Vector3d eye =
-      -(fit.cam_from_box.rotation.transpose() * fit.cam_from_box.translation);
   for (int k = 0; k < 3; ++k) {
-    if (k == axis) continue;
-    if ((corner >> k & 1) != 0 ? eye[k] > fit.length[k] : eye[k] < 0.0) return true;
+    if (k != axis && FaceIsSeen(fit.cam_from_box, fit.length, k, (corner >> k & 1) != 0))
+      return true;
   }
   return false;
 }

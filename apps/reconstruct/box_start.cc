@@ -1,16 +1,14 @@
-// Where the refinement of a box begins.
+#include "apps/reconstruct/box_start.h"
+
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "apps/reconstruct/fit_box.h"
+#include "apps/reconstruct/box_geometry.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/observations.h"
 
 namespace circline::apps {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-constexpr int kTurns = 360;  // Of the first edge about the camera: one in half a degree.
 
 // The normal of the plane through the camera and the edge.
 bool PlaneOfEdge(const Camera& camera, const BoxEdge& edge, Eigen::Vector3d* normal) {
@@ -22,19 +20,33 @@ bool PlaneOfEdge(const Camera& camera, const BoxEdge& edge, Eigen::Vector3d* nor
   return true;
 }
 
-double LengthPx(const BoxEdge& edge) { return (edge.points.back() - edge.points.front()).norm(); }
-
-// By how much the third edge misses the third axis, where the first axis is turned in the first
-// edge's plane by the angle.
-double Miss(const std::array<Eigen::Vector3d, 3>& normals, double angle, Eigen::Matrix3d* axes) {
-  const Eigen::Vector3d u = normals[0].unitOrthogonal(), v = normals[0].cross(u);
-  const Eigen::Vector3d x = std::cos(angle) * u + std::sin(angle) * v;
-  const Eigen::Vector3d y = normals[1].cross(x).normalized();
-  *axes << x, y, x.cross(y);
-  return axes->col(2).dot(normals[2]);
-}
-
 }  // namespace
+
+// The first axis is X = c u + s v, u and v in its plane, c^2 + s^2 = 1; the second lies across it
+// in its own plane: Y ~ n1 x X; the third, X x Y, lies in its own where n1.n2 = (X.n1)(X.n2):
+// A c^2 + B c s + C s^2 = 0.
+std::vector<Eigen::Matrix3d> OrthogonalAxes(const std::array<Eigen::Vector3d, 3>& normals) {
+  const Eigen::Vector3d u = normals[0].unitOrthogonal(), v = normals[0].cross(u).normalized();
+  const Eigen::Vector2d by_1(u.dot(normals[1]), v.dot(normals[1])),
+      by_2(u.dot(normals[2]), v.dot(normals[2]));
+  const double between = normals[1].dot(normals[2]);
+  const double A = by_1.x() * by_2.x() - between, C = by_1.y() * by_2.y() - between,
+               B = by_1.x() * by_2.y() + by_1.y() * by_2.x();
+  const double discriminant = B * B - 4.0 * A * C;
+  std::vector<Eigen::Matrix3d> found;
+  if (!(discriminant >= 0.0)) return found;
+  const double q = -0.5 * (B + std::copysign(std::sqrt(discriminant), B));
+  for (const Eigen::Vector2d& root : {Eigen::Vector2d(q, A), Eigen::Vector2d(C, q)}) {
+    constexpr double kNone = 1e-9;  // Any x does, or any y.
+    if (!(root.norm() > kNone)) continue;
+    const Eigen::Vector3d x = (root.x() * u + root.y() * v).normalized(), y = normals[1].cross(x);
+    if (!(y.norm() > kNone)) continue;
+    Eigen::Matrix3d axes;
+    axes << x, y.normalized(), x.cross(y.normalized());
+    found.push_back(axes);
+  }
+  return found;
+}
 
 std::vector<Eigen::Matrix3d> BoxAxes(const Camera& camera, const std::vector<BoxEdge>& edges) {
   std::array<Eigen::Vector3d, 3> normals;
@@ -42,23 +54,13 @@ std::vector<Eigen::Matrix3d> BoxAxes(const Camera& camera, const std::vector<Box
   for (const BoxEdge& edge : edges) {
     const auto axis = static_cast<std::size_t>(edge.axis);
     Eigen::Vector3d normal;
-    if (LengthPx(edge) <= longest[axis] || !PlaneOfEdge(camera, edge, &normal)) continue;
-    longest[axis] = LengthPx(edge);
+    const double length_px = EdgeLengthPx(edge);
+    if (length_px <= longest[axis] || !PlaneOfEdge(camera, edge, &normal)) continue;
+    longest[axis] = length_px;
     normals[axis] = normal;
   }
-  std::vector<Eigen::Matrix3d> found;
-  if (!(longest[0] > 0.0 && longest[1] > 0.0 && longest[2] > 0.0)) return found;
-  Eigen::Matrix3d axes, before;
-  double last = Miss(normals, 0.0, &before);
-  for (int k = 1; k <= kTurns; ++k) {
-    const double miss = Miss(normals, kPi * k / kTurns, &axes);
-    // The sign also changes where y does: there the miss does not pass through zero.
-    if ((miss < 0.0) != (last < 0.0) && axes.col(1).dot(before.col(1)) > 0.0)
-      found.push_back(std::abs(miss) < std::abs(last) ? axes : before);
-    last = miss;
-    before = axes;
-  }
-  return found;
+  if (!(longest[0] > 0.0 && longest[1] > 0.0 && longest[2] > 0.0)) return {};
+  return OrthogonalAxes(normals);
 }
 
 bool PlaceBox(const Camera& camera, const std::vector<BoxEdge>& edges, const Eigen::Matrix3d& axes,
@@ -77,7 +79,7 @@ bool PlaceBox(const Camera& camera, const std::vector<BoxEdge>& edges, const Eig
       const bool counts = k != edge.axis && edge.far[static_cast<std::size_t>(k)];
       row[3 + k] = counts ? normal.dot(axes.col(k)) : 0.0;
     }
-    moments += row * row.transpose() * LengthPx(edge);
+    moments += row * row.transpose() * EdgeLengthPx(edge);
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(moments);
   constexpr double kNoInformation = 1e-12;
@@ -89,11 +91,6 @@ bool PlaceBox(const Camera& camera, const std::vector<BoxEdge>& edges, const Eig
   *translation = x.head<3>();
   *length = x.tail<3>();
   return x.allFinite();
-}
-
-Eigen::Vector3d BoxCorner(const Eigen::Vector3d& length, int corner) {
-  return {(corner & 1) != 0 ? length.x() : 0.0, (corner & 2) != 0 ? length.y() : 0.0,
-          (corner & 4) != 0 ? length.z() : 0.0};
 }
 
 }  // namespace circline::apps

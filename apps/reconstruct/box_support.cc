@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace circline::apps {
 namespace {
@@ -23,14 +24,13 @@ void LongestFirst(std::vector<FlatLine>* lines) {
 
 std::vector<FlatLine> FlatLines(const std::vector<DetectedLine>& lines, const Camera& camera) {
   std::vector<FlatLine> flat;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
+  for (const DetectedLine& detected : lines) {
     FlatLine line;
-    line.plane = lines[i].fit.line;
-    line.index = static_cast<int>(i);
+    line.plane = detected.fit.line;
     bool seen = true;
     for (std::size_t k = 0; k < 2; ++k) {
       CalibratedPoint point;
-      seen = seen && PixelToCalibrated(camera, lines[i].ends[k], &point);
+      seen = seen && PixelToCalibrated(camera, detected.ends[k], &point);
       line.ends[k] = camera.fx * point.x;
     }
     if (seen) flat.push_back(line);
@@ -62,46 +62,40 @@ std::vector<FlatLine> LinesAlong(const std::vector<FlatLine>& lines,
   return along;
 }
 
-bool RunsAlong(const FlatLine& line, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
-               double near_px, double* begin, double* end) {
-  const double length = (b - a).norm();
-  if (!(length > 0.0)) return false;
-  const Eigen::Vector2d along = (b - a) / length, across(-along.y(), along.x());
-  double t0 = along.dot(line.ends[0] - a), t1 = along.dot(line.ends[1] - a);
-  double d0 = across.dot(line.ends[0] - a), d1 = across.dot(line.ends[1] - a);
-  if (t0 > t1) {
-    std::swap(t0, t1);
-    std::swap(d0, d1);
+RaySupport::RaySupport(const std::vector<FlatLine>& along, const Eigen::Vector2d& begin,
+                       const Eigen::Vector2d& towards, double near_px)
+    : near_px_(near_px) {
+  if (!(towards.norm() > 0.0)) return;
+  const Eigen::Vector2d ray = towards.normalized(), across(-ray.y(), ray.x());
+  for (const FlatLine& line : along) {
+    Part part{ray.dot(line.ends[0] - begin), ray.dot(line.ends[1] - begin),
+              across.dot(line.ends[0] - begin), 0.0};
+    double offset_at_end = across.dot(line.ends[1] - begin);
+    if (part.begin > part.end) {
+      std::swap(part.begin, part.end);
+      std::swap(part.offset, offset_at_end);
+    }
+    if (!(part.end > std::max(part.begin, 0.0))) continue;
+    part.slope = (offset_at_end - part.offset) / (part.end - part.begin);
+    const double offset = part.offset + part.slope * std::max(-part.begin, 0.0);
+    if (std::abs(offset) <= near_px) parts_.push_back(part);
   }
-  const double from = std::max(t0, 0.0), to = std::min(t1, length);
-  if (!(to > from) || !(t1 > t0)) return false;
-  const double slope = (d1 - d0) / (t1 - t0);
-  if (std::abs(d0 + slope * (from - t0)) > near_px || std::abs(d0 + slope * (to - t0)) > near_px)
-    return false;
-  *begin = t0;
-  *end = t1;
-  return true;
+  std::sort(parts_.begin(), parts_.end(),
+            [](const Part& a, const Part& b) { return a.begin < b.begin; });
 }
 
-double EdgeSupport(const std::vector<FlatLine>& along, const Eigen::Vector2d& a,
-                   const Eigen::Vector2d& b, double near_px) {
-  const double length = (b - a).norm();
-  std::vector<std::array<double, 2>> parts;
-  double before = 0.0, beyond = 0.0;
-  for (const FlatLine& line : along) {
-    double begin, end;
-    if (!RunsAlong(line, a, b, near_px, &begin, &end)) continue;
-    before = std::max(before, std::min(-begin - kFreeRunPx, kOverrunPx));
-    beyond = std::max(beyond, std::min(end - length - kFreeRunPx, kOverrunPx));
-    parts.push_back({std::max(begin, 0.0), std::min(end, length)});
+double RaySupport::Of(double length_px) const {
+  double before = 0.0, beyond = 0.0, covered = 0.0, reached = 0.0;
+  for (const Part& part : parts_) {
+    const double from = std::max(part.begin, 0.0), to = std::min(part.end, length_px);
+    if (!(to > from)) continue;
+    if (std::abs(part.offset + part.slope * (to - part.begin)) > near_px_) continue;
+    before = std::max(before, std::min(-part.begin - kFreeRunPx, kOverrunPx));
+    beyond = std::max(beyond, std::min(part.end - length_px - kFreeRunPx, kOverrunPx));
+    covered += std::max(0.0, to - std::max(from, reached));
+    reached = std::max(reached, to);
   }
-  std::sort(parts.begin(), parts.end());
-  double sum = 0.0, reached = 0.0;
-  for (const auto& part : parts) {
-    sum += std::max(0.0, part[1] - std::max(part[0], reached));
-    reached = std::max(reached, part[1]);
-  }
-  return sum - kGapWeight * (length - sum) - before - beyond;
+  return covered - kGapWeight * (length_px - covered) - before - beyond;
 }
 
 }  // namespace circline::apps

@@ -15,7 +15,6 @@ namespace circline::apps {
 struct FlatLine {
   std::array<Eigen::Vector2d, 2> ends;
   Eigen::Vector3d plane;  // Normal of the plane through the camera and the line.
-  int index = 0;          // Of the DetectedLine.
 };
 
 // Longest first.
@@ -32,15 +31,27 @@ std::vector<FlatLine> LinesAlong(const std::vector<FlatLine>& lines,
 Eigen::Vector2d FlatDirection(const Eigen::Vector3d& direction, const Eigen::Vector2d& at,
                               double focal_px);
 
-// Whether the line runs along the edge from a to b and overlaps it; [begin, end] is then its part
-// along it, from a, pixels, and may exceed the edge.
-bool RunsAlong(const FlatLine& line, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
-               double near_px, double* begin, double* end);
+// What lines of the photo say for the edges of a box that begin at a point of it and end anywhere
+// on a ray.
+class RaySupport {
+ public:
+  // `along`: LinesAlong the edge; those within `near_px` of it speak for it.
+  RaySupport(const std::vector<FlatLine>& along, const Eigen::Vector2d& begin,
+             const Eigen::Vector2d& towards, double near_px);
 
-// Covered length of the edge, by lines within `near_px`, less half of what is not, less what runs
-// on beyond its ends, pixels.
-double EdgeSupport(const std::vector<FlatLine>& along, const Eigen::Vector2d& a,
-                   const Eigen::Vector2d& b, double near_px);
+  // Covered length of an edge this long, less half of what is not covered, less what runs on beyond
+  // its ends; pixels.
+  double Of(double length_px) const;
+
+ private:
+  // Of a line: where it begins and ends along the ray, its offset across the ray where it begins,
+  // and the slope of that.
+  struct Part {
+    double begin, end, offset, slope;
+  };
+  std::vector<Part> parts_;  // By where they begin.
+  double near_px_;
+};
 
 }  // namespace circline::apps
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "apps/reconstruct/fit_box.h"
+#include "apps/reconstruct/axes_vote.h"
 #include "circline/ransac/detection/detect_pencils.h"
 #include "circline/ransac/detection/segment_meetings.h"
 
@@ -23,7 +23,8 @@ constexpr double kEdgeOnSine = 0.12;
 constexpr double kNearPx = 5.0;  // From an edge that a line speaks for.
 constexpr int kMaxPencils = 6;   // Whose directions may be an axis.
 constexpr std::uint64_t kSeed = 1;
-constexpr double kSameEndPx = 1.0;  // Far ends nearer than this are one.
+constexpr double kSameEndPx = 1.0;    // Far ends nearer than this are one.
+constexpr std::size_t kMaxEnds = 32;  // Of a box along one axis that are tried.
 
 // The edge along `axis`, at the far end of the box along `far` (3: at none).
 struct VisibleEdge {
@@ -82,10 +83,19 @@ class BoxTracer {
   }
 
  private:
-  double Support(const TracedBox& box, const VisibleEdge& edge) const {
-    Vector2d a, b;
-    if (!FlatEnds(box, edge, focal_px_, &a, &b)) return -std::numeric_limits<double>::infinity();
-    return EdgeSupport(along_[edge.axis], a, b, kNearPx);
+  // Of the edges along the box's axis `a` that begin at the point, one for each of these lengths.
+  Eigen::VectorXd Supports(const TracedBox& box, const Vector3d& begin, std::size_t a,
+                           const std::vector<double>& lengths) const {
+    Eigen::VectorXd support = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(lengths.size()),
+                                                        -std::numeric_limits<double>::infinity());
+    Vector2d from, to;
+    if (!ToFlat(begin, focal_px_, &from)) return support;
+    const RaySupport ray(along_[a], from, FlatDirection(box.axis[a], from, focal_px_), kNearPx);
+    for (std::size_t i = 0; i < lengths.size(); ++i) {
+      if (ToFlat(begin + lengths[i] * box.axis[a], focal_px_, &to))
+        support[static_cast<Eigen::Index>(i)] = ray.Of((to - from).norm());
+    }
+    return support;
   }
 
   // Each axis leads away from the camera, as far as that can be told, else either way.
@@ -106,11 +116,11 @@ class BoxTracer {
     }
   }
 
-  // Where lines across it may end the box along the axis.
+  // Where lines across it may end the box along the axis: the longest of these lines.
   std::vector<double> FarEnds(const TracedBox& box, std::size_t k) const {
-    std::vector<double> lengths;
+    std::vector<std::array<double, 2>> ends;  // Minus the line's length, and that of the box.
     Vector2d near, far;
-    if (!ToFlat(box.corner, focal_px_, &near)) return lengths;
+    if (!ToFlat(box.corner, focal_px_, &near)) return {};
     for (std::size_t j = 0; j < 3; ++j) {
       for (const FlatLine& line : along_[j]) {
         const double across = line.plane.dot(box.axis[k]);
@@ -118,14 +128,19 @@ class BoxTracer {
         const double length = -line.plane.dot(box.corner) / across;
         if (!(length > 0.0) || !ToFlat(box.corner + length * box.axis[k], focal_px_, &far))
           continue;
-        if ((far - near).norm() >= kMinEdgePx) lengths.push_back(length);
+        if ((far - near).norm() >= kMinEdgePx)
+          ends.push_back({-(line.ends[1] - line.ends[0]).norm(), length});
       }
     }
-    std::sort(lengths.begin(), lengths.end());
+    std::sort(ends.begin(), ends.end());
     const double same = kSameEndPx / focal_px_;
-    lengths.erase(std::unique(lengths.begin(), lengths.end(),
-                              [same](double a, double b) { return b - a < same; }),
-                  lengths.end());
+    std::vector<double> lengths;
+    for (std::size_t i = 0; i < ends.size() && lengths.size() < kMaxEnds; ++i) {
+      const bool is_new = std::none_of(lengths.begin(), lengths.end(), [&](double other) {
+        return std::abs(ends[i][1] - other) < same;
+      });
+      if (is_new) lengths.push_back(ends[i][1]);
+    }
     return lengths;
   }
 
@@ -139,15 +154,18 @@ class BoxTracer {
     }
     std::array<Eigen::MatrixXd, 3> pair;  // [k]: of lengths along k + 1 and k + 2.
     for (std::size_t k = 0; k < 3; ++k) pair[k] = PairSupport(box, ends, (k + 1) % 3, (k + 2) % 3);
-    const auto index = [](std::size_t i) { return static_cast<Eigen::Index>(i); };
-    for (std::size_t i = 0; i < ends[0].size(); ++i) {
-      for (std::size_t j = 0; j < ends[1].size(); ++j) {
-        for (std::size_t l = 0; l < ends[2].size(); ++l) {
-          const double score = pair[2](index(i), index(j)) + pair[0](index(j), index(l)) +
-                               pair[1](index(l), index(i));
+    const Eigen::VectorXd best_0 = pair[0].rowwise().maxCoeff(),
+                          best_1 = pair[1].colwise().maxCoeff().transpose();
+    for (Eigen::Index i = 0; i < pair[2].rows(); ++i) {
+      for (Eigen::Index j = 0; j < pair[2].cols(); ++j) {
+        if (!(pair[2](i, j) + best_0[j] + best_1[i] > best->score)) continue;
+        for (Eigen::Index l = 0; l < pair[0].cols(); ++l) {
+          const double score = pair[2](i, j) + pair[0](j, l) + pair[1](l, i);
           if (!(score > best->score)) continue;
           *best = box;
-          best->length = {ends[0][i], ends[1][j], ends[2][l]};
+          best->length = {ends[0][static_cast<std::size_t>(i)],
+                          ends[1][static_cast<std::size_t>(j)],
+                          ends[2][static_cast<std::size_t>(l)]};
           best->score = score;
         }
       }
@@ -156,19 +174,21 @@ class BoxTracer {
 
   // Of the edges along a at b's far end and along b at a's, where the face between them is seen;
   // and of those at the corner, each in the table that begins with its axis.
-  Eigen::MatrixXd PairSupport(TracedBox box, const std::array<std::vector<double>, 3>& ends,
+  Eigen::MatrixXd PairSupport(const TracedBox& box, const std::array<std::vector<double>, 3>& ends,
                               std::size_t a, std::size_t b) const {
     const std::size_t c = 3 - a - b;
     const auto rows = static_cast<Eigen::Index>(ends[a].size());
     const auto columns = static_cast<Eigen::Index>(ends[b].size());
     Eigen::MatrixXd support = Eigen::MatrixXd::Zero(rows, columns);
+    if (box.faces[b] || box.faces[c]) support.colwise() += Supports(box, box.corner, a, ends[a]);
+    if (!box.faces[c]) return support;
+    for (Eigen::Index j = 0; j < columns; ++j) {
+      const Vector3d far = box.corner + ends[b][static_cast<std::size_t>(j)] * box.axis[b];
+      support.col(j) += Supports(box, far, a, ends[a]);
+    }
     for (Eigen::Index i = 0; i < rows; ++i) {
-      box.length[a] = ends[a][static_cast<std::size_t>(i)];
-      if (box.faces[b] || box.faces[c]) support.row(i).array() += Support(box, {a, 3});
-      for (Eigen::Index j = 0; j < columns && box.faces[c]; ++j) {
-        box.length[b] = ends[b][static_cast<std::size_t>(j)];
-        support(i, j) += Support(box, {a, b}) + Support(box, {b, a});
-      }
+      const Vector3d far = box.corner + ends[a][static_cast<std::size_t>(i)] * box.axis[a];
+      support.row(i) += Supports(box, far, b, ends[b]).transpose();
     }
     return support;
   }
@@ -178,97 +198,7 @@ class BoxTracer {
   std::array<std::vector<FlatLine>, 3> along_;
 };
 
-// Which axes, of those that a direction known beforehand leaves, corners of lines speak for.
-class AxesVote {
- public:
-  AxesVote(const std::vector<FlatLine>& lines, double focal_px)
-      : lines_(lines), focal_px_(focal_px) {
-    for (std::size_t i = 0; i < lines.size(); ++i) {
-      for (std::size_t j = i + 1; j < lines.size(); ++j) {
-        if (FormCorner(lines[i].ends, lines[j].ends)) corners_.push_back({i, j});
-      }
-    }
-  }
-
-  // One axis is `axis`, a second one at right angles to it is seen along one of the lines.
-  void Try(const Vector3d& axis) {
-    for (const FlatLine& line : lines_) {
-      const Vector3d along = line.plane.cross(axis);
-      if (!(along.norm() > kMinSine)) continue;
-      Eigen::Matrix3d axes;
-      axes << along.normalized(), axis.cross(along.normalized()), axis;
-      votes_.emplace_back(Vote(axes), axes);
-    }
-  }
-
-  // Three lines that form corners with one another leave few.
-  void TryTriples(const std::vector<DetectedLine>& lines, const Camera& camera) {
-    const auto edge = [&](std::size_t i, int axis) {
-      BoxEdge one;
-      one.axis = axis;
-      one.points = lines[static_cast<std::size_t>(lines_[i].index)].points;
-      return one;
-    };
-    for (const auto& [i, j] : corners_) {
-      for (const auto& [k, l] : corners_) {
-        if (k != j || std::find(corners_.begin(), corners_.end(), Corner{i, l}) == corners_.end())
-          continue;
-        for (const Eigen::Matrix3d& axes : BoxAxes(camera, {edge(i, 0), edge(j, 1), edge(l, 2)}))
-          votes_.emplace_back(Vote(axes), axes);
-      }
-    }
-  }
-
-  std::vector<Eigen::Matrix3d> Best() {
-    std::stable_sort(votes_.begin(), votes_.end(),
-                     [](const auto& a, const auto& b) { return a.first > b.first; });
-    std::vector<Eigen::Matrix3d> best;
-    for (const auto& [vote, axes] : votes_) {
-      const bool is_new = std::none_of(best.begin(), best.end(), [&a = axes](const auto& b) {
-        return (a.transpose() * b).cwiseAbs().rowwise().maxCoeff().minCoeff() > kSameCosine;
-      });
-      if (is_new) best.push_back(axes);
-      if (best.size() == kMostAxes) break;
-    }
-    return best;
-  }
-
- private:
-  using Corner = std::array<std::size_t, 2>;  // Indices into lines_, ascending.
-  static constexpr double kMinSine = 0.2;
-  static constexpr double kSameCosine = 0.9998;  // One degree.
-  static constexpr std::size_t kMostAxes = 48;
-
-  // Length of lines that form corners between different axes, the shorter of each two.
-  double Vote(const Eigen::Matrix3d& axes) const {
-    std::vector<int> axis(lines_.size(), -1);
-    for (std::size_t i = 0; i < lines_.size(); ++i) {
-      for (int k = 0; k < 3; ++k) {
-        if (IsAlong(lines_[i], axes.col(k), focal_px_)) axis[i] = k;
-      }
-    }
-    double sum = 0.0;
-    for (const auto& [i, j] : corners_) {
-      if (axis[i] < 0 || axis[j] < 0 || axis[i] == axis[j]) continue;
-      sum += std::min((lines_[i].ends[1] - lines_[i].ends[0]).norm(),
-                      (lines_[j].ends[1] - lines_[j].ends[0]).norm());
-    }
-    return sum;
-  }
-
-  const std::vector<FlatLine>& lines_;
-  double focal_px_;
-  std::vector<Corner> corners_;
-  std::vector<std::pair<double, Eigen::Matrix3d>> votes_;
-};
-
 }  // namespace
-
-Eigen::Matrix3d TracedBox::Axes() const {
-  Eigen::Matrix3d axes;
-  axes << axis[0], axis[1], axis[2];
-  return axes;
-}
 
 Vector3d TracedBox::Point(const std::array<double, 3>& share) const {
   Vector3d point = corner;
@@ -276,13 +206,15 @@ Vector3d TracedBox::Point(const std::array<double, 3>& share) const {
   return point;
 }
 
-double VisiblePx(const TracedBox& box, double focal_px) {
-  double sum = 0.0;
+VisibleLength VisibleEdgesPx(const TracedBox& box, double focal_px) {
+  VisibleLength length;
   for (const VisibleEdge& edge : VisibleEdges(box.faces)) {
     Vector2d a, b;
-    if (FlatEnds(box, edge, focal_px, &a, &b)) sum += (b - a).norm();
+    if (!FlatEnds(box, edge, focal_px, &a, &b)) continue;
+    length.all_px += (b - a).norm();
+    length.shortest_px = std::min(length.shortest_px, (b - a).norm());
   }
-  return sum;
+  return length;
 }
 
 std::vector<TracedBox> TraceLines(const std::vector<DetectedLine>& lines,
@@ -298,7 +230,7 @@ std::vector<TracedBox> TraceLines(const std::vector<DetectedLine>& lines,
       if (pencil.observation.fit) vote.Try(pencil.observation.fit->direction.normalized());
     }
   }
-  vote.TryTriples(lines, camera);
+  vote.TryTriples();
   std::vector<Eigen::Matrix3d> all = vote.Best();
   all.insert(all.end(), axes.begin(), axes.end());
   std::vector<TracedBox> found;

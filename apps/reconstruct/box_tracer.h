@@ -21,13 +21,15 @@ struct TracedBox {
   std::array<bool, 3> faces{};  // Whether the face at the corner across this axis is seen.
   double score = -std::numeric_limits<double>::infinity();
 
-  Eigen::Matrix3d Axes() const;  // Columns.
   // The corner moved along the edges by these shares of them.
   Eigen::Vector3d Point(const std::array<double, 3>& share) const;
 };
 
-// Length of all visible edges, pixels.
-double VisiblePx(const TracedBox& box, double focal_px);
+// Of the visible edges.
+struct VisibleLength {
+  double all_px = 0.0, shortest_px = std::numeric_limits<double>::infinity();
+};
+VisibleLength VisibleEdgesPx(const TracedBox& box, double focal_px);
 
 // For each of some candidates of the box's axes the box that lines support best, in no order. The
 // candidates are `axes` (columns, camera frame, without sense), and those that have one axis in

@@ -6,7 +6,10 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/reconstruct/box_geometry.h"
 #include "apps/reconstruct/box_problem.h"
+#include "apps/reconstruct/box_start.h"
+#include "circline/estimators/observations.h"
 
 namespace circline::apps {
 namespace {
@@ -28,11 +31,7 @@ const char* const kAxisNames[] = {"x", "y", "z"};
 double UsualWearPx(const BoxObservation& box, const NoiseModel& noise) {
   if (!(noise.line_px > 0.0)) return 0.0;
   double longest = 0.0;
-  for (const BoxEdge& edge : box.edges) {
-    Eigen::AlignedBox2d extent;
-    for (const Eigen::Vector2d& point : edge.points) extent.extend(point);
-    longest = std::max(longest, extent.diagonal().norm());
-  }
+  for (const BoxEdge& edge : box.edges) longest = std::max(longest, EdgeLengthPx(edge));
   return kWornShare * longest;
 }
 
@@ -42,6 +41,23 @@ double WearPx(const std::vector<double>& misses, double usual_px) {
   for (const double miss : misses) sum += miss * miss;
   const double freedom = 2.0 * static_cast<double>(misses.size()) - kUnknowns;
   return std::sqrt(sum / (kWornFreedom + std::max(freedom, 0.0)));
+}
+
+// The edges of which the camera can undistort two points: those that it can have seen.
+std::vector<std::size_t> UsableEdges(const Camera& camera, const BoxObservation& box,
+                                     std::vector<std::string>* notes) {
+  std::vector<std::size_t> usable;
+  for (std::size_t e = 0; e < box.edges.size(); ++e) {
+    std::vector<CalibratedPoint> points;
+    CalibrateInliers(camera, box.edges[e].points, {}, &points);
+    if (points.size() >= 2) {
+      usable.push_back(e);
+    } else {
+      notes->push_back(std::string("an edge along ") + kAxisNames[box.edges[e].axis] +
+                       " lies where the lens shows nothing and is left out");
+    }
+  }
+  return usable;
 }
 
 // Along each axis there must be an edge at the near end and one at the far end.
@@ -141,14 +157,13 @@ Status FitBox(const Camera& camera, const BoxObservation& observed, const BoxOpt
   for (BoxEdge& edge : box.edges) {
     if (!(edge.sigma_px > 0.0)) edge.sigma_px = options.point_sigma_px;
   }
-  std::vector<std::size_t> edges;
-  for (std::size_t e = 0; e < box.edges.size(); ++e) edges.push_back(e);
+  std::vector<std::string> notes;
+  std::vector<std::size_t> edges = UsableEdges(camera, box, &notes);
   Status status = CheckEdges(box, edges);
   if (!status.ok()) return status;
   // Where perspective is weak a box turned inside out looks nearly alike: all starts are tried.
   std::vector<Eigen::Matrix3d> starts = BoxAxes(camera, box.edges);
   if (start) starts.push_back(*start);
-  std::vector<std::string> notes;
   const double usual_px = UsualWearPx(box, options.noise);
   while (true) {
     std::vector<double> misses;

@@ -43,18 +43,6 @@ struct BoxOptions {
 Status FitBox(const Camera& camera, const BoxObservation& box, const BoxOptions& options,
               const std::optional<Eigen::Matrix3d>& start, BoxFit* fit);
 
-// Where the box lies if its axes are these: least squares over the edges, up to scale. False where
-// they do not fix it. Lengths may be negative: the box then lies along the negative axis.
-bool PlaceBox(const Camera& camera, const std::vector<BoxEdge>& edges, const Eigen::Matrix3d& axes,
-              Eigen::Vector3d* translation, Eigen::Vector3d* length);
-
-// Rotations whose axes may be those of the box: of the longest edge along each axis, which alone
-// leave a few; senses without meaning.
-std::vector<Eigen::Matrix3d> BoxAxes(const Camera& camera, const std::vector<BoxEdge>& edges);
-
-// The box's corner with these bits: 1 far along x, 2 along y, 4 along z.
-Eigen::Vector3d BoxCorner(const Eigen::Vector3d& length, int corner);
-
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_RECONSTRUCT_FIT_BOX_H_

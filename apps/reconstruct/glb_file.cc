@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "apps/common/output_file.h"
-#include "apps/compare/encode.h"
 #include "apps/compare/gltf_pose.h"
 
 namespace circline::apps {
@@ -155,11 +154,10 @@ class GlbBuilder {
   }
 
   int AddMaterial(const Patch& patch) {
-    const std::vector<std::uint8_t> png = EncodePng(patch.texture);
     tinygltf::Image image;
     image.name = patch.name;
     image.mimeType = "image/png";
-    image.bufferView = AddView(png.data(), png.size(), 0);
+    image.bufferView = AddView(patch.png.data(), patch.png.size(), 0);
     gltf_.images.push_back(std::move(image));
     tinygltf::Texture texture;
     texture.sampler = 0;

@@ -15,6 +15,7 @@
 #include "apps/compare/overlay.h"
 #include "apps/reconstruct/box_picture.h"
 #include "apps/reconstruct/glb_file.h"
+#include "apps/reconstruct/measure_box.h"
 #include "apps/reconstruct/measurements.h"
 #include "apps/reconstruct/model.h"
 #include "apps/reconstruct/obj_file.h"
@@ -214,7 +215,9 @@ Status ReconstructPlane(const ModelOptions& options, ImageRun* run, Reconstructi
   if (hypothesis->camera) SeeThrough(*hypothesis->camera, &run->observations);
   made->model = PlaneModel(run->photo, run->observations, *hypothesis, options);
   if (made->model.patches.empty()) return Status::Refused("no evidence lies in the world's plane");
-  status = AddSolids(run->image->solids, run->observations, *hypothesis, &made->model);
+  status = AddSolids(run->image->solids, run->observations, *hypothesis, FLAGS_point_sigma_px,
+                     &made->model);
+  if (!status.ok()) return status;
   made->camera = run->observations.camera;
   made->pose = hypothesis->cam_from_world;
   made->measured = Measure(run->observations, *hypothesis, made->model, FLAGS_point_sigma_px);
@@ -229,13 +232,30 @@ Status ReconstructImage(const CompareOptions& options, const ModelOptions& model
   if (!run->read_error.empty()) return Status::Failed(run->read_error);
   const Solids& solids = run->image->solids;
   if (!solids.boxes.empty()) return ReconstructBox(options, *run, solids.boxes.front(), made);
-  if (solids.empty() && run->image->detect_everything) {
+  // --hypothesis chooses among the poses of the plane.
+  if (solids.empty() && run->image->detect_everything && FLAGS_hypothesis == 0) {
     BoxObservation box;
     box.id = "box";
-    if (ReconstructBox(options, *run, box, made).ok()) return Status::Ok();
+    const Status status = ReconstructBox(options, *run, box, made);
+    if (status.code != StatusCode::kRefused) return status;
+    SayOnStderr("circline_reconstruct: " + status.message + "; modelling the plane");
     *made = Reconstruction();
   }
   return ReconstructPlane(model_options, run, made);
+}
+
+// A photo with a box is modelled as that box alone.
+Status CheckSolids(const Solids& solids) {
+  if (solids.boxes.empty()) return Status::Ok();
+  if (solids.boxes.size() > 1) return Status::Invalid("one box a photo can be modelled");
+  const std::string name = "the box '" + solids.boxes.front().id + "' is modelled alone: ";
+  if (!solids.cylinders.empty())
+    return Status::Invalid(name + "leave out the cylinder '" + solids.cylinders.front().id + "'");
+  if (!solids.faces.empty())
+    return Status::Invalid(name + "leave out the face '" + solids.faces.front().id +
+                           "', which is not its base");
+  if (FLAGS_hypothesis > 0) return Status::Invalid("--hypothesis: a marked box has one pose");
+  return Status::Ok();
 }
 
 int Reconstruct() {
@@ -247,9 +267,9 @@ int Reconstruct() {
   if (status.ok()) status = ModelFromFlags(&model_options);
   if (status.ok()) status = ImagesFromFlags(options.inputs, &images);
   if (status.ok()) status = FindImage(images, &image);
-  if (status.ok() && image.solids.boxes.size() > 1)
-    status = Status::Invalid(image.path + ": one box a photo can be modelled");
   if (!status.ok()) return Refuse(status);
+  status = CheckSolids(image.solids);
+  if (!status.ok()) return Refuse(Status::Invalid(image.path + ": " + status.message));
   if (options.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.inputs.guess));
   options.overlays = true;  // The photo is needed.
   const SolverSet solvers(options);

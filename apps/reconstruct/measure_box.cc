@@ -1,8 +1,8 @@
-// Measurements of a box.
+#include "apps/reconstruct/measure_box.h"
+
 #include <Eigen/Dense>
 #include <cmath>
-
-#include "apps/reconstruct/measurements.h"
+#include <string>
 
 namespace circline::apps {
 namespace {

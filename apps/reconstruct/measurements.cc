@@ -43,7 +43,7 @@ bool MeasureRadius(const PoseHypothesis& hypothesis, const CircleObservation& ci
       !ConicToEllipse(conic, &seen)) {
     return false;
   }
-  const double noise_px = sigma_px / std::sqrt(0.5 * static_cast<double>(circle.points.size()));
+  const double noise_px = CenterSigmaPx(sigma_px, circle.points.size());
   const double mean_px = std::sqrt(seen.a * seen.b * camera.fx * camera.fy);
   radius->sigma = std::hypot(radius->sigma, radius->value * noise_px / mean_px);
   return true;
@@ -100,6 +100,10 @@ std::vector<MeasuredValue> Measure(const Observations& observations,
   for (const UprightEdge& edge : model.edges) {
     add("height", edge.name, Height, {edge.foot_px, edge.top_px}, point_sigma_px);
   }
+  for (const SolidHeight& solid : model.heights) {
+    all.push_back({"height", solid.id, solid.height, solid.sigma, unit,
+                   hypothesis.metric ? solid.truth : 0.0});
+  }
   for (const CircleObservation& circle : resolved.circles) {
     if (circle.plane != resolved.frame.plane) continue;
     Measurement radius;
@@ -125,7 +129,7 @@ std::string MeasurementsCsv(const std::vector<MeasuredValue>& measurements) {
       id.insert(at, 1, '"');
     }
     csv << m.what << ",\"" << id << "\"," << m.value << "," << m.sigma << "," << m.unit << ",";
-    if (m.truth > 0.0) {
+    if (m.truth != 0.0) {
       csv << m.truth << "," << m.value / m.truth - 1.0;
     } else {
       csv << ",";

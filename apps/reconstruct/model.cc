@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "apps/compare/encode.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/plane_evidence.h"
 #include "circline/estimators/metrology.h"
@@ -148,6 +149,10 @@ std::vector<Patch> Faces(const View& view, const Observations& resolved,
 
 }  // namespace
 
+double CenterSigmaPx(double sigma_px, std::size_t num_points) {
+  return sigma_px / std::sqrt(0.5 * static_cast<double>(num_points));
+}
+
 std::string FileSafe(const std::string& name) {
   std::string safe = name;
   for (char& c : safe) {
@@ -193,13 +198,14 @@ void TextureModel(const cv::Mat& photo, const Camera& camera, const CameraPose& 
                   const ModelOptions& options, Model* model) {
   std::vector<Patch> solid;  // What can hide something: a disc in a plane cannot.
   for (const Patch& patch : model->patches) {
-    if (patch.shape != PatchShape::kDisc || patch.corner.z() > 0.01 * model->size)
+    if (patch.shape != PatchShape::kDisc || std::abs(patch.corner.z()) > 0.01 * model->size)
       solid.push_back(patch);
   }
   for (Patch& patch : model->patches) {
     const bool is_plane = patch.name == "plane";
     patch.texture =
         PatchTexture(photo, camera, pose, patch, solid, is_plane ? options.texture_px : 0);
+    patch.png = EncodePng(patch.texture);
   }
 }
 

@@ -28,7 +28,9 @@ struct UprightEdge {
 // Of a round box.
 struct SolidHeight {
   std::string id;
-  double height = 0.0, truth = 0.0;  // `truth`: 0 = not known.
+  double height = 0.0;  // Of its upper rim; negative below the plane.
+  double sigma = 0.0;
+  double truth = 0.0;  // 0 = not known.
 };
 
 struct Model {
@@ -50,10 +52,15 @@ struct ModelOptions {
 Model PlaneModel(const cv::Mat& photo, const Observations& observations,
                  const PoseHypothesis& hypothesis, const ModelOptions& options);
 
-// Adds round boxes and pieces of planes that are marked. Refused, in words, where a rim is not seen
-// above its base or a corner lies beyond the horizon.
+// Adds round boxes and pieces of the plane that are marked; `point_sigma_px` is the standard
+// deviation of each coordinate of a marked point, and of a contour's points where it states none.
+// Refused, in words, where a rim is not seen above its base or a corner lies beyond the horizon;
+// invalid where a face lies in another plane.
 Status AddSolids(const Solids& solids, const Observations& observations,
-                 const PoseHypothesis& hypothesis, Model* model);
+                 const PoseHypothesis& hypothesis, double point_sigma_px, Model* model);
+
+// Standard deviation of each coordinate of an ellipse's centre, by that of its points all around.
+double CenterSigmaPx(double sigma_px, std::size_t num_points);
 
 // The visible faces of the box, in its own frame: "box_x0" is the one at the origin across x,
 // "box_x1" the one at the far end. Edges are shared to the bit. Empty where the camera is inside.

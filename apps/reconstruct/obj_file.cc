@@ -1,8 +1,8 @@
 #include "apps/reconstruct/obj_file.h"
 
 #include <iomanip>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
+#include <string>
 #include <vector>
 
 #include "apps/common/output_file.h"
@@ -65,12 +65,6 @@ class ObjText {
   std::size_t vertices_ = 0, texture_vertices_ = 0;  // Written; OBJ counts from 1.
 };
 
-Status WriteTexture(const Patch& patch, const std::string& folder) {
-  std::vector<std::uint8_t> png;
-  cv::imencode(".png", patch.texture, png);
-  return WriteFile(folder + "/" + TextureName(patch), std::string(png.begin(), png.end()));
-}
-
 }  // namespace
 
 Status WriteObj(const Model& model, const Camera& camera, const CameraPose& pose,
@@ -82,7 +76,10 @@ Status WriteObj(const Model& model, const Camera& camera, const CameraPose& pose
     obj.AddPatch(patch);
     materials << "newmtl " << patch.name << "\nKa 1 1 1\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd "
               << TextureName(patch) << "\n";
-    if (status.ok()) status = WriteTexture(patch, folder);
+    if (status.ok()) {
+      status = WriteFile(folder + "/" + TextureName(patch),
+                         std::string(patch.png.begin(), patch.png.end()));
+    }
   }
   obj.AddCamera(camera, pose, 0.15 * pose.translation.norm());
   if (status.ok()) status = WriteFile(folder + "/model.mtl", materials.str());

@@ -3,7 +3,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
+
+#include "apps/reconstruct/box_geometry.h"
 
 namespace circline::apps {
 namespace {
@@ -33,7 +36,8 @@ struct NearPoint {
 // An edge as the photo should show it.
 struct ExpectedEdge {
   std::vector<Vector2d> samples;
-  Vector2d across;  // Unit; of the outline: outwards.
+  Vector2d across;         // Unit; of the outline: outwards.
+  double length_px = 0.0;  // From corner to corner.
   bool is_outline = false;
 };
 
@@ -41,16 +45,11 @@ Vector3d Seen(const BoxFit& fit, const Vector3d& x) {
   return fit.cam_from_box.rotation * x + fit.cam_from_box.translation;
 }
 
-bool FaceIsSeen(const BoxFit& fit, int axis, bool far) {
-  const Vector3d eye = -(fit.cam_from_box.rotation.transpose() * fit.cam_from_box.translation);
-  return far ? eye[axis] > fit.length[axis] : eye[axis] < 0.0;
-}
-
 // False where none of its two faces is seen.
 bool Expect(const BoxFit& fit, int axis, int corner, ExpectedEdge* edge) {
   int seen = 0;
   for (int k = 0; k < 3; ++k) {
-    if (k != axis && FaceIsSeen(fit, k, (corner >> k & 1) != 0)) ++seen;
+    if (k != axis && FaceIsSeen(fit.cam_from_box, fit.length, k, (corner >> k & 1) != 0)) ++seen;
   }
   if (seen == 0) return false;
   edge->is_outline = seen == 1;
@@ -62,9 +61,10 @@ bool Expect(const BoxFit& fit, int axis, int corner, ExpectedEdge* edge) {
     return false;
   }
   const Vector2d along = (to - from).normalized();
+  edge->length_px = (to - from).norm();
   edge->across = {-along.y(), along.x()};
   if (edge->across.dot(middle - from) > 0.0) edge->across = -edge->across;
-  const int steps = std::max(2, static_cast<int>((to - from).norm() / kSpacingPx));
+  const int steps = std::max(2, static_cast<int>(edge->length_px / kSpacingPx));
   for (int i = 0; i <= steps; ++i) {
     const double share = kCornerShare + (1.0 - 2.0 * kCornerShare) * i / steps;
     Vector2d pixel;
@@ -177,10 +177,8 @@ double Overrun(const EdgeMap& edges, const ExpectedEdge& edge, double a, double 
 
 }  // namespace
 
-std::vector<BoxEdge> SnapBox(const EdgeMap& edges, const BoxFit& fit, double reach_px,
-                             double* overrun_px) {
-  std::vector<BoxEdge> snapped;
-  if (overrun_px != nullptr) *overrun_px = 0.0;
+SnappedBox SnapBox(const EdgeMap& edges, const BoxFit& fit, double reach_px) {
+  SnappedBox snapped;
   for (int axis = 0; axis < 3; ++axis) {
     for (int corner = 0; corner < 8; ++corner) {
       ExpectedEdge expected;
@@ -188,18 +186,22 @@ std::vector<BoxEdge> SnapBox(const EdgeMap& edges, const BoxFit& fit, double rea
       const std::vector<NearPoint> near = PointsNear(edges, expected, reach_px);
       double a = 0.0, b = 0.0;
       if (!FindOffsets(near, expected, reach_px, &a, &b)) continue;
-      if (overrun_px != nullptr) *overrun_px += Overrun(edges, expected, a, b);
+      snapped.overrun_px += Overrun(edges, expected, a, b);
+      snapped.covered_px += expected.length_px * CountOnLine(near, a, b) /
+                            static_cast<double>(expected.samples.size());
       BoxEdge edge;
       edge.axis = axis;
       for (int k = 0; k < 3; ++k) edge.far[static_cast<std::size_t>(k)] = (corner >> k & 1) != 0;
       edge.sigma_px = kLeastSigmaPx;
+      std::set<int> taken;  // A point may be near to several samples.
       for (const NearPoint& point : near) {
         if (std::abs(point.offset - a - point.share * (b - a)) > kOnLinePx) continue;
+        if (!taken.insert(point.index).second) continue;
         const EdgePoint& found = edges.points[static_cast<std::size_t>(point.index)];
         edge.points.push_back(found.Position());
         edge.sigma_px = std::max(edge.sigma_px, static_cast<double>(found.sigma_px));
       }
-      if (edge.points.size() >= 3) snapped.push_back(std::move(edge));
+      if (edge.points.size() >= 3) snapped.edges.push_back(std::move(edge));
     }
   }
   return snapped;

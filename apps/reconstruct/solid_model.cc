@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/reconstruct/box_geometry.h"
 #include "apps/reconstruct/model.h"
 #include "circline/estimators/metrology.h"
 
@@ -12,7 +13,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kParallelCosine = 0.98;  // Of rims that count as parallel to the plane.
+// Shorter by longer axis of a rim's shadow on the plane: with less it is not parallel to the plane.
+constexpr double kLeastRoundness = 0.95;
 
 bool SeenOnPlane(const Camera& camera, const CameraPose& pose, const Vector2d& pixel,
                  Vector2d* point) {
@@ -28,8 +30,13 @@ const CircleEstimate* FindEstimate(const PoseHypothesis& hypothesis, const std::
 }
 
 // A marked quadrilateral, or the box of a polygon, as a parallelogram of the plane.
-Status FacePatch(const FaceObservation& face, const Camera& camera, const CameraPose& pose,
-                 Patch* patch) {
+Status FacePatch(const FaceObservation& face, const std::string& world_plane, const Camera& camera,
+                 const CameraPose& pose, Patch* patch) {
+  if (!face.plane.empty() && face.plane != world_plane) {
+    return Status::Invalid("the face '" + face.id + "' lies in the plane '" + face.plane +
+                           "'; only faces of the world's plane, '" + world_plane +
+                           "', can be modelled");
+  }
   std::vector<Vector2d> corners;
   for (const Vector2d& pixel : face.corners) {
     Vector2d point;
@@ -58,48 +65,37 @@ Status FacePatch(const FaceObservation& face, const Camera& camera, const Camera
   return Status::Ok();
 }
 
-// Height of the upper rim over the plane, and its centre and radius.
-Status UpperRim(const CylinderObservation& cylinder, const CircleEstimate& base,
-                const Observations& observations, const PoseHypothesis& hypothesis,
-                Vector3d* center, double* radius) {
-  const CameraPose& pose = hypothesis.cam_from_world;
-  const auto world = [&](const Vector3d& x) {
-    return (pose.rotation.transpose() * (x - pose.translation)).eval();
-  };
-  const Vector3d foot = world(base.center);
-  *radius = base.radius;
+// The upper rim: the image of its centre, with the standard deviation of each coordinate, and its
+// radius by its height over the plane.
+struct Rim {
+  Vector2d center_px;
+  double sigma_px = 0.0;
+  double radius_on_plane = 0.0;  // Of its shadow on the plane, with a lamp at the camera; 0: none.
+};
+
+// As marked, or of the circle of that name, which is the image of one parallel to the plane.
+Status FindRim(const CylinderObservation& cylinder, const Observations& observations,
+               const CameraPose& pose, double point_sigma_px, Rim* rim) {
   if (cylinder.top) {
-    CalibratedPoint top;
-    double height = 0.0;
-    if (!PixelToCalibrated(observations.camera, *cylinder.top, &top) ||
-        !HeightOverPlane(pose, base.center, top.Homogeneous(), &height)) {
-      return Status::Refused("the cylinder '" + cylinder.id + "': its top cannot be seen");
-    }
-    *center = foot + Vector3d(0.0, 0.0, height);
+    *rim = {*cylinder.top, point_sigma_px, 0.0};
     return Status::Ok();
   }
-  const CircleEstimate* rim = FindEstimate(hypothesis, cylinder.rim);
   const int index = FindCircle(observations, cylinder.rim);
-  if (rim == nullptr || index < 0) {
-    return Status::Refused("the cylinder '" + cylinder.id + "': its rim '" + cylinder.rim +
-                           "' has no place in this pose");
-  }
-  if (std::abs(rim->normal.dot(pose.rotation.col(2))) < kParallelCosine) {
-    return Status::Refused("the cylinder '" + cylinder.id +
-                           "': its rims do not lie in parallel planes");
-  }
-  // Its own cone gives its place up to scale. Its axis is the base's.
-  const Vector3d ray = pose.rotation.transpose() * rim->center,
-                 eye = -(pose.rotation.transpose() * pose.translation);
-  const Vector2d apart = (foot - eye).head<2>();
-  const double scale = ray.head<2>().dot(apart) / ray.head<2>().squaredNorm();
-  if (!(scale > 0.0) || !std::isfinite(scale)) {
-    return Status::Refused("the cylinder '" + cylinder.id +
-                           "': seen along its axis, its height cannot be told");
-  }
-  *center = eye + scale * ray;
-  center->head<2>() = foot.head<2>();
-  *radius = scale * rim->radius;
+  const std::string name = "the cylinder '" + cylinder.id + "': its rim '" + cylinder.rim + "'";
+  Ellipse shadow;
+  if (index < 0) return Status::Refused(name + " is not in the photo");
+  const CircleObservation& circle = observations.circles[static_cast<std::size_t>(index)];
+  if (!circle.fit || !ConicOnPlane(pose, circle.fit->conic, &shadow))
+    return Status::Refused(name + " is not the image of a circle before the camera");
+  if (shadow.b < kLeastRoundness * shadow.a)
+    return Status::Refused(name + " does not lie in a plane parallel to its base");
+  const Vector3d center(shadow.center.x(), shadow.center.y(), 0.0);
+  if (!CameraToPixel(observations.camera, pose.rotation * center + pose.translation,
+                     &rim->center_px))
+    return Status::Refused(name + " has its centre where the camera sees nothing");
+  const double sigma_px = circle.sigma_px > 0.0 ? circle.sigma_px : point_sigma_px;
+  rim->sigma_px = CenterSigmaPx(sigma_px, circle.points.size());
+  rim->radius_on_plane = std::sqrt(shadow.a * shadow.b);
   return Status::Ok();
 }
 
@@ -136,40 +132,57 @@ void AddMantle(const std::string& id, const Vector3d& foot, const Vector3d& top,
   model->patches.push_back(disc);
 }
 
+Status AddCylinder(const CylinderObservation& cylinder, const Observations& observations,
+                   const PoseHypothesis& hypothesis, double point_sigma_px, Model* model) {
+  const CameraPose& pose = hypothesis.cam_from_world;
+  const CircleEstimate* base = FindEstimate(hypothesis, cylinder.base);
+  if (base == nullptr) {
+    return Status::Refused("the cylinder '" + cylinder.id + "': its base '" + cylinder.base +
+                           "' has no place in this pose");
+  }
+  Rim rim;
+  const Status status = FindRim(cylinder, observations, pose, point_sigma_px, &rim);
+  if (!status.ok()) return status;
+  Measurement height;
+  if (!HeightOverPlane(hypothesis, observations.camera, {base->center_px, rim.center_px},
+                       rim.sigma_px, &height)) {
+    return Status::Refused("the cylinder '" + cylinder.id +
+                           "': its height cannot be told, as where it is seen along its axis");
+  }
+  const Vector3d eye = -(pose.rotation.transpose() * pose.translation);
+  Vector3d foot = pose.rotation.transpose() * (base->center - pose.translation);
+  foot.z() = 0.0;
+  const double upper = rim.radius_on_plane * (1.0 - height.value / eye.z());
+  const double radius = upper > 0.0 ? 0.5 * (base->radius + upper) : base->radius;
+  // What was the plane's disc is now the cylinder's.
+  const auto is_own = [&](const Patch& patch) {
+    return patch.name == "circle_" + FileSafe(cylinder.base) ||
+           patch.name == "circle_" + FileSafe(cylinder.rim);
+  };
+  model->patches.erase(std::remove_if(model->patches.begin(), model->patches.end(), is_own),
+                       model->patches.end());
+  AddMantle("cylinder_" + FileSafe(cylinder.id), foot, foot + Vector3d(0.0, 0.0, height.value),
+            radius, eye, model);
+  model->heights.push_back(
+      {cylinder.id, height.value, height.sigma, std::copysign(cylinder.true_height, height.value)});
+  return Status::Ok();
+}
+
 }  // namespace
 
 Status AddSolids(const Solids& solids, const Observations& observations,
-                 const PoseHypothesis& hypothesis, Model* model) {
-  const CameraPose& pose = hypothesis.cam_from_world;
-  const Vector3d eye = -(pose.rotation.transpose() * pose.translation);
+                 const PoseHypothesis& hypothesis, double point_sigma_px, Model* model) {
+  const std::string world_plane = ResolveWorld(observations).frame.plane;
   for (const FaceObservation& face : solids.faces) {
     Patch patch;
-    const Status status = FacePatch(face, observations.camera, pose, &patch);
+    const Status status =
+        FacePatch(face, world_plane, observations.camera, hypothesis.cam_from_world, &patch);
     if (!status.ok()) return status;
     model->patches.push_back(patch);
   }
   for (const CylinderObservation& cylinder : solids.cylinders) {
-    const CircleEstimate* base = FindEstimate(hypothesis, cylinder.base);
-    if (base == nullptr) {
-      return Status::Refused("the cylinder '" + cylinder.id + "': its base '" + cylinder.base +
-                             "' has no place in this pose");
-    }
-    Vector3d top;
-    double radius;
-    const Status status = UpperRim(cylinder, *base, observations, hypothesis, &top, &radius);
+    const Status status = AddCylinder(cylinder, observations, hypothesis, point_sigma_px, model);
     if (!status.ok()) return status;
-    const Vector3d foot = pose.rotation.transpose() * (base->center - pose.translation);
-    // What was the plane's disc is now the cylinder's.
-    model->patches.erase(std::remove_if(model->patches.begin(), model->patches.end(),
-                                        [&](const Patch& patch) {
-                                          return patch.name ==
-                                                     "circle_" + FileSafe(cylinder.base) ||
-                                                 patch.name == "circle_" + FileSafe(cylinder.rim);
-                                        }),
-                         model->patches.end());
-    AddMantle("cylinder_" + FileSafe(cylinder.id), foot, top, 0.5 * (base->radius + radius), eye,
-              model);
-    model->heights.push_back({cylinder.id, top.z() - foot.z(), cylinder.true_height});
   }
   return Status::Ok();
 }
@@ -177,11 +190,10 @@ Status AddSolids(const Solids& solids, const Observations& observations,
 Model BoxModel(const BoxFit& fit) {
   Model model;
   model.size = fit.length.norm();
-  const Vector3d eye = -(fit.cam_from_box.rotation.transpose() * fit.cam_from_box.translation);
   for (int k = 0; k < 3; ++k) {
     const int a = (k + 1) % 3, b = (k + 2) % 3;
     for (const bool far : {false, true}) {
-      if (!(far ? eye[k] > fit.length[k] : eye[k] < 0.0)) continue;
+      if (!FaceIsSeen(fit.cam_from_box, fit.length, k, far)) continue;
       Patch patch;
       patch.name = std::string("box_") + "xyz"[k] + (far ? "1" : "0");
       patch.corner = far ? (fit.length[k] * Vector3d::Unit(k)).eval() : Vector3d::Zero().eval();

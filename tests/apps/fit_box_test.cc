@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 #include <vector>
 
+#include "apps/reconstruct/box_start.h"
 #include "circline/estimators/random.h"
 #include "tests/apps/painted_box.h"
 
@@ -83,42 +86,58 @@ TEST(FitBoxTest, TakesLeftHandedAxes) {
 
 // Of pose and lengths together, with and without a known edge, and with an unknown focal length:
 // the mean squared error in the metric of the stated covariance.
-TEST(FitBoxTest, CovarianceIsHonest) {
+void ExpectHonest(bool edge_known, bool focal_open) {
   const PaintedBox box;
   constexpr int kTrials = 60;
-  for (const bool focal_open : {false, true}) {
-    Random random(7);
-    double sum = 0.0;
-    int within = 0;
-    for (int trial = 0; trial < kTrials; ++trial) {
-      BoxObservation seen = SeenEdges(box, 0.4, &random);
-      seen.length = {box.size.x(), 0.0, 0.0};
-      BoxOptions options = Exact();
-      Camera camera = box.camera();
-      if (focal_open) {
-        options.camera.log_focal = 0.05;
-        const double off = std::exp(0.05 * random.Normal());
-        camera.fx *= off;
-        camera.fy *= off;
-      }
-      BoxFit fit;
-      const Status status = FitBox(camera, seen, options, {}, &fit);
-      ASSERT_TRUE(status.ok()) << status.message;
-      EXPECT_EQ(fit.focal_sigma > 0.0, focal_open);
-      Eigen::Matrix<double, 8, 1> error;
-      error << LogRotation(box.pose.rotation * fit.cam_from_box.rotation.transpose()),
-          box.pose.translation - fit.cam_from_box.translation, box.size.y() - fit.length.y(),
-          box.size.z() - fit.length.z();
-      Eigen::Matrix<double, 8, 8> covariance;
-      covariance << fit.covariance.topLeftCorner<6, 6>(), fit.covariance.block<6, 2>(0, 7),
-          fit.covariance.block<2, 6>(7, 0), fit.covariance.bottomRightCorner<2, 2>();
-      sum += error.dot(covariance.ldlt().solve(error));
-      for (int k = 0; k < 2; ++k)
-        within += std::abs(error[6 + k]) <= 3.0 * std::sqrt(covariance(6 + k, 6 + k));
+  const double unit = edge_known ? 1.0 : box.pose.translation.norm();
+  // What is estimated of [delta, delta_t, length]: either the length of the translation or that of
+  // the edge along x is given.
+  Eigen::Matrix<double, 9, 8> open = Eigen::Matrix<double, 9, 8>::Zero();
+  open.topLeftCorner<3, 3>().setIdentity();
+  if (edge_known) {
+    open.block<3, 3>(3, 3).setIdentity();
+  } else {
+    const Eigen::Vector3d ray = box.pose.translation.normalized();
+    open.block<3, 1>(3, 3) = ray.unitOrthogonal();
+    open.block<3, 1>(3, 4) = ray.cross(ray.unitOrthogonal());
+    open(6, 5) = 1.0;
+  }
+  open.bottomRightCorner<2, 2>().setIdentity();
+  Random random(7);
+  double sum = 0.0;
+  int within = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    BoxObservation seen = SeenEdges(box, 0.4, &random);
+    if (edge_known) seen.length = {box.size.x(), 0.0, 0.0};
+    BoxOptions options = Exact();
+    Camera camera = box.camera();
+    if (focal_open) {
+      options.camera.log_focal = 0.05;
+      const double off = std::exp(0.05 * random.Normal());
+      camera.fx *= off;
+      camera.fy *= off;
     }
-    // Chi-square of 8 a trial: its mean has a standard deviation of 4 / sqrt(trials).
-    EXPECT_NEAR(sum / kTrials, 8.0, 3.5 * 4.0 / std::sqrt(kTrials)) << focal_open;
-    EXPECT_GE(within, static_cast<int>(0.95 * 2 * kTrials));
+    BoxFit fit;
+    const Status status = FitBox(camera, seen, options, {}, &fit);
+    ASSERT_TRUE(status.ok()) << status.message;
+    EXPECT_EQ(fit.focal_sigma > 0.0, focal_open);
+    EXPECT_EQ(fit.metric, edge_known);
+    Eigen::Matrix<double, 9, 1> error;
+    error << LogRotation(box.pose.rotation * fit.cam_from_box.rotation.transpose()),
+        box.pose.translation / unit - fit.cam_from_box.translation, box.size / unit - fit.length;
+    const Eigen::Matrix<double, 8, 1> off = open.transpose() * error;
+    const Eigen::Matrix<double, 8, 8> covariance = open.transpose() * fit.covariance * open;
+    sum += off.dot(covariance.ldlt().solve(off));
+    for (int k = 6; k < 8; ++k) within += std::abs(off[k]) <= 3.0 * std::sqrt(covariance(k, k));
+  }
+  // Chi-square of 8 a trial: its mean has a standard deviation of 4 / sqrt(trials).
+  EXPECT_NEAR(sum / kTrials, 8.0, 3.5 * 4.0 / std::sqrt(kTrials)) << edge_known << focal_open;
+  EXPECT_GE(within, static_cast<int>(0.95 * 2 * kTrials)) << edge_known << focal_open;
+}
+
+TEST(FitBoxTest, CovarianceIsHonest) {
+  for (const bool edge_known : {false, true}) {
+    for (const bool focal_open : {false, true}) ExpectHonest(edge_known, focal_open);
   }
 }
 
@@ -134,6 +153,57 @@ TEST(FitBoxTest, LeavesOutAnEdgeThatContradicts) {
   ASSERT_EQ(fit.notes.size(), 1U);
   EXPECT_EQ(fit.notes[0], "an edge along x contradicts the others and is left out");
   EXPECT_LT((fit.length - box.size).norm(), 0.01);
+}
+
+// A lens of which the fitted distortion turns back at 1.1 focal lengths from the centre.
+TEST(FitBoxTest, LeavesOutAnEdgeThatTheLensCannotShow) {
+  const PaintedBox box;
+  Random random(1);
+  BoxObservation seen = SeenEdges(box, 0.0, &random);
+  Camera camera = box.camera();
+  camera.model = CameraModel::kOpenCV;
+  camera.distortion = {-0.28, 0.0, 0.0, 0.0, 0.0};
+  for (BoxEdge& edge : seen.edges) {
+    for (Eigen::Vector2d& point : edge.points) {
+      CalibratedPoint undistorted;
+      ASSERT_TRUE(PixelToCalibrated(box.camera(), point, &undistorted));
+      ASSERT_TRUE(CameraToPixel(camera, undistorted.Homogeneous(), &point));
+    }
+  }
+  for (Eigen::Vector2d& point : seen.edges[2].points) point += Eigen::Vector2d(1e4, 0.0);
+  BoxFit fit;
+  const Status status = FitBox(camera, seen, Exact(), {}, &fit);
+  ASSERT_TRUE(status.ok()) << status.message;
+  ASSERT_EQ(fit.notes.size(), 1U);
+  EXPECT_EQ(fit.notes[0], "an edge along x lies where the lens shows nothing and is left out");
+  EXPECT_LT((fit.length * box.pose.translation.norm() - box.size).norm(), 1e-6);
+  EXPECT_TRUE(std::isfinite(fit.rms_px));
+}
+
+TEST(BoxStartTest, FindsAxesOfThreePlanes) {
+  Random random(3);
+  for (int trial = 0; trial < 200; ++trial) {
+    const auto some = [&random] {
+      return Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal());
+    };
+    const Eigen::Matrix3d truth =
+        Eigen::Quaterniond(random.Normal(), random.Normal(), random.Normal(), random.Normal())
+            .normalized()
+            .toRotationMatrix();
+    std::array<Eigen::Vector3d, 3> normals;
+    for (std::size_t k = 0; k < 3; ++k)
+      normals[k] = truth.col(static_cast<Eigen::Index>(k)).cross(some()).normalized();
+    const std::vector<Eigen::Matrix3d> found = OrthogonalAxes(normals);
+    ASSERT_FALSE(found.empty());
+    double nearest = 0.0;
+    for (const Eigen::Matrix3d& axes : found) {
+      EXPECT_NEAR(axes.determinant(), 1.0, 1e-12);
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_NEAR(axes.col(static_cast<Eigen::Index>(k)).dot(normals[k]), 0.0, 1e-6);
+      nearest = std::max(nearest, (axes.transpose() * truth).diagonal().cwiseAbs().minCoeff());
+    }
+    EXPECT_NEAR(nearest, 1.0, 1e-9) << trial;
+  }
 }
 
 TEST(FitBoxTest, SaysWhatIsMissing) {

@@ -56,10 +56,13 @@ struct PaintedBox {
   Eigen::Vector2d Corner(double x, double y, double z) const {
     return Pixel(size.cwiseProduct(Eigen::Vector3d(x, y, z)));
   }
+  Eigen::Vector3d Eye() const { return -(pose.rotation.transpose() * pose.translation); }
+  Eigen::Vector3d Ray(double u, double v) const {
+    return pose.rotation.transpose() *
+           Eigen::Vector3d((u - 319.5) / kFocal, (v - 239.5) / kFocal, 1.0);
+  }
   int Brightness(double u, double v) const {
-    const Eigen::Vector3d eye = -(pose.rotation.transpose() * pose.translation);
-    const Eigen::Vector3d ray = pose.rotation.transpose() *
-                                Eigen::Vector3d((u - 319.5) / kFocal, (v - 239.5) / kFocal, 1.0);
+    const Eigen::Vector3d eye = Eye(), ray = Ray(u, v);
     double nearest = std::numeric_limits<double>::infinity();
     int seen = kAround;
     const std::array<double, 3> at = {0.0, 0.0, size.z()};
@@ -77,14 +80,20 @@ struct PaintedBox {
     return seen;
   }
   void Paint(const std::string& path) const {
+    PaintPhoto(path, [this](double u, double v) { return Brightness(u, v); });
+  }
+  // Any other scene, as this camera sees it: `brightness(u, v)`.
+  template <typename Brightness>
+  static void PaintPhoto(const std::string& path, const Brightness& brightness) {
     constexpr int kFiner = 4;  // Samples along each side of a pixel.
     cv::Mat photo(kHeight, kWidth, CV_8U);
     for (int v = 0; v < kHeight; ++v) {
       for (int u = 0; u < kWidth; ++u) {
         int sum = 0;
-        for (int k = 0; k < kFiner * kFiner; ++k)
-          sum += Brightness(u + (k % kFiner + 0.5) / kFiner - 0.5,
-                            v + (k / kFiner + 0.5) / kFiner - 0.5);
+        for (int i = 0; i < kFiner; ++i) {
+          for (int j = 0; j < kFiner; ++j)
+            sum += brightness(u + (j + 0.5) / kFiner - 0.5, v + (i + 0.5) / kFiner - 0.5);
+        }
         photo.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(sum / (kFiner * kFiner));
       }
     }

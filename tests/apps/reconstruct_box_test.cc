@@ -10,11 +10,11 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "tests/apps/board_set.h"
+#include "tests/apps/measured_rows.h"
 #include "tests/apps/painted_box.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
@@ -22,21 +22,17 @@
 namespace circline::apps {
 namespace {
 
-struct Value {
-  double value = 0.0, sigma = 0.0, error = 0.0;  // `error`: relative.
-};
-
 class ReconstructBox : public testing::Test {
  protected:
   void SetUp() override { box_.Paint(folder_ / "box.png"); }
 
   // `image`: what the scene file says of the photo.
-  Outcome Run(const std::string& image) const {
+  Outcome Run(const std::string& image, const std::string& flags = "") const {
     const std::string scene = folder_.Write(
         "scene.yaml", "%YAML:1.0\n---\n" + box_.CameraText() +
                           "images:\n  - { file: \"box.png\", camera: \"k\"" + image + " }\n");
     return RunProgram(CIRCLINE_RECONSTRUCT,
-                      "--scene='" + scene + "' --output='" + folder_ / "out" + "'");
+                      "--scene='" + scene + "' --output='" + folder_ / "out" + "' " + flags);
   }
   // The upper nearest corner and its three edges, and the far edges of the faces.
   std::string Marked(const std::string& more) const {
@@ -53,21 +49,11 @@ class ReconstructBox : public testing::Test {
            ", " + edge("x", "z", c(0, 0, 0), c(1, 0, 0)) + ", " +
            edge("y", "z", c(0, 0, 0), c(0, 1, 0)) + " ]" + more + " } ]";
   }
-  std::map<std::string, Value> Measured() const {
-    std::map<std::string, Value> measured;
-    std::istringstream csv(ReadAll(folder_ / "out/measurements.csv"));
-    std::string line;
-    std::getline(csv, line);
-    EXPECT_EQ(line, "what,id,value,sigma,unit,truth,relative_error");
-    while (std::getline(csv, line)) {
-      std::vector<std::string> cells;
-      std::istringstream row(line);
-      for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
-      measured[cells.at(0) + " " + cells.at(1)] = {
-          std::stod(cells.at(2)), std::stod(cells.at(3)),
-          cells.size() > 6 && !cells[6].empty() ? std::stod(cells[6]) : 0.0};
-    }
-    return measured;
+  std::map<std::string, MeasuredRow> Measured() const {
+    return ReadMeasurements(folder_ / "out/measurements.csv");
+  }
+  cv::Mat Texture(const std::string& patch) const {
+    return cv::imread(folder_ / ("out/texture_" + patch + ".png"), cv::IMREAD_UNCHANGED);
   }
   tinygltf::Model ReadGlb() const {
     tinygltf::Model model;
@@ -96,39 +82,36 @@ TEST_F(ReconstructBox, FindsTheBoxOfAPhoto) {
       Run(", solids: [ { id: \"carton\", kind: \"box\", length: [0., 0.6, 0.], true_length: [0.9, "
           "0.6, 0.4] } ]");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  const std::map<std::string, Value> measured = Measured();
+  const std::map<std::string, MeasuredRow> measured = Measured();
   for (const char* axis : {"x", "z"}) {
-    const Value& length = measured.at(std::string("length \"carton ") + axis + "\"");
+    const MeasuredRow& length = measured.at(std::string("length carton ") + axis);
     const double truth = axis[0] == 'x' ? 0.9 : 0.4;
     EXPECT_NEAR(length.value, truth, 0.01 * truth) << axis;
     EXPECT_LE(std::abs(length.value - truth), 3.0 * length.sigma) << axis;
-    EXPECT_NEAR(length.error, length.value / truth - 1.0, 1e-6) << axis;
+    EXPECT_NEAR(length.relative_error, length.value / truth - 1.0, 1e-6) << axis;
   }
   // Only the faces that are seen, each with its own brightness in the middle.
   const std::map<std::string, int> brightness = {
       {"box_z1", PaintedBox::kTop}, {"box_y0", PaintedBox::kFaceY}, {"box_x0", PaintedBox::kFaceX}};
   const tinygltf::Model model = ReadGlb();
-  ASSERT_EQ(model.meshes.size(), 3U);
-  std::set<int> seen, painted;
+  ASSERT_EQ(model.meshes.size(), brightness.size());
   for (const auto& mesh : model.meshes) {
-    const cv::Mat texture =
-        cv::imread(folder_ / ("out/texture_" + mesh.name + ".png"), cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(brightness.count(mesh.name), 1U) << mesh.name;
+    const cv::Mat texture = Texture(mesh.name);
     ASSERT_EQ(texture.channels(), 4) << mesh.name;
     const auto& middle = texture.at<cv::Vec4b>(texture.rows / 2, texture.cols / 2);
-    EXPECT_EQ(middle[3], 255);
-    seen.insert(middle[0]);
+    EXPECT_EQ(middle[3], 255) << mesh.name;
+    EXPECT_EQ(middle[0], brightness.at(mesh.name)) << mesh.name;
   }
-  for (const auto& [name, value] : brightness) painted.insert(value);
-  EXPECT_EQ(seen, painted);
 }
 
 TEST_F(ReconstructBox, ModelsWhatIsMarked) {
   const Outcome outcome = Run(Marked(", length: [0.9, 0., 0.], sigma_px: 0.1"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  const std::map<std::string, Value> measured = Measured();
-  EXPECT_NEAR(measured.at("length \"carton y\"").value, 0.6, 2e-3);
-  EXPECT_NEAR(measured.at("length \"carton z\"").value, 0.4, 2e-3);
-  EXPECT_NEAR(measured.at("ratio \"carton x/y\"").value, 1.5, 5e-3);
+  const std::map<std::string, MeasuredRow> measured = Measured();
+  EXPECT_NEAR(measured.at("length carton y").value, 0.6, 1e-5);
+  EXPECT_NEAR(measured.at("length carton z").value, 0.4, 1e-5);
+  EXPECT_NEAR(measured.at("ratio carton x/y").value, 1.5, 1e-5);
 
   const tinygltf::Model model = ReadGlb();
   ASSERT_EQ(model.meshes.size(), 3U);
@@ -151,8 +134,7 @@ TEST_F(ReconstructBox, ModelsWhatIsMarked) {
     EXPECT_TRUE(std::filesystem::exists(folder_ / (std::string("out/") + file))) << file;
 }
 
-// A hand before the upper face is no part of the photo's border, but what lies outside the photo
-// is.
+// The photo ends before the box does: what lies beyond its border is transparent, all else shown.
 TEST_F(ReconstructBox, LeavesOutWhatThePhotoDoesNotShow) {
   const cv::Mat photo = cv::imread(folder_ / "box.png", cv::IMREAD_GRAYSCALE);
   const double right = std::floor(box_.Corner(1, 0, 1).x()) - 60.0;
@@ -167,22 +149,34 @@ TEST_F(ReconstructBox, LeavesOutWhatThePhotoDoesNotShow) {
   const Outcome outcome = RunProgram(CIRCLINE_RECONSTRUCT,
                                      "--scene='" + scene + "' --output='" + folder_ / "out" + "'");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  int transparent = 0, shown = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "out")) {
-    if (entry.path().filename().string().rfind("texture_box", 0) != 0) continue;
-    const cv::Mat texture = cv::imread(entry.path().string(), cv::IMREAD_UNCHANGED);
-    for (int y = 0; y < texture.rows; ++y) {
-      for (int x = 0; x < texture.cols; ++x)
-        (texture.at<cv::Vec4b>(y, x)[3] == 0 ? transparent : shown) += 1;
+  const Eigen::Vector3d &size = box_.size, x(size.x(), 0.0, 0.0), y(0.0, size.y(), 0.0),
+                        z(0.0, 0.0, size.z());
+  const auto expect = [&](const char* face, const Eigen::Vector3d& corner, const Eigen::Vector3d& u,
+                          const Eigen::Vector3d& v) {
+    const cv::Mat texture = Texture(face);
+    ASSERT_FALSE(texture.empty()) << face;
+    int wrong = 0, beyond = 0;
+    for (int row = 0; row < texture.rows; ++row) {
+      for (int column = 0; column < texture.cols; ++column) {
+        const double s = (column + 0.5) / texture.cols, t = 1.0 - (row + 0.5) / texture.rows;
+        const double past = box_.Pixel(corner + s * u + t * v).x() - (std::floor(right) - 1.0);
+        if (std::abs(past) < 0.1) continue;
+        beyond += past > 0.0;
+        wrong += (texture.at<cv::Vec4b>(row, column)[3] == 0) != (past > 0.0);
+      }
     }
-  }
-  EXPECT_GT(transparent, 1000);
-  EXPECT_GT(shown, transparent);
+    EXPECT_EQ(wrong, 0) << face;
+    EXPECT_EQ(beyond > 0, u.x() > 0.0) << face;  // Both faces along x are cut.
+  };
+  expect("box_z1", z, x, y);
+  expect("box_y0", {0.0, 0.0, 0.0}, x, z);
+  expect("box_x0", y, -y, z);
 }
 
 TEST_F(ReconstructBox, SaysWhatIsWrong) {
-  const auto expect = [&](const std::string& image, int exit_code, const char* words) {
-    const Outcome outcome = Run(image);
+  const auto expect = [&](const std::string& image, int exit_code, const char* words,
+                          const std::string& flags = "") {
+    const Outcome outcome = Run(image, flags);
     EXPECT_EQ(outcome.exit_code, exit_code) << image;
     EXPECT_CONTAINS(outcome.err, words);
     EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
@@ -202,8 +196,17 @@ TEST_F(ReconstructBox, SaysWhatIsWrong) {
          "must name axes across the edge");
   expect(solid("\"box\", base: \"f\""), 2, "there is no face 'f' of four corners");
   expect(solid("\"cylinder\", base: \"c7\", top: [1., 1.]"), 2, "there is no circle 'c7'");
-  expect(solid("\"box\", corner: [100., 100.], x: [200., 100.], y: [100., 200.], z: [90., 60.]"), 1,
-         "edges at one end only");
+  const std::string corner =
+      "\"box\", corner: [100., 100.], x: [200., 100.], y: [100., 200.], z: [90., 60.]";
+  expect(solid(corner), 1, "edges at one end only");
+  const std::string circle =
+      ", circles: [ { id: \"c\", contour: [1., 0., 0., 1., -1., 0., 0., -1., 0.7, 0.7] } ]";
+  expect(circle + ", solids: [ { id: \"b\", kind: " + corner +
+             " }, { id: \"tin\", kind: \"cylinder\", base: \"c\", top: [1., 1.] } ]",
+         2, "the box 'b' is modelled alone: leave out the cylinder 'tin'");
+  expect(", faces: [ { id: \"f\", corners: [1., 1., 9., 1., 9., 9.] } ]" + solid(corner), 2,
+         "leave out the face 'f', which is not its base");
+  expect(solid(corner), 2, "--hypothesis: a marked box has one pose", "--hypothesis=1");
 }
 
 }  // namespace

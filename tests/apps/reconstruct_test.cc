@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tests/apps/board_set.h"
+#include "tests/apps/measured_rows.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
 
@@ -140,32 +141,23 @@ class Reconstruct : public testing::Test {
 
 TEST_F(Reconstruct, MeasuresTheBox) {
   ASSERT_EQ(Run("--image=box.png").exit_code, 0);
-  std::istringstream csv(ReadAll(folder_ / "out/measurements.csv"));
-  std::map<std::string, std::pair<double, double>> measured;  // Value, sigma.
-  std::string line;
-  std::getline(csv, line);
-  EXPECT_EQ(line, "what,id,value,sigma,unit,truth,relative_error");
-  while (std::getline(csv, line)) {
-    std::vector<std::string> cells;
-    std::istringstream row(line);
-    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
-    ASSERT_GE(cells.size(), 5U);
-    EXPECT_EQ(cells[4], cells[0] == "angle" ? "deg" : "world");
-    measured[cells[0] + " " + cells[1]] = {std::stod(cells[2]), std::stod(cells[3])};
-  }
+  const std::map<std::string, MeasuredRow> measured =
+      ReadMeasurements(folder_ / "out/measurements.csv");
   const std::map<std::string, double> truth = {
-      {"length \"x_0\"", 2 * kHalfX}, {"length \"x_1\"", 2 * kHalfX},
-      {"length \"y_0\"", 2 * kHalfY}, {"length \"y_1\"", 2 * kHalfY},
-      {"height \"z_0\"", -kDepth},    {"height \"z_1\"", -kDepth},
-      {"height \"z_2\"", -kDepth},    {"radius \"disc\"", kRadius},
-      {"angle \"x y\"", 90.0},        {"angle \"x z\"", 90.0},
-      {"angle \"y z\"", 90.0},        {"distance \"camera\"", box_.Center().z()}};
+      {"length x_0", 2 * kHalfX}, {"length x_1", 2 * kHalfX},
+      {"length y_0", 2 * kHalfY}, {"length y_1", 2 * kHalfY},
+      {"height z_0", -kDepth},    {"height z_1", -kDepth},
+      {"height z_2", -kDepth},    {"radius disc", kRadius},
+      {"angle x y", 90.0},        {"angle x z", 90.0},
+      {"angle y z", 90.0},        {"distance camera", box_.Center().z()}};
   ASSERT_EQ(measured.size(), truth.size());
   for (const auto& [key, value] : truth) {
     ASSERT_EQ(measured.count(key), 1U) << key;
-    EXPECT_NEAR(measured[key].first, value, 1e-4 * std::abs(value)) << key;
-    EXPECT_GT(measured[key].second, 0.0) << key;
-    EXPECT_LT(measured[key].second, 0.1 * std::abs(value)) << key;
+    const MeasuredRow& row = measured.at(key);
+    EXPECT_NEAR(row.value, value, 1e-4 * std::abs(value)) << key;
+    EXPECT_GT(row.sigma, 0.0) << key;
+    EXPECT_LT(row.sigma, 0.1 * std::abs(value)) << key;
+    EXPECT_EQ(row.unit, key.rfind("angle", 0) == 0 ? "deg" : "world") << key;
   }
 }
 
