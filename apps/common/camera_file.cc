@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/colmap_camera.h"
 #include "apps/common/text.h"
@@ -193,6 +194,22 @@ Camera ReadSceneCamera(const StorageNode& node, StatedCameraSigma* sigma) {
   ReadSigma(named.Get("k1_sigma"), &sigma->k1);
   CheckCamera(named, camera);
   return camera;
+}
+
+nlohmann::ordered_json CameraEntry(const Camera& camera, const StatedCameraSigma& sigma) {
+  nlohmann::ordered_json json = {{"id", camera.id}, {"model", ModelName(camera.model)}};
+  if (camera.width > 0) json["width"] = camera.width;
+  if (camera.height > 0) json["height"] = camera.height;
+  json["camera_matrix"] = {camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0};
+  if (camera.model != CameraModel::kPinhole) json["distortion"] = Distortion(camera);
+  const auto state = [&json](const char* key, const std::optional<double>& value) {
+    if (value) json[key] = *value;
+  };
+  state("focal_sigma", sigma.log_focal);
+  state("focal_sigma_doubtful", sigma.doubtful_log_focal);
+  state("principal_point_sigma_px", sigma.principal_point_px);
+  state("k1_sigma", sigma.k1);
+  return json;
 }
 
 }  // namespace circline::apps

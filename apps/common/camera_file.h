@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_COMMON_CAMERA_FILE_H_
 #define CIRCLINE_APPS_COMMON_CAMERA_FILE_H_
 
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,6 +43,9 @@ struct StatedCameraSigma {
 // A camera of a scene file: id, model, width, height, camera_matrix, distortion; focal_sigma,
 // focal_sigma_doubtful, principal_point_sigma_px, k1_sigma.
 Camera ReadSceneCamera(const StorageNode& node, StatedCameraSigma* sigma);
+
+// The same, to write: what `sigma` leaves open is not stated.
+nlohmann::ordered_json CameraEntry(const Camera& camera, const StatedCameraSigma& sigma);
 
 }  // namespace circline::apps
 

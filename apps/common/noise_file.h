@@ -1,4 +1,4 @@
-// A noise model from a file (docs: scene files). OpenCV FileStorage, YAML or JSON.
+// A noise model from a file (docs: scene files). YAML or JSON.
 #ifndef CIRCLINE_APPS_COMMON_NOISE_FILE_H_
 #define CIRCLINE_APPS_COMMON_NOISE_FILE_H_
 

@@ -1,5 +1,4 @@
-// Scene files: an image set with what is known of it (docs: scene files). OpenCV FileStorage, YAML
-// or JSON.
+// Scene files: an image set with what is known of it (docs: scene files). YAML or JSON.
 #ifndef CIRCLINE_APPS_COMMON_SCENE_H_
 #define CIRCLINE_APPS_COMMON_SCENE_H_
 

@@ -4,11 +4,10 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
-#include <set>
-#include <sstream>
+#include <nlohmann/json.hpp>
 #include <vector>
 
+#include "apps/common/document.h"
 #include "apps/common/text.h"
 #include "circline/estimators/status.h"
 
@@ -19,32 +18,9 @@ bool StartsWith(const std::string& text, const std::string& start) {
   return text.compare(0, start.size(), start) == 0;
 }
 
-// FileStorage insists on its header; people write plain YAML. Returns how many lines were added.
-int AddMissingHeader(std::string* text) {
-  const std::size_t begin = text->find_first_not_of(" \t\r\n");
-  if (begin == std::string::npos) return 0;
-  const char first = (*text)[begin];
-  if (first == '{' || first == '<' || StartsWith(text->substr(begin, 5), "%YAML")) return 0;
-  const bool has_rule = StartsWith(text->substr(begin, 3), "---");
-  *text = (has_rule ? "%YAML:1.0\n" : "%YAML:1.0\n---\n") + *text;
-  return has_rule ? 1 : 2;
-}
-
-// The parser's complaint as part of one line. It comes as "name(12): Missing ..." in the place
-// where OpenCV's exceptions have the function's name.
-std::string ParserMessage(const cv::Exception& error, int added_lines) {
-  const std::size_t colon = error.func.find("): ");
-  const std::size_t parenthesis = error.func.rfind('(', colon);
-  if (colon == std::string::npos || parenthesis == std::string::npos) return error.err;
-  int line = 0;
-  if (!ParseInt(error.func.substr(parenthesis + 1, colon - parenthesis - 1), &line))
-    return error.err;
-  return "line " + std::to_string(line - added_lines) + ": " + error.func.substr(colon + 3);
-}
-
-std::string OneLine(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
+// A whole number, too ("id: 3").
+bool IsText(const nlohmann::ordered_json& node) {
+  return node.is_string() || node.is_number_integer();
 }
 
 }  // namespace
@@ -73,23 +49,17 @@ Status StorageDocument::Open(const std::string& path) {
   return status.ok() ? Parse(path, std::move(text)) : status;
 }
 
-Status StorageDocument::Parse(const std::string& name, std::string text) {
-  text_ = std::move(text);
-  if (text_.find_first_not_of(" \t\r\n") == std::string::npos) {
-    return Status::Invalid(name + ": is empty");
-  }
-  const int added_lines = AddMissingHeader(&text_);
-  try {
-    storage_.open(text_, cv::FileStorage::READ | cv::FileStorage::MEMORY);
-    if (storage_.isOpened() && storage_.root().isMap()) return Status::Ok();
-  } catch (const cv::Exception& error) {
-    return Status::Invalid(
-        name + ": not valid YAML or JSON: " + OneLine(ParserMessage(error, added_lines)));
-  } catch (const std::exception& error) {
-    return Status::Invalid(name + ": not valid YAML or JSON: " + error.what());
-  }
+Status StorageDocument::Parse(const std::string& name, const std::string& text) {
+  const Status status = ParseDocument(text, json_.get());
+  if (!status.ok()) return Status::Invalid(name + ": " + status.message);
+  if (json_->is_object()) return Status::Ok();
   return Status::Invalid(name + ": not a YAML or JSON document with keys and values");
 }
+
+StorageDocument::StorageDocument() : json_(std::make_unique<nlohmann::ordered_json>()) {}
+StorageDocument::~StorageDocument() = default;
+
+bool StorageNode::Exists() const { return node_ != nullptr && !node_->is_null(); }
 
 void StorageNode::Fail(const std::string& message) const {
   if (!status_->ok()) return;
@@ -103,20 +73,17 @@ bool StorageNode::RequireThat(bool condition, const std::string& expected) const
 }
 
 void StorageNode::AllowKeys(const std::vector<std::string>& keys) const {
-  if (!RequireThat(node_.isMap(), "a map of keys and values")) return;
-  std::set<std::string> seen;
-  for (const std::string& key : node_.keys()) {
-    if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+  if (!RequireThat(Exists() && node_->is_object(), "a map of keys and values")) return;
+  for (const auto& [key, value] : node_->items()) {
+    if (std::find(keys.begin(), keys.end(), key) == keys.end())
       Fail("unknown key '" + key + "'" + DidYouMean(key, keys));
-    } else if (!seen.insert(key).second) {
-      Fail("key '" + key + "' stands there twice");
-    }
   }
 }
 
 StorageNode StorageNode::Get(const std::string& key) const {
   const std::string place = place_.empty() ? key : place_ + "." + key;
-  return {node_.isMap() ? node_[key] : cv::FileNode(), place, status_};
+  const bool has = node_ != nullptr && node_->is_object() && node_->contains(key);
+  return {has ? &(*node_)[key] : nullptr, place, status_};
 }
 
 StorageNode StorageNode::Require(const std::string& key) const {
@@ -127,21 +94,22 @@ StorageNode StorageNode::Require(const std::string& key) const {
 
 std::vector<StorageNode> StorageNode::Items() const {
   std::vector<StorageNode> items;
-  if (!Exists() || !RequireThat(node_.isSeq(), "a list")) return items;
-  for (const cv::FileNode& item : node_) {
-    items.emplace_back(item, place_ + "[" + std::to_string(items.size()) + "]", status_);
+  if (!Exists() || !RequireThat(node_->is_array(), "a list")) return items;
+  items.reserve(node_->size());
+  for (const Json& item : *node_) {
+    items.emplace_back(&item, place_ + "[" + std::to_string(items.size()) + "]", status_);
   }
   return items;
 }
 
 std::string StorageNode::Text() const {
-  if (!RequireThat(node_.isString() || node_.isInt(), "text")) return "";
-  return node_.isInt() ? std::to_string(static_cast<int>(node_.real())) : node_.string();
+  if (!RequireThat(Exists() && IsText(*node_), "text")) return "";
+  return node_->is_string() ? node_->get<std::string>() : node_->dump();
 }
 
 double StorageNode::Number() const {
-  if (!RequireThat(node_.isInt() || node_.isReal(), "a number")) return 0.0;
-  const double value = node_.real();
+  if (!RequireThat(Exists() && node_->is_number(), "a number")) return 0.0;
+  const auto value = node_->get<double>();
   return RequireThat(std::isfinite(value), "a finite number") ? value : 0.0;
 }
 
@@ -153,18 +121,12 @@ int StorageNode::Integer() const {
 
 std::vector<double> StorageNode::Numbers(std::size_t count, std::size_t multiple_of) const {
   std::vector<double> values;
-  if (node_.isMap()) {  // A matrix.
-    try {
-      cv::Mat matrix;
-      node_.mat().convertTo(matrix, CV_64F);
-      matrix = matrix.reshape(1, 1);
-      values.assign(matrix.begin<double>(), matrix.end<double>());
-    } catch (const std::exception&) {
-      Fail("must be a list of numbers");
-    }
-    for (const double value : values) RequireThat(std::isfinite(value), "a list of finite numbers");
-  } else if (RequireThat(node_.isSeq(), "a list of numbers")) {
-    values.reserve(node_.size());
+  if (Exists() && node_->is_object()) {  // A matrix of OpenCV's: rows, cols, dt and data.
+    values = Get("data").Numbers();
+    const double size = Require("rows").Number() * Require("cols").Number();
+    if (ok() && static_cast<double>(values.size()) != size) Fail("must have rows x cols numbers");
+  } else if (RequireThat(Exists() && node_->is_array(), "a list of numbers")) {
+    values.reserve(node_->size());
     for (const StorageNode& item : Items()) values.push_back(item.Number());
   }
   if (!ok()) return {};

@@ -1,9 +1,11 @@
-// Strict reading of OpenCV FileStorage documents (YAML, JSON): every value knows where it stands,
-// and the first thing that is wrong becomes one sentence that names the place.
+// Strict reading of YAML and JSON documents, those of OpenCV's FileStorage among them: every value
+// knows where it stands, and the first thing that is wrong becomes one sentence that names the
+// place.
 #ifndef CIRCLINE_APPS_COMMON_STORAGE_NODE_H_
 #define CIRCLINE_APPS_COMMON_STORAGE_NODE_H_
 
-#include <opencv2/core.hpp>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -15,10 +17,13 @@ namespace circline::apps {
 // first one wins) and returns an empty value, so that callers read on and look at the status once.
 class StorageNode {
  public:
-  StorageNode(const cv::FileNode& node, std::string place, Status* status)
+  using Json = nlohmann::ordered_json;
+
+  // Views a value of a document that outlives it; nullptr is one that does not exist.
+  StorageNode(const Json* node, std::string place, Status* status)
       : node_(node), place_(std::move(place)), status_(status) {}
 
-  bool Exists() const { return !node_.empty() && !node_.isNone(); }
+  bool Exists() const;  // A null does not.
   const std::string& place() const { return place_; }
   void set_place(std::string place) { place_ = std::move(place); }
 
@@ -42,24 +47,27 @@ class StorageNode {
  private:
   bool RequireThat(bool condition, const std::string& expected) const;
 
-  cv::FileNode node_;
+  const Json* node_;
   std::string place_;
   Status* status_;
 };
 
-// Opens a document held in memory until the object goes. YAML may come without OpenCV's "%YAML:1.0"
-// header.
+// A document held in memory until the object goes: a map of keys and values.
 class StorageDocument {
  public:
+  StorageDocument();
+  ~StorageDocument();
+  StorageDocument(const StorageDocument&) = delete;
+  StorageDocument& operator=(const StorageDocument&) = delete;
+
   // Not ok: one line that names the file, and the line in it where the parser can tell.
   Status Open(const std::string& path);
   // The same of a text; messages call it `name`.
-  Status Parse(const std::string& name, std::string text);
-  cv::FileNode root() const { return storage_.root(); }
+  Status Parse(const std::string& name, const std::string& text);
+  const nlohmann::ordered_json* root() const { return json_.get(); }
 
  private:
-  std::string text_;
-  cv::FileStorage storage_;
+  std::unique_ptr<nlohmann::ordered_json> json_;
 };
 
 // The bytes of a file, without a byte order mark.

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "apps/common/document.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "circline/estimators/pencil_lean.h"
 
@@ -221,10 +222,6 @@ std::size_t CountLines(const std::string& text) {
 
 }  // namespace
 
-std::string JsonText(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 std::vector<Json> ResultLines(const ImageRun& image) {
   std::vector<Json> lines;
   for (const SolverRun& run : image.solvers) {
@@ -279,9 +276,4 @@ ImageLines WriteLines(const ImageRun& run, const std::string& overlay,
   lines.observations = Line(ObservationLine(run, overlay, flags, noise, counts));
   return lines;
 }
-
-std::string TextAsWritten(const std::string& text) {
-  return Json::parse(JsonText(text)).get<std::string>();
-}
-
 }  // namespace circline::apps

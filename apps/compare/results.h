@@ -31,12 +31,6 @@ nlohmann::ordered_json ObservationLine(const ImageRun& run, const std::string& o
                                        const std::vector<std::string>& flags,
                                        const NoiseModel& noise, const LineCounts& counts);
 
-// Of one line; what is not UTF-8 is replaced, so that a file name cannot stop a run.
-std::string JsonText(const nlohmann::ordered_json& json);
-
-// A text as these lines have it: what is not UTF-8 is replaced.
-std::string TextAsWritten(const std::string& text);
-
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMPARE_RESULTS_H_

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "apps/common/document.h"
 #include "apps/common/flags_util.h"
 #include "apps/common/output_file.h"
 #include "apps/common/storage_node.h"

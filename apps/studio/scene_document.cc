@@ -5,8 +5,8 @@
 #include <set>
 
 #include "apps/common/camera_file.h"
+#include "apps/common/document.h"
 #include "apps/common/storage_node.h"
-#include "apps/compare/results.h"
 
 namespace circline::apps {
 namespace {
@@ -60,38 +60,12 @@ bool IsNameKey(const std::string& key) {
   return keys->count(key) > 0;
 }
 
-// `key`: that of the node, or of the list that it is in.
-Json FromNode(const cv::FileNode& node, const std::string& key) {
-  if (node.isMap()) {
-    Json map = Json::object();
-    for (const cv::FileNode& child : node) map[child.name()] = FromNode(child, child.name());
-    return map;
-  }
-  if (node.isSeq()) {
-    Json list = Json::array();
-    for (const cv::FileNode& child : node) list.push_back(FromNode(child, key));
-    return list;
-  }
-  const bool is_name = node.isInt() && IsNameKey(key);
-  if (is_name) return std::to_string(static_cast<int>(node));
-  if (node.isInt()) return static_cast<int>(node);
-  if (node.isReal()) return node.real();
-  return node.isString() ? Json(node.string()) : Json();
-}
-
-// The parts of a list, or the keys of a map, a line each down to `depth`; numbers side by side.
-std::string Lines(const Json& value, const std::string& indent, int depth) {
-  const bool is_map = value.is_object(), is_list = value.is_array();
-  if (depth == 0 || !(is_map || is_list) || value.empty()) return JsonText(value);
-  if (is_list && !value.front().is_structured()) return JsonText(value);
-  std::string text = is_map ? "{" : "[", separator = "\n";
-  for (const auto& [key, item] : value.items()) {
-    text += separator + indent + "  ";
-    if (is_map) text += JsonText(key) + ": ";
-    text += Lines(item, indent + "  ", depth - 1);
-    separator = ",\n";
-  }
-  return text + "\n" + indent + (is_map ? "}" : "]");
+// `key`: that of the value, or of the list that it is in.
+void WriteNamesAsText(Json* value, const std::string& key) {
+  if (value->is_number_integer() && IsNameKey(key)) *value = value->dump();
+  if (!value->is_structured()) return;
+  for (const auto& [own, item] : value->items())
+    WriteNamesAsText(&item, value->is_object() ? own : key);
 }
 
 bool IsSameButId(const Json& a, const Json& b) {
@@ -121,22 +95,6 @@ Json ListOrEmpty(const Json& scene, const char* key) {
 }
 
 }  // namespace
-
-Json CameraEntry(const Camera& camera, const StatedCameraSigma& sigma) {
-  Json json = {{"id", camera.id}, {"model", ModelName(camera.model)}};
-  if (camera.width > 0) json["width"] = camera.width;
-  if (camera.height > 0) json["height"] = camera.height;
-  json["camera_matrix"] = {camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0};
-  if (camera.model != CameraModel::kPinhole) json["distortion"] = Distortion(camera);
-  const auto state = [&json](const char* key, const std::optional<double>& value) {
-    if (value) json[key] = *value;
-  };
-  state("focal_sigma", sigma.log_focal);
-  state("focal_sigma_doubtful", sigma.doubtful_log_focal);
-  state("principal_point_sigma_px", sigma.principal_point_px);
-  state("k1_sigma", sigma.k1);
-  return json;
-}
 
 Json OneImageDocument(const Json& entry, const std::string& file, const Json& camera) {
   if (!entry.is_object())
@@ -189,14 +147,14 @@ Json WithImage(const Json& scene, const Json& document) {
   return whole;
 }
 
-std::string SceneText(const Json& scene) { return Lines(scene, "", 5) + "\n"; }
-
 Status ReadSceneJson(const std::string& path, Json* scene) {
   std::vector<SceneImage> images;
   Status status = ReadScene(path, {}, &images);
   StorageDocument document;
   if (status.ok()) status = document.Open(path);
-  if (status.ok()) *scene = FromNode(document.root(), "");
+  if (!status.ok()) return status;
+  *scene = *document.root();
+  WriteNamesAsText(scene, "");
   return status;
 }
 

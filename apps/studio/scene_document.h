@@ -27,9 +27,6 @@ class RequestError : public std::runtime_error {
   int status_;
 };
 
-// An entry of `cameras`; what `sigma` leaves open is not stated.
-Json CameraEntry(const Camera& camera, const StatedCameraSigma& sigma);
-
 // A document of one image: `entry` (which may lack file and camera) with them. Throws RequestError
 // where it has what no scene file can: other values than short plain texts, finite numbers, lists
 // and maps, or too many of them.
@@ -42,9 +39,6 @@ SceneImage ReadDocument(const Json& document, const std::string& folder);
 // file, and without cameras that no image is of. The cameras of the other images stay as they are:
 // the document's gets another id where one of theirs has it.
 Json WithImage(const Json& scene, const Json& document);
-
-// With a line for each circle, pencil and key, so that people can read and change it.
-std::string SceneText(const Json& scene);
 
 // A scene file as it stands, YAML or JSON; names are texts, also where they are written as numbers.
 Status ReadSceneJson(const std::string& path, Json* scene);

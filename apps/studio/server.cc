@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <functional>
 
-#include "apps/compare/results.h"
+#include "apps/common/document.h"
 #include "apps/studio/page.h"
 
 namespace circline::apps {

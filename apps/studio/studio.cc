@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <set>
 
+#include "apps/common/document.h"
 #include "apps/common/output_file.h"
 #include "apps/common/storage_node.h"
 #include "apps/compare/encode.h"
-#include "apps/compare/results.h"
 #include "apps/studio/answer.h"
 #include "apps/studio/export_pose.h"
 
@@ -238,7 +238,7 @@ Json Studio::Save(const Json& request) {
   }
   Json whole = WithImage(scene_, document);
   std::string path;
-  const Status status = Write(folder_, kSceneFile, SceneText(whole), &path);
+  const Status status = Write(folder_, kSceneFile, DocumentText(whole), &path);
   if (!status.ok()) throw RequestError(409, status.message);
   std::error_code error;
   scene_written_ = std::filesystem::last_write_time(path, error);

@@ -134,7 +134,7 @@ TEST_F(CalibrateTest, TheSceneSaysWhetherTheWorldIsRigid) {
     const Outcome run = Calibrate("--scene=" + stated + " --rigid=yes --output=" + Output());
     ASSERT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(ReadJson(Output() + "/calibration.json")["rigid"], rigid == "auto");
-    EXPECT_CONTAINS(ReadAll(Output() + "/scene.yaml"), "rigid: ");
+    EXPECT_CONTAINS(ReadAll(Output() + "/scene.yaml"), "\"rigid\": \"" + rigid + "\"");
   }
   const Outcome run =
       Calibrate("--scene=" + folder_.Write("bad.yaml", ReadAll(scene) + "rigid: 3\n") +

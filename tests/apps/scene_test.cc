@@ -289,10 +289,10 @@ TEST(Scene, NamesBadCameras) {
 }
 
 TEST(Scene, NamesMalformedFiles) {
-  EXPECT_CONTAINS(ErrorOf("images:\n  - { file: 01.jpg }\n"), "line 2: ");
+  EXPECT_CONTAINS(ErrorOf("images:\n  - { file: \"01.jpg }\n"), "line 3: ");
   EXPECT_CONTAINS(ErrorOf("%YAML:1.0\n---\ncameras: [ { id: \"c\"\nimages: x\n"),
-                  "not valid YAML or JSON");
-  EXPECT_CONTAINS(ErrorOf("{ \"images\": [ }"), "not valid YAML or JSON");
+                  "not valid YAML, JSON or XML");
+  EXPECT_CONTAINS(ErrorOf("{ \"images\": [ }"), "not valid YAML, JSON or XML");
   EXPECT_CONTAINS(ErrorOf(""), "is empty");
   EXPECT_CONTAINS(ErrorOf("just words"), "scene.yaml: ");
   EXPECT_CONTAINS(ErrorOf(std::string(300, '\0')), "scene.yaml: ");

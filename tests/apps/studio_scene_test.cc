@@ -7,6 +7,7 @@
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 
+#include "apps/common/document.h"
 #include "apps/studio/answer.h"
 #include "apps/studio/studio.h"
 #include "tests/apps/studio_disc.h"
@@ -117,7 +118,7 @@ TEST_F(StudioSceneTest, KeepsWhatAnotherHandWroteMeanwhile) {
   Json other = whole["images"][0];
   other["file"] = "b.png";
   whole["images"].push_back(other);
-  WriteByHand("scene.json", SceneText(whole));
+  WriteByHand("scene.json", DocumentText(whole));
   studio->Save({{"image", 0}, {"scene", Json::object()}});
   std::vector<SceneImage> saved = Saved();
   ASSERT_EQ(saved.size(), 2U);
@@ -127,7 +128,7 @@ TEST_F(StudioSceneTest, KeepsWhatAnotherHandWroteMeanwhile) {
   WriteByHand("scene.json", "{ \"pictures\": [] }");
   EXPECT_CONTAINS(ErrorOf([&] { studio->Save({{"image", 0}, {"scene", scene}}); }), "pictures");
   EXPECT_EQ(ReadAll(folder_ / "scene.json"), "{ \"pictures\": [] }");
-  WriteByHand("scene.json", SceneText(whole));
+  WriteByHand("scene.json", DocumentText(whole));
   EXPECT_EQ(ErrorOf([&] { studio->Save({{"image", 0}, {"scene", scene}}); }), "");
 }
 

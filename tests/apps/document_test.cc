@@ -1,0 +1,117 @@
+#include "apps/common/document.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <string>
+
+namespace circline::apps {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json Parsed(const std::string& text) {
+  Json root;
+  const Status status = ParseDocument(text, &root);
+  EXPECT_TRUE(status.ok()) << status.message;
+  return root;
+}
+
+std::string ErrorOf(const std::string& text) {
+  Json root;
+  const Status status = ParseDocument(text, &root);
+  EXPECT_FALSE(status.ok()) << root.dump().substr(0, 200);
+  EXPECT_EQ(status.message.find('\n'), std::string::npos) << status.message;
+  return status.message;
+}
+
+std::string Repeat(const std::string& text, int count) {
+  std::string all;
+  for (int i = 0; i < count; ++i) all += text;
+  return all;
+}
+
+TEST(Document, ScalarsAreNumbersWherePlain) {
+  EXPECT_EQ(Parsed("a: [ 3, -2.5, 1., .5, 1e3, +7, \"3\", '4', x3, 1.2.3, ., e, -, 0x10 ]\nb:\n"),
+            Json::parse(R"({"a": [3, -2.5, 1.0, 0.5, 1000.0, 7, "3", "4", "x3", "1.2.3", ".", "e",
+                                   "-", "0x10"], "b": null})"));
+  EXPECT_TRUE(std::isinf(Parsed("a: -.Inf")["a"].get<double>()));
+  EXPECT_TRUE(std::isnan(Parsed("a: .nan")["a"].get<double>()));
+  EXPECT_EQ(Parsed("a: 4294967680")["a"].get<double>(), 4294967680.0);
+}
+
+TEST(Document, JsonAndYamlOfOneSceneAreTheSame) {
+  const Json value = {{"file", "name with \"quotes\", \\ and \xC3\xA9"},
+                      {"points", {1.25, 0.1, 1e-300, 12345678}},
+                      {"maps", {{{"x", 1}}, {{"x", Json::array()}}}}};
+  EXPECT_EQ(Parsed(JsonText(value)), value);
+  EXPECT_EQ(Parsed(DocumentText(value)), value);
+  EXPECT_EQ(Parsed("%YAML:1.0\n---\n" + DocumentText(value)), value);
+  EXPECT_EQ(Parsed(R"({"smile": "\ud83d\ude00"})")["smile"], "\xF0\x9F\x98\x80");
+}
+
+// All three of its formats, from its own writer.
+TEST(Document, ReadsWhatOpenCvWrites) {
+  const std::vector<double> numbers = {552.25, 0.0, -1e-9, 3.0};
+  for (const std::string name : {"x.yml", "x.json", "x.xml"}) {
+    cv::FileStorage file(name, cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
+    file << "matrix" << cv::Mat(numbers).reshape(1, 2) << "count" << 3 << "size" << 2.5 << "time"
+         << "Mon 23 Nov"
+         << "list"
+         << "[" << 1 << 2 << "]"
+         << "maps"
+         << "["
+         << "{"
+         << "x" << 1 << "}"
+         << "{"
+         << "x" << 2 << "}"
+         << "]";
+    const Json root = Parsed(file.releaseAndGetString());
+    EXPECT_EQ(root["matrix"]["data"].get<std::vector<double>>(), numbers) << name;
+    EXPECT_EQ(root["matrix"]["rows"], 2) << name;
+    EXPECT_EQ(root["count"], 3) << name;
+    EXPECT_EQ(root["size"], 2.5) << name;
+    EXPECT_EQ(root["time"], "Mon 23 Nov") << name;
+    EXPECT_EQ(root["list"], Json::parse("[1, 2]")) << name;
+    EXPECT_EQ(root["maps"], Json::parse(R"([{"x": 1}, {"x": 2}])")) << name;
+  }
+}
+
+// 21 bytes for which FileStorage never comes back, and what overflows a stack that recurses.
+TEST(Document, HostileTextIsRefused) {
+  EXPECT_EQ(Parsed("%YAML:1.0\n a:\"\"\n6, -\n "), "a:\"\" 6, -");  // One text, to YAML.
+  for (const char* opening : {"[", "{a: ", "- ", "? ", "\"a\": ["}) {
+    EXPECT_NE(ErrorOf("a: " + Repeat(opening, 60000)), "") << opening;
+    EXPECT_NE(ErrorOf("{\"a\": " + Repeat(opening, 60000)), "") << opening;
+  }
+  EXPECT_NE(ErrorOf("<opencv_storage>" + Repeat("<a>", 60000)), "");
+  EXPECT_NE(ErrorOf("a: " + Repeat("[", 40) + Repeat("]", 40)).find("too deeply"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf("a: \"\\").find("line 1"), std::string::npos);
+  EXPECT_NE(ErrorOf("a: &x [1]\nb: *x\n").find("line 2: aliases"), std::string::npos);
+  EXPECT_NE(ErrorOf("a: 1\n---\nb: 1\n").find("second document"), std::string::npos);
+  EXPECT_NE(ErrorOf("? [a]\n: 1\n").find("a key must be text"), std::string::npos);
+  EXPECT_NE(ErrorOf("a: \xFF\xFE\n"), "");
+  EXPECT_NE(ErrorOf(std::string("a: b\0c", 6)), "");
+}
+
+TEST(Document, AKeyThatStandsTwiceIsNamed) {
+  EXPECT_NE(ErrorOf("a: 1\nb: 2\na: 3\n").find("line 3: key 'a' stands there twice"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf(R"({"b": {"a": 1}, "c": {"a": 2, "a": 3}})").find("key 'a' stands there twice"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf("<opencv_storage><a>1</a><a>2</a></opencv_storage>").find("key 'a'"),
+            std::string::npos);
+  std::string many, lines;
+  for (int i = 0; i < 1001; ++i) {
+    many += (i == 0 ? "{\"k" : ", \"k") + std::to_string(i) + "\": 1";
+    lines += "k" + std::to_string(i) + ": 1\n";
+  }
+  EXPECT_NE(ErrorOf(many + "}").find("too many keys"), std::string::npos);
+  EXPECT_NE(ErrorOf(lines).find("line 1001: a map has too many keys"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace circline::apps
