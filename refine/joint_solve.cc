@@ -59,7 +59,7 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   std::vector<double*> own(static_cast<std::size_t>(num_groups_), nullptr);
   std::vector<std::uint8_t> added(blocks_.size(), 0);
-  int unknowns = 0;
+  int unknowns = 0, eliminated = 0;
   for (const Term& term : terms_) {
     if (!IsActive(term, *state)) continue;
     blocks.clear();
@@ -77,7 +77,9 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
       if (block.tangent_size() == 0) continue;
       double* unused = nullptr;
       double*& first = block.group >= 0 ? own[static_cast<std::size_t>(block.group)] : unused;
-      ordering->AddElementToGroup(values, block.group >= 0 && first == nullptr ? 0 : 1);
+      const bool is_first = block.group >= 0 && first == nullptr;
+      if (is_first) eliminated += block.tangent_size();
+      ordering->AddElementToGroup(values, is_first ? 0 : 1);
       first = values;
     }
     problem.AddResidualBlock(term.cost.get(), term.loss.get(), blocks);
@@ -86,7 +88,10 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
 
   ceres::Solver::Options options = NearbyOptions(unknowns, max_iterations, state->cost);
   if (options.linear_solver_type == ceres::SPARSE_NORMAL_CHOLESKY) {
-    options.linear_solver_type = ceres::DENSE_SCHUR;
+    // What is left is a small matrix, or a large one of many zeros.
+    constexpr int kSparse = 200;
+    options.linear_solver_type =
+        unknowns - eliminated > kSparse ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
     options.linear_solver_ordering = ordering;
   }
   Watch watch(rival, FreeCost(*state));

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "circline/refine/chi_square.h"
@@ -16,6 +17,8 @@ namespace circline {
 namespace {
 
 constexpr std::size_t kMaxReadings = 16;
+// Of many circles the planes of those that explain the evidence best are starts, not of all.
+constexpr std::size_t kMostCircles = 6;
 constexpr double kHopeless = 300.0;  // Gaps that no start comes down.
 // Cost: several times what leaving out a feature costs, and its chi-square limit besides.
 constexpr double kContradiction = 100.0;
@@ -82,6 +85,7 @@ class ReadingSearch {
   std::vector<State> RefineAll(const Reading& reading) {
     std::vector<std::pair<std::size_t, State>> found;
     std::vector<std::size_t> tried;
+    std::set<int> circles;  // Whose planes were tried.
     const int best_circle = BestCircle(reading);
     double best = std::numeric_limits<double>::infinity();
     bool is_consistent = false;  // The best one explains all that is to take part.
@@ -90,11 +94,13 @@ class ReadingSearch {
       // Where all evidence agrees, one circle's planes are those of all.
       const int source = seeds_[start.seed].source;
       if (is_consistent && source < 0 && source != best_circle) continue;
+      if (source < 0 && circles.count(source) == 0 && circles.size() == kMostCircles) continue;
       const bool is_near = std::any_of(tried.begin(), tried.end(), [&](std::size_t other) {
         return IsSameSeed(seeds_[start.seed], seeds_[other]) && seeds_[other].source != source;
       });
       if (is_consistent && (is_near || start.cost > best + kHopeless * MaxGap())) continue;
       tried.push_back(start.seed);
+      if (source < 0) circles.insert(source);
       if (!SolveFrom(is_consistent, best, &state)) continue;
       if (std::any_of(found.begin(), found.end(), [&](const auto& other) {
             return IsSamePose(problem_, state, other.second);
@@ -250,14 +256,24 @@ class ReadingSearch {
       return a.first != b.first ? a.first > b.first : a.second < b.second;
     });
     // Of few features it may be any, whatever the misfits at a compromise of all; of many the
-    // worst.
+    // worst, and where many are as bad all of them at once: what agrees then comes back (Grow).
     constexpr std::size_t kFew = 6, kMost = 3;
-    const bool few = misfits.size() <= kFew;
-    for (std::size_t k = 0; k < (few ? excess.size() : std::min(kMost, excess.size())); ++k) {
-      constexpr double kComparable = 0.3;  // Of the worst.
-      if (!few && excess[k].first < kComparable * excess.front().first) break;
+    constexpr double kComparable = 0.3;  // Of the worst.
+    if (misfits.size() > kFew) {
+      const auto better = std::find_if(excess.begin(), excess.end(), [&](const auto& e) {
+        return e.first < kComparable * excess.front().first;
+      });
+      excess.erase(better, excess.end());
+      if (excess.size() > kMost) {
+        Reading without = minimum.active;
+        for (const auto& [unused, feature] : excess) without[feature] = 0;
+        rivals->push_back(std::move(without));
+        return;
+      }
+    }
+    for (const auto& [unused, feature] : excess) {
       Reading without = minimum.active;
-      without[excess[k].second] = 0;
+      without[feature] = 0;
       rivals->push_back(std::move(without));
     }
   }

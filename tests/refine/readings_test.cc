@@ -105,6 +105,31 @@ TEST_P(TiltedCircleTest, OneOfThreeIsNamedAndTheOthersKeepTheirPose) {
 INSTANTIATE_TEST_SUITE_P(Tilts, TiltedCircleTest,
                          ::testing::Values(5.0 * kDegree, 10.0 * kDegree, 15.0 * kDegree));
 
+// More of them than readings are looked at one by one: all at once, and what agrees comes back.
+TEST(ReadingsTest, ManyTiltedCirclesAmongManyAreNamed) {
+  constexpr double kNoise = 0.3;
+  PlaneScene scene(0.7, kNoise, 5);
+  Observations observations;
+  observations.camera = scene.camera;
+  Ids tilted;
+  for (int i = 0; i < 40; ++i) {
+    const std::string id = "c" + std::to_string(i);
+    const Vector2d center(-2.1 + 0.6 * (i % 8), -1.2 + 0.6 * (i / 8));
+    const bool is_tilted = i % 3 == 0;
+    observations.circles.push_back(
+        Tilted(&scene, id, center, 0.25, is_tilted ? 20.0 * kDegree : 0.0, 0.4 * i));
+    if (is_tilted) tilted.push_back(id);
+  }
+  const PoseEstimate estimate = EstimatePose(observations, Exact());
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  const PoseHypothesis& best = estimate.hypotheses.front();
+  Ids left_out = best.left_out;
+  std::sort(left_out.begin(), left_out.end());
+  std::sort(tilted.begin(), tilted.end());
+  EXPECT_EQ(left_out, tilted);
+  EXPECT_LT(NormalError(best, scene), 4.0 * SigmaNormal(best));
+}
+
 TEST(ReadingsTest, AWrongRadiusIsNamed) {
   constexpr int kScenes = Trials(60);
   int named = 0;
