@@ -6,6 +6,8 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "apps/common/text.h"
+
 namespace circline::apps {
 
 bool IsCutOffJpeg(const std::vector<std::uint8_t>& bytes) {
@@ -25,7 +27,7 @@ bool IsCutOffJpeg(const std::vector<std::uint8_t>& bytes) {
   return true;
 }
 
-std::string ReadPhoto(const std::string& path, cv::Mat* photo) {
+std::string ReadPhoto(const std::string& path, cv::Mat* photo, double max_megapixels) {
   namespace fs = std::filesystem;
   std::error_code error;
   if (!fs::exists(path, error)) return "the file does not exist";
@@ -44,7 +46,10 @@ std::string ReadPhoto(const std::string& path, cv::Mat* photo) {
   } catch (const std::exception&) {
     photo->release();
   }
-  return photo->empty() ? "is not an image that can be read" : "";
+  if (photo->empty()) return "is not an image that can be read";
+  if (static_cast<double>(photo->total()) <= 1e6 * max_megapixels) return "";
+  photo->release();
+  return "has more than " + FormatPlain(max_megapixels) + " megapixels";
 }
 
 }  // namespace circline::apps

@@ -9,9 +9,14 @@
 
 namespace circline::apps {
 
+// Larger photos are refused where nobody says otherwise: 100 megapixels take some 2 GB in
+// detection.
+constexpr double kMaxMegapixels = 100.0;
+
 // Grey or colour, 8 bits a channel, turned as its EXIF data say. Returns what is wrong with the
 // file, in words; empty: nothing.
-std::string ReadPhoto(const std::string& path, cv::Mat* photo);
+std::string ReadPhoto(const std::string& path, cv::Mat* photo,
+                      double max_megapixels = kMaxMegapixels);
 
 // Whether the file's end is missing, which decoders pass over with half a picture. False for what
 // is not a JPEG.

@@ -150,7 +150,7 @@ void ObserveRead(const CompareOptions& options, SceneImage* image, ImageRun* run
 void ReadAndObserve(const CompareOptions& options, SceneImage* image, ImageRun* run) {
   if (options.overlays || image->detect_everything || !image->rois.empty()) {
     const Stopwatch watch;
-    run->read_error = ReadPhoto(image->path, &run->photo);
+    run->read_error = ReadPhoto(image->path, &run->photo, options.max_megapixels);
     run->stages.emplace_back("read", watch.Microseconds());
   }
   if (run->read_error.empty()) ObserveRead(options, image, run);

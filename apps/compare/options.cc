@@ -54,6 +54,8 @@ DEFINE_int32(max_pencils, circline::DetectionOptions().max_pencils,
 DEFINE_uint64(seed, circline::FitOptions().seed, "Same input and seed: same bytes out.");
 DEFINE_int32(threads, 0,
              "Images worked on at a time, at most one for each core; 0 = one for each core.");
+DEFINE_double(max_megapixels, circline::apps::kMaxMegapixels,
+              "Photos with more are refused: time and memory grow with it.");
 DEFINE_bool(overlays, true, "Draw a picture of each photo with what was found in it.");
 DEFINE_bool(
     peers, false,
@@ -302,6 +304,9 @@ Status OptionsFromFlags(CompareOptions* options) {
     return Status::Invalid("--output is missing: the folder for the results");
   options->output = FLAGS_output;
   options->threads = FLAGS_threads;
+  if (!(FLAGS_max_megapixels > 0.0))
+    return CheckFlag("max_megapixels", Status::Invalid("must be positive"));
+  options->max_megapixels = FLAGS_max_megapixels;
   options->overlays = FLAGS_overlays;
   options->resume = FLAGS_resume;
   options->peers = FLAGS_peers;

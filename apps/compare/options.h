@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/common/photo_file.h"
 #include "apps/compare/finish.h"
 #include "apps/compare/inputs.h"
 #include "circline/estimators/closed_form_solvers.h"
@@ -29,7 +30,8 @@ struct CompareOptions {
   FitOptions fit;
   DetectionOptions detection;
   ClosedFormOptions closed_form;
-  int threads = 0;  // 0 = as many as the machine has.
+  int threads = 0;                         // 0 = as many as the machine has.
+  double max_megapixels = kMaxMegapixels;  // Larger photos are refused.
   bool overlays = true;
   bool structure_tells_focal = true;  // Detection looks for the focal length where it is wide.
   bool resume = false;

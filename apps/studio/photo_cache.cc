@@ -9,7 +9,6 @@ namespace circline::apps {
 
 std::shared_ptr<const LoadedPhoto> PhotoCache::Get(std::size_t index) {
   constexpr std::size_t kKept = 3;
-  constexpr std::size_t kMaxPixels = 100'000'000;
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto known = std::find_if(photos_.begin(), photos_.end(),
                                   [&](const auto& photo) { return photo->index == index; });
@@ -23,9 +22,6 @@ std::shared_ptr<const LoadedPhoto> PhotoCache::Get(std::size_t index) {
   if (!found.ok()) throw RequestError(403, found.message);
   const std::string error = ReadPhoto(photo->path, &photo->pixels);
   if (!error.empty()) throw RequestError(422, folder_->name(index) + ": " + error);
-  if (photo->pixels.total() > kMaxPixels) {
-    throw RequestError(422, folder_->name(index) + ": has more than 100 megapixels");
-  }
   photos_.push_front(photo);
   if (photos_.size() > kKept) photos_.pop_back();
   return photo;

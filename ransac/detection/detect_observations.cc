@@ -90,12 +90,13 @@ Status MoveToLikeliestFocal(const EdgeMap& edges, const DetectionOptions& option
 }  // namespace
 
 Status DetectionOptions::Validate() const {
-  if (!(min_ellipse_axis_px > 0.0)) return Status::Invalid("min_ellipse_axis_px must be positive");
+  if (!(min_ellipse_axis_px > 0.0) || !std::isfinite(min_ellipse_axis_px))
+    return Status::Invalid("min_ellipse_axis_px must be positive and finite");
   if (!(min_arc_deg > 0.0 && min_arc_deg <= 360.0)) {
     return Status::Invalid("min_arc_deg must be in (0, 360]");
   }
-  if (!(min_segment_length_px > 0.0)) {
-    return Status::Invalid("min_segment_length_px must be positive");
+  if (!(min_segment_length_px > 0.0) || !std::isfinite(min_segment_length_px)) {
+    return Status::Invalid("min_segment_length_px must be positive and finite");
   }
   if (max_circles < 0) return Status::Invalid("max_circles must not be negative");
   if (max_pencils < 0 || max_pencils > kMaxPencils) {

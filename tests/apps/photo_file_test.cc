@@ -38,6 +38,14 @@ class PhotoFile : public testing::Test {
   cv::Mat photo_;
 };
 
+TEST_F(PhotoFile, RefusesMoreMegapixelsThanAsked) {
+  const std::vector<std::uint8_t> bytes = Encoded(".png", cv::Mat(1001, 1000, CV_8U, 7.0));
+  const std::string path = folder_.Write("photo", std::string(bytes.begin(), bytes.end()));
+  EXPECT_EQ(ReadPhoto(path, &photo_, 1.0), "has more than 1 megapixels");
+  EXPECT_TRUE(photo_.empty());
+  EXPECT_EQ(ReadPhoto(path, &photo_, 1.01), "");
+}
+
 TEST_F(PhotoFile, ReadsWhateverDepthAndChannels) {
   for (const char* extension : {".jpg", ".png", ".bmp", ".tiff"}) {
     EXPECT_EQ(Read(Encoded(extension, Texture())), "") << extension;
