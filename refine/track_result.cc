@@ -32,6 +32,7 @@ void FillCovariance(const TrackMap& map, const TrackState& state, PoseHypothesis
     h->free_directions.push_back(direction);
     const Matrix6d without = Matrix6d::Identity() - free * free.transpose();
     covariance = without * covariance * without;
+    covariance.diagonal() = covariance.diagonal().cwiseMax(0.0);  // Rounding may leave less.
   }
   if (!map.has_position()) {
     for (int k = 3; k < 6; ++k) {
