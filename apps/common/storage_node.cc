@@ -46,7 +46,7 @@ Status ReadTextFile(const std::string& path, std::string* text) {
 Status StorageDocument::Open(const std::string& path) {
   std::string text;
   const Status status = ReadTextFile(path, &text);
-  return status.ok() ? Parse(path, std::move(text)) : status;
+  return status.ok() ? Parse(path, text) : status;
 }
 
 Status StorageDocument::Parse(const std::string& name, const std::string& text) {
