@@ -88,7 +88,8 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
 
   ceres::Solver::Options options = NearbyOptions(unknowns, max_iterations, state->cost);
   if (options.linear_solver_type == ceres::SPARSE_NORMAL_CHOLESKY) {
-    // What is left is a small matrix, or a large one of many zeros.
+    // What is left is a small matrix, or a large one of many zeros (the benchmark CirclesOfAPlane
+    // tells from where on; not tuned).
     constexpr int kSparse = 200;
     options.linear_solver_type =
         unknowns - eliminated > kSparse ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;

@@ -17,7 +17,8 @@ namespace circline {
 namespace {
 
 constexpr std::size_t kMaxReadings = 16;
-// Of many circles the planes of those that explain the evidence best are starts, not of all.
+// Of many circles the planes of those that explain the evidence best are starts, not of all: a
+// number, for time (circline_benchmark --benchmark_filter=CirclesOfAPlane), not chosen on photos.
 constexpr std::size_t kMostCircles = 6;
 constexpr double kHopeless = 300.0;  // Gaps that no start comes down.
 // Cost: several times what leaving out a feature costs, and its chi-square limit besides.
