@@ -8,23 +8,12 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/setup.sh
 
-# compare <set> <folder>: copies the photographs that the scene file names next to a copy of it, so
-# that build/demo/<set> can be opened, changed and run again by hand.
+# compare <set>
 compare() {
-  local set=$1 folder=$2 dir=build/demo/$1 file
-  mkdir -p "$dir"
-  cp "apps/demo/$set.yaml" "$dir/scene.yaml"
-  sed -nE 's/.*file: "([^"]+)".*/\1/p' "$dir/scene.yaml" | while read -r file; do
-    if [ -f "$folder/$file" ]; then
-      cp "$folder/$file" "$dir/$file"
-    elif [ -f "$folder/$file.gz" ]; then
-      gunzip -c "$folder/$file.gz" > "$dir/$file"
-    else
-      fail "no $file in $folder"
-    fi
-  done
+  local dir=build/demo/$1
+  lay_out "$1"
   echo
-  say "$set: $(sed -n '3s/^# //p' "$dir/scene.yaml")"
+  say "$1: $(sed -n '3s/^# //p' "$dir/scene.yaml")"
   build/release/bin/circline_compare --scene="$dir/scene.yaml" --output="$dir/out"
 }
 
@@ -50,15 +39,13 @@ track() {
 install_packages "${BUILD_PACKAGES[@]}"
 build release circline_compare circline_reconstruct circline_calibrate circline_track circline_studio
 
-find_folder opencv-doc /usr/share/doc/opencv-doc/examples/data
-compare chessboard "$found"
-find_folder visp-images-data /usr/share/visp-images-data/ViSP-images
-compare disc "$found/mire-2"
-compare box "$found/mire-2"
-compare dots "$found/calibration"
+for set in chessboard disc box dots; do
+  compare "$set"
+done
 
 echo
 say "track: a hundred frames about the disc, everything detected and followed"
+find_folder visp-images-data /usr/share/visp-images-data/ViSP-images
 track "$found/mire-2"
 
 echo

@@ -73,6 +73,26 @@ find_folder() {
   [ -d "$found" ] || fail "the package $package has no folder $folder"
 }
 
+# lay_out <set>: puts the scene file apps/demo/<set>.yaml and the photographs that it names into
+# build/demo/<set>, to be opened, changed and run again by hand.
+lay_out() {
+  local set=$1 dir=build/demo/$1 file from
+  case $set in
+    chessboard) find_folder opencv-doc /usr/share/doc/opencv-doc/examples/data ;;
+    *) find_folder visp-images-data /usr/share/visp-images-data/ViSP-images ;;
+  esac
+  mkdir -p "$dir"
+  cp "apps/demo/$set.yaml" "$dir/scene.yaml"
+  sed -nE 's/.*file: "([^"]+)".*/\1/p' "$dir/scene.yaml" | while read -r file; do
+    # Of ViSP's images each kind has a folder of its own.
+    for from in "$found" "$found/mire-2" "$found/calibration"; do
+      [ ! -f "$from/$file" ] || { cp "$from/$file" "$dir/$file"; break; }
+      [ ! -f "$from/$file.gz" ] || { gunzip -c "$from/$file.gz" > "$dir/$file"; break; }
+    done
+    [ -f "$dir/$file" ] || fail "no $file in $found"
+  done
+}
+
 # download <package> <folder>; a fresh system has no package lists yet.
 download() {
   (cd "$2" && apt-get -q download "$1") || { apt update && (cd "$2" && apt-get -q download "$1"); }

@@ -4,9 +4,9 @@ of the stated deviations they are. `pooled` counts focal lengths and principal p
 Rows that end in OpenCV: cv2.calibrateCamera on the same photographs with the layout KNOWN, from the centres of the contours'
 ellipses or the corners of cv2.findChessboardCorners. Needs python3-opencv.
 
-  calibration.py DATA [--converter=to_scene.py] [--calibrate=build/release/bin/circline_calibrate] [--draws=10]
+  calibration.py DATA [--calibrate=build/release/bin/circline_calibrate] [--draws=10]
 
-DATA holds one folder a set, each with a groundtruth.yml; see photographs.py for the converter.
+DATA holds one folder a set, each with a groundtruth.yml (docs/photographs.md).
 """
 import argparse
 import json
@@ -21,7 +21,9 @@ import tempfile
 import cv2
 import numpy as np
 
-# set, converter's arguments, flags, how many photos are drawn (0: all)
+from photograph_answers import TO_SCENE
+
+# set, to_scene.py's arguments, flags, how many photos are drawn (0: all)
 SETS = [
     ('circles-discocal-rgb', ['--circles=all'], [], (0, 5, 3, 2)),
     ('circles-discocal-rgb', ['--evidence=auto'], [], (0,)),
@@ -140,18 +142,16 @@ def judge(camera, truth, held):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('data')
-    parser.add_argument('--converter', default=None)
     parser.add_argument('--calibrate', default='build/release/bin/circline_calibrate')
     parser.add_argument('--draws', type=int, default=10)
     parser.add_argument('--guess', type=float, default=1.0, help='times the focal length of 60 degrees')
     args = parser.parse_args()
-    args.converter = args.converter or os.path.join(args.data, '..', 'tools', 'to_scene.py')
     pooled, seen = [], set()
     print(f'{"set":44} {"photos":>6} {"camera":>7} {"f %":>7} {"sigma %":>8} {"point px":>9} {"sigmas of f, cx, cy":>22}')
     with tempfile.TemporaryDirectory() as scratch:
         for data_set, given, flags, counts in SETS:
             source = os.path.join(scratch, 'source.yaml')
-            subprocess.run(['/usr/bin/python3', args.converter, os.path.join(args.data, data_set), source, *given],
+            subprocess.run([TO_SCENE, os.path.join(args.data, data_set), source, *given],
                            check=True, stdout=subprocess.DEVNULL)
             with open(source) as file:
                 scene = file.read()

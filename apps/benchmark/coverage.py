@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 """Do the stated standard deviations hold on photographs with truth? A table; exit code 1 if anything falls short.
 
-  coverage.py DATA [--compare=build/release/bin/circline_compare] [--converter=to_scene.py] [--sets=part,of,names]
+  coverage.py DATA [--compare=build/release/bin/circline_compare] [--sets=part,of,names]
               [--flags='--threads=1'] [--json=FILE] [--against=FILE] [--keep=DIR]
 
-DATA, the converter and what it needs as for photographs.py. --flags go to circline_compare, --keep keeps its output, --json
+DATA and what it needs as for photographs.py. --flags go to circline_compare, --keep keeps its output, --json
 writes all numbers (those of single photos too), --against=FILE prints what changed since a run with --json=FILE.
 
 A row is a set, what is given of it (`detected`: nothing) and a solver at a stage; or `pencils`: the directions of pencils
@@ -44,9 +44,9 @@ import tempfile
 import cv2
 import numpy
 
-from photographs import EQUAL, folder, group_circles, json_lines
+from photograph_answers import EQUAL, TO_SCENE, folder, group_circles, json_lines
 
-# What is given: the converter's arguments, and the solvers that are judged by it (none: all). The images of a board's centres
+# What is given: to_scene.py's arguments, and the solvers that are judged by it (none: all). The images of a board's centres
 # and axes come from the truth; where they decide more than the choice of a hypothesis or the turn, there is no row.
 LINES = ('lines', [], None)
 CENTRE = ('a circle, its centre', ['--centre'], ('single_circle', 'circle_center', 'joint'))
@@ -255,7 +255,7 @@ def pencil_row(data_set, given, lines, truths):
 def rows_of(args, data_set, given, options, only, scratch):
     out = folder(data_set, options, scratch)
     scene = out + '.yaml'
-    subprocess.run(['/usr/bin/python3', args.converter, os.path.join(args.data, data_set), scene,
+    subprocess.run([TO_SCENE, os.path.join(args.data, data_set), scene,
                     *(o for o in options if o != EQUAL)], check=True)
     if EQUAL in options:
         group_circles(scene)
@@ -317,11 +317,10 @@ def print_changes(results, earlier):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('data')
-    for flag, default in (('converter', None), ('compare', 'build/release/bin/circline_compare'), ('sets', ''), ('flags', ''),
+    for flag, default in (('compare', 'build/release/bin/circline_compare'), ('sets', ''), ('flags', ''),
                           ('json', None), ('against', None), ('keep', None)):
         parser.add_argument('--' + flag, default=default)
     args = parser.parse_args()
-    args.converter = args.converter or os.path.join(args.data, '..', 'tools', 'to_scene.py')
     results = []
     print(FORMAT.format(*HEAD))
     with tempfile.TemporaryDirectory() as temporary:

@@ -2,9 +2,9 @@
 """The focal length from one photo, everything detected, its calibration ignored: errors against the truth, whether the stated
 deviations hold, and whether the guess matters.
 
-  single_photo_focal.py DATA [--converter=to_scene.py] [--compare=build/release/bin/circline_compare] [--sets=a,b] [--photos]
+  single_photo_focal.py DATA [--compare=build/release/bin/circline_compare] [--sets=a,b] [--photos]
 
-DATA holds one folder a set, each with a groundtruth.yml; see photographs.py for the converter. `lens given`: principal point and
+DATA holds one folder a set, each with a groundtruth.yml (docs/photographs.md). `lens given`: principal point and
 distortion are the calibration's. `nothing given`: no distortion, principal point in the middle, both uncertain. The focal length
 starts at 60 degrees along the longer side, times 1, 0.7 and 1.4, with a deviation of 0.5 of its logarithm.
 
@@ -20,6 +20,8 @@ import re
 import statistics
 import subprocess
 import tempfile
+
+from photograph_answers import TO_SCENE
 
 SIGMA = 0.5  # Of log f, of the guess.
 GUESSES = (1.0, 0.7, 1.4)
@@ -101,12 +103,10 @@ def judge(rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('data')
-    parser.add_argument('--converter', default=None)
     parser.add_argument('--compare', default='build/release/bin/circline_compare')
     parser.add_argument('--sets', default='', help='only these, separated by commas')
     parser.add_argument('--photos', action='store_true', help='a line for each photo')
     args = parser.parse_args()
-    args.converter = args.converter or os.path.join(args.data, '..', 'tools', 'to_scene.py')
     heads = ['photos', 'answer', 'median %', '<= 5 %', '<= 10 %', 'in 2 s', 'sure', '<= 10 %', '> 20 %', 'same']
     print(f'{"set":42}' + ''.join(f'{h:>9}' for h in heads))
     pooled, num_photos = [], 0
@@ -115,7 +115,7 @@ def main():
             if args.sets and data_set not in args.sets.split(','):
                 continue
             source = os.path.join(scratch, 'source.yaml')
-            subprocess.run(['/usr/bin/python3', args.converter, os.path.join(args.data, data_set), source, '--evidence=auto'],
+            subprocess.run([TO_SCENE, os.path.join(args.data, data_set), source, '--evidence=auto'],
                            check=True, stdout=subprocess.DEVNULL)
             with open(source) as file:
                 scene = file.read()

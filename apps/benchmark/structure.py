@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 """Does the structure of a photograph depend on its size, or on chance? A line for each set; exit code 1 if it does.
 
-  structure.py DATA [--compare=build/release/bin/circline_compare] [--converter=to_scene.py] [--sets=part,of,names]
+  structure.py DATA [--compare=build/release/bin/circline_compare] [--sets=part,of,names]
                [--sizes=0.5,1,2] [--seeds=1,2,3] [--flags='--threads=1']
 
-DATA, the converter and what it needs as for photographs.py. Everything is detected in each photo, at each size of it (lenses
+DATA and what it needs as for photographs.py. Everything is detected in each photo, at each size of it (lenses
 and truths follow) and with each seed; the answers of `joint` with a probability of 0.9 or more are compared with those of
 the same photo at its own size with the first seed, if they are of the same plane (normals within 20 degrees).
 
@@ -26,6 +26,7 @@ import tempfile
 import cv2
 import numpy
 
+from photograph_answers import TO_SCENE
 from photographs import AUTOMATIC
 
 SURE = 0.9
@@ -87,11 +88,10 @@ def compare(base, other, counts):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('data')
-    for flag, default in (('converter', None), ('compare', 'build/release/bin/circline_compare'), ('sets', ''),
+    for flag, default in (('compare', 'build/release/bin/circline_compare'), ('sets', ''),
                           ('sizes', '0.5,1,2'), ('seeds', '1,2,3'), ('flags', '')):
         parser.add_argument('--' + flag, default=default)
     args = parser.parse_args()
-    args.converter = args.converter or os.path.join(args.data, '..', 'tools', 'to_scene.py')
     sizes, seeds = [float(s) for s in args.sizes.split(',')], args.seeds.split(',')
     total = collections.Counter()
     print(f'{"set":26} answers   pairs  agree  other')
@@ -100,7 +100,7 @@ def main():
             continue
         with tempfile.TemporaryDirectory() as scratch:
             scene = os.path.join(scratch, 'scene.yaml')
-            subprocess.run(['/usr/bin/python3', args.converter, os.path.join(args.data, data_set), scene,
+            subprocess.run([TO_SCENE, os.path.join(args.data, data_set), scene,
                             '--evidence=auto'], check=True, stdout=subprocess.DEVNULL)
             base, photos = sure_answers(args, scene, [f'--seed={seeds[0]}'], scratch)
             counts = collections.Counter(answers=len(base), photos=len(photos))

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 """Are tracked poses right, and sure only where they are right? A line for each claim; the last line is `N passed, N failed`.
 
-  tracking.py [DATA] [--frames=DIR] [--converter=to_scene.py] [--track=build/release/bin/circline_track] [--flags='...'] [--keep=DIR]
+  tracking.py [DATA] [--frames=DIR] [--track=build/release/bin/circline_track] [--flags='...'] [--keep=DIR]
 
 DIR is the folder of the 501 frames mire-2/image.NNNN.pgm of the Debian package visp-images-data, a plate with a disc that a
-camera moves about; twelve of them have a truth, that of apps/demo/disc.yaml. DATA and the converter are those of
-photographs.py (needs python3-opencv); without DATA its sets are left out.
+camera moves about; twelve of them have a truth, that of apps/demo/disc.yaml. DATA is that of photographs.py
+(needs python3-opencv); without DATA its sets are left out.
 
   right    frames with a truth whose first pose has the right normal (within 5 degrees)
   sure     those of probability 0.95 or more, and how many of them are wrong
@@ -37,6 +37,8 @@ import cv2
 import numpy
 
 from ties import write_scene
+
+from photograph_answers import TO_SCENE
 
 FAR_DEG, SURE, OPEN = 5.0, 0.95, 0.6
 BOARDS = ['chessboard-opencv', 'chessboard-charuco-robot', 'circles-visp36', 'circles-discocal-rgb', 'circles-discocal-tir']
@@ -130,7 +132,7 @@ def mire(args, claims):
 
 def scene_of(args, data_set, *options):
     scene = os.path.join(args.keep, data_set + '.yaml')
-    subprocess.run(['/usr/bin/python3', args.converter, os.path.join(args.data, data_set), scene, *options], check=True)
+    subprocess.run([TO_SCENE, os.path.join(args.data, data_set), scene, *options], check=True)
     with open(scene) as file:
         return scene, file.read()
 
@@ -217,7 +219,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('data', nargs='?')
     parser.add_argument('--frames', default='/usr/share/visp-images-data/ViSP-images/mire-2')
-    parser.add_argument('--converter')
     parser.add_argument('--track', default='build/release/bin/circline_track')
     parser.add_argument('--flags', default='', help='for circline_track')
     parser.add_argument('--keep', help='a folder for scenes and results')
@@ -229,7 +230,6 @@ def main():
         mire(args, claims)
         if args.data:
             args.data = os.path.abspath(args.data)
-            args.converter = args.converter or os.path.join(args.data, '..', 'tools', 'to_scene.py')
             for part in (teabox, boards, speed):
                 part(args, claims)
     print(f'{claims.passed} passed, {claims.failed} failed')

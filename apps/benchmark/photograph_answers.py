@@ -1,0 +1,144 @@
+"""Answers of circline_compare about photographs with truth, and their errors: for photographs.py."""
+import itertools
+import json
+import math
+import os
+import re
+import subprocess
+
+TOP = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..')
+TO_SCENE = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'to_scene.py')
+EQUAL = 'equal circles'  # Not for to_scene.py: all circles of a photo are one radius_group.
+SURE = 0.9  # The probability of an answer that counts as sure.
+
+
+def group_circles(scene):
+    with open(scene) as file:
+        text = file.read()
+    with open(scene, 'w') as file:
+        file.write(re.sub(r'(\{ id: "\w+", )(contour:)', r'\1radius_group: "dots", \2', text))
+
+
+def folder(data_set, options, scratch):
+    return os.path.join(scratch, '_'.join((data_set, *options)).replace('=', '').replace(' ', '_'))
+
+
+def json_lines(file):
+    with open(file) as lines:
+        return [json.loads(line) for line in lines]
+
+
+def run(args, data_set, options, scratch, cache={}):
+    """Result lines by image, solver and stage; one run for each set and evidence."""
+    key = (data_set, *options)
+    if key not in cache:
+        out = folder(data_set, options, scratch)
+        scene = out + '.yaml'
+        subprocess.run([TO_SCENE, os.path.join(args.data, data_set), scene,
+                        *(o for o in options if o != EQUAL)], check=True)
+        if EQUAL in options:
+            group_circles(scene)
+        subprocess.run([args.compare, f'--scene={scene}', f'--output={out}', '--overlays=false'], check=True,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        cache[key] = json_lines(os.path.join(out, 'results.jsonl'))
+        if data_set == 'box-camprodon':
+            cache[key] = set_box_errors(scene_rotations(scene), cache[key])
+    return cache[key]
+
+
+def bash(script, *arguments):
+    subprocess.run(['bash', '-c', f'set -euo pipefail; . cmake/setup.sh; {script}', 'bash', *arguments], check=True, cwd=TOP)
+
+
+def run_demo(args, scene, scratch, cache={}):
+    """Result lines of a scene of apps/demo, on photographs of Debian packages."""
+    if scene not in cache:
+        bash('lay_out "$1"', scene)
+        out = os.path.join(scratch, scene)
+        subprocess.run([args.compare, f'--scene={TOP}/build/demo/{scene}/scene.yaml', f'--output={out}', '--overlays=false'],
+                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        cache[scene] = json_lines(os.path.join(out, 'results.jsonl'))
+    return cache[scene]
+
+
+def answers(lines, solver, stage):
+    """For each image the hypotheses of one solver, best first; empty where it refused."""
+    by_image = {}
+    for line in lines:
+        hypotheses = by_image.setdefault(line['image'], [])
+        if (line['solver'], line['stage'], line['status']) == (solver, stage, 'ok'):
+            hypotheses.append(line)
+    return list(by_image.values())
+
+
+def error(line, field):
+    """Of directions the worst one."""
+    value = line.get(field)
+    if value is None:
+        return float('inf')
+    return max(value.values()) if isinstance(value, dict) else value
+
+
+def determinant(m):
+    return sum(m[i] * (m[3 + (i + 1) % 3] * m[6 + (i + 2) % 3] - m[3 + (i + 2) % 3] * m[6 + (i + 1) % 3]) for i in range(3))
+
+
+def box_error(rotation, truth):
+    """Of two rotations (row-major), in degrees, whichever face of a box and whichever of its edges the axes are."""
+    relative = [[sum(truth[3 * k + i] * rotation[3 * k + j] for k in range(3)) for j in range(3)] for i in range(3)]
+    best = 180.0
+    for axes in itertools.permutations(range(3)):
+        for signs in itertools.product((1, -1), repeat=3):
+            turned = [signs[j] * (i == axes[j]) for i in range(3) for j in range(3)]
+            if determinant(turned) < 0:
+                continue
+            trace = sum(relative[axes[j]][j] * signs[j] for j in range(3))
+            best = min(best, math.degrees(math.acos(max(-1.0, min(1.0, (trace - 1) / 2)))))
+    return best
+
+
+def is_right_first(hypotheses):
+    """Whether no other one is less than half as far off: readings of one pose differ by less than their errors."""
+    errors = [error(line, 'normal_error_deg') for line in hypotheses]
+    return 2.0 * min(errors) >= errors[0]
+
+
+def matrices(file, before):
+    """The numbers in the brackets that follow each `before`."""
+    with open(file) as text:
+        return [list(map(float, numbers.split(','))) for numbers in re.findall(before + r'\[([^\]]*)\]', text.read())]
+
+
+def scene_rotations(scene):
+    return matrices(scene, r'truth: \{ rotation: ')
+
+
+def box_axes(args, data_set):
+    """Of a box in each photo: rotations from its frame to the camera's."""
+    return matrices(os.path.join(args.data, data_set, 'groundtruth.yml'), r'box_axes_cam: !![^\[]*')
+
+
+def set_box_errors(truths, lines):
+    """A box has no front: what is right of any of its faces is right."""
+    images = list(dict.fromkeys(line['image'] for line in lines))
+    for line in lines:
+        if line.get('rotation_error_deg') is not None:
+            line['rotation_error_deg'] = box_error(line['rotation'], truths[images.index(line['image'])])
+    return lines
+
+
+def sure_errors(images):
+    """Of the rotation, of the photos with an answer that is sure."""
+    return [error(h[0], 'rotation_error_deg') for h in images if h and h[0]['probability'] >= SURE]
+
+
+def shares_plane(observation):
+    """Whether a circle and pencils along x and y were found to lie in the plane of the world."""
+    along = {p['along'] for p in observation['pencils'] if p['plane'] == 'p0'}
+    return {'x', 'y'} <= along and any(e['plane'] == 'p0' for e in observation['ellipses'])
+
+
+def any_error(line):
+    """Of the rotation where it is known, else of the normal, else of the worst direction."""
+    return next((error(line, field) for field in ('rotation_error_deg', 'normal_error_deg', 'direction_error_deg')
+                 if line.get(field) is not None), float('inf'))
