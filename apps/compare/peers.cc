@@ -10,13 +10,14 @@ namespace {
 
 constexpr std::size_t kFewestPoints = 4;
 
+// Infinite if the pose has a point where the camera does not see it, behind itself above all.
 double RmsPx(const CameraPose& pose, const SceneImage& image, const Camera& camera) {
   double sum = 0.0;
   int count = 0;
   for (const KnownPoint& point : image.points) {
     Eigen::Vector2d pixel;
     const Eigen::Vector3d seen = pose.rotation * point.world + pose.translation;
-    if (!CameraToPixel(camera, seen, &pixel)) continue;
+    if (!CameraToPixel(camera, seen, &pixel)) return std::numeric_limits<double>::infinity();
     sum += (pixel - point.pixel).squaredNorm();
     count += 2;
   }
@@ -44,6 +45,7 @@ PoseEstimate PeerSolver::Solve(const SceneImage& image, const Observations& obse
 std::vector<PeerSolver> PeerSolvers() {
   std::vector<PeerSolver> peers;
   AddOpenCvPeers(&peers);
+  AddOpenGvPeers(&peers);
   AddVispPeers(&peers);
   return peers;
 }
@@ -58,6 +60,12 @@ Status UsablePoints(const SceneImage& image, const Camera& camera, PeerPoints* p
   if (points->world.size() >= kFewestPoints) return Status::Ok();
   return Status::Refused("the scene file gives " + std::to_string(points->world.size()) +
                          " points of this photo; 4 or more are needed");
+}
+
+void SortByResidual(PoseEstimate* estimate) {
+  std::stable_sort(
+      estimate->hypotheses.begin(), estimate->hypotheses.end(),
+      [](const PoseHypothesis& a, const PoseHypothesis& b) { return a.rms_px < b.rms_px; });
 }
 
 PoseHypothesis PeerHypothesis(const CameraPose& pose) {

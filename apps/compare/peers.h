@@ -29,10 +29,13 @@ struct PeerSolver {
 };
 
 // In the order of the tables. Those of OpenCV where it was installed with its module calib3d:
-// opencv_ippe (two poses, coplanar points), opencv_sqpnp, opencv_iterative. Those of ViSP where the
-// build has CIRCLINE_WITH_VISP: visp_points, visp_circle.
+// opencv_ippe (two poses, coplanar points), opencv_sqpnp, opencv_iterative. Those of OpenGV where
+// the build has CIRCLINE_WITH_OPENGV: opengv_p3p (of the first three points; the others choose
+// among its poses), opengv_upnp. Those of ViSP where it has CIRCLINE_WITH_VISP: visp_points,
+// visp_circle.
 std::vector<PeerSolver> PeerSolvers();
 void AddOpenCvPeers(std::vector<PeerSolver>* peers);
+void AddOpenGvPeers(std::vector<PeerSolver>* peers);
 void AddVispPeers(std::vector<PeerSolver>* peers);
 
 // What the neighbours share.
@@ -48,6 +51,8 @@ Status UsablePoints(const SceneImage& image, const Camera& camera, PeerPoints* p
 // A pose of known points: metric, its residual that of the points.
 PoseHypothesis PointsHypothesis(const CameraPose& pose, const SceneImage& image,
                                 const Camera& camera);
+// Those of known points: best first.
+void SortByResidual(PoseEstimate* estimate);
 // The metric pose of a peer; residual unknown.
 PoseHypothesis PeerHypothesis(const CameraPose& pose);
 

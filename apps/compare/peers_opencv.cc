@@ -2,7 +2,6 @@
 #include "apps/compare/peers.h"
 
 #ifdef CIRCLINE_WITH_CALIB3D
-#include <algorithm>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #endif
@@ -36,9 +35,7 @@ PoseEstimate SolvePnp(const SceneImage& image, const Observations& observations)
     cv::cv2eigen(tvecs[i], pose.translation);
     estimate.hypotheses.push_back(PointsHypothesis(pose, image, observations.camera));
   }
-  std::stable_sort(
-      estimate.hypotheses.begin(), estimate.hypotheses.end(),
-      [](const PoseHypothesis& a, const PoseHypothesis& b) { return a.rms_px < b.rms_px; });
+  SortByResidual(&estimate);
   return estimate;
 }
 

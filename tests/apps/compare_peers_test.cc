@@ -1,4 +1,4 @@
-// OpenCV's and ViSP's poses beside our solvers.
+// OpenCV's, OpenGV's and ViSP's poses beside our solvers.
 #include <gtest/gtest.h>
 
 #include <iomanip>
@@ -23,7 +23,8 @@ std::string Points(const Board& board) {
   std::ostringstream text;
   text << std::setprecision(12) << "    points: [";
   for (int i = 0; i < 6; ++i) {
-    const double x = -0.9 + 0.6 * (i % 3), y = -0.9 + 1.2 * (i / 3);  // Of the plane Z = 0.
+    // Of the plane Z = 0; no three of the first four on a line.
+    const double x = -0.9 + 0.6 * (i / 2), y = -0.9 + 1.2 * (i % 2);
     const Eigen::Vector2d pixel = board.Pixel(x, y);
     text << (i == 0 ? "" : ", ") << pixel.x() << ", " << pixel.y() << ", " << x << ", " << y
          << ", 0";
@@ -91,6 +92,12 @@ TEST_F(ComparePeers, ExactPointsGiveTheTruth) {
   if (Rows("opencv_").empty()) GTEST_SKIP() << "OpenCV here has no calib3d";
   EXPECT_EQ(Rows("opencv_").size(), 3U);
   ExpectPointsGiveTheTruth("opencv_");
+}
+
+TEST_F(ComparePeers, ExactPointsGiveTheTruthInOpenGv) {
+  if (Rows("opengv_").empty()) GTEST_SKIP() << "built without CIRCLINE_WITH_OPENGV";
+  EXPECT_EQ(Rows("opengv_").size(), 3U);
+  ExpectPointsGiveTheTruth("opengv_");
 }
 
 TEST_F(ComparePeers, ExactPointsGiveTheTruthInVisp) {
