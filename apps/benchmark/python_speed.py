@@ -1,13 +1,16 @@
 #!/usr/bin/python3
 """What Python costs: estimate() on 300 points beside the same call in C++, and detection in two
-threads beside one.
+threads beside one, and beside two processes, which share no lock.
 
   apps/benchmark/python_speed.py [BUILD]      BUILD: build/release, built with -DCIRCLINE_BUILD_PYTHON=ON
 
-Times are of the processor for the first, of the wall for the second, which needs two idle cores.
+Times are of the processor for the first, of the wall for the second, which needs two idle cores;
+beside processes it does not, as other programs slow both alike. All are measured in turn.
 """
 
+import concurrent.futures
 import json
+import multiprocessing
 import pathlib
 import resource
 import subprocess
@@ -26,6 +29,7 @@ import circline  # noqa: E402
 
 CPP_ROW = "BM_EstimatePoseCircleAndLinesUnfitted"  # refine_benchmark.cc: the same scenes and calls.
 NUM_SCENES = 16
+PHOTO, CAMERA = scenes.disc_photo(), scenes.photo_camera()
 
 
 def cpp_microseconds() -> float:
@@ -65,15 +69,17 @@ def python_microseconds() -> float:
 waits = 0  # How often a thread has let go of the processor of itself: for the other's lock.
 
 
+def detect(photos: int) -> None:
+    for _ in range(photos):
+        circline.detect(PHOTO, CAMERA)
+
+
 def seconds_of_detection(num_threads: int, photos: int = 24) -> float:
     """Of `photos` photos, shared out to the threads."""
-    photo, camera = scenes.disc_photo(), scenes.photo_camera()
-
     def work() -> None:
         global waits
         before = resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
-        for _ in range(photos // num_threads):
-            circline.detect(photo, camera)
+        detect(photos // num_threads)
         waits += resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw - before
 
     threads = [threading.Thread(target=work) for _ in range(num_threads)]
@@ -85,6 +91,12 @@ def seconds_of_detection(num_threads: int, photos: int = 24) -> float:
     return time.perf_counter() - started
 
 
+def seconds_of_processes(pool: concurrent.futures.Executor, photos: int = 24) -> float:
+    started = time.perf_counter()
+    list(pool.map(detect, [photos // 2, photos // 2]))
+    return time.perf_counter() - started
+
+
 def main() -> None:
     rounds = 5  # In turn, so that what else the machine does falls on both.
     pairs = sorted((python_microseconds(), cpp_microseconds()) for _ in range(rounds))
@@ -92,8 +104,14 @@ def main() -> None:
     python, cpp = pairs[rounds // 2]
     print(f"estimate, 300 points: Python {python:.0f} us, C++ {cpp:.0f} us, "
           f"ratio {ratios[rounds // 2]:.2f} (median of {rounds})")
-    speed_ups = sorted(seconds_of_detection(1) / seconds_of_detection(2) for _ in range(rounds))
-    print(f"detection, two threads: {speed_ups[rounds // 2]:.2f} x one; {waits} waits in "
+    context = multiprocessing.get_context("fork")
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as pool:
+        seconds_of_processes(pool)
+        seconds = [(seconds_of_detection(1), seconds_of_detection(2), seconds_of_processes(pool))
+                   for _ in range(rounds)]
+    speed_up = sorted(one / two for one, two, _ in seconds)[rounds // 2]
+    beside = sorted(processes / two for _, two, processes in seconds)[rounds // 2]
+    print(f"detection, two threads: {speed_up:.2f} x one, {beside:.2f} x two processes; {waits} waits in "
           f"{2 * 24 * rounds} photos")
 
 
