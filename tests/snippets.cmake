@@ -1,4 +1,4 @@
-# Code in the guides is a part of the examples, which the package test builds and runs.
+# Code in README.md and the guides is a part of the examples, which the package test builds and runs.
 file(GLOB_RECURSE examples "${source}/docs/examples/*.cc" "${source}/docs/examples/*.h"
                            "${source}/docs/examples/*.py")
 list(APPEND examples "${source}/docs/example.cc")
@@ -7,7 +7,7 @@ foreach(example ${examples})
   file(READ "${example}" text)
   string(APPEND code "${text}")
 endforeach()
-file(GLOB guides "${source}/docs/guide/*.md")
+file(GLOB guides "${source}/README.md" "${source}/docs/*.md" "${source}/docs/guide/*.md")
 set(snippets 0)
 foreach(guide ${guides})
   file(READ "${guide}" text)

@@ -1,0 +1,33 @@
+# -D source=<top> -D folder=<to work in> -D generator=<CMake's>: CITATION.cff has the version of CMakeLists.txt, and the
+# next minor version, configured with shared libraries, has another SOVERSION.
+file(READ "${source}/CMakeLists.txt" text)
+string(REGEX MATCH "\nproject\\(circline VERSION ([0-9]+)\\.([0-9]+)\\.([0-9]+)" found "${text}")
+set(version "${CMAKE_MATCH_1}.${CMAKE_MATCH_2}.${CMAKE_MATCH_3}")
+set(next "${CMAKE_MATCH_1}.999.0")
+file(STRINGS "${source}/CITATION.cff" cited REGEX "^version: ")
+if(NOT cited STREQUAL "version: ${version}")
+  message(FATAL_ERROR "CITATION.cff says '${cited}', CMakeLists.txt ${version}")
+endif()
+
+file(REMOVE_RECURSE "${folder}")
+file(MAKE_DIRECTORY "${folder}/next")
+foreach(part cmake docs estimators ransac refine LICENSE)
+  file(CREATE_LINK "${source}/${part}" "${folder}/next/${part}" SYMBOLIC)
+endforeach()
+string(REPLACE "circline VERSION ${version}" "circline VERSION ${next}" text "${text}")
+file(WRITE "${folder}/next/CMakeLists.txt" "${text}")
+foreach(of "${source}" "${folder}/next")
+  file(REMOVE_RECURSE "${folder}/build")
+  execute_process(COMMAND "${CMAKE_COMMAND}" -S "${of}" -B "${folder}/build" -G "${generator}"
+                          -DBUILD_SHARED_LIBS=ON -DCIRCLINE_BUILD_APPS=OFF -DCIRCLINE_BUILD_TESTS=OFF
+                          -DCIRCLINE_BUILD_BENCHMARKS=OFF OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+  file(READ "${folder}/build/cmake_install.cmake" installed)
+  string(REGEX MATCH "libcircline_refine\\.so\\.([0-9]+)[^.0-9]" found "${installed}")
+  list(APPEND soversions "${CMAKE_MATCH_1}")
+endforeach()
+list(GET soversions 0 now)
+list(GET soversions 1 later)
+message(STATUS "${version}: libcircline_refine.so.${now}, ${next}: libcircline_refine.so.${later}")
+if(now STREQUAL "" OR later STREQUAL "" OR now STREQUAL later)
+  message(FATAL_ERROR "two minor versions have the same SOVERSION")
+endif()
