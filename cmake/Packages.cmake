@@ -1,5 +1,5 @@
-# `cpack` in the build folder: Debian packages. `cmake --preset package` configures for them (shared
-# libraries, man pages, /usr); apt takes what they need from `dpkg-shlibdeps`.
+# `cmake --workflow --preset package`, or `cpack` in a build folder: Debian packages. The preset has
+# shared libraries, man pages, /usr; apt takes what they need from `dpkg-shlibdeps`.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME circline)
 set(CPACK_PACKAGE_CONTACT "The circline authors <circline@localhost>")

@@ -9,9 +9,8 @@ install_packages "${BUILD_PACKAGES[@]}" pybind11-dev python3-dev python3-numpy p
 
 rm -rf build/pip/venv
 say "installing by pip (log: build/pip/install.log)"
-quietly build/pip/venv.log /usr/bin/python3 -m venv --system-site-packages build/pip/venv
-CIRCLINE_BUILD_DIR=$PWD/build/pip/build quietly build/pip/install.log \
-  build/pip/venv/bin/pip install --no-build-isolation ./apps/python
+command=$(sed -nE 's/^    (python3 -m venv .*pip install.*)/\1/p' README.md | sed 's,venv &&,build/pip/venv \&\&,; s,venv/bin,build/pip/venv/bin,')
+CIRCLINE_BUILD_DIR=$PWD/build/pip/build quietly build/pip/install.log bash -c "PATH=/usr/bin:\$PATH; $command"
 # Not the package of the system, nor that of another build.
 unset PYTHONPATH
 where=$(build/pip/venv/bin/python -c 'import circline; print(circline.__file__)')
