@@ -20,7 +20,7 @@ struct CircleEvidence {
 
 struct AssemblyOptions {
   int max_pencils = 3;                    // That are kept, those with a role first.
-  double max_shared_plane_deg = 5.0;      // Normals farther apart are never one plane.
+  double max_shared_plane_deg = 5.0;      // As in DetectionOptions.
   double diagonal_px = kUsualDiagonalPx;  // Of the photo (segment_meetings.h).
 };
 

@@ -56,32 +56,17 @@ bool IsNear(const PlacedPencil& pencil, const Eigen::Vector3d& direction) {
   return pencil.direction.vector.cross(direction).norm() < kDistinctSine;
 }
 
-// The normal of a circle that agrees with the plane's, or null.
-const UncertainDirection* PlaneChooser::AgreeingNormal(const CircleEvidence& circle,
-                                                       const UncertainDirection& normal) const {
-  const UncertainDirection* nearest = nullptr;
-  double smallest = options_.max_shared_plane_deg;
-  for (int k = 0; k < circle.num_normals; ++k) {
-    const UncertainDirection& candidate = circle.normals[static_cast<std::size_t>(k)];
-    if (!SamePlane(candidate, normal, options_.max_shared_plane_deg)) continue;
-    const double angle = AngleBetweenDeg(candidate, normal);
-    if (angle > smallest) continue;
-    smallest = angle;
-    nearest = &candidate;
-  }
-  return nearest;
-}
-
 void PlaneChooser::AddCircles(Plane* plane) const {
   for (std::size_t i = 0; i < circles_.size(); ++i) {
-    if (AgreeingNormal(circles_[i], plane->normal) == nullptr) continue;
+    if (!CanLieIn(*circles_[i].observation.fit, plane->normal)) continue;
     plane->circles.push_back(static_cast<int>(i));
     plane->support_px += kCircleWeight * circles_[i].support_px;
   }
 }
 
-// The plane of circles alone that starts from one circle's normal: the mean of all that agree,
-// weighted by their accuracy, until no more join.
+// The plane of circles alone that starts from one circle's normal: that of all that agree, until no
+// more join. What agrees with the start alone says little, as the normal of a small circle is
+// vague.
 Plane PlaneChooser::GrowFrom(const UncertainDirection& seed) const {
   Plane plane;
   plane.normal = seed;
@@ -91,18 +76,17 @@ Plane PlaneChooser::GrowFrom(const UncertainDirection& seed) const {
     Plane next;
     next.normal = MeanNormal(plane);
     AddCircles(&next);
-    if (next.support_px < plane.support_px) break;
+    if (pass > 0 && next.support_px < plane.support_px) break;
     plane = next;
   }
   return plane;
 }
 
 UncertainDirection PlaneChooser::MeanNormal(const Plane& plane) const {
-  std::vector<const UncertainDirection*> normals;
-  for (const int i : plane.circles) {
-    normals.push_back(AgreeingNormal(circles_[static_cast<std::size_t>(i)], plane.normal));
-  }
-  return MeanDirection(plane.normal, normals);
+  std::vector<const ConicFit*> circles;
+  for (const int i : plane.circles)
+    circles.push_back(&*circles_[static_cast<std::size_t>(i)].observation.fit);
+  return NormalOfCircles(plane.normal, options_.max_shared_plane_deg, circles);
 }
 
 Plane PlaneChooser::OfCircles() const {

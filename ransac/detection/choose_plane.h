@@ -51,8 +51,6 @@ class PlaneChooser {
   Plane Choose(const Plane& of_circles, std::vector<PlacedPencil>* pencils) const;
 
  private:
-  const UncertainDirection* AgreeingNormal(const CircleEvidence& circle,
-                                           const UncertainDirection& normal) const;
   void AddCircles(Plane* plane) const;
   Plane GrowFrom(const UncertainDirection& seed) const;
   UncertainDirection MeanNormal(const Plane& plane) const;

@@ -37,8 +37,9 @@ struct DetectionOptions {
   double min_segment_length_px = 20.0;  // Shortest line; > 0.
   int max_circles = 400;  // The best ones by coverage and size; 0 or more. `message` says more.
   int max_pencils = 3;    // Directions of parallel lines to look for; 0 to 100.
-  double max_shared_plane_deg =
-      5.0;  // Two planes nearer than this may be one (a statistical test decides); > 0.
+  // A direction nearer to a plane than this may lie in it (a statistical test decides), and a plane
+  // of circles has the normal of one of them to so much (a standard deviation); > 0.
+  double max_shared_plane_deg = 5.0;
   std::uint64_t seed = 1;  // Same photo, options and seed: same bits out.
   // What the points of one contour share: in the covariances of ellipses, and so in which planes
   // they may lie. By how much lines miss their pencil's direction is measured. Where the camera's

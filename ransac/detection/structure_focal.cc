@@ -28,8 +28,8 @@ constexpr double kNarrowest = 0.0874887, kWidest = 1.7320508;
 constexpr std::size_t kMaxCircles = 16, kMaxSeeds = 6, kMaxPencils = 4;
 // Of circles that are of the plane that most are of.
 constexpr double kPlaneShare = 0.5;
-// Errors of normals that no covariance knows (uncertain_direction.cc), radians.
-constexpr double kModelSigmaRad = 0.5 * 3.14159265358979323846 / 180.0;
+// The circles of a plane have its normal within this of that of one of them, degrees.
+constexpr double kSeedSigmaDeg = 5.0;
 // Pencils nearer than this (a sine; 3 degrees) are one.
 constexpr double kDistinctSine = 0.0523;
 
@@ -60,42 +60,6 @@ ConicFit Refocused(const ConicFit& fit, const Vector3d& scale) {
   return out;
 }
 
-// Covariance of the difference of two normals, across the first.
-Eigen::Matrix2d Across(const UncertainDirection& a, const UncertainDirection& b,
-                       Eigen::Vector2d* difference) {
-  Eigen::Matrix<double, 3, 2> tangent;
-  tangent.col(0) = a.vector.unitOrthogonal();
-  tangent.col(1) = a.vector.cross(tangent.col(0));
-  *difference = (a.vector.dot(b.vector) < 0.0 ? -1.0 : 1.0) * tangent.transpose() * b.vector;
-  return tangent.transpose() * (a.covariance + b.covariance) * tangent +
-         kModelSigmaRad * kModelSigmaRad * Eigen::Matrix2d::Identity();
-}
-
-// By how many standard deviations two normals are not those of one plane, squared.
-double Distance(const UncertainDirection& a, const UncertainDirection& b) {
-  Eigen::Vector2d difference;
-  const Eigen::Matrix2d covariance = Across(a, b, &difference);
-  return difference.dot(covariance.inverse() * difference);
-}
-
-// The normals that a circle can have.
-struct Normals {
-  std::array<UncertainDirection, 2> normals;
-  int count = 0;
-
-  // The nearest of them to that of a plane; null where there is none.
-  const UncertainDirection* Nearest(const UncertainDirection& plane, double* distance) const {
-    const UncertainDirection* nearest = nullptr;
-    for (int k = 0; k < count; ++k) {
-      const double d = Distance(plane, normals[static_cast<std::size_t>(k)]);
-      if (nearest != nullptr && !(d < *distance)) continue;
-      *distance = d;
-      nearest = &normals[static_cast<std::size_t>(k)];
-    }
-    return nearest;
-  }
-};
-
 class StructureEvidence {
  public:
   StructureEvidence(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
@@ -103,11 +67,11 @@ class StructureEvidence {
       : camera_(camera) {
     for (const CircleEvidence& circle : evidence.circles) {
       conics_.push_back(&*circle.observation.fit);
-      Eigen::Vector2d unused;
-      // Of the hemisphere's 2 pi against the Gaussian's.
+      const UncertainDirection& normal = circle.normals[0];
+      // The plane is known as well as the circle's own normal.
       peaks_.push_back(
           circle.num_normals > 0
-              ? 1.0 / std::sqrt(Across(circle.normals[0], circle.normals[0], &unused).determinant())
+              ? LikelihoodRatio({normal.vector, 2.0 * normal.covariance}, normal.vector)
               : 0.0);
     }
     for (const DetectedPencil& pencil : pencils) {
@@ -144,15 +108,15 @@ class StructureEvidence {
   // Of the plane that explains most of them, and of the lattice that they have in it.
   double Circles(double log_focal, const Vector3d& scale) {
     if (conics_.size() < 2) return 0.0;
-    std::vector<Normals> all(std::min(conics_.size(), kMaxCircles));
-    for (std::size_t i = 0; i < all.size(); ++i)
-      all[i].count = CircleNormals(Refocused(*conics_[i], scale), &all[i].normals);
+    std::vector<ConicFit> all(std::min(conics_.size(), kMaxCircles));
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = Refocused(*conics_[i], scale);
     double best = 0.0;
     UncertainDirection plane;
     for (std::size_t seed = 0; seed < std::min(all.size(), kMaxSeeds); ++seed) {
-      for (int k = 0; k < all[seed].count; ++k) {
-        const UncertainDirection mean =
-            MeanOfPlane(all, all[seed].normals[static_cast<std::size_t>(k)]);
+      std::array<UncertainDirection, 2> normals;
+      const int count = CircleNormals(all[seed], &normals);
+      for (int k = 0; k < count; ++k) {
+        const UncertainDirection mean = MeanOfPlane(all, normals[static_cast<std::size_t>(k)]);
         const double evidence = PlaneEvidence(all, mean);
         if (!(evidence > best)) continue;
         best = evidence;
@@ -162,27 +126,23 @@ class StructureEvidence {
     return best > 0.0 ? best + Lattice(log_focal, scale, plane.vector) : 0.0;
   }
 
-  static UncertainDirection MeanOfPlane(const std::vector<Normals>& all,
+  static UncertainDirection MeanOfPlane(const std::vector<ConicFit>& all,
                                         const UncertainDirection& seed) {
-    std::vector<const UncertainDirection*> members;
-    for (const Normals& circle : all) {
-      double distance;
-      const UncertainDirection* nearest = circle.Nearest(seed, &distance);
-      if (nearest != nullptr && distance <= kInlierSigmas * kInlierSigmas)
-        members.push_back(nearest);
+    std::vector<const ConicFit*> members;
+    for (const ConicFit& circle : all) {
+      if (CanLieIn(circle, seed)) members.push_back(&circle);
     }
-    return MeanDirection(seed, members);
+    return NormalOfCircles(seed, kSeedSigmaDeg, members);
   }
 
   // How much likelier circles are as those of one plane than as any. What a circle's normal is
   // known to changes with the focal length, what its contour is known to does not: that alone
   // counts, so that all focal lengths are compared by the same data.
-  double PlaneEvidence(const std::vector<Normals>& all, const UncertainDirection& plane) const {
+  double PlaneEvidence(const std::vector<ConicFit>& all, const UncertainDirection& plane) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < all.size(); ++i) {
-      double distance;
-      if (all[i].Nearest(plane, &distance) == nullptr) continue;
-      sum += std::log(1.0 - kPlaneShare + kPlaneShare * peaks_[i] * std::exp(-0.5 * distance));
+      const double chi2 = CircleEquations(all[i], plane.vector).Chi2(plane);
+      sum += std::log(1.0 - kPlaneShare + kPlaneShare * peaks_[i] * std::exp(-0.5 * chi2));
     }
     return sum;
   }

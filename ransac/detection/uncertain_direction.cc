@@ -36,25 +36,6 @@ struct AngleTest {
   double angle_deg = 0.0, sigma_deg = 0.0;
 };
 
-// Between the ends of two axes (no sense of sign).
-Vector3d Chord(const UncertainDirection& a, const UncertainDirection& b) {
-  const double sign = a.vector.dot(b.vector) < 0.0 ? -1.0 : 1.0;
-  return a.vector - sign * b.vector;
-}
-
-double ChordAngleDeg(const Vector3d& chord) {
-  return 2.0 * std::asin(std::min(1.0, 0.5 * chord.norm())) / kRadians;
-}
-
-double ChordSigmaDeg(const UncertainDirection& a, const UncertainDirection& b,
-                     const Vector3d& chord) {
-  const double norm = chord.norm();
-  const Matrix3d covariance = a.covariance + b.covariance;
-  const double variance =
-      norm > 1e-12 ? chord.dot(covariance * chord) / (norm * norm) : 0.5 * covariance.trace();
-  return std::hypot(std::sqrt(std::max(0.0, variance)) / kRadians, kModelSigmaDeg);
-}
-
 // How far from 90 degrees.
 AngleTest CompareToRightAngle(const UncertainDirection& a, const UncertainDirection& b) {
   AngleTest test;
@@ -66,18 +47,6 @@ AngleTest CompareToRightAngle(const UncertainDirection& a, const UncertainDirect
 }
 
 }  // namespace
-
-double AngleBetweenDeg(const UncertainDirection& a, const UncertainDirection& b) {
-  return ChordAngleDeg(Chord(a, b));
-}
-
-// Most pairs are far apart: what is asked of all circles and all planes costs one angle.
-bool SamePlane(const UncertainDirection& a, const UncertainDirection& b, double max_deg) {
-  const Vector3d chord = Chord(a, b);
-  const double angle_deg = ChordAngleDeg(chord);
-  if (!(angle_deg <= max_deg)) return false;
-  return angle_deg <= std::min(max_deg, kMaxSigmas * ChordSigmaDeg(a, b, chord));
-}
 
 bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal,
              double max_deg) {
@@ -120,30 +89,6 @@ bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
   return true;
 }
 
-UncertainDirection MeanDirection(const UncertainDirection& about,
-                                 const std::vector<const UncertainDirection*>& directions) {
-  const double model = kModelSigmaDeg * kRadians;
-  Vector3d sum = Vector3d::Zero();
-  Matrix3d information = Matrix3d::Zero();
-  const Matrix3d along = about.vector * about.vector.transpose();
-  const Matrix3d tangent = Matrix3d::Identity() - along;
-  for (const UncertainDirection* direction : directions) {
-    // Regular across the tangent plane by the model's variance, along the direction by a nominal
-    // one.
-    const Matrix3d weight =
-        (direction->covariance + model * model * Matrix3d::Identity()).inverse();
-    const Matrix3d w = tangent * weight * tangent;
-    information += w;
-    sum += w * (direction->vector - about.vector);
-  }
-  // Invertible: what is added acts along the direction only.
-  const Matrix3d inverse = (information + information.trace() * along).inverse();
-  UncertainDirection mean;
-  mean.vector = (about.vector + tangent * (inverse * sum)).normalized();
-  mean.covariance = tangent * inverse * tangent;
-  return mean;
-}
-
 double LikelihoodRatio(const UncertainDirection& normal, const Vector3d& plane) {
   constexpr double kNearby = 0.5;  // Cosine of an angle that no standard deviation spans.
   const double cosine = normal.vector.dot(plane);
@@ -178,6 +123,56 @@ double LogOddsOfMixture(const std::vector<double>& ratios) {
   double sum = 0.0;
   for (const double l : log_odds) sum += std::exp(l - most);
   return most + std::log(sum / kShares);
+}
+
+CircleEquations::CircleEquations(const ConicFit& fit, const Vector3d& normal) {
+  const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
+  const Vector3d Cu = fit.conic * u, Cv = fit.conic * v;
+  basis << u, v;
+  value << u.dot(Cu) - v.dot(Cv), 2.0 * u.dot(Cv);
+  // A step (a, b) of the normal takes u to u - a n and v to v - b n.
+  const double a = 2.0 * normal.dot(Cu), b = 2.0 * normal.dot(Cv);
+  by_normal << -a, b, -b, -a;
+  Eigen::Matrix<double, 2, 6> by_conic;
+  by_conic.row(0) = ConicToVector(u * u.transpose() - v * v.transpose()).transpose();
+  by_conic.row(1) = ConicToVector(u * v.transpose() + v * u.transpose()).transpose();
+  const double model = kModelSigmaDeg * kRadians;
+  covariance = by_conic * fit.Covariance() * by_conic.transpose() +
+               model * model * by_normal * by_normal.transpose();
+}
+
+double CircleEquations::Chi2(const UncertainDirection& normal) const {
+  const Eigen::Matrix2d J =
+      by_normal * basis.transpose() * normal.covariance * basis * by_normal.transpose();
+  return value.dot((covariance + J).inverse() * value);
+}
+
+bool CanLieIn(const ConicFit& fit, const UncertainDirection& normal) {
+  return CircleEquations(fit, normal.vector).Chi2(normal) <= kMaxSigmas * kMaxSigmas;
+}
+
+UncertainDirection NormalOfCircles(const UncertainDirection& about, double sigma_deg,
+                                   const std::vector<const ConicFit*>& circles) {
+  constexpr int kSteps = 3;
+  UncertainDirection normal = about;
+  for (int step = 0; step < kSteps; ++step) {
+    const double weight = std::pow(sigma_deg * kRadians, -2.0);
+    Eigen::Matrix2d information = weight * Eigen::Matrix2d::Identity();
+    Eigen::Matrix<double, 3, 2> basis;
+    basis.col(0) = normal.vector.unitOrthogonal();
+    basis.col(1) = normal.vector.cross(basis.col(0));
+    Eigen::Vector2d gradient = weight * basis.transpose() * (normal.vector - about.vector);
+    for (const ConicFit* circle : circles) {
+      const CircleEquations equations(*circle, normal.vector);
+      const Eigen::Matrix2d JW = equations.by_normal.transpose() * equations.covariance.inverse();
+      information += JW * equations.by_normal;
+      gradient += JW * equations.value;
+    }
+    const Eigen::Matrix2d covariance = information.inverse();
+    normal.vector = (normal.vector - basis * (covariance * gradient)).normalized();
+    normal.covariance = basis * covariance * basis.transpose();
+  }
+  return normal;
 }
 
 int CircleNormals(const ConicFit& fit, std::array<UncertainDirection, 2>* normals) {

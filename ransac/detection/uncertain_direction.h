@@ -1,6 +1,6 @@
-// Directions and normals with covariances, and what can be told from them: one plane or two, in the
-// plane or not, at right angles or not. Each is a test with the propagated covariances, and with
-// what no covariance of edge points knows.
+// Directions, normals and circles with covariances, and what can be told from them: in the plane or
+// not, at right angles or not. Each is a test with the propagated covariances, and with what no
+// covariance of edge points knows.
 #ifndef CIRCLINE_RANSAC_DETECTION_UNCERTAIN_DIRECTION_H_
 #define CIRCLINE_RANSAC_DETECTION_UNCERTAIN_DIRECTION_H_
 
@@ -22,12 +22,6 @@ struct UncertainDirection {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
-// The angle between two.
-double AngleBetweenDeg(const UncertainDirection& a, const UncertainDirection& b);
-
-// Whether two normals can be one plane's; never beyond `max_deg`.
-bool SamePlane(const UncertainDirection& a, const UncertainDirection& b, double max_deg);
-
 // Whether a direction can lie in the plane with a normal; never beyond `max_deg`.
 bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal, double max_deg);
 
@@ -41,10 +35,6 @@ bool Rectangular(const UncertainDirection& a, const UncertainDirection& b);
 bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
                    UncertainDirection* normal);
 
-// The mean of directions near `about`, weighted by their accuracy.
-UncertainDirection MeanDirection(const UncertainDirection& about,
-                                 const std::vector<const UncertainDirection*>& directions);
-
 // How much likelier it is to measure `normal` where a plane has the normal `plane`, but for what no
 // covariance knows, than where planes lie any way.
 double LikelihoodRatio(const UncertainDirection& normal, const Eigen::Vector3d& plane);
@@ -55,6 +45,28 @@ double ShareOfHemisphere(const UncertainDirection& direction);
 // Logarithm of the odds that some of the features have something in common to that none have, from
 // the likelihood ratios of all: any share of them is as likely before.
 double LogOddsOfMixture(const std::vector<double>& ratios);
+
+// What a circle says of a plane: its conic C meets the plane's circular points, I^T C I = 0 for
+// I = u + iv, where u and v span the plane. These two equations are linear in the conic, so that
+// what is Gaussian there is Gaussian here, where the normals of a small or nearly frontal circle
+// are not; and both planes that it can lie in fulfil them.
+struct CircleEquations {
+  Eigen::Vector2d value;
+  Eigen::Matrix2d by_normal;   // Derivatives by the normal's steps along the columns of `basis`.
+  Eigen::Matrix2d covariance;  // Of `value`: the conic's, and what no covariance knows.
+  Eigen::Matrix<double, 3, 2> basis;
+
+  CircleEquations(const ConicFit& fit, const Eigen::Vector3d& normal);
+  // Squared distance from a plane whose normal is known so well, in standard deviations.
+  double Chi2(const UncertainDirection& normal) const;
+};
+
+// Whether a circle can lie in the plane with a normal.
+bool CanLieIn(const ConicFit& fit, const UncertainDirection& normal);
+
+// The normal near `about` of the plane that circles lie in, which have it within `sigma_deg`.
+UncertainDirection NormalOfCircles(const UncertainDirection& about, double sigma_deg,
+                                   const std::vector<const ConicFit*>& circles);
 
 // The normals of the planes that a circle can lie in, with covariances: those of the conic's own
 // covariance, by differences. Returns how many: 0, 1 or 2.
