@@ -29,19 +29,18 @@ Status FitTrimmedDirection(const std::vector<LineFit>& lines, std::size_t num_ke
     return sum;
   };
   constexpr std::size_t kMostPairs = 200;
-  const std::size_t stride = n * (n - 1) / 2 / kMostPairs + 1;
+  const std::size_t num_pairs = n * (n - 1) / 2, stride = num_pairs / kMostPairs + 1;
   double best = std::numeric_limits<double>::infinity();
-  std::size_t pair = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = i + 1; j < n; ++j) {
-      if (pair++ % stride != 0) continue;
-      const Eigen::Vector3d crossing = lines[i].line.cross(lines[j].line);
-      if (!(crossing.norm() > kCoincidentRad)) continue;
-      const double sum = trimmed_sum(crossing.normalized());
-      if (!(sum < best)) continue;
-      best = sum;
-      fit->direction = crossing.normalized();
-    }
+  std::size_t i = 0, first = 0;  // The number of the first pair of line i with a later one.
+  for (std::size_t pair = 0; pair < num_pairs; pair += stride) {
+    for (; pair - first >= n - 1 - i; ++i) first += n - 1 - i;
+    const std::size_t j = i + 1 + pair - first;
+    const Eigen::Vector3d crossing = lines[i].line.cross(lines[j].line);
+    if (!(crossing.norm() > kCoincidentRad)) continue;
+    const double sum = trimmed_sum(crossing.normalized());
+    if (!(sum < best)) continue;
+    best = sum;
+    fit->direction = crossing.normalized();
   }
   if (!std::isfinite(best)) return Status::Refused("the lines of the pencil coincide");
   constexpr int kSteps = 2;

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <ctime>
 #include <vector>
 
 #include "circline/estimators/random.h"
 #include "tests/ransac/segment_scene.h"
+#include "tests/trials.h"
 
 namespace circline {
 namespace {
@@ -30,6 +32,20 @@ TEST(FitTrimmedDirection, IsThatOfTheLinesThatAgreeWhateverTheirScale) {
     right += AngleBetween(direction, fit.direction) < 0.1 ? 1 : 0;
   }
   EXPECT_GE(right, 47);
+}
+
+// In time that grows with the lines, not with the pairs of them, of which there are 45 milliards.
+TEST(FitTrimmedDirection, TakesThreeHundredThousandLines) {
+  Random random(1);
+  const Eigen::Vector3d direction = RandomRotation(&random).col(0);
+  std::vector<LineFit> lines;
+  while (lines.size() < 300000) AddSegment(&direction, &random, &lines);
+  VanishingPointFit fit;
+  const std::clock_t begin = std::clock();
+  ASSERT_TRUE(FitTrimmedDirection(lines, 200000, &fit).ok());
+  EXPECT_LT(AngleBetween(direction, fit.direction), 0.01);
+  if (kSanitized) return;
+  EXPECT_LT(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC, 10.0);
 }
 
 TEST(FitTrimmedDirection, RefusesTooFewLines) {
