@@ -109,8 +109,12 @@ Status AppendFile::Append(const std::string& text) {
     if (written < 0 && errno != EINTR) break;
     if (written > 0) done += static_cast<std::size_t>(written);
   }
-  const bool all = descriptor_ >= 0 && done == text.size();
-  return all ? Status::Ok() : Status::Failed(path_ + ": cannot be written");
+  if (descriptor_ >= 0 && done == text.size()) return Status::Ok();
+  // Where the disk is full a part is there, which is taken back.
+  const off_t end = descriptor_ >= 0 ? lseek(descriptor_, 0, SEEK_END) : -1;
+  const bool taken_back = end < 0 || ftruncate(descriptor_, end - static_cast<off_t>(done)) == 0;
+  return Status::Failed(path_ + ": cannot be written" +
+                        (taken_back ? "" : "; its last line is cut off"));
 }
 
 Status WriteFile(const std::string& path, const std::string& content) {
@@ -168,13 +172,14 @@ std::vector<std::string> UniqueStems(const std::vector<std::string>& paths) {
     }
     open = still_open;
   }
-  for (const std::size_t i : open) {  // Same path twice, or names such as a.jpg and a.png.
-    int number = 1;
-    std::string stem = StemWithFolders(paths[i], 0);
-    while (!taken.insert(FoldCase(stem)).second) {
-      stem = StemWithFolders(paths[i], 0) + "_" + std::to_string(++number);
-    }
-    stems[i] = stem;
+  // Same path twice, or names such as a.jpg and a.png. By stem: the number that was given last.
+  std::map<std::string, int> numbers;
+  for (const std::size_t i : open) {
+    const std::string own = StemWithFolders(paths[i], 0);
+    int& number = numbers[FoldCase(own)];
+    do {
+      stems[i] = ++number == 1 ? own : own + "_" + std::to_string(number);
+    } while (!taken.insert(FoldCase(stems[i])).second);
   }
   return stems;
 }

@@ -41,7 +41,7 @@ class AppendFile {
   AppendFile(const AppendFile&) = delete;
   AppendFile& operator=(const AppendFile&) = delete;
 
-  // Not ok: names the file that could not be written.
+  // Not ok: names the file that could not be written, which is as it was.
   Status Append(const std::string& text);
 
  private:

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <filesystem>
 #include <vector>
 
@@ -53,6 +54,13 @@ TEST(UniqueStems, KeepNamesApart) {
             (std::vector<std::string>{"a", "a_2", "A_3"}));
   EXPECT_EQ(UniqueStems({"../r/l/1.jpg", "../s/l/1.jpg", "l_1.jpg"}),
             (std::vector<std::string>{"r_l_1", "s_l_1", "l_1"}));
+}
+
+TEST(UniqueStems, OneNameManyTimesTakesNoLongerThanManyNames) {
+  const std::clock_t begin = std::clock();
+  const std::vector<std::string> stems = UniqueStems(std::vector<std::string>(20000, "a.jpg"));
+  EXPECT_EQ(stems.back(), "a_20000");
+  EXPECT_LT(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC, 10.0);
 }
 
 }  // namespace
