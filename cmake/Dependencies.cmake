@@ -23,6 +23,7 @@ if(CIRCLINE_BUILD_APPS)
   circline_find(glog libgoogle-glog-dev CONFIG)
   circline_find(gflags libgflags-dev CONFIG)
   circline_find(nlohmann_json nlohmann-json3-dev 3 CONFIG)
+  circline_find(JPEG libjpeg-dev)
   circline_find(TinyGLTF libtinygltf-dev CONFIG)
   circline_find(tinyxml2 libtinyxml2-dev CONFIG)
   # It has no CMake package.

@@ -4,7 +4,7 @@
 # Debian packages: what builds circline, its apps, tests and benchmarks.
 # shellcheck disable=SC2034
 BUILD_PACKAGES=(g++ cmake ninja-build libeigen3-dev libceres-dev libopencv-dev libgoogle-glog-dev
-                libgflags-dev nlohmann-json3-dev libexif-dev libcpp-httplib-dev libtinygltf-dev libyaml-dev libtinyxml2-dev pkg-config
+                libgflags-dev nlohmann-json3-dev libexif-dev libjpeg-dev libcpp-httplib-dev libtinygltf-dev libyaml-dev libtinyxml2-dev pkg-config
                 libgtest-dev libbenchmark-dev)
 
 say() { echo "circline: $*"; }

@@ -18,10 +18,6 @@ constexpr double kMaxMegapixels = 100.0;
 std::string ReadPhoto(const std::string& path, cv::Mat* photo,
                       double max_megapixels = kMaxMegapixels);
 
-// Whether the file's end is missing, which decoders pass over with half a picture. False for what
-// is not a JPEG.
-bool IsCutOffJpeg(const std::vector<std::uint8_t>& bytes);
-
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMMON_PHOTO_FILE_H_
