@@ -53,6 +53,11 @@ class Watch : public ceres::IterationCallback {
 }  // namespace
 
 Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival) const {
+  // Ceres prints what it cannot evaluate. Where the cost was finite before, it is.
+  const bool is_finite = std::all_of(state->x.begin(), state->x.end(),
+                                     [](double value) { return std::isfinite(value); });
+  if (!is_finite || (!std::isfinite(state->cost) && !std::isfinite(Cost(*state))))
+    return Status::Failed("the evidence cannot be evaluated at the seed");
   ceres::Problem problem(OwnsNothing());
   std::vector<double*> blocks;
   // A feature's own unknowns, one block of each, are eliminated first.

@@ -72,7 +72,10 @@ bool InPlaneManifold::MinusJacobian(const double* x, double* jacobian) const {
 }
 
 bool ScaleManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
-  const double factor = std::exp(delta[0]);
+  // A step that no start is so far off as to need; a longer one would leave the range of numbers,
+  // and Ceres print what it cannot evaluate there.
+  constexpr double kMost = 100.0;
+  const double factor = std::exp(std::clamp(delta[0], -kMost, kMost));
   for (int k = 0; k < 3; ++k) x_plus_delta[k] = factor * x[k];
   return true;
 }
