@@ -1,5 +1,6 @@
 #include "apps/track/overlay_video.h"
 
+#include <cmath>
 #include <filesystem>
 #include <opencv2/imgproc.hpp>
 
@@ -14,7 +15,7 @@ OverlayVideo::OverlayVideo(const std::string& folder, const std::string& name, d
     : path_(folder + "/" + name), temporary_path_(folder + "/part." + name), fps_(fps) {}
 
 OverlayVideo::~OverlayVideo() {
-  if (committed_ || !writer_.isOpened()) return;
+  if (committed_) return;
   writer_.release();
   std::error_code ignored;
   std::filesystem::remove(temporary_path_, ignored);
@@ -33,18 +34,32 @@ Status OverlayVideo::Add(const cv::Mat& picture) {
     cv::Mat frame = picture;
     if (frame.size() != size_) cv::resize(picture, frame, size_, 0.0, 0.0, cv::INTER_AREA);
     writer_.write(frame);
+    ++num_frames_;
   } catch (const std::exception& error) {
     return Status::Failed(path_ + " cannot be written: " + error.what());
   }
   return Status::Ok();
 }
 
+// Encoders do not say that a disk is full: the file then lacks frames or its end, and there is no
+// room left.
+bool OverlayVideo::IsWhole() const {
+  std::error_code error;
+  const std::filesystem::space_info space = std::filesystem::space(temporary_path_, error);
+  cv::VideoCapture video(temporary_path_);
+  // Some files say how long they are, not how many frames they have.
+  constexpr double kRounding = 1.0;
+  return !error && space.available > 0 && video.isOpened() &&
+         std::abs(video.get(cv::CAP_PROP_FRAME_COUNT) - num_frames_) <= kRounding;
+}
+
 Status OverlayVideo::Commit() {
   if (!writer_.isOpened()) return Status::Ok();
   writer_.release();
-  committed_ = true;
+  if (!IsWhole()) return Status::Failed(path_ + ": cannot be written");
   std::error_code error;
   std::filesystem::rename(temporary_path_, path_, error);
+  committed_ = !error;
   return error ? Status::Failed(path_ + ": " + error.message()) : Status::Ok();
 }
 

@@ -24,10 +24,13 @@ class OverlayVideo {
   Status Commit();
 
  private:
+  bool IsWhole() const;
+
   std::string path_, temporary_path_;
   double fps_;
   cv::Size size_;
   cv::VideoWriter writer_;
+  int num_frames_ = 0;
   bool committed_ = false;
 };
 

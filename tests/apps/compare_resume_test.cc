@@ -1,9 +1,7 @@
 // Runs of circline_compare that are stopped, go on, and grow large.
-#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <csignal>
@@ -25,19 +23,6 @@ namespace circline::apps {
 namespace {
 
 namespace fs = std::filesystem;
-
-// The program as a process of ours, silent.
-pid_t Start(const std::vector<std::string>& arguments) {
-  const pid_t pid = fork();
-  if (pid != 0) return pid;
-  const int null = open("/dev/null", O_RDWR);
-  for (const int stream : {0, 1, 2}) dup2(null, stream);
-  std::vector<char*> argv = {const_cast<char*>(CIRCLINE_COMPARE_BINARY)};
-  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-  argv.push_back(nullptr);
-  execv(argv[0], argv.data());
-  _exit(127);
-}
 
 // Every byte up to the last line end, and nothing after it.
 bool HasWholeLinesOnly(const std::string& path) {
@@ -74,7 +59,8 @@ TEST(CompareResume, KilledAtRandomGivesTheSameBytes) {
   int num_killed = 0, num_begun = 0;
   for (int trial = 0; trial < kTrials; ++trial) {
     const std::string out = folder / ("killed" + std::to_string(trial));
-    const pid_t pid = Start({"--scene=" + scene, "--threads=2", "--output=" + out});
+    const pid_t pid = StartProgram(CIRCLINE_COMPARE_BINARY,
+                                   {"--scene=" + scene, "--threads=2", "--output=" + out});
     ASSERT_GT(pid, 0);
     const double share = std::generate_canonical<double, 32>(random);
     std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(share * whole_ms));
@@ -148,8 +134,9 @@ TEST(CompareResume, RefusesTheResultsOfAnotherRun) {
 // Peak memory of the program over the photos of a folder, kilobytes.
 long PeakKilobytes(const std::string& photos, const std::string& camera,
                    const std::string& output) {
-  const pid_t pid = Start({"--images=" + photos, "--camera=" + camera, "--output=" + output,
-                           "--threads=2", "--overlays=false"});
+  const pid_t pid = StartProgram(CIRCLINE_COMPARE_BINARY,
+                                 {"--images=" + photos, "--camera=" + camera, "--output=" + output,
+                                  "--threads=2", "--overlays=false"});
   int status = 0;
   rusage usage{};
   EXPECT_EQ(wait4(pid, &status, 0, &usage), pid);

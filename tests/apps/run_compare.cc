@@ -1,6 +1,8 @@
 #include "tests/apps/run_compare.h"
 
+#include <fcntl.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstdlib>
 
@@ -19,6 +21,18 @@ Outcome RunProgram(const std::string& program, const std::string& arguments) {
 
 Outcome RunCompare(const std::string& arguments) {
   return RunProgram(CIRCLINE_COMPARE_BINARY, arguments);
+}
+
+pid_t StartProgram(const std::string& program, const std::vector<std::string>& arguments) {
+  const pid_t pid = fork();
+  if (pid != 0) return pid;
+  const int null = open("/dev/null", O_RDWR);
+  for (const int stream : {0, 1, 2}) dup2(null, stream);
+  std::vector<char*> argv = {const_cast<char*>(program.c_str())};
+  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+  execv(argv[0], argv.data());
+  _exit(127);
 }
 
 }  // namespace circline::apps

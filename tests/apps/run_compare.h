@@ -2,7 +2,10 @@
 #ifndef CIRCLINE_TESTS_APPS_RUN_COMPARE_H_
 #define CIRCLINE_TESTS_APPS_RUN_COMPARE_H_
 
+#include <sys/types.h>
+
 #include <string>
+#include <vector>
 
 // The program's path, from the build.
 #ifndef CIRCLINE_COMPARE_BINARY
@@ -18,6 +21,9 @@ struct Outcome {
 
 Outcome RunProgram(const std::string& program, const std::string& arguments);
 Outcome RunCompare(const std::string& arguments);
+
+// As a process of ours that goes on, silent.
+pid_t StartProgram(const std::string& program, const std::vector<std::string>& arguments);
 
 }  // namespace circline::apps
 

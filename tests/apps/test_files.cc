@@ -1,5 +1,6 @@
 #include "tests/apps/test_files.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -10,7 +11,9 @@ namespace circline::apps {
 
 TestFolder::TestFolder() {
   const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-  std::string pattern = testing::TempDir() + "/circline_" + info->name() + "_XXXXXX";
+  std::string name = info->name();
+  std::replace(name.begin(), name.end(), '/', '_');  // In front of a test's parameter.
+  std::string pattern = testing::TempDir() + "/circline_" + name + "_XXXXXX";
   path_ = mkdtemp(pattern.data());
 }
 
