@@ -125,6 +125,8 @@ std::string MeasurementsCsv(const std::vector<MeasuredValue>& measurements) {
   csv << std::setprecision(9) << "what,id,value,sigma,unit,truth,relative_error\n";
   for (const MeasuredValue& m : measurements) {
     std::string id = m.id;
+    // Spreadsheets would take it for a formula.
+    if (id.find_first_of("=+-@\t\r") == 0) id.insert(0, 1, '\'');
     for (std::size_t at = 0; (at = id.find('"', at)) != std::string::npos; at += 2) {
       id.insert(at, 1, '"');
     }
