@@ -11,8 +11,8 @@
 namespace circline {
 
 // Those of n points without far more neighbours than the loneliest fifth has. near(i, j): whether
-// two are neighbours, within three thresholds of an inlier. `stand_ins`: so many, the first, count
-// for all; put them in random order where they are fewer than n.
+// two are neighbours, within three thresholds of an inlier. `stand_ins`: so many, the first `j`,
+// count for all; near() must spread them over all points where they are fewer than n.
 template <typename Near>
 std::vector<int> Uncrowded(int n, int stand_ins, const Near& near) {
   if (n == 0) return {};
