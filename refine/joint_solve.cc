@@ -60,11 +60,8 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
     return Status::Failed("the evidence cannot be evaluated at the seed");
   ceres::Problem problem(OwnsNothing());
   std::vector<double*> blocks;
-  // A feature's own unknowns, one block of each, are eliminated first.
-  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  std::vector<double*> own(static_cast<std::size_t>(num_groups_), nullptr);
   std::vector<std::uint8_t> added(blocks_.size(), 0);
-  int unknowns = 0, eliminated = 0;
+  int unknowns = 0;
   for (const Term& term : terms_) {
     if (!IsActive(term, *state)) continue;
     blocks.clear();
@@ -79,13 +76,6 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
       problem.AddParameterBlock(values, block.size,
                                 const_cast<ceres::Manifold*>(block.manifold));  // Not owned.
       if (block.is_constant) problem.SetParameterBlockConstant(values);
-      if (block.tangent_size() == 0) continue;
-      double* unused = nullptr;
-      double*& first = block.group >= 0 ? own[static_cast<std::size_t>(block.group)] : unused;
-      const bool is_first = block.group >= 0 && first == nullptr;
-      if (is_first) eliminated += block.tangent_size();
-      ordering->AddElementToGroup(values, is_first ? 0 : 1);
-      first = values;
     }
     problem.AddResidualBlock(term.cost.get(), term.loss.get(), blocks);
   }
@@ -93,11 +83,30 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
 
   ceres::Solver::Options options = NearbyOptions(unknowns, max_iterations, state->cost);
   if (options.linear_solver_type == ceres::SPARSE_NORMAL_CHOLESKY) {
+    // A feature's own unknowns, the largest block of each, are eliminated first.
+    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    std::vector<const Block*> largest(static_cast<std::size_t>(num_groups_), nullptr);
+    const auto is_unknown = [&](const Block& block) {
+      return added[static_cast<std::size_t>(&block - blocks_.data())] != 0 &&
+             block.tangent_size() > 0;
+    };
+    for (const Block& block : blocks_) {
+      if (block.group < 0 || !is_unknown(block)) continue;
+      const Block*& own = largest[static_cast<std::size_t>(block.group)];
+      if (own == nullptr || block.tangent_size() > own->tangent_size()) own = &block;
+    }
+    int left = unknowns;
+    for (const Block& block : blocks_) {
+      if (!is_unknown(block)) continue;
+      const bool is_eliminated =
+          block.group >= 0 && largest[static_cast<std::size_t>(block.group)] == &block;
+      if (is_eliminated) left -= block.tangent_size();
+      ordering->AddElementToGroup(state->x.data() + block.offset, is_eliminated ? 0 : 1);
+    }
     // What is left is a small matrix, or a large one of many zeros (the benchmark CirclesOfAPlane
     // tells from where on; not tuned).
     constexpr int kSparse = 200;
-    options.linear_solver_type =
-        unknowns - eliminated > kSparse ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
+    options.linear_solver_type = left > kSparse ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
     options.linear_solver_ordering = ordering;
   }
   Watch watch(rival, FreeCost(*state));
