@@ -48,53 +48,43 @@ bool IsInlier(double distance, const ImagePoints& points) {
   return std::abs(distance) <= kInlierSigmas * points.options().sigma_px;
 }
 
-// Counts and rms of the inliers.
-void CountInliers(const JointProblem& problem, const State& state, PoseHypothesis* h) {
-  double squares = 0.0;
+// Counts and rms of the inliers. Returns how much wider the estimate scatters than least squares on
+// the inliers would: the variance of an M-estimate, E[psi^2] / E[psi']^2 over residuals in standard
+// deviations (Huber 1964), where enough of them are redundant to measure it, and never less than
+// what every loss is tuned to.
+double CountInliers(const JointProblem& problem, const State& state, PoseHypothesis* h) {
+  double squares_px = 0.0;
+  double squares = 0.0, slopes = 0.0, inliers = 0.0, points = 0.0, unknowns = 3.0;
   ForEachCurve(problem, state,
-               [&](int, const ImagePoints& points, const std::vector<double>& distances) {
-                 h->num_observations += static_cast<int>(distances.size());
+               [&](int f, const ImagePoints& set, const std::vector<double>& distances) {
+                 const bool is_circle =
+                     problem.features()[static_cast<std::size_t>(f)].kind == Feature::Kind::kCircle;
+                 unknowns += is_circle ? 3.0 : 1.0;
+                 points += static_cast<double>(distances.size());
                  for (const double d : distances) {
-                   if (!IsInlier(d, points)) continue;
-                   ++h->num_inliers;
-                   squares += d * d;
+                   const double r = d / set.options().sigma_px, r2 = r * r;
+                   const LossSlopes loss = LossSlopesAt(set.options().loss, r2);
+                   squares += loss.first * loss.first * r2;
+                   slopes += loss.first + 2.0 * r2 * loss.second;
+                   if (!IsInlier(d, set)) continue;
+                   inliers += 1.0;
+                   squares_px += d * d;
                  }
                });
+  h->num_observations = static_cast<int>(points);
+  h->num_inliers = static_cast<int>(inliers);
   ForEachPoint(problem, state, [&](int, const PlanePointCost& cost, double miss) {
     ++h->num_observations;
     if (!(miss <= kInlierSigmas * cost.sigma_px())) return;
     ++h->num_inliers;
-    squares += miss * miss;
+    squares_px += miss * miss;
   });
-  h->rms_px = h->num_inliers > 0 ? std::sqrt(squares / h->num_inliers) : 0.0;
-}
+  h->rms_px = h->num_inliers > 0 ? std::sqrt(squares_px / h->num_inliers) : 0.0;
 
-// How much wider the estimate scatters than least squares on the inliers would: the variance of an
-// M-estimate, E[psi^2] / E[psi']^2 over residuals in standard deviations (Huber 1964), where enough
-// of them are redundant to measure it, and never less than what every loss is tuned to.
-double Inflation(const JointProblem& problem, const State& state) {
-  constexpr double kTuned = 1.0 / 0.95;
+  constexpr double kTuned = 1.0 / 0.95, kEnough = 30.0;
   const EstimationOptions& options = problem.options();
-  if (options.conic_loss.type == LossType::kTrivial &&
-      options.line_loss.type == LossType::kTrivial) {
+  if (options.conic_loss.type == LossType::kTrivial && options.line_loss.type == LossType::kTrivial)
     return 1.0;
-  }
-  double squares = 0.0, slopes = 0.0, inliers = 0.0, points = 0.0, unknowns = 3.0;
-  ForEachCurve(
-      problem, state, [&](int f, const ImagePoints& set, const std::vector<double>& distances) {
-        unknowns += problem.features()[static_cast<std::size_t>(f)].kind == Feature::Kind::kCircle
-                        ? 3.0
-                        : 1.0;
-        points += static_cast<double>(distances.size());
-        for (const double d : distances) {
-          const double r = d / set.options().sigma_px, r2 = r * r;
-          const LossSlopes loss = LossSlopesAt(set.options().loss, r2);
-          squares += loss.first * loss.first * r2;
-          slopes += loss.first + 2.0 * r2 * loss.second;
-          inliers += std::abs(r) <= kInlierSigmas ? 1.0 : 0.0;
-        }
-      });
-  constexpr double kEnough = 30.0;
   if (!(points > unknowns + kEnough) || !(slopes > 0.0)) return kTuned;
   const double redundancy = points / (points - unknowns);
   return std::max(kTuned, redundancy * squares * inliers / (slopes * slopes));
@@ -355,8 +345,7 @@ double JointProblem::InlierShare(const State& state) const {
 Status FillRefined(const JointProblem& problem, State state, Refined* refined) {
   *refined = Refined();
   PoseHypothesis* h = &refined->hypothesis;
-  CountInliers(problem, state, h);
-  const double inflation = Inflation(problem, state);
+  const double inflation = CountInliers(problem, state, h);
   h->cost = problem.Cost(state) + LeftOutCost(problem, state);
   Linearization at(problem, state, Weighing{true, kInlierSigmas, 1.0 / inflation});
   if (!std::isfinite(h->cost) || !at.ComputeCovariance())
