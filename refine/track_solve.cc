@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -130,10 +131,11 @@ bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& opti
   const double gate = options.gate_probability / static_cast<double>(terms_.size());
   constexpr int kFew = 2;  // Evaluations that come to nothing.
   int left = options.max_evaluations;
+  std::optional<TrackPrior> prior;  // Of the last solve.
   const auto solve = [&](TrackFit* at) {
-    const TrackPrior prior(map_, before, Used(*at));
-    if (!prior.ok()) return false;
-    left -= Solve(prior, left, at);
+    prior.emplace(map_, before, Used(*at));
+    if (!prior->ok()) return false;
+    left -= Solve(*prior, left, at);
     return at->state.x.allFinite();
   };
   if (!solve(fit)) return false;
@@ -149,11 +151,13 @@ bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& opti
     if (back < 0) break;
     const Term& term = terms_[static_cast<std::size_t>(back)];
     with.active[static_cast<std::size_t>(back)] = 1;
-    if (!solve(&with) || Excess(term, with) > ChiSquareLimit(term.dof, gate)) break;
+    if (!solve(&with) || Excess(term, with) > ChiSquareLimit(term.dof, gate)) {
+      prior.emplace(map_, before, Used(*fit));
+      break;
+    }
     *fit = std::move(with);
   }
-  const TrackPrior prior(map_, before, Used(*fit));
-  return Score(prior, gate, fit) && Update(before, prior, fit);
+  return Score(*prior, gate, fit) && Update(before, *prior, fit);
 }
 
 // What is left out costs what clutter would: as much as what just agrees.
