@@ -34,6 +34,10 @@ bool DropOutliers(const JointProblem& problem, State* state);
 // feature is clutter with a probability of one in fifty; clutter may have any direction.
 double LeftOutCost(const JointProblem& problem, const State& state);
 
+// Takes in what a minimum leaves out but agrees with it: the same pose on more evidence. Costs are
+// with LeftOutCost.
+void TakeBackWhatFits(const JointProblem& problem, State* minimum);
+
 }  // namespace circline
 
 #endif  // CIRCLINE_REFINE_JOINT_RESULT_H_

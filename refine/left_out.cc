@@ -1,8 +1,9 @@
-// What it costs to leave a feature out.
+// What it costs to leave a feature out, and what comes back.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/refine/joint_result.h"
@@ -111,6 +112,42 @@ double LeftOutCost(const JointProblem& problem, const State& state) {
     if (!parent_is_out) cost += ClutterCost(problem, f);
   }
   return cost;
+}
+
+namespace {
+
+// Makes all active that is left out but agrees with this pose, so that leaving it out costs more
+// than keeping it. False where there is no such line or circle.
+bool AdmitWhatFits(const JointProblem& problem, State* state) {
+  bool any = false;
+  for (std::size_t i = 0; i < state->active.size(); ++i) {
+    State with = *state;
+    if (state->active[i] != 0 || !problem.Admit(i, &with)) continue;
+    State alone = with, none = with, without = with;
+    none.active.assign(with.active.size(), 0);
+    without.active.assign(with.active.size(), 1);
+    without.active[i] = 0;
+    for (std::size_t k = 0; k < with.active.size(); ++k) {
+      if (k != i && problem.features()[k].parent != static_cast<int>(i)) alone.active[k] = 0;
+    }
+    if (DropOutliers(problem, &alone)) continue;
+    const double cost = problem.Cost(alone) - problem.Cost(none);
+    if (!(cost < LeftOutCost(problem, without))) continue;
+    *state = std::move(with);
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace
+
+void TakeBackWhatFits(const JointProblem& problem, State* minimum) {
+  for (State with = *minimum; AdmitWhatFits(problem, &with);) {
+    if (!problem.Solve(problem.options().max_iterations, &with).ok()) return;
+    with.cost += LeftOutCost(problem, with);
+    if (!(with.cost < minimum->cost)) return;
+    *minimum = with;
+  }
 }
 
 }  // namespace circline

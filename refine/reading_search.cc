@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <set>
 #include <utility>
 
@@ -26,6 +25,7 @@ constexpr double kContradiction = 100.0;
 constexpr double kNoRival = std::numeric_limits<double>::infinity();
 
 using Reading = std::vector<std::uint8_t>;  // By feature: takes part.
+constexpr std::size_t kFew = 6;             // Of so few features any may be the odd one.
 
 class ReadingSearch {
  public:
@@ -36,20 +36,25 @@ class ReadingSearch {
   Status Run() {
     // Lines that a fit has found odd are left out first, and then all are taken in: the fit knew
     // one pencil only.
-    std::vector<Reading> queue = {problem_.FirstReading()};
+    std::vector<Candidate> queue = {{problem_.FirstReading(), seeds_}};
     const Reading everything(problem_.features().size(), 1);
-    if (queue.front() != everything) queue.push_back(everything);
+    if (queue.front().reading != everything) queue.push_back({everything, seeds_});
     for (std::size_t next = 0; next < queue.size() && next < kMaxReadings; ++next) {
-      const Reading reading = queue[next];
-      std::vector<State> minima = RefineAll(reading);
+      const Candidate candidate = queue[next];
+      std::vector<State> minima = RefineAll(candidate);
       std::stable_sort(minima.begin(), minima.end(),
                        [](const State& a, const State& b) { return a.cost < b.cost; });
       // A minimum that costs too much may do so because of what contradicts it.
       constexpr std::size_t kMostMinima = 4;
       minima.resize(std::min(minima.size(), kMostMinima));
+      // A compromise of few features may be far from the pose of those that agree; of many it is
+      // near.
+      const std::vector<Seed> near = everything.size() > kFew ? SeedsAt(minima) : candidate.seeds;
       for (const State& minimum : minima) {
-        for (const Reading& other : Rivals(minimum)) {
-          if (std::find(queue.begin(), queue.end(), other) == queue.end()) queue.push_back(other);
+        for (Reading& other : Rivals(minimum)) {
+          const bool is_known = std::any_of(queue.begin(), queue.end(),
+                                            [&](const Candidate& c) { return c.reading == other; });
+          if (!is_known) queue.push_back({std::move(other), near});
         }
       }
     }
@@ -61,18 +66,32 @@ class ReadingSearch {
   std::vector<State>& minima() { return minima_; }
 
  private:
+  struct Candidate {
+    Reading reading;
+    std::vector<Seed> seeds;
+  };
+
   struct Start {
     State state;
     double cost;  // With what is left out.
     std::size_t seed;
   };
 
+  std::vector<Seed> SeedsAt(const std::vector<State>& minima) const {
+    std::vector<Seed> seeds;
+    for (const State& minimum : minima)
+      seeds.push_back({problem_.PoseAt(minimum), problem_.LogFocalAt(minimum),
+                       static_cast<int>(seeds.size()) + 1});
+    return seeds;
+  }
+
   // All seeds that can start, the cheapest first.
-  std::vector<Start> Starts(const Reading& reading) {
+  std::vector<Start> Starts(const Candidate& candidate) {
     std::vector<Start> starts;
-    for (std::size_t i = 0; i < seeds_.size(); ++i) {
+    for (std::size_t i = 0; i < candidate.seeds.size(); ++i) {
+      const Seed& seed = candidate.seeds[i];
       State state;
-      last_ = problem_.Start(seeds_[i].pose, seeds_[i].log_focal, reading, &state);
+      last_ = problem_.Start(seed.pose, seed.log_focal, candidate.reading, &state);
       if (!last_.ok()) continue;
       const double cost = state.cost + LeftOutCost(problem_, state);
       starts.push_back({std::move(state), cost, i});
@@ -83,21 +102,22 @@ class ReadingSearch {
   }
 
   // The minima that the seeds lead to, in the order of the seeds.
-  std::vector<State> RefineAll(const Reading& reading) {
+  std::vector<State> RefineAll(const Candidate& candidate) {
+    const std::vector<Seed>& seeds = candidate.seeds;
     std::vector<std::pair<std::size_t, State>> found;
     std::vector<std::size_t> tried;
     std::set<int> circles;  // Whose planes were tried.
-    const int best_circle = BestCircle(reading);
+    const int best_circle = BestCircle(candidate);
     double best = std::numeric_limits<double>::infinity();
     bool is_consistent = false;  // The best one explains all that is to take part.
-    for (Start& start : Starts(reading)) {
+    for (Start& start : Starts(candidate)) {
       State& state = start.state;
       // Where all evidence agrees, one circle's planes are those of all.
-      const int source = seeds_[start.seed].source;
+      const int source = seeds[start.seed].source;
       if (is_consistent && source < 0 && source != best_circle) continue;
       if (source < 0 && circles.count(source) == 0 && circles.size() == kMostCircles) continue;
       const bool is_near = std::any_of(tried.begin(), tried.end(), [&](std::size_t other) {
-        return IsSameSeed(seeds_[start.seed], seeds_[other]) && seeds_[other].source != source;
+        return IsSameSeed(seeds[start.seed], seeds[other]) && seeds[other].source != source;
       });
       if (is_consistent && (is_near || start.cost > best + kHopeless * MaxGap())) continue;
       tried.push_back(start.seed);
@@ -110,9 +130,9 @@ class ReadingSearch {
       }
       if (state.cost < best) {
         best = state.cost;
-        is_consistent = state.active == reading && IsConsistent(state);
+        is_consistent = state.active == candidate.reading && IsConsistent(state);
       }
-      found.emplace_back(FirstLike(start.seed), std::move(state));
+      found.emplace_back(FirstLike(seeds, start.seed), std::move(state));
     }
     std::stable_sort(found.begin(), found.end(),
                      [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -131,7 +151,7 @@ class ReadingSearch {
       return;
     }
     if (HasOutliers(state)) return;
-    Grow(&state);
+    TakeBackWhatFits(problem_, &state);
     if (!IsKnown(state, minima_)) minima_.push_back(std::move(state));
   }
 
@@ -154,17 +174,18 @@ class ReadingSearch {
   }
 
   // The first seed that is as near to the same minimum.
-  std::size_t FirstLike(std::size_t seed) const {
+  static std::size_t FirstLike(const std::vector<Seed>& seeds, std::size_t seed) {
     std::size_t first = 0;
-    while (!IsSameSeed(seeds_[first], seeds_[seed])) ++first;
+    while (!IsSameSeed(seeds[first], seeds[seed])) ++first;
     return first;
   }
 
   // Source of the seeds of the best known circle that takes part; 0 where none does.
-  int BestCircle(const Reading& reading) const {
-    for (const Seed& seed : seeds_) {
+  int BestCircle(const Candidate& candidate) const {
+    for (const Seed& seed : candidate.seeds) {
       for (const JointProblem::CircleBlocks& c : problem_.circles()) {
-        if (seed.circle == c.observation && reading[static_cast<std::size_t>(c.feature)] != 0)
+        if (seed.circle == c.observation &&
+            candidate.reading[static_cast<std::size_t>(c.feature)] != 0)
           return seed.source;
       }
     }
@@ -212,27 +233,6 @@ class ReadingSearch {
   // What has no inliers has no say: the minimum without it is that of another reading.
   bool HasOutliers(State state) const { return DropOutliers(problem_, &state); }
 
-  // With a line or circle that is left out but agrees with this pose, so that leaving it out costs
-  // more than keeping it; none where there is no such feature.
-  std::optional<State> WithWhatFits(const State& minimum) const {
-    for (std::size_t i = 0; i < minimum.active.size(); ++i) {
-      State with = minimum;
-      if (minimum.active[i] != 0 || !problem_.Admit(i, &with) || HasOutliers(with)) continue;
-      if (problem_.Cost(with) + LeftOutCost(problem_, with) < minimum.cost) return with;
-    }
-    return {};
-  }
-
-  // Takes in what agrees with a minimum: the same pose on more evidence.
-  void Grow(State* minimum) const {
-    while (std::optional<State> with = WithWhatFits(*minimum)) {
-      if (!problem_.Solve(problem_.options().max_iterations, &*with).ok()) return;
-      with->cost += LeftOutCost(problem_, *with);
-      if (!(with->cost < minimum->cost)) return;
-      *minimum = std::move(*with);
-    }
-  }
-
   // Readings without what contradicts this minimum.
   std::vector<Reading> Rivals(const State& minimum) const {
     std::vector<Reading> rivals;
@@ -257,8 +257,8 @@ class ReadingSearch {
       return a.first != b.first ? a.first > b.first : a.second < b.second;
     });
     // Of few features it may be any, whatever the misfits at a compromise of all; of many the
-    // worst, and where many are as bad all of them at once: what agrees then comes back (Grow).
-    constexpr std::size_t kFew = 6, kMost = 3;
+    // worst, and where many are as bad all of them at once: what agrees then comes back.
+    constexpr std::size_t kMost = 3;
     constexpr double kComparable = 0.3;  // Of the worst.
     if (misfits.size() > kFew) {
       const auto better = std::find_if(excess.begin(), excess.end(), [&](const auto& e) {
