@@ -59,6 +59,11 @@ done
 mkdir -p out && cp -r shard0 out/shard-0
 export SLURM_ARRAY_TASK_ID=0 SLURM_ARRAY_TASK_COUNT=2 SLURM_CPUS_PER_TASK=1
 
+awk '/^```/ { fenced = !fenced }
+     !fenced && /^    / { line = line substr($0, 5)
+       if (sub(/\\$/, "", line)) next
+       if (line ~ /^circline_/) print line }
+     { line = "" }' "$top/README.md" "$top"/docs/*.md "$top"/docs/guide/*.md > shown.txt
 run=0
 while read -r command; do
   command=$(sed -E 's/ +# .*//; s/ \[[^]]*\]//g' <<< "$command")
@@ -76,9 +81,6 @@ while read -r command; do
   esac
   [ "$status" -eq 0 ] || { cat said.txt; echo "exit code $status"; exit 1; }
   run=$((run + 1))
-done < <(awk '/^```/ { fenced = !fenced } !fenced && /^    / { line = line substr($0, 5)
-                if (sub(/\\$/, "", line)) next
-                if (line ~ /^circline_/) print line }
-              { line = "" }' "$top/README.md" "$top"/docs/*.md "$top"/docs/guide/*.md)
+done < shown.txt
 [ "$run" -ge 25 ]
 echo "$run commands"

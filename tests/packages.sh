@@ -59,7 +59,7 @@ for file in "$chroot_dir/usr/bin/circline_compare" "$chroot_dir"/usr/lib/python3
 done
 
 say "examples against the packages"
-quietly build/chroot-tools.log inside apt-get install -y --no-install-recommends g++ cmake ninja-build pkg-config
+quietly build/chroot-tools.log inside apt-get install -y --no-install-recommends g++ make cmake ninja-build pkg-config
 quietly build/chroot-pytest.log inside sh -c '
   apt-get install -y --no-install-recommends python3-pytest python3-matplotlib &&
   cd /source && python3 -m pytest -q -p no:cacheprovider tests/python'
