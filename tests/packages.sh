@@ -41,6 +41,8 @@ before=$(inside find / -xdev -name '*circline*')
 mkdir -p "$chroot_dir/source/build/package"
 cp "${packages[@]}" "$chroot_dir/source/build/package"
 cp -r docs tests apps README.md "$chroot_dir/source"
+find_folder visp-images-data /usr/share/visp-images-data/ViSP-images
+cp -r "$found/mire-2" "$chroot_dir/source/frames"
 echo 'APT::Get::Assume-Yes "true"; APT::Install-Recommends "false";' > "$chroot_dir/etc/apt/apt.conf.d/99test"
 quietly build/chroot-install.log inside sh -c "cd /source && ${install[1]}"
 
@@ -68,8 +70,10 @@ quietly build/chroot-commands.log inside sh -c '
   tests/commands.sh /tmp/commands /usr'
 tail -n 5 build/chroot-commands.log
 quietly build/chroot-consumer.log inside sh -c '
-  cmake -S /source/tests/consumer -B /tmp/consumer -G Ninja -DCMAKE_BUILD_TYPE=Release &&
+  cmake -S /source/tests/consumer -B /tmp/consumer -G Ninja -DCMAKE_BUILD_TYPE=Release -DCIRCLINE_FRAMES=/source/frames &&
   cmake --build /tmp/consumer && ctest --test-dir /tmp/consumer --output-on-failure'
+! grep -F '***Skipped' build/chroot-consumer.log || fail "not all examples ran"
+
 
 say "removing the packages"
 rm -rf "$chroot_dir/source" "$chroot_dir"/tmp/*
