@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "circline/ransac/detection/box_search.h"
 #include "circline/ransac/detection/choose_plane.h"
 #include "circline/ransac/detection/circle_grid.h"
 #include "circline/ransac/detection/find_box.h"
@@ -22,6 +23,10 @@ using Eigen::Vector3d;
 constexpr double kMinMeetingShare = 0.4;
 // Or lies in the convex hull of its circles, widened by this factor: a plate reaches beyond them.
 constexpr double kCirclesGrowth = 2.0;
+
+// Evidence of a pencil (LogOddsOfDirection) that no box outweighs: six edges along two of its axes,
+// at four each.
+constexpr double kMostOddsOfABox = 24.0;
 
 class Assembler {
  public:
@@ -63,28 +68,87 @@ class Assembler {
     for (std::size_t i = before; i < pencils_.size(); ++i) pencils_[i].of_grid = true;
   }
 
-  // Where circles are all that the plane has: a box on it, whose edges become its axes.
-  bool AddBox(Plane* plane) {
+  // A box that stands on the plane where circles are all that this has, or one that has better
+  // evidence than two pencils: its edges become the axes.
+  bool AddBox(Plane* plane) { return AddBoxOnCircles(plane) || AddFreeBox(plane); }
+
+  std::vector<DetectedLine> AllLines() const {
+    std::vector<DetectedLine> lines = lines_;
+    lines.insert(lines.end(), bent_.begin(), bent_.end());
+    return lines;
+  }
+
+  bool AddBoxOnCircles(Plane* plane) {
     if (plane->pencils[0] >= 0 || plane->circles.empty()) return false;
     std::vector<UncertainDirection> normals = {plane->normal};
     if (plane->circles.size() == 1) {
       const CircleEvidence& circle = circles_[static_cast<std::size_t>(plane->circles[0])];
       normals.assign(circle.normals.begin(), circle.normals.begin() + circle.num_normals);
     }
-    std::vector<DetectedLine> lines = lines_;
-    lines.insert(lines.end(), bent_.begin(), bent_.end());
     std::vector<Vector3d> vectors;
     for (const UncertainDirection& normal : normals) vectors.push_back(normal.vector);
-    std::optional<FoundBox> box = FindBox(lines, vectors, options_.diagonal_px);
+    std::optional<FoundBox> box = FindBox(AllLines(), vectors, options_.diagonal_px);
     if (!box) return false;
     plane->normal = normals[box->normal];
+    PlaceBox(&*box);
+    return true;
+  }
+
+  // Where two circles or more, or a circle and two pencils, have a plane, that is no box's.
+  bool AddFreeBox(Plane* plane) {
+    const bool is_of_pencils = plane->pencils[0] >= 0;
+    if (plane->circles.size() > (is_of_pencils ? 0 : 1)) return false;
+    if (is_of_pencils &&
+        std::min(LogOddsOf(plane->pencils[0]), LogOddsOf(plane->pencils[1])) >= kMostOddsOfABox)
+      return false;
+    std::vector<Vector3d> axes;
+    for (const PlacedPencil& pencil : pencils_) {
+      if (!pencil.of_grid) axes.push_back(pencil.direction.vector);
+    }
+    std::optional<FoundBox> box = FindFreeBox(AllLines(), axes, options_.diagonal_px);
+    if (!box || (is_of_pencils && !Contradicts(*box, *plane))) return false;
+    *plane = Plane();
+    plane->normal.vector = box->axes.col(2);
+    plane->support_px = box->pencils[0].support_px + box->pencils[1].support_px;
+    const int first = static_cast<int>(pencils_.size());
+    plane->pencils = {first, first + 1};
+    PlaceBox(&*box);
+    return true;
+  }
+
+  void PlaceBox(FoundBox* box) {
     for (int k = 0; k < 3; ++k) {
       PlacedPencil pencil(std::move(box->pencils[static_cast<std::size_t>(k)]), box->axes.col(k));
       pencil.observation.direction = static_cast<PencilDirection>(k);
       if (k < 2) pencil.observation.plane = "p0";
       pencils_.push_back(std::move(pencil));
     }
-    return true;
+  }
+
+  double LogOddsOf(int pencil) const {
+    const PlacedPencil& p = pencils_[static_cast<std::size_t>(pencil)];
+    return LogOddsOfDirection(lines_, p.members, p.direction.vector);
+  }
+
+  // Whether the box has another direction than the two pencils, and better evidence for it: what
+  // they have in common speaks for both.
+  bool Contradicts(const FoundBox& box, const Plane& plane) const {
+    std::array<bool, 3> in_common{};
+    bool is_other = false;
+    double log_odds = 0.0;
+    for (const int i : plane.pencils) {
+      const PlacedPencil& pencil = pencils_[static_cast<std::size_t>(i)];
+      bool is_axis = false;
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (!IsNear(pencil, box.axes.col(static_cast<Eigen::Index>(k)))) continue;
+        is_axis = in_common[k] = true;
+      }
+      if (is_axis) continue;
+      is_other = true;
+      log_odds -= LogOddsOf(i);
+    }
+    for (std::size_t k = 0; k < 3; ++k) log_odds += in_common[k] ? 0.0 : box.log_odds_along[k];
+    return is_other && log_odds > 0.0;
   }
 
   void SetPlane(const Plane& plane) {

@@ -32,7 +32,8 @@ struct AssemblyOptions {
 // those that the pencils' members index; the two pencils that span the plane are fitted again to
 // all that lie where the two meet. Where circles are all that a plane has, a box that stands on it
 // (of `lines` and `bent` ones) gives it x and y, and tells which of a lone circle's two normals it
-// has.
+// has. A box with an axis along a pencil is taken where there is no plane, and instead of two
+// pencils one of which is along none of its axes and has less evidence than they.
 void AssembleObservations(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
                           const std::vector<DetectedLine>& bent,
                           std::vector<CircleEvidence>* circles,

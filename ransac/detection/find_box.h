@@ -2,8 +2,9 @@
 // meet in corners.
 //
 // The few edges of a box hardly stand out among the lines of a photo: each of its directions has
-// two or three. What gives it away is that lines of all three end in common points. The normal
-// comes from elsewhere (a circle leaves two); what is left to search is one angle.
+// two or three. What gives it away is that lines of all three end in common points. One axis
+// comes from elsewhere (a circle leaves two normals, a pencil has a direction); what is left to
+// search is one angle.
 #ifndef CIRCLINE_RANSAC_DETECTION_FIND_BOX_H_
 #define CIRCLINE_RANSAC_DETECTION_FIND_BOX_H_
 
@@ -18,12 +19,13 @@
 namespace circline {
 
 struct FoundBox {
-  std::size_t normal = 0;                 // Which of those given.
+  std::size_t normal = 0;                 // Which of those given; of FindBox.
   Eigen::Matrix3d axes;                   // A rotation: directions in the plane, the normal.
   std::array<DetectedPencil, 3> pencils;  // Along them; one line or more each, no fit.
   // Logarithm of how much likelier the lines are as edges of the box than as lines of any
   // direction.
   double log_odds = 0.0;
+  std::array<double, 3> log_odds_along{};  // The part that the lines along each axis have in it.
 };
 
 // The box with the highest odds on a plane with one of the normals (unit, camera frame); none where
@@ -33,6 +35,13 @@ struct FoundBox {
 std::optional<FoundBox> FindBox(const std::vector<DetectedLine>& lines,
                                 const std::vector<Eigen::Vector3d>& normals,
                                 double diagonal_px = kUsualDiagonalPx);
+
+// The box with the highest odds that has an axis within a degree or so of one of those given, as
+// the directions of a photo's pencils are; none where the odds are too low or those of another box
+// nearly as high. The longest of its directions comes first, then the second. Same cost.
+std::optional<FoundBox> FindFreeBox(const std::vector<DetectedLine>& lines,
+                                    const std::vector<Eigen::Vector3d>& axes,
+                                    double diagonal_px = kUsualDiagonalPx);
 
 }  // namespace circline
 

@@ -19,9 +19,6 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kMinLogOdds = 2.5;
 // A line so nearly orthogonal to the axis (a sine) has no direction orthogonal to it.
 constexpr double kMinCross = 0.05;
-// How much likelier a line without miss is, times its standard deviation, than a line that lies any
-// way: l . v is uniform on [-1, 1] for these (Archimedes). 2 / sqrt(2 pi).
-constexpr double kPeakRatio = 0.7978845608028654;
 
 }  // namespace
 
@@ -30,7 +27,7 @@ OrthogonalEvidence::OrthogonalEvidence(const std::vector<LineFit>& lines, const 
     : axis_(axis) {
   for (const LineFit& line : lines) {
     const double lean = kRightAngleSigmaDeg * kPi / 180.0 * line.line.dot(axis);
-    lines_.push_back(WithDirectionError(line, std::hypot(spread_rad, lean)));
+    lines_.emplace_back(WithDirectionError(line, std::hypot(spread_rad, lean)));
   }
 }
 
@@ -38,12 +35,13 @@ double OrthogonalEvidence::LogOdds(const Vector3d& direction) const {
   const Vector3d turn = axis_.cross(direction);
   double expected = 0.0, information = 0.0;
   std::vector<double> ratios;  // Of likelihoods, of the lines that may share the direction.
-  for (const LineFit& line : lines_) {
-    const double sigma = std::sqrt(direction.dot(line.covariance * direction));
-    expected += std::min(1.0, kInlierSigmas * sigma);  // Lines as near by chance.
-    const double r = line.line.dot(direction) / sigma, slope = line.line.dot(turn) / sigma;
-    if (std::abs(r) > kInlierSigmas) continue;
-    ratios.push_back(kPeakRatio / sigma * std::exp(-0.5 * r * r));
+  for (const LineOdds& line : lines_) {
+    const double variance = line.Variance(direction), sigma = std::sqrt(variance);
+    // Lines as near by chance.
+    expected += 2.0 / kPi * std::asin(std::min(1.0, kInlierSigmas * sigma / line.Sine(direction)));
+    const double slope = line.Miss(turn) / sigma;
+    if (std::abs(line.Miss(direction)) > kInlierSigmas * sigma) continue;
+    ratios.push_back(std::exp(line.LogRatio(direction, variance)));
     information += slope * slope;
   }
   if (ratios.empty()) return -std::numeric_limits<double>::infinity();
@@ -57,8 +55,8 @@ double OrthogonalEvidence::LogOdds(const Vector3d& direction) const {
 std::optional<Vector3d> OrthogonalEvidence::Best() const {
   std::optional<Vector3d> best;
   double best_odds = kMinLogOdds;
-  for (const LineFit& proposer : lines_) {
-    const Vector3d cross = axis_.cross(proposer.line);
+  for (const LineOdds& proposer : lines_) {
+    const Vector3d cross = axis_.cross(proposer.fit().line);
     if (cross.norm() < kMinCross) continue;
     const double log_odds = LogOdds(cross.normalized());
     if (!(log_odds > best_odds)) continue;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "circline/estimators/line.h"
+#include "circline/ransac/detection/line_odds.h"
 
 namespace circline {
 
@@ -30,7 +31,7 @@ class OrthogonalEvidence {
 
  private:
   Eigen::Vector3d axis_;
-  std::vector<LineFit> lines_;
+  std::vector<LineOdds> lines_;
 };
 
 }  // namespace circline

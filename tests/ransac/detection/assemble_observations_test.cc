@@ -210,6 +210,36 @@ TEST(AssembleObservations, TwoPencilsOfAPlaneNeedNoBox) {
   EXPECT_LT(AxisDeg(found.pencils[0].fit->direction, kFrame.col(0)), 0.1);
 }
 
+// One pencil is no plane; a box with an axis along it has three.
+TEST(AssembleObservations, ABoxAlongAPencilGivesTheAxes) {
+  Random random(1);
+  const Matrix3d axes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
+  const std::vector<DetectedLine> edges =
+      detection_test::BoxEdges(detection_test::TestCamera(), axes, 0.2, &random);
+  const Observations found = Assemble({}, {Pencil(axes.col(1), 500.0)}, 3, edges);
+  EXPECT_EQ(found.frame.plane, "p0");
+  ASSERT_EQ(found.pencils.size(), 3U);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(found.pencils[k].direction, static_cast<PencilDirection>(k));
+    EXPECT_EQ(found.pencils[k].plane, k < 2 ? "p0" : "");
+    EXPECT_EQ(found.pencils[k].lines.size(), 3U);
+  }
+}
+
+// Two that claim to span a plane at right angles, one of them along the box and the other along
+// none of its edges: the box has better evidence than a direction of no lines.
+TEST(AssembleObservations, ABoxThatContradictsAWeakPencilIsTaken) {
+  Random random(1);
+  const Matrix3d axes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
+  const std::vector<DetectedLine> edges =
+      detection_test::BoxEdges(detection_test::TestCamera(), axes, 0.2, &random);
+  const Vector3d between = (axes.col(1) + axes.col(2)).normalized();
+  const Observations found =
+      Assemble({}, {Pencil(axes.col(0), 500.0), Pencil(between, 400.0)}, 3, edges);
+  ASSERT_EQ(found.pencils.size(), 3U);
+  for (const PencilObservation& pencil : found.pencils) EXPECT_EQ(pencil.lines.size(), 3U);
+}
+
 // Of directions in their plane only those of lines among them: others are so by accident.
 TEST(AssembleObservations, LinesFarFromAPlanesCirclesAreNotInIt) {
   for (const bool is_far : {false, true}) {

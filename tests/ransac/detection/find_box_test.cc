@@ -116,7 +116,52 @@ TEST(FindBox, IsRareByAccident) {
   EXPECT_LE(found, kTrials / 50);
 }
 
+// A pencil with lines of other things points half a degree beside the box's axis.
+TEST(FindFreeBox, NeedsNoMoreThanADirectionNearOneOfItsAxes) {
+  const Camera camera = TestCamera();
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed);
+    std::vector<DetectedLine> lines = BoxEdges(camera, &random);
+    const std::vector<DetectedLine> clutter = Clutter(camera, 60, &random);
+    lines.insert(lines.end(), clutter.begin(), clutter.end());
+    const Matrix3d turn =
+        ExpRotation(0.005 * Vector3d(random.Normal(), random.Normal(), random.Normal()));
+    const Vector3d other(random.Normal(), random.Normal(), random.Normal());
+    const auto box = FindFreeBox(lines, {other.normalized(), turn * kAxes.col(seed % 3)});
+    if (!box) continue;
+    ++found;
+    EXPECT_NEAR(box->axes.determinant(), 1.0, 1e-9);
+    for (int k = 0; k < 3; ++k) {
+      double nearest = 90.0;
+      for (int axis = 0; axis < 3; ++axis)
+        nearest = std::min(nearest, AxisDeg(box->axes.col(k), kAxes.col(axis)));
+      EXPECT_LT(nearest, 1.5) << seed;
+    }
+    EXPECT_GE(box->pencils[0].support_px, box->pencils[1].support_px);
+    EXPECT_GE(box->pencils[1].support_px, box->pencils[2].support_px);
+  }
+  EXPECT_GE(found, 18);
+}
+
+TEST(FindFreeBox, IsRareByAccident) {
+  const Camera camera = TestCamera();
+  Random random(7);
+  int found = 0;
+  constexpr int kTrials = 100;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::vector<Vector3d> axes;
+    for (int k = 0; k < 3; ++k) {
+      const double x = random.Normal(), y = random.Normal(), z = random.Normal();
+      axes.push_back(Vector3d(x, y, z).normalized());
+    }
+    found += FindFreeBox(Clutter(camera, 100, &random), axes).has_value() ? 1 : 0;
+  }
+  EXPECT_LE(found, 1);
+}
+
 TEST(FindBox, NothingInNothingOut) {
+  EXPECT_FALSE(FindFreeBox({}, {Vector3d::UnitZ()}).has_value());
   EXPECT_FALSE(FindBox({}, {Vector3d::UnitZ()}).has_value());
   Random random(1);
   EXPECT_FALSE(FindBox(BoxEdges(TestCamera(), &random), {}).has_value());

@@ -1,0 +1,34 @@
+#include "circline/ransac/detection/line_odds.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace circline {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kLeastSine = 1e-3;  // The middle of a line is not known to better.
+
+}  // namespace
+
+// A line is known least where it turns about its middle.
+LineOdds::LineOdds(const LineFit& fit) : fit_(fit) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(fit.covariance);
+  middle_ = fit.line.cross(eigen.eigenvectors().col(2)).normalized();
+}
+
+double LineOdds::Sine(const Eigen::Vector3d& direction) const {
+  return std::clamp(middle_.cross(direction).norm() / direction.norm(), kLeastSine, 1.0);
+}
+
+// A line of any orientation, an angle phi uniform, misses by sine * cos(phi): with a density of
+// 1 / (pi sine) at no miss, and hardly more near it.
+double LineOdds::LogRatio(const Eigen::Vector3d& direction, double variance) const {
+  const double sine = Sine(direction), miss = Miss(direction);
+  return 0.5 * std::log(0.5 * kPi * sine * sine / variance) - 0.5 * miss * miss / variance;
+}
+
+}  // namespace circline
