@@ -28,6 +28,8 @@ class Served {
   Served() {
     std::string folder = std::filesystem::temp_directory_path() / "circline_fuzz_XXXXXX";
     Expect(mkdtemp(folder.data()) != nullptr, "a folder can be made");
+    static const std::string made = folder;
+    std::atexit([] { std::filesystem::remove_all(made); });
     cv::imwrite(folder + "/disc.png", apps::DiscPhoto(96, 72));
     apps::PhotoFolder photos;
     Expect(photos.Open(folder).ok(), "the folder can be opened");
