@@ -1,0 +1,104 @@
+// How the time of what the library and the programs do with one photo or one file grows with what
+// is in it. The last line of each is the fit of n log n.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "apps/common/scene.h"
+#include "circline/estimators/random.h"
+#include "circline/ransac/fit_observations.h"
+#include "circline/refine/estimate_pose.h"
+
+namespace circline {
+namespace {
+
+// An ellipse, three tenths of its points beside it.
+Observations LongContour(std::int64_t count) {
+  Random random(1);
+  Observations observations;
+  observations.camera.fx = observations.camera.fy = 600.0;
+  CircleObservation circle;
+  circle.id = "c";
+  for (std::int64_t i = 0; i < count; ++i) {
+    const double angle = 6.283185307179586 * static_cast<double>(i) / static_cast<double>(count);
+    const double beside = i % 10 < 3 ? random.Uniform(5.0, 60.0) : 0.0;
+    circle.points.emplace_back(200.0 * std::cos(angle) + beside + 0.2 * random.Normal(),
+                               150.0 * std::sin(angle) + 0.2 * random.Normal());
+  }
+  observations.circles = {circle};
+  return observations;
+}
+
+void BM_GrowthContourPoints(benchmark::State& state) {
+  for (auto _ : state) {
+    Observations observations = LongContour(state.range(0));
+    if (!FitObservations({}, &observations).ok()) std::abort();
+    benchmark::DoNotOptimize(EstimatePose(observations));
+  }
+  state.SetComplexityN(state.range(0));
+}
+BENCHMARK(BM_GrowthContourPoints)
+    ->RangeMultiplier(10)
+    ->Range(100, 100000)
+    ->Unit(benchmark::kMillisecond)
+    ->Complexity(benchmark::oNLogN);
+
+void BM_GrowthSceneEntries(benchmark::State& state) {
+  std::string text =
+      "cameras: [{id: \"k\", model: \"pinhole\", width: 640, height: 480, "
+      "camera_matrix: [600, 0, 320, 0, 600, 240, 0, 0, 1]}]\nimages:\n";
+  for (std::int64_t i = 0; i < state.range(0); ++i)
+    text += "  - {file: \"a.jpg\", camera: \"k\"}\n";
+  for (auto _ : state) {
+    std::vector<apps::SceneImage> images;
+    if (!apps::ParseScene("scene", text, "", {}, &images).ok()) std::abort();
+    benchmark::DoNotOptimize(images);
+  }
+  state.SetComplexityN(state.range(0));
+}
+BENCHMARK(BM_GrowthSceneEntries)
+    ->RangeMultiplier(10)
+    ->Range(100, 100000)
+    ->Unit(benchmark::kMillisecond)
+    ->Complexity(benchmark::oNLogN);
+
+// A pencil whose lines are given, none of them parallel to the others by more than their noise.
+void BM_GrowthSegments(benchmark::State& state) {
+  Random random(1);
+  Observations observations;
+  observations.camera.fx = observations.camera.fy = 600.0;
+  for (const double direction : {0.0, 1.2}) {
+    PencilObservation pencil;
+    pencil.id = direction == 0.0 ? "x" : "y";
+    pencil.plane = "p";
+    pencil.direction = direction == 0.0 ? PencilDirection::kX : PencilDirection::kY;
+    const Eigen::Vector2d meet(2000.0 * std::cos(direction), 2000.0 * std::sin(direction));
+    for (std::int64_t i = 0; i < state.range(0) / 2; ++i) {
+      const Eigen::Vector2d from(random.Uniform(-300.0, 300.0), random.Uniform(-200.0, 200.0));
+      const Eigen::Vector2d to = from + 0.05 * (meet - from);
+      const auto noisy = [&random](const Eigen::Vector2d& p) {
+        const double dx = random.Normal(), dy = random.Normal();
+        return Eigen::Vector2d(p + 0.2 * Eigen::Vector2d(dx, dy));
+      };
+      pencil.lines.push_back({{noisy(from), noisy(to)}, {}, {}});
+    }
+    observations.pencils.push_back(pencil);
+  }
+  for (auto _ : state) {
+    Observations fitted = observations;
+    if (!FitObservations({}, &fitted).ok()) std::abort();
+    benchmark::DoNotOptimize(EstimatePose(fitted));
+  }
+  state.SetComplexityN(state.range(0));
+}
+BENCHMARK(BM_GrowthSegments)
+    ->RangeMultiplier(10)
+    ->Range(100, 10000)
+    ->Unit(benchmark::kMillisecond)
+    ->Complexity(benchmark::oNLogN);
+
+}  // namespace
+}  // namespace circline
