@@ -18,7 +18,7 @@ namespace {
 constexpr double kMatchPx = 12.0;   // How far a circle moves from one frame to the next, at most.
 constexpr double kMatchRad = 0.01;  // How far off a line may run from where its direction points.
 
-constexpr std::size_t kFewestCircles = 3;  // To start from.
+constexpr std::size_t kFewestCircles = 5;  // To start from: the map never grows.
 
 // Of the centre of the ellipse; false where none is fitted.
 bool CenterPx(const Camera& camera, const CircleObservation& circle, Vector2d* pixel) {

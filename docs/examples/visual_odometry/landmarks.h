@@ -39,7 +39,7 @@ struct Frame {
 };
 
 // The pose of a frame to start from, and a map of what it sees, in the world of its estimate. False
-// where that does not suffice: fewer than three circles, a doubtful pose, no scale.
+// where that does not suffice: fewer than five circles, a doubtful pose, no scale.
 bool StartMap(const circline::Observations& seen, Frame* frame, Map* map);
 
 // Adds to the frame, whose pose is that of the frame before, the circles and lines that belong to
