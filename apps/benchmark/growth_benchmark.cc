@@ -2,6 +2,7 @@
 // is in it. The last line of each is the fit of n log n.
 #include <benchmark/benchmark.h>
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <string>
@@ -65,20 +66,21 @@ BENCHMARK(BM_GrowthSceneEntries)
     ->Unit(benchmark::kMillisecond)
     ->Complexity(benchmark::oNLogN);
 
-// A pencil whose lines are given, none of them parallel to the others by more than their noise.
+// Two orthogonal pencils.
 void BM_GrowthSegments(benchmark::State& state) {
   Random random(1);
   Observations observations;
   observations.camera.fx = observations.camera.fy = 600.0;
-  for (const double direction : {0.0, 1.2}) {
+  const std::array<Eigen::Vector2d, 2> vanishing_points = {Eigen::Vector2d(2000.0, 0.0),
+                                                           Eigen::Vector2d(-180.0, 1800.0)};
+  for (std::size_t k = 0; k < 2; ++k) {
     PencilObservation pencil;
-    pencil.id = direction == 0.0 ? "x" : "y";
+    pencil.id = k == 0 ? "x" : "y";
     pencil.plane = "p";
-    pencil.direction = direction == 0.0 ? PencilDirection::kX : PencilDirection::kY;
-    const Eigen::Vector2d meet(2000.0 * std::cos(direction), 2000.0 * std::sin(direction));
+    pencil.direction = k == 0 ? PencilDirection::kX : PencilDirection::kY;
     for (std::int64_t i = 0; i < state.range(0) / 2; ++i) {
       const Eigen::Vector2d from(random.Uniform(-300.0, 300.0), random.Uniform(-200.0, 200.0));
-      const Eigen::Vector2d to = from + 0.05 * (meet - from);
+      const Eigen::Vector2d to = from + 0.05 * (vanishing_points[k] - from);
       const auto noisy = [&random](const Eigen::Vector2d& p) {
         const double dx = random.Normal(), dy = random.Normal();
         return Eigen::Vector2d(p + 0.2 * Eigen::Vector2d(dx, dy));
