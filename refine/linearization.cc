@@ -14,24 +14,12 @@ namespace {
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 constexpr double kNoInformation = 1e-12;  // Of an eigenvalue, at unit diagonal.
 
-// Gauss-Jordan steps at the first k diagonal entries of a symmetric matrix [P Q; Q^T S]: leaves
-// [P^-1 P^-1 Q; . S - Q^T P^-1 Q]. False where P is not positive definite.
-bool Sweep(Eigen::Index k, Eigen::MatrixXd* matrix) {
-  Eigen::MatrixXd& A = *matrix;
-  for (Eigen::Index i = 0; i < k; ++i) {
-    const double inverse = 1.0 / A(i, i);
-    if (!(inverse > 0.0) || !std::isfinite(inverse)) return false;
-    Eigen::VectorXd pivots = A.col(i);
-    A.col(i).setZero();
-    pivots[i] = -1.0;
-    A(i, i) = 0.0;
-    for (Eigen::Index j = 0; j < A.cols(); ++j) {
-      const double by = j == i ? inverse : inverse * A(i, j);
-      A(i, j) = 0.0;
-      A.col(j) -= by * pivots;
-    }
-  }
-  return true;
+// Inverse of a symmetric positive definite matrix. False where it is none.
+bool Invert(const Eigen::MatrixXd& A, Eigen::MatrixXd* inverse) {
+  const Eigen::LLT<Eigen::MatrixXd> llt(A);
+  if (llt.info() != Eigen::Success) return false;
+  *inverse = llt.solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
+  return inverse->allFinite();
 }
 
 // Pseudo-inverse on the observed subspace, which units do not matter to, and the directions without
@@ -132,7 +120,6 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
     ambient_size +=
         static_cast<std::size_t>(problem_.blocks()[static_cast<std::size_t>(index)].size);
   ambient_.resize(ambient_size * static_cast<std::size_t>(num_rows));
-  rows.columns.reserve(ambient_size);
   double* next = ambient_.data();
   for (std::size_t k = 0; k < term.blocks.size(); ++k) {
     const auto block = static_cast<std::size_t>(term.blocks[k]);
@@ -211,9 +198,11 @@ bool Linearization::Eliminate(Group* group) {
       target.push_back(column < 0 ? -1 - column : k + IndexIn(group->shared, column));
     AddInformation(rows.J, target, &A);
   }
-  if (!Sweep(k, &A)) return false;
-  group->inverse = A.topLeftCorner(k, k);
-  group->gain = A.topRightCorner(k, n);
+  if (k > 0) {
+    if (!Invert(A.topLeftCorner(k, k), &group->inverse)) return false;
+    group->gain = group->inverse.lazyProduct(A.topRightCorner(k, n));
+    A.bottomRightCorner(n, n) -= A.bottomLeftCorner(n, k).lazyProduct(group->gain);
+  }
   for (int a = 0; a < n; ++a) {
     for (int b = 0; b < n; ++b)
       information_(group->shared[static_cast<std::size_t>(a)],
