@@ -10,8 +10,11 @@ function(circline_own_target target)
   target_compile_features(${target} PUBLIC cxx_std_17)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE
-    -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Woverloaded-virtual
+    -Wall -Wextra -Wpedantic -Wconversion -Wnon-virtual-dtor -Woverloaded-virtual
     $<$<BOOL:${CIRCLINE_WERROR}>:-Werror>)
+  if(NOT CMAKE_UNITY_BUILD)  # There a name of one file hides that of another.
+    target_compile_options(${target} PRIVATE -Wshadow)
+  endif()
   if(CIRCLINE_SANITIZE)
     # GCC guesses wrong on code that the sanitizers have rewritten.
     target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)

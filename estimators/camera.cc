@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
@@ -37,7 +39,7 @@ RadialFactor KannalaBrandtRadial(const std::array<double, 8>& k, double s) {
 
 // Angle off the axis whose distorted radius is theta_d; false where that is 89 degrees or more.
 bool FisheyeAngle(const std::array<double, 8>& k, double theta_d, double* theta) {
-  constexpr double kMaxAngle = 89.0 / 57.29577951308232;
+  constexpr double kMaxAngle = 89.0 * kDegree;
   const auto distort = [&k](double t) {
     const double q = t * t;
     return t * (1.0 + q * (k[0] + q * (k[1] + q * (k[2] + q * k[3]))));

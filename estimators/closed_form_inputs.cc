@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pencil_lean.h"
 
 namespace circline {
@@ -133,7 +134,6 @@ Reading ReadVanishingPoints(const std::array<PencilObservation, 2>& pencils, dou
   const double va = ta.dot(a.covariance * ta), vb = tb.dot(b.covariance * tb);
   double excess = std::atan2(a.direction.cross(b.direction).norm(), a.direction.dot(b.direction));
   // Directions have no sense: `angle` or its supplement, whichever is nearer.
-  constexpr double kPi = 3.14159265358979323846;
   excess -= std::abs(excess - angle) < std::abs(excess - (kPi - angle)) ? angle : kPi - angle;
   const double ea = excess * va / (va + vb), eb = excess - ea;
   Reading r;

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/closed_form_errors.h"
 
 namespace circline {
@@ -53,7 +54,7 @@ void FillSupport(const Observations& evidence, PoseHypothesis* h) {
     estimate.direction = pencil.fit->direction;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(pencil.fit->covariance,
                                                                Eigen::EigenvaluesOnly);
-    estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) * 57.29577951308232;
+    estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
     h->pencils.push_back(estimate);
   }
   if (h->num_inliers > 0) h->rms_px = std::sqrt(squares / h->num_inliers);
@@ -61,7 +62,6 @@ void FillSupport(const Observations& evidence, PoseHypothesis* h) {
 
 // What two pencils say beside the pose: the angle between them, with its standard deviation.
 std::string AngleBetween(const PencilObservation& a, const PencilObservation& b) {
-  constexpr double kDegrees = 57.29577951308232;
   const Eigen::Vector3d u = a.fit->direction;
   const Eigen::Vector3d v = b.fit->direction * (u.dot(b.fit->direction) < 0.0 ? -1.0 : 1.0);
   const Eigen::Vector3d n = u.cross(v).normalized();
@@ -70,8 +70,8 @@ std::string AngleBetween(const PencilObservation& a, const PencilObservation& b)
   const double variance = du.dot(a.fit->covariance * du) + dv.dot(b.fit->covariance * dv);
   char text[160];
   std::snprintf(text, sizeof(text), "' are %.2f +- %.2f degrees apart",
-                kDegrees * std::atan2(u.cross(v).norm(), u.dot(v)),
-                kDegrees * std::sqrt(std::max(0.0, variance)));
+                std::atan2(u.cross(v).norm(), u.dot(v)) / kDegree,
+                std::sqrt(std::max(0.0, variance)) / kDegree);
   return "the directions of '" + a.id + "' and '" + b.id + text;
 }
 

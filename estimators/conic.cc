@@ -4,12 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
-
-namespace {
-constexpr double kSqrt2 = 1.4142135623730951;
-}  // namespace
-
 Vector6d ConicToVector(const Eigen::Matrix3d& C) {
   Vector6d v;
   v << C(0, 0), C(1, 1), C(2, 2), kSqrt2 * C(0, 1), kSqrt2 * C(0, 2), kSqrt2 * C(1, 2);
@@ -56,7 +53,6 @@ bool ConicToEllipse(const Eigen::Matrix3d& conic, Ellipse* ellipse) {
   ellipse->b = std::sqrt(level / large);
   // Direction of the smaller eigenvalue of A.
   double angle = radius > 0.0 ? 0.5 * std::atan2(-A(0, 1), -difference) : 0.0;
-  constexpr double kPi = 3.14159265358979323846;
   if (angle <= -0.5 * kPi) angle += kPi;
   ellipse->angle = angle;
   return std::isfinite(ellipse->a) && std::isfinite(ellipse->b) && center.allFinite();

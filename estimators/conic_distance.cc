@@ -4,17 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/cholesky6.h"
 #include "circline/estimators/foot_points.h"
 #include "circline/estimators/weights.h"
 
 namespace circline {
-namespace {
-
-constexpr double kSqrt2 = 1.4142135623730951;
-
-}  // namespace
-
 Contour::Contour(const std::vector<CalibratedPoint>& points, const std::vector<double>* weights,
                  const Normalization& n) {
   // Filled up to whole lanes with points of no weight.

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
 
@@ -67,7 +68,6 @@ struct Moments {
   // Sum of w m m^T, m the gradient of x^T C x with respect to ConicToVector(C): (x^2, y^2, 1,
   // sqrt2 xy, sqrt2 x, sqrt2 y).
   Matrix6d Scatter() const {
-    constexpr double kSqrt2 = 1.4142135623730951;
     Matrix6d M;
     M.row(0) << xxxx, xxyy, xx, kSqrt2 * xxxy, kSqrt2 * xxx, kSqrt2 * xxy;
     M.row(1) << xxyy, yyyy, yy, kSqrt2 * xyyy, kSqrt2 * xyy, kSqrt2 * yyy;
@@ -82,7 +82,6 @@ struct Moments {
   // squared derivatives of m, plus mean(m) e^T + e mean(m)^T, e the expectation of the monomials'
   // second-order error (1 for x^2 and y^2).
   Matrix6d HyperConstraint() const {
-    constexpr double kSqrt2 = 1.4142135623730951;
     Matrix6d N;
     N.row(0) << 6.0 * xx, xx + yy, 1.0, 3.0 * kSqrt2 * xy, 3.0 * kSqrt2 * x, kSqrt2 * y;
     N.row(1) << xx + yy, 6.0 * yy, 1.0, 3.0 * kSqrt2 * xy, kSqrt2 * x, 3.0 * kSqrt2 * y;

@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/export.h"
@@ -38,7 +39,6 @@ inline double LineDistance(const CalibratedPoint& p, const Eigen::Vector3d& line
 // d distance / d ConicToVector(C).
 inline double ConicDistance(const CalibratedPoint& p, const Eigen::Matrix3d& C,
                             Vector6d* jacobian) {
-  constexpr double kSqrt2 = 1.4142135623730951;
   const double x = p.x.x(), y = p.x.y();
   const Eigen::Vector3d polar = C * p.Homogeneous();
   const Eigen::Vector2d g = p.GradientPerPixel(polar.head<2>());
@@ -63,7 +63,6 @@ inline double OrthogonalDistance(const CalibratedPoint& p, const Eigen::Matrix3d
                          lane(p.x_from_pixel[1]), lane(p.x_from_pixel[2]), lane(p.x_from_pixel[3])},
                         C, level);
   if (jacobian != nullptr) {
-    constexpr double kSqrt2 = 1.4142135623730951;
     const double x = foot.x[0], y = foot.y[0];
     *jacobian << x * x, y * y, 1.0, kSqrt2 * x * y, kSqrt2 * x, kSqrt2 * y;
     *jacobian *= foot.inverse_gradient[0];

@@ -3,14 +3,14 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 Vector3d CameraCenter(const CameraPose& pose) {
   return -(pose.rotation.transpose() * pose.translation);
@@ -22,8 +22,6 @@ Matrix3d ImageFromPlane(const CameraPose& pose) {
   H.col(2) = pose.translation;
   return H;
 }
-
-double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 // Both segments as vectors on the plane.
 bool VectorsOnPlane(const CameraPose& pose, const SegmentPair& segments, Vector2d* first,

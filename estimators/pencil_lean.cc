@@ -5,10 +5,11 @@
 #include <array>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // Angle about the direction, radians, over which leans become independent. On scene-lund,
 // box-camprodon and boards, where 0.1 to 0.3 serve alike; scene-lund-more, box-camprodon-more and
 // circles-robot10x10 had no part in it.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/export.h"
 
 namespace CIRCLINE_EXPORT circline {
@@ -33,7 +34,7 @@ class Random {
   // Standard normal (Box-Muller, one of the two values).
   double Normal() {
     const double u = 1.0 - Uniform();
-    return std::sqrt(-2.0 * std::log(u)) * std::cos(6.283185307179586 * Uniform());
+    return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * kPi * Uniform());
   }
 
  private:

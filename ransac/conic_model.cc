@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 #include "circline/ransac/conic_normal_equations.h"
 #include "circline/ransac/conic_sectors.h"
@@ -257,7 +258,6 @@ double ConicModel::BandShare(const Value& value, double threshold) const {
   const double large = half + std::sqrt(std::max(0.0, half * half - minor));
   const double a = std::sqrt(k * large / minor), b = std::sqrt(k / large);
   // Ramanujan's first approximation of the perimeter.
-  constexpr double kPi = 3.14159265358979323846;
   const double perimeter = kPi * (3.0 * (a + b) - std::sqrt((3.0 * a + b) * (a + 3.0 * b)));
   const double area = perimeter * 2.0 * threshold * pixel_;
   return area < box_area_ ? area / box_area_ : 1.0;

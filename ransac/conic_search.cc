@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/ransac/crowds.h"
 #include "circline/ransac/false_alarms.h"
 #include "circline/ransac/inlier_weights.h"
@@ -86,7 +87,6 @@ std::vector<ConicCandidate> ConicSearch::Run() const {
 }
 
 std::optional<ConicCandidate> ConicSearch::RunShort() const {
-  constexpr double kPi = 3.14159265358979323846;
   RansacOptions options = options_.ransac;
   constexpr int kMost = 500;
   options.max_iterations = std::min(kMost, options.max_iterations);

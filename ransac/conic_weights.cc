@@ -5,12 +5,12 @@
 #include <cmath>
 #include <numeric>
 
+#include "circline/estimators/basics.h"
 #include "circline/ransac/conic_sectors.h"
 
 namespace circline {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr int kSectors = kConicSectors;
 
 // Points per pixel of distance, by sector.

@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
@@ -11,10 +13,6 @@ constexpr double kMinSide = 4.0;
 
 // Squared standard deviations by which the product of ratios may miss one: 99.8 %.
 constexpr double kMaxMiss2 = 9.2;
-
-double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 struct Side {
   Eigen::Vector2d normal;  // Not of unit length: the side's length.

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/refine/layout_alignment.h"
 
@@ -197,7 +198,6 @@ Placer::Match Placer::Best(std::size_t photo, const GivenFrame& world, const Pla
 // Names a photo's line groups by their directions; takes in what is new.
 void Placer::NamePencils(std::size_t photo, const PoseHypothesis& h, std::vector<Known>* known,
                          SharedLayout* shared) {
-  constexpr double kDegree = 0.017453292519943295;
   const Eigen::Matrix3d back = shared->poses[photo].rotation.transpose();
   std::vector<std::uint8_t> is_taken(known->size(), 0);
   for (const PencilEstimate& pencil : h.pencils) {

@@ -7,14 +7,13 @@
 #include <cstdio>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/camera_shifts.h"
 #include "circline/refine/linearization.h"
 
 namespace circline {
 namespace {
-
-constexpr double kRadToDeg = 57.29577951308232;
 
 // Calls visit(feature, points, distances) for each contour and line that takes part.
 template <typename Visit>
@@ -204,7 +203,7 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
       continue;
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-    estimate.sigma_deg = kRadToDeg * std::sqrt(std::max(0.0, eigen.eigenvalues()[2]));
+    estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
     h->pencils.push_back(estimate);
   }
 }

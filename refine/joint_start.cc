@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/plane_circle.h"
@@ -243,7 +244,7 @@ Eigen::Matrix3d JointProblem::SenseOfPriors(const CameraPose& seed) const {
   const FrameObservation& frame = observations_.frame;
   if (pose_priors_.empty() || frame.x_axis || frame.y_axis) return seed.rotation;
   constexpr int kSpins = 16;
-  constexpr double kTurn = 6.283185307179586 / kSpins;
+  constexpr double kTurn = 2.0 * kPi / kSpins;
   Eigen::Matrix3d best = seed.rotation;
   double least = std::numeric_limits<double>::infinity();
   for (const double face : {0.0, 0.5 * kSpins * kTurn}) {

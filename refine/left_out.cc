@@ -5,13 +5,13 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/refine/joint_result.h"
 
 namespace circline {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // A probability that a feature is none of what it is said to be.
 constexpr double kClutter = 0.02;
 

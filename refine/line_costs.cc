@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/cost_functions.h"
 #include "circline/refine/line_root.h"
@@ -14,7 +15,6 @@
 namespace circline {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // A residual under MostlyExact, as one that is squared: its value, and that by the residual.
 struct AsSquare {
   double value, slope;

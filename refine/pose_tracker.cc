@@ -229,7 +229,7 @@ class PoseTracker::Implementation {
       if (!fits_.empty()) FillFrame(*frame_, fits_[i], &h, i == 0 ? &estimate.notes : nullptr);
       estimate.hypotheses.push_back(std::move(h));
     }
-    estimate.decided_by = DecidedBy(estimate.hypotheses);
+    estimate.decided_by = DecidedByFrames(estimate.hypotheses);
   }
 
   void Predicted(const Observations& observations, TrackedPose* tracked) {

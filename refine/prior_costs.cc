@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/cost_functions.h"
 
@@ -31,7 +32,6 @@ struct AngleResidual {
     const T sine = sqrt(ceres::DotProduct(cross, cross)), cosine = ceres::DotProduct(a, b);
     if (!(Scalar(sine) > 0.0)) return false;
     const T between = atan2(sine, cosine);
-    constexpr double kPi = 3.14159265358979323846;
     // The angle or its supplement, whichever is nearer.
     const double folded = std::acos(std::cos(angle));
     const double direct = std::abs(Scalar(between) - folded),

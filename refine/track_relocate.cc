@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
@@ -60,7 +62,6 @@ std::vector<double> Spins(const TrackMap& map, const TrackState& state, const Po
     constexpr double kAcross = 0.5;  // Of a unit vector, in the plane.
     if (in_frame.head<2>().norm() < kAcross || in_map.head<2>().norm() < kAcross) continue;
     const double spin = AngleOf(in_frame.head<2>()) - AngleOf(in_map.head<2>());
-    constexpr double kPi = 3.14159265358979323846;
     return {spin, spin + kPi};
   }
   return {};

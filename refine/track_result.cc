@@ -6,12 +6,12 @@
 #include <cmath>
 #include <cstdio>
 
+#include "circline/estimators/basics.h"
 #include "circline/refine/camera_shifts.h"
 
 namespace circline {
 namespace {
 
-constexpr double kRadToDeg = 57.29577951308232;
 // A turn this uncertain, radians, is one of which nothing is known: a uniform one has 1.8.
 constexpr double kFreeTurn = 1.0;
 
@@ -79,7 +79,7 @@ void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& c
     for (Eigen::Index k = 0; k < rows; ++k) columns.push_back(map.tangent(d.block) + k);
     const Eigen::Matrix3d covariance = J * state.covariance(columns, columns) * J.transpose();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-    estimate.sigma_deg = kRadToDeg * std::sqrt(std::max(0.0, eigen.eigenvalues()[2]));
+    estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
     h->pencils.push_back(estimate);
   }
 }
@@ -102,7 +102,7 @@ void FillCamera(const TrackMap& map, const TrackState& state, const Camera& came
 
 }  // namespace
 
-std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
+std::string DecidedByFrames(const std::vector<PoseHypothesis>& hypotheses) {
   if (hypotheses.size() < 2) return "only one pose fits the evidence of all frames";
   constexpr double kSure = 0.95;
   if (hypotheses[0].probability < kSure)

@@ -16,7 +16,7 @@ namespace circline {
 PoseHypothesis HypothesisOf(const TrackMap& map, const TrackState& state, const Camera& camera);
 
 // PoseEstimate::decided_by, of ranked hypotheses.
-std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses);
+std::string DecidedByFrames(const std::vector<PoseHypothesis>& hypotheses);
 
 // What a frame says of a hypothesis: inliers, cost, what was left out and in words why.
 void FillFrame(const TrackFrame& frame, const TrackFit& fit, PoseHypothesis* hypothesis,

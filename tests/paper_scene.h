@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
@@ -63,7 +64,7 @@ inline Observations PaperScene(double sigma_px, Random* random) {
   circle.sigma_px = sigma;
   constexpr int kPoints = 100;
   for (int i = 0; i < kPoints; ++i) {
-    const double a = 2.0 * 3.14159265358979323846 * i / kPoints;
+    const double a = 2.0 * kPi * i / kPoints;
     circle.points.push_back(
         PaperPixel(10.0 + 7.0 * std::cos(a), 10.0 + 7.0 * std::sin(a), sigma_px, random));
   }

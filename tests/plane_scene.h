@@ -2,10 +2,12 @@
 #ifndef CIRCLINE_TESTS_PLANE_SCENE_H_
 #define CIRCLINE_TESTS_PLANE_SCENE_H_
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
@@ -45,7 +47,7 @@ class PlaneScene {
     circle.plane = "p0";
     circle.sigma_px = sigma();
     for (int i = 0; i < points; ++i) {
-      const double a = 6.283185307179586 * i / points;
+      const double a = 2.0 * kPi * i / points;
       circle.points.push_back(Pixel(x + radius * std::cos(a), y + radius * std::sin(a)));
     }
     return circle;
@@ -93,6 +95,15 @@ class PlaneScene {
  private:
   double sigma_px_;
 };
+
+// Noise-free pixels give a pose this well: the lens is inverted to 1e-10.
+inline constexpr double kExact = 1e-8;
+
+// Of the plane's normal, radians; 0 for its opposite, too.
+inline double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
+  return std::asin(
+      std::min(1.0, h.cam_from_world.rotation.col(2).cross(scene.pose.rotation.col(2)).norm()));
+}
 
 }  // namespace circline
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/refine/adjust_photos.h"
 #include "tests/plane_scene.h"
 
@@ -27,7 +28,7 @@ class Photos {
     if (model == CameraModel::kOpenCV) scene_.camera.distortion = {-0.2, 0.05};
     if (model == CameraModel::kFisheye) scene_.camera.distortion = {0.05, -0.02};
     for (int i = 0; i < count; ++i) {
-      const double turn = 6.283185307179586 * i / count;
+      const double turn = 2.0 * kPi * i / count;
       scene_.pose.rotation =
           ExpRotation(tilt * Eigen::Vector3d(std::cos(turn), std::sin(turn), 0.0)) *
           ExpRotation({0.0, 0.0, 0.4 * i}) * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();

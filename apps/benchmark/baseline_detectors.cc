@@ -5,19 +5,19 @@
 #include <opencv2/imgproc.hpp>
 #ifdef CIRCLINE_HAVE_XIMGPROC
 #include <opencv2/ximgproc/edge_drawing.hpp>
+
+#include "circline/estimators/basics.h"
 #endif
 
 namespace circline::benchmark {
 namespace {
-
-constexpr double kRadians = 3.14159265358979323846 / 180.0;
 
 Ellipse MakeEllipse(double x, double y, double a, double b, double angle_deg) {
   Ellipse e;
   e.center = {x, y};
   e.a = std::max(a, b);
   e.b = std::min(a, b);
-  e.angle = kRadians * (a >= b ? angle_deg : angle_deg + 90.0);
+  e.angle = kDegree * (a >= b ? angle_deg : angle_deg + 90.0);
   return e;
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "apps/benchmark/closed_form_rows.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/circular_points.h"
 #include "circline/estimators/conic_fit.h"
@@ -30,7 +31,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocal = 800.0;
 
 // A circle, the frame of its plane, and everything seen of them, without noise.

@@ -13,6 +13,7 @@
 #include "apps/benchmark/detection_tables.h"
 #include "apps/benchmark/detection_truth.h"
 #include "apps/benchmark/ellipse_overlap.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/line_pose.h"
@@ -34,7 +35,7 @@ struct PhotoErrors {
 };
 
 double DirectionDeg(const Vector3d& a, const Vector3d& b) {
-  return kDegrees * std::atan2(a.cross(b).norm(), std::abs(a.dot(b)));
+  return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) / kDegree;
 }
 
 // Angle between rotations up to the symmetry of a square board.
@@ -49,7 +50,7 @@ double BoardRotationDeg(const Matrix3d& a, const Matrix3d& b) {
       const double d = std::sin(quarter * 1.5707963267948966);
       Matrix3d z;
       z << c, -d, 0, d, c, 0, 0, 0, 1;
-      best = std::min(best, kDegrees * RotationAngle(a * z * s, b));
+      best = std::min(best, RotationAngle(a * z * s, b) / kDegree);
     }
   }
   return best;

@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/random.h"
 
@@ -16,7 +17,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr int kSupersampling = 4;
 // Inner over outer radius of a ring.
 constexpr double kRingRatio = 0.6;
@@ -52,7 +52,7 @@ Disc DrawDisc(const Camera& camera, Random* random) {
           .normalized();
   disc.radius = random->Uniform(16.0, 100.0) / camera.fx;
   disc.is_ring = random->Uniform() < 0.45;
-  const double tilt = random->Uniform(0.0, 75.0) * kPi / 180.0;
+  const double tilt = random->Uniform(0.0, 75.0) * kDegree;
   const double azimuth = random->Uniform(0.0, 2.0 * kPi);
   disc.normal = {std::sin(tilt) * std::cos(azimuth), std::sin(tilt) * std::sin(azimuth),
                  -std::cos(tilt)};

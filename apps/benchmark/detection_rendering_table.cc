@@ -16,6 +16,7 @@
 #include "apps/benchmark/detection_tables.h"
 #include "apps/benchmark/detection_truth.h"
 #include "apps/benchmark/ellipse_overlap.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 
@@ -132,7 +133,7 @@ double BetterNormalDeg(const Matrix3d& conic, const Vector3d& normal) {
   double best = 180.0;
   for (int k = 0; k < n; ++k) {
     const double c = std::abs(poses[static_cast<std::size_t>(k)].normal.dot(normal));
-    best = std::min(best, kDegrees * std::acos(std::min(1.0, c)));
+    best = std::min(best, std::acos(std::min(1.0, c)) / kDegree);
   }
   return best;
 }

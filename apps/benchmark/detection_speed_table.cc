@@ -13,6 +13,7 @@
 #include "apps/benchmark/detection_statistics.h"
 #include "apps/benchmark/detection_tables.h"
 #include "apps/benchmark/detection_truth.h"
+#include "circline/estimators/basics.h"
 #include "circline/ransac/detection/detect_observations.h"
 
 namespace circline::benchmark {
@@ -81,7 +82,7 @@ class RingSheet {
   void Disc(const cv::Point2d& center, double radius, int gray) {
     std::vector<cv::Point> contour;
     for (int i = 0; i < 720; ++i) {
-      const double t = i * 3.14159265358979323846 / 360.0;
+      const double t = i * kPi / 360.0;
       contour.push_back(Project(center.x + radius * std::cos(t), center.y + radius * std::sin(t)));
     }
     cv::fillPoly(large_, std::vector<std::vector<cv::Point>>{contour}, cv::Scalar(gray), cv::LINE_8,

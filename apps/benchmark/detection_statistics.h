@@ -7,8 +7,6 @@
 
 namespace circline::benchmark {
 
-constexpr double kDegrees = 57.29577951308232;
-
 // Processor time, which other work on the machine does not lengthen; there is one thread only.
 double Milliseconds(std::clock_t since);
 

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "apps/benchmark/detection_statistics.h"
+#include "circline/estimators/basics.h"
 
 namespace circline::benchmark {
 namespace {
@@ -92,7 +93,7 @@ Ellipse ReadEllipse(const cv::Mat& m) {
   ellipse.center = {m.at<double>(0), m.at<double>(1)};
   ellipse.a = m.at<double>(2);
   ellipse.b = m.at<double>(3);
-  ellipse.angle = m.at<double>(4) / kDegrees;
+  ellipse.angle = m.at<double>(4) * kDegree;
   return ellipse;
 }
 

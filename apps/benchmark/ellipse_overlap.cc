@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "circline/estimators/basics.h"
+
 namespace circline::benchmark {
 
 using Eigen::Matrix3d;
@@ -12,7 +14,7 @@ using Eigen::Vector3d;
 PolygonPoints EllipsePolygon(const Ellipse& e) {
   PolygonPoints polygon;
   for (int k = 0; k < 128; ++k) {
-    const Vector2d p = EllipsePoint(e, 2.0 * 3.14159265358979 * k / 128);
+    const Vector2d p = EllipsePoint(e, 2.0 * kPi * k / 128);
     polygon.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()));
   }
   return polygon;
@@ -23,7 +25,7 @@ PolygonPoints ContourPolygon(const Camera& camera, const Matrix3d& conic) {
   Ellipse e;
   if (!ConicToEllipse(conic, &e)) return polygon;
   for (int k = 0; k < 128; ++k) {
-    const Vector2d x = EllipsePoint(e, 2.0 * 3.14159265358979 * k / 128);
+    const Vector2d x = EllipsePoint(e, 2.0 * kPi * k / 128);
     Vector2d p;
     if (!CameraToPixel(camera, Vector3d(x.x(), x.y(), 1.0), &p)) return {};
     polygon.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()));

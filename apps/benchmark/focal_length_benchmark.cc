@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/benchmark/closed_form_rows.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_focal.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/focal_length.h"
@@ -21,7 +22,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocal = 800.0;  // The guess, pixels.
 constexpr double kSigma = 0.1;    // Of contour points, pixels, in the stated covariances.
 constexpr double kMinFocal = 0.35, kMaxFocal = 7.0;
@@ -72,7 +72,7 @@ FocalScene RandomScene(Random* random) {
   };
   s.axes = {direction(Vector3d::UnitX()), direction(Vector3d::UnitY()),
             direction(Vector3d::UnitZ())};
-  s.oblique = direction({std::cos(50.0 * kPi / 180.0), std::sin(50.0 * kPi / 180.0), 0.0});
+  s.oblique = direction({std::cos(50.0 * kDegree), std::sin(50.0 * kDegree), 0.0});
   s.circle = circle(0.5, 0.2, 2.0);
   s.inner = circle(0.5, 0.2, 1.2);
   s.nested = circle(0.9, 0.4, 1.0);
@@ -116,7 +116,7 @@ BENCHMARK(BM_FocalFromOrthogonalVanishingPoints);
 
 void BM_FocalFromObliqueVanishingPoints(benchmark::State& state) {
   FocalRow<2>(state, [](const FocalScene& s, std::array<FocalSolution, 2>* solutions) {
-    return FocalFromVanishingPoints(s.axes[0], s.oblique, 50.0 * kPi / 180.0, 0.0, solutions);
+    return FocalFromVanishingPoints(s.axes[0], s.oblique, 50.0 * kDegree, 0.0, solutions);
   });
 }
 BENCHMARK(BM_FocalFromObliqueVanishingPoints);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/common/scene.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/fit_observations.h"
 #include "circline/refine/estimate_pose.h"
@@ -24,7 +25,7 @@ Observations LongContour(std::int64_t count) {
   CircleObservation circle;
   circle.id = "c";
   for (std::int64_t i = 0; i < count; ++i) {
-    const double angle = 6.283185307179586 * static_cast<double>(i) / static_cast<double>(count);
+    const double angle = 2.0 * kPi * static_cast<double>(i) / static_cast<double>(count);
     const double beside = i % 10 < 3 ? random.Uniform(5.0, 60.0) : 0.0;
     circle.points.emplace_back(200.0 * std::cos(angle) + beside + 0.2 * random.Normal(),
                                150.0 * std::sin(angle) + 0.2 * random.Normal());

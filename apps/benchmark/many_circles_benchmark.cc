@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/random.h"
 #include "circline/refine/estimate_pose.h"
@@ -33,7 +34,7 @@ Observations CirclesOfAPlane(std::int64_t count, std::int64_t every) {
     circle.id = "c" + std::to_string(i);
     circle.plane = "p";
     for (int k = 0; k < kPoints; ++k) {
-      const double a = 6.283185307179586 * k / kPoints;
+      const double a = 2.0 * kPi * k / kPoints;
       const Eigen::Vector3d on = Eigen::Vector3d(x, y, 0.0) +
                                  radius * (lean * Eigen::Vector3d(std::cos(a), std::sin(a), 0.0));
       Eigen::Vector2d pixel;

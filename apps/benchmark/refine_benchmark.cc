@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 #include "circline/refine/estimate_pose.h"
 #include "circline/refine/joint_problem.h"
@@ -15,7 +16,6 @@
 namespace circline {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kNoisePx = 0.3;
 constexpr std::size_t kScenes = 16;  // Taken in turn, so that no branch is learnt by heart.
 

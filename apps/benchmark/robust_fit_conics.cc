@@ -10,6 +10,7 @@
 #include "apps/benchmark/robust_fit_rows.h"
 #include "apps/benchmark/robust_fit_scenes.h"
 #include "apps/benchmark/robust_fit_table.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/robust_conic.h"
@@ -33,7 +34,7 @@ bool FromOpenCv(const cv::RotatedRect& rect, Matrix3d* conic) {
   ellipse.center = {static_cast<double>(rect.center.x), static_cast<double>(rect.center.y)};
   ellipse.a = 0.5 * static_cast<double>(rect.size.width);
   ellipse.b = 0.5 * static_cast<double>(rect.size.height);
-  ellipse.angle = static_cast<double>(rect.angle) * kRadians;
+  ellipse.angle = static_cast<double>(rect.angle) * kDegree;
   if (!(ellipse.a > 0.0 && ellipse.b > 0.0)) return false;
   *conic = TransformConic(EllipseToConic(ellipse), PixelFromX(SceneCamera()));
   return conic->allFinite();
@@ -144,7 +145,7 @@ void RunConicRow(const ConicRow& row) {
   options.arc_deg = row.arc_deg;
   options.clutter = row.clutter;
   options.sigma_px = FLAGS_sigma_px;
-  options.direction_sigma_rad = FLAGS_direction_sigma_deg * kRadians;
+  options.direction_sigma_rad = FLAGS_direction_sigma_deg * kDegree;
   std::vector<ConicScene> scenes;
   for (int trial = 0; trial < FLAGS_trials; ++trial) {
     scenes.push_back(MakeConicScene(options, TrialSeed(trial)));

@@ -8,6 +8,7 @@
 #include "apps/benchmark/robust_fit_rows.h"
 #include "apps/benchmark/robust_fit_scenes.h"
 #include "apps/benchmark/robust_fit_table.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/ransac/fit_observations.h"
 
@@ -68,7 +69,7 @@ double ErrorOf(const ConicScene& scene, const CircleObservation& circle) {
 
 void RunRow(const ContourRow& row, bool with_directions) {
   ConicSceneOptions options = row.scene;
-  options.direction_sigma_rad = FLAGS_direction_sigma_deg * kRadians;
+  options.direction_sigma_rad = FLAGS_direction_sigma_deg * kDegree;
   FitOptions fit_options;
   fit_options.noise_model = NoiseModel::Exact();
   Tally tally;

@@ -22,8 +22,6 @@ DECLARE_uint64(ransac_seed);
 
 namespace circline::apps {
 
-inline constexpr double kRadians = 3.14159265358979323846 / 180.0;  // Of a degree.
-
 // Not ok: one line that names the flag.
 Status CheckFlags();
 

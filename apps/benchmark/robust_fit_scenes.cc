@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 
 namespace circline::apps {
@@ -15,7 +16,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 // Semi-axes of the second rim over those of the first.
 constexpr double kRimScale = 1.15;
 
@@ -175,7 +175,7 @@ ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed) 
   ConicScene scene;
   scene.sigma_px = options.sigma_px;
   std::vector<Vector2d> truth;
-  const double arc = options.arc_deg / 180.0 * kPi;
+  const double arc = options.arc_deg * kDegree;
   const double start = random.Uniform(0.0, 2.0 * kPi);
   for (int i = 0; i < options.num_inliers; ++i) {
     const double t = start + arc * i / options.num_inliers;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "apps/benchmark/scenes_world.h"
+#include "circline/estimators/basics.h"
 
 namespace circline::apps {
 namespace {

@@ -9,6 +9,7 @@
 #include "apps/benchmark/scenes_settings.h"
 #include "apps/common/progress.h"
 #include "apps/common/text.h"
+#include "circline/estimators/basics.h"
 
 namespace circline::apps {
 namespace {

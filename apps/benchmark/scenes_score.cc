@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "apps/common/text.h"
+#include "circline/estimators/basics.h"
 
 namespace circline::apps {
 namespace {

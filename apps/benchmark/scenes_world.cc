@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string>
 
+#include "circline/estimators/basics.h"
+
 namespace circline::apps {
 namespace {
 

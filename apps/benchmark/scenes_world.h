@@ -8,14 +8,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
 
 namespace circline::apps {
-
-inline constexpr double kPi = 3.14159265358979323846;
-inline constexpr double kDegree = kPi / 180.0;
 
 enum class Lens { kPinhole, kMild, kStrong, kFisheye };  // kMild and kStrong: CameraModel::kOpenCV.
 inline constexpr int kNumLenses = 4;

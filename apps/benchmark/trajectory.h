@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
@@ -111,7 +112,7 @@ class Trajectory {
   std::vector<Frame> frames;
 
  private:
-  static constexpr double kTurn = 6.283185307179586;
+  static constexpr double kTurn = 2.0 * kPi;
 
   Eigen::Vector3d Normal() {
     const double x = random_.Normal(), y = random_.Normal(), z = random_.Normal();

@@ -10,6 +10,7 @@
 #include "apps/common/text.h"
 #include "apps/compare/report_image.h"
 #include "apps/compare/report_style.h"
+#include "circline/estimators/basics.h"
 
 namespace circline::apps {
 namespace {
@@ -191,7 +192,7 @@ std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera) {
   const AdjustedCamera& made = adjusted.cameras[static_cast<std::size_t>(camera)];
   std::vector<std::string> advice;
   if (made.num_photos == 0) return advice;
-  constexpr double kFlat = 0.35, kDegrees = 57.29578;  // 20 degrees; of a radian.
+  constexpr double kFlat = 0.35;  // 20 degrees.
   double most_tilt = 0.0;
   Eigen::Vector2d tilts = Eigen::Vector2d::Zero();
   for (const AdjustedPhoto& photo : adjusted.photos) {
@@ -204,7 +205,7 @@ std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera) {
   }
   if (most_tilt < kFlat) {
     advice.push_back("Tilt the sheet more: no photo has it tilted by more than " +
-                     FormatFixed(most_tilt * kDegrees, 0) +
+                     FormatFixed(most_tilt / kDegree, 0) +
                      " degrees; 30 to 50 tell the focal length best.");
   } else if (std::min(tilts.x(), tilts.y()) < 0.5 * kFlat) {
     advice.push_back(

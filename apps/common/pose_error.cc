@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
+
 namespace circline::apps {
 namespace {
-
-constexpr double kDegreesPerRadian = 57.295779513082323;
 
 // Whether the scene says which point the origin is, so that two translations mean the same.
 bool SceneGivesOrigin(const FrameObservation& frame) {
@@ -55,11 +55,11 @@ std::vector<Eigen::Matrix3d> SymmetryGroup(Symmetry symmetry) {
 }
 
 double AngleDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * kDegreesPerRadian;
+  return std::atan2(a.cross(b).norm(), a.dot(b)) / kDegree;
 }
 
 double AngleWithoutSenseDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) * kDegreesPerRadian;
+  return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) / kDegree;
 }
 
 double RotationErrorDeg(const Eigen::Matrix3d& truth, const Eigen::Matrix3d& estimate,
@@ -67,7 +67,7 @@ double RotationErrorDeg(const Eigen::Matrix3d& truth, const Eigen::Matrix3d& est
   if (symmetry == Symmetry::kAxis) return AngleWithoutSenseDeg(truth.col(2), estimate.col(2));
   double smallest = 360.0;
   for (const Eigen::Matrix3d& s : SymmetryGroup(symmetry)) {
-    smallest = std::min(smallest, RotationAngle(truth * s, estimate) * kDegreesPerRadian);
+    smallest = std::min(smallest, RotationAngle(truth * s, estimate) / kDegree);
   }
   return smallest;
 }
@@ -92,7 +92,7 @@ std::optional<double> SigmaNormalDeg(const PoseHypothesis& hypothesis) {
       across * hypothesis.Covariance().topLeftCorner<3, 3>() * across;
   if (!covariance.allFinite()) return std::nullopt;  // Of a solver that gives none.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) * kDegreesPerRadian;
+  return std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
 }
 
 PoseErrors ComparePose(const PoseHypothesis& hypothesis, const SceneImage& image) {

@@ -14,11 +14,10 @@
 #include "apps/common/scene_solids.h"
 #include "apps/common/storage_node.h"
 #include "apps/common/text.h"
+#include "circline/estimators/basics.h"
 
 namespace circline::apps {
 namespace {
-
-constexpr double kRadiansPerDegree = 0.017453292519943295;
 
 std::vector<Segment> ReadSegments(const StorageNode& node) {
   const std::vector<double> v = node.Numbers(0, 4);
@@ -163,9 +162,9 @@ void ReadKnownAngle(const StorageNode& node, Observations* observations) {
     }
   }
   if (angle.pencils[0] == angle.pencils[1]) pencils.Fail("names the same pencil twice");
-  angle.value = node.Require("value").Number() * kRadiansPerDegree;
+  angle.value = node.Require("value").Number() * kDegree;
   const StorageNode sigma = node.Get("sigma");
-  if (sigma.Exists()) angle.sigma = sigma.Number() * kRadiansPerDegree;
+  if (sigma.Exists()) angle.sigma = sigma.Number() * kDegree;
   if (angle.sigma < 0.0) sigma.Fail("must be 0 or positive");
   observations->known_angles.push_back(angle);
 }

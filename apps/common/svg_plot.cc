@@ -32,8 +32,6 @@ struct Frame {
   }
 };
 
-std::string Number(double value) { return FormatFixed(value, 1); }
-
 // Round values (1, 2, 5 times a power of ten) that cut the range into about five.
 std::vector<double> LinearTicks(double low, double high) {
   const double raw = (high - low) / 5.0;
@@ -68,11 +66,11 @@ void DrawGrid(const Frame& frame, std::ostringstream* svg) {
   const std::vector<double> x_ticks = PlotTicks(plot.log_x, plot.x_min, plot.x_max);
   const std::vector<double> y_ticks = PlotTicks(plot.log_y, plot.y_min, plot.y_max);
   for (const double x : x_ticks) {
-    *svg << "<path d='M" << Number(frame.X(x)) << " " << kTop << "V" << Number(frame.bottom())
+    *svg << "<path d='M" << SvgNumber(frame.X(x)) << " " << kTop << "V" << SvgNumber(frame.bottom())
          << "'/>";
   }
   for (const double y : y_ticks) {
-    *svg << "<path d='M" << kLeft << " " << Number(frame.Y(y)) << "H" << Number(frame.right())
+    *svg << "<path d='M" << kLeft << " " << SvgNumber(frame.Y(y)) << "H" << SvgNumber(frame.right())
          << "'/>";
   }
   *svg << "</g><g fill='currentColor' fill-opacity='.75' font-size='11'>";
@@ -81,14 +79,14 @@ void DrawGrid(const Frame& frame, std::ostringstream* svg) {
     const double half_width = 0.5 * kTickText * static_cast<double>(TickText(x).size());
     if (frame.X(x) - half_width < free_x) continue;
     free_x = frame.X(x) + half_width + kTickText;
-    *svg << "<text text-anchor='middle' x='" << Number(frame.X(x)) << "' y='"
-         << Number(frame.bottom() + 15) << "'>" << TickText(x) << "</text>";
+    *svg << "<text text-anchor='middle' x='" << SvgNumber(frame.X(x)) << "' y='"
+         << SvgNumber(frame.bottom() + 15) << "'>" << TickText(x) << "</text>";
   }
   for (const double y : y_ticks) {
     if (frame.Y(y) + kTickText > free_y) continue;
     free_y = frame.Y(y) - kTickText;
-    *svg << "<text text-anchor='end' x='" << kLeft - 6 << "' y='" << Number(frame.Y(y) + 4) << "'>"
-         << (plot.percent_y ? TickText(y * 100.0) + " %" : TickText(y)) << "</text>";
+    *svg << "<text text-anchor='end' x='" << kLeft - 6 << "' y='" << SvgNumber(frame.Y(y) + 4)
+         << "'>" << (plot.percent_y ? TickText(y * 100.0) + " %" : TickText(y)) << "</text>";
   }
   *svg << "</g>";
 }
@@ -97,14 +95,14 @@ void DrawLabels(const Frame& frame, std::ostringstream* svg) {
   const Plot& plot = frame.plot;
   const double middle_x = (kLeft + frame.right()) / 2, middle_y = (kTop + frame.bottom()) / 2;
   *svg << "<text text-anchor='middle' font-size='14' font-weight='600' fill='currentColor' x='"
-       << Number(middle_x) << "' y='18'>" << EscapeHtml(plot.title) << "</text>"
-       << "<text text-anchor='middle' font-size='12' fill='currentColor' x='" << Number(middle_x)
-       << "' y='" << Number(frame.bottom() + 34) << "'>" << EscapeHtml(plot.x_label) << "</text>"
+       << SvgNumber(middle_x) << "' y='18'>" << EscapeHtml(plot.title) << "</text>"
+       << "<text text-anchor='middle' font-size='12' fill='currentColor' x='" << SvgNumber(middle_x)
+       << "' y='" << SvgNumber(frame.bottom() + 34) << "'>" << EscapeHtml(plot.x_label) << "</text>"
        << "<text text-anchor='middle' font-size='12' fill='currentColor' transform='translate(13 "
-       << Number(middle_y) << ") rotate(-90)'>" << EscapeHtml(plot.y_label) << "</text>"
+       << SvgNumber(middle_y) << ") rotate(-90)'>" << EscapeHtml(plot.y_label) << "</text>"
        << "<rect fill='none' stroke='currentColor' stroke-opacity='.5' x='" << kLeft << "' y='"
-       << kTop << "' width='" << Number(frame.right() - kLeft) << "' height='"
-       << Number(frame.bottom() - kTop) << "'/>";
+       << kTop << "' width='" << SvgNumber(frame.right() - kLeft) << "' height='"
+       << SvgNumber(frame.bottom() - kTop) << "'/>";
 }
 
 void DrawSeries(const Frame& frame, const PlotSeries& series, std::ostringstream* svg) {
@@ -117,14 +115,15 @@ void DrawSeries(const Frame& frame, const PlotSeries& series, std::ostringstream
   };
   for (const auto& [x, y] : series.points) {
     const bool usable = is_usable(x, y);
-    if (usable) *svg << (pen_down ? "L" : "M") << Number(frame.X(x)) << " " << Number(frame.Y(y));
+    if (usable)
+      *svg << (pen_down ? "L" : "M") << SvgNumber(frame.X(x)) << " " << SvgNumber(frame.Y(y));
     pen_down = usable;
   }
   *svg << "'><title>" << EscapeHtml(series.name) << "</title></path>";
   for (const auto& [x, y] : series.points) {
     if (!series.dots || !is_usable(x, y)) continue;
-    *svg << "<circle r='3' fill='" << series.color << "' cx='" << Number(frame.X(x)) << "' cy='"
-         << Number(frame.Y(y)) << "'/>";
+    *svg << "<circle r='3' fill='" << series.color << "' cx='" << SvgNumber(frame.X(x)) << "' cy='"
+         << SvgNumber(frame.Y(y)) << "'/>";
   }
 }
 
@@ -143,13 +142,16 @@ void DrawLegend(const Frame& frame, std::ostringstream* svg) {
     const double x = kLeft + static_cast<double>(column) * column_width;
     const double y = frame.plot.height + static_cast<double>(row) * kLegendRow + 8;
     *svg << "<path stroke-width='2.5' stroke='" << series.color << "'"
-         << (series.dashed ? " stroke-dasharray='5 3'" : "") << " d='M" << Number(x) << " "
-         << Number(y - 4) << "h22'/><text font-size='12' fill='currentColor' x='" << Number(x + 28)
-         << "' y='" << Number(y) << "'>" << EscapeHtml(series.name) << "</text>";
+         << (series.dashed ? " stroke-dasharray='5 3'" : "") << " d='M" << SvgNumber(x) << " "
+         << SvgNumber(y - 4) << "h22'/><text font-size='12' fill='currentColor' x='"
+         << SvgNumber(x + 28) << "' y='" << SvgNumber(y) << "'>" << EscapeHtml(series.name)
+         << "</text>";
   }
 }
 
 }  // namespace
+
+std::string SvgNumber(double value) { return FormatFixed(value, 1); }
 
 std::string TickText(double value) {
   if (value == 0.0) return "0";
@@ -178,7 +180,7 @@ std::string RenderSvg(const Plot& plot) {
   const std::size_t rows = (plot.series.size() + columns - 1) / columns;
   const double height = plot.height + static_cast<double>(rows) * kLegendRow;
   std::ostringstream svg;
-  svg << "<svg viewBox='0 0 " << plot.width << " " << Number(height)
+  svg << "<svg viewBox='0 0 " << plot.width << " " << SvgNumber(height)
       << "' role='img' font-family='system-ui,sans-serif'>";
   DrawGrid(frame, &svg);
   for (const PlotSeries& series : plot.series) DrawSeries(frame, series, &svg);

@@ -35,6 +35,9 @@ std::string TickText(double value);
 // Colours that stay apart for most eyes, repeated after ten.
 std::string SeriesColor(std::size_t index);
 
+// A place or length in a picture, to a tenth.
+std::string SvgNumber(double value);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMMON_SVG_PLOT_H_

@@ -10,10 +10,9 @@
 namespace circline::apps {
 namespace {
 
-constexpr double kWidth = 640.0, kNames = 286.0, kRight = 64.0, kTop = 34.0, kRow = 20.0;
+constexpr double kWidth = 640.0, kNames = 286.0, kMarginRight = 64.0, kMarginTop = 34.0,
+                 kRow = 20.0;
 constexpr double kBox = 11.0, kBelow = 42.0;
-
-std::string Number(double value) { return FormatFixed(value, 1); }
 
 struct Axis {
   double low, high;
@@ -22,7 +21,7 @@ struct Axis {
   double X(double value) const {
     const double t = log ? std::log(std::max(value, low) / low) / std::log(high / low)
                          : (value - low) / (high - low);
-    return kNames + std::clamp(t, 0.0, 1.0) * (kWidth - kRight - kNames);
+    return kNames + std::clamp(t, 0.0, 1.0) * (kWidth - kMarginRight - kNames);
   }
 };
 
@@ -44,36 +43,36 @@ void DrawAxis(const RowsPlot& plot, const Axis& axis, double bottom, std::ostrin
                                         ? DecadeTicks(axis.low, axis.high)
                                         : PlotTicks(axis.log, axis.low, axis.high);
   for (const double tick : ticks) {
-    const std::string x = Number(axis.X(tick));
-    *svg << "<path stroke='currentColor' stroke-opacity='.14' d='M" << x << " " << kTop << "V"
-         << Number(bottom) << "'/><text text-anchor='middle' font-size='11' fill='currentColor' "
-         << "fill-opacity='.75' x='" << x << "' y='" << Number(bottom + 15) << "'>"
+    const std::string x = SvgNumber(axis.X(tick));
+    *svg << "<path stroke='currentColor' stroke-opacity='.14' d='M" << x << " " << kMarginTop << "V"
+         << SvgNumber(bottom) << "'/><text text-anchor='middle' font-size='11' fill='currentColor' "
+         << "fill-opacity='.75' x='" << x << "' y='" << SvgNumber(bottom + 15) << "'>"
          << TickText(tick) << "</text>";
   }
   *svg << "<text text-anchor='middle' font-size='14' font-weight='600' fill='currentColor' x='"
        << kWidth / 2 << "' y='18'>" << EscapeHtml(plot.title)
        << "</text><text text-anchor='middle' font-size='12' fill='currentColor' x='"
-       << Number((kNames + kWidth - kRight) / 2) << "' y='" << Number(bottom + 34) << "'>"
-       << EscapeHtml(plot.x_label) << "</text>";
+       << SvgNumber((kNames + kWidth - kMarginRight) / 2) << "' y='" << SvgNumber(bottom + 34)
+       << "'>" << EscapeHtml(plot.x_label) << "</text>";
 }
 
 void DrawBox(const SvgRow& row, const Axis& axis, double y, std::ostringstream* svg) {
   std::array<double, 5> x{};
   for (std::size_t i = 0; i < 5; ++i) x[i] = axis.X(row.quantiles[i]);
-  *svg << "<path stroke='" << row.color << "' d='M" << Number(x[0]) << " " << Number(y) << "H"
-       << Number(x[1]) << "M" << Number(x[3]) << " " << Number(y) << "H" << Number(x[4])
+  *svg << "<path stroke='" << row.color << "' d='M" << SvgNumber(x[0]) << " " << SvgNumber(y) << "H"
+       << SvgNumber(x[1]) << "M" << SvgNumber(x[3]) << " " << SvgNumber(y) << "H" << SvgNumber(x[4])
        << "'/><rect fill='" << row.color << "' fill-opacity='.25' stroke='" << row.color << "' x='"
-       << Number(x[1]) << "' y='" << Number(y - kBox / 2) << "' width='"
-       << Number(std::max(1.0, x[3] - x[1])) << "' height='" << Number(kBox)
-       << "'/><path stroke-width='2.5' stroke='" << row.color << "' d='M" << Number(x[2]) << " "
-       << Number(y - kBox / 2) << "v" << Number(kBox) << "'/>";
+       << SvgNumber(x[1]) << "' y='" << SvgNumber(y - kBox / 2) << "' width='"
+       << SvgNumber(std::max(1.0, x[3] - x[1])) << "' height='" << SvgNumber(kBox)
+       << "'/><path stroke-width='2.5' stroke='" << row.color << "' d='M" << SvgNumber(x[2]) << " "
+       << SvgNumber(y - kBox / 2) << "v" << SvgNumber(kBox) << "'/>";
 }
 
 void DrawBar(const SvgRow& row, const Axis& axis, double y, std::ostringstream* svg) {
-  *svg << "<rect fill='" << row.color << "' fill-opacity='.75' x='" << Number(kNames) << "' y='"
-       << Number(y - kBox / 2) << "' width='"
-       << Number(std::max(1.0, axis.X(row.quantiles[2]) - kNames)) << "' height='" << Number(kBox)
-       << "'/>";
+  *svg << "<rect fill='" << row.color << "' fill-opacity='.75' x='" << SvgNumber(kNames) << "' y='"
+       << SvgNumber(y - kBox / 2) << "' width='"
+       << SvgNumber(std::max(1.0, axis.X(row.quantiles[2]) - kNames)) << "' height='"
+       << SvgNumber(kBox) << "'/>";
 }
 
 }  // namespace
@@ -81,19 +80,20 @@ void DrawBar(const SvgRow& row, const Axis& axis, double y, std::ostringstream* 
 std::string RenderRows(const RowsPlot& plot) {
   if (plot.rows.empty()) return "";
   const Axis axis = MakeAxis(plot);
-  const double bottom = kTop + kRow * static_cast<double>(plot.rows.size());
+  const double bottom = kMarginTop + kRow * static_cast<double>(plot.rows.size());
   std::ostringstream svg;
-  svg << "<svg viewBox='0 0 " << kWidth << " " << Number(bottom + kBelow)
+  svg << "<svg viewBox='0 0 " << kWidth << " " << SvgNumber(bottom + kBelow)
       << "' role='img' font-family='system-ui,sans-serif'>";
   DrawAxis(plot, axis, bottom, &svg);
-  double y = kTop + kRow / 2;
+  double y = kMarginTop + kRow / 2;
   for (const SvgRow& row : plot.rows) {
     svg << "<g><title>" << EscapeHtml(row.name + ": " + row.label) << "</title>"
         << "<text text-anchor='end' font-size='11' fill='currentColor' x='" << kNames - 8 << "' y='"
-        << Number(y + 4) << "'>" << EscapeHtml(row.name) << "</text>";
+        << SvgNumber(y + 4) << "'>" << EscapeHtml(row.name) << "</text>";
     (plot.bars ? DrawBar : DrawBox)(row, axis, y, &svg);
-    svg << "<text font-size='11' fill='currentColor' fill-opacity='.75' x='" << kWidth - kRight + 6
-        << "' y='" << Number(y + 4) << "'>" << EscapeHtml(row.label) << "</text></g>";
+    svg << "<text font-size='11' fill='currentColor' fill-opacity='.75' x='"
+        << kWidth - kMarginRight + 6 << "' y='" << SvgNumber(y + 4) << "'>" << EscapeHtml(row.label)
+        << "</text></g>";
     y += kRow;
   }
   svg << "</svg>";

@@ -7,6 +7,7 @@
 
 #include "apps/common/exif.h"
 #include "apps/common/text.h"
+#include "circline/estimators/basics.h"
 #include "circline/refine/adjust_photos.h"
 
 DEFINE_double(focal_px, 0.0,
@@ -18,7 +19,6 @@ DEFINE_double(fov_deg, 0.0,
 namespace circline::apps {
 namespace {
 
-constexpr double kRadiansPerDegree = 0.017453292519943295;
 constexpr double kUsualFovDeg = 60.0;
 // Of log f: of a guess that somebody makes, of EXIF's figure where it is the lens's, and of no
 // figure at all.
@@ -27,7 +27,7 @@ constexpr double kGuessSigma = 0.25, kExifSigma = 0.05, kUnknownSigma = 0.5;
 constexpr double kMostPixels = 1e7;
 
 double FocalOfFov(double fov_deg, int width, int height) {
-  return 0.5 * std::max(width, height) / std::tan(0.5 * fov_deg * kRadiansPerDegree);
+  return 0.5 * std::max(width, height) / std::tan(0.5 * fov_deg * kDegree);
 }
 
 std::string SureTo(double sigma, double doubtful) {

@@ -8,12 +8,10 @@
 #include "apps/compare/canvas.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/pose_curves.h"
+#include "circline/estimators/basics.h"
 
 namespace circline::apps {
 namespace {
-
-constexpr double kFullTurn = 6.283185307179586;
-constexpr double kDegreesPerRadian = 57.295779513082323;
 
 const cv::Scalar kWhite(255, 255, 255), kEllipse(0, 215, 255), kUnusedEllipse(90, 150, 170),
     kOutlier(60, 60, 255);
@@ -48,7 +46,7 @@ void DrawEllipse(const Camera& camera, const CircleObservation& circle, bool use
   Ellipse ellipse;
   if (!circle.fit || !ConicToEllipse(circle.fit->conic, &ellipse)) return;
   const int pieces = PiecesOfEllipse(ellipse.a * camera.fx);
-  const auto pixels = ProjectCurve(camera, pieces, 0.0, kFullTurn, [&ellipse](double t) {
+  const auto pixels = ProjectCurve(camera, pieces, 0.0, 2.0 * kPi, [&ellipse](double t) {
     return EllipsePoint(ellipse, t).homogeneous().eval();
   });
   canvas->Polyline(pixels, used ? kEllipse : kUnusedEllipse, used ? 2 : 1);
@@ -154,7 +152,7 @@ void DrawPose(const Observations& observations, const PoseEstimate& estimate, Ca
 // ---- The caption ----
 
 std::string SigmaText(const PoseHypothesis& hypothesis) {
-  const Eigen::Vector3d sigma = hypothesis.SigmaRotation() * kDegreesPerRadian;
+  const Eigen::Vector3d sigma = hypothesis.SigmaRotation() / kDegree;
   if (!sigma.allFinite()) {
     const std::optional<double> normal = SigmaNormalDeg(hypothesis);
     return normal ? "sigma of the normal " + FormatShort(*normal, 2) + " deg"

@@ -4,14 +4,14 @@
 #include <cmath>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic_fit.h"
 
 namespace circline::apps {
 namespace {
 
-constexpr double kFullTurn = 6.283185307179586;
 // Points closer than this (or three times their mean spacing) leave no gap between them.
-constexpr double kSmallestGap = kFullTurn / 36.0;
+constexpr double kSmallestGap = 2.0 * kPi / 36.0;
 
 std::vector<Eigen::Vector2d> Inliers(const std::vector<Eigen::Vector2d>& points,
                                      const std::vector<std::uint8_t>& mask) {
@@ -32,14 +32,13 @@ double Coverage(const Ellipse& ellipse, const std::vector<Eigen::Vector2d>& poin
         std::atan2((c * d.y() - s * d.x()) / ellipse.b, (c * d.x() + s * d.y()) / ellipse.a));
   }
   std::sort(turns.begin(), turns.end());
-  const double gap_limit =
-      std::max(kSmallestGap, 3.0 * kFullTurn / static_cast<double>(turns.size()));
+  const double gap_limit = std::max(kSmallestGap, 6.0 * kPi / static_cast<double>(turns.size()));
   double uncovered = 0.0;
   for (std::size_t i = 0; i < turns.size(); ++i) {
-    const double next = i + 1 < turns.size() ? turns[i + 1] : turns[0] + kFullTurn;
+    const double next = i + 1 < turns.size() ? turns[i + 1] : turns[0] + 2.0 * kPi;
     if (next - turns[i] > gap_limit) uncovered += next - turns[i];
   }
-  return 1.0 - uncovered / kFullTurn;
+  return 1.0 - uncovered / 2.0 * kPi;
 }
 
 }  // namespace

@@ -8,14 +8,13 @@
 
 #include "apps/common/document.h"
 #include "apps/compare/pixel_ellipse.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pencil_lean.h"
 
 namespace circline::apps {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr double kDegreesPerRadian = 57.295779513082323;
 
 const char* StatusText(const Status& status) {
   if (status.ok()) return "ok";
@@ -107,7 +106,7 @@ Json HypothesisLine(const ImageRun& image, const SolverRun& run, std::size_t ind
   line["rms_px"] = h.num_inliers > 0 ? Number(h.rms_px) : Json();  // Null: a prediction.
   line["num_inliers"] = h.num_inliers;
   line["num_observations"] = h.num_observations;
-  line["sigma_rotation_deg"] = Array((h.SigmaRotation() * kDegreesPerRadian).eval());
+  line["sigma_rotation_deg"] = Array((h.SigmaRotation() / kDegree).eval());
   line["sigma_normal_deg"] = Number(SigmaNormalDeg(h));
   line["free_directions"] = Json::array();
   for (const std::array<double, 6>& direction : h.free_directions) {
@@ -171,7 +170,7 @@ Json PencilJson(const PencilObservation& pencil, double pencil_axis_rad) {
         pencil.fit->covariance + pencil_axis_rad * pencil_axis_rad * LeanShape(pencil),
         Eigen::EigenvaluesOnly);
     const double variance = std::max(0.0, eigen.eigenvalues()[2]);
-    json["sigma_deg"] = Number(std::sqrt(variance) * kDegreesPerRadian);
+    json["sigma_deg"] = Number(std::sqrt(variance) / kDegree);
   } else {
     json["sigma_deg"] = nullptr;
   }

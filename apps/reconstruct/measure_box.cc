@@ -4,10 +4,10 @@
 #include <cmath>
 #include <string>
 
+#include "circline/estimators/basics.h"
+
 namespace circline::apps {
 namespace {
-
-constexpr double kDegreesPerRadian = 57.295779513082323;
 
 // Between the normal of the circle alone and the nearest axis of the box alone. The standard
 // deviation is that of both together about the axis that turns one into the other.
@@ -33,8 +33,8 @@ bool Agreement(const CircleObservation& circle, const BoxFit& fit, const Observa
           about);
       *agreement = {"agreement",
                     circle.id + " " + "xyz"[k],
-                    std::atan2(turn.norm(), nearest) * kDegreesPerRadian,
-                    std::sqrt(variance) * kDegreesPerRadian,
+                    std::atan2(turn.norm(), nearest) / kDegree,
+                    std::sqrt(variance) / kDegree,
                     "deg",
                     0.0};
     }

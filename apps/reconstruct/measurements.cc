@@ -7,12 +7,11 @@
 #include <utility>
 
 #include "apps/compare/pixel_ellipse.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/metrology.h"
 
 namespace circline::apps {
 namespace {
-
-constexpr double kDegreesPerRadian = 57.295779513082323;
 
 using Rays = std::vector<Eigen::Vector3d>;
 
@@ -56,9 +55,9 @@ bool MeasureAngle(const PencilObservation& a, const PencilObservation& b, Measur
   const double sine = u.cross(v).norm();
   if (!(sine > 1e-6)) return false;
   measured->id = a.id + " " + b.id;
-  measured->value = std::atan2(sine, std::abs(u.dot(v))) * kDegreesPerRadian;
+  measured->value = std::atan2(sine, std::abs(u.dot(v))) / kDegree;
   const double variance = v.dot(a.fit->covariance * v) + u.dot(b.fit->covariance * u);
-  measured->sigma = std::sqrt(variance) / sine * kDegreesPerRadian;
+  measured->sigma = std::sqrt(variance) / sine / kDegree;
   return std::isfinite(measured->sigma);
 }
 

@@ -6,13 +6,14 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "circline/estimators/basics.h"
+
 namespace circline::apps {
 namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr unsigned kDiscCorners = 64;
 constexpr unsigned kMantleSteps = 48;
 constexpr int kMaxTexturePx = 8192;

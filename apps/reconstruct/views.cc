@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "apps/compare/canvas.h"
+#include "circline/estimators/basics.h"
 
 namespace circline::apps {
 namespace {
@@ -14,7 +15,6 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kRadiansPerDegree = 0.017453292519943295;
 const cv::Vec3b kGround(245, 243, 240), kBehind(170, 170, 170);
 constexpr int kFiner = 2;      // Rendered so many times as large, then averaged.
 constexpr int kMostPx = 1600;  // Longer side of the photo in the picture, and of each view.
@@ -54,10 +54,6 @@ class Renderer {
   const cv::Mat& picture() const { return picture_; }
 
  private:
-  static double Cross(const Vector2d& a, const Vector2d& b) {
-    return a.x() * b.y() - a.y() * b.x();
-  }
-
   // Depths by barycentric coordinates; y runs down, so that what is seen from outside is negative.
   void Fill(const std::array<Corner, 3>& c, const cv::Mat& texture) {
     const Vector2d a = c[0].pixel, ab = c[1].pixel - a, ac = c[2].pixel - a;
@@ -163,8 +159,8 @@ cv::Mat ModelViews(const cv::Mat& photo, const Model& model, const CameraPose& p
   // From the photo's own azimuth, and over the plane; degrees.
   constexpr double kSides[3][2] = {{-35.0, 30.0}, {35.0, 30.0}, {0.0, 70.0}};
   for (const auto& from : kSides) {
-    const CameraPose view = LookAt(center, azimuth + from[0] * kRadiansPerDegree,
-                                   side * from[1] * kRadiansPerDegree, kDistance * radius);
+    const CameraPose view =
+        LookAt(center, azimuth + from[0] * kDegree, side * from[1] * kDegree, kDistance * radius);
     cv::Mat small;
     cv::resize(RenderModel(model, camera, view), small, shown.size(), 0.0, 0.0, cv::INTER_AREA);
     pictures.push_back(small);

@@ -6,10 +6,11 @@
 #include <numeric>
 #include <utility>
 
+#include "circline/estimators/basics.h"
+
 namespace circline::apps {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kRotationAngle = 0.84;  // Radians, about (0.717, 0.359, 0.598).
 constexpr double kSide = 20.0;           // Of the square, world units.
 constexpr double kRadius = 7.0;

@@ -11,6 +11,7 @@
 
 #include "apps/common/progress.h"
 #include "apps/common/text.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/ransac/fit_observations.h"
 #include "circline/refine/refined_solvers.h"
@@ -18,7 +19,6 @@
 namespace circline::apps {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kFailureBounds = 10.0;    // A larger rotation error, in bounds, is a failure.
 constexpr double kFailureExactRad = 1e-6;  // The same without noise.
 constexpr double kMaxOutlierRatio = 0.8;

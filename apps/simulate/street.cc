@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
 
 namespace circline::apps {
@@ -12,18 +13,17 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kDegrees = 3.14159265358979323846 / 180.0;  // Radians.
-constexpr int kWidth = 640, kHeight = 480;                   // Pixels.
+constexpr int kWidth = 640, kHeight = 480;  // Pixels.
 
 // The camera. Its field of view; how far it is turned upwards and to the side; the standard
 // deviations of its calibration (those of CameraSigma) and of k1.
-constexpr double kLeastView = 48.0 * kDegrees, kMostView = 78.0 * kDegrees;
-constexpr double kTilt = 6.0 * kDegrees, kMeanTilt = 5.0 * kDegrees, kRoll = 2.0 * kDegrees;
+constexpr double kLeastView = 48.0 * kDegree, kMostView = 78.0 * kDegree;
+constexpr double kTilt = 6.0 * kDegree, kMeanTilt = 5.0 * kDegree, kRoll = 2.0 * kDegree;
 constexpr double kK1Sigma = 0.002;
 // Each pair of directions of a house is at right angles to so much (standard deviation); a house
 // whose fronts meet at another angle does so by this much more or less.
-constexpr double kLean = 0.7 * kDegrees;
-constexpr double kLeastSkew = 12.0 * kDegrees, kMostSkew = 50.0 * kDegrees;
+constexpr double kLean = 0.7 * kDegree;
+constexpr double kLeastSkew = 12.0 * kDegree, kMostSkew = 50.0 * kDegree;
 constexpr double kShareSkew = 0.5;
 // Of each edge against the direction of its house, by house: standard deviation, radians.
 constexpr double kLeastScatter = 5e-4, kMostScatter = 3e-3;
@@ -87,7 +87,7 @@ class Painter {
   }
 
   void AddClutter(std::vector<StreetSegment>* segments) {
-    const double angle = random_.Uniform(0.0, 180.0 * kDegrees);
+    const double angle = random_.Uniform(0.0, 180.0 * kDegree);
     const double length = kLeastLength - kClutterLength * std::log(1.0 - random_.Uniform());
     const double u = random_.Uniform(0.0, kWidth), v = random_.Uniform(0.0, kHeight);
     const Vector2d half = 0.5 * length * Vector2d(std::cos(angle), std::sin(angle));
@@ -191,9 +191,9 @@ int CountOf(const std::vector<StreetSegment>& segments, int house, int direction
 
 // A corner both fronts of which are seen; `between`: the angle between these, but for the lean.
 House DrawCorner(double between, double distance, double aside, Random* random) {
-  constexpr double kGrazing = 8.0 * kDegrees;
-  const double least = std::max(kGrazing, between - 90.0 * kDegrees + kGrazing);
-  const double most = std::min(90.0 * kDegrees - kGrazing, between - kGrazing);
+  constexpr double kGrazing = 8.0 * kDegree;
+  const double least = std::max(kGrazing, between - 90.0 * kDegree + kGrazing);
+  const double most = std::min(90.0 * kDegree - kGrazing, between - kGrazing);
   return DrawHouse(random->Uniform(least, most), between, distance, aside, random);
 }
 
@@ -205,7 +205,7 @@ void AddOthers(Painter* painter, Random* random, std::vector<House>* houses,
   const auto most = static_cast<std::size_t>(kMostOther * static_cast<double>(segments->size()));
   for (int k = random->UniformInt(3); k > 0; --k) {
     const double distance = random->Uniform(15.0, 40.0), aside = random->Uniform(-12.0, 12.0);
-    const House other = DrawCorner(90.0 * kDegrees, distance, aside, random);
+    const House other = DrawCorner(90.0 * kDegree, distance, aside, random);
     const HouseDirections first = houses->front().directions;
     const auto is_parallel = [&](const Vector3d& front) {
       return std::any_of(
@@ -235,7 +235,7 @@ StreetPhoto DrawStreet(Random* random) {
         ExpRotation(Vector3d(-kMeanTilt - kTilt * random->Normal(), 0.0, kRoll * random->Normal()));
     const double distance = random->Uniform(8.0, 25.0), aside = random->Uniform(-3.0, 3.0);
     const double skew = photo.is_orthogonal ? 0.0 : DrawSkew(random);
-    std::vector<House> houses = {DrawCorner(90.0 * kDegrees + skew, distance, aside, random)};
+    std::vector<House> houses = {DrawCorner(90.0 * kDegree + skew, distance, aside, random)};
     Painter painter(truth, cam_from_world, photo.sigma_px, random);
     for (const int along : {0, 1}) painter.AddFront(houses[0], 0, along, &photo.segments);
     int seen = 0;

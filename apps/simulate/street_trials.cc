@@ -10,6 +10,7 @@
 
 #include "apps/common/progress.h"
 #include "apps/common/text.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
 #include "circline/ransac/detection/observe_evidence.h"
 #include "circline/refine/estimate_pose.h"
@@ -20,7 +21,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kDegrees = 180.0 / 3.14159265358979323846;  // Of a radian.
 constexpr double kSure = 0.9, kWrongDeg = 5.0, kSigmas = 2.0;
 constexpr std::array<double, 3> kThresholdsDeg = {3.0, 5.0, 10.0};
 // Directions this far from a right angle make no frame with axes between them.
@@ -31,7 +31,7 @@ constexpr double kSkewDeg = 5.0;
 std::vector<Matrix3d> FramesOf(const Vector3d& first, const Vector3d& second) {
   const Vector3d normal = first.cross(second).normalized(), other = second.cross(normal);
   const double turn = std::atan2(first.cross(other).dot(normal), first.dot(other));
-  const bool is_skew = std::abs(turn) * kDegrees > kSkewDeg;
+  const bool is_skew = std::abs(turn) / kDegree > kSkewDeg;
   const int steps = is_skew ? 1 : 8;
   std::vector<Matrix3d> frames;
   for (int k = 0; k <= steps; ++k) {
@@ -73,7 +73,7 @@ StreetAnswer Judge(const StreetPhoto& photo, const Observations& observations) {
   answer.sigma = best.SigmaRotation();
   for (const HouseDirections& house : photo.houses) {
     const Vector3d error = NearestError(house, best.cam_from_world.rotation);
-    const double angle_deg = kDegrees * error.norm();
+    const double angle_deg = error.norm() / kDegree;
     if (&house == &photo.houses.front()) answer.error_deg = angle_deg;
     if (!(angle_deg < answer.error_any_deg)) continue;
     answer.error_any_deg = angle_deg;
@@ -153,7 +153,7 @@ std::vector<std::string> Cells(const StreetAnswer& answer) {
   std::vector<std::string> cells = {"0", FormatFixed(answer.error_deg, 5),
                                     FormatFixed(answer.error_any_deg, 5)};
   for (const Vector3d& v : {answer.error, answer.sigma}) {
-    for (const double value : v) cells.push_back(FormatFixed(kDegrees * value, 5));
+    for (const double value : v) cells.push_back(FormatFixed(value / kDegree, 5));
   }
   cells.push_back(FormatFixed(answer.probability, 4));
   return cells;

@@ -6,12 +6,12 @@
 
 #include "apps/compare/pose_curves.h"
 #include "apps/compare/results.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/metrology.h"
 
 namespace circline::apps {
 namespace {
 
-constexpr double kDegreesPerRadian = 57.295779513082323;
 constexpr std::size_t kMaxMeasurements = 200;
 
 double Rounded(double value, double steps) { return std::round(value * steps) / steps; }
@@ -78,9 +78,9 @@ bool Measure(const std::string& kind, const std::vector<Eigen::Vector2d>& p, dou
   if (kind == "height") return HeightOverPlane(hypothesis, camera, {p[0], p[1]}, sigma_px, value);
   if (!AngleOnPlane(hypothesis, camera, {p[0], p[1], p[2], p[3]}, sigma_px, value)) return false;
   // Lines have no sense, so that their angle is an acute one.
-  const double degrees = std::abs(value->value) * kDegreesPerRadian;
+  const double degrees = std::abs(value->value) / kDegree;
   value->value = std::min(degrees, 180.0 - degrees);
-  value->sigma *= kDegreesPerRadian;
+  value->sigma /= kDegree;
   return true;
 }
 

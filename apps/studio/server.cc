@@ -17,7 +17,7 @@ using httplib::Response;
 
 // A scene of a few hundred contours.
 constexpr std::size_t kMaxRequestBytes = std::size_t{8} << 20;
-constexpr int kMaxDepth = 16;
+constexpr int kMaxRequestDepth = 16;
 
 // With a parameter, as httplib compresses a plain application/json, which takes it 30 ms.
 constexpr char kJsonType[] = "application/json; charset=utf-8";
@@ -56,7 +56,7 @@ bool IsDeep(const std::string& text) {
     } else if (c == '"') {
       in_string = true;
     } else if (c == '[' || c == '{') {
-      if (++depth > kMaxDepth) return true;
+      if (++depth > kMaxRequestDepth) return true;
     } else if (c == ']' || c == '}') {
       --depth;
     }

@@ -8,12 +8,12 @@
 #include <utility>
 
 #include "apps/common/svg_plot.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
 
 namespace circline::apps {
 namespace {
 
-constexpr double kDegreesPerRadian = 57.295779513082323;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kMostPoints = 2000;  // Of a plot; more make a browser slow.
 
@@ -109,9 +109,9 @@ std::vector<Eigen::Vector3d> TurnsSinceStart(const std::vector<TrackedFrame>& fr
       first = f.rotation;
       has_first = true;
     }
-    turns.push_back(f.has_pose ? Eigen::Vector3d(kDegreesPerRadian *
-                                                 LogRotation(f.rotation * first.transpose()))
-                               : Eigen::Vector3d::Constant(kNone));
+    turns.push_back(f.has_pose
+                        ? Eigen::Vector3d(LogRotation(f.rotation * first.transpose()) / kDegree)
+                        : Eigen::Vector3d::Constant(kNone));
   }
   return turns;
 }

@@ -15,7 +15,7 @@
 namespace circline::apps {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr int kPictureWidth = 640;
 constexpr std::size_t kMostPictures = 24, kMostRows = 2000;
 
@@ -39,7 +39,7 @@ struct Counts {
 };
 
 double Quantile(std::vector<double> values, double share) {
-  if (values.empty()) return kNone;
+  if (values.empty()) return kUnknown;
   const auto at =
       values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());

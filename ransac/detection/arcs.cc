@@ -5,12 +5,12 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
 using Eigen::Vector2d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Polygonal approximation of a chain: largest distance of a point to it, pixels. Well above the
 // noise of an edge point, so that every vertex is a true turn; small enough that a circle of 4 px
@@ -19,21 +19,19 @@ constexpr float kPolygonTolerancePx = 0.7f;
 // On a smooth curve the polygon's turn at a vertex times the shorter edge is about eight times the
 // tolerance at most (chord and sagitta); far beyond that, the vertex is a corner.
 constexpr double kCornerFactor = 2.0;
-constexpr double kMaxTurn = 75.0 * kPi / 180.0;
+constexpr double kMaxTurn = 75.0 * kDegree;
 // Largest length of the edge between the two halves of a rounded corner, in lengths of its
 // neighbours: edges of a smooth curve change more slowly.
 constexpr double kRoundedShare = 0.3;
 // What an arc needs to take part.
 constexpr int kMinArcPoints = 6;
-constexpr double kMinArcTurn = 12.0 * kPi / 180.0;
+constexpr double kMinArcTurn = 12.0 * kDegree;
 // What the smoothing rounds on either side of a corner, points.
 constexpr int kCornerReach = 2;
 // How far the ends of two arcs may lie from the conic through their middles, pixels: tangents are
 // good to a few degrees.
 constexpr double kEndSlackPx = 2.0;
 constexpr double kEndSlackShare = 0.03;
-
-double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 // Vertices (indices of points) of the Douglas-Peucker polygon of points[begin, end).
 class Polygon {

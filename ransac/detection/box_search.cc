@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
 #include "circline/ransac/detection/segment_meetings.h"
 
@@ -21,7 +22,6 @@ constexpr double kModelSigmaRad = 1.7e-3;
 // The logarithm of the odds, before its direction is looked at, that a line that forms corners is
 // an edge of the box (the choice between three directions not counted).
 constexpr double kLogOddsOfAnEdge = -1.5;
-constexpr double kPi = 3.14159265358979323846;
 // Angles about the normal that are tried, of a quarter turn: one in half a degree.
 constexpr int kAngles = 180;
 constexpr int kPasses = 4;

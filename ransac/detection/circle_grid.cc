@@ -8,9 +8,11 @@
 #include <optional>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/vanishing_point.h"
+#include "circline/ransac/detection/contour_support.h"
 
 namespace circline {
 namespace {
@@ -35,14 +37,6 @@ constexpr double kMinShare = 0.5;
 constexpr double kSizeFactor = 1.25;
 // No centre is known better than this, whatever the scatter of a few says, pixels.
 constexpr double kMinCentreSigmaPx = 0.03;
-
-double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
-
-double MedianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 class LatticeFinder {
  public:
@@ -86,7 +80,7 @@ class LatticeFinder {
       x.push_back(p.x());
       y.push_back(p.y());
     }
-    const Vector2d middle(MedianOf(x), MedianOf(y));
+    const Vector2d middle(Median(&x), Median(&y));
     std::vector<std::size_t> order(points_.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -104,7 +98,7 @@ class LatticeFinder {
       }
       nearest.push_back(std::sqrt(smallest));
     }
-    return MedianOf(nearest);
+    return Median(&nearest);
   }
 
   // The two steps that most points can take; of equally good ones the shorter.

@@ -5,14 +5,14 @@
 #include <cmath>
 #include <limits>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 // An edge point supports a contour if its gradient is within 25 degrees of the contour's normal.
 constexpr double kMinNormalCosine = 0.906;
@@ -24,8 +24,6 @@ constexpr double kFarPx = 1e6;
 
 // To the nearest integer, for values within 2 kFarPx of 0; a tenth of the time of std::lround.
 int Round(double x) { return static_cast<int>(x + (2e6 + 0.5)) - 2000000; }
-
-double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/ransac/detection/arcs.h"
 #include "circline/ransac/detection/ellipse_fitter.h"
@@ -12,10 +13,8 @@
 namespace circline {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 // An arc alone determines an ellipse from this turn on.
-constexpr double kMinSingleTurn = 50.0 * kPi / 180.0;
+constexpr double kMinSingleTurn = 50.0 * kDegree;
 // Arcs that take part in pairs: the most bent and longest ones. Bounds the quadratic step.
 constexpr std::size_t kMaxPairedArcs = 256;
 // Pairs tried, the most promising ones: what comes after them has not added an ellipse.

@@ -27,7 +27,7 @@ constexpr double kPointSigmaPx = 0.3;
 constexpr double kBleedSigmaPx = 0.4;
 constexpr double kMaxAlternatingPx = 2.0;
 // Averaged points are not trusted beyond this: lenses and edges are not straight to better.
-constexpr double kMinSigmaPx = 0.1;
+constexpr double kMinLineSigmaPx = 0.1;
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -185,7 +185,7 @@ class LineJoiner {
     if (!FitLine(calibrated_, 1.0, &line.fit).ok()) return;
     const double n = static_cast<double>(calibrated_.size());
     const double spread = n > 2.0 ? line.fit.rms_px * std::sqrt(n / (n - 2.0)) : 0.0;
-    line.sigma_px = std::max(kMinSigmaPx, spread);
+    line.sigma_px = std::max(kMinLineSigmaPx, spread);
     line.fit.covariance *= line.sigma_px * line.sigma_px;
     SetEnds(joined, &line);
     lines_.push_back(std::move(line));

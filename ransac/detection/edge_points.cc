@@ -11,7 +11,7 @@ namespace circline {
 namespace {
 
 // Localisation is never better than this, whatever the noise says: pixels are not points.
-constexpr float kMinSigmaPx = 0.03f;
+constexpr float kMinPointSigmaPx = 0.03f;
 
 // Samples of a Gaussian and of its derivative; scaled so that a constant stays, and a ramp of slope
 // one yields one.
@@ -203,7 +203,7 @@ class PointFinder {
     const float cosine = std::max(std::abs(gx), std::abs(gy)) / length;
     variance *= cosine * cosine;
     point.blur_px = std::sqrt(variance);
-    point.sigma_px = std::max(kMinSigmaPx, slope_noise_ * variance / length);
+    point.sigma_px = std::max(kMinPointSigmaPx, slope_noise_ * variance / length);
     return point;
   }
 

@@ -26,7 +26,7 @@ constexpr double kMinSigmas = 2.0;
 constexpr double kMaxShiftPx = 0.6;
 
 // Averaged points are not trusted beyond this, as in detect_lines.cc.
-constexpr double kMinSigmaPx = 0.1;
+constexpr double kMinShiftedSigmaPx = 0.1;
 
 double MedianOf(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -127,7 +127,7 @@ void MoveBack(const Camera& camera, const std::vector<Vector2d>& gradients, doub
   if (!FitLine(calibrated, 1.0, &moved.fit).ok()) return;
   // The scatter was part staircase.
   const double n = static_cast<double>(calibrated.size());
-  moved.sigma_px = std::max(kMinSigmaPx, moved.fit.rms_px * std::sqrt(n / (n - 2.0)));
+  moved.sigma_px = std::max(kMinShiftedSigmaPx, moved.fit.rms_px * std::sqrt(n / (n - 2.0)));
   moved.fit.covariance *= moved.sigma_px * moved.sigma_px;
   *line = std::move(moved);
 }

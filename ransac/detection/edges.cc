@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
+#include "circline/estimators/basics.h"
 #include "circline/ransac/detection/edge_chains.h"
 #include "circline/ransac/detection/edge_points.h"
 
@@ -46,7 +47,7 @@ double EstimateNoise(const cv::Mat& gray) {
 
 // Of one component of the gradient, for white noise seen through the derivative of a Gaussian.
 double GradientNoise(double pixel_noise, double smoothing) {
-  return pixel_noise / (std::sqrt(8.0 * 3.14159265358979323846) * smoothing * smoothing);
+  return pixel_noise / (std::sqrt(8.0 * kPi) * smoothing * smoothing);
 }
 
 double Threshold(double value, double factor, double noise) {

@@ -25,7 +25,7 @@ constexpr double kOutlierSigmas = 3.5;
 // Times that points which stand out are left out of the fit to start from.
 constexpr int kMaxTrims = 10;
 // No contour is known better than this, whatever its scatter says.
-constexpr double kMinSigmaPx = 0.05;
+constexpr double kMinEllipseSigmaPx = 0.05;
 
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
@@ -164,7 +164,7 @@ bool EllipseFitter::FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
   }
   // Degrees of freedom: five go into the ellipse.
   const double n = static_cast<double>(fit_points_.size());
-  e->sigma_px = std::max(kMinSigmaPx, e->fit.rms_px * std::sqrt(n / (n - 5.0)));
+  e->sigma_px = std::max(kMinEllipseSigmaPx, e->fit.rms_px * std::sqrt(n / (n - 5.0)));
   for (double& c : e->fit.covariance) c *= e->sigma_px * e->sigma_px;
   return true;
 }
@@ -175,7 +175,7 @@ bool EllipseFitter::DropOutliers(DetectedEllipse* e) {
   sorted_.clear();
   for (const double d : distances_) sorted_.push_back(std::abs(d));
   // 1.4826: median absolute deviation to standard deviation of a Gaussian.
-  const double limit = kOutlierSigmas * std::max(kMinSigmaPx, 1.4826 * Median(&sorted_));
+  const double limit = kOutlierSigmas * std::max(kMinEllipseSigmaPx, 1.4826 * Median(&sorted_));
   std::size_t kept = 0;
   for (std::size_t k = 0; k < distances_.size(); ++k) {
     if (std::abs(distances_[k]) > limit) continue;

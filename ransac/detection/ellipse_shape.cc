@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 
 namespace circline {
 namespace {
 
 using Eigen::Matrix3d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Share of random contour samples that find an edge point in place and direction by accident, in a
 // busy photo: edge points on a tenth of the pixels, 3 of them looked at, 50 of 360 degrees.
@@ -58,7 +57,7 @@ double Log10BinomialTail(double n, double k, double p) {
 
 }  // namespace
 
-double ToDegrees(double radians) { return radians * 180.0 / kPi; }
+double ToDegrees(double radians) { return radians / kDegree; }
 
 double Log10FalseAlarms(const Support& support, BrightSide bright) {
   const double n = support.perimeter_px / kIndependentPx;

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kLeastSine = 1e-3;  // The middle of a line is not known to better.
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/ransac/detection/uncertain_direction.h"
 
@@ -13,7 +14,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 // 12 to 1. Of 0, 2, 2.5 and 3, on simulated streets (seed 1; others had no part in it) and one
 // photograph of a box, where the lowest two are too low.
 constexpr double kMinLogOdds = 2.5;
@@ -26,7 +26,7 @@ OrthogonalEvidence::OrthogonalEvidence(const std::vector<LineFit>& lines, const 
                                        double spread_rad)
     : axis_(axis) {
   for (const LineFit& line : lines) {
-    const double lean = kRightAngleSigmaDeg * kPi / 180.0 * line.line.dot(axis);
+    const double lean = kRightAngleSigmaDeg * kDegree * line.line.dot(axis);
     lines_.emplace_back(WithDirectionError(line, std::hypot(spread_rad, lean)));
   }
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
@@ -20,8 +22,6 @@ constexpr double kMaxCornerGap = 21.0 / kUsualDiagonalPx;
 constexpr double kMinCornerSine = 0.17;
 constexpr double kFullMeetings = 3.0;
 constexpr std::size_t kCoreMeetings = 2;
-
-double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 double PointSegmentDistance(const Vector2d& p, const Segment& s) {
   const Vector2d d = s[1] - s[0];

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 
@@ -15,8 +16,6 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-constexpr double kRadians = 3.14159265358979323846 / 180.0;
 
 // Errors of a direction or a normal that no covariance of edge points knows: calibration, surfaces
 // that are not quite plane, prints that are not quite round. Standard deviation, degrees.
@@ -39,10 +38,10 @@ struct AngleTest {
 // How far from 90 degrees.
 AngleTest CompareToRightAngle(const UncertainDirection& a, const UncertainDirection& b) {
   AngleTest test;
-  test.angle_deg = std::asin(std::min(1.0, std::abs(a.vector.dot(b.vector)))) / kRadians;
+  test.angle_deg = std::asin(std::min(1.0, std::abs(a.vector.dot(b.vector)))) / kDegree;
   const double variance =
       a.vector.dot(b.covariance * a.vector) + b.vector.dot(a.covariance * b.vector);
-  test.sigma_deg = std::sqrt(std::max(0.0, variance)) / kRadians;
+  test.sigma_deg = std::sqrt(std::max(0.0, variance)) / kDegree;
   return test;
 }
 
@@ -62,7 +61,7 @@ double LogOddsOfRightAngle(const UncertainDirection& a, const UncertainDirection
   const double sigma = std::hypot(test.sigma_deg, kRightAngleSigmaDeg), r = test.angle_deg / sigma;
   constexpr double kTwiceGaussian = 0.7978845608028654;  // 2 / sqrt(2 pi): no sense of sign.
   return std::log(kRightAngleShare / (1.0 - kRightAngleShare) * kTwiceGaussian /
-                  (sigma * kRadians * std::cos(test.angle_deg * kRadians))) -
+                  (sigma * kDegree * std::cos(test.angle_deg * kDegree))) -
          0.5 * r * r;
 }
 
@@ -75,7 +74,7 @@ bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
                    UncertainDirection* normal) {
   const Vector3d cross = a.vector.cross(b.vector);
   const double sine = cross.norm();
-  if (sine < std::sin(kMinSpanDeg * kRadians)) return false;
+  if (sine < std::sin(kMinSpanDeg * kDegree)) return false;
   normal->vector = cross / sine;
   const Matrix3d tangent =
       (Matrix3d::Identity() - normal->vector * normal->vector.transpose()) / sine;
@@ -96,7 +95,7 @@ double LikelihoodRatio(const UncertainDirection& normal, const Vector3d& plane) 
   Eigen::Matrix<double, 3, 2> across;
   across.col(0) = plane.unitOrthogonal();
   across.col(1) = plane.cross(across.col(0));
-  const double model = kModelSigmaDeg * kRadians;
+  const double model = kModelSigmaDeg * kDegree;
   const Eigen::Matrix2d covariance =
       across.transpose() * normal.covariance * across + model * model * Eigen::Matrix2d::Identity();
   const Eigen::Vector2d miss = across.transpose() * normal.vector;
@@ -136,7 +135,7 @@ CircleEquations::CircleEquations(const ConicFit& fit, const Vector3d& normal) {
   Eigen::Matrix<double, 2, 6> by_conic;
   by_conic.row(0) = ConicToVector(u * u.transpose() - v * v.transpose()).transpose();
   by_conic.row(1) = ConicToVector(u * v.transpose() + v * u.transpose()).transpose();
-  const double model = kModelSigmaDeg * kRadians;
+  const double model = kModelSigmaDeg * kDegree;
   covariance = by_conic * fit.Covariance() * by_conic.transpose() +
                model * model * by_normal * by_normal.transpose();
 }
@@ -156,7 +155,7 @@ UncertainDirection NormalOfCircles(const UncertainDirection& about, double sigma
   constexpr int kSteps = 3;
   UncertainDirection normal = about;
   for (int step = 0; step < kSteps; ++step) {
-    const double weight = std::pow(sigma_deg * kRadians, -2.0);
+    const double weight = std::pow(sigma_deg * kDegree, -2.0);
     Eigen::Matrix2d information = weight * Eigen::Matrix2d::Identity();
     Eigen::Matrix<double, 3, 2> basis;
     basis.col(0) = normal.vector.unitOrthogonal();

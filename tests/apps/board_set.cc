@@ -8,11 +8,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
+#include "circline/estimators/basics.h"
+
 namespace circline::apps {
 
 Board::Board(double tilt_deg) {
-  rotation =
-      Eigen::AngleAxisd(tilt_deg * 0.0174532925, Eigen::Vector3d(1.0, 0.4, 0.1).normalized());
+  rotation = Eigen::AngleAxisd(tilt_deg * kDegree, Eigen::Vector3d(1.0, 0.4, 0.1).normalized());
   translation = Eigen::Vector3d(-0.1, 0.05, 4.0);
 }
 
@@ -77,7 +78,7 @@ std::string TruthText(const Board& board, const std::string& symmetry) {
 std::string AnnotatedImage(const Board& board, const std::string& file) {
   std::vector<Eigen::Vector2d> contour;
   for (int i = 0; i < 40; ++i) {
-    const double t = 2.0 * 3.14159265358979 * i / 40;
+    const double t = 2.0 * kPi * i / 40;
     contour.push_back(board.Pixel(0.5 * std::cos(t), 0.5 * std::sin(t)));
   }
   const auto p = [&board](double x, double y) { return board.Pixel(x, y); };

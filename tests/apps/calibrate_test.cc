@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "apps/common/scene.h"
+#include "circline/estimators/basics.h"
 #include "tests/apps/board_set.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
@@ -73,7 +74,7 @@ std::string SheetPhoto(const Board& board, const std::string& file, double squee
   for (int k = 0; k < 9; ++k) {
     std::vector<Eigen::Vector2d> contour;
     for (int i = 0; i < 40; ++i) {
-      const double t = 2.0 * 3.14159265358979 * i / 40;
+      const double t = 2.0 * kPi * i / 40;
       contour.push_back(
           board.Pixel(k % 3 - 1 + 0.3 * std::cos(t), k / 3 * 0.8 - 0.8 + 0.3 * std::sin(t)));
       contour.back().x() *= squeeze;
@@ -88,7 +89,7 @@ std::string SheetScene(const TestFolder& folder, int count, int gross) {
   std::string scene = "%YAML:1.0\n---\n" + BoardCamera() + "images:\n";
   for (int i = 0; i < count; ++i) {
     Board board(0.0);
-    const double turn = 6.283185307179586 * i / count;
+    const double turn = 2.0 * kPi * i / count;
     board.rotation = Eigen::AngleAxisd(0.6, Eigen::Vector3d(std::cos(turn), std::sin(turn), 0.0)) *
                      Eigen::AngleAxisd(0.3 * i, Eigen::Vector3d::UnitZ());
     board.translation.x() += 0.3 * std::sin(2.0 * turn);

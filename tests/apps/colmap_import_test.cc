@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "apps/common/colmap_file.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
 #include "tests/apps/run_compare.h"
@@ -108,7 +109,7 @@ std::string BoxAbout(const CameraPose& pose, const Eigen::Vector3d& center, doub
   constexpr int kMargin = 12, kPoints = 24;
   Eigen::Vector2d low(1e9, 1e9), high = -low;
   for (int i = 0; i < kPoints; ++i) {
-    const double a = 6.283185307179586 * i / kPoints;
+    const double a = 2.0 * kPi * i / kPoints;
     const Eigen::Vector3d X =
         center + radius * (std::cos(a) * Eigen::Vector3d::UnitX() + std::sin(a) * across);
     const Eigen::Vector3d x = pose.rotation * X + pose.translation;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "tests/apps/board_set.h"
 #include "tests/apps/json_lines.h"
 #include "tests/apps/run_compare.h"
@@ -53,7 +54,7 @@ TEST_F(CompareInputs, FocalLengthOrFieldOfViewStandInForACalibration) {
   // As well known as a calibration, it is one.
   ASSERT_EQ(Run("--focal_px=300 --focal_sigma=0.002").exit_code, 0);
   EXPECT_EQ(Results(), calibrated);
-  const double fov = 2.0 * std::atan(0.5 * kWidth / kFocal) * 180.0 / 3.14159265358979323846;
+  const double fov = 2.0 * std::atan(0.5 * kWidth / kFocal) / kDegree;
   ASSERT_EQ(Run("--focal_sigma=0.002 --fov_deg=" + std::to_string(fov)).exit_code, 0);
   const Json guessed = Best("joint");
   std::istringstream lines(calibrated);

@@ -17,6 +17,7 @@
 #include "apps/compare/selection.h"
 #include "apps/compare/sweep.h"
 #include "apps/compare/work_queue.h"
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
 #include "tests/apps/test_files.h"
 
@@ -149,7 +150,7 @@ SolverRun RunOf(const std::string& solver, const LossSetting* loss, double tilt_
   run.solver = solver;
   run.loss = loss;
   PoseHypothesis hypothesis;
-  hypothesis.cam_from_world.rotation = ExpRotation({tilt_deg / 57.29577951308232, 0.0, 0.0});
+  hypothesis.cam_from_world.rotation = ExpRotation({tilt_deg * kDegree, 0.0, 0.0});
   hypothesis.probability = probability;
   run.estimate.hypotheses = {hypothesis};
   return run;
@@ -225,7 +226,7 @@ SolverRecord Answer(const std::string& solver, double tilt_deg) {
   record.key = {solver, "refined", "huber", 1.0};
   record.status = "ok";
   HypothesisRecord hypothesis;
-  hypothesis.rotation = ExpRotation({tilt_deg * 0.017453292519943295, 0.0, 0.0});
+  hypothesis.rotation = ExpRotation({tilt_deg * kDegree, 0.0, 0.0});
   record.hypotheses = {hypothesis};
   return record;
 }

@@ -10,17 +10,17 @@
 namespace circline::apps {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-Json Parsed(const std::string& text) {
-  Json root;
+OrderedJson Parsed(const std::string& text) {
+  OrderedJson root;
   const Status status = ParseDocument(text, &root);
   EXPECT_TRUE(status.ok()) << status.message;
   return root;
 }
 
 std::string ErrorOf(const std::string& text) {
-  Json root;
+  OrderedJson root;
   const Status status = ParseDocument(text, &root);
   EXPECT_FALSE(status.ok()) << root.dump().substr(0, 200);
   EXPECT_EQ(status.message.find('\n'), std::string::npos) << status.message;
@@ -34,8 +34,9 @@ std::string Repeat(const std::string& text, int count) {
 }
 
 TEST(Document, ScalarsAreNumbersWherePlain) {
-  EXPECT_EQ(Parsed("a: [ 3, -2.5, 1., .5, 1e3, +7, \"3\", '4', x3, 1.2.3, ., e, -, 0x10 ]\nb:\n"),
-            Json::parse(R"({"a": [3, -2.5, 1.0, 0.5, 1000.0, 7, "3", "4", "x3", "1.2.3", ".", "e",
+  EXPECT_EQ(
+      Parsed("a: [ 3, -2.5, 1., .5, 1e3, +7, \"3\", '4', x3, 1.2.3, ., e, -, 0x10 ]\nb:\n"),
+      OrderedJson::parse(R"({"a": [3, -2.5, 1.0, 0.5, 1000.0, 7, "3", "4", "x3", "1.2.3", ".", "e",
                                    "-", "0x10"], "b": null})"));
   EXPECT_TRUE(std::isinf(Parsed("a: -.Inf")["a"].get<double>()));
   EXPECT_TRUE(std::isnan(Parsed("a: .nan")["a"].get<double>()));
@@ -43,9 +44,9 @@ TEST(Document, ScalarsAreNumbersWherePlain) {
 }
 
 TEST(Document, JsonAndYamlOfOneSceneAreTheSame) {
-  const Json value = {{"file", "name with \"quotes\", \\ and \xC3\xA9"},
-                      {"points", {1.25, 0.1, 1e-300, 12345678}},
-                      {"maps", {{{"x", 1}}, {{"x", Json::array()}}}}};
+  const OrderedJson value = {{"file", "name with \"quotes\", \\ and \xC3\xA9"},
+                             {"points", {1.25, 0.1, 1e-300, 12345678}},
+                             {"maps", {{{"x", 1}}, {{"x", OrderedJson::array()}}}}};
   EXPECT_EQ(Parsed(JsonText(value)), value);
   EXPECT_EQ(Parsed(DocumentText(value)), value);
   EXPECT_EQ(Parsed("%YAML:1.0\n---\n" + DocumentText(value)), value);
@@ -68,14 +69,14 @@ TEST(Document, ReadsWhatOpenCvWrites) {
          << "{"
          << "x" << 2 << "}"
          << "]";
-    const Json root = Parsed(file.releaseAndGetString());
+    const OrderedJson root = Parsed(file.releaseAndGetString());
     EXPECT_EQ(root["matrix"]["data"].get<std::vector<double>>(), numbers) << name;
     EXPECT_EQ(root["matrix"]["rows"], 2) << name;
     EXPECT_EQ(root["count"], 3) << name;
     EXPECT_EQ(root["size"], 2.5) << name;
     EXPECT_EQ(root["time"], "Mon 23 Nov") << name;
-    EXPECT_EQ(root["list"], Json::parse("[1, 2]")) << name;
-    EXPECT_EQ(root["maps"], Json::parse(R"([{"x": 1}, {"x": 2}])")) << name;
+    EXPECT_EQ(root["list"], OrderedJson::parse("[1, 2]")) << name;
+    EXPECT_EQ(root["maps"], OrderedJson::parse(R"([{"x": 1}, {"x": 2}])")) << name;
   }
 }
 

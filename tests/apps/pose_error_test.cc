@@ -5,10 +5,10 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "circline/estimators/basics.h"
+
 namespace circline::apps {
 namespace {
-
-constexpr double kDegree = 0.017453292519943295;
 
 Eigen::Matrix3d Truth3() {
   return Eigen::AngleAxisd(0.84, Eigen::Vector3d(0.717, 0.359, 0.598).normalized())

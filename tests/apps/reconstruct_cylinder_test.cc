@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "tests/apps/board_set.h"
 #include "tests/apps/measured_rows.h"
 #include "tests/apps/painted_box.h"
@@ -18,7 +19,7 @@
 namespace circline::apps {
 namespace {
 
-constexpr double kRadius = 0.3, kTinHeight = 0.4;
+constexpr double kTinRadius = 0.3, kTinHeight = 0.4;
 constexpr int kLid = 220, kSide = 90, kGround = 150, kLabel = 50;
 
 // About the axis x = 0.45, y = 0.3; a dark label lies on the plane.
@@ -31,10 +32,10 @@ class ReconstructCylinder : public testing::Test {
   int Brightness(double u, double v) const {
     const Eigen::Vector3d ray = camera_.Ray(u, v), eye = camera_.Eye() - axis_;
     const auto at = [&](double z) { return (eye + (z - eye.z()) / ray.z() * ray).eval(); };
-    if (at(kTinHeight).head<2>().norm() < kRadius) return kLid;
+    if (at(kTinHeight).head<2>().norm() < kTinRadius) return kLid;
     const Eigen::Vector2d e = eye.head<2>(), r = ray.head<2>();
     const double b = e.dot(r),
-                 root = b * b - r.squaredNorm() * (e.squaredNorm() - kRadius * kRadius);
+                 root = b * b - r.squaredNorm() * (e.squaredNorm() - kTinRadius * kTinRadius);
     const double z =
         root > 0.0 ? eye.z() - (b + std::sqrt(root)) / r.squaredNorm() * ray.z() : -1.0;
     if (z > 0.0 && z < kTinHeight) return kSide;
@@ -49,8 +50,8 @@ class ReconstructCylinder : public testing::Test {
   std::vector<Eigen::Vector2d> Ring(double z) const {
     std::vector<Eigen::Vector2d> ring;
     for (int i = 0; i < 60; ++i) {
-      const double t = 2.0 * 3.14159265358979 * i / 60;
-      ring.push_back(Pixel(kRadius * std::cos(t), kRadius * std::sin(t), z));
+      const double t = 2.0 * kPi * i / 60;
+      ring.push_back(Pixel(kTinRadius * std::cos(t), kTinRadius * std::sin(t), z));
     }
     return ring;
   }

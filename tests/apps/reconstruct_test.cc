@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "tests/apps/board_set.h"
 #include "tests/apps/measured_rows.h"
 #include "tests/apps/run_compare.h"
@@ -27,7 +28,7 @@ constexpr int kTop = 200, kLeftOfTop = 160, kDisc = 30, kFront = 90, kRight = 12
 class Box {
  public:
   Box() {
-    rotation_ = Eigen::AngleAxisd(3.14159265358979 - 0.9, Eigen::Vector3d::UnitX()) *
+    rotation_ = Eigen::AngleAxisd(kPi - 0.9, Eigen::Vector3d::UnitX()) *
                 Eigen::AngleAxisd(-0.6, Eigen::Vector3d::UnitZ());
     translation_ = Eigen::Vector3d(0.0, -0.2, 4.5);
   }
@@ -66,7 +67,7 @@ class Box {
   std::string Scene(const std::string& file) const {
     std::vector<Eigen::Vector2d> contour;
     for (int i = 0; i < 40; ++i) {
-      const double t = 2.0 * 3.14159265358979 * i / 40;
+      const double t = 2.0 * kPi * i / 40;
       contour.push_back(Pixel({kRadius * std::cos(t), kRadius * std::sin(t), 0.0}));
     }
     const auto top = [this](int x, int y) { return Pixel({x * kHalfX, y * kHalfY, 0.0}); };

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "tests/apps/test_files.h"
 
 namespace circline::apps {
@@ -133,7 +134,7 @@ TEST(Scene, ReadsEverything) {
   EXPECT_EQ(o.frame.origin_is_center, "c0");
   ASSERT_EQ(o.known_angles.size(), 1U);
   EXPECT_NEAR(o.known_angles[0].value, 1.5707963267948966, 1e-15);
-  EXPECT_NEAR(o.known_angles[0].sigma, 0.5 * 0.017453292519943295, 1e-15);
+  EXPECT_NEAR(o.known_angles[0].sigma, 0.5 * kDegree, 1e-15);
   ASSERT_EQ(o.known_lengths.size(), 1U);
   EXPECT_EQ(o.known_lengths[0].value, 0.1);
   ASSERT_TRUE(a.truth.has_value());

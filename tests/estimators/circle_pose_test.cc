@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 
 namespace circline {
@@ -20,7 +21,7 @@ CirclePose RandomCircle(double tilt, double distance, Random* random) {
       Eigen::Vector3d(random->Uniform(-0.5, 0.5), random->Uniform(-0.5, 0.5), 1.0).normalized();
   const Eigen::Vector3d towards = -pose.center.normalized();
   const Eigen::Vector3d a = towards.unitOrthogonal(), b = towards.cross(a);
-  const double spin = random->Uniform(0.0, 6.283185307179586);
+  const double spin = random->Uniform(0.0, 2.0 * kPi);
   pose.normal =
       std::cos(tilt) * towards + std::sin(tilt) * (std::cos(spin) * a + std::sin(spin) * b);
   return pose;

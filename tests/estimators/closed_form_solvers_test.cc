@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 
+#include "circline/estimators/basics.h"
 #include "tests/plane_scene.h"
 #include "tests/trials.h"
 
@@ -25,17 +26,11 @@ PoseEstimate Solve(const std::string& name, const Observations& observations,
   return solver->Solve(observations);
 }
 
-double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
-  return h.cam_from_world.rotation.col(2).cross(scene.pose.rotation.col(2)).norm();
-}
-
 // Adds the drawn axes, on lines of their own.
 void DrawAxes(PlaneScene* scene, Observations* observations) {
   observations->frame.x_axis = Segment{scene->Pixel(0, 0), scene->Pixel(2, 0)};
   observations->frame.y_axis = Segment{scene->Pixel(0, 0), scene->Pixel(0, 2)};
 }
-
-constexpr double kExact = 1e-8;  // Noise-free pixels; the lens is inverted to 1e-10.
 
 TEST(ClosedFormSolversTest, SingleCircleReturnsBothPosesAsEquals) {
   PlaneScene scene;
@@ -325,7 +320,6 @@ TEST(ClosedFormSolversTest, MoreNoiseIsNeverMoreCertain) {
 
 // Directions have no sense: 70 degrees are 110, -70 and 250.
 TEST(ClosedFormSolversTest, KnownAnglesHaveNoSense) {
-  constexpr double kPi = 3.14159265358979323846;
   const Eigen::Vector3d oblique(std::cos(1.2), std::sin(1.2), 0.0);
   PlaneScene scene(0.7, 0.3);
   Observations observations = scene.Empty();

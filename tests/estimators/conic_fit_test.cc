@@ -9,13 +9,13 @@
 #include <cstdio>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 #include "tests/trials.h"
 
 namespace circline {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocal = 800.0;
 
 // Noisy points on an arc of an ellipse of 100 x 60 px or so, somewhere off the axis.
@@ -33,7 +33,7 @@ struct Arc {
     for (int i = 0; i < kPoints; ++i) {
       CalibratedPoint p;
       p.x_from_pixel = {1.0 / kFocal, 0.0, 0.0, 1.0 / kFocal};
-      p.x = EllipsePoint(ellipse, start + degrees / 180.0 * kPi * i / kPoints);
+      p.x = EllipsePoint(ellipse, start + degrees * kDegree * i / kPoints);
       truth.push_back(p);
       const double dx = random->Normal(), dy = random->Normal();
       p.x += sigma_px / kFocal * Eigen::Vector2d(dx, dy);

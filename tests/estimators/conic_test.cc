@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/geometric_residuals.h"
 #include "circline/estimators/random.h"
 
@@ -26,7 +27,7 @@ TEST(ConicTest, EllipseRoundTrip) {
     EXPECT_LT((out.center - in.center).norm(), 1e-9);
     EXPECT_NEAR(out.a, in.a, 1e-9);
     EXPECT_NEAR(out.b, in.b, 1e-9);
-    EXPECT_LT(std::abs(std::remainder(out.angle - in.angle, 3.14159265358979323846)), 1e-9);
+    EXPECT_LT(std::abs(std::remainder(out.angle - in.angle, kPi)), 1e-9);
     const Eigen::Vector2d p = EllipsePoint(in, random.Uniform(0.0, 6.28));
     const Eigen::Vector3d x(p.x(), p.y(), 1.0);
     EXPECT_NEAR(x.dot(EllipseToConic(in) * x), 0.0, 1e-12);

@@ -37,7 +37,7 @@ void ExpectDefined(const PoseEstimate& estimate) {
 }
 
 // The answer of one solver; those of all others are checked as well.
-PoseEstimate Solve(const std::string& name, const Observations& observations) {
+PoseEstimate SolveDefined(const std::string& name, const Observations& observations) {
   SolverRegistry registry;
   AddClosedFormSolvers(&registry);
   PoseEstimate answer;
@@ -47,10 +47,6 @@ PoseEstimate Solve(const std::string& name, const Observations& observations) {
     if (solver->name() == name) answer = estimate;
   }
   return answer;
-}
-
-double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
-  return h.cam_from_world.rotation.col(2).cross(scene.pose.rotation.col(2)).norm();
 }
 
 double BestNormalError(const PoseEstimate& estimate, const PlaneScene& scene) {
@@ -66,13 +62,11 @@ PencilObservation AlongY(PlaneScene* scene, int lines = 2) {
   return scene->Pencil("L2", PencilDirection::kY, Vector3d::UnitY(), lines);
 }
 
-constexpr double kExact = 1e-8;  // Noise-free pixels; the lens is inverted to 1e-10.
-
 TEST(DegeneracyTest, ASingleCircleHasTwoPosesAndNoFavourite) {
   PlaneScene scene;
   Observations observations = scene.Empty();
   observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
-  const PoseEstimate estimate = Solve("single_circle", observations);
+  const PoseEstimate estimate = SolveDefined("single_circle", observations);
   ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
   EXPECT_NEAR(estimate.hypotheses[0].probability, 0.5, 1e-9);
   EXPECT_LT(BestNormalError(estimate, scene), kExact);
@@ -88,7 +82,7 @@ TEST(DegeneracyTest, AFrontalCircleKeepsItsNormal) {
     scene.pose.translation = Vector3d(0.0, 0.0, 10.0);
     Observations observations = scene.Empty();
     observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
-    const PoseEstimate estimate = Solve("single_circle", observations);
+    const PoseEstimate estimate = SolveDefined("single_circle", observations);
     ASSERT_GE(estimate.hypotheses.size(), 1U) << estimate.status.message;
     // The fit knows the two largest eigenvalues to 1e-15 or so; the tilt is their root.
     EXPECT_LT(BestNormalError(estimate, scene), 1e-6) << tilt;
@@ -104,7 +98,7 @@ TEST(DegeneracyTest, AFarAwayCircleLeavesBothPosesOpen) {
     Observations observations = scene.Empty();
     observations.circles = {scene.Circle("c0", 0.0, 0.0, 3.0)};
     observations.circles[0].center = scene.Pixel(0.0, 0.0);
-    const PoseEstimate estimate = Solve("circle_center", observations);
+    const PoseEstimate estimate = SolveDefined("circle_center", observations);
     ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
     if (distance > 100.0) {
       EXPECT_LT(estimate.hypotheses[0].probability, 0.9);
@@ -127,7 +121,7 @@ TEST(DegeneracyTest, AnAxisAlongTheTiltLeavesProposition4Open) {
   for (const double origin : {0.0, 0.8}) {
     observations.frame.x_axis = Segment{scene.Pixel(0, origin), scene.Pixel(2, origin)};
     observations.frame.y_axis = Segment{scene.Pixel(0, origin), scene.Pixel(0, origin + 2)};
-    const PoseEstimate estimate = Solve("circle_frame", observations);
+    const PoseEstimate estimate = SolveDefined("circle_frame", observations);
     ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
     EXPECT_LT(estimate.hypotheses[0].probability, 0.7);
     EXPECT_LT(BestNormalError(estimate, scene), kExact);
@@ -135,7 +129,7 @@ TEST(DegeneracyTest, AnAxisAlongTheTiltLeavesProposition4Open) {
   observations.frame.x_axis = Segment{scene.Pixel(0, 0), scene.Pixel(2, 0)};
   observations.frame.y_axis = Segment{scene.Pixel(0, 0), scene.Pixel(0, 2)};
   observations.frame.origin_is_center = "c0";
-  const PoseEstimate estimate = Solve("circle_frame", observations);
+  const PoseEstimate estimate = SolveDefined("circle_frame", observations);
   ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
   EXPECT_GT(estimate.hypotheses[0].probability, 0.95);
   EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
@@ -160,7 +154,7 @@ TEST(DegeneracyTest, AHyperbolaIsNoCircle) {
     ASSERT_GE(circle.points.size(), 20U);
     ASSERT_LT(circle.points.size(), 400U);
     observations.circles = {circle};
-    const PoseEstimate estimate = Solve("single_circle", observations);
+    const PoseEstimate estimate = SolveDefined("single_circle", observations);
     ASSERT_FALSE(estimate.status.ok());
     EXPECT_NE(estimate.status.message.find("'c0'"), std::string::npos) << estimate.status.message;
   }
@@ -174,7 +168,7 @@ TEST(DegeneracyTest, PencilsParallelInTheImageAreOrdinary) {
   observations.pencils = {AlongX(&scene), AlongY(&scene)};
   observations.frame.x_axis = Segment{scene.Pixel(0, 0), scene.Pixel(2, 0)};
   observations.frame.y_axis = Segment{scene.Pixel(0, 0), scene.Pixel(0, 2)};
-  const PoseEstimate estimate = Solve("line_pairs", observations);
+  const PoseEstimate estimate = SolveDefined("line_pairs", observations);
   ASSERT_EQ(estimate.hypotheses.size(), 1U) << estimate.status.message;
   EXPECT_LT(RotationAngle(estimate.hypotheses[0].cam_from_world.rotation, scene.pose.rotation),
             1e-9);
@@ -184,14 +178,14 @@ TEST(DegeneracyTest, OneDirectionSpansNoPlane) {
   PlaneScene scene;
   Observations observations = scene.Empty();
   observations.pencils = {AlongX(&scene, 4)};
-  PoseEstimate estimate = Solve("line_pairs", observations);
+  PoseEstimate estimate = SolveDefined("line_pairs", observations);
   EXPECT_EQ(estimate.status.code, StatusCode::kRefused);
   EXPECT_NE(estimate.status.message.find("second direction"), std::string::npos)
       << estimate.status.message;
   // Two pencils of one direction: v1 and v2 coincide.
   PencilObservation again = scene.Pencil("again", PencilDirection::kFree, Vector3d::UnitX(), 3);
   observations.pencils.push_back(again);
-  estimate = Solve("line_pairs", observations);
+  estimate = SolveDefined("line_pairs", observations);
   EXPECT_EQ(estimate.status.code, StatusCode::kRefused);
   EXPECT_NE(estimate.status.message.find("same direction"), std::string::npos)
       << estimate.status.message;
@@ -206,7 +200,7 @@ TEST(DegeneracyTest, LinesMayRunAnywhere) {
   Observations observations = scene.Empty();
   // Of three lines each the middle one is seen through the principal point: horizontal, vertical.
   observations.pencils = {AlongX(&scene, 3), AlongY(&scene, 3)};
-  const PoseEstimate estimate = Solve("line_pairs", observations);
+  const PoseEstimate estimate = SolveDefined("line_pairs", observations);
   ASSERT_EQ(estimate.hypotheses.size(), 1U) << estimate.status.message;
   EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
 }
@@ -238,7 +232,7 @@ TEST(DegeneracyTest, UnusablePencilsAreNamed) {
     Observations observations = scene.Empty();
     observations.pencils = {AlongX(&scene), AlongY(&scene)};
     broken.damage(&observations.pencils[1]);
-    const PoseEstimate estimate = Solve("line_pairs", observations);
+    const PoseEstimate estimate = SolveDefined("line_pairs", observations);
     ASSERT_FALSE(estimate.status.ok()) << broken.name;
     EXPECT_NE(estimate.status.message.find("L2"), std::string::npos)
         << broken.name << ": " << estimate.status.message;
@@ -279,7 +273,7 @@ TEST(DegeneracyTest, UnusableContoursAreNamed) {
     observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
     observations.circles[0].center = scene.Pixel(0.5, 0.2);
     broken.damage(&observations.circles[0]);
-    const PoseEstimate estimate = Solve("circle_center", observations);
+    const PoseEstimate estimate = SolveDefined("circle_center", observations);
     ASSERT_FALSE(estimate.status.ok()) << broken.name;
     EXPECT_NE(estimate.status.message.find("c0"), std::string::npos)
         << broken.name << ": " << estimate.status.message;
@@ -296,7 +290,7 @@ TEST(DegeneracyTest, ShortArcsKnowWhatTheyDoNotKnow) {
     CircleObservation circle = scene.Circle("c0", 0.5, 0.2, 2.0, 360);
     circle.points.resize(static_cast<std::size_t>(degrees));
     observations.circles = {circle};
-    const PoseEstimate estimate = Solve("single_circle", observations);
+    const PoseEstimate estimate = SolveDefined("single_circle", observations);
     ASSERT_EQ(estimate.hypotheses.size(), 2U) << degrees << estimate.status.message;
     // The rotation about the normal is free: what is left of its covariance is the normal's.
     const auto& best = *std::min_element(estimate.hypotheses.begin(), estimate.hypotheses.end(),

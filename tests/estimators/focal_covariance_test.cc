@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_focal.h"
 #include "circline/estimators/focal_length.h"
 #include "circline/estimators/plane_focal.h"

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_focal.h"
 #include "circline/estimators/plane_focal.h"
 #include "circline/estimators/random.h"

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/line.h"
@@ -20,8 +21,6 @@
 
 namespace circline {
 
-inline constexpr double kPi = 3.14159265358979323846;
-inline constexpr double kDegree = kPi / 180.0;
 inline constexpr double kGuess = 800.0;  // Pixels: the length that the coordinates are in units of.
 inline constexpr double kMinFocal = 0.35, kMaxFocal = 7.0;
 inline constexpr double kSigma = 0.1;  // Pixels: small, so that first order holds.

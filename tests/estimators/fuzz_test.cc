@@ -11,6 +11,7 @@
 #include <limits>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/circular_points.h"
@@ -109,7 +110,7 @@ class Fuzzer {
     std::vector<CalibratedPoint> points(static_cast<std::size_t>(random.UniformInt(24)));
     const Vector2d a = Vector2(), b = Vector2();
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const double t = random.Uniform(0.0, 6.283185307179586);
+      const double t = random.Uniform(0.0, 2.0 * kPi);
       switch (shape_) {
         case 0:
           points[i].x = a + t * b;

@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/random.h"
 
@@ -17,8 +18,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 // The plane seen from above at a slant, +Z towards the camera or away from it.
 CameraPose SlantedPose(bool towards = true) {

@@ -4,12 +4,11 @@
 
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 
 namespace circline {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 Observations MakePhoto() {
   Observations photo;

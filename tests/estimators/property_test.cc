@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/circular_points.h"
 #include "circline/estimators/line_pose.h"
@@ -23,9 +24,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kDegree = kPi / 180.0;
 
 int NumScenes() {
   const char* text = std::getenv("CIRCLINE_PROPERTY_SCENES");

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
@@ -44,7 +46,7 @@ TEST_P(RobustLossTest, KeepsNinetyFivePercentOfTheEfficiency) {
   double slope = 0.0, square = 0.0;
   constexpr double kStep = 1e-3;
   for (double r = -9.0; r < 9.0; r += kStep) {
-    const double density = std::exp(-0.5 * r * r) / std::sqrt(2.0 * 3.14159265358979323846) * kStep;
+    const double density = std::exp(-0.5 * r * r) / std::sqrt(2.0 * kPi) * kStep;
     slope += (psi(r + 1e-4) - psi(r - 1e-4)) / 2e-4 * density;
     square += psi(r) * psi(r) * density;
   }

@@ -7,14 +7,13 @@
 #include <cstdint>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/conic_model.h"
 
 namespace circline::conic_scene {
-
-constexpr double kPi = 3.14159265358979323846;
 
 inline Camera TestCamera() {
   Camera camera;
@@ -68,14 +67,14 @@ inline Scene MakeScene(std::uint64_t seed, double outlier_ratio, double arc_deg 
   std::vector<Eigen::Vector2d> truth, pixels, normals;
   const double start = random.Uniform(0.0, 2.0 * kPi);
   for (int i = 0; i < 100; ++i) {
-    const double t = start + arc_deg / 180.0 * kPi * i / 100.0;
+    const double t = start + arc_deg * kDegree * i / 100.0;
     truth.push_back(EllipsePoint(ellipse, t));
     normals.push_back(normal_of(ellipse, t));
     pixels.push_back(truth.back() + noise());
   }
   Eigen::Vector2d half = Eigen::Vector2d::Zero();
   for (int i = 0; i < 360; ++i) {
-    half = half.cwiseMax((EllipsePoint(ellipse, i * kPi / 180.0) - ellipse.center).cwiseAbs());
+    half = half.cwiseMax((EllipsePoint(ellipse, i * kDegree) - ellipse.center).cwiseAbs());
   }
   half *= 1.5;
   const auto in_box = [&] {

@@ -7,19 +7,12 @@
 #include <cmath>
 
 #include "circline/estimators/random.h"
+#include "tests/ransac/conic_scene.h"
 
 namespace circline {
 namespace {
 
-Camera TestCamera() {
-  Camera camera;
-  camera.fx = camera.fy = 800.0;
-  camera.cx = 320.0;
-  camera.cy = 240.0;
-  return camera;
-}
-
-struct Scene {
+struct LineScene {
   std::vector<CalibratedPoint> points, truth;
 
   // In units of the Cramer-Rao bound (2 parameters).
@@ -34,7 +27,7 @@ struct Scene {
 };
 
 // 100 points along 300 px with sigma 1 px, outliers uniform in 400 x 400 px.
-Scene MakeScene(std::uint64_t seed, double outlier_ratio, double sigma = 1.0) {
+LineScene MakeLineScene(std::uint64_t seed, double outlier_ratio, double sigma = 1.0) {
   Random random(seed);
   const double angle = random.Uniform(0.0, 3.14159);
   const Eigen::Vector2d along(std::cos(angle), std::sin(angle)), center(320.0, 240.0);
@@ -50,9 +43,9 @@ Scene MakeScene(std::uint64_t seed, double outlier_ratio, double sigma = 1.0) {
     const double x = random.Uniform(-200.0, 200.0), y = random.Uniform(-200.0, 200.0);
     pixels.push_back(center + Eigen::Vector2d(x, y));
   }
-  Scene scene;
-  PixelsToCalibrated(TestCamera(), pixels, &scene.points);
-  PixelsToCalibrated(TestCamera(), truth, &scene.truth);
+  LineScene scene;
+  PixelsToCalibrated(conic_scene::TestCamera(), pixels, &scene.points);
+  PixelsToCalibrated(conic_scene::TestCamera(), truth, &scene.truth);
   return scene;
 }
 
@@ -63,7 +56,7 @@ TEST(FitLineRobust, IsEfficientUpToSeventyPercentOutliers) {
   for (const Case& c : {Case{0.0, 1.0}, Case{0.5, 1.05}, Case{0.7, 1.1}}) {
     std::vector<double> errors;
     for (std::uint64_t seed = 0; seed < 100; ++seed) {
-      const Scene scene = MakeScene(seed, c.outlier_ratio);
+      const LineScene scene = MakeLineScene(seed, c.outlier_ratio);
       LineFit fit;
       ASSERT_TRUE(FitLineRobust(scene.points, RobustFitOptions(), &fit).ok());
       errors.push_back(scene.Error(fit.line));
@@ -76,7 +69,7 @@ TEST(FitLineRobust, IsEfficientUpToSeventyPercentOutliers) {
 }
 
 TEST(FitLineRobust, MaskIsThatOfTheReturnedLine) {
-  const Scene scene = MakeScene(3, 0.6);
+  const LineScene scene = MakeLineScene(3, 0.6);
   const RobustFitOptions options;
   LineFit fit;
   std::vector<std::uint8_t> mask;
@@ -89,7 +82,7 @@ TEST(FitLineRobust, MaskIsThatOfTheReturnedLine) {
 }
 
 TEST(FitLineRobust, CleanPointsGiveTheFitOfEstimators) {
-  const Scene scene = MakeScene(3, 0.0, 0.3);
+  const LineScene scene = MakeLineScene(3, 0.0, 0.3);
   LineFit robust, direct;
   ASSERT_TRUE(FitLineRobust(scene.points, RobustFitOptions(), &robust).ok());
   ASSERT_TRUE(FitLine(scene.points, 1.0, &direct).ok());
@@ -99,7 +92,7 @@ TEST(FitLineRobust, CleanPointsGiveTheFitOfEstimators) {
 
 TEST(FitLineRobust, TwoPointsAreFittedAsTheyAre) {
   std::vector<CalibratedPoint> points;
-  PixelsToCalibrated(TestCamera(), {{100.0, 200.0}, {400.0, 250.0}}, &points);
+  PixelsToCalibrated(conic_scene::TestCamera(), {{100.0, 200.0}, {400.0, 250.0}}, &points);
   LineFit fit;
   std::vector<std::uint8_t> mask;
   ASSERT_TRUE(FitLineRobust(points, RobustFitOptions(), &fit, &mask).ok());
@@ -110,8 +103,8 @@ TEST(FitLineRobust, TwoPointsAreFittedAsTheyAre) {
 
 TEST(FitLineRobust, OneStrayPointOfFour) {
   std::vector<CalibratedPoint> points;
-  PixelsToCalibrated(TestCamera(), {{100.0, 200.0}, {200.0, 200.1}, {240.0, 260.0}, {400.0, 200.0}},
-                     &points);
+  PixelsToCalibrated(conic_scene::TestCamera(),
+                     {{100.0, 200.0}, {200.0, 200.1}, {240.0, 260.0}, {400.0, 200.0}}, &points);
   LineFit fit;
   std::vector<std::uint8_t> mask;
   ASSERT_TRUE(FitLineRobust(points, RobustFitOptions(), &fit, &mask).ok());
@@ -124,7 +117,8 @@ TEST(FitLineRobust, RefusesWhatHoldsNoLine) {
   EXPECT_EQ(FitLineRobust({}, options, &fit).code, StatusCode::kRefused);
   for (const std::size_t n : {1u, 2u, 10u}) {
     std::vector<CalibratedPoint> points;
-    PixelsToCalibrated(TestCamera(), std::vector<Eigen::Vector2d>(n, {100.0, 50.0}), &points);
+    PixelsToCalibrated(conic_scene::TestCamera(), std::vector<Eigen::Vector2d>(n, {100.0, 50.0}),
+                       &points);
     EXPECT_EQ(FitLineRobust(points, options, &fit).code, StatusCode::kRefused) << n;
   }
 }
@@ -133,13 +127,13 @@ TEST(FitLineRobust, NamesBadOptions) {
   RobustFitOptions options;
   options.sigma_px = -1.0;
   LineFit fit;
-  const Status status = FitLineRobust(MakeScene(1, 0.0).points, options, &fit);
+  const Status status = FitLineRobust(MakeLineScene(1, 0.0).points, options, &fit);
   EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
   EXPECT_NE(status.message.find("sigma_px"), std::string::npos);
 }
 
 TEST(LineModel, ResidualsAreDistancesInPixels) {
-  const Scene scene = MakeScene(2, 0.5);
+  const LineScene scene = MakeLineScene(2, 0.5);
   const LineModel model(scene.points);
   const std::array<int, 2> sample{3, 90};
   LineModel::Value value;

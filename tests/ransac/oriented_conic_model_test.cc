@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/ransac.h"
 #include "tests/ransac/conic_scene.h"
@@ -12,7 +13,6 @@
 namespace circline {
 namespace {
 
-using conic_scene::kPi;
 using conic_scene::MakeScene;
 using conic_scene::Scene;
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/random.h"
 #include "tests/ransac/conic_scene.h"
@@ -15,7 +16,6 @@ namespace circline {
 namespace {
 
 using conic_scene::Clutter;
-using conic_scene::kPi;
 using conic_scene::MakeScene;
 using conic_scene::Scene;
 using conic_scene::TestCamera;

@@ -7,13 +7,13 @@
 #include <cmath>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/random.h"
 
 namespace circline::segment_scene {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocal = 800.0;
 
 inline Camera TestCamera() {

@@ -11,10 +11,12 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/random.h"
 #include "circline/refine/estimate_pose.h"
 #include "tests/pinhole_camera.h"
+#include "tests/refine/simulated_options.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -23,8 +25,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 // A circle of radius 1 somewhere in the photo, tilted by `tilt` against the line of sight.
 CirclePose RandomCircle(double distance, double tilt, Random* random) {
@@ -58,13 +58,6 @@ CircleObservation Observe(const Camera& camera, const CirclePose& circle, double
     observation.points.push_back(Noisy(pixel, sigma_px, random));
   }
   return observation;
-}
-
-EstimationOptions LeastSquares() {
-  EstimationOptions options;
-  options.noise_model = NoiseModel::Exact();
-  options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
-  return options;
 }
 
 // Covariance of the normal (its two tangent components) from noisy points on rings of the given
@@ -131,8 +124,7 @@ TEST(RingsTest, NormalSitsOnTheBoundOfBothRings) {
   }
   if (kSanitized) return;
   std::printf("two rings: rms of the normal %.3f degrees, bound %.3f, ratio %.3f\n",
-              std::sqrt(square) * 180.0 / kPi, std::sqrt(bound) * 180.0 / kPi,
-              std::sqrt(square / bound));
+              std::sqrt(square) / kDegree, std::sqrt(bound) / kDegree, std::sqrt(square / bound));
   EXPECT_LE(std::sqrt(square / bound), 1.05);
 }
 

@@ -13,6 +13,7 @@
 #include <memory>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
@@ -21,7 +22,6 @@ namespace circline {
 namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-constexpr double kPi = 3.14159265358979323846;
 
 Camera LensCamera() {
   Camera camera;

@@ -7,6 +7,7 @@
 #include <map>
 #include <string>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/refined_solvers.h"
 #include "tests/paper_scene.h"
@@ -97,7 +98,7 @@ TEST(EfficiencyTest, OrthogonalDistancesLeanSmallRingsOverLess) {
       circle.concentric = "g0";
       circle.sigma_px = kSigmaPx;
       for (int k = 0; k < 60; ++k) {
-        const double a = 6.283185307 * k / 60.0;
+        const double a = 2.0 * kPi * k / 60.0;
         const Eigen::Vector3d on(radius * std::cos(a), radius * std::sin(a), 0.0);
         Eigen::Vector2d pixel;
         CameraToPixel(observations.camera, pose.rotation * on + pose.translation, &pixel);

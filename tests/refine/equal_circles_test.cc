@@ -9,6 +9,7 @@
 #include "circline/estimators/circle_pose.h"
 #include "circline/refine/estimate_pose.h"
 #include "tests/plane_scene.h"
+#include "tests/refine/simulated_options.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -72,16 +73,6 @@ double Bound(bool equal) {
   }
   const Eigen::MatrixXd covariance = (J.transpose() * J).inverse();
   return std::sqrt(covariance.topLeftCorner<2, 2>().trace());
-}
-
-EstimationOptions Exact() {
-  EstimationOptions options;
-  options.noise_model = NoiseModel::Exact();
-  return options;
-}
-
-double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
-  return std::asin(h.cam_from_world.rotation.col(2).cross(scene.pose.rotation.col(2)).norm());
 }
 
 TEST(EqualCirclesTest, NormalSitsOnItsBound) {

@@ -8,25 +8,16 @@
 #include <cstdio>
 #include <limits>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/refined_solvers.h"
 #include "tests/paper_scene.h"
 #include "tests/plane_scene.h"
+#include "tests/refine/simulated_options.h"
 #include "tests/trials.h"
 
 namespace circline {
 namespace {
-
-double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
-  return h.cam_from_world.rotation.col(2).cross(scene.pose.rotation.col(2)).norm();
-}
-
-// Simulated evidence has the noise of points and nothing else.
-EstimationOptions Exact() {
-  EstimationOptions options;
-  options.noise_model = NoiseModel::Exact();
-  return options;
-}
 
 TEST(EstimatePoseTest, OneCircleHasTwoPosesOfEqualProbability) {
   PlaneScene scene(0.7, 0.2);
@@ -147,7 +138,7 @@ TEST(EstimatePoseTest, PairsLeaveOutWhatIsKnownOfOthers) {
   observations.circles = {scene.Circle("c0", 1.0, 1.0, 0.5)};
   observations.circles[0].plane = "p1";
   observations.frame.plane = "p0";
-  observations.known_angles = {KnownAngle{{"L2", "L3"}, 0.5 * 3.14159265358979323846, 0.0}};
+  observations.known_angles = {KnownAngle{{"L2", "L3"}, 0.5 * kPi, 0.0}};
   observations.known_lengths = {
       KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(1, 0)}, "p1", 1.0}};
   SolverRegistry registry;

@@ -8,9 +8,11 @@
 #include <cstdio>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pencil_lean.h"
 #include "circline/refine/estimate_pose.h"
 #include "tests/plane_scene.h"
+#include "tests/refine/simulated_options.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -19,13 +21,6 @@ namespace {
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-EstimationOptions LeastSquares(const NoiseModel& model) {
-  EstimationOptions options;
-  options.noise_model = model;
-  options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
-  return options;
-}
 
 // Of the normal, two components.
 struct NormalErrors {
@@ -54,7 +49,7 @@ CircleObservation OffPlane(PlaneScene* scene, const char* id, const Vector2d& ce
   const Eigen::Matrix3d turn = ExpRotation({about_x, about_y, 0.0});
   constexpr int kPoints = 60;
   for (int i = 0; i < kPoints; ++i) {
-    const double a = 6.283185307179586 * i / kPoints;
+    const double a = 2.0 * kPi * i / kPoints;
     const Vector3d on = Vector3d(center.x(), center.y(), height * radius) +
                         turn * (radius * Vector3d(std::cos(a), std::sin(a), 0.0));
     circle.points.push_back(scene->Pixel(on.x(), on.y(), on.z()));
@@ -157,7 +152,7 @@ TEST(ImperfectionsTest, ContoursThatShareAnOffsetAreCountedHonestly) {
       const std::vector<Vector2d> exact = circle.points;
       const std::size_t n = exact.size();
       for (std::size_t j = 0; j < n; ++j) {
-        const double a = 6.283185307179586 * static_cast<double>(j) / static_cast<double>(n);
+        const double a = 2.0 * kPi * static_cast<double>(j) / static_cast<double>(n);
         PlaneScene still(0.7, 0.0);
         const auto on = [&](double angle) -> Vector2d {
           Vector2d pixel;
@@ -170,7 +165,7 @@ TEST(ImperfectionsTest, ContoursThatShareAnOffsetAreCountedHonestly) {
         };
         const Vector2d along = (on(a + 1e-4) - on(a - 1e-4)).normalized();
         Vector2d out(along.y(), -along.x());
-        if (out.dot(on(a) - on(a + 3.14159265358979)) < 0.0) out = -out;
+        if (out.dot(on(a) - on(a + kPi)) < 0.0) out = -out;
         circle.points[j] += offset * out;
       }
       observations.circles.push_back(circle);

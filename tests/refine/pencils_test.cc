@@ -13,9 +13,11 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 #include "circline/refine/estimate_pose.h"
 #include "tests/pinhole_camera.h"
+#include "tests/refine/simulated_options.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -25,7 +27,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 constexpr double kSigmaPx = 1.0;
 
 enum class Angle { kHard, kSoft, kAbsent };
@@ -140,13 +141,6 @@ Matrix3d Bound(const Scene& scene, Angle angle, double angle_sigma) {
   if (angle == Angle::kHard) return information.topLeftCorner<3, 3>().inverse();
   if (angle == Angle::kSoft) information(3, 3) += 1.0 / (angle_sigma * angle_sigma);
   return information.inverse().topLeftCorner<3, 3>();
-}
-
-EstimationOptions LeastSquares() {
-  EstimationOptions options;
-  options.noise_model = NoiseModel::Exact();
-  options.line_loss.type = LossType::kTrivial;
-  return options;
 }
 
 // Lines alone do not tell the senses of the axes.

@@ -9,6 +9,7 @@
 
 #include "circline/refine/estimate_pose.h"
 #include "tests/plane_scene.h"
+#include "tests/refine/simulated_options.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -16,13 +17,6 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-EstimationOptions LeastSquares() {
-  EstimationOptions options;
-  options.noise_model = NoiseModel::Exact();
-  options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
-  return options;
-}
 
 Observations OneCircle(PlaneScene* scene) {
   Observations observations = scene->Empty();
@@ -33,10 +27,6 @@ Observations OneCircle(PlaneScene* scene) {
 
 double Between(const Vector3d& a, const Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
-double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
-  return Between(h.cam_from_world.rotation.col(2), scene.pose.rotation.col(2));
 }
 
 PosePrior Around(const CameraPose& mean, double sigma_rad, double sigma_t) {

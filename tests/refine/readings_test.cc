@@ -9,9 +9,11 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/refined_solvers.h"
 #include "tests/plane_scene.h"
+#include "tests/refine/simulated_options.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -20,18 +22,6 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Ids = std::vector<std::string>;
-
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
-
-EstimationOptions Exact() {
-  EstimationOptions options;
-  options.noise_model = NoiseModel::Exact();
-  return options;
-}
-
-double NormalError(const PoseHypothesis& h, const PlaneScene& scene) {
-  return std::asin(h.cam_from_world.rotation.col(2).cross(scene.pose.rotation.col(2)).norm());
-}
 
 double SigmaNormal(const PoseHypothesis& h) {
   const Eigen::Matrix<double, 3, 2> tangents = h.cam_from_world.rotation.leftCols<2>();

@@ -7,13 +7,13 @@
 #include <utility>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
 namespace circline {
 namespace {
 
 using detection_test::Develop;
-using detection_test::kPi;
 using detection_test::PixelPattern;
 using detection_test::Render;
 

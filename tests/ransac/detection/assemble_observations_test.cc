@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
@@ -17,7 +18,6 @@ namespace circline {
 namespace {
 
 using detection_test::AxisDeg;
-using detection_test::kDegrees;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -26,7 +26,7 @@ DetectedPencil Pencil(const Vector3d& direction, double support) {
   DetectedPencil pencil;
   VanishingPointFit fit;
   fit.direction = direction.normalized();
-  const double sigma = 0.1 / kDegrees;
+  const double sigma = 0.1 * kDegree;
   fit.covariance =
       sigma * sigma * (Matrix3d::Identity() - fit.direction * fit.direction.transpose());
   pencil.observation.fit = fit;
@@ -101,7 +101,7 @@ TEST(AssembleObservations, OrthogonalPencilsBecomeAxes) {
 // Walls lean by a degree; what is farther off is no wall.
 TEST(AssembleObservations, ARightAngleIsATestNotAWish) {
   for (const double off_deg : {0.3, 1.6, 5.0}) {
-    const double a = off_deg / kDegrees;
+    const double a = off_deg * kDegree;
     const Vector3d skew = std::cos(a) * kFrame.col(1) + std::sin(a) * kFrame.col(0);
     const Observations found = Assemble({}, {Pencil(kFrame.col(0), 900.0), Pencil(skew, 700.0)});
     const bool orthogonal = off_deg < 2.0;

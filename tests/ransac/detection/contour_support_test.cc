@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
@@ -12,7 +13,6 @@ namespace {
 
 using detection_test::Develop;
 using detection_test::DistortedCamera;
-using detection_test::kPi;
 using detection_test::Render;
 using detection_test::TestCamera;
 using Eigen::Matrix3d;
@@ -123,7 +123,7 @@ TEST(Supporter, MeasuresNormalsAtThePointsThemselves) {
   Support support;
   supporter.Collect(samples, BrightSide::kOutside, 1.5, &support);
   EXPECT_GT(support.Coverage(), 0.99);
-  EXPECT_LT(support.normal_median, 1.0 * kPi / 180.0);
+  EXPECT_LT(support.normal_median, 1.0 * kDegree);
 }
 
 TEST(Supporter, TakesEitherBrightSideIfAsked) {

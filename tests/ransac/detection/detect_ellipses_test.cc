@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "tests/ransac/detection/detection_test_util.h"
@@ -22,8 +23,6 @@ using detection_test::Develop;
 using detection_test::DistortedCamera;
 using detection_test::FisheyeCamera;
 using detection_test::HasSet;
-using detection_test::kDegrees;
-using detection_test::kPi;
 using detection_test::LookAt;
 using detection_test::Noise;
 using detection_test::Render;
@@ -32,8 +31,8 @@ using detection_test::TestCamera;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-std::vector<DetectedEllipse> Detect(const cv::Mat& image, const Camera& camera,
-                                    const EllipseOptions& options = {}) {
+std::vector<DetectedEllipse> EllipsesOf(const cv::Mat& image, const Camera& camera,
+                                        const EllipseOptions& options = {}) {
   EdgeMap edges;
   EXPECT_TRUE(DetectEdges(image, EdgeOptions(), &edges).ok());
   std::vector<DetectedEllipse> ellipses;
@@ -72,7 +71,7 @@ TEST(DetectEllipses, FindsATiltedDiscThroughEveryLens) {
     for (const double tilt : {20.0, 45.0, 65.0}) {
       CameraPose pose = LookAt(tilt, 10.0, 0.0, distance);
       pose.translation += Vector3d(0.6, -0.3, 0.0);  // Off the axis, where the lens bends.
-      const std::vector<DetectedEllipse> found = Detect(Disc(camera, pose), camera);
+      const std::vector<DetectedEllipse> found = EllipsesOf(Disc(camera, pose), camera);
       ASSERT_EQ(found.size(), 1U) << "tilt " << tilt << " focal " << camera.fx;
       EXPECT_GT(found[0].coverage_deg, 350.0);
       EXPECT_EQ(found[0].bright, BrightSide::kOutside);
@@ -94,7 +93,7 @@ TEST(DetectEllipses, NeverRoundsAnEllipseToACircle) {
     return x.dot(conic * x) * conic(0, 0) < 0.0 ? 30.0 : 170.0;
   }));
   Camera camera = TestCamera(300, 280, 300.0);
-  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
   ASSERT_EQ(found.size(), 1U);
   Ellipse e;
   ASSERT_TRUE(ConicToEllipse(found[0].fit.conic, &e));
@@ -106,7 +105,7 @@ TEST(DetectEllipses, NeverRoundsAnEllipseToACircle) {
 TEST(DetectEllipses, GroupsTheRimsOfARing) {
   const Camera camera = TestCamera();
   const CameraPose pose = LookAt(40.0, 0.0, 0.0, 6.0);
-  std::vector<DetectedEllipse> found = Detect(Disc(camera, pose, 1.6), camera);
+  std::vector<DetectedEllipse> found = EllipsesOf(Disc(camera, pose, 1.6), camera);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_GE(found[0].concentric, 0);
   EXPECT_EQ(found[0].concentric, found[1].concentric);
@@ -122,11 +121,11 @@ TEST(DetectEllipses, FindsARimInPiecesBesideAWholeOne) {
   const Camera camera = TestCamera();
   const CameraPose pose = LookAt(40.0, 0.0, 0.0, 4.0);
   const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [](double x, double y) {
-    const double r = std::hypot(x, y), sector = std::atan2(y, x) * kDegrees / 18.0;
+    const double r = std::hypot(x, y), sector = std::atan2(y, x) / kDegree / 18.0;
     const double edge = sector - std::floor(sector) < 0.5 ? 0.7 : 0.0;
     return r < edge ? 200.0 : r < 1.2 ? 30.0 : 200.0;
   }));
-  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_LT(BetterNormalDeg(found[1], pose.rotation.col(2)), 1.0);
   EXPECT_EQ(found[0].concentric, found[1].concentric);
@@ -137,7 +136,7 @@ TEST(DetectEllipses, FindsARimInPiecesBesideAWholeOne) {
 TEST(DetectEllipses, LeavesTheEdgesOfOneRimApart) {
   const Camera camera = TestCamera();
   const std::vector<DetectedEllipse> found =
-      Detect(Disc(camera, LookAt(40.0, 0.0, 0.0, 6.0), 1.12), camera);
+      EllipsesOf(Disc(camera, LookAt(40.0, 0.0, 0.0, 6.0), 1.12), camera);
   ASSERT_EQ(found.size(), 2U);
   for (const DetectedEllipse& e : found) EXPECT_EQ(e.concentric, -1);
 }
@@ -150,7 +149,7 @@ TEST(DetectEllipses, KeepsNeighboursApart) {
     const double u = x - 1.5 * std::round(x / 1.5), v = y - 1.5 * std::round(y / 1.5);
     return std::hypot(u, v) < 0.4 ? 30.0 : 200.0;
   }));
-  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
   EXPECT_EQ(found.size(), 15U);  // 5 x 3.
   for (const DetectedEllipse& e : found) EXPECT_EQ(e.concentric, -1);
 }
@@ -166,7 +165,7 @@ TEST(DetectEllipses, FindsAnOccludedDisc) {
                                               return std::hypot(x, y) < 1.0 ? 40.0 : 120.0;
                                             }),
                                 0.7, 2.0);
-  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_GT(found[0].coverage_deg, 150.0);
   EXPECT_LT(found[0].coverage_deg, 290.0);
@@ -179,7 +178,7 @@ TEST(DetectEllipses, FindsAGreyDiscBeforeBlackAndWhite) {
   const cv::Mat image = Develop(RenderPlane(camera, pose, 20.0, [](double x, double y) {
     return std::hypot(x, y) < 1.0 ? 120.0 : x + 0.3 * y < 0.1 ? 20.0 : 220.0;
   }));
-  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].bright, BrightSide::kEither);
   EXPECT_GT(found[0].coverage_deg, 300.0);
@@ -193,7 +192,7 @@ TEST(DetectEllipses, FindsADiscAmongWhatTouchesIt) {
   const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [](double x, double y) {
     return std::hypot(x, y) < 1.0 || std::hypot(x - 1.05, y - 0.2) < 0.25 ? 40.0 : 200.0;
   }));
-  const std::vector<DetectedEllipse> found = Detect(image, camera);
+  const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
   ASSERT_GE(found.size(), 1U);
   EXPECT_GT(found[0].coverage_deg, 290.0);
   EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3);
@@ -215,7 +214,7 @@ TEST(DetectEllipses, UndoesWhatTheBendDoesToTheRim) {
                                          }),
                                   blur);
     const Camera camera = TestCamera(120, 100, 300.0);
-    const std::vector<DetectedEllipse> found = Detect(image, camera);
+    const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
     ASSERT_EQ(found.size(), 1U);
     Ellipse e;
     ASSERT_TRUE(ConicToEllipse(found[0].fit.conic, &e));
@@ -243,7 +242,7 @@ TEST(DetectEllipses, KeepsToTheRimsBesideAPenumbra) {
   const cv::Mat image = cv::imread(folder + file, cv::IMREAD_GRAYSCALE);
   const Camera camera = TestCamera(image.cols, image.rows, image.cols);
   std::vector<Ellipse> found;
-  for (const DetectedEllipse& e : Detect(image, camera)) found.push_back(InPixels(e, camera));
+  for (const DetectedEllipse& e : EllipsesOf(image, camera)) found.push_back(InPixels(e, camera));
   const cv::FileStorage storage(folder + "groundtruth.yml", cv::FileStorage::READ);
   int labels = 0, hits = 0;
   for (const cv::FileNode& node : storage["images"]) {
@@ -269,25 +268,25 @@ TEST(DetectEllipses, RespectsItsLimits) {
   const cv::Mat image = Disc(camera, LookAt(40.0, 0.0, 0.0, 6.0), 1.6);
   EllipseOptions options;
   options.min_axis_px = 80.0;  // The inner semi-axes are about 83 x 63, the outer ones 133 x 101.
-  EXPECT_EQ(Detect(image, camera, options).size(), 1U);
+  EXPECT_EQ(EllipsesOf(image, camera, options).size(), 1U);
 }
 
 TEST(DetectEllipses, FindsNoneWhereThereAreNone) {
   const Camera camera = TestCamera(320, 240);
-  EXPECT_TRUE(Detect(cv::Mat(240, 320, CV_8UC1, cv::Scalar(100)), camera).empty());
+  EXPECT_TRUE(EllipsesOf(cv::Mat(240, 320, CV_8UC1, cv::Scalar(100)), camera).empty());
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    EXPECT_TRUE(Detect(Noise(320, 240, 30.0, seed), camera).empty()) << seed;
+    EXPECT_TRUE(EllipsesOf(Noise(320, 240, 30.0, seed), camera).empty()) << seed;
   }
   const cv::Mat squares = Develop(Render(320, 240, [](double u, double v) {
     return std::fmod(u, 60.0) < 30.0 && std::fmod(v, 60.0) < 30.0 ? 40.0 : 190.0;
   }));
-  EXPECT_TRUE(Detect(squares, camera).empty());
+  EXPECT_TRUE(EllipsesOf(squares, camera).empty());
 }
 
 TEST(DetectEllipses, IsRepeatable) {
   const Camera camera = TestCamera();
   const cv::Mat image = Disc(camera, LookAt(40.0, 15.0, 0.0, 6.0), 1.6, 10.0);
-  const std::vector<DetectedEllipse> a = Detect(image, camera), b = Detect(image, camera);
+  const std::vector<DetectedEllipse> a = EllipsesOf(image, camera), b = EllipsesOf(image, camera);
   ASSERT_EQ(a.size(), 2U);
   ASSERT_EQ(b.size(), 2U);
   for (std::size_t k = 0; k < a.size(); ++k) {

@@ -23,8 +23,8 @@ using detection_test::TestCamera;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-std::vector<DetectedLine> Detect(const cv::Mat& image, const Camera& camera,
-                                 const LineOptions& options = {}) {
+std::vector<DetectedLine> LinesOf(const cv::Mat& image, const Camera& camera,
+                                  const LineOptions& options = {}) {
   EdgeMap edges;
   EXPECT_TRUE(DetectEdges(image, EdgeOptions(), &edges).ok());
   std::vector<DetectedLine> lines;
@@ -52,7 +52,7 @@ TEST(DetectLines, KeepsALongLineWholeThroughEveryLens) {
     pose.translation.x() = camera.fx > 300.0 ? 1.1 : 2.2;  // Near the border, where the lens bends.
     const cv::Mat image = Develop(
         RenderPlane(camera, pose, 60.0, [](double x, double) { return x > 0.0 ? 180.0 : 60.0; }));
-    const std::vector<DetectedLine> lines = Detect(image, camera);
+    const std::vector<DetectedLine> lines = LinesOf(image, camera);
     ASSERT_EQ(lines.size(), 1U) << camera.fx;
     EXPECT_GT(lines[0].length_px, 200.0);
     EXPECT_LT(AxisDeg(lines[0].fit.line, TrueLine(pose)), 0.02);
@@ -72,7 +72,7 @@ TEST(DetectLines, JoinsTheSidesOfARowOfSquares) {
     return (static_cast<int>(std::floor(x)) + static_cast<int>(std::floor(y))) % 2 == 0 ? 30.0
                                                                                         : 220.0;
   }));
-  const std::vector<DetectedLine> lines = Detect(image, camera);
+  const std::vector<DetectedLine> lines = LinesOf(image, camera);
   // Seven lines along y (six squares wide) and five along x, each in one piece. The outer ones
   // border every other square only.
   ASSERT_GE(lines.size(), 12U);
@@ -106,7 +106,7 @@ TEST(DetectLines, JoinsSidesThatTheBrightBleedsAcross) {
                : 220.0;
   }));
   int whole = 0;
-  for (const DetectedLine& line : Detect(image, camera)) {
+  for (const DetectedLine& line : LinesOf(image, camera)) {
     if ((line.ends[1] - line.ends[0]).norm() < 150.0) continue;
     ++whole;
     const Vector3d l = line.fit.line;
@@ -128,7 +128,7 @@ TEST(DetectLines, StatesHowWellItKnowsALine) {
   const Vector3d truth = TrueLine(pose);
   const Vector3d direction = pose.rotation.col(1);
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    const std::vector<DetectedLine> lines = Detect(Develop(clean, 0.7, 12.0, seed), camera);
+    const std::vector<DetectedLine> lines = LinesOf(Develop(clean, 0.7, 12.0, seed), camera);
     if (lines.empty() || AxisDeg(lines[0].fit.line, truth) > 1.0) continue;
     const double variance = direction.dot(lines[0].fit.covariance * direction);
     const double miss = lines[0].fit.line.dot(direction);
@@ -143,7 +143,7 @@ TEST(DetectLines, ACircleIsNoLine) {
   const cv::Mat image = Develop(Render(300, 300, [](double u, double v) {
     return std::hypot(u - 150.0, v - 150.0) < 90.0 ? 40.0 : 160.0;
   }));
-  for (const DetectedLine& line : Detect(image, TestCamera(300, 300))) {
+  for (const DetectedLine& line : LinesOf(image, TestCamera(300, 300))) {
     EXPECT_LT(line.length_px, 45.0);  // Chords whose sagitta is within the noise.
   }
 }
@@ -176,7 +176,7 @@ TEST(DetectLines, KeepsBentEdgesApart) {
   ASSERT_EQ(bent.size(), 1U);
   EXPECT_TRUE(near(bent[0], 29.5));
   EXPECT_GT(bent[0].length_px, 70.0);
-  EXPECT_EQ(Detect(image, TestCamera(200, 120), options).size(), 2U);
+  EXPECT_EQ(LinesOf(image, TestCamera(200, 120), options).size(), 2U);
 }
 
 TEST(DetectLines, DropsShortOnesAndSkippedPoints) {
@@ -184,12 +184,12 @@ TEST(DetectLines, DropsShortOnesAndSkippedPoints) {
     return u > 30.2 && u < 90.1 && v > 40.3 && v < 70.4 ? 40.0 : 160.0;
   }));
   const Camera camera = TestCamera(120, 120);
-  EXPECT_EQ(Detect(image, camera).size(), 4U);
+  EXPECT_EQ(LinesOf(image, camera).size(), 4U);
   LineOptions options;
   options.min_length_px = 40.0;
-  EXPECT_EQ(Detect(image, camera, options).size(), 2U);
+  EXPECT_EQ(LinesOf(image, camera, options).size(), 2U);
   options.max_lines = 1;
-  EXPECT_EQ(Detect(image, camera, options).size(), 1U);
+  EXPECT_EQ(LinesOf(image, camera, options).size(), 1U);
   EdgeMap edges;
   ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &edges).ok());
   const std::vector<std::uint8_t> skip(edges.points.size(), 1);
@@ -200,8 +200,8 @@ TEST(DetectLines, DropsShortOnesAndSkippedPoints) {
 
 TEST(DetectLines, FindsFewInNoiseAndNoneOnABlankImage) {
   const Camera camera = TestCamera(320, 240);
-  EXPECT_TRUE(Detect(cv::Mat(240, 320, CV_8UC1, cv::Scalar(3)), camera).empty());
-  EXPECT_LE(Detect(Noise(320, 240, 30.0), camera).size(), 3U);
+  EXPECT_TRUE(LinesOf(cv::Mat(240, 320, CV_8UC1, cv::Scalar(3)), camera).empty());
+  EXPECT_LE(LinesOf(Noise(320, 240, 30.0), camera).size(), 3U);
 }
 
 TEST(DetectLines, NamesTheOptionThatIsWrong) {

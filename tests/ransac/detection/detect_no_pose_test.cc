@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/detection/detect_observations.h"
 #include "tests/ransac/detection/detection_test_util.h"
@@ -19,7 +20,6 @@ namespace {
 using detection_test::Detect;
 using detection_test::Develop;
 using detection_test::FisheyeCamera;
-using detection_test::kDegrees;
 using detection_test::LookAt;
 using detection_test::Noise;
 using detection_test::Render;
@@ -107,7 +107,7 @@ TEST(DetectObservations, OneCircleIsSaidToHaveTwoPoses) {
     ASSERT_TRUE(PixelToCalibrated(camera, circle.points[k], &p));
     const Vector3d polar = circle.fit->conic * p.Homogeneous();
     const Vector2d across = p.GradientPerPixel(polar.head<2>()).normalized();
-    EXPECT_GT(std::abs(across.dot(circle.normals[k])), std::cos(15.0 / kDegrees));
+    EXPECT_GT(std::abs(across.dot(circle.normals[k])), std::cos(15.0 * kDegree));
   }
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "tests/ransac/detection/detection_test_util.h"
 #include "tests/ransac/detection/observations_test_util.h"
 
@@ -22,7 +23,6 @@ using detection_test::Detect;
 using detection_test::Develop;
 using detection_test::DistortedCamera;
 using detection_test::FisheyeCamera;
-using detection_test::kDegrees;
 using detection_test::LookAt;
 using detection_test::RenderPlane;
 using detection_test::TestCamera;
@@ -70,7 +70,7 @@ TEST(DetectObservations, DirectionsThatAreNotOrthogonalStayFree) {
   const Camera camera = TestCamera();
   const CameraPose pose = LookAt(30.0, -15.0, 12.0, 12.0);
   for (const double degrees : {86.0, 80.0, 60.0}) {
-    const double s = std::cos(degrees / kDegrees), c = std::sin(degrees / kDegrees);
+    const double s = std::cos(degrees * kDegree), c = std::sin(degrees * kDegree);
     const cv::Mat image = Develop(RenderPlane(camera, pose, 220.0, [=](double x, double y) {
       return Checker(x - y * s / c, y / c, 4.0, 3.0);  // Rows along x, columns along (s, c).
     }));

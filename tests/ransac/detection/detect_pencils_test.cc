@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "circline/estimators/basics.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
@@ -112,8 +113,7 @@ TEST(DetectPencils, ARefitTakesAllLinesOfWhatBends) {
   EXPECT_GE(pencil.members.size(), 0.9 * kLines);
   EXPECT_LT(pencil.members.back(), kLines);
   const double error = AxisDeg(pencil.observation.fit->direction, kFirst);
-  const double sigma =
-      detection_test::kDegrees * std::sqrt(pencil.observation.fit->covariance.trace());
+  const double sigma = std::sqrt(pencil.observation.fit->covariance.trace()) / kDegree;
   EXPECT_LT(error, 3.0 * sigma);
   EXPECT_LT(sigma, 0.6);
   const DetectedPencil before = pencil;

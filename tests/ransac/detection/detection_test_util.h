@@ -13,14 +13,12 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
 
 namespace circline::detection_test {
-
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kDegrees = 180.0 / kPi;
 
 inline Camera TestCamera(int width = 480, int height = 360, double focal = 500.0) {
   Camera camera;
@@ -125,9 +123,9 @@ inline cv::Mat RenderPlane(const Camera& camera, const CameraPose& pose, double 
 // Looks at the origin of Z = 0 from `distance`, tilted about the image's x and y axes and turned.
 inline CameraPose LookAt(double tilt_x_deg, double tilt_y_deg, double turn_deg, double distance) {
   CameraPose pose;
-  pose.rotation = ExpRotation(Eigen::Vector3d(tilt_x_deg / kDegrees, tilt_y_deg / kDegrees, 0.0)) *
+  pose.rotation = ExpRotation(Eigen::Vector3d(tilt_x_deg * kDegree, tilt_y_deg * kDegree, 0.0)) *
                   ExpRotation(Eigen::Vector3d(kPi, 0.0, 0.0)) *
-                  ExpRotation(Eigen::Vector3d(0.0, 0.0, turn_deg / kDegrees));
+                  ExpRotation(Eigen::Vector3d(0.0, 0.0, turn_deg * kDegree));
   pose.translation = Eigen::Vector3d(0.0, 0.0, distance);
   return pose;
 }
@@ -137,7 +135,7 @@ inline cv::Mat Noise(int width, int height, double sigma, std::uint64_t seed = 1
 }
 
 inline double AxisDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return kDegrees * std::atan2(a.cross(b).norm(), std::abs(a.dot(b)));
+  return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) / kDegree;
 }
 
 // Folder with sets of photographs, from the environment or beside the sources; may not exist.

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
 namespace circline {
@@ -15,7 +16,7 @@ constexpr double kTurn = 0.2;     // Radians, of the rows against the image's.
 constexpr double kSquare = 32.0;  // Pixels.
 
 // A field of 6 x 4 squares, the dark ones smaller by `shift` pixels on every side.
-cv::Mat Board(double shift) {
+cv::Mat ShiftedBoard(double shift) {
   const auto is_dark = [shift](double x, double y) {
     for (int i = -3; i < 3; ++i) {
       for (int j = -2; j < 2; ++j) {
@@ -40,7 +41,7 @@ struct Lines {
   std::vector<DetectedLine> lines;
 };
 
-Lines Detect(const cv::Mat& photo) {
+Lines DetectIn(const cv::Mat& photo) {
   Lines result;
   EXPECT_TRUE(DetectEdges(photo, EdgeOptions(), &result.edges).ok());
   EXPECT_TRUE(
@@ -54,7 +55,7 @@ double WorstTurn(const std::vector<DetectedLine>& lines) {
   for (const DetectedLine& line : lines) {
     if (line.length_px < 1.5 * kSquare) continue;
     const double angle = std::atan2(-line.fit.line.x(), line.fit.line.y());
-    worst = std::max(worst, std::abs(std::remainder(angle - kTurn, 0.5 * detection_test::kPi)));
+    worst = std::max(worst, std::abs(std::remainder(angle - kTurn, 0.5 * kPi)));
   }
   return worst;
 }
@@ -62,14 +63,14 @@ double WorstTurn(const std::vector<DetectedLine>& lines) {
 TEST(EdgeShift, IsMeasuredOnLinesOfBothKindsOfEdges) {
   const Camera camera = detection_test::TestCamera();
   for (const double shift : {-0.3, -0.15, 0.15, 0.3}) {
-    const Lines found = Detect(Board(shift));
+    const Lines found = DetectIn(ShiftedBoard(shift));
     EXPECT_NEAR(EstimateEdgeShift(found.edges, camera, found.lines), -shift, 0.05) << shift;
   }
 }
 
 TEST(EdgeShift, UndoneItLeavesLinesStraight) {
   const Camera camera = detection_test::TestCamera();
-  Lines found = Detect(Board(0.3));
+  Lines found = DetectIn(ShiftedBoard(0.3));
   const double before = WorstTurn(found.lines);
   UndoEdgeShift(found.edges, camera, &found.lines);
   EXPECT_GT(before, 0.01);
@@ -78,7 +79,7 @@ TEST(EdgeShift, UndoneItLeavesLinesStraight) {
 
 TEST(EdgeShift, NoneWhereThereIsNone) {
   const Camera camera = detection_test::TestCamera();
-  const Lines found = Detect(Board(0.0));
+  const Lines found = DetectIn(ShiftedBoard(0.0));
   ASSERT_GE(found.lines.size(), 10u);
   EXPECT_NEAR(EstimateEdgeShift(found.edges, camera, found.lines), 0.0, 0.03);
   EXPECT_EQ(EstimateEdgeShift(found.edges, camera, {}), 0.0);

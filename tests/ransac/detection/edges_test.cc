@@ -9,14 +9,13 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
 namespace circline {
 namespace {
 
 using detection_test::Develop;
-using detection_test::kDegrees;
-using detection_test::kPi;
 using detection_test::Noise;
 using detection_test::Render;
 

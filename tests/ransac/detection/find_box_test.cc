@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
@@ -33,7 +34,7 @@ std::vector<DetectedLine> Clutter(const Camera& camera, int count, Random* rando
   std::vector<DetectedLine> lines;
   for (int i = 0; i < count; ++i) {
     const Vector2d from(random->Uniform(20.0, 460.0), random->Uniform(20.0, 340.0));
-    const double angle = random->Uniform(0.0, 2.0 * M_PI), length = random->Uniform(20.0, 90.0);
+    const double angle = random->Uniform(0.0, 2.0 * kPi), length = random->Uniform(20.0, 90.0);
     const Vector2d to = from + length * Vector2d(std::cos(angle), std::sin(angle));
     lines.push_back(LineThrough(camera, from, to, kNoisePx, random));
   }

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "tests/ransac/segment_scene.h"
 
 namespace circline {
@@ -22,7 +23,7 @@ TEST(LineOdds, AreFairWhereverTheLineLies) {
     constexpr int kLines = 20000;
     double sum = 0.0;
     for (int i = 0; i < kLines; ++i) {
-      const double angle = segment_scene::kPi * (i + 0.5) / kLines;
+      const double angle = kPi * (i + 0.5) / kLines;
       const Vector3d along(std::cos(angle), std::sin(angle), 0.0);
       LineFit fit;
       fit.line = along.cross(middle);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "circline/estimators/basics.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
@@ -76,8 +77,7 @@ TEST(LocalPencils, TakeTheLinesOfTheBoardAndNoOthers) {
     }
     EXPECT_LT(*members.rbegin(), scene.num_board) << bend;
     EXPECT_GE(members.size(), 0.8 * scene.num_board) << bend;
-    const double sigma =
-        detection_test::kDegrees * std::sqrt(scene.pair[0].observation.fit->covariance.trace());
+    const double sigma = std::sqrt(scene.pair[0].observation.fit->covariance.trace()) / kDegree;
     EXPECT_LT(AxisDeg(scene.pair[0].observation.fit->direction, kRow), 3.0 * sigma) << bend;
     EXPECT_LT(sigma, 3.0) << bend;
   }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/detection/detect_lines.h"
 #include "circline/ransac/detection/detect_observations.h"
@@ -26,7 +27,6 @@ using detection_test::BetterNormalDeg;
 using detection_test::DataFolder;
 using detection_test::Detect;
 using detection_test::HasSet;
-using detection_test::kDegrees;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -147,7 +147,7 @@ TEST(RealPhotographs, BoxesAreRareOnNormalsOfNothing) {
       for (int trial = 0; trial < 40; ++trial) {
         const double x = random.Normal(), y = random.Normal(), z = random.Normal();
         const Vector3d normal = Vector3d(x, y, z).normalized();
-        if ((axes.transpose() * normal).cwiseAbs().maxCoeff() > std::cos(8.0 / kDegrees)) continue;
+        if ((axes.transpose() * normal).cwiseAbs().maxCoeff() > std::cos(8.0 * kDegree)) continue;
         ++normals;
         found += FindBox(lines, {normal}).has_value() ? 1 : 0;
       }
@@ -184,7 +184,7 @@ TEST(RealPhotographs, BoardsAmongClutterGiveAxesThatKnowTheirError) {
       }
     }
     errors.push_back(AxesErrorDeg(x, y, photo.rotation));
-    EXPECT_LT(errors.back(), 3.0 * kDegrees * std::sqrt(variance)) << photo.file;
+    EXPECT_LT(errors.back(), 3.0 / kDegree * std::sqrt(variance)) << photo.file;
   }
   EXPECT_LT(Median(errors), 1.0);
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic_fit.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
@@ -13,20 +14,19 @@ namespace circline {
 namespace {
 
 using detection_test::AxisDeg;
-using detection_test::kDegrees;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 UncertainDirection Make(const Vector3d& vector, double sigma_deg) {
   UncertainDirection direction;
   direction.vector = vector.normalized();
-  const double sigma = sigma_deg / kDegrees;
+  const double sigma = sigma_deg * kDegree;
   direction.covariance =
       sigma * sigma * (Matrix3d::Identity() - direction.vector * direction.vector.transpose());
   return direction;
 }
 
-Vector3d InXy(double deg) { return {std::cos(deg / kDegrees), std::sin(deg / kDegrees), 0.0}; }
+Vector3d InXy(double deg) { return {std::cos(deg * kDegree), std::sin(deg * kDegree), 0.0}; }
 
 TEST(UncertainDirection, WhatLiesInAPlaneDependsOnHowWellItIsKnown) {
   const UncertainDirection sharp = Make(InXy(0.0), 0.1), blunt = Make(InXy(0.0), 1.5);
@@ -45,7 +45,7 @@ TEST(UncertainDirection, ARightAngleIsNeverFarFromOne) {
 // o / (1 + o) are at right angles.
 TEST(UncertainDirection, TheOddsOfARightAngleAreThoseOfItsPrior) {
   Random random(3);
-  const auto turn = [&random](double sigma_deg) { return sigma_deg * random.Normal() / kDegrees; };
+  const auto turn = [&random](double sigma_deg) { return sigma_deg * random.Normal() * kDegree; };
   int counts[3] = {0, 0, 0}, right[3] = {0, 0, 0};
   for (int trial = 0; trial < 40000; ++trial) {
     const bool is_right = random.Uniform() < 0.5;
@@ -78,7 +78,7 @@ TEST(UncertainDirection, TheSpannedNormalHasTheSpreadOfItsSamples) {
   Random random(1);
   const auto moved = [&random](const UncertainDirection& d, double sigma_deg) {
     const Vector3d noise(random.Normal(), random.Normal(), random.Normal());
-    return Vector3d(d.vector + sigma_deg / kDegrees * d.vector.cross(noise));
+    return Vector3d(d.vector + sigma_deg * kDegree * d.vector.cross(noise));
   };
   Matrix3d scatter = Matrix3d::Zero();
   constexpr int kSamples = 100000;
@@ -91,7 +91,7 @@ TEST(UncertainDirection, TheSpannedNormalHasTheSpreadOfItsSamples) {
 }
 
 Vector3d DrawNormal(double tilt_deg, Random* random) {
-  const double turn = random->Uniform(0.0, 2.0 * detection_test::kPi), tilt = tilt_deg / kDegrees;
+  const double turn = random->Uniform(0.0, 2.0 * kPi), tilt = tilt_deg * kDegree;
   return {std::sin(tilt) * std::cos(turn), std::sin(tilt) * std::sin(turn), -std::cos(tilt)};
 }
 
@@ -102,7 +102,7 @@ ConicFit SmallDisc(const Vector3d& normal, Random* random) {
   const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
   std::vector<CalibratedPoint> points;
   for (int k = 0; k < 40; ++k) {
-    const double angle = k * detection_test::kPi / 20.0;
+    const double angle = k * kPi / 20.0;
     Eigen::Vector2d pixel;
     CalibratedPoint point;
     EXPECT_TRUE(CameraToPixel(camera, center + std::cos(angle) * u + std::sin(angle) * v, &pixel));
