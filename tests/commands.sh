@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
-# tests/commands.sh <folder> <prefix>: runs every command of circline's programs that README.md and docs show, those
+# tests/commands.sh <folder> <prefix> [mpi]: runs every command of circline's programs that README.md and docs show, those
 # that are indented, in the folder, against the installation: on photos of a sheet of discs that are made here under the
-# names that the commands have. Simulations are cut short, the studio is stopped once it has answered. Not run: what
-# begins with another program (benchmarks, MPI and SLURM, builds; README.md's are run by .ci/run, packages.sh, pip.sh).
+# names that the commands have. Simulations are cut short, the studio is stopped once it has answered. Then
+# the array of jobs of docs/clusters.md, by a stand-in for Slurm. With `mpi` that page's commands of MPI instead, with
+# as many processes as it says on whatever cores are there. Not run: what begins with another program (benchmarks and
+# builds; README.md's are run by .ci/run, packages.sh, pip.sh, the fuzzing by tests/run.sh --full).
 set -euo pipefail
 tests=$(cd "$(dirname "$0")" && pwd)
 top=$tests/..
@@ -59,10 +61,12 @@ done
 mkdir -p out && cp -r shard0 out/shard-0
 export SLURM_ARRAY_TASK_ID=0 SLURM_ARRAY_TASK_COUNT=2 SLURM_CPUS_PER_TASK=1
 
-awk '/^```/ { fenced = !fenced }
+words='circline_[a-z]+'
+[ "${3:-}" != mpi ] || words='mpirun|srun'
+awk -v words="$words" '/^```/ { fenced = !fenced }
      !fenced && /^    / { line = line substr($0, 5)
        if (sub(/\\$/, "", line)) next
-       if (line ~ /^circline_/) print line }
+       if (line ~ "^(" words ") ") print line }
      { line = "" }' "$top/README.md" "$top"/docs/*.md "$top"/docs/guide/*.md > shown.txt
 run=0
 while read -r command; do
@@ -73,6 +77,8 @@ while read -r command; do
   case $command in
     circline_simulate*) command+=" --trials=2" ;;
     circline_studio*) command="timeout 5 $command --port=0" ;;
+    mpirun*) command=${command/--map-by slot:PE=4/--oversubscribe} ;;
+    srun*) command=$(sed -E 's/srun --ntasks=([0-9]+) .*--mpi=pmix/mpirun --oversubscribe -np \1/' <<< "$command") ;;
   esac
   timeout 240 bash -o pipefail -ec "$command" > said.txt 2>&1 < /dev/null || status=$?
   case $command in
@@ -82,5 +88,35 @@ while read -r command; do
   [ "$status" -eq 0 ] || { cat said.txt; echo "exit code $status"; exit 1; }
   run=$((run + 1))
 done < shown.txt
-[ "$run" -ge 25 ]
+if [ "${3:-}" = mpi ]; then
+  [ "$run" -ge 2 ]
+else
+  [ "$run" -ge 25 ]
+  mkdir bin
+  cat > bin/sbatch <<'END'
+#!/usr/bin/env bash
+# Stands in for Slurm: runs a command, or an array of jobs one after the other, now.
+for argument; do
+  case $argument in
+    --wrap=*) exec bash -c "${argument#--wrap=}" ;;
+    --*) ;;
+    *) script=$argument ;;
+  esac
+done
+last=$(sed -nE 's/^#SBATCH --array=0-([0-9]+)$/\1/p' "$script")
+for k in $(seq 0 "$last"); do
+  SLURM_ARRAY_TASK_ID=$k SLURM_ARRAY_TASK_COUNT=$((last + 1)) bash -e "$script" >&2
+done
+echo 1
+END
+  chmod +x bin/sbatch
+  page=$top/docs/clusters.md
+  sed -n '/^    #!\/bin\/bash/,/--resume$/s/^    //p' "$page" > compare.sbatch
+  sed -nE '/^    (job=|sbatch )/s/^    //p' "$page" > array.sh
+  rm -rf out
+  PATH="$PWD/bin:$PATH" bash -eu array.sh > said.txt 2>&1 || { cat said.txt; exit 1; }
+  circline_compare --scene=set/scene.yaml --output=whole > said.txt 2>&1
+  cmp whole/results.jsonl out/all/results.jsonl
+  run=$((run + 2))
+fi
 echo "$run commands"

@@ -9,8 +9,8 @@
 #                             installed package
 #   tests/run.sh --full       the same with long draws where a statistic or a search for rare cases
 #                             takes a sample else, the Debian packages in a bare chroot (as root),
-#                             the Python package by pip, and the table of compilers; more than an
-#                             hour more
+#                             the Python package by pip, the table of compilers, and ten minutes of each
+#                             fuzz target; three hours more
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/setup.sh
@@ -52,9 +52,9 @@ read -r failed total < <(sed -nE 's/^[0-9]+% tests passed, ([0-9]+) tests failed
 [ -n "${total:-}" ] || { cat "$log" >&2; fail "no tests were run"; }
 
 if [ "$*" = --full ]; then
-  for script in tests/packages.sh tests/pip.sh tests/compilers.sh; do
+  for script in tests/packages.sh tests/pip.sh tests/compilers.sh "tests/fuzz/run.sh 600"; do
     status=0
-    "$script" || status=$?
+    $script || status=$?
     total=$((total + 1))
     case $status in
       0) ;;
