@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <exception>
 #include <limits>
+#include <mutex>
 #include <thread>
 
 #include "circline/estimators/closed_form_solvers.h"
@@ -16,13 +18,25 @@ namespace circline {
 
 void ParallelFor(int count, int num_threads, const std::function<void(int)>& work) {
   std::atomic<int> next{0};
+  std::mutex mutex;
+  std::exception_ptr thrown;
   const auto run = [&] {
-    for (int i = next++; i < count; i = next++) work(i);
+    try {
+      for (int i = next++; i < count; i = next++) work(i);
+    } catch (...) {  // No memory left, or a cost function of the user's.
+      next = count;
+      const std::lock_guard<std::mutex> lock(mutex);
+      if (!thrown) thrown = std::current_exception();
+    }
   };
   std::vector<std::thread> others;
-  for (int k = 1; k < std::min(num_threads, count); ++k) others.emplace_back(run);
+  try {
+    for (int k = 1; k < std::min(num_threads, count); ++k) others.emplace_back(run);
+  } catch (const std::exception&) {  // No more threads can be had: fewer do the work.
+  }
   run();
   for (std::thread& thread : others) thread.join();
+  if (thrown) std::rethrow_exception(thrown);
 }
 
 PreparedPhoto Prepare(const Observations& given, const Camera& camera, const NoiseModel& noise) {

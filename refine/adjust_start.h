@@ -14,7 +14,8 @@
 
 namespace circline {
 
-// Calls work(0) .. work(count - 1) on so many threads.
+// Calls work(0) .. work(count - 1) on so many threads. What one of them throws ends the rest, and
+// is thrown again.
 void ParallelFor(int count, int num_threads, const std::function<void(int)>& work);
 
 // Photos as they are refined: fitted, resolved (ResolveWorld), with the noise of their points.

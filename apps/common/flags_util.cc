@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <gflags/gflags.h>
 #include <glog/logging.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -126,10 +127,11 @@ class Parser {
 int IgnoreOpenCvError(int, const char*, const char*, const char*, int, void*) { return 0; }
 
 // A file that is opened must not get the number of a stream that was closed: errors would land in
-// it.
+// it. A closed standard output stays one that cannot be written.
 bool OccupyStandardStreams() {
   for (int descriptor = 0; descriptor <= 2; ++descriptor) {
-    if (fcntl(descriptor, F_GETFD) == -1 && open("/dev/null", O_RDWR) != descriptor) return false;
+    const int mode = descriptor == STDOUT_FILENO ? O_RDONLY : O_RDWR;
+    if (fcntl(descriptor, F_GETFD) == -1 && open("/dev/null", mode) != descriptor) return false;
   }
   return true;
 }
@@ -199,7 +201,7 @@ int RunGuarded(const char* program, const std::string& app, const std::function<
   try {
     code = run();
   } catch (const std::exception& error) {  // Such as no memory left.
-    SayOnStderr(app + ": stopped: " + error.what());
+    SayOnStderr(app + ": stopped: " + Words(error));
   }
   std::cout.flush();
   if (std::cout && std::fflush(stdout) == 0) return code;

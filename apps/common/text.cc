@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
+#include <new>
 
 namespace circline::apps {
 namespace {
@@ -181,6 +182,10 @@ std::string WithoutControls(const std::string& text) {
     out += escaped;
   }
   return out;
+}
+
+std::string Words(const std::exception& error) {
+  return dynamic_cast<const std::bad_alloc*>(&error) ? "not enough memory" : error.what();
 }
 
 }  // namespace circline::apps

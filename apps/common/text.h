@@ -3,6 +3,7 @@
 #define CIRCLINE_APPS_COMMON_TEXT_H_
 
 #include <cstdint>
+#include <exception>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,9 @@ std::string EncodeBase64(const std::vector<std::uint8_t>& bytes);
 
 // A line for a terminal: control characters, which may move the cursor or end the line, as \xNN.
 std::string WithoutControls(const std::string& text);
+
+// What was thrown, in words.
+std::string Words(const std::exception& error);
 
 }  // namespace circline::apps
 

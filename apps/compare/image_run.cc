@@ -6,6 +6,7 @@
 
 #include "apps/common/photo_file.h"
 #include "apps/common/plugins.h"
+#include "apps/common/text.h"
 #include "apps/compare/other_planes.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/record.h"
@@ -231,7 +232,7 @@ ImageRun Guarded(SceneImage* image, const std::function<void(ImageRun*)>& work) 
   try {
     work(&run);
   } catch (const std::exception& error) {  // Such as a photo too large for the memory.
-    run.read_error = std::string("cannot be worked on: ") + error.what();
+    run.read_error = "cannot be worked on: " + Words(error);
     std::replace(run.read_error.begin(), run.read_error.end(), '\n', ' ');
     run.solvers.clear();
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <map>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
@@ -40,13 +41,32 @@ class Queue {
       const WorkedImage oldest = std::move(waiting_.begin()->second);
       waiting_.erase(waiting_.begin());
       lock.unlock();
-      const bool go_on = deliver_(delivered_, oldest);
+      bool go_on = false;
+      Guard([&] { go_on = deliver_(delivered_, oldest); });
       lock.lock();
       ++delivered_;
-      stopped_ = !go_on;
+      stopped_ = stopped_ || !go_on;
       room_.notify_all();
     }
     delivering_ = false;
+  }
+
+  // What throws, such as where no memory is left, ends all; Finish throws it again.
+  template <typename Work>
+  void Guard(const Work& work) {
+    try {
+      work();
+    } catch (...) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopped_ = true;
+      if (!thrown_) thrown_ = std::current_exception();
+      room_.notify_all();
+    }
+  }
+
+  // After all threads.
+  void Finish() const {
+    if (thrown_) std::rethrow_exception(thrown_);
   }
 
  private:
@@ -57,6 +77,7 @@ class Queue {
   std::map<std::size_t, WorkedImage> waiting_;
   std::size_t next_ = 0, delivered_ = 0;
   bool delivering_ = false, stopped_ = false;
+  std::exception_ptr thrown_;
 };
 
 // Finishes images in a thread of its own; all that it took, before it ends.
@@ -95,7 +116,7 @@ class Finisher {
         const auto [index, finishing] = std::move(waiting_.front());
         waiting_.pop_front();
         lock.unlock();
-        queue_->Put(index, finishing());
+        queue_->Guard([&, i = index, &finish = finishing] { queue_->Put(i, finish()); });
       }
       lock.lock();
     }
@@ -117,18 +138,22 @@ void WorkInOrder(std::size_t count, const std::function<Finishing(std::size_t)>&
   const int num_workers = static_cast<int>(std::min(threads, count));
   if (num_workers == 0) return;
   Queue queue(count, deliver);
-  Finisher finisher(&queue);
-  cv::parallel_for_(
-      cv::Range(0, num_workers),
-      [&](const cv::Range& range) {
-        for (int i = range.start; i < range.end; ++i) {
-          for (std::size_t index = 0; queue.Take(&index);) {
-            Finishing finishing = work(index);
-            if (!finisher.Take(index, &finishing)) queue.Put(index, finishing());
-          }
-        }
-      },
-      num_workers);
+  {
+    Finisher finisher(&queue);
+    const auto work_all = [&] {
+      for (std::size_t index = 0; queue.Take(&index);) {
+        Finishing finishing = work(index);
+        if (!finisher.Take(index, &finishing)) queue.Put(index, finishing());
+      }
+    };
+    cv::parallel_for_(
+        cv::Range(0, num_workers),
+        [&](const cv::Range& range) {
+          for (int i = range.start; i < range.end; ++i) queue.Guard(work_all);
+        },
+        num_workers);
+  }
+  queue.Finish();
 }
 
 }  // namespace circline::apps

@@ -13,7 +13,8 @@ namespace circline::apps {
 // says. What `work` returns is called in one more thread, so that the next image need not wait for
 // it; where that thread falls behind, by the one that worked. `deliver` gets what came of it: one
 // call at a time, in order. Only so many images wait for their turn that memory does not depend on
-// `count`. A `deliver` that returns false ends it.
+// `count`. A `deliver` that returns false ends it; so does what one of them throws, which is thrown
+// again.
 void WorkInOrder(std::size_t count, const std::function<Finishing(std::size_t)>& work,
                  const std::function<bool(std::size_t, const WorkedImage&)>& deliver);
 

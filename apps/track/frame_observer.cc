@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <utility>
 
+#include "apps/common/text.h"
+
 namespace circline::apps {
 namespace {
 
@@ -61,7 +63,7 @@ ImageRun FrameObserver::Follow(const PoseHypothesis* last, const PoseHypothesis*
     const Status status = follower_->Next(frame->photo, &run.observations);
     if (!status.ok()) run.read_error = status.message;
   } catch (const std::exception& error) {  // Such as a frame too large for the memory.
-    run.read_error = std::string("cannot be worked on: ") + error.what();
+    run.read_error = "cannot be worked on: " + Words(error);
   }
   run.stages.emplace_back("observe", watch.Microseconds());
   if (!run.read_error.empty()) return run;

@@ -102,10 +102,12 @@ TEST_F(CompareHostile, ADeviceIsWrittenToAndALinkFollowed) {
 }
 
 TEST_F(CompareHostile, ALostStandardOutputIsAnError) {
-  const Outcome outcome =
-      RunProgram("sh", "-c '\"" CIRCLINE_COMPARE_BINARY "\" --list_solvers > /dev/full'");
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_CONTAINS(outcome.err, "standard output cannot be written");
+  for (const std::string where : {">/dev/full", ">&-"}) {
+    const Outcome outcome =
+        RunProgram("sh", "-c '\"" CIRCLINE_COMPARE_BINARY "\" --list_solvers " + where + "'");
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_CONTAINS(outcome.err, "standard output cannot be written");
+  }
 }
 
 TEST_F(CompareHostile, ClosedStreamsDoNotReachTheResults) {

@@ -71,6 +71,27 @@ TEST(WorkQueue, EndsWhenDeliveryFails) {
   }
 }
 
+TEST(WorkQueue, ThrowsWhatAThreadThrows) {
+  const auto nothing = [](std::size_t) { return [] { return WorkedImage(); }; };
+  const auto fail = [](std::size_t i) {
+    if (i == 7) throw std::bad_alloc();
+  };
+  for (const int threads : {1, 2}) {
+    cv::setNumThreads(threads);
+    const auto go_on = [](std::size_t, const WorkedImage&) { return true; };
+    EXPECT_THROW(WorkInOrder(
+                     1000, [&](std::size_t i) { return fail(i), nothing(i); }, go_on),
+                 std::bad_alloc);
+    EXPECT_THROW(
+        WorkInOrder(
+            1000, [&](std::size_t i) { return [&, i] { return fail(i), WorkedImage(); }; }, go_on),
+        std::bad_alloc);
+    EXPECT_THROW(WorkInOrder(1000, nothing,
+                             [&](std::size_t i, const WorkedImage&) { return fail(i), true; }),
+                 std::bad_alloc);
+  }
+}
+
 ImageLines OneImage(int index) {
   const std::string i = std::to_string(index);
   return {"{\"result\":" + i + "}\n{\"result\":" + i + "}\n",

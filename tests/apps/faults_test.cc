@@ -102,6 +102,30 @@ class Faults : public testing::TestWithParam<Program> {
   double whole_ms_ = 0.0;
 };
 
+#ifndef CIRCLINE_SANITIZED  // A sanitizer's own memory is not what is limited.
+// From too little to be loaded, to enough.
+TEST_P(Faults, MemoryThatRunsOutIsSaid) {
+  MakeWhole();
+  bool enough = false;
+  for (int megabytes = 180; megabytes <= 420; megabytes += 16) {
+    const auto limited = [&](const std::vector<std::string>& arguments) {
+      std::string line = "-c 'ulimit -v " + std::to_string(megabytes * 1000) +
+                         "; exec \"$@\"' sh '" + GetParam().path + "' ";
+      for (const std::string& argument : arguments) line += "'" + argument + "' ";
+      return RunProgram("sh", line);
+    };
+    if (limited({"--version"}).exit_code != 0) continue;
+    const std::string output = folder_ / ("limited" + std::to_string(megabytes));
+    const Outcome outcome = limited(Arguments(output));
+    EXPECT_TRUE(outcome.exit_code == 0 || (outcome.exit_code == 1 && !outcome.err.empty()))
+        << megabytes << " MB: " << outcome.exit_code << " " << outcome.err;
+    EXPECT_FALSE(HasPart(output)) << megabytes;
+    enough = outcome.exit_code == 0;
+  }
+  EXPECT_TRUE(enough);
+}
+#endif
+
 TEST_P(Faults, AFullDiskIsNamed) {
   const SmallDisk disk(folder_ / "disk");
   if (!disk.mounted()) GTEST_SKIP() << "no file system can be mounted here (root may)";

@@ -2,17 +2,34 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
+#include <new>
 #include <string>
 #include <vector>
 
 #include "circline/estimators/random.h"
 #include "circline/refine/adjust_photos.h"
+#include "circline/refine/adjust_start.h"
 #include "tests/sheet_photos.h"
 
 namespace circline {
 namespace {
+
+TEST(ParallelFor, ThrowsWhatAThreadThrows) {
+  for (const int threads : {1, 4}) {
+    std::atomic<int> done{0};
+    const auto work = [&](int i) {
+      if (i == 10) throw std::bad_alloc();
+      ++done;
+    };
+    EXPECT_THROW(ParallelFor(1000000, threads, work), std::bad_alloc);
+    EXPECT_LT(done, 1000000);
+    ParallelFor(10, threads, work);
+    EXPECT_GE(done, 10);
+  }
+}
 
 TEST(AdjustHard, OnePhotoIsAsGoodAsItsSigma) {
   const Photos sheet = Photos(1).WithCircles();
