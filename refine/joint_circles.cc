@@ -162,11 +162,12 @@ void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size
   const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : DrawnSigma();
   std::optional<ImagePoints> points = Points({segment[0], segment[1]}, {}, sigma, false);
   LineFit fit;
-  if (!points || !FitLine(points->points(), 1.0, &fit).ok()) return;
+  if (!points || !FitLine(points->points(), sigma, &fit).ok()) return;
   Feature diameter{Feature::Kind::kPlaneLine,
                    circle.id + ".diameters[" + std::to_string(index) + "]",
                    "a diameter of circle '" + circle.id + "'"};
   diameter.parent = feature;
+  diameter.line_covariance = fit.covariance;
   const int f = AddFeature(diameter);
   const int angle = AddBlock(1, {0.0}, {}, false, group);
   AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),

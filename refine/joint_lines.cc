@@ -139,6 +139,7 @@ void JointProblemBuilder::AddAxisLine(const LineObservation& line, double sigma_
   Feature feature{Feature::Kind::kPlaneLine, id, name};
   feature.dof = 2;
   feature.free_twice_cost = FreeTwiceCost(*points, line.fit->line);
+  feature.line_covariance = line.fit->covariance;
   const int f = AddFeature(feature), angle = AddConstant({axis * kHalfPi});
   AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
                  {JointProblem::kRotation, JointProblem::kTranslation, origin_point_, angle}, f,
@@ -156,7 +157,7 @@ void JointProblemBuilder::AddDrawnAxis(const std::optional<Segment>& axis, int w
                     name = which == 0 ? "the X axis" : "the Y axis";
   std::optional<ImagePoints> points = Points(line.points, {}, DrawnSigma(), false);
   LineFit fit;
-  if (!points || !FitLine(points->points(), 1.0, &fit).ok()) return;
+  if (!points || !FitLine(points->points(), DrawnSigma(), &fit).ok()) return;
   line.fit = fit;
   if (p_.origin_observed_) {
     AddAxisLine(line, DrawnSigma(), which, id, name);

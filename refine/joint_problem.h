@@ -54,6 +54,8 @@ struct Feature {
   int observation = -1, line = -1;  // Index of circle, pencil or length; line within its pencil.
   // Twice the cost of its own free fit, under the loss.
   double free_twice_cost = 0.0;
+  // Of a line that lies in the plane, not along some direction only: the covariance of its fit.
+  std::optional<Eigen::Matrix3d> line_covariance = std::nullopt;
 };
 
 // One residual block.

@@ -44,11 +44,14 @@ double LogNormalInformation(const CircleObservation& circle) {
   return std::isfinite(most) ? most : kUnknown;
 }
 
-// The same of a line's fit, of where its direction may be seen: one degree of freedom.
-double LogDirectionInformation(const LineFit& fit) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(fit.covariance,
-                                                             Eigen::EigenvaluesOnly);
-  return -std::log(std::clamp(eigen.eigenvalues()[2], 1e-16, 1.0));
+// The same of a line's fit: of where its direction may be seen, one degree of freedom, or of the
+// whole line, two.
+double LogLineInformation(const Eigen::Matrix3d& covariance, int dimensions) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+  double log_information = 0.0;
+  for (int k = 3 - dimensions; k < 3; ++k)
+    log_information -= std::log(std::clamp(eigen.eigenvalues()[k], 1e-16, 1.0));
+  return log_information;
 }
 
 // -log of the density of clutter over that of a feature at its mode, whatever the pose.
@@ -67,11 +70,15 @@ double ClutterCost(const JointProblem& problem, const Feature& f) {
     case Feature::Kind::kLine:
       if (f.observation < 0) break;
       log_information =
-          LogDirectionInformation(*observations.pencils[static_cast<std::size_t>(f.observation)]
-                                       .lines[static_cast<std::size_t>(f.line)]
-                                       .fit);
+          LogLineInformation(observations.pencils[static_cast<std::size_t>(f.observation)]
+                                 .lines[static_cast<std::size_t>(f.line)]
+                                 .fit->covariance,
+                             1);
       break;
-    case Feature::Kind::kPlaneLine:
+    case Feature::Kind::kPlaneLine:  // An axis through the origin; a diameter may turn.
+      dimensions = f.dof;
+      volume = f.dof == 2 ? 2.0 * kPi : kPi;
+      if (f.line_covariance) log_information = LogLineInformation(*f.line_covariance, f.dof);
       break;
     case Feature::Kind::kAxis:
       dimensions = f.dof;

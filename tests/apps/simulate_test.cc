@@ -67,7 +67,7 @@ std::vector<Row> ReadCsv(const std::string& path, const std::string& header = kH
 
 TEST(Simulate, WritesARowForEachMethodNoiseAndRatio) {
   const TestFolder folder;
-  ASSERT_EQ(RunSimulate("--trials=20 --noise_px=0,1 --outlier_ratio=0,0.3 --output='" +
+  ASSERT_EQ(RunSimulate("--trials=200 --noise_px=0,1 --outlier_ratio=0,0.3 --output='" +
                         folder / "out" + "'"),
             0);
   const std::vector<Row> rows = ReadCsv(folder / "out/simulation.csv");
@@ -78,11 +78,17 @@ TEST(Simulate, WritesARowForEachMethodNoiseAndRatio) {
                                                 {"circle_frame_refined", 0.00389},
                                                 {"line_pairs_refined", 0.00800},
                                                 {"joint", 0.00336}};
+  // What the closed forms reach of it (rms over bound, 1000 trials of another seed); the others sit
+  // on it.
+  const std::map<std::string, double> efficiencies = {{"circle_frame", 1.17}, {"line_pairs", 1.63}};
+  // Of 200 trials of three unequal components the rms scatters by 5 %, the mean NEES of three by
+  // 0.17: false alarms of 3.5 deviations are one in two thousand each.
+  constexpr double kRmsScatter = 3.5 * 0.05, kNeesScatter = 3.5 * 0.17;
   std::map<std::string, double> clean_bounds;
   for (Row row : rows) {
     const std::string& method = row["method"];
     ASSERT_EQ(bounds.count(method), 1U) << method;
-    EXPECT_EQ(row["trials"], "20");
+    EXPECT_EQ(row["trials"], "200");
     const double bound = std::stod(row["bound_rms_rad"]), rms = std::stod(row["rotation_rms_rad"]);
     if (row["noise_px"] == "0") {
       EXPECT_EQ(row["nees_mean"], "");
@@ -92,10 +98,10 @@ TEST(Simulate, WritesARowForEachMethodNoiseAndRatio) {
     } else if (row["outlier_ratio"] == "0") {
       EXPECT_EQ(row["failures"], "0") << method;
       EXPECT_NEAR(bound, bounds.at(method), 0.005 * bounds.at(method)) << method;
-      EXPECT_GT(rms, 0.6 * bound) << method;
-      EXPECT_LT(rms, 3.0 * bound) << method;
-      EXPECT_GT(std::stod(row["nees_mean"]), 1.0) << method;
-      EXPECT_LT(std::stod(row["nees_mean"]), 6.0) << method;
+      const auto found = efficiencies.find(method);
+      const double reached = found == efficiencies.end() ? 1.0 : found->second;
+      EXPECT_NEAR(rms, reached * bound, kRmsScatter * reached * bound) << method;
+      EXPECT_NEAR(std::stod(row["nees_mean"]), 3.0, kNeesScatter) << method;
       clean_bounds[method] = bound;
     } else {
       EXPECT_GT(bound, 1.1 * clean_bounds[method]) << method;  // Fewer points tell less.
