@@ -38,7 +38,7 @@ double Coverage(const Ellipse& ellipse, const std::vector<Eigen::Vector2d>& poin
     const double next = i + 1 < turns.size() ? turns[i + 1] : turns[0] + 2.0 * kPi;
     if (next - turns[i] > gap_limit) uncovered += next - turns[i];
   }
-  return 1.0 - uncovered / 2.0 * kPi;
+  return 1.0 - uncovered / (2.0 * kPi);
 }
 
 }  // namespace

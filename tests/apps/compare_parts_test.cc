@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <chrono>
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
@@ -13,6 +14,7 @@
 #include "apps/compare/agreement.h"
 #include "apps/compare/other_planes.h"
 #include "apps/compare/overlay.h"
+#include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/record_files.h"
 #include "apps/compare/selection.h"
 #include "apps/compare/sweep.h"
@@ -89,6 +91,19 @@ TEST(WorkQueue, ThrowsWhatAThreadThrows) {
     EXPECT_THROW(WorkInOrder(1000, nothing,
                              [&](std::size_t i, const WorkedImage&) { return fail(i), true; }),
                  std::bad_alloc);
+  }
+}
+
+TEST(PixelEllipse, CoverageIsTheArcsShareOfTheTurn) {
+  for (const int degrees : {90, 180, 270}) {
+    CircleObservation circle;
+    for (int i = 0; i <= degrees; i += 2) {
+      const double t = i * kDegree;
+      circle.points.emplace_back(300.0 + 50.0 * std::cos(t), 200.0 + 30.0 * std::sin(t));
+    }
+    PixelEllipse seen;
+    ASSERT_TRUE(FitPixelEllipse(circle, &seen));
+    EXPECT_NEAR(seen.coverage, degrees / 360.0, 1e-6);
   }
 }
 
