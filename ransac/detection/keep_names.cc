@@ -125,8 +125,7 @@ class PlaneNames {
       most = count;
       name = candidate;
     }
-    // Not operator+, of which g++ 12 warns wrongly as C++20 (GCC bug 105651); below, too.
-    if (name.empty()) name.append("p").append(std::to_string(next_.plane++));
+    if (name.empty()) name = "p" + std::to_string(next_.plane++);
     return name;
   }
 
@@ -166,7 +165,7 @@ void NameFeatures(const std::vector<Feature>& predicted, const std::vector<int>&
       Continue(predicted[static_cast<std::size_t>(continued[k])], &feature);
     } else {
       do {
-        feature.id = std::string(letter).append(std::to_string((*number)++));
+        feature.id = letter + std::to_string((*number)++);
       } while (std::any_of(predicted.begin(), predicted.end(),
                            [&](const Feature& other) { return other.id == feature.id; }));
     }
