@@ -96,6 +96,8 @@ void JointProblemBuilder::Build() {
     AddCameraPrior(sigmas);
   }
   AddOrigin();
+  for (const CircleObservation& circle : obs_.circles)
+    num_circles_[ContrastOf(circle)] += InPlane(circle) ? 1 : 0;
   for (std::size_t i = 0; i < obs_.circles.size(); ++i) AddCircle(i);
   for (std::size_t i = 0; i < obs_.pencils.size(); ++i) AddPencil(i);
   AddDrawnAxis(obs_.frame.x_axis, 0);

@@ -5,6 +5,9 @@
 
 #include <ceres/manifold.h>
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <map>
 #include <memory>
 #include <optional>
@@ -52,7 +55,7 @@ class JointProblemBuilder {
   void AddPencil(std::size_t index);
   void AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,
                double direction_sigma, Feature feature);
-  int DirectionBlock(const PencilObservation& pencil);
+  int DirectionBlock(std::size_t pencil);
   int AxisOfLine(std::size_t pencil, std::size_t line) const;
   void AddAxisLine(const LineObservation& line, double sigma_px, int axis, const std::string& id,
                    const std::string& name);
@@ -66,6 +69,9 @@ class JointProblemBuilder {
 
   bool InPlane(const CircleObservation& circle) const {
     return circle.fit && circle.plane == obs_.frame.plane;
+  }
+  static std::size_t ContrastOf(const CircleObservation& circle) {
+    return static_cast<std::size_t>(std::clamp(circle.contrast, -1, 1) + 1);
   }
   bool IsAtOrigin(const CircleObservation& circle) const;
   // Of points drawn by hand: axes, the origin, lengths' ends.
@@ -81,6 +87,8 @@ class JointProblemBuilder {
   bool has_camera_ = false, is_metric_ = false;
   int origin_point_ = -1;  // Constant block (0, 0).
   std::string origin_circle_;
+  // Of one contrast, by ContrastOf: circles in the plane, the block of their offset.
+  std::array<int, 3> num_circles_ = {0, 0, 0}, offsets_ = {-1, -1, -1};
   std::map<std::string, int> concentric_, radius_groups_, directions_;
 };
 

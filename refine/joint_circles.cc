@@ -14,8 +14,9 @@ namespace circline {
 bool JointProblemBuilder::IsAtOrigin(const CircleObservation& circle) const {
   if (origin_circle_.empty()) return false;
   if (circle.id == origin_circle_) return true;
+  if (circle.concentric.empty()) return false;
   const int index = FindCircle(obs_, origin_circle_);
-  return index >= 0 && !circle.concentric.empty() &&
+  return index >= 0 &&
          obs_.circles[static_cast<std::size_t>(index)].concentric == circle.concentric;
 }
 
@@ -95,13 +96,9 @@ int JointProblemBuilder::RadiusBlock(const CircleObservation& circle, int featur
 // Contours of one contrast share an offset where there are several, or a radius to compare with.
 int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
   if (!(model_.contour_offset_px > 0.0)) return -1;
-  const int contrast = std::clamp(circle.contrast, -1, 1);
-  const auto count =
-      std::count_if(obs_.circles.begin(), obs_.circles.end(), [&](const CircleObservation& c) {
-        return InPlane(c) && std::clamp(c.contrast, -1, 1) == contrast;
-      });
-  int& block = p_.offsets_[contrast + 1];
-  if (block < 0 && (count > 1 || circle.radius > 0.0)) {
+  const std::size_t contrast = ContrastOf(circle);
+  int& block = offsets_[contrast];
+  if (block < 0 && (num_circles_[contrast] > 1 || circle.radius > 0.0)) {
     block = AddBlock(1, {0.0});
     AddTerm(std::unique_ptr<ceres::CostFunction>(NewGaussianPrior({model_.contour_offset_px})),
             {block});

@@ -59,7 +59,8 @@ int JointProblemBuilder::AxisOfLine(std::size_t pencil, std::size_t line) const 
 }
 
 // A pencil's direction: tied to its axis or to the plane, as closely as the noise model says.
-int JointProblemBuilder::DirectionBlock(const PencilObservation& pencil) {
+int JointProblemBuilder::DirectionBlock(std::size_t index) {
+  const PencilObservation& pencil = obs_.pencils[index];
   const double sigma = AxisSigma(pencil, model_, p_.camera_sigma_);
   const bool is_free = pencil.direction == PencilDirection::kFree;
   const Eigen::Vector3d axis = is_free ? Eigen::Vector3d::UnitX()
@@ -71,7 +72,7 @@ int JointProblemBuilder::DirectionBlock(const PencilObservation& pencil) {
   const int block = AddBlock(3, value, std::make_unique<ceres::SphereManifold<3>>());
   Feature tie{Feature::Kind::kAxis, pencil.id, "the direction of pencil '" + pencil.id + "'"};
   tie.dof = is_free ? 1 : 2;
-  tie.observation = FindPencil(obs_, pencil.id);
+  tie.observation = static_cast<int>(index);
   const int feature = AddFeature(tie);
   AddTerm(std::unique_ptr<ceres::CostFunction>(
               is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma)
@@ -108,7 +109,7 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
     std::optional<ImagePoints> points = Points(line.points, line.inliers, sigma, false);
     if (!points) continue;
     if (direction < 0) {
-      direction = DirectionBlock(pencil);
+      direction = DirectionBlock(index);
       p_.pencils_.push_back({static_cast<int>(index), direction});
     }
     AddLine(std::move(*points), line.fit->line, direction, model_.line_direction_rad, feature);

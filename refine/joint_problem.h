@@ -210,8 +210,7 @@ class JointProblem {
   std::vector<LengthBlocks> lengths_;
   std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
   std::vector<std::string> unused_;
-  std::vector<double> defaults_;   // Of State::x.
-  int offsets_[3] = {-1, -1, -1};  // Blocks, by CircleObservation::contrast + 1.
+  std::vector<double> defaults_;  // Of State::x.
   int num_groups_ = 0;
   std::vector<int> pose_priors_;  // Terms.
   int center_at_origin_ = -1;     // Circle (index in circles_) whose centre the origin is, or -1.

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <utility>
 
 #include "circline/estimators/basics.h"
@@ -89,10 +90,10 @@ double CountInliers(const JointProblem& problem, const State& state, PoseHypothe
   return std::max(kTuned, redundancy * squares * inliers / (slopes * slopes));
 }
 
-// [delta, delta_t] by the shared unknowns: delta in the camera frame.
-Eigen::MatrixXd PoseFromShared(const JointProblem& problem, const State& state,
-                               const Linearization& at) {
-  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(6, at.num_columns());
+// [delta, delta_t] by the core of the shared unknowns: delta in the camera frame.
+Eigen::MatrixXd PoseFromCore(const JointProblem& problem, const State& state,
+                             const Linearization& at) {
+  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(6, at.core_size());
   const std::vector<Block>& blocks = problem.blocks();
   const CameraPose pose = problem.PoseAt(state);
   const int turns = blocks[JointProblem::kRotation].tangent_size();
@@ -172,26 +173,32 @@ void FillCircles(const JointProblem& problem, const State& state, Refined* refin
 void FillPencils(const JointProblem& problem, const State& state, const Linearization& at,
                  const Eigen::MatrixXd& T, PoseHypothesis* h) {
   const Eigen::Matrix3d R = problem.PoseAt(state).rotation;
+  std::vector<int> core(static_cast<std::size_t>(at.core_size()));
+  std::iota(core.begin(), core.end(), 0);
+  const std::vector<JointProblem::PencilBlocks>& all = problem.pencils();  // In the same order.
+  auto blocks = all.begin();
   for (std::size_t i = 0; i < problem.observations().pencils.size(); ++i) {
     const PencilObservation& pencil = problem.observations().pencils[i];
-    const auto blocks = std::find_if(
-        problem.pencils().begin(), problem.pencils().end(),
-        [i](const JointProblem::PencilBlocks& p) { return p.observation == static_cast<int>(i); });
+    while (blocks != all.end() && blocks->observation < static_cast<int>(i)) ++blocks;
     PencilEstimate estimate;
     estimate.id = pencil.id;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-    if (blocks != problem.pencils().end()) {
+    if (blocks != all.end() && blocks->observation == static_cast<int>(i)) {
       const Block& block = problem.blocks()[static_cast<std::size_t>(blocks->direction)];
       estimate.direction =
           R * Eigen::Map<const Eigen::Vector3d>(state.x.data() + block.offset).normalized();
       Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * T.topRows<3>();
+      std::vector<int> columns = core;
       if (block.tangent_size() > 0) {
         Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> plus(
             3, block.tangent_size());
         block.manifold->PlusJacobian(state.x.data() + block.offset, plus.data());
-        J.middleCols(at.column(blocks->direction), block.tangent_size()) += R * plus;
+        J.conservativeResize(3, J.cols() + plus.cols());
+        J.rightCols(plus.cols()) = R * plus;
+        for (int k = 0; k < block.tangent_size(); ++k)
+          columns.push_back(at.column(blocks->direction) + k);
       }
-      covariance = J * at.covariance() * J.transpose();
+      covariance = J * at.Covariance(columns) * J.transpose();
     } else if (pencil.direction != PencilDirection::kFree) {
       estimate.direction = R.col(static_cast<int>(pencil.direction));
       const Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * T.topRows<3>();
@@ -226,7 +233,7 @@ void NoteWhatStays(const JointProblem& problem, const Linearization& at, Refined
       stays = "principal point";
     column += 2;
   }
-  const bool has_k1 = sigma.k1 > 0.0 && at.num_columns() > column;
+  const bool has_k1 = sigma.k1 > 0.0 && at.core_size() > column;
   if (has_k1 && stays_at(column, sigma.k1)) stays += stays.empty() ? "k1" : " and k1";
   if (stays.empty()) return;
   refined->notes.push_back("camera: the evidence cannot tell " + stays +
@@ -354,7 +361,7 @@ Status FillRefined(const JointProblem& problem, State state, Refined* refined) {
   h->origin_observed = problem.origin_observed();
   h->cam_from_world.rotation = pose.rotation;
   h->cam_from_world.translation = h->metric ? pose.translation : pose.translation.normalized();
-  const Eigen::MatrixXd T = PoseFromShared(problem, state, at);
+  const Eigen::MatrixXd T = PoseFromCore(problem, state, at);
   const Matrix6d covariance = T * at.covariance() * T.transpose();
   Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
   FillFreeDirections(problem, T, at, h);

@@ -217,7 +217,12 @@ void JointProblem::PlaceLines(const double* camera, State* state) const {
     const PencilObservation& pencil =
         observations_.pencils[static_cast<std::size_t>(p.observation)];
     if (pencil.direction != PencilDirection::kFree) continue;
-    Eigen::Vector3d d = R.transpose() * Refocused(pencil.fit->direction, camera[0]);
+    // Where in the plane its lines would have it: the conditional mean, given that it lies there.
+    const Eigen::Vector3d off = pencil.fit->covariance * R.col(2);
+    const double variance = R.col(2).dot(off);
+    Eigen::Vector3d d = pencil.fit->direction;
+    if (variance > 0.0) d -= R.col(2).dot(d) / variance * off;
+    d = R.transpose() * Refocused(d, camera[0]);
     d.z() = 0.0;
     if (!(d.norm() > 0.0)) continue;
     d.normalize();

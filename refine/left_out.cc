@@ -128,8 +128,9 @@ namespace {
 bool AdmitWhatFits(const JointProblem& problem, State* state) {
   bool any = false;
   for (std::size_t i = 0; i < state->active.size(); ++i) {
+    if (state->active[i] != 0) continue;
     State with = *state;
-    if (state->active[i] != 0 || !problem.Admit(i, &with)) continue;
+    if (!problem.Admit(i, &with)) continue;
     State alone = with, none = with, without = with;
     none.active.assign(with.active.size(), 0);
     without.active.assign(with.active.size(), 1);

@@ -1,6 +1,11 @@
 // The joint problem at a place as one linear system: information, covariance, volumes, and how far
 // each feature contradicts the others. From the Jacobians of the same cost functions that ceres
 // solves for. Internal: not installed.
+//
+// Unknowns are of three kinds. A feature's own (a circle's tilt) are eliminated first. Of the
+// shared ones, leaves (a pencil's direction) meet the core (the pose, the camera, the contours'
+// offset) and no other leaf: they are eliminated one by one, so that the time is linear in their
+// number.
 #ifndef CIRCLINE_REFINE_LINEARIZATION_H_
 #define CIRCLINE_REFINE_LINEARIZATION_H_
 
@@ -20,17 +25,19 @@ class Linearization {
   bool ok() const { return ok_; }
 
   // First column of a block in the shared unknowns, tangent space; -1 for constants and for what a
-  // feature has of its own. The camera's come last, whether it is estimated or not.
+  // feature has of its own. The core's come first, and last of them the camera's, whether it is
+  // estimated or not.
   int column(int block) const { return columns_[static_cast<std::size_t>(block)]; }
-  int num_columns() const { return static_cast<int>(information_.rows()); }
+  int core_size() const { return static_cast<int>(information_.core.rows()); }
 
   // Covariance of the shared unknowns, pseudo-inverse on the observed subspace. A camera that is
   // not estimated is counted by its prior: Sigma_x + S Sigma_camera S^T, S how the others follow it
-  // ("consider" covariance). Also fills null_space(). False where a feature's own unknowns carry no
-  // information.
+  // ("consider" covariance). Also fills null_space(), of the core. False where a feature's own
+  // unknowns carry no information.
   bool ComputeCovariance();
-  const Eigen::MatrixXd& covariance() const { return covariance_; }
+  const Eigen::MatrixXd& covariance() const { return covariance_; }  // Of the core.
   const Eigen::MatrixXd& null_space() const { return null_space_; }
+  Eigen::MatrixXd Covariance(const std::vector<int>& columns) const;
 
   // By feature: d^2 = 2 (C(all) - C(without it) - C(its own free fit)), to second order, and its
   // degrees of freedom; 0 for what is inactive or has no test. Needs ComputeCovariance.
@@ -58,14 +65,34 @@ class Linearization {
     std::vector<int> shared;        // Columns.
     Eigen::MatrixXd inverse, gain;  // Of the information of the own part.
   };
+  // Symmetric, with the rows and columns of the shared unknowns: zero between two leaves.
+  struct Arrow {
+    struct Leaf {
+      Eigen::MatrixXd own, with_core;
+    };
+    Eigen::MatrixXd core;
+    std::vector<Leaf> leaves;
+  };
+  // The unknowns x of a leaf follow those y of the core: x = -gain y + n.
+  struct Leaf {
+    int first, size;                              // Columns.
+    Eigen::MatrixXd gain, covariance, with_core;  // Of n, and between n and y.
+  };
   static int IndexIn(const std::vector<int>& columns, int column) {
     return static_cast<int>(std::find(columns.begin(), columns.end(), column) - columns.begin());
   }
 
+  std::size_t LeafAt(int column) const {
+    return static_cast<std::size_t>(leaf_at_[static_cast<std::size_t>(column - core_size())]);
+  }
   void LayOut();
+  std::vector<bool> FindLeaves() const;  // By block.
+  void Add(int row, int column, double value, Arrow* sum) const;
+  void AddInformation(const Eigen::MatrixXd& J, const std::vector<int>& columns);
   bool AddTerm(const Term& term, const Weighing& weighing);
   void TakeLoss(const Term& term, Rows* rows);
   bool Eliminate(Group* group);
+  bool Eliminate(std::size_t leaf);
   const Eigen::MatrixXd& PlusJacobian(int block);  // Of the block's manifold, worked out once.
   void Leverage(const std::vector<const Rows*>& parts, Eigen::MatrixXd* S,
                 Eigen::VectorXd* f) const;
@@ -75,12 +102,15 @@ class Linearization {
   const State& state_;
   bool ok_ = true;
   std::vector<int> columns_, own_columns_;
-  int num_estimated_ = 0;
+  int num_estimated_ = 0;  // Columns of the core.
   std::vector<Group> groups_;
   std::vector<Rows> rows_;
   std::vector<Eigen::MatrixXd> plus_;  // By block.
   std::vector<double> ambient_;        // Jacobians of one term, as its cost function writes them.
-  Eigen::MatrixXd information_, overcounted_, covariance_, null_space_;
+  std::vector<Leaf> leaves_;
+  std::vector<int> leaf_at_;  // By column beyond the core's.
+  Arrow information_, overcounted_;
+  Eigen::MatrixXd covariance_, null_space_;
 };
 
 }  // namespace circline

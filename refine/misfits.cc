@@ -52,7 +52,7 @@ void Linearization::Leverage(const std::vector<const Rows*>& parts, Eigen::Matri
   auto B = by_shared.topRows(used);
   const bool has_own = group->size > 0;
   if (has_own) B.leftCols(group->gain.cols()) -= W.lazyProduct(group->gain);
-  const Eigen::MatrixXd covariance = covariance_(shared, shared);
+  const Eigen::MatrixXd covariance = Covariance(shared);
   const Eigen::MatrixXd follow = B.lazyProduct(covariance);
   *S = follow.lazyProduct(B.transpose());
   if (!has_own) return;

@@ -20,7 +20,8 @@ constexpr std::size_t kMaxReadings = 16;
 // number, for time (circline_benchmark --benchmark_filter=CirclesOfAPlane), not chosen on photos.
 constexpr std::size_t kMostCircles = 6;
 constexpr double kHopeless = 300.0;  // Gaps that no start comes down.
-// Cost: several times what leaving out a feature costs, and its chi-square limit besides.
+// Cost beyond what chance has features miss their free fits by: several times what leaving out one
+// costs, and its chi-square limit besides.
 constexpr double kContradiction = 100.0;
 constexpr double kNoRival = std::numeric_limits<double>::infinity();
 
@@ -36,9 +37,9 @@ class ReadingSearch {
   Status Run() {
     // Lines that a fit has found odd are left out first, and then all are taken in: the fit knew
     // one pencil only.
-    std::vector<Candidate> queue = {{problem_.FirstReading(), seeds_}};
+    std::vector<Candidate> queue = {{problem_.FirstReading(), seeds_, kNoRival}};
     const Reading everything(problem_.features().size(), 1);
-    if (queue.front().reading != everything) queue.push_back({everything, seeds_});
+    if (queue.front().reading != everything) queue.push_back({everything, seeds_, kNoRival});
     for (std::size_t next = 0; next < queue.size() && next < kMaxReadings; ++next) {
       const Candidate candidate = queue[next];
       std::vector<State> minima = RefineAll(candidate);
@@ -51,10 +52,11 @@ class ReadingSearch {
       // near.
       const std::vector<Seed> near = everything.size() > kFew ? SeedsAt(minima) : candidate.seeds;
       for (const State& minimum : minima) {
+        if (IsHopeless(minimum, candidate.parent_cost)) continue;
         for (Reading& other : Rivals(minimum)) {
           const bool is_known = std::any_of(queue.begin(), queue.end(),
                                             [&](const Candidate& c) { return c.reading == other; });
-          if (!is_known) queue.push_back({std::move(other), near});
+          if (!is_known) queue.push_back({std::move(other), near, minimum.cost});
         }
       }
     }
@@ -69,6 +71,7 @@ class ReadingSearch {
   struct Candidate {
     Reading reading;
     std::vector<Seed> seeds;
+    double parent_cost;  // Of the minimum that it leaves something out of.
   };
 
   struct Start {
@@ -157,8 +160,7 @@ class ReadingSearch {
 
   // What contradicts itself competes where nothing else explains the evidence better.
   void FinishRough() {
-    double best = std::numeric_limits<double>::infinity();
-    for (const State& minimum : minima_) best = std::min(best, minimum.cost);
+    double best = BestKept();
     std::stable_sort(rough_.begin(), rough_.end(),
                      [](const State& a, const State& b) { return a.cost < b.cost; });
     for (State& state : rough_) {
@@ -198,9 +200,10 @@ class ReadingSearch {
   bool SolveFrom(bool is_consistent, double best, State* state) {
     const int max_iterations = problem_.options().max_iterations;
     const double left_out = LeftOutCost(problem_, *state);
+    const double contradiction = 0.5 * DegreesOfFreedom(*state) + kContradiction;
     last_ = is_consistent
                 ? problem_.Solve(max_iterations, state, {best - left_out, MaxGap()})
-                : problem_.SolveGraduated(max_iterations, state, {kNoRival, 0.0, kContradiction});
+                : problem_.SolveGraduated(max_iterations, state, {kNoRival, 0.0, contradiction});
     if (!last_.ok()) return false;
     state->cost += left_out;
     return true;
@@ -212,11 +215,16 @@ class ReadingSearch {
     return 2.0 * (problem_.Cost(state) - problem_.FreeCost(state));
   }
 
-  bool IsConsistent(const State& state) const {
+  // Of all features together.
+  int DegreesOfFreedom(const State& state) const {
     int dof = 0;
     for (std::size_t i = 0; i < state.active.size(); ++i)
       dof += state.active[i] != 0 ? problem_.features()[i].dof : 0;
-    return TotalMisfit(state) <= ChiSquareLimit(std::max(1, dof), FalseAlarms(state));
+    return std::max(1, dof);
+  }
+
+  bool IsConsistent(const State& state) const {
+    return TotalMisfit(state) <= ChiSquareLimit(DegreesOfFreedom(state), FalseAlarms(state));
   }
 
   // Of each feature, that all of a photo raise one in 10 000.
@@ -232,6 +240,18 @@ class ReadingSearch {
 
   // What has no inliers has no say: the minimum without it is that of another reading.
   bool HasOutliers(State state) const { return DropOutliers(problem_, &state); }
+
+  double BestKept() const {
+    double best = kNoRival;
+    for (const State& minimum : minima_) best = std::min(best, minimum.cost);
+    return best;
+  }
+
+  // Of many features, where steps like the one from its parent would not lead to what competes.
+  bool IsHopeless(const State& minimum, double parent_cost) const {
+    return problem_.features().size() > kFew &&
+           minimum.cost - kMaxReadings * (parent_cost - minimum.cost) > BestKept() + MaxGap();
+  }
 
   // Readings without what contradicts this minimum.
   std::vector<Reading> Rivals(const State& minimum) const {

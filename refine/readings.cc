@@ -113,10 +113,13 @@ std::optional<VanishingPointFit> SecondDirection(const PencilObservation& pencil
   return second;
 }
 
-// What the closed forms say with a pencil's second direction: the other evidence tells which.
+// What the closed forms say with a pencil's second direction: the other evidence tells which. Of
+// many pencils one does not matter.
 void AddSecondDirections(const Observations& resolved,
                          const std::vector<std::shared_ptr<const Solver>>& seeders,
                          std::vector<Seed>* seeds) {
+  constexpr std::size_t kFew = 6;
+  if (resolved.pencils.size() > kFew) return;
   for (std::size_t i = 0; i < resolved.pencils.size(); ++i) {
     const std::optional<VanishingPointFit> second = SecondDirection(resolved.pencils[i]);
     if (!second) continue;

@@ -67,7 +67,32 @@ BENCHMARK(BM_GrowthSceneEntries)
     ->Unit(benchmark::kMillisecond)
     ->Complexity(benchmark::oNLogN);
 
-// Two orthogonal pencils.
+constexpr double kSegmentNoisePx = 0.2;
+
+// A segment of a pencil, 20 to 90 pixels long.
+LineObservation SegmentTo(const Eigen::Vector2d& vanishing_point, Random* random) {
+  Eigen::Vector2d from(random->Uniform(-300.0, 300.0), random->Uniform(-200.0, 200.0));
+  if ((vanishing_point - from).norm() < 200.0) from *= -1.0;
+  const double length = random->Uniform(20.0, 90.0);
+  const Eigen::Vector2d to = from + length * (vanishing_point - from).normalized();
+  const auto noisy = [random](const Eigen::Vector2d& p) {
+    const double dx = random->Normal(), dy = random->Normal();
+    return Eigen::Vector2d(p + kSegmentNoisePx * Eigen::Vector2d(dx, dy));
+  };
+  return {{noisy(from), noisy(to)}, {}, {}};
+}
+
+void FitAndEstimate(const Observations& observations, benchmark::State* state) {
+  for (auto _ : *state) {
+    Observations fitted = observations;
+    if (!FitObservations({}, &fitted).ok()) std::abort();
+    benchmark::DoNotOptimize(EstimatePose(fitted));
+  }
+  state->SetComplexityN(state->range(0));
+}
+
+// Two orthogonal pencils; where `every` is above 0, each every-th segment of the first runs to a
+// point 300 pixels beside the others' vanishing point.
 void BM_GrowthSegments(benchmark::State& state) {
   Random random(1);
   Observations observations;
@@ -80,26 +105,45 @@ void BM_GrowthSegments(benchmark::State& state) {
     pencil.plane = "p";
     pencil.direction = k == 0 ? PencilDirection::kX : PencilDirection::kY;
     for (std::int64_t i = 0; i < state.range(0) / 2; ++i) {
-      const Eigen::Vector2d from(random.Uniform(-300.0, 300.0), random.Uniform(-200.0, 200.0));
-      const Eigen::Vector2d to = from + 0.05 * (vanishing_points[k] - from);
-      const auto noisy = [&random](const Eigen::Vector2d& p) {
-        const double dx = random.Normal(), dy = random.Normal();
-        return Eigen::Vector2d(p + 0.2 * Eigen::Vector2d(dx, dy));
-      };
-      pencil.lines.push_back({{noisy(from), noisy(to)}, {}, {}});
+      const bool leans = k == 0 && state.range(1) > 0 && i % state.range(1) == 0;
+      const Eigen::Vector2d beside(0.0, leans ? 300.0 : 0.0);
+      pencil.lines.push_back(SegmentTo(vanishing_points[k] + beside, &random));
     }
     observations.pencils.push_back(pencil);
   }
-  for (auto _ : state) {
-    Observations fitted = observations;
-    if (!FitObservations({}, &fitted).ok()) std::abort();
-    benchmark::DoNotOptimize(EstimatePose(fitted));
-  }
-  state.SetComplexityN(state.range(0));
+  FitAndEstimate(observations, &state);
 }
 BENCHMARK(BM_GrowthSegments)
+    ->ArgNames({"segments", "leaning_every"})
+    ->ArgsProduct({{100, 1000, 10000}, {0}})
+    ->Unit(benchmark::kMillisecond)
+    ->Complexity(benchmark::oNLogN);
+BENCHMARK(BM_GrowthSegments)
+    ->ArgNames({"segments", "leaning_every"})
+    ->ArgsProduct({{100, 1000, 10000}, {10}})
+    ->Unit(benchmark::kMillisecond)
+    ->Complexity(benchmark::oNLogN);
+
+// Pencils of three segments each, of any directions of one plane; its normal is (0, 0.6, -0.8).
+void BM_GrowthFreePencils(benchmark::State& state) {
+  Random random(1);
+  Observations observations;
+  observations.camera.fx = observations.camera.fy = 600.0;
+  for (std::int64_t i = 0; i < state.range(0); ++i) {
+    const double angle = random.Uniform(0.0, kPi);
+    const Eigen::Vector3d direction(std::cos(angle), 0.8 * std::sin(angle), 0.6 * std::sin(angle));
+    PencilObservation pencil;
+    pencil.id = "l" + std::to_string(i);
+    pencil.plane = "p";
+    for (int k = 0; k < 3; ++k)
+      pencil.lines.push_back(SegmentTo(600.0 * direction.head<2>() / direction.z(), &random));
+    observations.pencils.push_back(pencil);
+  }
+  FitAndEstimate(observations, &state);
+}
+BENCHMARK(BM_GrowthFreePencils)
     ->RangeMultiplier(10)
-    ->Range(100, 10000)
+    ->Range(10, 10000)
     ->Unit(benchmark::kMillisecond)
     ->Complexity(benchmark::oNLogN);
 
