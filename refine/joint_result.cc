@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 #include <utility>
 
 #include "circline/estimators/basics.h"
@@ -169,12 +168,19 @@ void FillCircles(const JointProblem& problem, const State& state, Refined* refin
   }
 }
 
+std::vector<int> RotationColumns(const JointProblem& problem, const Linearization& at) {
+  std::vector<int> columns;
+  for (int k = 0; k < problem.blocks()[JointProblem::kRotation].tangent_size(); ++k)
+    columns.push_back(at.column(JointProblem::kRotation) + k);
+  return columns;
+}
+
 // Each pencil's own direction, which leans from its axis as far as the evidence says.
 void FillPencils(const JointProblem& problem, const State& state, const Linearization& at,
-                 const Eigen::MatrixXd& T, PoseHypothesis* h) {
+                 PoseHypothesis* h) {
   const Eigen::Matrix3d R = problem.PoseAt(state).rotation;
-  std::vector<int> core(static_cast<std::size_t>(at.core_size()));
-  std::iota(core.begin(), core.end(), 0);
+  const std::vector<int> rotation = RotationColumns(problem, at);
+  const Eigen::MatrixXd turns = R.leftCols(static_cast<Eigen::Index>(rotation.size()));
   const std::vector<JointProblem::PencilBlocks>& all = problem.pencils();  // In the same order.
   auto blocks = all.begin();
   for (std::size_t i = 0; i < problem.observations().pencils.size(); ++i) {
@@ -187,8 +193,8 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
       const Block& block = problem.blocks()[static_cast<std::size_t>(blocks->direction)];
       estimate.direction =
           R * Eigen::Map<const Eigen::Vector3d>(state.x.data() + block.offset).normalized();
-      Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * T.topRows<3>();
-      std::vector<int> columns = core;
+      Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * turns;
+      std::vector<int> columns = rotation;
       if (block.tangent_size() > 0) {
         Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> plus(
             3, block.tangent_size());
@@ -201,8 +207,8 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
       covariance = J * at.Covariance(columns) * J.transpose();
     } else if (pencil.direction != PencilDirection::kFree) {
       estimate.direction = R.col(static_cast<int>(pencil.direction));
-      const Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * T.topRows<3>();
-      covariance = J * at.covariance() * J.transpose();
+      const Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * turns;
+      covariance = J * at.Covariance(rotation) * J.transpose();
     } else if (pencil.fit) {
       estimate.direction = pencil.fit->direction;
       covariance = pencil.fit->covariance;
@@ -303,9 +309,7 @@ void FillLeftOut(const JointProblem& problem, const State& state, Refined* refin
 // Log determinant of the covariance of rotation and, where it is estimated, focal length; a turn
 // that the evidence says nothing of has a variance of one, and no other has more.
 double LogDet(const JointProblem& problem, const Linearization& at) {
-  std::vector<int> columns;
-  for (int k = 0; k < problem.blocks()[JointProblem::kRotation].tangent_size(); ++k)
-    columns.push_back(at.column(JointProblem::kRotation) + k);
+  std::vector<int> columns = RotationColumns(problem, at);
   if (problem.camera_is_estimated()) columns.push_back(at.column(JointProblem::kCamera));
   Eigen::MatrixXd covariance = at.covariance()(columns, columns);
   const Eigen::MatrixXd nulls = at.null_space()(columns, Eigen::all);
@@ -367,7 +371,7 @@ Status FillRefined(const JointProblem& problem, State state, Refined* refined) {
   FillFreeDirections(problem, T, at, h);
   h->rank = CovarianceRank(covariance);
   FillCircles(problem, state, refined);
-  FillPencils(problem, state, at, T, h);
+  FillPencils(problem, state, at, h);
   FillFocal(problem, state, at, T, refined);
   FillLeftOut(problem, state, refined);
   h->log_det = LogDet(problem, at);

@@ -3,8 +3,8 @@
 # that are indented, in the folder, against the installation: on photos of a sheet of discs that are made here under the
 # names that the commands have. Simulations are cut short, the studio is stopped once it has answered. Then
 # the array of jobs of docs/clusters.md, by a stand-in for Slurm. With `mpi` that page's commands of MPI instead, with
-# as many processes as it says on whatever cores are there. Not run: what begins with another program (benchmarks and
-# builds; README.md's are run by .ci/run, packages.sh, pip.sh, the fuzzing by tests/run.sh --full).
+# as many processes as it says on whatever cores are there. Commands of other programs are not run here: a list below
+# says what runs them, and one that is not in it fails.
 set -euo pipefail
 tests=$(cd "$(dirname "$0")" && pwd)
 top=$tests/..
@@ -61,13 +61,30 @@ done
 mkdir -p out && cp -r shard0 out/shard-0
 export SLURM_ARRAY_TASK_ID=0 SLURM_ARRAY_TASK_COUNT=2 SLURM_CPUS_PER_TASK=1
 
-words='circline_[a-z]+'
+# shown <first words>: the commands that begin with one of them.
+shown() {
+  awk -v words="$1" '/^```/ { fenced = !fenced }
+       !fenced && /^    / { line = line substr($0, 5)
+         if (sub(/\\$/, "", line)) next
+         if (line ~ "^(" words ") ") print line }
+       { line = "" }' "$top/README.md" "$top/CONTRIBUTING.md" "$top"/docs/*.md "$top"/docs/guide/*.md
+}
+words='circline_[a-z]+|python3 -c|/usr/bin/time'
 [ "${3:-}" != mpi ] || words='mpirun|srun'
-awk -v words="$words" '/^```/ { fenced = !fenced }
-     !fenced && /^    / { line = line substr($0, 5)
-       if (sub(/\\$/, "", line)) next
-       if (line ~ "^(" words ") ") print line }
-     { line = "" }' "$top/README.md" "$top"/docs/*.md "$top"/docs/guide/*.md > shown.txt
+shown "$words" > shown.txt
+shown '[^ ]*/[^ ]+|apt|apt-get|cmake|ctest|g[+][+]|python3|[A-Z_]+=[^ ]+ .*' > others.txt
+while read -r command; do
+  case $command in
+    "python3 -c"* | /usr/bin/time*) ;;  # Here.
+    apps/demo.sh* | tests/run.sh* | .ci/run* | ctest* | apps/benchmark/photographs.py* | apps/benchmark/peers.py*) ;;  # .ci/run
+    apt-get* | "cmake --preset release -DCIRCLINE_WITH_"*) ;;                                   # .ci/run
+    "cmake --workflow --preset package" | "apt install ./build/package/"*) ;;                   # tests/packages.sh
+    "python3 -m venv"*) ;;                                                                      # tests/pip.sh
+    tests/fuzz/run.sh* | tests/threads.sh* | *apps/benchmark/boxes.py*) ;;                     # tests/run.sh --full
+    *first_pose* | */pose* | "python3 photo_to_pose.py"*) ;;                                    # tests/first_pose.sh
+    *) echo "run by no test: $command" && exit 1 ;;
+  esac
+done < others.txt
 run=0
 while read -r command; do
   command=$(sed -E 's/ +# .*//; s/ \[[^]]*\]//g' <<< "$command")
@@ -76,12 +93,15 @@ while read -r command; do
   status=0
   case $command in
     circline_simulate*) command+=" --trials=2" ;;
+    python3*) command=/usr/bin/${command//1178/80} ;;  # A small photo, else the same.
+    /usr/bin/time*) command=${command#*-v } ;;
     circline_studio*) command="timeout 5 $command --port=0" ;;
     mpirun*) command=${command/--map-by slot:PE=4/--oversubscribe} ;;
     srun*) command=$(sed -E 's/srun --ntasks=([0-9]+) .*--mpi=pmix/mpirun --oversubscribe -np \1/' <<< "$command") ;;
   esac
   timeout 240 bash -o pipefail -ec "$command" > said.txt 2>&1 < /dev/null || status=$?
   case $command in
+    /usr/bin/python3*) ;;
     *circline_studio*) [ "$status" -eq 124 ] && grep -q http://127.0.0.1: said.txt && status=0 ;;
     *) [ "$status" -ne 0 ] || [ -n "$(find out -type f -size +0)" ] || { echo "nothing in out"; exit 1; } ;;
   esac

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # tests/compilers.sh: builds the four libraries, warnings as errors, with each compiler, language
 # standard and build type, in build/compilers, and prints a table of what came of it. Several files
-# are compiled as one. Half an hour on two cores; tests/run.sh --full runs it. Exit code 1 if one did
+# are compiled as one. 45 minutes on two cores; tests/run.sh --full runs it. Exit code 1 if one did
 # not build.
 set -euo pipefail
 cd "$(dirname "$0")/.."

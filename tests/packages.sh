@@ -40,7 +40,7 @@ quietly build/chroot-update.log inside apt-get update
 before=$(inside find / -xdev -name '*circline*')
 mkdir -p "$chroot_dir/source/build/package"
 cp "${packages[@]}" "$chroot_dir/source/build/package"
-cp -r docs tests apps README.md "$chroot_dir/source"
+cp -r docs tests apps README.md CONTRIBUTING.md "$chroot_dir/source"
 find_folder visp-images-data /usr/share/visp-images-data/ViSP-images
 cp -r "$found/mire-2" "$chroot_dir/source/frames"
 echo 'APT::Get::Assume-Yes "true"; APT::Install-Recommends "false";' > "$chroot_dir/etc/apt/apt.conf.d/99test"

@@ -124,24 +124,102 @@ BENCHMARK(BM_GrowthSegments)
     ->Unit(benchmark::kMillisecond)
     ->Complexity(benchmark::oNLogN);
 
-// Pencils of three segments each, of any directions of one plane; its normal is (0, 0.6, -0.8).
-void BM_GrowthFreePencils(benchmark::State& state) {
-  Random random(1);
-  Observations observations;
-  observations.camera.fx = observations.camera.fy = 600.0;
-  for (std::int64_t i = 0; i < state.range(0); ++i) {
-    const double angle = random.Uniform(0.0, kPi);
-    const Eigen::Vector3d direction(std::cos(angle), 0.8 * std::sin(angle), 0.6 * std::sin(angle));
-    PencilObservation pencil;
-    pencil.id = "l" + std::to_string(i);
-    pencil.plane = "p";
-    for (int k = 0; k < 3; ++k)
-      pencil.lines.push_back(SegmentTo(600.0 * direction.head<2>() / direction.z(), &random));
-    observations.pencils.push_back(pencil);
+// A sheet four units wide, six away, seen 40 degrees off its normal.
+class Sheet {
+ public:
+  Sheet() {
+    Camera& camera = observations_.camera;
+    camera.fx = camera.fy = 600.0;
+    camera.cx = 320.0;
+    camera.cy = 240.0;
   }
-  FitAndEstimate(observations, &state);
+
+  // With its centre and a diameter.
+  void AddCircle() {
+    const Eigen::Vector2d center = Anywhere();
+    const double radius = random_.Uniform(0.05, 0.2);
+    CircleObservation circle;
+    circle.id = "c" + std::to_string(observations_.circles.size());
+    circle.plane = "p";
+    constexpr int kPoints = 24;
+    for (int k = 0; k < kPoints; ++k)
+      circle.points.push_back(Pixel(center + radius * Along(2.0 * kPi * k / kPoints)));
+    circle.center = Pixel(center);
+    const Eigen::Vector2d across = radius * Along(random_.Uniform(0.0, kPi));
+    circle.diameters.push_back({Pixel(center - across), Pixel(center + across)});
+    observations_.circles.push_back(circle);
+  }
+
+  void AddPencil(double angle, int segments, PencilDirection direction) {
+    PencilObservation pencil;
+    pencil.id = "l" + std::to_string(observations_.pencils.size());
+    pencil.plane = "p";
+    pencil.direction = direction;
+    for (int k = 0; k < segments; ++k) {
+      const Eigen::Vector2d from = Anywhere();
+      const double length = random_.Uniform(0.2, 1.0);
+      pencil.lines.push_back({{Pixel(from), Pixel(from + length * Along(angle))}, {}, {}});
+    }
+    observations_.pencils.push_back(pencil);
+  }
+  void AddFreePencil() { AddPencil(random_.Uniform(0.0, kPi), 3, PencilDirection::kFree); }
+
+  void AddLength() {
+    const Eigen::Vector2d a = Anywhere(), b = Anywhere();
+    KnownLength length;
+    length.points = {Pixel(a), Pixel(b)};
+    length.plane = "p";
+    length.value = (a - b).norm();
+    observations_.known_lengths.push_back(length);
+  }
+
+  const Observations& observations() const { return observations_; }
+
+ private:
+  static Eigen::Vector2d Along(double angle) { return {std::cos(angle), std::sin(angle)}; }
+  Eigen::Vector2d Anywhere() {
+    const double x = random_.Uniform(-2.0, 2.0), y = random_.Uniform(-2.0, 2.0);
+    return {x, y};
+  }
+  Eigen::Vector2d Pixel(const Eigen::Vector2d& at) {
+    const Eigen::Vector3d ray =
+        ExpRotation({0.7, 0.0, 0.0}) * Eigen::Vector3d(at.x(), at.y(), 0.0) +
+        Eigen::Vector3d(0.0, 0.0, 6.0);
+    Eigen::Vector2d pixel;
+    CameraToPixel(observations_.camera, ray, &pixel);
+    const double dx = random_.Normal(), dy = random_.Normal();
+    return pixel + kSegmentNoisePx * Eigen::Vector2d(dx, dy);
+  }
+
+  Random random_{1};
+  Observations observations_;
+};
+
+// Pencils of three segments, of any directions of the sheet.
+void BM_GrowthFreePencils(benchmark::State& state) {
+  Sheet sheet;
+  for (std::int64_t i = 0; i < state.range(0); ++i) sheet.AddFreePencil();
+  FitAndEstimate(sheet.observations(), &state);
 }
 BENCHMARK(BM_GrowthFreePencils)
+    ->RangeMultiplier(10)
+    ->Range(10, 10000)
+    ->Unit(benchmark::kMillisecond)
+    ->Complexity(benchmark::oNLogN);
+
+// So many of every kind: circles with their centres and diameters, segments of two orthogonal
+// pencils, pencils of any direction, lengths.
+void BM_GrowthOfAll(benchmark::State& state) {
+  const auto count = static_cast<int>(state.range(0));
+  Sheet sheet;
+  for (int i = 0; i < count; ++i) sheet.AddCircle();
+  for (int i = 0; i < count; ++i) sheet.AddFreePencil();
+  for (int i = 0; i < count; ++i) sheet.AddLength();
+  sheet.AddPencil(0.0, count, PencilDirection::kX);
+  sheet.AddPencil(0.5 * kPi, count, PencilDirection::kY);
+  FitAndEstimate(sheet.observations(), &state);
+}
+BENCHMARK(BM_GrowthOfAll)
     ->RangeMultiplier(10)
     ->Range(10, 10000)
     ->Unit(benchmark::kMillisecond)

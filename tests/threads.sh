@@ -1,0 +1,10 @@
+#!/usr/bin/env bash
+# tests/threads.sh: what runs in several threads, built with ThreadSanitizer (clang) in build/threads: estimates and
+# trackers at once, AdjustPhotos in four threads. ceres runs in the thread that calls it. Some minutes; tests/run.sh
+# --full runs it. Exit code 1 for a race.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. cmake/setup.sh
+install_packages "${BUILD_PACKAGES[@]}" clang libclang-rt-dev
+build threads circline_refine_test
+build/threads/bin/circline_refine_test --gtest_filter='Threads.*:ParallelFor.*:AdjustPhotos.SameBits*'
