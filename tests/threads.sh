@@ -7,4 +7,4 @@ cd "$(dirname "$0")/.."
 . cmake/setup.sh
 install_packages "${BUILD_PACKAGES[@]}" clang libclang-rt-dev
 build threads circline_refine_test
-build/threads/bin/circline_refine_test --gtest_filter='Threads.*:ParallelFor.*:AdjustPhotos.SameBits*'
+CIRCLINE_SOAK_CALLS=2000 build/threads/bin/circline_refine_test --gtest_filter='Threads.*:ParallelFor.*:AdjustPhotos.SameBits*'
