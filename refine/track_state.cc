@@ -189,7 +189,8 @@ void MoveOn(const TrackMap& map, const TrackerOptions& options, double dt, Track
 void MoveBy(const TrackMap& map, const TrackerOptions& options, const RelativePose& motion,
             double dt, TrackState* state) {
   using M = TrackMap;
-  const double seconds = dt > 0.0 ? dt : 1.0, rate = 1.0 / seconds;
+  constexpr double kShortest = 1e-6;  // Finer than cameras' clocks: less makes rates without bound.
+  const double seconds = std::max(dt, kShortest), rate = 1.0 / seconds;
   const Eigen::Vector3d turn = LogRotation(motion.now_from_before.rotation);
   const Eigen::Matrix3d inverse = LeftJacobian(turn).inverse();
   const bool has_shift = map.has_position() && motion.has_translation;

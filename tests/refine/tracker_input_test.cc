@@ -191,6 +191,18 @@ TEST_F(OneTrackTest, ARelativeMotionTakesTime) {
   EXPECT_TRUE(Update(10).estimate.status.ok());
 }
 
+TEST_F(OneTrackTest, ARelativeMotionInNearlyNoTimeStaysFinite) {
+  const CameraPose &from = sequence_.frames[0].pose, &to = sequence_.frames[1].pose;
+  PoseTracker tracker(ExactOptions(sequence_.options()));
+  ASSERT_TRUE(tracker.Update(Seen(0), 0.0).estimate.status.ok());
+  for (const double time : {1e-170, 2e-170, 0.1}) {
+    const TrackedPose tracked = tracker.Update(Seen(1), time, Gyroscope(from, to));
+    ASSERT_FALSE(tracked.estimate.hypotheses.empty()) << tracked.estimate.status.message;
+    for (const PoseHypothesis& h : tracked.estimate.hypotheses)
+      EXPECT_TRUE(h.Covariance().allFinite()) << time;
+  }
+}
+
 TEST_F(OneTrackTest, WhatIsKnownOfThePoseCounts) {
   const TrackedPose plain = Update(10);
   MotionPrior motion;
