@@ -76,6 +76,9 @@ class Parser {
     std::string name = text.substr(0, equals);
     std::replace(name.begin(), name.end(), '-', '_');
     if (IsHelp(name)) return Status::Ok();
+    // These would have gflags read flags elsewhere, and end the process where it does not like
+    // them.
+    if (name == "fromenv" || name == "tryfromenv") return UnknownFlag(name);
     gflags::CommandLineFlagInfo info;
     const bool known = gflags::GetCommandLineFlagInfo(name.c_str(), &info);
     if (equals != std::string::npos) {

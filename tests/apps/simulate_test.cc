@@ -219,6 +219,7 @@ TEST(Simulate, BadFlagsAreNamedAndNothingIsWritten) {
   const TestFolder folder;
   const std::map<std::string, std::string> cases = {
       {"--trails=3", "unknown flag --trails; did you mean 'trials'?"},
+      {"--tryfromenv=x", "unknown flag --tryfromenv"},
       {"--trials=0", "--trials"},
       {"--trials=many", "--trials"},
       {"--noise_px=1,-1", "--noise_px"},

@@ -8,6 +8,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -21,6 +22,16 @@
 
 namespace circline::fuzz {
 namespace {
+
+// libFuzzer's clock interrupts calls.
+template <typename Call>
+ssize_t Uninterrupted(const Call& call) {
+  ssize_t n;
+  do {
+    n = call();
+  } while (n < 0 && errno == EINTR);
+  return n;
+}
 
 // A studio of one small photo, for the whole run.
 class Served {
@@ -54,15 +65,17 @@ class Served {
     Expect(connect(connection, to, sizeof(address)) == 0, "the studio serves");
     // It may end the connection before it has read everything.
     for (std::size_t sent = 0; sent < request.size();) {
-      const ssize_t n =
-          send(connection, request.data() + sent, request.size() - sent, MSG_NOSIGNAL);
+      const ssize_t n = Uninterrupted([&] {
+        return send(connection, request.data() + sent, request.size() - sent, MSG_NOSIGNAL);
+      });
       if (n <= 0) break;
       sent += static_cast<std::size_t>(n);
     }
     if (is_all) shutdown(connection, SHUT_WR);
     std::string answer;
     char buffer[4096];
-    for (ssize_t n; (n = recv(connection, buffer, sizeof(buffer), 0)) > 0;)
+    const auto receive = [&] { return recv(connection, buffer, sizeof(buffer), 0); };
+    for (ssize_t n; (n = Uninterrupted(receive)) > 0;)
       answer.append(buffer, static_cast<std::size_t>(n));
     close(connection);
     return answer;
