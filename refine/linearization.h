@@ -37,6 +37,7 @@ class Linearization {
   bool ComputeCovariance();
   const Eigen::MatrixXd& covariance() const { return covariance_; }  // Of the core.
   const Eigen::MatrixXd& null_space() const { return null_space_; }
+  // Of any shared unknowns, n x n for n columns.
   Eigen::MatrixXd Covariance(const std::vector<int>& columns) const;
 
   // By feature: d^2 = 2 (C(all) - C(without it) - C(its own free fit)), to second order, and its

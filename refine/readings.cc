@@ -118,8 +118,8 @@ std::optional<VanishingPointFit> SecondDirection(const PencilObservation& pencil
 void AddSecondDirections(const Observations& resolved,
                          const std::vector<std::shared_ptr<const Solver>>& seeders,
                          std::vector<Seed>* seeds) {
-  constexpr std::size_t kFew = 6;
-  if (resolved.pencils.size() > kFew) return;
+  constexpr std::size_t kManyPencils = 6;  // For time; not chosen on photos.
+  if (resolved.pencils.size() > kManyPencils) return;
   for (std::size_t i = 0; i < resolved.pencils.size(); ++i) {
     const std::optional<VanishingPointFit> second = SecondDirection(resolved.pencils[i]);
     if (!second) continue;

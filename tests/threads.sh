@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # tests/threads.sh: what runs in several threads, built with ThreadSanitizer (clang) in build/threads: estimates and
-# trackers at once, AdjustPhotos in four threads. ceres runs in the thread that calls it. Some minutes; tests/run.sh
-# --full runs it. Exit code 1 for a race.
+# trackers at once, AdjustPhotos in three threads. Some minutes; tests/run.sh --full runs it.
+# Exit code 1 for a race.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/setup.sh
