@@ -4,15 +4,12 @@
 #include <sys/wait.h>
 
 #include <chrono>
-#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <random>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "tests/apps/board_set.h"
@@ -56,23 +53,19 @@ TEST(CompareResume, KilledAtRandomGivesTheSameBytes) {
   const double whole_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 
-  std::mt19937 random(7);
+  RandomKiller killer(whole_ms);
   int num_killed = 0, num_begun = 0;
   for (int trial = 0; trial < kTrials; ++trial) {
     const std::string out = folder / ("killed" + std::to_string(trial));
     const pid_t pid = StartProgram(CIRCLINE_COMPARE_BINARY,
                                    {"--scene=" + scene, "--threads=2", "--output=" + out});
     ASSERT_GT(pid, 0);
-    const double share = std::generate_canonical<double, 32>(random);
-    std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(share * whole_ms));
-    kill(pid, SIGKILL);
-    int status = 0;
-    ASSERT_EQ(waitpid(pid, &status, 0), pid);
-    if (WIFSIGNALED(status)) ++num_killed;
+    const bool killed = killer.Kill(pid);
+    if (killed) ++num_killed;
     for (const char* file : {"results.jsonl", "observations.jsonl", "timings.jsonl"}) {
       EXPECT_TRUE(HasWholeLinesOnly(out + "/" + file)) << file;
     }
-    if (WIFSIGNALED(status) && !ReadAll(out + "/results.jsonl").empty()) ++num_begun;
+    if (killed && !ReadAll(out + "/results.jsonl").empty()) ++num_begun;
     const Outcome outcome = RunCompare("--scene='" + scene + "' --resume --output='" + out + "'");
     EXPECT_EQ(outcome.exit_code, 1);
     EXPECT_CONTAINS(outcome.err, "gone.png: the file does not exist");

@@ -1,12 +1,10 @@
 // What the programs leave where the disk is full or may not be written, where the folder goes away
 // under them, and where they are killed: a sentence, and no file that is not whole.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -159,18 +157,12 @@ TEST_P(Faults, AFolderThatMayNotBeWrittenIsNamed) {
 
 TEST_P(Faults, KilledAtRandomLeavesNothingHalf) {
   MakeWhole();
-  std::mt19937 random(7);
+  RandomKiller killer(whole_ms_);
   int num_killed = 0;
   constexpr int kRuns = Trials(6);
   for (int run = 0; run < kRuns; ++run) {
     const std::string out = folder_ / ("killed" + std::to_string(run));
-    const pid_t pid = Start(out);
-    const double share = std::generate_canonical<double, 32>(random);
-    std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(share * whole_ms_));
-    kill(pid, SIGKILL);
-    int status = 0;
-    ASSERT_EQ(waitpid(pid, &status, 0), pid);
-    if (WIFSIGNALED(status)) ++num_killed;
+    if (killer.Kill(Start(out))) ++num_killed;
     ExpectNothingHalf(out);
     EXPECT_EQ(Run(out).exit_code, 0);
     ExpectSameFiles(Whole(), out);

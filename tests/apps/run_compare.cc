@@ -4,7 +4,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
+#include <thread>
 
 #include "tests/apps/test_files.h"
 
@@ -33,6 +36,27 @@ pid_t StartProgram(const std::string& program, const std::vector<std::string>& a
   argv.push_back(nullptr);
   execv(argv[0], argv.data());
   _exit(127);
+}
+
+bool RandomKiller::Kill(pid_t pid) {
+  if (pid <= 0) return false;  // It was never started.
+  using Clock = std::chrono::steady_clock;
+  constexpr double kSlower = 1.1;  // Whoever was killed might have taken longer.
+  const Clock::time_point begin = Clock::now();
+  const double share = std::generate_canonical<double, 32>(random_);
+  double ms = 0.0;
+  while (ms < share * whole_ms_) {
+    std::this_thread::sleep_for(std::chrono::microseconds(500));
+    ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+    if (waitpid(pid, nullptr, WNOHANG) == pid) {
+      whole_ms_ = ms;
+      return false;
+    }
+  }
+  kill(pid, SIGKILL);
+  whole_ms_ *= kSlower;
+  int status = 0;
+  return waitpid(pid, &status, 0) == pid && WIFSIGNALED(status);
 }
 
 }  // namespace circline::apps

@@ -4,6 +4,7 @@
 
 #include <sys/types.h>
 
+#include <random>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,19 @@ Outcome RunCompare(const std::string& arguments);
 
 // As a process of ours that goes on, silent.
 pid_t StartProgram(const std::string& program, const std::vector<std::string>& arguments);
+
+// Kills programs at moments uniform over the time that they take. Of that time it keeps track, as
+// it changes by itself on a machine that does other things, too: most are killed, whatever it does.
+class RandomKiller {
+ public:
+  explicit RandomKiller(double whole_ms) : whole_ms_(whole_ms) {}
+  // Waits for the program's end; whether it was killed, and did not end by itself before.
+  bool Kill(pid_t pid);
+
+ private:
+  double whole_ms_;
+  std::mt19937 random_{7};
+};
 
 }  // namespace circline::apps
 
