@@ -227,8 +227,7 @@ void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseH
   Vector6d length = Vector6d::Zero();
   length.tail<3>() = h->cam_from_world.translation;
   if (!h->metric) leave_out(length);
-  Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
-  h->rank = CovarianceRank(covariance);
+  SetCovariance(covariance, h);
   if (candidate.contradiction.size() > 0) {
     const Eigen::MatrixXd tail = S.bottomRows(candidate.contradiction.size());
     const Eigen::MatrixXd C = tail * tail.transpose();

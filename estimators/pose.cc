@@ -59,11 +59,22 @@ Eigen::Vector3d PoseHypothesis::SigmaRotation() const {
   return sigma;
 }
 
-int CovarianceRank(const Matrix6d& covariance) {
-  const Vector6d scale =
-      covariance.diagonal().unaryExpr([](double v) { return v > 0.0 ? 1.0 / std::sqrt(v) : 0.0; });
+void SetCovariance(Matrix6d covariance, PoseHypothesis* hypothesis) {
+  constexpr double kRounding = 1e-12;
+  const double nothing = kRounding * covariance.cwiseAbs().maxCoeff();
+  Vector6d scale = Vector6d::Zero();
+  for (int i = 0; i < 6; ++i) {
+    if (covariance(i, i) > 0.0) {
+      scale[i] = 1.0 / std::sqrt(covariance(i, i));
+    } else if (covariance(i, i) >= -nothing) {
+      covariance.row(i).setZero();
+      covariance.col(i).setZero();
+    }
+  }
   const Matrix6d correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
-  return static_cast<int>(Eigen::FullPivLU<Matrix6d>(correlation).setThreshold(1e-9).rank());
+  hypothesis->rank =
+      static_cast<int>(Eigen::FullPivLU<Matrix6d>(correlation).setThreshold(1e-9).rank());
+  Eigen::Map<Matrix6d>(hypothesis->covariance.data()) = covariance;
 }
 
 void RankHypotheses(std::vector<PoseHypothesis>* hypotheses) {

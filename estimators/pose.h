@@ -95,8 +95,9 @@ Camera CameraOf(const PoseHypothesis& hypothesis, const Camera& given);
 // Those that tie with the best (odds below 11 to 10) keep the order in which they came.
 void RankHypotheses(std::vector<PoseHypothesis>* hypotheses);
 
-// Rank of a covariance of [delta, delta_t] whatever the units of the two.
-int CovarianceRank(const Matrix6d& covariance);
+// Fills covariance and rank, that of the correlations: whatever the units of delta and delta_t.
+// What rounding leaves of a direction without variance, -1e-17, is zero, its covariances, too.
+void SetCovariance(Matrix6d covariance, PoseHypothesis* hypothesis);
 
 // Rotation vector <-> matrix (Rodrigues), and the angle between two rotations, radians.
 Eigen::Matrix3d ExpRotation(const Eigen::Vector3d& delta);

@@ -12,35 +12,6 @@ namespace circline {
 namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-constexpr double kNoInformation = 1e-12;  // Of an eigenvalue, at unit diagonal.
-
-// Inverse of a symmetric positive definite matrix. False where it is none.
-bool Invert(const Eigen::MatrixXd& A, Eigen::MatrixXd* inverse) {
-  const Eigen::LLT<Eigen::MatrixXd> llt(A);
-  if (llt.info() != Eigen::Success) return false;
-  *inverse = llt.solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
-  return inverse->allFinite();
-}
-
-// Pseudo-inverse on the observed subspace, which units do not matter to, and the directions without
-// information. `diagonal`: what the information would be if all else were known.
-bool PseudoInverse(const Eigen::MatrixXd& A, const Eigen::VectorXd& diagonal,
-                   Eigen::MatrixXd* inverse, Eigen::MatrixXd* nulls) {
-  const Eigen::VectorXd scale =
-      diagonal.unaryExpr([](double d) { return d > 0.0 ? 1.0 / std::sqrt(d) : 1.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * A *
-                                                             scale.asDiagonal());
-  if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) return false;
-  const Eigen::Index n = A.rows();
-  Eigen::Index k = 0;
-  while (k < n && eigen.eigenvalues()[k] <= kNoInformation) ++k;
-  const Eigen::MatrixXd vectors = scale.asDiagonal() * eigen.eigenvectors();
-  const auto known = eigen.eigenvalues().tail(n - k);
-  *inverse = vectors.rightCols(n - k) * known.cwiseInverse().asDiagonal() *
-             vectors.rightCols(n - k).transpose();
-  *nulls = vectors.leftCols(k).colwise().normalized();
-  return true;
-}
 
 }  // namespace
 
@@ -129,31 +100,29 @@ void Linearization::LayOut() {
     const int size = blocks[i].tangent_size();
     leaf_at_.insert(leaf_at_.end(), static_cast<std::size_t>(size),
                     static_cast<int>(leaves_.size()));
-    leaves_.push_back({next, size, {}, {}, {}});
+    leaves_.push_back({next, size, {}, {}, {}, {}});
     columns_[i] = next;
     next += size;
   }
-  for (Arrow* arrow : {&information_, &overcounted_}) {
-    arrow->core.setZero(core, core);
-    for (const Leaf& leaf : leaves_)
-      arrow->leaves.push_back(
-          {Eigen::MatrixXd::Zero(leaf.size, leaf.size), Eigen::MatrixXd::Zero(leaf.size, core)});
-  }
+  information_.core.setZero(core, core);
+  for (const Leaf& leaf : leaves_)
+    information_.leaves.push_back(
+        {Eigen::MatrixXd::Zero(leaf.size, leaf.size), Eigen::MatrixXd::Zero(leaf.size, core)});
 }
 
 // A leaf's rows hold what is between it and the core, the core's do not.
-void Linearization::Add(int row, int column, double value, Arrow* sum) const {
+void Linearization::Add(int row, int column, double value) {
   const int core = core_size();
   if (row < core) {
-    if (column < core) sum->core(row, column) += value;
+    if (column < core) information_.core(row, column) += value;
     return;
   }
   const auto at = LeafAt(row);
   const int first = leaves_[at].first;
   if (column < core) {
-    sum->leaves[at].with_core(row - first, column) += value;
+    information_.leaves[at].with_core(row - first, column) += value;
   } else {
-    sum->leaves[at].own(row - first, column - first) += value;
+    information_.leaves[at].own(row - first, column - first) += value;
   }
 }
 
@@ -163,8 +132,8 @@ void Linearization::AddInformation(const Eigen::MatrixXd& J, const std::vector<i
     for (std::size_t b = 0; b <= a; ++b) {
       const double sum =
           J.col(static_cast<Eigen::Index>(a)).dot(J.col(static_cast<Eigen::Index>(b)));
-      Add(columns[a], columns[b], sum, &information_);
-      if (a != b) Add(columns[b], columns[a], sum, &information_);
+      Add(columns[a], columns[b], sum);
+      if (a != b) Add(columns[b], columns[a], sum);
     }
   }
 }
@@ -235,146 +204,21 @@ void Linearization::TakeLoss(const Term& term, Rows* rows) {
   term.loss->Evaluate(rows->twice_cost, rho);
   const double W = std::max(1.0, rho[1]);
   if (term.is_mostly_exact) {
-    const Eigen::MatrixXd H = rows->J.transpose() * rows->J;
-    Eigen::MatrixXd more = (W * W - W) * H;
+    Overcounted over{rows->columns, rows->J, {}};
+    double information = 1.0;
+    Eigen::MatrixXd C = Eigen::MatrixXd::Identity(over.F.rows(), over.F.rows());
     if (term.lean_shape) {
       // J^T J is the plus Jacobian's P^T P over the variance of a direction's two components.
       const Eigen::MatrixXd& P = PlusJacobian(term.blocks.front());
-      const Eigen::MatrixXd in_camera = problem_.PoseAt(state_).rotation * P;
-      const double information = H.trace() / P.squaredNorm();
-      more = W * W * information * in_camera.transpose() * *term.lean_shape * in_camera - W * H;
+      over.F = problem_.PoseAt(state_).rotation * P;
+      information = rows->J.squaredNorm() / P.squaredNorm();
+      C = *term.lean_shape;
     }
-    for (std::size_t a = 0; a < rows->columns.size(); ++a) {
-      for (std::size_t b = 0; b < rows->columns.size(); ++b)
-        Add(rows->columns[a], rows->columns[b],
-            more(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)), &overcounted_);
-    }
+    over.S = W * information * (W * C - Eigen::MatrixXd::Identity(C.rows(), C.rows()));
+    overcounted_.push_back(std::move(over));
   }
   rows->J *= std::sqrt(W);
   rows->f *= std::sqrt(W);
-}
-
-// A group's own unknowns out of the information of the shared ones.
-bool Linearization::Eliminate(Group* group) {
-  std::vector<int> target;
-  for (const std::size_t index : group->rows) {
-    for (const int column : rows_[index].columns) {
-      if (column >= 0 &&
-          std::find(group->shared.begin(), group->shared.end(), column) == group->shared.end())
-        group->shared.push_back(column);
-    }
-  }
-  const int k = group->size, n = static_cast<int>(group->shared.size());
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(k + n, k + n);
-  for (const std::size_t index : group->rows) {
-    const Rows& rows = rows_[index];
-    target.clear();
-    for (const int column : rows.columns)
-      target.push_back(column < 0 ? -1 - column : k + IndexIn(group->shared, column));
-    A(target, target) += rows.J.transpose() * rows.J;
-  }
-  if (k > 0) {
-    if (!Invert(A.topLeftCorner(k, k), &group->inverse)) return false;
-    group->gain = group->inverse.lazyProduct(A.topRightCorner(k, n));
-    A.bottomRightCorner(n, n) -= A.bottomLeftCorner(n, k).lazyProduct(group->gain);
-  }
-  for (int a = 0; a < n; ++a) {
-    for (int b = 0; b < n; ++b)
-      Add(group->shared[static_cast<std::size_t>(a)], group->shared[static_cast<std::size_t>(b)],
-          A(k + a, k + b), &information_);
-  }
-  return true;
-}
-
-// A leaf out of the core's information, and out of what is counted too much: with its unknowns
-// measured from where they follow the core, that is M = L^T O L, L = [1 0; -gain 1].
-bool Linearization::Eliminate(std::size_t index) {
-  Leaf& leaf = leaves_[index];
-  const auto& [own, with_core] = information_.leaves[index];
-  const auto& [over_own, over_with_core] = overcounted_.leaves[index];
-  Eigen::MatrixXd inverse, unused;
-  if (!PseudoInverse(own, own.diagonal(), &inverse, &unused)) return false;
-  leaf.gain = inverse * with_core;
-  information_.core -= with_core.transpose() * leaf.gain;
-  const Eigen::MatrixXd across = over_with_core - over_own * leaf.gain;
-  overcounted_.core -= over_with_core.transpose() * leaf.gain + leaf.gain.transpose() * across;
-  leaf.covariance = inverse + inverse * over_own * inverse;
-  leaf.with_core = inverse * across;  // Times the core's covariance: ComputeCovariance.
-  return true;
-}
-
-bool Linearization::ComputeCovariance() {
-  for (Group& group : groups_) {
-    if (ok_ && !group.rows.empty()) ok_ = Eliminate(&group);
-  }
-  if (!ok_) return false;
-  const Eigen::VectorXd diagonal = information_.core.diagonal();
-  for (std::size_t i = 0; i < leaves_.size(); ++i) {
-    if (!Eliminate(i)) return false;
-  }
-  const int n = core_size(), e = num_estimated_, c = n - e;
-  Eigen::MatrixXd inverse, nulls;
-  if (!PseudoInverse(information_.core.topLeftCorner(e, e), diagonal.head(e), &inverse, &nulls))
-    return false;
-  covariance_.setZero(n, n);
-  covariance_.topLeftCorner(e, e) =
-      inverse + inverse * overcounted_.core.topLeftCorner(e, e) * inverse;
-  null_space_ = nulls;
-  for (Leaf& leaf : leaves_) {
-    leaf.with_core.leftCols(e) *= inverse;
-    leaf.with_core.rightCols(c).setZero();
-  }
-  if (c > 0) {
-    const CameraSigma& sigma = problem_.camera_sigma();
-    Eigen::VectorXd ambient = Eigen::VectorXd::Zero(kCameraSize);
-    ambient << sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
-        sigma.principal_point_px, sigma.k1, Eigen::VectorXd::Zero(kCameraSize - 5);
-    const Eigen::MatrixXd P = PlusJacobian(JointProblem::kCamera);
-    const Eigen::MatrixXd prior =
-        P.transpose() * ambient.cwiseAbs2().asDiagonal() * P;  // P selects.
-    const Eigen::MatrixXd follow = -inverse * information_.core.topRightCorner(e, c);
-    covariance_.topLeftCorner(e, e) += follow * prior * follow.transpose();
-    covariance_.topRightCorner(e, c) = follow * prior;
-    covariance_.bottomLeftCorner(c, e) = covariance_.topRightCorner(e, c).transpose();
-    covariance_.bottomRightCorner(c, c) = prior;
-  }
-  return covariance_.allFinite();
-}
-
-Eigen::MatrixXd Linearization::Covariance(const std::vector<int>& columns) const {
-  const auto n = static_cast<Eigen::Index>(columns.size());
-  const int core = core_size();
-  Eigen::MatrixXd by_core = Eigen::MatrixXd::Zero(n, core), with_core = by_core;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const int column = columns[static_cast<std::size_t>(i)];
-    if (column < core) {
-      by_core(i, column) = 1.0;
-      continue;
-    }
-    const Leaf& leaf = leaves_[LeafAt(column)];
-    by_core.row(i) = -leaf.gain.row(column - leaf.first);
-    with_core.row(i) = leaf.with_core.row(column - leaf.first);
-  }
-  const Eigen::MatrixXd across = with_core * by_core.transpose();
-  Eigen::MatrixXd covariance =
-      by_core * covariance_ * by_core.transpose() + across + across.transpose();
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const int a = columns[static_cast<std::size_t>(i)];
-    for (Eigen::Index j = 0; a >= core && j < n; ++j) {
-      const int b = columns[static_cast<std::size_t>(j)];
-      const Leaf& leaf = leaves_[LeafAt(a)];
-      if (b >= core && LeafAt(b) == LeafAt(a))
-        covariance(i, j) += leaf.covariance(a - leaf.first, b - leaf.first);
-    }
-  }
-  return covariance;
-}
-
-double Linearization::OwnVariance(int block, int coordinate) const {
-  const int group = problem_.blocks()[static_cast<std::size_t>(block)].group,
-            own = own_columns_[static_cast<std::size_t>(block)] + coordinate;
-  const Group& of = groups_[static_cast<std::size_t>(group)];
-  return of.rows.empty() ? 0.0 : of.inverse(own, own);
 }
 
 }  // namespace circline

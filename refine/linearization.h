@@ -76,8 +76,14 @@ class Linearization {
   };
   // The unknowns x of a leaf follow those y of the core: x = -gain y + n.
   struct Leaf {
-    int first, size;                              // Columns.
-    Eigen::MatrixXd gain, covariance, with_core;  // Of n, and between n and y.
+    int first, size;                        // Columns.
+    Eigen::MatrixXd gain, inverse;          // Of the information of the own part.
+    Eigen::MatrixXd covariance, with_core;  // Of n, and between n and y.
+  };
+  // F^T S F: what the information holds too much of, by a loss.
+  struct Overcounted {
+    std::vector<int> columns;  // Of F; those of one leaf at most.
+    Eigen::MatrixXd F, S;
   };
   static int IndexIn(const std::vector<int>& columns, int column) {
     return static_cast<int>(std::find(columns.begin(), columns.end(), column) - columns.begin());
@@ -88,12 +94,14 @@ class Linearization {
   }
   void LayOut();
   std::vector<bool> FindLeaves() const;  // By block.
-  void Add(int row, int column, double value, Arrow* sum) const;
+  void Add(int row, int column, double value);
   void AddInformation(const Eigen::MatrixXd& J, const std::vector<int>& columns);
   bool AddTerm(const Term& term, const Weighing& weighing);
   void TakeLoss(const Term& term, Rows* rows);
   bool Eliminate(Group* group);
   bool Eliminate(std::size_t leaf);
+  Eigen::MatrixXd AlongCore(const Overcounted& over) const;
+  void AddOvercounted(const Eigen::MatrixXd& inverse);
   const Eigen::MatrixXd& PlusJacobian(int block);  // Of the block's manifold, worked out once.
   void Leverage(const std::vector<const Rows*>& parts, Eigen::MatrixXd* S,
                 Eigen::VectorXd* f) const;
@@ -110,7 +118,8 @@ class Linearization {
   std::vector<double> ambient_;        // Jacobians of one term, as its cost function writes them.
   std::vector<Leaf> leaves_;
   std::vector<int> leaf_at_;  // By column beyond the core's.
-  Arrow information_, overcounted_;
+  Arrow information_;
+  std::vector<Overcounted> overcounted_;
   Eigen::MatrixXd covariance_, null_space_;
 };
 

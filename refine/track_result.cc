@@ -32,7 +32,6 @@ void FillCovariance(const TrackMap& map, const TrackState& state, PoseHypothesis
     h->free_directions.push_back(direction);
     const Matrix6d without = Matrix6d::Identity() - free * free.transpose();
     covariance = without * covariance * without;
-    covariance.diagonal() = covariance.diagonal().cwiseMax(0.0);  // Rounding may leave less.
   }
   if (!map.has_position()) {
     for (int k = 3; k < 6; ++k) {
@@ -41,8 +40,7 @@ void FillCovariance(const TrackMap& map, const TrackState& state, PoseHypothesis
       h->free_directions.push_back(direction);
     }
   }
-  Eigen::Map<Matrix6d>(h->covariance.data()) = covariance;
-  h->rank = CovarianceRank(covariance);
+  SetCovariance(covariance, h);
 }
 
 void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& camera,

@@ -1,6 +1,8 @@
 // Runs a fuzz target without libFuzzer: `x_fuzz COUNT [SEED_FILES]` runs the files, COUNT changes
-// of each with a fixed generator, and COUNT inputs of random bytes.
+// of each with a fixed generator, and COUNT inputs of random bytes. What ends it by abort() is
+// written to failed_input.
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -14,7 +16,18 @@ namespace {
 
 using Input = std::vector<std::uint8_t>;
 
-void Run(const Input& input) { LLVMFuzzerTestOneInput(input.data(), input.size()); }
+const Input* running = nullptr;
+
+void WriteRunning(int /*signal*/) {
+  std::ofstream("failed_input", std::ios::binary)
+      .write(reinterpret_cast<const char*>(running->data()),
+             static_cast<std::streamsize>(running->size()));
+}
+
+void Run(const Input& input) {
+  running = &input;
+  LLVMFuzzerTestOneInput(input.data(), input.size());
+}
 
 std::uint8_t RandomByte(std::mt19937* random) {
   return static_cast<std::uint8_t>((*random)() & 0xff);
@@ -49,6 +62,7 @@ Input Changed(Input input, std::mt19937* random) {
 int main(int argc, char** argv) {
   const int count = argc > 1 ? std::atoi(argv[1]) : 1000;
   std::mt19937 random(1);
+  std::signal(SIGABRT, WriteRunning);
   for (int i = 2; i < argc; ++i) {
     std::ifstream file(argv[i], std::ios::binary);
     const Input seed((std::istreambuf_iterator<char>(file)), {});
