@@ -217,17 +217,16 @@ PoseHypothesis UncertainPose(const Candidate& candidate, bool metric, bool spin_
 }
 
 void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseHypothesis* h) {
-  Matrix6d covariance = S.topRows<6>() * S.topRows<6>().transpose();
-  const auto leave_out = [&covariance](const Vector6d& free) {
-    const Matrix6d project = Matrix6d::Identity() - free * free.transpose();
-    covariance = project * covariance * project;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> root = S.topRows<6>();
+  const auto leave_out = [&root](const Vector6d& free) {
+    root -= free * (free.transpose() * root);
   };
   for (const std::array<double, 6>& direction : h->free_directions)
     leave_out(Eigen::Map<const Vector6d>(direction.data()));
   Vector6d length = Vector6d::Zero();
   length.tail<3>() = h->cam_from_world.translation;
   if (!h->metric) leave_out(length);
-  SetCovariance(covariance, h);
+  SetCovariance(root * root.transpose(), h);
   if (candidate.contradiction.size() > 0) {
     const Eigen::MatrixXd tail = S.bottomRows(candidate.contradiction.size());
     const Eigen::MatrixXd C = tail * tail.transpose();

@@ -50,6 +50,12 @@ class PoseTracker::Implementation {
       return tracked;
     }
     Move(dt, motion);
+    if (states_.empty()) {
+      Start(observations, &tracked);
+      tracked.estimate.notes.emplace_back(
+          "the motion left the range of numbers: the track starts anew");
+      return tracked;
+    }
     Refine();
     if (fits_.empty()) {
       Predicted(observations, &tracked);
@@ -105,7 +111,7 @@ class PoseTracker::Implementation {
       const TrackState& state = states_[i];
       const double log_focal = std::log(estimate.hypotheses[i].focal_scale);
       TrackFit fit;
-      if (!frame.RefineHere(state, log_focal, options_, &fit)) continue;
+      if (!state.IsInRange() || !frame.RefineHere(state, log_focal, options_, &fit)) continue;
       ConditionOnPriors(&fit.state);
       fit.state.log_weight = state.log_weight;  // Its evidence has been counted.
       fits.push_back(std::move(fit));
@@ -184,6 +190,7 @@ class PoseTracker::Implementation {
     return has(given.circles) || has(given.pencils) ? plane : std::string();
   }
 
+  // Keeps the states that numbers can hold.
   void Move(double dt, const MotionPrior& motion) {
     for (TrackState& state : states_) {
       if (motion.relative) {
@@ -194,7 +201,10 @@ class PoseTracker::Implementation {
       if (motion.absolute) Condition(map_, *motion.absolute, &state);
       if (motion.gravity) Condition(map_, *motion.gravity, &state);
     }
-    Rank(options_, &states_);  // For a frame that says nothing more.
+    states_.erase(std::remove_if(states_.begin(), states_.end(),
+                                 [](const TrackState& state) { return !state.IsInRange(); }),
+                  states_.end());
+    if (!states_.empty()) Rank(options_, &states_);  // For a frame that says nothing more.
   }
 
   // Fills fits_, ranked; empty where the frame says nothing or contradicts all hypotheses.

@@ -24,14 +24,18 @@ void FillCovariance(const TrackMap& map, const TrackState& state, PoseHypothesis
   T.topLeftCorner<3, 3>() = R;
   covariance = T * covariance * T.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance.topLeftCorner<3, 3>());
-  for (int k = 0; k < 3; ++k) {
-    if (!(eigen.eigenvalues()[k] > kFreeTurn * kFreeTurn)) continue;
+  int num_known = 0;  // The least uncertain turns come first.
+  while (num_known < 3 && !(eigen.eigenvalues()[num_known] > kFreeTurn * kFreeTurn)) ++num_known;
+  for (int k = num_known; k < 3; ++k) {
     std::array<double, 6> direction{};
-    Eigen::Map<Vector6d> free(direction.data());
-    free.head<3>() = eigen.eigenvectors().col(k);
+    Eigen::Map<Vector6d>(direction.data()).head<3>() = eigen.eigenvectors().col(k);
     h->free_directions.push_back(direction);
-    const Matrix6d without = Matrix6d::Identity() - free * free.transpose();
-    covariance = without * covariance * without;
+  }
+  if (num_known < 3) {
+    const auto known = eigen.eigenvectors().leftCols(num_known);
+    Matrix6d onto = Matrix6d::Identity();
+    onto.topLeftCorner<3, 3>() = known * known.transpose();
+    covariance = onto * covariance * onto;
   }
   if (!map.has_position()) {
     for (int k = 3; k < 6; ++k) {

@@ -107,6 +107,11 @@ void TrackState::SetPose(const TrackMap& map, const CameraPose& pose) {
       pose.translation;
 }
 
+bool TrackState::IsInRange() const {
+  constexpr double kRange = 1e100;
+  return x.cwiseAbs().maxCoeff() < kRange && covariance.cwiseAbs().maxCoeff() < kRange;
+}
+
 void TrackState::Append(const TrackMap& map, int index, const double* values,
                         const Eigen::MatrixXd& block_covariance) {
   const Block& block = map.block(index);

@@ -76,6 +76,7 @@ struct TrackState {
   }
   CameraPose Pose(const TrackMap& map) const;
   void SetPose(const TrackMap& map, const CameraPose& pose);
+  bool IsInRange() const;  // Squares of all numbers, and their sums, are finite.
   // Takes in a block that has been added to the map.
   void Append(const TrackMap& map, int block, const double* values,
               const Eigen::MatrixXd& block_covariance);

@@ -203,6 +203,22 @@ TEST_F(OneTrackTest, ARelativeMotionInNearlyNoTimeStaysFinite) {
   }
 }
 
+TEST_F(OneTrackTest, AMotionBeyondNumbersStartsAnew) {
+  const CameraPose &from = sequence_.frames[0].pose, &to = sequence_.frames[1].pose;
+  for (const double far : {1e90, 1e200, -1e305}) {
+    PoseTracker tracker(ExactOptions(sequence_.options()));
+    ASSERT_TRUE(tracker.Update(Seen(0), 0.0).estimate.status.ok());
+    MotionPrior motion = Gyroscope(from, to);
+    motion.relative->has_translation = true;
+    motion.relative->now_from_before.translation.x() = far;
+    const TrackedPose tracked = tracker.Update(Seen(1), 0.1, motion);
+    EXPECT_TRUE(tracked.reinitialized) << far;
+    ASSERT_FALSE(tracked.estimate.hypotheses.empty()) << tracked.estimate.status.message;
+    const PoseHypothesis& h = tracked.estimate.hypotheses.front();
+    EXPECT_TRUE(h.Covariance().allFinite() && h.cam_from_world.translation.allFinite()) << far;
+  }
+}
+
 TEST_F(OneTrackTest, WhatIsKnownOfThePoseCounts) {
   const TrackedPose plain = Update(10);
   MotionPrior motion;
