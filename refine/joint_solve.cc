@@ -15,12 +15,14 @@ namespace {
 
 // Ends where a step, taken or not, changes the cost by little, or where the steps that would follow
 // do (near the minimum under a loss they shrink at a constant rate), however large the cost of all
-// points is; where more steps like it would not lead to what competes; and where features that
+// points is: of many features one or another creeps in the tails of its loss long after the pose
+// stands; where more steps like it would not lead to what competes; and where features that
 // contradict each other, so that many points lie in the tails of the loss, make the steps creep.
 class Watch : public ceres::IterationCallback {
  public:
-  Watch(const Rival& rival, double free_cost)
-      : most_(rival.cost + rival.gap),
+  Watch(const Rival& rival, double free_cost, int unknowns)
+      : little_(kLittleCost * std::max(1.0, unknowns / kFew)),
+        most_(rival.cost + rival.gap),
         contradicted_(free_cost + rival.contradiction),
         free_cost_(free_cost) {}
   bool creeps() const { return num_slow_ == kMostSlow; }
@@ -31,7 +33,7 @@ class Watch : public ceres::IterationCallback {
     last_change_ = summary.step_is_successful ? summary.cost_change : 0.0;
     const bool converges = rate > 0.0 && rate < 1.0;
     const double rest = converges ? summary.cost_change * rate / (1.0 - rate) : summary.cost_change;
-    if (std::min(std::abs(summary.cost_change), std::abs(rest)) < kLittleCost)
+    if (std::min(std::abs(summary.cost_change), std::abs(rest)) < little_)
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     constexpr double kSlow = 0.003;  // Of what is above the free fits.
     const bool is_slow = summary.cost > contradicted_ && summary.step_is_successful &&
@@ -44,8 +46,9 @@ class Watch : public ceres::IterationCallback {
   }
 
  private:
-  static constexpr int kMostSlow = 2;  // Steps, one after the other.
-  double most_, contradicted_, free_cost_;
+  static constexpr int kMostSlow = 2;   // Steps, one after the other.
+  static constexpr double kFew = 20.0;  // Unknowns: a pose's and a camera's, not tuned.
+  double little_, most_, contradicted_, free_cost_;
   double last_change_ = 0.0;
   int num_slow_ = 0;
 };
@@ -109,7 +112,7 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
     options.linear_solver_type = left > kSparse ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
     options.linear_solver_ordering = ordering;
   }
-  Watch watch(rival, FreeCost(*state));
+  Watch watch(rival, FreeCost(*state), unknowns);
   options.callbacks.push_back(&watch);
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
