@@ -1,8 +1,8 @@
 #include "apps/calibrate/calibration_pictures.h"
 
 #include <algorithm>
-#include <opencv2/core/utility.hpp>
 
+#include "apps/common/in_parallel.h"
 #include "apps/compare/encode.h"
 #include "apps/compare/image_run.h"
 #include "apps/compare/overlay.h"
@@ -39,18 +39,16 @@ std::vector<std::vector<std::uint8_t>> CalibrationPictures(const CompareOptions&
   const SolverSet solvers(joint);
   const std::vector<std::size_t> chosen = ChoosePhotos(adjusted);
   std::vector<std::vector<std::uint8_t>> pictures(images.size());
-  cv::parallel_for_(cv::Range(0, static_cast<int>(chosen.size())), [&](const cv::Range& range) {
-    for (int k = range.start; k < range.end; ++k) {
-      const std::size_t i = chosen[static_cast<std::size_t>(k)];
-      SceneImage image = images[i];
-      const AdjustedCamera& made =
-          adjusted.cameras[static_cast<std::size_t>(adjusted.photos[i].camera)];
-      image.observations.camera = made.camera;
-      image.camera_sigma = StatedCameraSigma();
-      image.guessed_sigma.reset();
-      const ImageRun run = RunImage(joint, solvers, &image);
-      if (!run.photo.empty()) pictures[i] = EncodeJpeg(DrawOverlay(run), kWidth);
-    }
+  InParallel(static_cast<int>(chosen.size()), [&](int k) {
+    const std::size_t i = chosen[static_cast<std::size_t>(k)];
+    SceneImage image = images[i];
+    const AdjustedCamera& made =
+        adjusted.cameras[static_cast<std::size_t>(adjusted.photos[i].camera)];
+    image.observations.camera = made.camera;
+    image.camera_sigma = StatedCameraSigma();
+    image.guessed_sigma.reset();
+    const ImageRun run = RunImage(joint, solvers, &image);
+    if (!run.photo.empty()) pictures[i] = EncodeJpeg(DrawOverlay(run), kWidth);
   });
   return pictures;
 }

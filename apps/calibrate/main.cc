@@ -7,7 +7,6 @@
 #include <iostream>
 #include <map>
 #include <mutex>
-#include <opencv2/core/utility.hpp>
 #include <optional>
 
 #include "apps/calibrate/calibrate_options.h"
@@ -16,6 +15,7 @@
 #include "apps/calibrate/calibration_pictures.h"
 #include "apps/calibrate/import_model.h"
 #include "apps/common/flags_util.h"
+#include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
 #include "apps/common/progress.h"
 #include "apps/compare/image_run.h"
@@ -64,20 +64,18 @@ std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<Scen
   std::vector<ImageRun> runs(images->size());
   Progress progress("photos", static_cast<int>(images->size()), 0);
   std::mutex mutex;
-  cv::parallel_for_(cv::Range(0, static_cast<int>(images->size())), [&](const cv::Range& range) {
-    for (int i = range.start; i < range.end; ++i) {
-      const auto index = static_cast<std::size_t>(i);
-      runs[index] = ObserveImage(options, &(*images)[index]);
-      Camera& camera = runs[index].observations.camera;
-      // Not the one that the photo alone makes likeliest: the prior is about the one given.
-      camera = (*images)[index].observations.camera;
-      runs[index].observations.stated_focal_px = 0.0;
-      if (camera.width == 0) camera.width = runs[index].photo.cols;
-      if (camera.height == 0) camera.height = runs[index].photo.rows;
-      runs[index].photo.release();
-      const std::lock_guard<std::mutex> lock(mutex);
-      progress.Advance();
-    }
+  InParallel(static_cast<int>(images->size()), [&](int i) {
+    const auto index = static_cast<std::size_t>(i);
+    runs[index] = ObserveImage(options, &(*images)[index]);
+    Camera& camera = runs[index].observations.camera;
+    // Not the one that the photo alone makes likeliest: the prior is about the one given.
+    camera = (*images)[index].observations.camera;
+    runs[index].observations.stated_focal_px = 0.0;
+    if (camera.width == 0) camera.width = runs[index].photo.cols;
+    if (camera.height == 0) camera.height = runs[index].photo.rows;
+    runs[index].photo.release();
+    const std::lock_guard<std::mutex> lock(mutex);
+    progress.Advance();
   });
   return runs;
 }

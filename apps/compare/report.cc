@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <opencv2/core.hpp>
-#include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
 #include "apps/compare/encode.h"
@@ -126,11 +126,9 @@ void WriteSections(const std::string& folder, const std::vector<ShownImage>& sho
   for (std::size_t begin = 0; begin < shown.size(); begin += kAtATime) {
     const std::size_t count = std::min(kAtATime, shown.size() - begin);
     std::vector<std::vector<std::uint8_t>> pictures(count);
-    cv::parallel_for_(cv::Range(0, static_cast<int>(count)), [&](const cv::Range& range) {
-      for (std::size_t i = static_cast<std::size_t>(range.start);
-           i < static_cast<std::size_t>(range.end); ++i) {
-        pictures[i] = ReadPicture(folder, records[begin + i].overlay);
-      }
+    InParallel(static_cast<int>(count), [&](int k) {
+      const auto i = static_cast<std::size_t>(k);
+      pictures[i] = ReadPicture(folder, records[begin + i].overlay);
     });
     for (std::size_t i = 0; i < count; ++i) {
       file->Write(ImageSection(records[begin + i], keys, pictures[i], shown[begin + i].why));

@@ -10,6 +10,8 @@
 #include <thread>
 #include <utility>
 
+#include "apps/common/in_parallel.h"
+
 namespace circline::apps {
 namespace {
 
@@ -146,12 +148,7 @@ void WorkInOrder(std::size_t count, const std::function<Finishing(std::size_t)>&
         if (!finisher.Take(index, &finishing)) queue.Put(index, finishing());
       }
     };
-    cv::parallel_for_(
-        cv::Range(0, num_workers),
-        [&](const cv::Range& range) {
-          for (int i = range.start; i < range.end; ++i) queue.Guard(work_all);
-        },
-        num_workers);
+    InParallel(num_workers, [&](int) { queue.Guard(work_all); });
   }
   queue.Finish();
 }

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 
+#include "apps/common/in_parallel.h"
 #include "apps/common/progress.h"
 #include "apps/common/text.h"
 #include "circline/estimators/basics.h"
@@ -250,13 +251,11 @@ std::vector<SimulationRow> Simulate(const SimulationOptions& options) {
                                     options.outlier_kind};
       const Solvers& solvers = disturbance.outlier_ratio > 0.0 ? robust : clean;
       std::vector<Trial> trials(static_cast<std::size_t>(options.trials));
-      cv::parallel_for_(cv::Range(0, options.trials), [&](const cv::Range& range) {
-        for (int k = range.start; k < range.end; ++k) {
-          trials[static_cast<std::size_t>(k)] = RunTrial(
-              scene, disturbance, solvers, options.inlier_sigmas, TrialSeed(options.seed, i, j, k));
-          const std::lock_guard<std::mutex> lock(mutex);
-          progress.Advance();
-        }
+      InParallel(options.trials, [&](int k) {
+        trials[static_cast<std::size_t>(k)] = RunTrial(
+            scene, disturbance, solvers, options.inlier_sigmas, TrialSeed(options.seed, i, j, k));
+        const std::lock_guard<std::mutex> lock(mutex);
+        progress.Advance();
       });
       for (std::size_t m = 0; m < Methods().size(); ++m) {
         rows.push_back(Summarize(trials, m, disturbance, scene.pose().rotation));

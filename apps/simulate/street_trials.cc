@@ -8,6 +8,7 @@
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 
+#include "apps/common/in_parallel.h"
 #include "apps/common/progress.h"
 #include "apps/common/text.h"
 #include "circline/estimators/basics.h"
@@ -166,17 +167,15 @@ std::vector<StreetTrial> SimulateStreets(int num_trials, std::uint64_t seed, int
   Progress progress("photos", num_trials);
   std::mutex mutex;
   std::vector<StreetTrial> trials(static_cast<std::size_t>(num_trials));
-  cv::parallel_for_(cv::Range(0, num_trials), [&](const cv::Range& range) {
-    for (int k = range.start; k < range.end; ++k) {
-      Random random(Random(seed).Next() + static_cast<std::uint64_t>(k));
-      random = Random(random.Next());
-      StreetTrial& trial = trials[static_cast<std::size_t>(k)];
-      trial.photo = DrawStreet(&random);
-      trial.detected = Judge(trial.photo, Detect(trial.photo, random.Next()));
-      trial.known = Judge(trial.photo, Know(trial.photo));
-      const std::lock_guard<std::mutex> lock(mutex);
-      progress.Advance();
-    }
+  InParallel(num_trials, [&](int k) {
+    Random random(Random(seed).Next() + static_cast<std::uint64_t>(k));
+    random = Random(random.Next());
+    StreetTrial& trial = trials[static_cast<std::size_t>(k)];
+    trial.photo = DrawStreet(&random);
+    trial.detected = Judge(trial.photo, Detect(trial.photo, random.Next()));
+    trial.known = Judge(trial.photo, Know(trial.photo));
+    const std::lock_guard<std::mutex> lock(mutex);
+    progress.Advance();
   });
   return trials;
 }

@@ -1,0 +1,15 @@
+// Work shared among threads.
+#ifndef CIRCLINE_APPS_COMMON_IN_PARALLEL_H_
+#define CIRCLINE_APPS_COMMON_IN_PARALLEL_H_
+
+#include <functional>
+
+namespace circline::apps {
+
+// Calls work(0) to work(count - 1) in OpenCV's thread pool, on as many threads as cv::getNumThreads
+// says. What is thrown is thrown here.
+void InParallel(int count, const std::function<void(int)>& work);
+
+}  // namespace circline::apps
+
+#endif  // CIRCLINE_APPS_COMMON_IN_PARALLEL_H_
