@@ -269,3 +269,23 @@ def test_lets_other_threads_run():
     done.set()
     ticker.join()
     assert sum(started < t < ended for t in ticks) >= 3
+
+
+def test_threads_answer_as_one():
+    """Detections and estimates of four threads at once are those of one, in all bits."""
+    photo, camera = scenes.disc_photo(), scenes.photo_camera()
+
+    def answer():
+        hypotheses = circline.estimate(circline.detect(photo, camera)).hypotheses
+        return [(h.covariance.tobytes(), h.cam_from_world.rotation.tobytes()) for h in hypotheses]
+
+    alone, together = answer(), []
+    threads = [
+        threading.Thread(target=lambda: together.extend(answer() for _ in range(3)))
+        for _ in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(alone) > 0 and together == [alone] * 12
