@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <iostream>
+#include <new>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <sstream>
@@ -195,11 +197,24 @@ int ParseAndRun(int argc, char** argv, const std::string& app, const std::string
   return kExitOk;
 }
 
+// Where an exception cannot be passed on: nlohmann's JSON allocates in its destructor.
+[[noreturn]] void EndWithoutMemory() noexcept {
+  try {
+    if (std::current_exception()) throw;
+  } catch (const std::bad_alloc&) {
+    std::fputs("circline: stopped: not enough memory\n", stderr);
+    std::_Exit(kExitUnreadable);
+  } catch (...) {
+  }
+  std::abort();
+}
+
 }  // namespace
 
 int RunGuarded(const char* program, const std::string& app, const std::function<int()>& run) {
   if (!OccupyStandardStreams()) return kExitUnreadable;
   InitAppLogging(program);
+  std::set_terminate(EndWithoutMemory);
   int code = kExitUnreadable;
   try {
     code = run();
