@@ -91,9 +91,13 @@ bool NamesPlane(const Observations& observations, const std::string& plane) {
 }
 
 Status ValidateKnown(const Observations& observations) {
+  std::set<std::string> pencils;
+  if (!observations.known_angles.empty()) {
+    for (const PencilObservation& pencil : observations.pencils) pencils.insert(pencil.id);
+  }
   for (const KnownAngle& angle : observations.known_angles) {
     for (const std::string& id : angle.pencils) {
-      if (FindPencil(observations, id) < 0) {
+      if (pencils.count(id) == 0) {
         return Status::Invalid("known angle: there is no pencil '" + id + "'");
       }
     }

@@ -13,6 +13,38 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+// Which shared blocks but the pose's and the camera's meet in a feature or a prior.
+struct Meetings {
+  std::vector<std::vector<int>> blocks;          // Of each meeting.
+  std::vector<std::vector<std::size_t>> places;  // By block: the meetings.
+};
+
+Meetings FindMeetings(const JointProblem& problem) {
+  const std::vector<Block>& blocks = problem.blocks();
+  // By feature group, then by prior.
+  Meetings all;
+  all.blocks.resize(static_cast<std::size_t>(problem.num_groups()));
+  all.places.resize(blocks.size());
+  for (const Term& term : problem.terms()) {
+    std::size_t at = all.blocks.size();
+    if (term.group >= 0) {
+      at = static_cast<std::size_t>(term.group);
+    } else {
+      all.blocks.emplace_back();
+    }
+    for (const int block : term.blocks) {
+      const Block& b = blocks[static_cast<std::size_t>(block)];
+      std::vector<int>& here = all.blocks[at];
+      if (block <= JointProblem::kCamera || b.group >= 0 || b.tangent_size() == 0 ||
+          std::find(here.begin(), here.end(), block) != here.end())
+        continue;
+      here.push_back(block);
+      all.places[static_cast<std::size_t>(block)].push_back(at);
+    }
+  }
+  return all;
+}
+
 }  // namespace
 
 Linearization::Linearization(const JointProblem& problem, const State& state,
@@ -24,56 +56,65 @@ Linearization::Linearization(const JointProblem& problem, const State& state,
   }
 }
 
-// Shared blocks of which no two meet in a feature or a prior: those of few first, so that what ties
-// many is left to the core.
-std::vector<bool> Linearization::FindLeaves() const {
+// Shared blocks, together where they meet: those of few meetings first, so that what ties many is
+// left to the core, and so is what would make a leaf too large.
+std::vector<std::vector<int>> Linearization::FindLeaves() const {
   const std::vector<Block>& blocks = problem_.blocks();
-  // By feature group, then by prior: the blocks that meet there.
-  std::vector<std::vector<int>> meetings(static_cast<std::size_t>(problem_.num_groups()));
-  std::vector<std::vector<std::size_t>> places(blocks.size());  // Of a block, in meetings.
-  for (const Term& term : problem_.terms()) {
-    std::size_t at = meetings.size();
-    if (term.group >= 0) {
-      at = static_cast<std::size_t>(term.group);
-    } else {
-      meetings.emplace_back();
-    }
-    for (const int block : term.blocks) {
-      const Block& b = blocks[static_cast<std::size_t>(block)];
-      std::vector<int>& here = meetings[at];
-      if (block <= JointProblem::kCamera || b.group >= 0 || b.tangent_size() == 0 ||
-          std::find(here.begin(), here.end(), block) != here.end())
-        continue;
-      here.push_back(block);
-      places[static_cast<std::size_t>(block)].push_back(at);
-    }
-  }
-  std::vector<std::size_t> order;
+  const Meetings all = FindMeetings(problem_);
+  const std::vector<std::vector<int>>& meetings = all.blocks;
+  const std::vector<std::vector<std::size_t>>& places = all.places;
+  std::vector<int> order;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    if (!places[i].empty()) order.push_back(i);
+    if (!places[i].empty()) order.push_back(static_cast<int>(i));
   }
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return places[a].size() < places[b].size();
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return places[static_cast<std::size_t>(a)].size() < places[static_cast<std::size_t>(b)].size();
   });
-  std::vector<bool> is_leaf(blocks.size(), false), is_taken(meetings.size(), false);
-  for (const std::size_t i : order) {
-    is_leaf[i] = std::none_of(places[i].begin(), places[i].end(),
-                              [&](std::size_t at) { return is_taken[at]; });
-    for (const std::size_t at : places[i]) is_taken[at] = is_taken[at] || is_leaf[i];
+  // A larger leaf costs its size cubed, smaller ones a larger core (not tuned).
+  constexpr int kLargest = 100;
+  std::vector<std::vector<int>> leaves;
+  std::vector<int> leaf_of(blocks.size(), -1);
+  for (const int i : order) {
+    std::vector<int> joined, together = {i};
+    constexpr std::size_t kMostJoined = 2;  // Those of a chain.
+    for (const std::size_t at : places[static_cast<std::size_t>(i)]) {
+      if (joined.size() > kMostJoined) break;
+      for (const int other : meetings[at]) {
+        const int leaf = leaf_of[static_cast<std::size_t>(other)];
+        if (leaf < 0 || std::find(joined.begin(), joined.end(), leaf) != joined.end()) continue;
+        joined.push_back(leaf);
+        const auto& members = leaves[static_cast<std::size_t>(leaf)];
+        together.insert(together.end(), members.begin(), members.end());
+      }
+    }
+    int size = 0;
+    for (const int block : together) size += blocks[static_cast<std::size_t>(block)].tangent_size();
+    if (joined.size() > kMostJoined || size > kLargest) continue;
+    if (joined.empty()) {
+      joined.push_back(static_cast<int>(leaves.size()));
+      leaves.emplace_back();
+    }
+    for (const int leaf : joined) leaves[static_cast<std::size_t>(leaf)].clear();
+    for (const int block : together) leaf_of[static_cast<std::size_t>(block)] = joined.front();
+    leaves[static_cast<std::size_t>(joined.front())] = std::move(together);
   }
-  return is_leaf;
+  return leaves;
 }
 
 void Linearization::LayOut() {
   const std::vector<Block>& blocks = problem_.blocks();
-  const std::vector<bool> is_leaf = FindLeaves();
+  const std::vector<std::vector<int>> leaves = FindLeaves();
+  std::vector<bool> is_in_leaf(blocks.size(), false);
+  for (const std::vector<int>& leaf : leaves) {
+    for (const int block : leaf) is_in_leaf[static_cast<std::size_t>(block)] = true;
+  }
   columns_.assign(blocks.size(), -1);
   own_columns_.assign(blocks.size(), -1);
   groups_.resize(static_cast<std::size_t>(problem_.num_groups()));
   plus_.resize(blocks.size());
   int next = 0;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    if (i == JointProblem::kCamera || is_leaf[i]) continue;
+    if (i == JointProblem::kCamera || is_in_leaf[i]) continue;
     const int size = blocks[i].tangent_size();
     if (size == 0) continue;
     if (blocks[i].group >= 0) {
@@ -95,14 +136,18 @@ void Linearization::LayOut() {
     if (problem_.camera_is_estimated()) num_estimated_ = next;
   }
   const int core = next;
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    if (!is_leaf[i]) continue;
-    const int size = blocks[i].tangent_size();
-    leaf_at_.insert(leaf_at_.end(), static_cast<std::size_t>(size),
+  for (const std::vector<int>& members : leaves) {
+    if (members.empty()) continue;
+    Leaf leaf;
+    leaf.first = next;
+    for (const int block : members) {
+      columns_[static_cast<std::size_t>(block)] = next;
+      next += blocks[static_cast<std::size_t>(block)].tangent_size();
+    }
+    leaf.size = next - leaf.first;
+    leaf_at_.insert(leaf_at_.end(), static_cast<std::size_t>(leaf.size),
                     static_cast<int>(leaves_.size()));
-    leaves_.push_back({next, size, {}, {}, {}, {}});
-    columns_[i] = next;
-    next += size;
+    leaves_.push_back(std::move(leaf));
   }
   information_.core.setZero(core, core);
   for (const Leaf& leaf : leaves_)

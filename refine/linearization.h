@@ -3,9 +3,9 @@
 // solves for. Internal: not installed.
 //
 // Unknowns are of three kinds. A feature's own (a circle's tilt) are eliminated first. Of the
-// shared ones, leaves (a pencil's direction) meet the core (the pose, the camera, the contours'
-// offset) and no other leaf: they are eliminated one by one, so that the time is linear in their
-// number.
+// shared ones, leaves (a pencil's direction, those of pencils at known angles) meet the core (the
+// pose, the camera, the contours' offset) and no other leaf: they are eliminated one by one, so
+// that the time is linear in their number.
 #ifndef CIRCLINE_REFINE_LINEARIZATION_H_
 #define CIRCLINE_REFINE_LINEARIZATION_H_
 
@@ -74,11 +74,12 @@ class Linearization {
     Eigen::MatrixXd core;
     std::vector<Leaf> leaves;
   };
-  // The unknowns x of a leaf follow those y of the core: x = -gain y + n.
+  // The unknowns x of a leaf follow those y of the core that it meets: x = -gain y + n.
   struct Leaf {
-    int first, size;                        // Columns.
+    int first = 0, size = 0;                // Columns.
+    std::vector<int> meets;                 // Of the core's columns.
     Eigen::MatrixXd gain, inverse;          // Of the information of the own part.
-    Eigen::MatrixXd covariance, with_core;  // Of n, and between n and y.
+    Eigen::MatrixXd covariance, with_core;  // Of n, and between n and all of the core.
   };
   // F^T S F: what the information holds too much of, by a loss.
   struct Overcounted {
@@ -93,7 +94,7 @@ class Linearization {
     return static_cast<std::size_t>(leaf_at_[static_cast<std::size_t>(column - core_size())]);
   }
   void LayOut();
-  std::vector<bool> FindLeaves() const;  // By block.
+  std::vector<std::vector<int>> FindLeaves() const;  // The blocks of each.
   void Add(int row, int column, double value);
   void AddInformation(const Eigen::MatrixXd& J, const std::vector<int>& columns);
   bool AddTerm(const Term& term, const Weighing& weighing);

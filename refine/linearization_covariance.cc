@@ -79,8 +79,12 @@ bool Linearization::Eliminate(std::size_t index) {
   const auto& [own, with_core] = information_.leaves[index];
   Eigen::MatrixXd unused;
   if (!PseudoInverse(own, own.diagonal(), &leaf.inverse, &unused)) return false;
-  leaf.gain = leaf.inverse * with_core;
-  information_.core -= with_core.transpose() * leaf.gain;
+  for (int column = 0; column < core_size(); ++column) {
+    if (!with_core.col(column).isZero(0.0)) leaf.meets.push_back(column);
+  }
+  const Eigen::MatrixXd met = with_core(Eigen::all, leaf.meets);
+  leaf.gain = leaf.inverse * met;
+  information_.core(leaf.meets, leaf.meets) -= met.transpose() * leaf.gain;
   leaf.covariance = leaf.inverse;
   leaf.with_core.setZero(leaf.size, core_size());
   return true;
@@ -97,7 +101,10 @@ Eigen::MatrixXd Linearization::AlongCore(const Overcounted& over) const {
       along.col(column) += over.F.col(k);
     } else if (column >= core) {
       const Leaf& leaf = leaves_[LeafAt(column)];
-      along -= over.F.col(k) * leaf.gain.row(column - leaf.first).leftCols(e);
+      for (std::size_t i = 0; i < leaf.meets.size(); ++i) {
+        const double gain = leaf.gain(column - leaf.first, static_cast<Eigen::Index>(i));
+        if (leaf.meets[i] < e) along.col(leaf.meets[i]) -= gain * over.F.col(k);
+      }
     }
   }
   return along;
@@ -169,20 +176,38 @@ bool Linearization::ComputeCovariance() {
 Eigen::MatrixXd Linearization::Covariance(const std::vector<int>& columns) const {
   const auto n = static_cast<Eigen::Index>(columns.size());
   const int core = core_size();
-  Eigen::MatrixXd by_core = Eigen::MatrixXd::Zero(n, core), with_core = by_core;
+  std::vector<int> met;  // Of the core's columns, by those of `columns` or their leaves.
+  for (const int column : columns) {
+    if (column < core) {
+      met.push_back(column);
+    } else {
+      const std::vector<int>& meets = leaves_[LeafAt(column)].meets;
+      met.insert(met.end(), meets.begin(), meets.end());
+    }
+  }
+  std::sort(met.begin(), met.end());
+  met.erase(std::unique(met.begin(), met.end()), met.end());
+  const auto at = [&met](int column) {
+    return std::lower_bound(met.begin(), met.end(), column) - met.begin();
+  };
+  const auto m = static_cast<Eigen::Index>(met.size());
+  Eigen::MatrixXd by_core = Eigen::MatrixXd::Zero(n, m), with_core = by_core;
   for (Eigen::Index i = 0; i < n; ++i) {
     const int column = columns[static_cast<std::size_t>(i)];
     if (column < core) {
-      by_core(i, column) = 1.0;
+      by_core(i, at(column)) = 1.0;
       continue;
     }
     const Leaf& leaf = leaves_[LeafAt(column)];
-    by_core.row(i) = -leaf.gain.row(column - leaf.first);
-    with_core.row(i) = leaf.with_core.row(column - leaf.first);
+    const int row = column - leaf.first;
+    for (std::size_t k = 0; k < leaf.meets.size(); ++k)
+      by_core(i, at(leaf.meets[k])) = -leaf.gain(row, static_cast<Eigen::Index>(k));
+    for (Eigen::Index k = 0; k < m; ++k)
+      with_core(i, k) = leaf.with_core(row, met[static_cast<std::size_t>(k)]);
   }
   const Eigen::MatrixXd across = with_core * by_core.transpose();
   Eigen::MatrixXd covariance =
-      by_core * covariance_ * by_core.transpose() + across + across.transpose();
+      by_core * covariance_(met, met) * by_core.transpose() + across + across.transpose();
   for (Eigen::Index i = 0; i < n; ++i) {
     const int a = columns[static_cast<std::size_t>(i)];
     for (Eigen::Index j = 0; a >= core && j < n; ++j) {

@@ -162,7 +162,25 @@ class Sheet {
     }
     observations_.pencils.push_back(pencil);
   }
-  void AddFreePencil() { AddPencil(random_.Uniform(0.0, kPi), 3, PencilDirection::kFree); }
+  // Of any direction, which is returned.
+  double AddFreePencil() {
+    const double angle = random_.Uniform(0.0, kPi);
+    AddPencil(angle, 3, PencilDirection::kFree);
+    return angle;
+  }
+  // Pencils of any directions, each at a known angle to the one before, those of a chain.
+  void AddAngles(int chain) {
+    double before = AddFreePencil();
+    for (int k = 1; k < chain; ++k) {
+      const double angle = AddFreePencil();
+      const std::size_t last = observations_.pencils.size() - 1;
+      observations_.known_angles.push_back(
+          {{observations_.pencils[last - 1].id, observations_.pencils[last].id},
+           angle - before,
+           0.01});
+      before = angle;
+    }
+  }
 
   void AddLength() {
     const Eigen::Vector2d a = Anywhere(), b = Anywhere();
@@ -206,6 +224,20 @@ BENCHMARK(BM_GrowthFreePencils)
     ->Range(10, 10000)
     ->Unit(benchmark::kMillisecond)
     ->Complexity(benchmark::oNLogN);
+
+// The same in pairs at known angles, or in chains of so many.
+void BM_GrowthKnownAngles(benchmark::State& state) {
+  Sheet sheet;
+  const std::int64_t chain = state.range(1);
+  for (std::int64_t i = 0; i < state.range(0) / chain; ++i)
+    sheet.AddAngles(static_cast<int>(chain));
+  FitAndEstimate(sheet.observations(), &state);
+}
+BENCHMARK(BM_GrowthKnownAngles)
+    ->ArgNames({"pencils", "chain"})
+    ->ArgsProduct({{100, 1000, 10000}, {2}})
+    ->ArgsProduct({{100, 1000, 10000}, {100}})
+    ->Unit(benchmark::kMillisecond);
 
 // So many of every kind: circles with their centres and diameters, segments of two orthogonal
 // pencils, pencils of any direction, lengths.

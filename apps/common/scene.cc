@@ -63,14 +63,14 @@ std::array<int, 4> ReadRectangle(const StorageNode& node) {
   return {x0, y0, x1 - x0, y1 - y0};
 }
 
-void ReadCircle(const StorageNode& node, SceneImage* image) {
+using Ids = std::set<std::string>;
+
+void ReadCircle(const StorageNode& node, Ids* ids, SceneImage* image) {
   node.AllowKeys({"id", "contour", "roi", "center", "radius", "radius_sigma", "plane", "concentric",
                   "radius_group", "sigma_px", "diameters"});
   CircleObservation circle;
   circle.id = node.Require("id").Text();
-  if (FindCircle(image->observations, circle.id) >= 0) {
-    node.Fail("id '" + circle.id + "' is used twice");
-  }
+  if (!ids->insert(circle.id).second) node.Fail("id '" + circle.id + "' is used twice");
   circle.sigma_px = ReadPositive(node.Get("sigma_px"));
   circle.radius = ReadPositive(node.Get("radius"));
   circle.radius_sigma = ReadPositive(node.Get("radius_sigma"));
@@ -102,11 +102,11 @@ PencilDirection ReadDirection(const StorageNode& node) {
   return PencilDirection::kFree;
 }
 
-void ReadPencil(const StorageNode& node, Observations* observations) {
+void ReadPencil(const StorageNode& node, Ids* ids, Observations* observations) {
   node.AllowKeys({"id", "segments", "direction", "plane", "sigma_px"});
   PencilObservation pencil;
   pencil.id = node.Require("id").Text();
-  if (FindPencil(*observations, pencil.id) >= 0) node.Fail("id '" + pencil.id + "' is used twice");
+  if (!ids->insert(pencil.id).second) node.Fail("id '" + pencil.id + "' is used twice");
   pencil.direction = ReadDirection(node.Get("direction"));
   pencil.plane = ReadOptionalText(node.Get("plane"));
   pencil.sigma_px = ReadPositive(node.Get("sigma_px"));
@@ -146,7 +146,7 @@ void ReadFrame(const StorageNode& node, bool detect_everything, Observations* ob
   }
 }
 
-void ReadKnownAngle(const StorageNode& node, Observations* observations) {
+void ReadKnownAngle(const StorageNode& node, const Ids& pencil_ids, Observations* observations) {
   node.AllowKeys({"pencils", "value", "sigma"});
   KnownAngle angle;
   const StorageNode pencils = node.Require("pencils");
@@ -157,7 +157,7 @@ void ReadKnownAngle(const StorageNode& node, Observations* observations) {
   }
   for (std::size_t i = 0; i < 2; ++i) {
     angle.pencils[i] = ids[i].Text();
-    if (FindPencil(*observations, angle.pencils[i]) < 0) {
+    if (pencil_ids.count(angle.pencils[i]) == 0) {
       ids[i].Fail("there is no pencil '" + angle.pencils[i] + "'");
     }
   }
@@ -169,10 +169,12 @@ void ReadKnownAngle(const StorageNode& node, Observations* observations) {
   observations->known_angles.push_back(angle);
 }
 
-void ReadKnown(const StorageNode& node, bool detect_everything, Observations* observations) {
+void ReadKnown(const StorageNode& node, const Ids& pencil_ids, bool detect_everything,
+               Observations* observations) {
   if (!node.Exists()) return;
   node.AllowKeys({"angle_deg", "length"});
-  for (const StorageNode& item : node.Get("angle_deg").Items()) ReadKnownAngle(item, observations);
+  for (const StorageNode& item : node.Get("angle_deg").Items())
+    ReadKnownAngle(item, pencil_ids, observations);
   for (const StorageNode& item : node.Get("length").Items()) {
     item.AllowKeys({"points", "plane", "value", "sigma"});
     KnownLength length;
@@ -285,12 +287,14 @@ SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
     image.observations.camera = camera->camera;
     image.camera_sigma = camera->sigma;
   }
-  for (const StorageNode& item : node.Get("circles").Items()) ReadCircle(item, &image);
-  for (const StorageNode& item : node.Get("pencils").Items()) ReadPencil(item, &image.observations);
+  Ids circle_ids, pencil_ids;
+  for (const StorageNode& item : node.Get("circles").Items()) ReadCircle(item, &circle_ids, &image);
+  for (const StorageNode& item : node.Get("pencils").Items())
+    ReadPencil(item, &pencil_ids, &image.observations);
   image.detect_everything =
       image.observations.circles.empty() && image.observations.pencils.empty();
   ReadFrame(node.Get("frame"), image.detect_everything, &image.observations);
-  ReadKnown(node.Get("known"), image.detect_everything, &image.observations);
+  ReadKnown(node.Get("known"), pencil_ids, image.detect_everything, &image.observations);
   ReadTruth(node.Get("truth"), &image);
   ReadPoints(node.Get("points"), &image);
   image.solids = ReadSolids(node, image.observations);
@@ -407,24 +411,16 @@ Status ParseScene(const std::string& name, const std::string& text, const std::s
   return Status::Ok();
 }
 
-Status ListPhotos(const std::string& patterns, const Camera& camera,
-                  std::vector<SceneImage>* images) {
-  images->clear();
+Status ListPhotos(const std::string& patterns, std::vector<std::string>* paths) {
+  paths->clear();
   for (const std::string& pattern : SplitList(patterns)) {
     if (pattern.empty()) continue;
-    std::vector<std::string> paths;
-    const Status status = ExpandPattern(pattern, &paths);
+    std::vector<std::string> named;
+    const Status status = ExpandPattern(pattern, &named);
     if (!status.ok()) return status;
-    for (const std::string& path : paths) {
-      SceneImage image;
-      image.name = path;
-      image.path = path;
-      image.observations.camera = camera;
-      image.detect_everything = true;
-      images->push_back(std::move(image));
-    }
+    paths->insert(paths->end(), named.begin(), named.end());
   }
-  return images->empty() ? Status::Invalid("--images: names no photo") : Status::Ok();
+  return paths->empty() ? Status::Invalid("--images: names no photo") : Status::Ok();
 }
 
 }  // namespace circline::apps

@@ -88,11 +88,10 @@ bool IsPhotoName(const std::string& path);
 // Paths of the photos in a folder itself, sorted; none where it cannot be read.
 std::vector<std::string> PhotosInFolder(const std::string& folder);
 
-// The photos that a comma-separated list of files, folders and wildcards names, sorted within each;
-// to be detected. A plain file name need not exist (reading it will tell); a wildcard that matches
+// Paths of the photos that a comma-separated list of files, folders and wildcards names, sorted
+// within each. A plain file name need not exist (reading it will tell); a wildcard that matches
 // nothing, or a folder without photos, is an error.
-Status ListPhotos(const std::string& patterns, const Camera& camera,
-                  std::vector<SceneImage>* images);
+Status ListPhotos(const std::string& patterns, std::vector<std::string>* paths);
 
 }  // namespace circline::apps
 

@@ -46,12 +46,7 @@ ImageSet::ImageSet(std::vector<SceneImage> images, int shard_index, int num_shar
     entry.stem = std::move(stems[i]);
     entry.index = i;
     if (IsPlain(image)) {
-      const Camera& camera = image.observations.camera;
-      const auto known = std::find_if(cameras_.begin(), cameras_.end(), [&](const StatedCamera& c) {
-        return SameCamera(c.camera, camera) && SameSigma(c.sigma, image.camera_sigma);
-      });
-      entry.camera = static_cast<std::size_t>(known - cameras_.begin());
-      if (known == cameras_.end()) cameras_.push_back({camera, image.camera_sigma});
+      entry.like = LikeAny(image);
       if (image.truth) entry.truth = std::make_unique<Truth>(std::move(*image.truth));
     } else {
       entry.annotated = std::make_unique<SceneImage>(std::move(image));
@@ -60,19 +55,44 @@ ImageSet::ImageSet(std::vector<SceneImage> images, int shard_index, int num_shar
   }
 }
 
+ImageSet::ImageSet(const std::vector<std::string>& paths, const SceneImage& like, int shard_index,
+                   int num_shards)
+    : likes_({like}), set_size_(paths.size()) {
+  std::vector<std::string> stems = UniqueStems(paths);
+  const std::size_t step = static_cast<std::size_t>(num_shards);
+  entries_.reserve(paths.size() / step + 1);
+  for (std::size_t i = static_cast<std::size_t>(shard_index); i < paths.size(); i += step) {
+    Entry entry;
+    entry.name = paths[i];
+    entry.stem = std::move(stems[i]);
+    entry.index = i;
+    entries_.push_back(std::move(entry));
+  }
+}
+
+std::size_t ImageSet::LikeAny(const SceneImage& image) {
+  const Camera& camera = image.observations.camera;
+  const auto known = std::find_if(likes_.begin(), likes_.end(), [&](const SceneImage& like) {
+    return SameCamera(like.observations.camera, camera) &&
+           SameSigma(like.camera_sigma, image.camera_sigma);
+  });
+  const auto place = static_cast<std::size_t>(known - likes_.begin());
+  if (known == likes_.end()) {
+    SceneImage like;
+    like.observations.camera = camera;
+    like.camera_sigma = image.camera_sigma;
+    like.detect_everything = true;
+    likes_.push_back(std::move(like));
+  }
+  return place;
+}
+
 SceneImage ImageSet::At(std::size_t i) const {
   const Entry& entry = entries_[i];
-  SceneImage image;
-  if (entry.annotated != nullptr) {
-    image = *entry.annotated;
-  } else {
-    image.name = entry.name;
-    image.path = path(i);
-    image.observations.camera = cameras_[entry.camera].camera;
-    image.camera_sigma = cameras_[entry.camera].sigma;
-    image.detect_everything = true;
-    if (entry.truth != nullptr) image.truth = *entry.truth;
-  }
+  SceneImage image = entry.annotated != nullptr ? *entry.annotated : likes_[entry.like];
+  image.name = entry.name;
+  image.path = path(i);
+  if (entry.truth != nullptr) image.truth = *entry.truth;
   image.index = entry.index;
   image.set_size = set_size_;
   image.stem = entry.stem;

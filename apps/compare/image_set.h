@@ -11,13 +11,16 @@
 
 namespace circline::apps {
 
-// Holds of a photo in which everything is detected little more than its name.
+// Holds of a photo of which nothing is annotated little more than its name.
 class ImageSet {
  public:
   ImageSet() = default;
   // Takes every num_shards-th image from shard_index on; index and stem are those in the whole
   // list.
   ImageSet(std::vector<SceneImage> images, int shard_index, int num_shards);
+  // Photos of which the same is known, `like`.
+  ImageSet(const std::vector<std::string>& paths, const SceneImage& like, int shard_index,
+           int num_shards);
 
   std::size_t size() const { return entries_.size(); }
   SceneImage At(std::size_t i) const;
@@ -33,18 +36,15 @@ class ImageSet {
  private:
   struct Entry {
     std::string name, path, stem;  // The path is empty where it is the name.
-    std::size_t index = 0, camera = 0;
+    std::size_t index = 0, like = 0;
     std::unique_ptr<Truth> truth;
     std::unique_ptr<SceneImage> annotated;  // Whole, where the scene file says more of the photo.
   };
 
-  std::vector<Entry> entries_;
-  struct StatedCamera {
-    Camera camera;
-    StatedCameraSigma sigma;
-  };
+  std::size_t LikeAny(const SceneImage& image);  // Of likes_, where it comes to stand if need be.
 
-  std::vector<StatedCamera> cameras_;
+  std::vector<Entry> entries_;
+  std::vector<SceneImage> likes_;  // Without a name.
   std::string rigid_;
   std::size_t set_size_ = 0;
 };

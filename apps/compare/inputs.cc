@@ -93,29 +93,33 @@ Status OneCamera(const std::vector<Camera>& cameras, Camera* camera) {
   return Status::Ok();
 }
 
-// Turns photos in which everything is detected into photos with one circle to detect.
-void SetRoi(const std::array<int, 4>& roi, double radius, std::vector<SceneImage>* images) {
-  for (SceneImage& image : *images) {
-    CircleObservation circle;
-    circle.id = "circle";
-    circle.radius = radius;
-    image.observations.circles = {circle};
-    image.rois = {{0, roi}};
-    image.detect_everything = false;
-  }
+Status ReadScenes(const InputOptions& options, const std::vector<Camera>& cameras,
+                  ImageSet* images) {
+  std::vector<SceneImage> all;
+  std::string rigid;
+  const Status status = ReadScene(FLAGS_scene, cameras, &all, &rigid);
+  if (status.ok()) *images = ImageSet(std::move(all), options.shard_index, options.num_shards);
+  images->set_rigid(rigid);
+  return status;
 }
 
-Status ReadImages(const InputOptions& options, std::vector<SceneImage>* images,
-                  std::string* rigid) {
-  std::vector<Camera> cameras;
+// Photos in which everything is to be detected, or one circle.
+Status ListImages(const InputOptions& options, const std::vector<Camera>& cameras,
+                  ImageSet* images) {
+  SceneImage like;
+  like.detect_everything = !options.roi;
   Status status;
-  if (!FLAGS_camera.empty()) status = ReadCameraFile(FLAGS_camera, &cameras);
-  if (!status.ok()) return status;
-  if (!FLAGS_scene.empty()) return ReadScene(FLAGS_scene, cameras, images, rigid);
-  Camera camera;
-  if (!options.guess.wanted) status = OneCamera(cameras, &camera);
-  if (status.ok()) status = ListPhotos(FLAGS_images, camera, images);
-  if (status.ok() && options.roi) SetRoi(*options.roi, options.circle_radius, images);
+  if (!options.guess.wanted) status = OneCamera(cameras, &like.observations.camera);
+  if (options.roi) {
+    CircleObservation circle;
+    circle.id = "circle";
+    circle.radius = options.circle_radius;
+    like.observations.circles = {circle};
+    like.rois = {{0, *options.roi}};
+  }
+  std::vector<std::string> paths;
+  if (status.ok()) status = ListPhotos(FLAGS_images, &paths);
+  if (status.ok()) *images = ImageSet(paths, like, options.shard_index, options.num_shards);
   return status;
 }
 
@@ -135,12 +139,12 @@ Status InputsFromFlags(InputOptions* options) {
 }
 
 Status ImagesFromFlags(const InputOptions& options, ImageSet* images) {
-  std::vector<SceneImage> all;
-  std::string rigid;
-  const Status status = ReadImages(options, &all, &rigid);
-  if (status.ok()) *images = ImageSet(std::move(all), options.shard_index, options.num_shards);
-  images->set_rigid(rigid);
-  return status;
+  std::vector<Camera> cameras;
+  const Status status =
+      FLAGS_camera.empty() ? Status::Ok() : ReadCameraFile(FLAGS_camera, &cameras);
+  if (!status.ok()) return status;
+  return FLAGS_scene.empty() ? ListImages(options, cameras, images)
+                             : ReadScenes(options, cameras, images);
 }
 
 }  // namespace circline::apps

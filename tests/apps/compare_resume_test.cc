@@ -160,8 +160,11 @@ TEST(CompareScale, MemoryIsFlatInTheNumberOfImages) {
   const long many = PeakKilobytes(folder / "many", camera, folder / "out_many");
   RecordProperty("few_kb", std::to_string(few));
   RecordProperty("many_kb", std::to_string(many));
-  EXPECT_LE(10 * many, 12 * few) << few << " kB for " << kFew << ", " << many << " kB for "
-                                 << kMany;
+  // A photo's names, and of each solver the numbers whose medians are asked for.
+  constexpr double kKilobytesAPhoto = 0.6;
+  const auto a_tenth_more = 1.1 * static_cast<double>(few);
+  EXPECT_LE(static_cast<double>(many), a_tenth_more + kKilobytesAPhoto * kMany)
+      << few << " kB for " << kFew << ", " << many << " kB for " << kMany;
 }
 
 }  // namespace

@@ -17,8 +17,8 @@
 namespace circline {
 namespace {
 
-// Rings that share centres and radii, and pencils of any direction, of which two are tied by an
-// angle.
+// Rings that share centres and radii, and pencils of any direction, of which three are a chain of
+// known angles.
 Observations RingsAndPencils() {
   PlaneScene scene(0.7, 0.3);
   Observations observations = scene.Empty();
@@ -38,7 +38,7 @@ Observations RingsAndPencils() {
                                                 PencilDirection::kFree,
                                                 {std::cos(angle), std::sin(angle), 0.0}));
   }
-  observations.known_angles = {{{"l0", "l1"}, 0.7, 0.002}};
+  observations.known_angles = {{{"l0", "l1"}, 0.7, 0.002}, {{"l1", "l2"}, 0.4, 0.002}};
   FitDirect(scene.sigma(), &observations);
   return ResolveWorld(observations);
 }
@@ -115,8 +115,8 @@ TEST(Linearization, HasTheCovarianceOfAllUnknownsAtOnce) {
     for (int k = 0; k < block.tangent_size(); ++k) columns.back().push_back(at.column(index) + k);
     beyond_the_core += at.column(index) >= at.core_size() ? 1 : 0;
   }
-  // Of the directions all but one of the two that the angle ties, and two rings' centres.
-  EXPECT_EQ(beyond_the_core, 5);
+  // The directions, three of them together; two rings' centres, and the radius that ties them.
+  EXPECT_EQ(beyond_the_core, 7);
   ByCeres expected(problem, &state);
   ASSERT_TRUE(expected.Compute(values));
   for (std::size_t a = 0; a < blocks.size(); ++a) {
