@@ -11,6 +11,26 @@
 namespace circline {
 namespace {
 
+// Of a covariance, symmetric (Cayley and Hamilton).
+Eigen::Matrix2d SquareRoot(const Eigen::Matrix2d& C) {
+  const double root = std::sqrt(std::max(0.0, C.determinant()));
+  const double scale = std::sqrt(C.trace() + 2.0 * root);
+  return (C + root * Eigen::Matrix2d::Identity()) / (scale > 0.0 ? scale : 1.0);
+}
+
+// c^T C^+ c, of a covariance of any rank.
+double SquaredDistance(const Eigen::VectorXd& c, const Eigen::MatrixXd& C) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(C);
+  const Eigen::VectorXd along = eigen.eigenvectors().transpose() * c;
+  const double least = static_cast<double>(c.size()) * std::numeric_limits<double>::epsilon() *
+                       eigen.eigenvalues()[c.size() - 1];
+  double sum = 0.0;
+  for (Eigen::Index k = 0; k < c.size(); ++k) {
+    if (eigen.eigenvalues()[k] > least) sum += along[k] * along[k] / eigen.eigenvalues()[k];
+  }
+  return sum;
+}
+
 // Adds an error of a unit vector, or of a line's normal: its covariance across the vector, over the
 // variance `sigma_rad` squared.
 void AddAngularError(double sigma_rad, const Eigen::Matrix3d& shape, Measured* m) {
@@ -18,10 +38,10 @@ void AddAngularError(double sigma_rad, const Eigen::Matrix3d& shape, Measured* m
   const Eigen::Vector3d v = m->value, a = v.unitOrthogonal();
   Eigen::Matrix<double, 3, 2> across;
   across << a, v.normalized().cross(a);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(across.transpose() * shape * across);
+  const Eigen::Matrix2d C = across.transpose() * shape * across;
   const Eigen::Index old = m->columns.cols();
   m->columns.conservativeResize(3, old + 2);
-  m->columns.rightCols<2>() = sigma_rad * v.norm() * across * eigen.operatorSqrt();
+  m->columns.rightCols<2>() = sigma_rad * v.norm() * across * SquareRoot(C);
 }
 
 // All inputs after the change of calibrated coordinates x' = A x.
@@ -229,9 +249,7 @@ void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseH
   SetCovariance(root * root.transpose(), h);
   if (candidate.contradiction.size() > 0) {
     const Eigen::MatrixXd tail = S.bottomRows(candidate.contradiction.size());
-    const Eigen::MatrixXd C = tail * tail.transpose();
-    h->cost = 0.5 * candidate.contradiction.dot(
-                        C.completeOrthogonalDecomposition().solve(candidate.contradiction));
+    h->cost = 0.5 * SquaredDistance(candidate.contradiction, tail * tail.transpose());
     if (!std::isfinite(h->cost)) h->cost = 0.5 * std::numeric_limits<double>::max();
   }
 }

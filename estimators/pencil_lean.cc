@@ -59,7 +59,8 @@ Eigen::Matrix3d LeanShape(const PencilObservation& pencil) {
   if (!(all.determinant() > kNarrow * all.trace() * all.trace())) return one_wall;
   const Eigen::Matrix2d inverse = all.inverse();
   // Walls of one street also lean together: the mean of many is no better than one.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(inverse * turned * inverse);
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen;
+  eigen.computeDirect(inverse * turned * inverse);
   const Eigen::Matrix2d shape = eigen.eigenvectors() *
                                 eigen.eigenvalues().cwiseMax(1.0).asDiagonal() *
                                 eigen.eigenvectors().transpose();

@@ -14,6 +14,14 @@
 namespace circline {
 namespace {
 
+// The shortest turn of one unit vector into another.
+Eigen::Matrix3d RotationBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const Eigen::Vector3d across = from.cross(to);
+  const double sine = across.norm();
+  const Eigen::Vector3d axis = sine > 0.0 ? Eigen::Vector3d(across / sine) : from.unitOrthogonal();
+  return ExpRotation(std::atan2(sine, from.dot(to)) * axis);
+}
+
 ImagePoints::Options PointOptions(const EstimationOptions& options, bool is_circle) {
   ImagePoints::Options points;
   points.loss = (is_circle ? options.conic_loss : options.line_loss).type;
@@ -171,9 +179,7 @@ std::vector<CameraPose> TrackFrame::CircleStarts(const TrackState& prior) const 
     const CirclePose& p = poses[static_cast<std::size_t>(i)];
     CameraPose start;
     start.rotation =
-        Eigen::Quaterniond::FromTwoVectors(normal, faces ? p.normal : Eigen::Vector3d(-p.normal))
-            .toRotationMatrix() *
-        predicted.rotation;
+        RotationBetween(normal, faces ? p.normal : Eigen::Vector3d(-p.normal)) * predicted.rotation;
     start.translation = radius * p.center - start.rotation * in_plane;
     if (start.rotation.allFinite() && start.translation.allFinite()) starts.push_back(start);
   }
