@@ -172,6 +172,8 @@ double LineSigma(const PencilObservation& pencil, const LineObservation& line) {
   return line.sigma_px > 0.0 ? line.sigma_px : pencil.sigma_px;
 }
 
+bool HasRole(const PencilObservation& pencil) { return pencil.direction != PencilDirection::kFree; }
+
 int FindCircle(const Observations& observations, const std::string& id) {
   for (std::size_t i = 0; i < observations.circles.size(); ++i) {
     if (observations.circles[i].id == id) return static_cast<int>(i);
@@ -198,8 +200,6 @@ std::string FirstNamedPlane(const Observations& observations) {
   }
   return "";
 }
-
-bool HasRole(const PencilObservation& pencil) { return pencil.direction != PencilDirection::kFree; }
 
 // A radius known of one circle is that of its group.
 void ShareRadii(std::vector<CircleObservation>* circles) {

@@ -137,6 +137,9 @@ double StatedLogFocal(const Observations& observations);
 // Standard deviation of the points of a pencil's line: its own, else the pencil's; 0 = not known.
 double LineSigma(const PencilObservation& pencil, const LineObservation& line);
 
+// Whether the pencil runs along an axis of the world.
+bool HasRole(const PencilObservation& pencil);
+
 // Index of a circle or pencil by id, or -1.
 int FindCircle(const Observations& observations, const std::string& id);
 int FindPencil(const Observations& observations, const std::string& id);

@@ -12,8 +12,6 @@ namespace {
 
 using PencilPair = std::array<PencilObservation, 2>;
 
-bool HasRole(const PencilObservation& pencil) { return pencil.direction != PencilDirection::kFree; }
-
 // Whether two pencils have different directions: they run along different axes, are known to make
 // an angle, or are measured more than three standard deviations apart.
 bool Differ(const PencilObservation& a, const PencilObservation& b,

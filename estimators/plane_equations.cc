@@ -11,7 +11,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-constexpr double kRounding = 1e-10;  // Standard deviation of residuals that state none.
+constexpr double kUnstatedSigma = 1e-10;  // Standard deviation of residuals that state none.
 
 // A conic M on the plane as three numbers: (M00 - M11, 2 M01) / (M00 + M11), which are 0 for a
 // circle, and the log of its radius (of the circle of its area); `rates`: d number = <rate, dM>.
@@ -51,7 +51,7 @@ template <int N>
 bool Add(const Eigen::Matrix<double, N, 1>& r, const Eigen::Matrix<double, N, 4>& J,
          const Eigen::Matrix<double, N, 2>& J_shift, Eigen::Matrix<double, N, N> covariance,
          PlaneEquations* equations) {
-  covariance.diagonal().array() += kRounding * kRounding;
+  covariance.diagonal().array() += kUnstatedSigma * kUnstatedSigma;
   const Eigen::Matrix<double, N, N> weight = covariance.inverse();
   const Eigen::Matrix<double, 4, N> JW = J.transpose() * weight;
   equations->information += JW * J;

@@ -18,10 +18,7 @@
 
 #include "apps/common/storage_node.h"
 #include "apps/common/text.h"
-
-#ifndef CIRCLINE_VERSION
-#define CIRCLINE_VERSION "0.1.0"
-#endif
+#include "circline/version.h"
 
 namespace circline::apps {
 namespace {
@@ -160,7 +157,7 @@ std::string HelpText(const std::string& usage) {
   return text.str();
 }
 
-std::string VersionText(const std::string& app) { return app + " " CIRCLINE_VERSION; }
+std::string VersionText(const std::string& app) { return app + " " CIRCLINE_VERSION_STRING; }
 
 void SayOnStderr(const std::string& line) {
   std::fputs((WithoutControls(line) + "\n").c_str(), stderr);

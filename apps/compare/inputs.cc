@@ -31,13 +31,10 @@ DEFINE_string(merge, "",
               "Instead of --scene or --images: folders of all the shards of a set, separated by "
               "commas, to be joined in --output.");
 
-DECLARE_double(focal_px);
-DECLARE_double(fov_deg);
-
 namespace circline::apps {
 namespace {
 
-Status CheckSources() {
+Status CheckSources(const CameraGuess& guess) {
   const std::vector<std::string> given = {FLAGS_scene, FLAGS_images, FLAGS_merge};
   const auto missing = std::count(given.begin(), given.end(), "");
   if (missing == 3) {
@@ -45,7 +42,7 @@ Status CheckSources() {
   }
   if (missing < 2) return Status::Invalid("give --scene, --images or --merge, not both");
   if (!FLAGS_images.empty()) return Status::Ok();
-  const bool for_images = FLAGS_focal_px != 0.0 || FLAGS_fov_deg != 0.0 || !FLAGS_roi.empty() ||
+  const bool for_images = guess.focal_px > 0.0 || guess.fov_deg > 0.0 || !FLAGS_roi.empty() ||
                           FLAGS_circle_radius != 0.0;
   return for_images ? Status::Invalid(
                           "--focal_px, --fov_deg, --roi and --circle_radius go with "
@@ -127,8 +124,8 @@ Status ListImages(const InputOptions& options, const std::vector<Camera>& camera
 
 Status InputsFromFlags(InputOptions* options) {
   Status status = ReadShard(&options->shard_index, &options->num_shards);
-  if (status.ok()) status = CheckSources();
   if (status.ok()) status = ReadGuess(&options->guess);
+  if (status.ok()) status = CheckSources(options->guess);
   if (status.ok()) status = ReadRoi(&options->roi);
   options->circle_radius = FLAGS_circle_radius;
   if (status.ok() && !(FLAGS_circle_radius >= 0.0 && std::isfinite(FLAGS_circle_radius))) {

@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 // A line tells the shift if it has this many points of either kind, a photo if it has this many
 // such lines.
-constexpr int kMinPoints = 3;
+constexpr int kMinPointsOfSide = 3;
 constexpr std::size_t kMinLines = 5;
 // An edge belongs to a line if its gradient is this nearly across it (a cosine).
 constexpr double kMinCosine = 0.9;
@@ -63,7 +63,7 @@ std::vector<Vector2d> GradientsOfBothKinds(const EdgeMap& edges, const DetectedL
     left += side > 0.0 ? 1 : 0;
     right += side < 0.0 ? 1 : 0;
   }
-  if (left < kMinPoints || right < kMinPoints) gradients.clear();
+  if (left < kMinPointsOfSide || right < kMinPointsOfSide) gradients.clear();
   return gradients;
 }
 

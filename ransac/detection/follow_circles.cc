@@ -27,8 +27,6 @@ constexpr int kMaxDraws = 300;
 constexpr std::size_t kMaxBandPoints = 400;
 // More of the known points than this on one side: that is the bright one.
 constexpr double kOneSided = 0.8;
-// No circle changes its size by more than this factor from a frame to the next.
-constexpr double kMaxGrowth = 1.5;
 
 Vector2d Outward(const CalibratedPoint& p, const Matrix3d& conic) {
   return p.GradientPerPixel((conic * p.Homogeneous()).head<2>()).normalized();

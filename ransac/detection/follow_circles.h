@@ -9,6 +9,9 @@
 
 namespace circline {
 
+// No circle changes its size by more than this factor from a frame to the next.
+constexpr double kMaxGrowth = 1.5;
+
 // For each predicted circle the ellipse that the edges follow within `search_px` of it, by the same
 // fit and the same verdict as DetectEllipses; without points where there is none. A predicted
 // circle has a fit, and a few points with normals if its bright side is known.

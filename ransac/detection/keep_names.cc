@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "circline/estimators/conic.h"
+#include "circline/ransac/detection/follow_circles.h"
 #include "circline/ransac/detection/follow_lines.h"
 
 namespace circline {
 namespace {
 
-constexpr double kMaxGrowth = 1.5;
 constexpr double kMaxTurnSine = 0.17;  // 10 degrees.
 // A sheet of dots seen from elsewhere has some where others were: fewer than this share of the
 // features is no continuation.

@@ -19,7 +19,7 @@ OrderedJson Parsed(const std::string& text) {
   return root;
 }
 
-std::string ErrorOf(const std::string& text) {
+std::string ErrorOfText(const std::string& text) {
   OrderedJson root;
   const Status status = ParseDocument(text, &root);
   EXPECT_FALSE(status.ok()) << root.dump().substr(0, 200);
@@ -84,34 +84,35 @@ TEST(Document, ReadsWhatOpenCvWrites) {
 TEST(Document, HostileTextIsRefused) {
   EXPECT_EQ(Parsed("%YAML:1.0\n a:\"\"\n6, -\n "), "a:\"\" 6, -");  // One text, to YAML.
   for (const char* opening : {"[", "{a: ", "- ", "? ", "\"a\": ["}) {
-    EXPECT_NE(ErrorOf("a: " + Repeat(opening, 60000)), "") << opening;
-    EXPECT_NE(ErrorOf("{\"a\": " + Repeat(opening, 60000)), "") << opening;
+    EXPECT_NE(ErrorOfText("a: " + Repeat(opening, 60000)), "") << opening;
+    EXPECT_NE(ErrorOfText("{\"a\": " + Repeat(opening, 60000)), "") << opening;
   }
-  EXPECT_NE(ErrorOf("<opencv_storage>" + Repeat("<a>", 60000)), "");
-  EXPECT_NE(ErrorOf("a: " + Repeat("[", 40) + Repeat("]", 40)).find("too deeply"),
+  EXPECT_NE(ErrorOfText("<opencv_storage>" + Repeat("<a>", 60000)), "");
+  EXPECT_NE(ErrorOfText("a: " + Repeat("[", 40) + Repeat("]", 40)).find("too deeply"),
             std::string::npos);
-  EXPECT_NE(ErrorOf("a: \"\\").find("line 1"), std::string::npos);
-  EXPECT_NE(ErrorOf("a: &x [1]\nb: *x\n").find("line 2: aliases"), std::string::npos);
-  EXPECT_NE(ErrorOf("a: 1\n---\nb: 1\n").find("second document"), std::string::npos);
-  EXPECT_NE(ErrorOf("? [a]\n: 1\n").find("a key must be text"), std::string::npos);
-  EXPECT_NE(ErrorOf("a: \xFF\xFE\n"), "");
-  EXPECT_NE(ErrorOf(std::string("a: b\0c", 6)), "");
+  EXPECT_NE(ErrorOfText("a: \"\\").find("line 1"), std::string::npos);
+  EXPECT_NE(ErrorOfText("a: &x [1]\nb: *x\n").find("line 2: aliases"), std::string::npos);
+  EXPECT_NE(ErrorOfText("a: 1\n---\nb: 1\n").find("second document"), std::string::npos);
+  EXPECT_NE(ErrorOfText("? [a]\n: 1\n").find("a key must be text"), std::string::npos);
+  EXPECT_NE(ErrorOfText("a: \xFF\xFE\n"), "");
+  EXPECT_NE(ErrorOfText(std::string("a: b\0c", 6)), "");
 }
 
 TEST(Document, AKeyThatStandsTwiceIsNamed) {
-  EXPECT_NE(ErrorOf("a: 1\nb: 2\na: 3\n").find("line 3: key 'a' stands there twice"),
+  EXPECT_NE(ErrorOfText("a: 1\nb: 2\na: 3\n").find("line 3: key 'a' stands there twice"),
             std::string::npos);
-  EXPECT_NE(ErrorOf(R"({"b": {"a": 1}, "c": {"a": 2, "a": 3}})").find("key 'a' stands there twice"),
-            std::string::npos);
-  EXPECT_NE(ErrorOf("<opencv_storage><a>1</a><a>2</a></opencv_storage>").find("key 'a'"),
+  EXPECT_NE(
+      ErrorOfText(R"({"b": {"a": 1}, "c": {"a": 2, "a": 3}})").find("key 'a' stands there twice"),
+      std::string::npos);
+  EXPECT_NE(ErrorOfText("<opencv_storage><a>1</a><a>2</a></opencv_storage>").find("key 'a'"),
             std::string::npos);
   std::string many, lines;
   for (int i = 0; i < 1001; ++i) {
     many += (i == 0 ? "{\"k" : ", \"k") + std::to_string(i) + "\": 1";
     lines += "k" + std::to_string(i) + ": 1\n";
   }
-  EXPECT_NE(ErrorOf(many + "}").find("too many keys"), std::string::npos);
-  EXPECT_NE(ErrorOf(lines).find("line 1001: a map has too many keys"), std::string::npos);
+  EXPECT_NE(ErrorOfText(many + "}").find("too many keys"), std::string::npos);
+  EXPECT_NE(ErrorOfText(lines).find("line 1001: a map has too many keys"), std::string::npos);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@
 namespace circline::apps {
 namespace {
 
-constexpr int kWidth = 4000, kHeight = 3000;
+constexpr int kPhotoWidth = 4000, kPhotoHeight = 3000;
 
 void Put(std::uint32_t value, int bytes, std::string* out) {
   for (int k = 0; k < bytes; ++k) out->push_back(static_cast<char>(value >> (8 * k)));
@@ -59,13 +59,13 @@ std::string Jpeg(const std::vector<Tag>& tags) {
   return jpeg + exif + "\xFF\xD9";
 }
 
-constexpr std::uint16_t kFilm = 0xA405, kFocal = 0x920A, kResolution = 0xA20E, kUnit = 0xA210,
+constexpr std::uint16_t kFilm = 0xA405, kPhotoFocal = 0x920A, kResolution = 0xA20E, kUnit = 0xA210,
                         kPixelX = 0xA002;
 
 class Exif : public testing::Test {
  protected:
   ExifFocalLength Read(const std::string& bytes) const {
-    return ReadExifFocalLength(folder_.Write("photo.jpg", bytes), kWidth, kHeight);
+    return ReadExifFocalLength(folder_.Write("photo.jpg", bytes), kPhotoWidth, kPhotoHeight);
   }
   const TestFolder folder_;
 };
@@ -78,28 +78,31 @@ TEST_F(Exif, EquivalentFocalLengthComparesDiagonals) {
 
 TEST_F(Exif, FocalPlaneGivesPixelsForAMillimetre) {
   // 8 mm, 2540 pixels an inch.
-  const std::vector<Tag> inches = {{kFocal, 80, 10}, {kResolution, 2540, 1}, {kUnit, 2, {}}};
+  const std::vector<Tag> inches = {{kPhotoFocal, 80, 10}, {kResolution, 2540, 1}, {kUnit, 2, {}}};
   EXPECT_NEAR(Read(Jpeg(inches)).focal_px, 800.0, 1e-6);
-  const std::vector<Tag> centimetres = {{kFocal, 8, 1}, {kResolution, 10000, 1}, {kUnit, 3, {}}};
+  const std::vector<Tag> centimetres = {
+      {kPhotoFocal, 8, 1}, {kResolution, 10000, 1}, {kUnit, 3, {}}};
   EXPECT_NEAR(Read(Jpeg(centimetres)).focal_px, 8000.0, 1e-6);
-  const std::vector<Tag> millimetres = {{kFocal, 8, 1}, {kResolution, 100, 1}, {kUnit, 4, {}}};
+  const std::vector<Tag> millimetres = {{kPhotoFocal, 8, 1}, {kResolution, 100, 1}, {kUnit, 4, {}}};
   EXPECT_NEAR(Read(Jpeg(millimetres)).focal_px, 800.0, 1e-6);
-  const std::vector<Tag> micrometres = {{kFocal, 8, 1}, {kResolution, 1, 5}, {kUnit, 5, {}}};
+  const std::vector<Tag> micrometres = {{kPhotoFocal, 8, 1}, {kResolution, 1, 5}, {kUnit, 5, {}}};
   EXPECT_NEAR(Read(Jpeg(micrometres)).focal_px, 1600.0, 1e-6);
-  const std::vector<Tag> unitless = {{kFocal, 80, 10}, {kResolution, 2540, 1}, {kUnit, 1, {}}};
+  const std::vector<Tag> unitless = {{kPhotoFocal, 80, 10}, {kResolution, 2540, 1}, {kUnit, 1, {}}};
   EXPECT_EQ(Read(Jpeg(unitless)).focal_px, 0.0);  // 1: no unit of length.
   // Made half as large since.
-  const std::vector<Tag> smaller = {{kFocal, 80, 10}, {kResolution, 2540, 1}, {kPixelX, 8000, {}}};
+  const std::vector<Tag> smaller = {
+      {kPhotoFocal, 80, 10}, {kResolution, 2540, 1}, {kPixelX, 8000, {}}};
   EXPECT_NEAR(Read(Jpeg(smaller)).focal_px, 0.0, 1e-6);  // 400 px is no lens's.
-  const std::vector<Tag> longer = {{kFocal, 320, 10}, {kResolution, 2540, 1}, {kPixelX, 8000, {}}};
+  const std::vector<Tag> longer = {
+      {kPhotoFocal, 320, 10}, {kResolution, 2540, 1}, {kPixelX, 8000, {}}};
   EXPECT_NEAR(Read(Jpeg(longer)).focal_px, 1600.0, 1e-6);
 }
 
 TEST_F(Exif, WhatNoLensHasIsPassedOver) {
-  for (const std::vector<Tag>& tags :
-       std::vector<std::vector<Tag>>{{{kFilm, 1, {}}},
-                                     {{kFilm, 65535, {}}},
-                                     {{kFocal, 4000000000U, 1}, {kResolution, 4000000000U, 1}}}) {
+  for (const std::vector<Tag>& tags : std::vector<std::vector<Tag>>{
+           {{kFilm, 1, {}}},
+           {{kFilm, 65535, {}}},
+           {{kPhotoFocal, 4000000000U, 1}, {kResolution, 4000000000U, 1}}}) {
     const ExifFocalLength focal = Read(Jpeg(tags));
     EXPECT_EQ(focal.focal_px, 0.0);
     EXPECT_CONTAINS(focal.words, "is no lens's");
@@ -107,8 +110,8 @@ TEST_F(Exif, WhatNoLensHasIsPassedOver) {
   for (const std::vector<Tag>& tags :
        std::vector<std::vector<Tag>>{{},
                                      {{kFilm, 0, {}}},
-                                     {{kFocal, 8, 1}},  // No focal plane.
-                                     {{kFocal, 8, 0}, {kResolution, 2540, 0}}}) {
+                                     {{kPhotoFocal, 8, 1}},  // No focal plane.
+                                     {{kPhotoFocal, 8, 0}, {kResolution, 2540, 0}}}) {
     EXPECT_EQ(Read(Jpeg(tags)).focal_px, 0.0);
   }
 }
@@ -116,7 +119,7 @@ TEST_F(Exif, WhatNoLensHasIsPassedOver) {
 // Whatever is broken: an answer that is finite, and no crash.
 TEST_F(Exif, BrokenDataGiveNone) {
   const std::string whole =
-      Jpeg({{kFilm, 28, {}}, {kFocal, 80, 10}, {kResolution, 2540, 1}, {kUnit, 2, {}}});
+      Jpeg({{kFilm, 28, {}}, {kPhotoFocal, 80, 10}, {kResolution, 2540, 1}, {kUnit, 2, {}}});
   ASSERT_GT(Read(whole).focal_px, 0.0);
   for (std::size_t size = 0; size < whole.size(); size += 3) {
     EXPECT_TRUE(std::isfinite(Read(whole.substr(0, size)).focal_px)) << size;
@@ -132,7 +135,7 @@ TEST_F(Exif, BrokenDataGiveNone) {
     const double focal = Read(broken).focal_px;
     EXPECT_TRUE(std::isfinite(focal) && focal >= 0.0) << i;
   }
-  EXPECT_EQ(ReadExifFocalLength(folder_ / "none.jpg", kWidth, kHeight).focal_px, 0.0);
+  EXPECT_EQ(ReadExifFocalLength(folder_ / "none.jpg", kPhotoWidth, kPhotoHeight).focal_px, 0.0);
   EXPECT_EQ(Read("\x89PNG\r\n").focal_px, 0.0);
 }
 

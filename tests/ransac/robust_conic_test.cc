@@ -18,7 +18,6 @@ namespace {
 using conic_scene::Clutter;
 using conic_scene::MakeScene;
 using conic_scene::Scene;
-using conic_scene::TestCamera;
 
 struct Statistics {
   int wrong = 0;  // Refused, or an error of more than three times the bound.
@@ -167,7 +166,7 @@ TEST(FitConicRobust, SameSeedSameBits) {
 
 TEST(FitConicRobust, CovarianceIsHonest) {
   // Mean of e^T Cov^+ e over trials, chi-square with 5 degrees of freedom each.
-  const Camera camera = TestCamera();
+  const Camera camera = conic_scene::TestCamera();
   Eigen::Matrix3d x_from_pixel;
   x_from_pixel << 1.0 / camera.fx, 0.0, -camera.cx / camera.fx, 0.0, 1.0 / camera.fy,
       -camera.cy / camera.fy, 0.0, 0.0, 1.0;
@@ -196,7 +195,7 @@ TEST(FitConicRobust, ExactPointsGiveTheExactEllipse) {
 }
 
 TEST(FitConicRobust, MeasuresInPixelsOfADistortedPhoto) {
-  Camera camera = TestCamera();
+  Camera camera = conic_scene::TestCamera();
   camera.model = CameraModel::kOpenCV;
   camera.distortion = {-0.3, 0.1, 1e-3, -1e-3, 0.0, 0.0, 0.0, 0.0};
   Random random(9);
@@ -236,7 +235,7 @@ TEST(FitConicRobust, RefusesWhatHoldsNoEllipse) {
   std::vector<std::uint8_t> mask(3, 9);
   const auto refused = [&](const std::vector<Eigen::Vector2d>& pixels) {
     std::vector<CalibratedPoint> points;
-    PixelsToCalibrated(TestCamera(), pixels, &points);
+    PixelsToCalibrated(conic_scene::TestCamera(), pixels, &points);
     const Status status = FitConicRobust(points, options, &fit, &mask);
     return status.code == StatusCode::kRefused && !status.message.empty();
   };

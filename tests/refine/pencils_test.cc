@@ -27,7 +27,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kSigmaPx = 1.0;
+constexpr double kNoisePx = 1.0;
 
 enum class Angle { kHard, kSoft, kAbsent };
 
@@ -91,7 +91,7 @@ Observations Observe(const Scene& scene, Angle angle, double angle_sigma, Random
     PencilObservation pencil;
     pencil.id = ids[k];
     pencil.plane = "p0";
-    pencil.sigma_px = kSigmaPx;
+    pencil.sigma_px = kNoisePx;
     pencil.direction = k == 0                  ? PencilDirection::kX
                        : angle == Angle::kHard ? PencilDirection::kY
                                                : PencilDirection::kFree;
@@ -99,7 +99,7 @@ Observations Observe(const Scene& scene, Angle angle, double angle_sigma, Random
       LineObservation line;
       for (const Vector2d& p : s) {
         const double dx = random->Normal(), dy = random->Normal();
-        line.points.emplace_back(p + kSigmaPx * Vector2d(dx, dy));
+        line.points.emplace_back(p + kNoisePx * Vector2d(dx, dy));
       }
       pencil.lines.push_back(line);
     }
@@ -118,7 +118,7 @@ std::vector<LineFit> ExactLines(const Scene& scene, std::size_t pencil) {
     std::vector<CalibratedPoint> points;
     PixelsToCalibrated(scene.camera, {s[0], s[1]}, &points);
     LineFit fit;
-    EXPECT_TRUE(FitLine(points, kSigmaPx, &fit).ok());
+    EXPECT_TRUE(FitLine(points, kNoisePx, &fit).ok());
     lines.push_back(fit);
   }
   return lines;
@@ -201,7 +201,7 @@ INSTANTIATE_TEST_SUITE_P(Cases, PencilsTest,
                                            PencilCase{4, Angle::kAbsent},
                                            PencilCase{10, Angle::kAbsent}));
 
-int NumScenes() {
+int NumPencilScenes() {
   const char* text = std::getenv("CIRCLINE_PENCIL_SCENES");
   if (text != nullptr && std::atoi(text) > 0) return std::atoi(text);
   return 2000;
@@ -213,7 +213,7 @@ int NumScenes() {
 TEST(PencilsTest, FitsNoWorseThanTheTruth) {
   Random random(22);
   int worse = 0;
-  const int scenes = NumScenes();
+  const int scenes = NumPencilScenes();
   for (int i = 0; i < scenes; ++i) {
     const Scene scene = RandomScene(2 + random.UniformInt(3), 90.0 * kDegree, i % 2 == 0, &random);
     const Observations observations = Observe(scene, Angle::kHard, 0.0, &random);
@@ -231,7 +231,7 @@ TEST(PencilsTest, FitsNoWorseThanTheTruth) {
         std::vector<CalibratedPoint> points;
         PixelsToCalibrated(scene.camera, line.points, &points);
         LineFit fit;
-        ASSERT_TRUE(FitLine(points, kSigmaPx, &fit).ok());
+        ASSERT_TRUE(FitLine(points, kNoisePx, &fit).ok());
         const double r = VanishingPointResidual(fit, scene.directions[k]);
         cost += 0.5 * r * r;
       }

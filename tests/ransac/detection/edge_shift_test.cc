@@ -36,13 +36,13 @@ cv::Mat ShiftedBoard(double shift) {
   return detection_test::Develop(image, 0.8, 1.0);
 }
 
-struct Lines {
+struct Found {
   EdgeMap edges;
   std::vector<DetectedLine> lines;
 };
 
-Lines DetectIn(const cv::Mat& photo) {
-  Lines result;
+Found DetectIn(const cv::Mat& photo) {
+  Found result;
   EXPECT_TRUE(DetectEdges(photo, EdgeOptions(), &result.edges).ok());
   EXPECT_TRUE(
       DetectLines(result.edges, detection_test::TestCamera(), LineOptions(), &result.lines).ok());
@@ -63,14 +63,14 @@ double WorstTurn(const std::vector<DetectedLine>& lines) {
 TEST(EdgeShift, IsMeasuredOnLinesOfBothKindsOfEdges) {
   const Camera camera = detection_test::TestCamera();
   for (const double shift : {-0.3, -0.15, 0.15, 0.3}) {
-    const Lines found = DetectIn(ShiftedBoard(shift));
+    const Found found = DetectIn(ShiftedBoard(shift));
     EXPECT_NEAR(EstimateEdgeShift(found.edges, camera, found.lines), -shift, 0.05) << shift;
   }
 }
 
 TEST(EdgeShift, UndoneItLeavesLinesStraight) {
   const Camera camera = detection_test::TestCamera();
-  Lines found = DetectIn(ShiftedBoard(0.3));
+  Found found = DetectIn(ShiftedBoard(0.3));
   const double before = WorstTurn(found.lines);
   UndoEdgeShift(found.edges, camera, &found.lines);
   EXPECT_GT(before, 0.01);
@@ -79,7 +79,7 @@ TEST(EdgeShift, UndoneItLeavesLinesStraight) {
 
 TEST(EdgeShift, NoneWhereThereIsNone) {
   const Camera camera = detection_test::TestCamera();
-  const Lines found = DetectIn(ShiftedBoard(0.0));
+  const Found found = DetectIn(ShiftedBoard(0.0));
   ASSERT_GE(found.lines.size(), 10u);
   EXPECT_NEAR(EstimateEdgeShift(found.edges, camera, found.lines), 0.0, 0.03);
   EXPECT_EQ(EstimateEdgeShift(found.edges, camera, {}), 0.0);
