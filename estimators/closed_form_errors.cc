@@ -18,8 +18,9 @@ Eigen::Matrix2d SquareRoot(const Eigen::Matrix2d& C) {
   return (C + root * Eigen::Matrix2d::Identity()) / (scale > 0.0 ? scale : 1.0);
 }
 
-// c^T C^+ c, of a covariance of any rank.
+// c^T C^+ c, of a covariance of any rank; infinite where C is.
 double SquaredDistance(const Eigen::VectorXd& c, const Eigen::MatrixXd& C) {
+  if (!C.allFinite()) return std::numeric_limits<double>::infinity();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(C);
   const Eigen::VectorXd along = eigen.eigenvectors().transpose() * c;
   const double least = static_cast<double>(c.size()) * std::numeric_limits<double>::epsilon() *
