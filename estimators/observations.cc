@@ -172,7 +172,9 @@ double LineSigma(const PencilObservation& pencil, const LineObservation& line) {
   return line.sigma_px > 0.0 ? line.sigma_px : pencil.sigma_px;
 }
 
-bool HasRole(const PencilObservation& pencil) { return pencil.direction != PencilDirection::kFree; }
+bool RunsAlongAxis(const PencilObservation& pencil) {
+  return pencil.direction != PencilDirection::kFree;
+}
 
 int FindCircle(const Observations& observations, const std::string& id) {
   for (std::size_t i = 0; i < observations.circles.size(); ++i) {
@@ -236,7 +238,7 @@ bool IsInWorldPlane(const KnownLength& length, const Observations& resolved) {
 Observations ResolveWorld(const Observations& observations) {
   Observations out = observations;
   FrameObservation& frame = out.frame;
-  const bool has_role = std::any_of(out.pencils.begin(), out.pencils.end(), HasRole);
+  const bool has_role = std::any_of(out.pencils.begin(), out.pencils.end(), RunsAlongAxis);
   ShareRadii(&out.circles);
   frame.plane = FirstNamedPlane(out);
   if (frame.plane.empty()) {
@@ -270,7 +272,7 @@ Observations ResolveWorld(const Observations& observations) {
   if (!x_is_fixed) {
     const auto first = std::find_if(
         out.pencils.begin(), out.pencils.end(),
-        [&](const PencilObservation& p) { return !HasRole(p) && p.plane == frame.plane; });
+        [&](const PencilObservation& p) { return !RunsAlongAxis(p) && p.plane == frame.plane; });
     if (first != out.pencils.end()) first->direction = PencilDirection::kX;
   }
   return out;

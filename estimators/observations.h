@@ -138,7 +138,7 @@ double StatedLogFocal(const Observations& observations);
 double LineSigma(const PencilObservation& pencil, const LineObservation& line);
 
 // Whether the pencil runs along an axis of the world.
-bool HasRole(const PencilObservation& pencil);
+bool RunsAlongAxis(const PencilObservation& pencil);
 
 // Index of a circle or pencil by id, or -1.
 int FindCircle(const Observations& observations, const std::string& id);

@@ -18,7 +18,7 @@ bool Differ(const PencilObservation& a, const PencilObservation& b,
             const std::vector<KnownAngle>& known_angles) {
   constexpr double kGate = 3.0, kRounding = 1e-9;
   if (!(a.fit->direction.cross(b.fit->direction).norm() > kRounding)) return false;
-  if (HasRole(a) && HasRole(b)) return a.direction != b.direction;
+  if (RunsAlongAxis(a) && RunsAlongAxis(b)) return a.direction != b.direction;
   for (const KnownAngle& known : known_angles) {
     if (IsBetween(known, a.id, b.id) && std::abs(std::sin(known.value)) > kGate * known.sigma)
       return true;
@@ -32,7 +32,7 @@ Status FirstPair(std::vector<PencilObservation> pencils,
                  const std::vector<KnownAngle>& known_angles, PencilPair* pair) {
   std::stable_sort(pencils.begin(), pencils.end(),
                    [](const PencilObservation& a, const PencilObservation& b) {
-                     return HasRole(a) > HasRole(b);
+                     return RunsAlongAxis(a) > RunsAlongAxis(b);
                    });
   for (std::size_t i = 0; i < pencils.size(); ++i) {
     for (std::size_t j = i + 1; j < pencils.size(); ++j) {
@@ -58,7 +58,8 @@ Status SelectPencils(const Observations& observations, PencilPair* pair, FrameOb
   for (const PencilObservation& pencil : observations.pencils) {
     if (!pencil.fit) continue;
     fitted.push_back(pencil);
-    if (HasRole(pencil) || pencil.plane == observations.frame.plane) of_world.push_back(pencil);
+    if (RunsAlongAxis(pencil) || pencil.plane == observations.frame.plane)
+      of_world.push_back(pencil);
   }
   *frame = observations.frame;
   frame->origin_is_center.clear();
@@ -138,7 +139,7 @@ Recipe OrthogonalVanishingPointsRecipe() {
   r.select = [](const Observations& observations, Observations* evidence) {
     std::vector<PencilObservation> along_axes;
     for (const PencilObservation& pencil : observations.pencils) {
-      if (pencil.fit && HasRole(pencil)) along_axes.push_back(pencil);
+      if (pencil.fit && RunsAlongAxis(pencil)) along_axes.push_back(pencil);
     }
     PencilPair pair;
     const Status status = FirstPair(along_axes, observations.known_angles, &pair);

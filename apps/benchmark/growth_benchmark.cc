@@ -48,18 +48,36 @@ BENCHMARK(BM_GrowthContourPoints)
     ->Unit(benchmark::kMillisecond)
     ->Complexity(benchmark::oNLogN);
 
-void BM_GrowthSceneEntries(benchmark::State& state) {
-  std::string text =
+void ParseImages(const std::string& images, benchmark::State* state) {
+  const std::string text =
       "cameras: [{id: \"k\", model: \"pinhole\", width: 640, height: 480, "
-      "camera_matrix: [600, 0, 320, 0, 600, 240, 0, 0, 1]}]\nimages:\n";
-  for (std::int64_t i = 0; i < state.range(0); ++i)
-    text += "  - {file: \"a.jpg\", camera: \"k\"}\n";
-  for (auto _ : state) {
-    std::vector<apps::SceneImage> images;
-    if (!apps::ParseScene("scene", text, "", {}, &images).ok()) std::abort();
-    benchmark::DoNotOptimize(images);
+      "camera_matrix: [600, 0, 320, 0, 600, 240, 0, 0, 1]}]\nimages:\n" +
+      images;
+  for (auto _ : *state) {
+    std::vector<apps::SceneImage> parsed;
+    if (!apps::ParseScene("scene", text, "", {}, &parsed).ok()) std::abort();
+    benchmark::DoNotOptimize(parsed);
   }
-  state.SetComplexityN(state.range(0));
+  state->SetComplexityN(state->range(0));
+}
+
+void BM_GrowthScenePencils(benchmark::State& state) {
+  std::string image = "  - file: \"a.jpg\"\n    pencils:\n";
+  for (std::int64_t i = 0; i < state.range(0); ++i)
+    image += "      - {id: \"p" + std::to_string(i) + "\", segments: [10, 20, 30, 40]}\n";
+  ParseImages(image, &state);
+}
+BENCHMARK(BM_GrowthScenePencils)
+    ->RangeMultiplier(10)
+    ->Range(100, 100000)
+    ->Unit(benchmark::kMillisecond)
+    ->Complexity(benchmark::oNLogN);
+
+void BM_GrowthSceneEntries(benchmark::State& state) {
+  std::string images;
+  for (std::int64_t i = 0; i < state.range(0); ++i)
+    images += "  - {file: \"a.jpg\", camera: \"k\"}\n";
+  ParseImages(images, &state);
 }
 BENCHMARK(BM_GrowthSceneEntries)
     ->RangeMultiplier(10)

@@ -1,7 +1,5 @@
 #include "apps/common/scene.h"
 
-#include <glob.h>
-
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -305,34 +303,6 @@ SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
   return image;
 }
 
-std::vector<std::string> MatchWildcard(const std::string& pattern) {
-  std::vector<std::string> paths;
-  glob_t found{};
-  if (glob(pattern.c_str(), GLOB_TILDE, nullptr, &found) == 0) {
-    for (std::size_t i = 0; i < found.gl_pathc; ++i) paths.emplace_back(found.gl_pathv[i]);
-  }
-  globfree(&found);
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
-
-Status ExpandPattern(const std::string& pattern, std::vector<std::string>* paths) {
-  std::error_code error;
-  if (std::filesystem::exists(pattern, error)) {  // Also a file whose name has wildcard letters.
-    const bool is_folder = std::filesystem::is_directory(pattern, error);
-    *paths = is_folder ? PhotosInFolder(pattern) : std::vector<std::string>{pattern};
-    if (paths->empty()) return Status::Invalid("--images: no photo in the folder " + pattern);
-    return Status::Ok();
-  }
-  if (pattern.find_first_of("*?[") == std::string::npos) {
-    if (!IsPhotoName(pattern)) return Status::Invalid("--images: there is no folder " + pattern);
-    *paths = {pattern};
-    return Status::Ok();
-  }
-  *paths = MatchWildcard(pattern);
-  return paths->empty() ? Status::Invalid("--images: nothing matches " + pattern) : Status::Ok();
-}
-
 }  // namespace
 
 const char* SymmetryName(Symmetry symmetry) {
@@ -340,27 +310,6 @@ const char* SymmetryName(Symmetry symmetry) {
          : symmetry == Symmetry::kD2 ? "D2"
          : symmetry == Symmetry::kD4 ? "D4"
                                      : "axis";
-}
-
-bool IsPhotoName(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  static const auto* const known = new std::set<std::string>{
-      ".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".webp", ".jp2"};
-  return known->count(extension) > 0;
-}
-
-std::vector<std::string> PhotosInFolder(const std::string& folder) {
-  std::vector<std::string> paths;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (!entry.is_directory(error) && IsPhotoName(entry.path().string())) {
-      paths.push_back(entry.path().string());
-    }
-  }
-  std::sort(paths.begin(), paths.end());
-  return paths;
 }
 
 Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
@@ -409,18 +358,6 @@ Status ParseScene(const std::string& name, const std::string& text, const std::s
     return Status::Invalid(name + separator + status.message);
   }
   return Status::Ok();
-}
-
-Status ListPhotos(const std::string& patterns, std::vector<std::string>* paths) {
-  paths->clear();
-  for (const std::string& pattern : SplitList(patterns)) {
-    if (pattern.empty()) continue;
-    std::vector<std::string> named;
-    const Status status = ExpandPattern(pattern, &named);
-    if (!status.ok()) return status;
-    paths->insert(paths->end(), named.begin(), named.end());
-  }
-  return paths->empty() ? Status::Invalid("--images: names no photo") : Status::Ok();
 }
 
 }  // namespace circline::apps

@@ -82,17 +82,6 @@ Status ParseScene(const std::string& name, const std::string& text, const std::s
                   const std::vector<Camera>& cameras, std::vector<SceneImage>* images,
                   std::string* rigid = nullptr);
 
-// Whether photos have names that end like this one; letters' case does not count.
-bool IsPhotoName(const std::string& path);
-
-// Paths of the photos in a folder itself, sorted; none where it cannot be read.
-std::vector<std::string> PhotosInFolder(const std::string& folder);
-
-// Paths of the photos that a comma-separated list of files, folders and wildcards names, sorted
-// within each. A plain file name need not exist (reading it will tell); a wildcard that matches
-// nothing, or a folder without photos, is an error.
-Status ListPhotos(const std::string& patterns, std::vector<std::string>* paths);
-
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMMON_SCENE_H_

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "apps/common/camera_file.h"
+#include "apps/common/photo_list.h"
 #include "apps/common/text.h"
 
 DEFINE_string(scene, "", "Scene file (YAML or JSON): photos and what is known of them.");

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "apps/common/scene.h"
+#include "apps/common/photo_list.h"
 
 namespace circline::apps {
 namespace {

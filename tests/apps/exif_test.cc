@@ -59,7 +59,7 @@ std::string Jpeg(const std::vector<Tag>& tags) {
   return jpeg + exif + "\xFF\xD9";
 }
 
-constexpr std::uint16_t kFilm = 0xA405, kPhotoFocal = 0x920A, kResolution = 0xA20E, kUnit = 0xA210,
+constexpr std::uint16_t kFilm = 0xA405, kFocalLength = 0x920A, kResolution = 0xA20E, kUnit = 0xA210,
                         kPixelX = 0xA002;
 
 class Exif : public testing::Test {
@@ -78,23 +78,25 @@ TEST_F(Exif, EquivalentFocalLengthComparesDiagonals) {
 
 TEST_F(Exif, FocalPlaneGivesPixelsForAMillimetre) {
   // 8 mm, 2540 pixels an inch.
-  const std::vector<Tag> inches = {{kPhotoFocal, 80, 10}, {kResolution, 2540, 1}, {kUnit, 2, {}}};
+  const std::vector<Tag> inches = {{kFocalLength, 80, 10}, {kResolution, 2540, 1}, {kUnit, 2, {}}};
   EXPECT_NEAR(Read(Jpeg(inches)).focal_px, 800.0, 1e-6);
   const std::vector<Tag> centimetres = {
-      {kPhotoFocal, 8, 1}, {kResolution, 10000, 1}, {kUnit, 3, {}}};
+      {kFocalLength, 8, 1}, {kResolution, 10000, 1}, {kUnit, 3, {}}};
   EXPECT_NEAR(Read(Jpeg(centimetres)).focal_px, 8000.0, 1e-6);
-  const std::vector<Tag> millimetres = {{kPhotoFocal, 8, 1}, {kResolution, 100, 1}, {kUnit, 4, {}}};
+  const std::vector<Tag> millimetres = {
+      {kFocalLength, 8, 1}, {kResolution, 100, 1}, {kUnit, 4, {}}};
   EXPECT_NEAR(Read(Jpeg(millimetres)).focal_px, 800.0, 1e-6);
-  const std::vector<Tag> micrometres = {{kPhotoFocal, 8, 1}, {kResolution, 1, 5}, {kUnit, 5, {}}};
+  const std::vector<Tag> micrometres = {{kFocalLength, 8, 1}, {kResolution, 1, 5}, {kUnit, 5, {}}};
   EXPECT_NEAR(Read(Jpeg(micrometres)).focal_px, 1600.0, 1e-6);
-  const std::vector<Tag> unitless = {{kPhotoFocal, 80, 10}, {kResolution, 2540, 1}, {kUnit, 1, {}}};
+  const std::vector<Tag> unitless = {
+      {kFocalLength, 80, 10}, {kResolution, 2540, 1}, {kUnit, 1, {}}};
   EXPECT_EQ(Read(Jpeg(unitless)).focal_px, 0.0);  // 1: no unit of length.
   // Made half as large since.
   const std::vector<Tag> smaller = {
-      {kPhotoFocal, 80, 10}, {kResolution, 2540, 1}, {kPixelX, 8000, {}}};
+      {kFocalLength, 80, 10}, {kResolution, 2540, 1}, {kPixelX, 8000, {}}};
   EXPECT_NEAR(Read(Jpeg(smaller)).focal_px, 0.0, 1e-6);  // 400 px is no lens's.
   const std::vector<Tag> longer = {
-      {kPhotoFocal, 320, 10}, {kResolution, 2540, 1}, {kPixelX, 8000, {}}};
+      {kFocalLength, 320, 10}, {kResolution, 2540, 1}, {kPixelX, 8000, {}}};
   EXPECT_NEAR(Read(Jpeg(longer)).focal_px, 1600.0, 1e-6);
 }
 
@@ -102,7 +104,7 @@ TEST_F(Exif, WhatNoLensHasIsPassedOver) {
   for (const std::vector<Tag>& tags : std::vector<std::vector<Tag>>{
            {{kFilm, 1, {}}},
            {{kFilm, 65535, {}}},
-           {{kPhotoFocal, 4000000000U, 1}, {kResolution, 4000000000U, 1}}}) {
+           {{kFocalLength, 4000000000U, 1}, {kResolution, 4000000000U, 1}}}) {
     const ExifFocalLength focal = Read(Jpeg(tags));
     EXPECT_EQ(focal.focal_px, 0.0);
     EXPECT_CONTAINS(focal.words, "is no lens's");
@@ -110,8 +112,8 @@ TEST_F(Exif, WhatNoLensHasIsPassedOver) {
   for (const std::vector<Tag>& tags :
        std::vector<std::vector<Tag>>{{},
                                      {{kFilm, 0, {}}},
-                                     {{kPhotoFocal, 8, 1}},  // No focal plane.
-                                     {{kPhotoFocal, 8, 0}, {kResolution, 2540, 0}}}) {
+                                     {{kFocalLength, 8, 1}},  // No focal plane.
+                                     {{kFocalLength, 8, 0}, {kResolution, 2540, 0}}}) {
     EXPECT_EQ(Read(Jpeg(tags)).focal_px, 0.0);
   }
 }
@@ -119,7 +121,7 @@ TEST_F(Exif, WhatNoLensHasIsPassedOver) {
 // Whatever is broken: an answer that is finite, and no crash.
 TEST_F(Exif, BrokenDataGiveNone) {
   const std::string whole =
-      Jpeg({{kFilm, 28, {}}, {kPhotoFocal, 80, 10}, {kResolution, 2540, 1}, {kUnit, 2, {}}});
+      Jpeg({{kFilm, 28, {}}, {kFocalLength, 80, 10}, {kResolution, 2540, 1}, {kUnit, 2, {}}});
   ASSERT_GT(Read(whole).focal_px, 0.0);
   for (std::size_t size = 0; size < whole.size(); size += 3) {
     EXPECT_TRUE(std::isfinite(Read(whole.substr(0, size)).focal_px)) << size;
