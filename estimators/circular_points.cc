@@ -2,10 +2,12 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <utility>
 
 #include "circline/estimators/circle_pose.h"
+#include "circline/estimators/line_pose.h"
 
 namespace circline {
 namespace {
@@ -38,21 +40,65 @@ bool Bracket(const CircularPoints& points, const Eigen::Vector3d& v,
   return std::norm(*bracket) > kMinNorm * points.real.squaredNorm();
 }
 
-// Both unit; false where they are parallel to rounding.
-bool SymmetricRotation(const Eigen::Vector3d& normal, const Eigen::Vector3d& x,
-                       const Eigen::Vector3d& y, Eigen::Matrix3d* rotation) {
-  // Sum and difference of unit vectors are orthogonal whatever angle these enclose.
-  const Eigen::Vector3d sum = x + y, difference = x - y;
-  const double sum_norm = sum.norm(), difference_norm = difference.norm();
-  constexpr double kMinSine = 1e-12;
-  if (!(sum_norm > kMinSine) || !(difference_norm > kMinSine)) return false;
-  constexpr double kSqrtHalf = 0.7071067811865476;
-  const Eigen::Vector3d u = (kSqrtHalf / sum_norm) * sum,
-                        v = (kSqrtHalf / difference_norm) * difference;
-  rotation->col(0) = u + v;
-  rotation->col(1) = u - v;
-  rotation->col(2) = x.cross(y).dot(normal) < 0.0 ? Eigen::Vector3d(-normal) : normal;
+constexpr double kMinSine = 1e-12;  // Below, two directions are one to rounding.
+
+// The join of a pair that is scaled.
+bool Join(const CircularPoints& scaled, Eigen::Vector3d* line) {
+  const Eigen::Vector3d join = scaled.real.cross(scaled.imag);
+  const double norm = join.norm();
+  if (!(norm > kMinSine)) return false;
+  *line = join / norm;
   return true;
+}
+
+// Where a line meets the vanishing line; false where it is that. Both are scaled.
+bool Meet(const Eigen::Vector3d& vanishing_line, const Eigen::Vector3d& line,
+          Eigen::Vector3d* point) {
+  *point = vanishing_line.cross(line);
+  return point->squaredNorm() > kMinSine * kMinSine;
+}
+
+// Two axes on one plane.
+struct Axes {
+  Eigen::Vector3d x, y;  // Where their images meet the vanishing line.
+  // Of the angle from the one to the other: the real part of the square root of the cross ratio
+  // {m, conj(m); x, y} = [m, y] [conj(m), x] / ([m, x] [conj(m), y]), of which the second half is
+  // the conjugate of the first.
+  double cosine;
+};
+
+// All scaled.
+bool FindAxes(const CircularPoints& m, const Eigen::Vector3d& x_line, const Eigen::Vector3d& y_line,
+              Axes* axes) {
+  Eigen::Vector3d normal;
+  if (!Join(m, &normal) || !Meet(normal, x_line, &axes->x) || !Meet(normal, y_line, &axes->y))
+    return false;
+  const Eigen::Vector2d x(axes->x.dot(m.real), axes->x.dot(m.imag)),
+      y(axes->y.dot(m.real), axes->y.dot(m.imag));
+  axes->cosine = x.dot(y) / std::sqrt(x.squaredNorm() * y.squaredNorm());
+  return std::isfinite(axes->cosine);
+}
+
+bool ScaleAndFindAxes(const CircularPoints& points, const Eigen::Vector3d& x_line,
+                      const Eigen::Vector3d& y_line, Axes* axes) {
+  CircularPoints m;
+  Eigen::Vector3d x, y;
+  return ScaledPair(points, &m) && Scaled(x_line, &x) && Scaled(y_line, &y) &&
+         FindAxes(m, x, y, axes);
+}
+
+bool OrthogonalAxes(const Axes& axes, double x_variance, double y_variance,
+                    FrameRotation* rotation) {
+  rotation->deviation = std::abs(axes.cosine);
+  return RotationFromOrthogonalDirections(axes.x, x_variance, axes.y, y_variance,
+                                          &rotation->rotation);
+}
+
+CircularPoints OfUnitNormal(const Eigen::Vector3d& n) {
+  CircularPoints points;
+  points.real = n.unitOrthogonal();
+  points.imag = n.cross(points.real);
+  return points;
 }
 
 }  // namespace
@@ -60,9 +106,7 @@ bool SymmetricRotation(const Eigen::Vector3d& normal, const Eigen::Vector3d& x,
 bool CircularPointsOfPlane(const Eigen::Vector3d& normal, CircularPoints* points) {
   Eigen::Vector3d n;
   if (!Scaled(normal, &n)) return false;
-  n.normalize();
-  points->real = n.unitOrthogonal();
-  points->imag = n.cross(points->real);
+  *points = OfUnitNormal(n.normalized());
   return true;
 }
 
@@ -70,31 +114,14 @@ int CircularPointsOfConic(const Eigen::Matrix3d& conic, std::array<CircularPoint
   std::array<CirclePose, 2> poses;
   const int count = CirclePoses(conic, &poses);
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-    CircularPointsOfPlane(poses[i].normal, &(*points)[i]);
+    (*points)[i] = OfUnitNormal(poses[i].normal);
   }
   return count;
 }
 
 bool VanishingLine(const CircularPoints& points, Eigen::Vector3d* line) {
   CircularPoints m;
-  if (!ScaledPair(points, &m)) return false;
-  const Eigen::Vector3d join = m.real.cross(m.imag);
-  const double norm = join.norm();
-  constexpr double kMinSine = 1e-12;
-  if (!(norm > kMinSine)) return false;
-  *line = join / norm;
-  return true;
-}
-
-bool CrossRatio(const CircularPoints& points, const Eigen::Vector3d& x, const Eigen::Vector3d& y,
-                std::complex<double>* cross_ratio) {
-  CircularPoints m;
-  std::complex<double> mx, my;
-  if (!ScaledPair(points, &m) || !Bracket(m, x, &mx) || !Bracket(m, y, &my)) return false;
-  // [m, y] [conj(m), x] / ([m, x] [conj(m), y]): the second half is the conjugate of the first.
-  const std::complex<double> half = my * std::conj(mx);
-  *cross_ratio = half / std::conj(half);
-  return true;
+  return ScaledPair(points, &m) && Join(m, line);
 }
 
 bool HarmonicConjugate(const CircularPoints& points, const Eigen::Vector3d& v,
@@ -112,11 +139,11 @@ bool HarmonicConjugate(const CircularPoints& points, const Eigen::Vector3d& v,
 
 bool RotationFromCircularPoints(const CircularPoints& points, const Eigen::Vector3d& x_line,
                                 Eigen::Matrix3d* rotation) {
-  Eigen::Vector3d normal, line, v_y;
-  if (!VanishingLine(points, &normal) || !Scaled(x_line, &line)) return false;
-  const Eigen::Vector3d v_x = normal.cross(line);
-  constexpr double kMinSine = 1e-12;
-  if (!(v_x.norm() > kMinSine) || !HarmonicConjugate(points, v_x.normalized(), &v_y)) return false;
+  Eigen::Vector3d normal, line, v_x, v_y;
+  if (!VanishingLine(points, &normal) || !Scaled(x_line, &line) || !Meet(normal, line, &v_x) ||
+      !HarmonicConjugate(points, v_x.normalized(), &v_y)) {
+    return false;
+  }
   rotation->col(0) = v_x.normalized();
   rotation->col(1) = v_y;
   rotation->col(2) = normal;
@@ -125,14 +152,17 @@ bool RotationFromCircularPoints(const CircularPoints& points, const Eigen::Vecto
 
 double HarmonicDeviation(const CircularPoints& points, const Eigen::Vector3d& x_line,
                          const Eigen::Vector3d& y_line) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Eigen::Vector3d normal, x, y;
-  std::complex<double> cross_ratio;
-  if (!VanishingLine(points, &normal) || !Scaled(x_line, &x) || !Scaled(y_line, &y) ||
-      !CrossRatio(points, normal.cross(x), normal.cross(y), &cross_ratio)) {
-    return kInfinity;
-  }
-  return 0.5 * std::abs(cross_ratio + 1.0);
+  Axes axes;
+  if (ScaleAndFindAxes(points, x_line, y_line, &axes)) return axes.cosine;
+  return std::numeric_limits<double>::infinity();
+}
+
+bool RotationFromFrame(const CircularPoints& points, const Eigen::Vector3d& x_line,
+                       double x_variance, const Eigen::Vector3d& y_line, double y_variance,
+                       FrameRotation* rotation) {
+  Axes axes;
+  return ScaleAndFindAxes(points, x_line, y_line, &axes) &&
+         OrthogonalAxes(axes, x_variance, y_variance, rotation);
 }
 
 int RotationsFromCircleAndFrame(const Eigen::Matrix3d& conic, const Eigen::Vector3d& x_line,
@@ -140,22 +170,13 @@ int RotationsFromCircleAndFrame(const Eigen::Matrix3d& conic, const Eigen::Vecto
                                 std::array<FrameRotation, 2>* rotations) {
   Eigen::Vector3d x, y;
   if (!Scaled(x_line, &x) || !Scaled(y_line, &y)) return 0;
-  std::array<CirclePose, 2> poses;
-  const int candidates = CirclePoses(conic, &poses);
+  std::array<CircularPoints, 2> planes;
+  const int candidates = CircularPointsOfConic(conic, &planes);
   std::size_t count = 0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(candidates); ++i) {
-    const Eigen::Vector3d& n = poses[i].normal;
-    Eigen::Vector3d v_x = n.cross(x), v_y = n.cross(y);
-    const double norm_x = v_x.norm(), norm_y = v_y.norm();
-    constexpr double kMinSine = 1e-12;
-    if (!(norm_x > kMinSine) || !(norm_y > kMinSine)) continue;
-    v_x /= norm_x;
-    v_y /= norm_y;
-    FrameRotation& r = (*rotations)[count];
-    if (!SymmetricRotation(n, v_x, v_y, &r.rotation)) continue;
-    // |cross ratio + 1| / 2 without the complex numbers.
-    r.deviation = std::abs(v_x.dot(v_y));
-    ++count;
+    Axes axes;
+    if (FindAxes(planes[i], x, y, &axes) && OrthogonalAxes(axes, 1.0, 1.0, &(*rotations)[count]))
+      ++count;
   }
   if (count == 2 && (*rotations)[1].deviation < (*rotations)[0].deviation) {
     std::swap((*rotations)[0], (*rotations)[1]);

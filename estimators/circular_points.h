@@ -8,7 +8,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <complex>
 
 #include "circline/estimators/export.h"
 
@@ -36,13 +35,6 @@ int CircularPointsOfConic(const Eigen::Matrix3d& conic, std::array<CircularPoint
 // parallel to rounding, or not finite).
 bool VanishingLine(const CircularPoints& points, Eigen::Vector3d* line);
 
-// Cross ratio {m, conj(m); x, y} of the ICPs and two real points of their line (what x and y have
-// off the line is ignored). It has modulus 1 and is exp(2 i angle), angle that from direction x to
-// direction y about real x imag (Laguerre 1853): -1 where they are orthogonal. False for a point
-// that is zero, not finite, or the pole of the line.
-bool CrossRatio(const CircularPoints& points, const Eigen::Vector3d& x, const Eigen::Vector3d& y,
-                std::complex<double>* cross_ratio);
-
 // The point of the line that with v divides the ICPs harmonically: the vanishing point orthogonal
 // to v in the plane, v turned by +90 degrees about real x imag, of v's length.
 bool HarmonicConjugate(const CircularPoints& points, const Eigen::Vector3d& v,
@@ -54,23 +46,29 @@ bool HarmonicConjugate(const CircularPoints& points, const Eigen::Vector3d& v,
 bool RotationFromCircularPoints(const CircularPoints& points, const Eigen::Vector3d& x_line,
                                 Eigen::Matrix3d* rotation);
 
-// Proposition 4, the test: how far the axes with images x_line and y_line are from orthogonal in
-// the plane, |cross ratio + 1| / 2 of where they meet the vanishing line, which is the |cosine| of
-// their angle. The true plane has 0. Infinity where a line is the vanishing line.
+// Proposition 4, the test: the cosine of the angle between the axes with images x_line and y_line
+// (or of lines parallel to them) in the plane. The cross ratio of the ICPs and the two points where
+// the lines meet the vanishing line is exp(2 i angle) (Laguerre 1853): it is -1, and the cosine 0,
+// for the true plane. Infinity where a line is the vanishing line.
 double HarmonicDeviation(const CircularPoints& points, const Eigen::Vector3d& x_line,
                          const Eigen::Vector3d& y_line);
 
 // Proposition 4: a circle and the images of the two axes of its plane's frame (or of lines parallel
 // to them). For each candidate plane the rotation whose X and Y axes are nearest to where x_line
-// and y_line meet the vanishing line, both turned by the same angle to be orthogonal (as the paper
-// does; RotationFromOrthogonalDirections weights them). Signs as they come: see SignChoices.
+// and y_line meet the vanishing line. Signs as they come: see SignChoices.
 struct FrameRotation {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // World to camera.
-  double deviation = 0.0;  // HarmonicDeviation of the axes: 0 for the true plane.
+  double deviation = 0.0;  // |HarmonicDeviation| of the axes: 0 for the true plane.
 };
-// Returns how many were written, the smaller deviation first: at most 2, as CirclePoses; a
-// candidate whose vanishing line is an axis, or on which the axes are parallel, is no hypothesis.
-// 0.3 us.
+// On one plane, given by its ICPs: what the solver `circle_frame` runs for each candidate. What the
+// axes lack to a right angle is shared between them in proportion to the variances of their
+// directions in the plane (rad^2); equal ones, as in the paper, turn both by the same angle. False
+// where a line is the vanishing line, or where the axes are parallel.
+bool RotationFromFrame(const CircularPoints& points, const Eigen::Vector3d& x_line,
+                       double x_variance, const Eigen::Vector3d& y_line, double y_variance,
+                       FrameRotation* rotation);
+// On both planes of an ellipse, with equal variances. Returns how many were written, the smaller
+// deviation first: at most 2, as CircularPointsOfConic. 0.3 us.
 int RotationsFromCircleAndFrame(const Eigen::Matrix3d& conic, const Eigen::Vector3d& x_line,
                                 const Eigen::Vector3d& y_line,
                                 std::array<FrameRotation, 2>* rotations);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "circline/estimators/circular_points.h"
 #include "circline/estimators/line_pose.h"
 
 namespace circline {
@@ -35,9 +36,11 @@ Eigen::Matrix3d Orient(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& p
   return best;
 }
 
-// Variance of the in-plane angle of the direction n x l, from the covariance of l.
-double InPlaneVariance(const Measured& line, const Eigen::Vector3d& direction) {
-  return (direction.normalized().transpose() * line.columns).squaredNorm();
+// Variance of the angle, in the plane with this normal, of a line's direction.
+double InPlaneVariance(const Measured& line, const Eigen::Vector3d& normal) {
+  const Eigen::Vector3d direction = normal.cross(Eigen::Vector3d(line.value));
+  const double length2 = direction.squaredNorm();
+  return (direction.transpose() * line.columns).squaredNorm() / (length2 * length2);
 }
 
 // Translation: where the origin's ray, followed backwards if need be (axes may cross behind the
@@ -239,21 +242,22 @@ std::vector<Candidate> LinePose(const Eigen::Matrix3d& rotation, const Inputs& i
 
 bool RotationOfPlane(const Eigen::Vector3d& n, const Eigen::Vector3d& plane_ray,
                      const Inputs& inputs, Eigen::Matrix3d* rotation) {
-  const auto direction = [&n](const Measured& line) -> Eigen::Vector3d {
-    return n.cross(Eigen::Vector3d(line.value));
-  };
-  bool valid = true;
+  CircularPoints plane;
+  bool valid = CircularPointsOfPlane(n, &plane);
   if (inputs.x_line.present() && inputs.y_line.present()) {
-    const Eigen::Vector3d x = direction(inputs.x_line), y = direction(inputs.y_line);
-    valid = RotationFromOrthogonalDirections(x, InPlaneVariance(inputs.x_line, x) / x.squaredNorm(),
-                                             y, InPlaneVariance(inputs.y_line, y) / y.squaredNorm(),
-                                             rotation);
+    FrameRotation frame;
+    valid =
+        valid && RotationFromFrame(plane, inputs.x_line.value, InPlaneVariance(inputs.x_line, n),
+                                   inputs.y_line.value, InPlaneVariance(inputs.y_line, n), &frame);
+    *rotation = frame.rotation;
   } else if (inputs.x_line.present()) {
-    const Eigen::Vector3d x = direction(inputs.x_line);
-    valid = RotationFromDirections(x, n.cross(x), rotation);
+    valid = valid && RotationFromCircularPoints(plane, inputs.x_line.value, rotation);
   } else if (inputs.y_line.present()) {
-    const Eigen::Vector3d y = direction(inputs.y_line);
-    valid = RotationFromDirections(y.cross(n), y, rotation);
+    Eigen::Matrix3d R;  // Its X axis is the world's Y axis.
+    valid = valid && RotationFromCircularPoints(plane, inputs.y_line.value, &R);
+    rotation->col(0) = -R.col(1);
+    rotation->col(1) = R.col(0);
+    rotation->col(2) = R.col(2);
   } else {
     const Eigen::Vector3d reference =
         std::abs(n.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
@@ -282,12 +286,12 @@ std::vector<Candidate> CircleFramePoses(const Inputs& inputs) {
   return CircleCandidates(
       inputs, [](const CirclePose& circle, const Inputs& in) -> Eigen::VectorXd {
         const Eigen::Vector3d lx = in.x_line.value, ly = in.y_line.value;
-        const Eigen::Vector3d x = circle.normal.cross(lx).normalized(),
-                              y = circle.normal.cross(ly).normalized();
+        CircularPoints plane;
+        CircularPointsOfPlane(circle.normal, &plane);
         // Lines along the axes cross anywhere; the axes themselves, at the origin.
         const bool at_crossing = in.origin_at_center && in.x_sense && in.y_sense;
         Eigen::VectorXd contradiction(at_crossing ? 3 : 1);
-        contradiction[0] = x.dot(y);
+        contradiction[0] = HarmonicDeviation(plane, lx, ly);
         if (at_crossing) contradiction.tail<2>() = CenterMiss(circle, lx.cross(ly));
         return contradiction;
       });

@@ -37,11 +37,15 @@ bool RotationFromOrthogonalDirections(const Eigen::Vector3d& x_direction, double
   Eigen::Vector3d x, y, normal;
   if (!Normal(x_direction, y_direction, &x, &y, &normal)) return false;
   // x and y enclose 90 degrees + excess; turn each towards the other by its share.
-  const double excess = std::atan2(-x.dot(y), x.cross(y).dot(normal));
   const double sum = x_variance + y_variance;
   const double share = sum > 0.0 && std::isfinite(sum) ? x_variance / sum : 0.5;
-  const double turn = share * excess;
-  const Eigen::Vector3d r1 = (std::cos(turn) * x + std::sin(turn) * normal.cross(x)).normalized();
+  Eigen::Vector3d r1;
+  if (share == 0.5) {
+    r1 = (x + y.cross(normal)).normalized();  // Halfway, without trigonometry.
+  } else {
+    const double turn = share * std::atan2(-x.dot(y), x.cross(y).dot(normal));
+    r1 = (std::cos(turn) * x + std::sin(turn) * normal.cross(x)).normalized();
+  }
   rotation->col(0) = r1;
   rotation->col(1) = normal.cross(r1);
   rotation->col(2) = normal;

@@ -101,7 +101,7 @@ TEST(CircularPointsTest, OfAConicLieOnItAndHoldTheTruth) {
   EXPECT_EQ(CircularPointsOfConic(Matrix3d::Identity(), &m), 0);
 }
 
-TEST(CircularPointsTest, CrossRatioIsLaguerresAngle) {
+TEST(CircularPointsTest, DeviationIsTheCosineOfLaguerresAngle) {
   Random random(4);
   for (int i = 0; i < 1000; ++i) {
     const Matrix3d R = RandomRotation(&random);
@@ -112,9 +112,10 @@ TEST(CircularPointsTest, CrossRatioIsLaguerresAngle) {
     const auto direction = [&R](double a) -> Vector3d {
       return std::cos(a) * R.col(0) + std::sin(a) * R.col(1);
     };
-    std::complex<double> ratio;
-    ASSERT_TRUE(CrossRatio(m, 2.0 * direction(phi), -0.1 * direction(phi + angle), &ratio));
-    EXPECT_LT(std::abs(ratio - std::polar(1.0, 2.0 * angle)), 1e-13);
+    // Lines with these vanishing points.
+    const Vector3d x_line = R.col(2).cross(2.0 * direction(phi)),
+                   y_line = R.col(2).cross(-0.1 * direction(phi + angle));
+    EXPECT_NEAR(HarmonicDeviation(m, x_line, y_line), -std::cos(angle), 1e-13);
   }
 }
 
@@ -131,9 +132,7 @@ TEST(CircularPointsTest, HarmonicConjugateIsTheOrthogonalDirection) {
     Vector3d conjugate;
     ASSERT_TRUE(HarmonicConjugate(m, v, &conjugate));
     EXPECT_LT((conjugate - n.cross(v)).norm(), 1e-14);
-    std::complex<double> ratio;
-    ASSERT_TRUE(CrossRatio(m, v, conjugate, &ratio));
-    EXPECT_LT(std::abs(ratio + 1.0), 1e-13);
+    EXPECT_NEAR(HarmonicDeviation(m, n.cross(v), n.cross(conjugate)), 0.0, 1e-13);
   }
 }
 
@@ -163,14 +162,14 @@ TEST(CircularPointsTest, HarmonicDeviationIsTheCosineBetweenTheAxes) {
     ASSERT_TRUE(CircularPointsOfPlane(circle.normal, &truth));
     const Vector3d origin = circle.center + 0.3 * truth.real - 0.5 * truth.imag;
     const Vector3d x_line = origin.cross(truth.real), y_line = origin.cross(truth.imag);
-    EXPECT_LT(HarmonicDeviation(truth, x_line, y_line), 1e-12);
+    EXPECT_NEAR(HarmonicDeviation(truth, x_line, y_line), 0.0, 1e-12);
     std::array<CircularPoints, 2> m;
     const int count = CircularPointsOfConic(ProjectCircle(circle), &m);
     for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
       Vector3d n;
       ASSERT_TRUE(VanishingLine(m[k], &n));
       const double cosine = n.cross(x_line).normalized().dot(n.cross(y_line).normalized());
-      EXPECT_NEAR(HarmonicDeviation(m[k], x_line, y_line), std::abs(cosine), 1e-13);
+      EXPECT_NEAR(HarmonicDeviation(m[k], x_line, y_line), cosine, 1e-13);
     }
   }
 }
@@ -201,19 +200,36 @@ TEST(CircularPointsTest, CircleAndFrameGiveTheRotation) {
   }
 }
 
+// The axis that is known exactly keeps its direction.
+TEST(CircularPointsTest, TheWorseKnownAxisGivesWay) {
+  CircularPoints plane;
+  ASSERT_TRUE(CircularPointsOfPlane(Vector3d::UnitZ(), &plane));
+  // X is drawn along X, Y 0.1 radians off a right angle with it.
+  const Vector3d x_line(0.0, 1.0, -0.3), y_line(std::cos(0.1), std::sin(0.1), 0.2);
+  const double variances[][2] = {{0.0, 1.0}, {1.0, 0.0}, {1.0, 1.0}, {1.0, 3.0}};
+  const double turns[] = {0.0, 0.1, 0.05, 0.025};  // Of X.
+  for (int i = 0; i < 4; ++i) {
+    FrameRotation frame;
+    ASSERT_TRUE(RotationFromFrame(plane, x_line, variances[i][0], y_line, variances[i][1], &frame));
+    EXPECT_NEAR(std::asin(std::abs(frame.rotation(1, 0))), turns[i], 1e-14);
+    EXPECT_NEAR(frame.deviation, std::sin(0.1), 1e-14);
+  }
+}
+
 TEST(CircularPointsTest, RefusesWhatIsNoPlane) {
   CircularPoints m;
   Vector3d v;
   Matrix3d R;
-  std::complex<double> ratio;
   EXPECT_FALSE(CircularPointsOfPlane(Vector3d::Zero(), &m));
   EXPECT_FALSE(CircularPointsOfPlane(Vector3d(1.0, kNaN, 0.0), &m));
   EXPECT_FALSE(VanishingLine({Vector3d::UnitX(), 2.0 * Vector3d::UnitX()}, &v));
   ASSERT_TRUE(CircularPointsOfPlane(Vector3d::UnitZ(), &m));
-  EXPECT_FALSE(CrossRatio(m, Vector3d::UnitZ(), Vector3d::UnitX(), &ratio));
   EXPECT_FALSE(HarmonicConjugate(m, Vector3d::Zero(), &v));
   EXPECT_FALSE(RotationFromCircularPoints(m, Vector3d::UnitZ(), &R));
   EXPECT_TRUE(std::isinf(HarmonicDeviation(m, Vector3d::UnitZ(), Vector3d::UnitX())));
+  FrameRotation frame;
+  EXPECT_FALSE(RotationFromFrame(m, Vector3d::UnitX(), 1.0, Vector3d::UnitZ(), 1.0, &frame));
+  EXPECT_FALSE(RotationFromFrame(m, Vector3d::UnitX(), 1.0, Vector3d::UnitX(), 1.0, &frame));
 }
 
 }  // namespace

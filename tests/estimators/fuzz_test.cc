@@ -6,7 +6,6 @@
 #include <Eigen/Dense>
 #include <array>
 #include <cmath>
-#include <complex>
 #include <cstdlib>
 #include <limits>
 #include <vector>
@@ -237,9 +236,10 @@ bool FuzzCircularPoints(Fuzzer* f) {
   if (f->random.Uniform() < 0.5) m = {f->Vector3(), f->Vector3()};
   Vector3d v;
   Matrix3d R;
-  std::complex<double> ratio;
+  FrameRotation frame;
   if (VanishingLine(m, &v) && !Finite(v)) return false;
-  if (CrossRatio(m, f->Vector3(), f->Vector3(), &ratio) && !Finite(ratio.real() + ratio.imag())) {
+  if (RotationFromFrame(m, f->Vector3(), f->Number(), f->Vector3(), f->Number(), &frame) &&
+      !(Finite(frame.rotation) && Finite(frame.deviation))) {
     return false;
   }
   if (HarmonicConjugate(m, f->Vector3(), &v) && !Finite(v)) return false;
