@@ -10,8 +10,8 @@
 #include "circline/estimators/weights.h"
 
 namespace circline {
-Contour::Contour(const std::vector<CalibratedPoint>& points, const std::vector<double>* weights,
-                 const Normalization& n) {
+PointDistances::PointDistances(const std::vector<CalibratedPoint>& points,
+                               const std::vector<double>* weights, const Normalization& n) {
   // Filled up to whole lanes with points of no weight.
   data_.resize(static_cast<Eigen::Index>((points.size() + kLanes - 1) / kLanes * kLanes), kEnd);
   const double inverse = 1.0 / n.scale;
@@ -30,7 +30,7 @@ Contour::Contour(const std::vector<CalibratedPoint>& points, const std::vector<d
 }
 
 // Orthogonal distances of kLanes points to the conic, in pixels. Returns sum w r^2.
-double Contour::FindFeet(Eigen::Index i, const Eigen::Matrix3d& conic, double level) {
+double PointDistances::FindFeet(Eigen::Index i, const Eigen::Matrix3d& conic, double level) {
   const FootPoints<kLanes> foot = FindFootPoints<kLanes>(
       {At(kX, i), At(kY, i), At(kJ00, i), At(kJ01, i), At(kJ10, i), At(kJ11, i)}, conic, level);
   const Lanes weight = At(kWeight, i);
@@ -41,7 +41,7 @@ double Contour::FindFeet(Eigen::Index i, const Eigen::Matrix3d& conic, double le
   return (weight * foot.distance * foot.distance).sum();
 }
 
-Contour::NormalEquations Contour::Linearize(const Eigen::Matrix3d& conic) {
+PointDistances::NormalEquations PointDistances::Linearize(const Eigen::Matrix3d& conic) {
   NormalEquations e;
   const double level = EllipseLevel(conic);
   e.cost = 0.0;
@@ -68,9 +68,9 @@ Contour::NormalEquations Contour::Linearize(const Eigen::Matrix3d& conic) {
 
 // Over unit conic vectors. The scale of the vector is no parameter: adding
 // kappa v v^T to the normal matrix pins it without touching the rest.
-bool MinimizeDistances(const Eigen::Matrix3d& initial, Contour* contour, Minimum* minimum) {
+bool MinimizeDistances(const Eigen::Matrix3d& initial, PointDistances* contour, Minimum* minimum) {
   Eigen::Matrix3d* const conic = &minimum->conic;
-  Contour::NormalEquations& e = minimum->equations;
+  PointDistances::NormalEquations& e = minimum->equations;
   *conic = initial;
   e = contour->Linearize(*conic);
   if (!std::isfinite(e.cost)) return false;
@@ -99,7 +99,7 @@ bool MinimizeDistances(const Eigen::Matrix3d& initial, Contour* contour, Minimum
       return true;
     }
     if (is_ellipse) {
-      const Contour::NormalEquations next = contour->Linearize(candidate);
+      const PointDistances::NormalEquations next = contour->Linearize(candidate);
       if (next.cost <= e.cost) {
         *conic = candidate;
         e = next;

@@ -12,10 +12,10 @@
 namespace circline {
 
 // Points that count, normalised, column by column: what is read and written once a pass.
-class Contour {
+class PointDistances {
  public:
-  Contour(const std::vector<CalibratedPoint>& points, const std::vector<double>* weights,
-          const Normalization& normalization);
+  PointDistances(const std::vector<CalibratedPoint>& points, const std::vector<double>* weights,
+                 const Normalization& normalization);
 
   // Sums over the points at signed distances r to an ellipse (pixels, negative inside), weights w.
   struct NormalEquations {
@@ -53,13 +53,13 @@ class Contour {
 
 struct Minimum {
   Eigen::Matrix3d conic = Eigen::Matrix3d::Zero();  // Normalised coordinates.
-  Contour::NormalEquations equations;
+  PointDistances::NormalEquations equations;
   int iterations = 0;
 };
 
 // Levenberg-Marquardt from `initial`, an ellipse; never leaves the ellipses. False where the
 // distances are not finite.
-bool MinimizeDistances(const Eigen::Matrix3d& initial, Contour* contour, Minimum* minimum);
+bool MinimizeDistances(const Eigen::Matrix3d& initial, PointDistances* contour, Minimum* minimum);
 
 }  // namespace circline
 

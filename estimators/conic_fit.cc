@@ -23,8 +23,9 @@ Matrix6d VectorTransform(const Eigen::Matrix3d& T) {
 
 // Covariance of the unit conic vector in original coordinates from the normal equations in
 // normalised ones. False where the points do not determine all of its 5 degrees of freedom.
-bool ConicCovariance(const Contour::NormalEquations& e, const Eigen::Matrix3d& normalized_conic,
-                     const Normalization& normalization, double sigma_px, ConicFit* fit) {
+bool ConicCovariance(const PointDistances::NormalEquations& e,
+                     const Eigen::Matrix3d& normalized_conic, const Normalization& normalization,
+                     double sigma_px, ConicFit* fit) {
   const Vector6d v = ConicToVector(normalized_conic);
   const double kappa = e.information.trace() / 5.0;
   const Matrix6d A = e.information + kappa * v * v.transpose();
@@ -82,7 +83,7 @@ bool IsHyperbola(const Problem& problem, const Minimum& best) {
 // `other` (optional): where to look for a second minimum if the first was hard to reach.
 Status Refine(const Problem& problem, const Eigen::Matrix3d& initial, const Eigen::Matrix3d* other,
               ConicFit* fit) {
-  Contour contour(problem.points, problem.weights, problem.normalization);
+  PointDistances contour(problem.points, problem.weights, problem.normalization);
   Minimum best;
   bool found = MinimizeDistances(initial, &contour, &best);
   constexpr int kHard = 7;  // Three steps are usual; more say that the cost is far from quadratic.
