@@ -9,6 +9,7 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/observations.h"
+#include "circline/estimators/status.h"
 #include "circline/ransac/fit_observations.h"
 #include "circline/ransac/ransac.h"
 
@@ -21,6 +22,7 @@ struct FittedFeature {
   std::vector<int> indices;  // Of `points` among the pixels.
   bool is_stated = false;    // The noise.
   double sigma_px = 0.0;
+  Status status;  // Of its first fit.
 
   // A line through two points misses neither: how it misses its pencil's direction tells its noise.
   bool HasNoiseFromPencil() const { return !is_stated && points.size() == 2; }

@@ -29,10 +29,9 @@ class PointFitter {
       circle.fit.reset();
       circle.inliers.clear();
       circle.second.reset();
-      Status status = FitCircle(circles_.back(), nullptr, &circle);
+      circles_.back().status = FitCircle(circles_.back(), nullptr, &circle);
       if (LeaveCrowdsOut(circle.points, circle.inliers, &circles_.back()))
-        status = FitCircle(circles_.back(), nullptr, &circle);
-      if (!status.ok()) run_.Report("circle '" + circle.id + "'", status.message);
+        circles_.back().status = FitCircle(circles_.back(), nullptr, &circle);
     }
     for (PencilObservation& pencil : run_.observations.pencils) {
       pencil.fit.reset();
@@ -43,13 +42,13 @@ class PointFitter {
         line.fit.reset();
         line.inliers.clear();
         line.is_parallel = true;
-        Status status = FitLine(features.back(), &line);
+        features.back().status = FitLine(features.back(), &line);
         if (LeaveCrowdsOut(line.points, line.inliers, &features.back()))
-          status = FitLine(features.back(), &line);
-        if (!status.ok()) run_.Report(pencil, i, status.message);
+          features.back().status = FitLine(features.back(), &line);
       }
     }
     for (int round = 0; round < FitRun::kMaxRounds && FollowNoise(); ++round) continue;
+    ReportFailures();
     for (std::size_t i = 0; i < circles_.size(); ++i) {
       CircleObservation& circle = run_.observations.circles[i];
       if (!circle.fit) continue;
@@ -89,15 +88,17 @@ class PointFitter {
     return result;
   }
 
+  static bool HasManyOutliers(const std::vector<std::uint8_t>& inliers) {
+    constexpr double kMany = 0.15;  // Of all points.
+    return static_cast<double>(std::count(inliers.begin(), inliers.end(), 0)) >
+           kMany * static_cast<double>(inliers.size());
+  }
+
   // Where a fit has found many outliers, it may itself have followed some, or have found nothing:
   // leaves out what crowds. False where there is nothing to leave out.
   bool LeaveCrowdsOut(const std::vector<Eigen::Vector2d>& pixels,
                       const std::vector<std::uint8_t>& inliers, FittedFeature* f) const {
-    constexpr double kMany = 0.15;  // Of all points.
-    const auto outliers = std::count(inliers.begin(), inliers.end(), 0);
-    const bool is_clean = !inliers.empty() && static_cast<double>(outliers) <=
-                                                  kMany * static_cast<double>(inliers.size());
-    if (is_clean) return false;
+    if (!inliers.empty() && !HasManyOutliers(inliers)) return false;
     const auto pixel = [&](int i) -> const Eigen::Vector2d& {
       return pixels[static_cast<std::size_t>(f->indices[static_cast<std::size_t>(i)])];
     };
@@ -171,15 +172,23 @@ class PointFitter {
     return status;
   }
 
-  // Fits again what has another noise than its gate was made for; false if there is nothing.
+  // Fits again what has another noise than its gate was made for; false if there is nothing. Where
+  // the gate was too narrow for many points, the ellipse may be one through a few of them, or there
+  // is none: a wider gate takes a new search.
   bool FollowNoise() {
     const PointNoise noise = MeasurePointNoise(run_.observations, run_.options.noise_model);
     bool moved = false;
     for (std::size_t i = 0; i < circles_.size(); ++i) {
       CircleObservation& circle = run_.observations.circles[i];
-      if (!circles_[i].TakeNoise(noise.circles[i]) || !circle.fit) continue;
-      const ConicFit initial = *circle.fit;
-      moved |= FitCircle(circles_[i], &initial, &circle).ok();
+      const double before = circles_[i].sigma_px;
+      if (!circles_[i].TakeNoise(noise.circles[i])) continue;
+      const bool is_wider = circles_[i].sigma_px > before;
+      const std::optional<ConicFit> initial = circle.fit;
+      if (is_wider && (!initial || HasManyOutliers(circle.inliers))) {
+        moved |= FitCircle(circles_[i], nullptr, &circle).ok();
+      } else if (initial) {
+        moved |= FitCircle(circles_[i], &*initial, &circle).ok();
+      }
     }
     for (std::size_t k = 0; k < lines_.size(); ++k) {
       for (std::size_t i = 0; i < lines_[k].size(); ++i) {
@@ -189,6 +198,19 @@ class PointFitter {
       }
     }
     return moved;
+  }
+
+  void ReportFailures() const {
+    for (std::size_t i = 0; i < circles_.size(); ++i) {
+      const CircleObservation& circle = run_.observations.circles[i];
+      if (!circle.fit) run_.Report("circle '" + circle.id + "'", circles_[i].status.message);
+    }
+    for (std::size_t k = 0; k < lines_.size(); ++k) {
+      const PencilObservation& pencil = run_.observations.pencils[k];
+      for (std::size_t i = 0; i < lines_[k].size(); ++i) {
+        if (!pencil.lines[i].fit) run_.Report(pencil, i, lines_[k][i].status.message);
+      }
+    }
   }
 
   // From points of 1 px to those that there are, with what they share.

@@ -5,8 +5,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "circline/estimators/conic.h"
 #include "circline/estimators/random.h"
@@ -341,6 +343,41 @@ TEST(FitObservations, MasksAndCovariancesAreRightAtAnyNoiseStatedOrNot) {
       EXPECT_NEAR(inliers / (180.0 * trials), 0.998, 0.003) << sigma << stated;
     }
   }
+}
+
+// Few points of a contour, twice as noisy as is thought at first: an ellipse through five or six of
+// them is not the last word once the lines have told the noise.
+TEST(FitObservations, AContourOfFewNoisyPointsIsNotJudgedByAFewOfThem) {
+  constexpr double kSigma = 2.0;
+  constexpr int kPoints = 14, kLines = 4, kLinePoints = 40;
+  const int trials = Trials(300);
+  int few = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    Random random(static_cast<std::uint64_t>(trial));
+    Observations observations;
+    observations.camera = TestCamera();
+    CircleObservation circle;
+    circle.id = "c0";
+    for (int i = 0; i < kPoints; ++i) {
+      const double t = 3.5 * i / kPoints;  // 200 degrees of it.
+      circle.points.push_back(Pixel(0.25 * std::cos(t), 0.2 * std::sin(t), &random, kSigma));
+    }
+    observations.circles.push_back(circle);
+    PencilObservation pencil;
+    pencil.id = "L1";
+    for (int i = 0; i < kLines; ++i) {
+      LineObservation line;
+      for (int k = 0; k < kLinePoints; ++k)
+        line.points.push_back(Pixel(-0.3 + 0.6 * k / kLinePoints, 0.1 * i - 0.15, &random, kSigma));
+      pencil.lines.push_back(line);
+    }
+    observations.pencils.push_back(pencil);
+    ASSERT_TRUE(FitObservations(FitOptions(), &observations).ok());
+    const std::vector<std::uint8_t>& inliers = observations.circles[0].inliers;
+    few += 2 * std::count(inliers.begin(), inliers.end(), 1) < kPoints ? 1 : 0;
+  }
+  if (kSanitized) return;
+  EXPECT_LE(few, 0.01 * trials);
 }
 
 // A manhole's rim and, over 40 % of it, that of its frame.
