@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
-#include "circline/estimators/circle_pose.h"
+#include "circline/refine/circle_planes.h"
 #include "circline/refine/joint_result.h"
 
 namespace circline {
@@ -20,25 +20,13 @@ constexpr double kClutter = 0.02;
 double LogNormalInformation(const CircleObservation& circle) {
   constexpr double kUnknown = 2.0 * 2.0 * 6.9;  // Two milliradians.
   if (!circle.fit) return kUnknown;
-  std::array<CirclePose, 2> poses, moved;
-  const int count = CirclePoses(circle.fit->conic, &poses);
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(circle.fit->Covariance());
-  Eigen::Matrix3d covariance[2] = {Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
-  const Vector6d conic = ConicToVector(circle.fit->conic);
-  for (int k = 1; k < 6; ++k) {  // The first has no variance.
-    const Vector6d step =
-        std::sqrt(std::max(0.0, eigen.eigenvalues()[k])) * eigen.eigenvectors().col(k);
-    if (CirclePoses(VectorToConic(conic + step), &moved) != count) return kUnknown;
-    for (int i = 0; i < count; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      const Eigen::Vector3d turn = moved[at].normal.cross(poses[at].normal);
-      covariance[i] += turn * turn.transpose();
-    }
-  }
+  std::array<CirclePlane, 2> planes;
+  const int count = CirclePlanes(*circle.fit, &planes);
+  if (count == 0) return kUnknown;
   double most = 0.0;
   for (int i = 0; i < count; ++i) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(covariance[i],
-                                                               Eigen::EigenvaluesOnly);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(
+        planes[static_cast<std::size_t>(i)].covariance, Eigen::EigenvaluesOnly);
     most = std::max(most, -std::log(turns.eigenvalues()[1] * turns.eigenvalues()[2]));
   }
   return std::isfinite(most) ? most : kUnknown;

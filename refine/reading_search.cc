@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "circline/refine/agreeing_lines.h"
 #include "circline/refine/chi_square.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/linearization.h"
@@ -16,6 +17,7 @@ namespace circline {
 namespace {
 
 constexpr std::size_t kMaxReadings = 16;
+constexpr std::size_t kMostSamples = 8;  // Beside these, of what agrees with one line.
 // Of many circles the planes of those that explain the evidence best are starts, not of all: a
 // number, for time (circline_benchmark --benchmark_filter=CirclesOfAPlane), not chosen on photos.
 constexpr std::size_t kMostCircles = 6;
@@ -40,7 +42,9 @@ class ReadingSearch {
     std::vector<Candidate> queue = {{problem_.FirstReading(), seeds_, kNoRival}};
     const Reading everything(problem_.features().size(), 1);
     if (queue.front().reading != everything) queue.push_back({everything, seeds_, kNoRival});
-    for (std::size_t next = 0; next < queue.size() && next < kMaxReadings; ++next) {
+    bool has_sampled = false;
+    std::size_t most = kMaxReadings;
+    for (std::size_t next = 0; next < queue.size() && next < most; ++next) {
       const Candidate candidate = queue[next];
       std::vector<State> minima = RefineAll(candidate);
       std::stable_sort(minima.begin(), minima.end(),
@@ -50,6 +54,7 @@ class ReadingSearch {
       minima.resize(std::min(minima.size(), kMostMinima));
       // A compromise of few features may be far from the pose of those that agree; of many it is
       // near.
+      const std::size_t num_before = queue.size();
       const std::vector<Seed> near = everything.size() > kFew ? SeedsAt(minima) : candidate.seeds;
       for (const State& minimum : minima) {
         if (IsHopeless(minimum, candidate.parent_cost)) continue;
@@ -58,6 +63,13 @@ class ReadingSearch {
                                             [&](const Candidate& c) { return c.reading == other; });
           if (!is_known) queue.push_back({std::move(other), near, minimum.cost});
         }
+      }
+      // A compromise, or a loss that has settled on some odd lines, may not lead to what agrees.
+      if (has_sampled || queue.size() == num_before) continue;
+      has_sampled = true;
+      for (AgreeingLines& lines : FindAgreeingLines(problem_, seeds_, kMostSamples)) {
+        queue.push_back({std::move(lines.reading), std::move(lines.seeds), kNoRival});
+        ++most;
       }
     }
     FinishRough();
@@ -155,7 +167,14 @@ class ReadingSearch {
     }
     if (HasOutliers(state)) return;
     TakeBackWhatFits(problem_, &state);
-    if (!IsKnown(state, minima_)) minima_.push_back(std::move(state));
+    const auto known = std::find_if(minima_.begin(), minima_.end(), [&](const State& other) {
+      return IsSamePose(problem_, state, other);
+    });
+    if (known == minima_.end()) {
+      minima_.push_back(std::move(state));
+    } else if (state.cost < known->cost) {
+      *known = std::move(state);
+    }
   }
 
   // What contradicts itself competes where nothing else explains the evidence better.
@@ -231,11 +250,6 @@ class ReadingSearch {
   static double FalseAlarms(const State& state) {
     const auto active = std::count(state.active.begin(), state.active.end(), 1);
     return 1e-4 / static_cast<double>(std::max<std::ptrdiff_t>(1, active));
-  }
-
-  bool IsKnown(const State& state, const std::vector<State>& others) const {
-    return std::any_of(others.begin(), others.end(),
-                       [&](const State& other) { return IsSamePose(problem_, state, other); });
   }
 
   // What has no inliers has no say: the minimum without it is that of another reading.
