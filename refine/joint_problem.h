@@ -109,8 +109,7 @@ class JointProblem {
   // would not come near the rival.
   Status Solve(int max_iterations, State* state, const Rival& rival = Rival()) const;
   // The same from a start that may be far off, where much lies in the tails of the losses: under
-  // wide ones first, which narrow to their own width (graduated non-convexity; Black and Rangarajan
-  // 1996).
+  // wide ones first, which narrow to their own width.
   Status SolveGraduated(int max_iterations, State* state, const Rival& rival = Rival()) const;
 
   // Of the active features' own free fits: no pose costs less.
@@ -179,7 +178,8 @@ class JointProblem {
 
   double TwiceCost(const Term& term, const State& state, const Weighing& weighing) const;
   double LargestMiss(const State& state) const;
-  void SetWeighing(const Weighing& weighing) const;
+  Status SolveNarrowing(const std::vector<double>& widths, int max_iterations, State* state,
+                        const Rival& rival) const;
   Eigen::Matrix3d SenseOfPriors(const CameraPose& seed) const;
   // What Start has found of the circles.
   struct Placed {

@@ -4,6 +4,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -13,6 +16,48 @@
 namespace circline {
 namespace {
 
+// Losses that start wide and narrow to their own width after every few steps (graduated
+// non-convexity; Black and Rangarajan 1996), all within one call of ceres: it asks for the cost and
+// the derivatives where a step has led, and gets them under the next width.
+class Narrowing : public ceres::EvaluationCallback {
+ public:
+  using Set = std::function<void(const Weighing&)>;
+  // `widths`: tuning constants, in those of the losses, one after the other.
+  Narrowing(const Set& set, const std::vector<double>& widths, int steps)
+      : set_(set), widths_(widths), steps_each_(steps) {
+    Apply();
+  }
+  ~Narrowing() override { set_(Weighing()); }
+  Narrowing(const Narrowing&) = delete;
+  Narrowing& operator=(const Narrowing&) = delete;
+
+  bool is_wide() const { return next_ < widths_.size(); }
+  void Narrow() {
+    ++next_;
+    steps_ = 0;
+    Apply();
+  }
+  void PrepareForEvaluation(bool jacobians, bool is_new_point) override {
+    const bool has_stepped = jacobians && !is_new_point;
+    if (is_wide() && has_stepped && ++steps_ == steps_each_) Narrow();
+  }
+  // Of all widths together.
+  int num_steps() const { return steps_each_ * static_cast<int>(widths_.size()); }
+
+ private:
+  void Apply() {
+    Weighing weighing;
+    if (is_wide()) weighing.stretch = widths_[next_];
+    set_(weighing);
+  }
+
+  const Set& set_;
+  const std::vector<double>& widths_;
+  int steps_each_;
+  std::size_t next_ = 0;
+  int steps_ = 0;
+};
+
 // Ends where a step, taken or not, changes the cost by little, or where the steps that would follow
 // do (near the minimum under a loss they shrink at a constant rate), however large the cost of all
 // points is: of many features one or another creeps in the tails of its loss long after the pose
@@ -20,15 +65,27 @@ namespace {
 // contradict each other, so that many points lie in the tails of the loss, make the steps creep.
 class Watch : public ceres::IterationCallback {
  public:
-  Watch(const Rival& rival, double free_cost, int unknowns)
-      : little_(kLittleCost * std::max(1.0, unknowns / kFew)),
+  Watch(const Rival& rival, double free_cost, int unknowns, const Narrowing& losses)
+      : losses_(losses),
+        was_wide_(losses.is_wide()),
+        little_(kLittleCost * std::max(1.0, unknowns / kFew)),
         most_(rival.cost + rival.gap),
         contradicted_(free_cost + rival.contradiction),
         free_cost_(free_cost) {}
   bool creeps() const { return num_slow_ == kMostSlow; }
+  // The first step after the losses have narrowed led upwards: ceres compared its cost with that of
+  // the wider ones.
+  bool has_risen() const { return has_risen_; }
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
     constexpr double kMoreSteps = 5.0;
+    if (was_wide_) {
+      was_wide_ = losses_.is_wide();
+      narrowed_cost_ = summary.cost;
+      return ceres::SOLVER_CONTINUE;
+    }
     if (summary.iteration == 0 || !summary.step_is_valid) return ceres::SOLVER_CONTINUE;
+    has_risen_ = summary.step_is_successful && summary.cost > narrowed_cost_;
+    if (has_risen_) return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     const double rate = last_change_ > 0.0 ? summary.cost_change / last_change_ : 1.0;
     last_change_ = summary.step_is_successful ? summary.cost_change : 0.0;
     const bool converges = rate > 0.0 && rate < 1.0;
@@ -48,20 +105,45 @@ class Watch : public ceres::IterationCallback {
  private:
   static constexpr int kMostSlow = 2;   // Steps, one after the other.
   static constexpr double kFew = 20.0;  // Unknowns: a pose's and a camera's, not tuned.
+  const Narrowing& losses_;
+  bool was_wide_, has_risen_ = false;
+  double narrowed_cost_ = std::numeric_limits<double>::infinity();
   double little_, most_, contradicted_, free_cost_;
   double last_change_ = 0.0;
   int num_slow_ = 0;
 };
 
+bool HasBoundedLoss(const EstimationOptions& options) {
+  const auto is_bounded = [](LossType loss) {
+    return loss == LossType::kTukey || loss == LossType::kGemanMcClure || loss == LossType::kArctan;
+  };
+  return is_bounded(options.conic_loss.type) || is_bounded(options.line_loss.type);
+}
+
 }  // namespace
 
 Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival) const {
+  return SolveNarrowing({}, max_iterations, state, rival);
+}
+
+Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_iterations,
+                                    State* state, const Rival& rival) const {
   // Ceres prints what it cannot evaluate. Where the cost was finite before, it is.
   const bool is_finite = std::all_of(state->x.begin(), state->x.end(),
                                      [](double value) { return std::isfinite(value); });
   if (!is_finite || (!std::isfinite(state->cost) && !std::isfinite(Cost(*state))))
     return Status::Failed("the evidence cannot be evaluated at the seed");
-  ceres::Problem problem(OwnsNothing());
+  const Narrowing::Set set_weighing = [this](const Weighing& weighing) {
+    for (const Term& term : terms_) {
+      if (term.weighed != nullptr) term.weighed->set_weighing(weighing);
+    }
+  };
+  // A wide loss is nearly that of least squares, of which one step comes near enough for the next
+  // width; not one that is bounded, and soon flat.
+  Narrowing losses(set_weighing, widths, HasBoundedLoss(options_) ? 2 : 1);
+  ceres::Problem::Options of_problem = OwnsNothing();
+  if (losses.is_wide()) of_problem.evaluation_callback = &losses;
+  ceres::Problem problem(of_problem);
   std::vector<double*> blocks;
   std::vector<std::uint8_t> added(blocks_.size(), 0);
   int unknowns = 0;
@@ -84,55 +166,31 @@ Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival)
   }
   if (unknowns == 0) return Status::Refused("nothing of the evidence ties the pose");
 
-  ceres::Solver::Options options = NearbyOptions(unknowns, max_iterations, state->cost);
-  if (options.linear_solver_type == ceres::SPARSE_NORMAL_CHOLESKY) {
-    // A feature's own unknowns, the largest block of each, are eliminated first.
-    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-    std::vector<const Block*> largest(static_cast<std::size_t>(num_groups_), nullptr);
-    const auto is_unknown = [&](const Block& block) {
-      return added[static_cast<std::size_t>(&block - blocks_.data())] != 0 &&
-             block.tangent_size() > 0;
-    };
-    for (const Block& block : blocks_) {
-      if (block.group < 0 || !is_unknown(block)) continue;
-      const Block*& own = largest[static_cast<std::size_t>(block.group)];
-      if (own == nullptr || block.tangent_size() > own->tangent_size()) own = &block;
-    }
-    int left = unknowns;
-    for (const Block& block : blocks_) {
-      if (!is_unknown(block)) continue;
-      const bool is_eliminated =
-          block.group >= 0 && largest[static_cast<std::size_t>(block.group)] == &block;
-      if (is_eliminated) left -= block.tangent_size();
-      ordering->AddElementToGroup(state->x.data() + block.offset, is_eliminated ? 0 : 1);
-    }
-    // What is left is a small matrix, or a large one of many zeros (the benchmark CirclesOfAPlane
-    // tells from where on; not tuned).
-    constexpr int kSparse = 200;
-    options.linear_solver_type = left > kSparse ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
-    options.linear_solver_ordering = ordering;
-  }
-  Watch watch(rival, FreeCost(*state), unknowns);
-  options.callbacks.push_back(&watch);
+  // Ceres asks for a share of the cost, of which the free fits' is the most that is known; it falls
+  // no further than that, and where it stays above ten times as much a little is still little.
+  const double least_cost = std::max(FreeCost(*state), kNothing / kLittleCost * state->cost);
+  ceres::Solver::Options options =
+      NearbyOptions(unknowns, max_iterations + losses.num_steps(), least_cost);
+  options.jacobi_scaling = false;  // A Cholesky factorisation does not mind the units.
   ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
+  for (bool is_done = false; !is_done;) {
+    Watch watch(rival, FreeCost(*state), unknowns, losses);
+    options.callbacks = {&watch};
+    ceres::Solve(options, &problem, &summary);
+    state->is_rough = watch.creeps();
+    is_done = !summary.IsSolutionUsable() || (!losses.is_wide() && !watch.has_risen());
+    if (losses.is_wide()) losses.Narrow();  // A minimum of the wider ones.
+  }
   if (summary.termination_type == ceres::USER_FAILURE)
     return Status::Refused("another pose explains the evidence far better");
   if (!summary.IsSolutionUsable() && summary.termination_type != ceres::NO_CONVERGENCE)
     return Status::Failed("the evidence cannot be evaluated at the seed");
   state->cost = summary.final_cost;
-  state->is_rough = watch.creeps();
   for (const double v : state->x) {
     if (!std::isfinite(v)) return Status::Failed("the refinement left the range of numbers");
   }
   return std::isfinite(state->cost) ? Status::Ok()
                                     : Status::Failed("the refinement left the range of numbers");
-}
-
-void JointProblem::SetWeighing(const Weighing& weighing) const {
-  for (const Term& term : terms_) {
-    if (term.weighed != nullptr) term.weighed->set_weighing(weighing);
-  }
 }
 
 // Of all features, root mean square over its points, standard deviations.
@@ -156,23 +214,13 @@ Status JointProblem::SolveGraduated(int max_iterations, State* state, const Riva
       options_.line_loss.type == LossType::kTrivial) {
     return Solve(max_iterations, state, rival);
   }
-  Weighing weighing;
   constexpr double kWidest = 300.0, kNarrower = 0.25;
-  const auto is_bounded = [](LossType loss) {
-    return loss == LossType::kTukey || loss == LossType::kGemanMcClure || loss == LossType::kArctan;
-  };
   // A loss that is bounded soon has no slope to follow.
-  const double near =
-      is_bounded(options_.conic_loss.type) || is_bounded(options_.line_loss.type) ? 1.5 : 3.0;
-  constexpr int kIterations = 2;  // Of each width: near enough for the next.
-  for (double width = std::min(LargestMiss(*state), kWidest); width > near; width *= kNarrower) {
-    weighing.stretch = width;
-    SetWeighing(weighing);
-    const Status status = Solve(kIterations, state);
-    SetWeighing(Weighing());
-    if (!status.ok()) return status;
-  }
-  return Solve(max_iterations, state, rival);
+  const double near = HasBoundedLoss(options_) ? 1.5 : 3.0;
+  std::vector<double> widths;
+  for (double width = std::min(LargestMiss(*state), kWidest); width > near; width *= kNarrower)
+    widths.push_back(width);
+  return SolveNarrowing(widths, max_iterations, state, rival);
 }
 
 }  // namespace circline

@@ -10,6 +10,8 @@ namespace circline {
 
 // Of cost: half of a thirtieth of a standard deviation, squared.
 constexpr double kLittleCost = 5e-4;
+// A step that does less is not worth its derivatives.
+constexpr double kNothing = 0.1 * kLittleCost;
 
 inline ceres::Problem::Options OwnsNothing() {
   ceres::Problem::Options ownership;
@@ -27,8 +29,6 @@ inline ceres::Solver::Options NearbyOptions(int unknowns, int max_iterations, do
   options.linear_solver_type =
       unknowns <= kDense ? ceres::DENSE_NORMAL_CHOLESKY : ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = max_iterations;
-  // A step that does less is not worth its derivatives.
-  constexpr double kNothing = 0.1 * kLittleCost;
   options.function_tolerance = kNothing / std::max(1.0, cost);
   options.gradient_tolerance = 1e-9;
   options.parameter_tolerance = 1e-10;

@@ -23,7 +23,6 @@ namespace {
 
 // Wide priors of the focal length are searched at these, in standard deviations.
 constexpr double kFocalStarts[] = {-1.6, -0.8, 0.8, 1.6};
-constexpr int kForScales = 2;  // Iterations: near enough to see how far features miss each other.
 
 // What tells the best hypothesis from the next, in words.
 std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
@@ -161,8 +160,7 @@ NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* 
     best = state;
     best_seed = &seed;
   }
-  const int max_iterations = std::min(kForScales, problem.options().max_iterations);
-  if (best_seed == nullptr || !problem.SolveGraduated(max_iterations, &best).ok())
+  if (best_seed == nullptr || !problem.SolveGraduated(problem.options().max_iterations, &best).ok())
     return problem.options().noise_model;
   best_seed->pose = problem.PoseAt(best);
   best_seed->log_focal = problem.LogFocalAt(best);
