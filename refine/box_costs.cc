@@ -1,6 +1,5 @@
 // The cost function of a box's edges.
 #include <Eigen/Dense>
-#include <optional>
 #include <utility>
 
 #include "circline/refine/block_chain.h"
@@ -64,12 +63,13 @@ bool BoxEdgeCost::EvaluateWith(const Weighing& weighing, const double* const* pa
   const Placed e(*this, parameters);
   const bool camera_variable = has_camera_ && jacobians != nullptr && jacobians[kCamera] != nullptr;
   const int rows = num_residuals();
-  std::optional<LineRoot> root;
-  if (!LineResiduals(points_, e.p.cross(e.d), has_camera_ ? parameters[kCamera] : nullptr, weighing,
-                     camera_variable, rows, residuals, jacobians != nullptr ? &root : nullptr))
+  CurveModel model;
+  if (!SumLineInto(points_, e.p.cross(e.d), has_camera_ ? parameters[kCamera] : nullptr, weighing,
+                   camera_variable, rows, residuals, jacobians != nullptr ? &model : nullptr))
     return false;
-  if (!root) return true;
-  const auto U = root->U.leftCols(3);
+  if (jacobians == nullptr) return true;
+  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), rows, residuals);
+  const auto U = root.U.leftCols(3);
   const Eigen::Matrix3d by_p = -CrossMatrix(e.d), by_d = CrossMatrix(e.p);
   const Eigen::Matrix3d by_corner = by_p * e.R, by_along = by_d * e.R;
   WriteJacobian(
@@ -88,7 +88,7 @@ bool BoxEdgeCost::EvaluateWith(const Weighing& weighing, const double* const* pa
   WriteJacobian(U * (by_corner * BySkew(e.corner) + by_along * BySkew(e.along)), rows, kSkew,
                 jacobians);
   if (camera_variable)
-    WriteCameraJacobian(root->U.rightCols(root->U.cols() - 3), rows, kCamera, jacobians);
+    WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, kCamera, jacobians);
   return true;
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <utility>
 
 #include "circline/estimators/basics.h"
@@ -42,12 +41,11 @@ struct DirectionLineCost::Placed {
   Eigen::Vector3d in_world, d, m, turned, line, by_angle;
   double c, s, e, along, norm;
 
-  // d line / d d.
-  Eigen::Matrix3d ByDirection(const Eigen::Vector3d& fit) const {
-    const Eigen::Matrix3d m_by_d = (m * m.transpose() - Eigen::Matrix3d::Identity()) / norm *
-                                   (along * Eigen::Matrix3d::Identity() + d * fit.transpose());
-    return c * m_by_d + s * (CrossMatrix(d) * m_by_d - CrossMatrix(m)) +
-           e * Eigen::Matrix3d::Identity();
+  // (d line / d d)^T u.
+  Eigen::Vector3d ByDirection(const Eigen::Vector3d& fit, const Eigen::Vector3d& u) const {
+    const Eigen::Vector3d by_m = c * u + s * u.cross(d);
+    const Eigen::Vector3d across = (m.dot(by_m) * m - by_m) / norm;
+    return along * across + d.dot(across) * fit + s * m.cross(u) + e * u;
   }
 };
 
@@ -109,28 +107,36 @@ bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* con
   const bool soft = options_.direction_sigma > 0.0;
   const bool camera_variable = options_.camera && jacobians != nullptr && jacobians[3] != nullptr;
   const int rows = num_residuals(), line_rows = rows - (soft ? 1 : 0);
-  std::optional<LineRoot> root;
-  if (!LineResiduals(points_, p.line, options_.camera ? parameters[3] : nullptr, weighing,
-                     camera_variable, line_rows, residuals, jacobians != nullptr ? &root : nullptr))
+  CurveModel model;
+  if (!SumLineInto(points_, p.line, options_.camera ? parameters[3] : nullptr, weighing,
+                   camera_variable, line_rows, residuals, jacobians != nullptr ? &model : nullptr))
     return false;
   const double deviation = soft ? p.e / options_.direction_sigma : 0.0;
   const AsSquare prior(deviation);
   if (soft) residuals[line_rows] = weighing.inliers_only ? deviation : prior.value;
-  if (!root) return true;
-  const auto U = root->U.leftCols(3);
-  const Eigen::Matrix3d by_direction = p.ByDirection(fit_);
-  WriteJacobian(
-      U * (by_direction * (-p.R * CrossMatrix(p.in_world))) * DeltaFromQuaternion(parameters[0]),
-      rows, 0, jacobians);
-  WriteJacobian(U * (by_direction * p.R), rows, 1, jacobians);
-  if (camera_variable)
-    WriteCameraJacobian(root->U.rightCols(root->U.cols() - 3), rows, 3, jacobians);
-  if (jacobians[2] == nullptr) return true;
-  Eigen::Matrix<double, 3, 2> by_own;
-  by_own << p.by_angle, p.d;
-  WriteJacobian(U * by_own.leftCols(soft ? 2 : 1), rows, 2, jacobians);
-  if (soft) {
-    jacobians[2][2 * line_rows + 1] =
+  if (jacobians == nullptr) return true;
+  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), line_rows, residuals);
+  if (camera_variable) WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, 3, jacobians);
+  for (int k = 0; k < 3; ++k) {
+    if (jacobians[k] != nullptr)
+      std::fill_n(jacobians[k], rows * parameter_block_sizes()[static_cast<std::size_t>(k)], 0.0);
+  }
+  const Eigen::Matrix<double, 3, 4> by_quaternion = DeltaFromQuaternion(parameters[0]);
+  const int own_size = soft ? 2 : 1;
+  for (int row = 0; row < static_cast<int>(root.U.rows()); ++row) {
+    const Eigen::Vector3d u = root.U.row(row).head<3>();
+    const Eigen::Vector3d by_world = p.R.transpose() * p.ByDirection(fit_, u);
+    if (jacobians[0] != nullptr) {
+      Eigen::Map<Eigen::RowVector4d>(jacobians[0] + 4 * row) =
+          p.in_world.cross(by_world).transpose() * by_quaternion;
+    }
+    if (jacobians[1] != nullptr) Eigen::Map<Eigen::Vector3d>(jacobians[1] + 3 * row) = by_world;
+    if (jacobians[2] == nullptr) continue;
+    jacobians[2][own_size * row] = u.dot(p.by_angle);
+    if (soft) jacobians[2][own_size * row + 1] = u.dot(p.d);
+  }
+  if (soft && jacobians[2] != nullptr) {
+    jacobians[2][own_size * line_rows + 1] =
         (weighing.inliers_only ? 1.0 : prior.slope) / options_.direction_sigma;
   }
   return true;
@@ -173,12 +179,13 @@ bool PlaneLineCost::EvaluateWith(const Weighing& weighing, const double* const* 
   const PlaneLine line(parameters);
   const bool camera_variable = has_camera_ && jacobians != nullptr && jacobians[4] != nullptr;
   const int rows = num_residuals();
-  std::optional<LineRoot> root;
-  if (!LineResiduals(points_, line.p.cross(line.d), has_camera_ ? parameters[4] : nullptr, weighing,
-                     camera_variable, rows, residuals, jacobians != nullptr ? &root : nullptr))
+  CurveModel model;
+  if (!SumLineInto(points_, line.p.cross(line.d), has_camera_ ? parameters[4] : nullptr, weighing,
+                   camera_variable, rows, residuals, jacobians != nullptr ? &model : nullptr))
     return false;
-  if (!root) return true;
-  const auto U = root->U.leftCols(3);
+  if (jacobians == nullptr) return true;
+  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), rows, residuals);
+  const auto U = root.U.leftCols(3);
   const Eigen::Matrix3d by_p = -CrossMatrix(line.d), by_d = CrossMatrix(line.p);
   WriteJacobian(
       U * (by_p * (-line.R * CrossMatrix(line.X)) + by_d * (-line.R * CrossMatrix(line.D))) *
@@ -188,8 +195,7 @@ bool PlaneLineCost::EvaluateWith(const Weighing& weighing, const double* const* 
   WriteJacobian(U * by_p * line.R.leftCols<2>(), rows, 2, jacobians);
   const Eigen::Vector3d turned(-line.D.y(), line.D.x(), 0.0);
   WriteJacobian(U * (by_d * (line.R * turned)), rows, 3, jacobians);
-  if (camera_variable)
-    WriteCameraJacobian(root->U.rightCols(root->U.cols() - 3), rows, 4, jacobians);
+  if (camera_variable) WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, 4, jacobians);
   return true;
 }
 

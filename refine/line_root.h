@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "circline/refine/block_chain.h"
 #include "circline/refine/image_points.h"
@@ -20,30 +19,25 @@ inline int LineRank(const ImagePoints& points, bool camera) {
   return 2 + (camera ? points.options().num_distortion : 0);
 }
 
+// The cost of the points about the line: in `model`, or where that is null (no Jacobians are asked
+// for) in the residuals. `camera` may be null, and is a variable if `camera_variable`. False where
+// a point has no finite cost.
+inline bool SumLineInto(const ImagePoints& points, const Eigen::Vector3d& line,
+                        const double* camera, const Weighing& weighing, bool camera_variable,
+                        int num_rows, double* residuals, CurveModel* model) {
+  const double twice_cost = points.SumLine(line, camera, weighing, camera_variable, model);
+  if (!std::isfinite(twice_cost)) return false;
+  if (model == nullptr) CostOnly(twice_cost, num_rows, residuals);
+  return true;
+}
+
+// Writes the residuals of a model; returns what their Jacobians are made of.
 inline LineRoot WriteLine(const CurveModel& model, int rank, int num_rows, double* residuals) {
   const LineRoot root = SquareRootOf<CurveModel::kMaxSize>(model, rank, 3, 2);
   std::fill(residuals, residuals + num_rows, 0.0);
   Eigen::Map<Eigen::VectorXd>(residuals, root.f.size()) = root.f;
   residuals[num_rows - 1] = root.rest;
   return root;
-}
-
-// The residuals of the points about the line; in `root`, unless it is null (no Jacobians are asked
-// for), what their Jacobians are made of. `camera` may be null, and is a variable if
-// `camera_variable`. False where a point has no finite cost.
-inline bool LineResiduals(const ImagePoints& points, const Eigen::Vector3d& line,
-                          const double* camera, const Weighing& weighing, bool camera_variable,
-                          int num_rows, double* residuals, std::optional<LineRoot>* root) {
-  CurveModel model;
-  const double twice_cost =
-      points.SumLine(line, camera, weighing, camera_variable, root != nullptr ? &model : nullptr);
-  if (!std::isfinite(twice_cost)) return false;
-  if (root == nullptr) {
-    CostOnly(twice_cost, num_rows, residuals);
-  } else {
-    *root = WriteLine(model, LineRank(points, camera_variable), num_rows, residuals);
-  }
-  return true;
 }
 
 }  // namespace circline
