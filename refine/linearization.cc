@@ -200,6 +200,8 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
   problem_.Parameters(term, state_, parameters);
   const int num_rows = term.cost->num_residuals();
   Rows rows{term.feature, term.group, {}, {}, Eigen::VectorXd(num_rows), 0.0};
+  constexpr std::size_t kMostColumns = 20;  // Of nearly all.
+  rows.columns.reserve(kMostColumns);
   std::size_t ambient_size = 0;
   for (const int index : term.blocks)
     ambient_size +=

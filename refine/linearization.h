@@ -104,9 +104,14 @@ class Linearization {
   Eigen::MatrixXd AlongCore(const Overcounted& over) const;
   void AddOvercounted(const Eigen::MatrixXd& inverse);
   const Eigen::MatrixXd& PlusJacobian(int block);  // Of the block's manifold, worked out once.
-  void Leverage(const std::vector<const Rows*>& parts, Eigen::MatrixXd* S,
+  // The covariance of some shared unknowns, which the lines of a pencil have in common.
+  struct Known {
+    std::vector<int> columns;
+    Eigen::MatrixXd covariance;
+  };
+  void Leverage(const std::vector<const Rows*>& parts, Known* known, Eigen::MatrixXd* S,
                 Eigen::VectorXd* f) const;
-  Misfit MisfitOf(std::size_t feature, const std::vector<const Rows*>& parts) const;
+  Misfit MisfitOf(std::size_t feature, const std::vector<const Rows*>& parts, Known* known) const;
 
   const JointProblem& problem_;
   const State& state_;

@@ -11,12 +11,22 @@ namespace {
 
 constexpr double kNoInformation = 1e-12;  // Of an eigenvalue, at unit diagonal.
 
-// Inverse of a symmetric positive definite matrix. False where it is none.
-bool Invert(const Eigen::MatrixXd& A, Eigen::MatrixXd* inverse) {
-  const Eigen::LLT<Eigen::MatrixXd> llt(A);
-  if (llt.info() != Eigen::Success) return false;
-  *inverse = llt.solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
-  return inverse->allFinite();
+// Solves the first k equations of a symmetric system for their own unknowns (Goodnight 1979): A, B
+// of [A B; B^T C] become -A^-1 and A^-1 B, and C becomes C - B^T A^-1 B. False where A is not
+// positive definite.
+bool Sweep(Eigen::Index k, Eigen::MatrixXd* system) {
+  Eigen::VectorXd column(system->rows());
+  for (Eigen::Index p = 0; p < k; ++p) {
+    const double pivot = (*system)(p, p);
+    if (!(pivot > 0.0) || !std::isfinite(pivot)) return false;
+    column = system->col(p) / pivot;
+    for (Eigen::Index j = 0; j < system->cols(); ++j)
+      system->col(j) -= (pivot * column[j]) * column;
+    system->col(p) = column;
+    system->row(p) = column.transpose();
+    (*system)(p, p) = -1.0 / pivot;
+  }
+  return system->allFinite();
 }
 
 // Pseudo-inverse on the observed subspace, which units do not matter to, and the directions without
@@ -58,13 +68,18 @@ bool Linearization::Eliminate(Group* group) {
     target.clear();
     for (const int column : rows.columns)
       target.push_back(column < 0 ? -1 - column : k + IndexIn(group->shared, column));
-    A(target, target) += rows.J.transpose() * rows.J;
+    for (std::size_t a = 0; a < target.size(); ++a) {
+      for (std::size_t b = 0; b <= a; ++b) {
+        const auto i = static_cast<Eigen::Index>(a), j = static_cast<Eigen::Index>(b);
+        const double sum = rows.J.col(i).dot(rows.J.col(j));
+        A(target[a], target[b]) += sum;
+        if (a != b) A(target[b], target[a]) += sum;
+      }
+    }
   }
-  if (k > 0) {
-    if (!Invert(A.topLeftCorner(k, k), &group->inverse)) return false;
-    group->gain = group->inverse.lazyProduct(A.topRightCorner(k, n));
-    A.bottomRightCorner(n, n) -= A.bottomLeftCorner(n, k).lazyProduct(group->gain);
-  }
+  if (!Sweep(k, &A)) return false;
+  group->inverse = -A.topLeftCorner(k, k);
+  group->gain = A.topRightCorner(k, n);
   for (int a = 0; a < n; ++a) {
     for (int b = 0; b < n; ++b)
       Add(group->shared[static_cast<std::size_t>(a)], group->shared[static_cast<std::size_t>(b)],

@@ -9,8 +9,8 @@ namespace circline {
 
 // S = J Sigma J^T of all residuals of a feature and of those that say nothing without it, and the
 // residuals; those that depend on nothing are left out.
-void Linearization::Leverage(const std::vector<const Rows*>& parts, Eigen::MatrixXd* S,
-                             Eigen::VectorXd* f) const {
+void Linearization::Leverage(const std::vector<const Rows*>& parts, Known* known,
+                             Eigen::MatrixXd* S, Eigen::VectorXd* f) const {
   const Group none;
   const Group* group = &none;
   for (const Rows* part : parts) {
@@ -52,8 +52,8 @@ void Linearization::Leverage(const std::vector<const Rows*>& parts, Eigen::Matri
   auto B = by_shared.topRows(used);
   const bool has_own = group->size > 0;
   if (has_own) B.leftCols(group->gain.cols()) -= W.lazyProduct(group->gain);
-  const Eigen::MatrixXd covariance = Covariance(shared);
-  const Eigen::MatrixXd follow = B.lazyProduct(covariance);
+  if (known->columns != shared) *known = {shared, Covariance(shared)};
+  const Eigen::MatrixXd follow = B.lazyProduct(known->covariance);
   *S = follow.lazyProduct(B.transpose());
   if (!has_own) return;
   const Eigen::MatrixXd with = W.lazyProduct(group->inverse);
@@ -72,14 +72,16 @@ std::vector<Linearization::Misfit> Linearization::Misfits() const {
     const int parent = features[static_cast<std::size_t>(rows.feature)].parent;
     if (parent >= 0) parts[static_cast<std::size_t>(parent)].push_back(&rows);
   }
+  Known known;
   for (std::size_t i = 0; i < features.size(); ++i) {
-    if (state_.active[i] != 0 && !parts[i].empty()) misfits[i] = MisfitOf(i, parts[i]);
+    if (state_.active[i] != 0 && !parts[i].empty()) misfits[i] = MisfitOf(i, parts[i], &known);
   }
   return misfits;
 }
 
 Linearization::Misfit Linearization::MisfitOf(std::size_t feature,
-                                              const std::vector<const Rows*>& parts) const {
+                                              const std::vector<const Rows*>& parts,
+                                              Known* known) const {
   const std::vector<Feature>& features = problem_.features();
   Misfit misfit{-features[feature].free_twice_cost, features[feature].dof};
   for (const Rows* part : parts) {
@@ -92,7 +94,7 @@ Linearization::Misfit Linearization::MisfitOf(std::size_t feature,
   misfit.d2 = std::max(0.0, misfit.d2);
   Eigen::MatrixXd S;
   Eigen::VectorXd f;
-  Leverage(parts, &S, &f);
+  Leverage(parts, known, &S, &f);
   if (f.size() == 0) return misfit;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(S);
   for (Eigen::Index k = 0; k < f.size(); ++k) {
