@@ -185,7 +185,8 @@ CalibratedPoint ImagePoints::At(std::size_t i, const Camera* shifted) const {
   const Eigen::Vector2d given(camera_.fx, camera_.fy);
   move(given.cwiseProduct(straight) + Eigen::Vector2d(camera_.cx, camera_.cy) - pixels_[i]);
   constexpr int kMaxSteps = 20;
-  constexpr double kConverged = 1e-5;  // Pixels, before the last step, which squares the error.
+  // Pixels, before the last step, which squares the error; a lens does not change over so little.
+  constexpr double kConverged = 1e-3;
   for (int step = 0; step < kMaxSteps; ++step) {
     Eigen::Vector2d pixel;
     std::array<double, 4> J;
@@ -284,7 +285,8 @@ double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, con
   double level = 0.0;
   const bool orthogonal = IsOrthogonal(C, &level);
   const auto distance = [&](std::size_t i, auto* row) {
-    CalibratedPoint p = NormalizedAt(i, changed);
+    const CalibratedPoint seen = At(i, changed);
+    CalibratedPoint p = changed == nullptr ? normalized_[i] : Normalize(seen);
     Eigen::Vector2d inwards = Eigen::Vector2d::Zero();
     if (offset_px != 0.0 || (row != nullptr && variables.offset))
       inwards = MoveInwards(C, offset_px, &p);
@@ -308,7 +310,7 @@ double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, con
         by_pixel = p.GradientPerPixel(by_x);
       }
       (*row)[6] = variables.offset ? by_pixel.dot(inwards) : 0.0;
-      if constexpr (kSize > 7) FillCameraColumns(i, At(i, changed), seen_by, d, by_pixel, row, 7);
+      if constexpr (kSize > 7) FillCameraColumns(i, seen, seen_by, d, by_pixel, row, 7);
     }
     return d;
   };
