@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
-#include <memory>
 #include <vector>
 
 #include "circline/refine/joint_problem.h"
