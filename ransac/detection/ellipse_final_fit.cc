@@ -18,8 +18,6 @@ constexpr double kSecondCoverage = 0.7;
 // The second look at a ragged contour: smoothing, and the largest part of the photo, pixels.
 constexpr double kSecondSmoothingPx = 1.6;
 constexpr int kMaxSecondLookPx = 200;
-// Up to this miss of the shape the first look has the better place.
-constexpr double kSecondLookLimit = 1.2;
 // Points beyond this many standard deviations take no part in the final fit.
 constexpr double kOutlierSigmas = 3.5;
 // Times that points which stand out are left out of the fit to start from.
@@ -53,14 +51,7 @@ double CurvatureAt(const Matrix3d& conic, const CalibratedPoint& p, Vector2d* ou
 
 bool EllipseFitter::Fit(EllipseCandidate candidate, DetectedEllipse* e) {
   EllipseCandidate smooth = candidate;
-  const double miss = FinalFit(&candidate, e);
-  if (miss > 1.0) {
-    DetectedEllipse seen;
-    if (!SecondLook(&smooth, &seen)) return false;
-    // A wide Gaussian also takes in what runs beside the contour: it confirms the ellipse, but
-    // where the first scale is not too ragged, that has the better place.
-    if (miss > kSecondLookLimit) *e = std::move(seen);
-  }
+  if (!(FinalFit(&candidate, e) > 0.0) && !SecondLook(&smooth, e)) return false;
   e->bright = candidate.bright;
   return true;
 }
@@ -81,7 +72,7 @@ bool EllipseFitter::SecondLook(EllipseCandidate* candidate, DetectedEllipse* e) 
   Camera camera = camera_;  // Seen from the corner of the box; fits stay valid.
   camera.cx -= box.x;
   camera.cy -= box.y;
-  if (EllipseFitter(map, camera, options_).FinalFit(candidate, e) > 1.0) return false;
+  if (EllipseFitter(map, camera, options_).FinalFit(candidate, e) <= 0.0) return false;
   for (Vector2d& p : e->contour) p += Vector2d(box.x, box.y);
   // The points of the first scale that it explains.
   if (!Gather(*candidate, 0.7, kGatherPx[0])) return false;
@@ -102,9 +93,9 @@ cv::Rect EllipseFitter::Surroundings() const {
 
 // Maximum likelihood on all points of the contour, outliers left out; from a direct fit to all
 // points, which brings the contour near enough for the nearest points to be its own. Returns the
-// shape's miss; infinite where there is no ellipse at all.
+// log-odds of a rim; minus infinity where there is no ellipse at all.
 double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
+  constexpr double kNone = -std::numeric_limits<double>::infinity();
   if (!Gather(*candidate, 0.7, kGatherPx.back())) return kNone;
   Straighten(candidate->conic, e);
   if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic, kMaxTrims)) return kNone;
@@ -122,7 +113,7 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   e->normal_deg = ToDegrees(support_.normal_median);
   const double miss = ShapeMiss(e->fit.rms_px, candidate->conic, e->points);
   e->contrast = support_.gradient;
-  return miss;
+  return RimLogOdds(Log10FalseAlarms(support_, candidate->bright), miss);
 }
 
 // The edge points of the support where they would lie if the contour, `conic`, were straight.

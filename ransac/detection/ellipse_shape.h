@@ -35,6 +35,10 @@ struct EllipseShape {
   double Miss(const Support& support) const;
 };
 
+// Logarithm of the odds that a contour is the rim of a circle to that it is anything else, clutter
+// or a blob; `miss` is its shape's.
+double RimLogOdds(double log10_false_alarms, double miss);
+
 }  // namespace circline
 
 #endif  // CIRCLINE_RANSAC_DETECTION_ELLIPSE_SHAPE_H_
