@@ -22,6 +22,7 @@ constexpr int kMaxSecondLookPx = 200;
 constexpr double kOutlierSigmas = 3.5;
 // Times that points which stand out are left out of the fit to start from.
 constexpr int kMaxTrims = 10;
+constexpr double kMostMiss = 1.4;
 // No contour is known better than this, whatever its scatter says.
 constexpr double kMinEllipseSigmaPx = 0.05;
 
@@ -113,6 +114,7 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   e->normal_deg = ToDegrees(support_.normal_median);
   const double miss = ShapeMiss(e->fit.rms_px, candidate->conic, e->points);
   e->contrast = support_.gradient;
+  if (miss > kMostMiss) return kNone;
   return RimLogOdds(Log10FalseAlarms(support_, candidate->bright), miss);
 }
 

@@ -228,20 +228,13 @@ bool EllipseFitter::Refit(EllipseCandidate* candidate) {
     if (!FitTrimmed(&candidate->conic, 1)) return false;
   }
   if (!Gather(*candidate, 1.5, kGatherPx.back(), 2 * kRoughSamples)) return false;
-  candidate->score = support_.length_px * support_.Coverage();
-  // One side all around explains more than either side does.
-  if (candidate->bright == BrightSide::kEither) candidate->score *= 0.5;
   if (!Plausible(candidate->bright)) return false;
   CalibrateSupport(kRoughSamples);
   Trim(candidate->conic);
-  // Of rivals for one contour the one that it keeps to: what strays, of a neighbouring edge that
-  // runs together with it, counts against it.
-  const double kept =
-      static_cast<double>(trimmed_.size()) / static_cast<double>(fit_points_.size());
-  candidate->score *= kept * kept;
   const double rms_px = Rms(trimmed_, candidate->conic);
-  return rms_px <= kShapeSlack * kMaxRmsPx &&
-         ShapeMiss(rms_px, candidate->conic, fit_indices_) <= kShapeSlack;
+  const double miss = ShapeMiss(rms_px, candidate->conic, fit_indices_);
+  candidate->score = RimLogOdds(Log10FalseAlarms(support_, candidate->bright), miss);
+  return rms_px <= kShapeSlack * kMaxRmsPx && miss <= kShapeSlack;
 }
 
 double EllipseFitter::ShapeMiss(double rms_px, const Matrix3d& conic,

@@ -108,7 +108,6 @@ double EllipseShape::Miss(const Support& support) const {
 }
 
 double RimLogOdds(double log10_false_alarms, double miss) {
-  if (!(miss <= kMostMiss)) return -std::numeric_limits<double>::infinity();
   return kLogOdds + kLogOddsPerFalseAlarm * log10_false_alarms + kLogOddsPerMiss * miss;
 }
 
