@@ -22,6 +22,13 @@ constexpr int kMaxSecondLookPx = 200;
 constexpr double kOutlierSigmas = 3.5;
 // Times that points which stand out are left out of the fit to start from.
 constexpr int kMaxTrims = 10;
+// Where edges scatter about a contour by more than this many of their standard deviations, it is
+// fitted anew to so many stretches of it, each with this share of its points: one keeps clear of
+// what hides up to 0.4 of a rim.
+constexpr double kNearSigmas = 2.0;
+constexpr std::size_t kStretches = 8;
+constexpr double kStretchShare = 0.6;
+// However much of it there is, a contour that misses by more is a blob's.
 constexpr double kMostMiss = 1.4;
 // No contour is known better than this, whatever its scatter says.
 constexpr double kMinEllipseSigmaPx = 0.05;
@@ -99,7 +106,7 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   constexpr double kNone = -std::numeric_limits<double>::infinity();
   if (!Gather(*candidate, 0.7, kGatherPx.back())) return kNone;
   Straighten(candidate->conic, e);
-  if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic, kMaxTrims)) return kNone;
+  if (fit_points_.size() < 6 || !FitLeastMedian(&candidate->conic)) return kNone;
   const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
   if (!Gather(*candidate, 0.7, reach)) return kNone;
   if (!FitSupport(candidate->conic, e)) return kNone;
@@ -116,6 +123,33 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   e->contrast = support_.gradient;
   if (miss > kMostMiss) return kNone;
   return RimLogOdds(Log10FalseAlarms(support_, candidate->bright), miss);
+}
+
+// What hides a part of a rim often runs beside it, and a fit to all edges along the contour lies
+// between the two. Of the fits to all, and to each of some stretches with what else agrees, this is
+// the one with the least median distance.
+bool EllipseFitter::FitLeastMedian(Matrix3d* conic) {
+  if (!FitTrimmed(conic, kMaxTrims)) return false;
+  supporter_.AverageStrength(&support_);
+  if (Rms(fit_points_, *conic) < kNearSigmas * std::hypot(kMinEllipseSigmaPx, support_.sigma_px)) {
+    return true;
+  }
+  double least = MedianDistance(*conic);
+  const std::size_t n = fit_points_.size();
+  stretch_.resize(static_cast<std::size_t>(kStretchShare * static_cast<double>(n)));
+  for (std::size_t k = 0; k < kStretches; ++k) {
+    for (std::size_t i = 0; i < stretch_.size(); ++i)
+      stretch_[i] = fit_points_[(i + n * k / kStretches) % n];
+    Matrix3d other;
+    if (stretch_.size() < 6 || !FitConicDirect(stretch_, &other).ok()) continue;
+    Concentrate(kMaxTrims, &other);
+    const double median = MedianDistance(other);
+    if (!(median < least)) continue;
+    least = median;
+    *conic = other;
+  }
+  Trim(*conic);
+  return true;
 }
 
 // The edge points of the support where they would lie if the contour, `conic`, were straight.
@@ -164,11 +198,9 @@ bool EllipseFitter::FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
 
 // False if there are none.
 bool EllipseFitter::DropOutliers(DetectedEllipse* e) {
-  MeasureDistances(e->fit.conic);
-  sorted_.clear();
-  for (const double d : distances_) sorted_.push_back(std::abs(d));
   // 1.4826: median absolute deviation to standard deviation of a Gaussian.
-  const double limit = kOutlierSigmas * std::max(kMinEllipseSigmaPx, 1.4826 * Median(&sorted_));
+  const double limit =
+      kOutlierSigmas * std::max(kMinEllipseSigmaPx, 1.4826 * MedianDistance(e->fit.conic));
   std::size_t kept = 0;
   for (std::size_t k = 0; k < distances_.size(); ++k) {
     if (std::abs(distances_[k]) > limit) continue;

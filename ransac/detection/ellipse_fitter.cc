@@ -145,11 +145,17 @@ void EllipseFitter::AppendPoints(const Arc& arc) {
   }
 }
 
-// Direct fit to the points at hand, and again without those that stand out until these stay the
-// same: the ends of an arc often follow a neighbour's edge, a shadow runs beside a rim, and a few
-// such points spoil a least-squares fit.
+// Direct fit to the points at hand, and to those that agree.
 bool EllipseFitter::FitTrimmed(Matrix3d* conic, int max_trims) {
   if (!FitConicDirect(fit_points_, conic).ok()) return false;
+  Concentrate(max_trims, conic);
+  return true;
+}
+
+// Fits again without the points that stand out until these stay the same: the ends of an arc often
+// follow a neighbour's edge, a shadow runs beside a rim, and a few such points spoil a
+// least-squares fit.
+void EllipseFitter::Concentrate(int max_trims, Matrix3d* conic) {
   std::size_t before = fit_points_.size();
   for (int round = 0; round < max_trims; ++round) {
     Trim(*conic);
@@ -159,14 +165,10 @@ bool EllipseFitter::FitTrimmed(Matrix3d* conic, int max_trims) {
     if (!FitConicDirect(trimmed_, &better).ok()) break;
     *conic = better;
   }
-  return true;
 }
 
 void EllipseFitter::Trim(const Matrix3d& conic) {
-  MeasureDistances(conic);
-  sorted_.clear();
-  for (const double d : distances_) sorted_.push_back(std::abs(d));
-  const double limit = kTrimSigmas * std::max(kTrimMinSigmaPx, 1.4826 * Median(&sorted_));
+  const double limit = kTrimSigmas * std::max(kTrimMinSigmaPx, 1.4826 * MedianDistance(conic));
   trimmed_.clear();
   for (std::size_t k = 0; k < fit_points_.size(); ++k) {
     if (std::abs(distances_[k]) <= limit) trimmed_.push_back(fit_points_[k]);
@@ -177,6 +179,14 @@ void EllipseFitter::Trim(const Matrix3d& conic) {
 void EllipseFitter::MeasureDistances(const Matrix3d& conic) {
   distances_.clear();
   for (const CalibratedPoint& p : fit_points_) distances_.push_back(ConicDistancePx(p, conic));
+}
+
+// Of their lengths. Measures the distances.
+double EllipseFitter::MedianDistance(const Matrix3d& conic) {
+  MeasureDistances(conic);
+  sorted_.clear();
+  for (const double d : distances_) sorted_.push_back(std::abs(d));
+  return Median(&sorted_);
 }
 
 // Whether the points of the arcs are near the contour that was fitted to them, and the gradients

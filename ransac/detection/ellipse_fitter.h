@@ -65,8 +65,11 @@ class EllipseFitter {
 
   void AppendPoints(const Arc& arc);
   bool FitTrimmed(Eigen::Matrix3d* conic, int max_trims);
+  bool FitLeastMedian(Eigen::Matrix3d* conic);
+  void Concentrate(int max_trims, Eigen::Matrix3d* conic);
   void Trim(const Eigen::Matrix3d& conic);
   void MeasureDistances(const Eigen::Matrix3d& conic);
+  double MedianDistance(const Eigen::Matrix3d& conic);
   bool ArcsAgree(const EllipseCandidate& candidate) const;
   static double Rms(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic);
   bool Refit(EllipseCandidate* candidate);
@@ -91,7 +94,7 @@ class EllipseFitter {
   Supporter supporter_;
   const double max_axis_px_;
   // Scratch.
-  std::vector<CalibratedPoint> fit_points_, trimmed_;
+  std::vector<CalibratedPoint> fit_points_, trimmed_, stretch_;
   std::vector<int> fit_indices_;
   std::vector<ContourSample> samples_;
   Support support_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
@@ -52,8 +51,6 @@ constexpr double kShapeLimit = 2.5;
 constexpr double kLogOdds = 3.47;
 constexpr double kLogOddsPerFalseAlarm = -0.24;
 constexpr double kLogOddsPerMiss = -5.55;
-// However long it is, a contour that misses by more is a blob's.
-constexpr double kMostMiss = 1.4;
 
 // Logarithm (base 10) of the upper tail of the binomial distribution by Hoeffding's bound in its
 // Chernoff form: k of n successes or more at probability p.
