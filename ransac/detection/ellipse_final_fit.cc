@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/ransac/detection/ellipse_fitter.h"
@@ -22,10 +23,10 @@ constexpr int kMaxSecondLookPx = 200;
 constexpr double kOutlierSigmas = 3.5;
 // Times that points which stand out are left out of the fit to start from.
 constexpr int kMaxTrims = 10;
-// Where edges scatter about a contour by more than this many of their standard deviations, it is
-// fitted anew to so many stretches of it, each with this share of its points: one keeps clear of
-// what hides up to 0.4 of a rim.
-constexpr double kNearSigmas = 2.0;
+// What edge points of a photographed rim leave at most but for their noise, pixels. Where they
+// scatter by more, a contour is fitted anew to so many stretches of it, each with this share of its
+// points: one keeps clear of what hides up to 0.4 of a rim.
+constexpr double kRimSigmaPx = 0.1;
 constexpr std::size_t kStretches = 8;
 constexpr double kStretchShare = 0.6;
 // However much of it there is, a contour that misses by more is a blob's.
@@ -106,7 +107,7 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   constexpr double kNone = -std::numeric_limits<double>::infinity();
   if (!Gather(*candidate, 0.7, kGatherPx.back())) return kNone;
   Straighten(candidate->conic, e);
-  if (fit_points_.size() < 6 || !FitLeastMedian(&candidate->conic)) return kNone;
+  if (fit_points_.size() < 6 || !FitLikeliest(&candidate->conic)) return kNone;
   const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
   if (!Gather(*candidate, 0.7, reach)) return kNone;
   if (!FitSupport(candidate->conic, e)) return kNone;
@@ -125,16 +126,15 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   return RimLogOdds(Log10FalseAlarms(support_, candidate->bright), miss);
 }
 
-// What hides a part of a rim often runs beside it, and a fit to all edges along the contour lies
-// between the two. Of the fits to all, and to each of some stretches with what else agrees, this is
-// the one with the least median distance.
-bool EllipseFitter::FitLeastMedian(Matrix3d* conic) {
+// Direct fits to the points at hand and, where these scatter, to stretches of them, each with what
+// else agrees: what hides a part of a rim often runs beside it, and a fit to all lies between the
+// two. The one that the points are likeliest for, each of the rim or anywhere within reach.
+bool EllipseFitter::FitLikeliest(Matrix3d* conic) {
   if (!FitTrimmed(conic, kMaxTrims)) return false;
   supporter_.AverageStrength(&support_);
-  if (Rms(fit_points_, *conic) < kNearSigmas * std::hypot(kMinEllipseSigmaPx, support_.sigma_px)) {
-    return true;
-  }
-  double least = MedianDistance(*conic);
+  const double sigma_px = std::hypot(kRimSigmaPx, support_.sigma_px);
+  if (Rms(fit_points_, *conic) < sigma_px) return true;
+  double best = LogLikelihood(*conic, sigma_px);
   const std::size_t n = fit_points_.size();
   stretch_.resize(static_cast<std::size_t>(kStretchShare * static_cast<double>(n)));
   for (std::size_t k = 0; k < kStretches; ++k) {
@@ -143,13 +143,24 @@ bool EllipseFitter::FitLeastMedian(Matrix3d* conic) {
     Matrix3d other;
     if (stretch_.size() < 6 || !FitConicDirect(stretch_, &other).ok()) continue;
     Concentrate(kMaxTrims, &other);
-    const double median = MedianDistance(other);
-    if (!(median < least)) continue;
-    least = median;
+    const double log_likelihood = LogLikelihood(other, sigma_px);
+    if (!(log_likelihood > best)) continue;
+    best = log_likelihood;
     *conic = other;
   }
   Trim(*conic);
   return true;
+}
+
+double EllipseFitter::LogLikelihood(const Matrix3d& conic, double sigma_px) {
+  MeasureDistances(conic);
+  const double peak = 2.0 * kGatherPx.back() / (std::sqrt(2.0 * kPi) * sigma_px);
+  double sum = 0.0;
+  for (const double d : distances_) {
+    const double r = d / sigma_px;
+    sum += std::log(1.0 + peak * std::exp(-0.5 * r * r));
+  }
+  return sum;
 }
 
 // The edge points of the support where they would lie if the contour, `conic`, were straight.

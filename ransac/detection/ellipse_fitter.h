@@ -65,7 +65,8 @@ class EllipseFitter {
 
   void AppendPoints(const Arc& arc);
   bool FitTrimmed(Eigen::Matrix3d* conic, int max_trims);
-  bool FitLeastMedian(Eigen::Matrix3d* conic);
+  bool FitLikeliest(Eigen::Matrix3d* conic);
+  double LogLikelihood(const Eigen::Matrix3d& conic, double sigma_px);
   void Concentrate(int max_trims, Eigen::Matrix3d* conic);
   void Trim(const Eigen::Matrix3d& conic);
   void MeasureDistances(const Eigen::Matrix3d& conic);
