@@ -32,6 +32,8 @@ constexpr int kCornerReach = 2;
 // good to a few degrees.
 constexpr double kEndSlackPx = 2.0;
 constexpr double kEndSlackShare = 0.03;
+// ... and how far their tangents there may be from its own, a sine (20 degrees).
+constexpr double kEndTangentSine = 0.34;
 
 // Vertices (indices of points) of the Douglas-Peucker polygon of points[begin, end).
 class Polygon {
@@ -212,12 +214,14 @@ bool OnInnerSides(const Arc& a, const Arc& b) {
 
 // The conics through two points with given tangents are T1 T2 + m L^2 = 0, with the two tangents
 // and the line that joins the points; a third point settles m. Here the points are the middles of
-// the arcs, m is fitted to their four ends, and the ends must then lie on the conic. In pixels, so
-// that strong distortion needs the slack; it is a filter before the true fit, and a hundred times
-// faster.
+// the arcs, m is fitted to their four ends, and these must then lie on the conic and run along it.
+// In pixels, so that strong distortion needs the slack; it is a filter before the true fit, and a
+// hundred times faster.
 bool EndsAgree(const Arc& a, const Arc& b) {
   const Vector2d along = (b.middle - a.middle).normalized();
   const std::array<Vector2d, 4> ends = {a.first, a.last, b.first, b.last};
+  const std::array<Vector2d, 4> tangents = {a.first_tangent, a.last_tangent, b.first_tangent,
+                                            b.last_tangent};
   std::array<double, 4> t1, t2, line;
   double numerator = 0.0, denominator = 0.0;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -235,7 +239,9 @@ bool EndsAgree(const Arc& a, const Arc& b) {
     const double value = t1[k] * t2[k] + m * line[k] * line[k];
     const Vector2d gradient = t1[k] * n2 + t2[k] * n1 + 2.0 * m * line[k] * n;
     const double slack = kEndSlackPx + kEndSlackShare * std::abs(line[k]);
-    if (!(std::abs(value) <= slack * gradient.norm())) return false;
+    const double length = gradient.norm();
+    if (!(std::abs(value) <= slack * length)) return false;
+    if (!(std::abs(tangents[k].dot(gradient)) <= kEndTangentSine * length)) return false;
   }
   return true;
 }

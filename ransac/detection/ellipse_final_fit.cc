@@ -29,6 +29,7 @@ constexpr int kMaxTrims = 10;
 constexpr double kRimSigmaPx = 0.1;
 constexpr std::size_t kStretches = 8;
 constexpr double kStretchShare = 0.6;
+constexpr int kStretchTrims = 3;
 // However much of it there is, a contour that misses by more is a blob's.
 constexpr double kMostMiss = 1.4;
 // No contour is known better than this, whatever its scatter says.
@@ -109,8 +110,11 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   Straighten(candidate->conic, e);
   if (fit_points_.size() < 6 || !FitLikeliest(&candidate->conic)) return kNone;
   const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
+  // What is gathered about a fit to all that is as near depends less on where the first started.
   if (!Gather(*candidate, 0.7, reach)) return kNone;
-  if (!FitSupport(candidate->conic, e)) return kNone;
+  Straighten(candidate->conic, e);
+  if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic, 1)) return kNone;
+  if (!Gather(*candidate, 0.7, reach) || !FitSupport(candidate->conic, e)) return kNone;
   candidate->conic = e->fit.conic;
   if (!Plausible(candidate->bright) || contour_.minor_px() < options_.min_axis_px ||
       e->fit.rms_px > kMaxRmsPx) {
@@ -134,7 +138,7 @@ bool EllipseFitter::FitLikeliest(Matrix3d* conic) {
   supporter_.AverageStrength(&support_);
   const double sigma_px = std::hypot(kRimSigmaPx, support_.sigma_px);
   if (Rms(fit_points_, *conic) < sigma_px) return true;
-  double best = LogLikelihood(*conic, sigma_px);
+  double least = TruncatedCost(*conic, sigma_px);
   const std::size_t n = fit_points_.size();
   stretch_.resize(static_cast<std::size_t>(kStretchShare * static_cast<double>(n)));
   for (std::size_t k = 0; k < kStretches; ++k) {
@@ -142,24 +146,24 @@ bool EllipseFitter::FitLikeliest(Matrix3d* conic) {
       stretch_[i] = fit_points_[(i + n * k / kStretches) % n];
     Matrix3d other;
     if (stretch_.size() < 6 || !FitConicDirect(stretch_, &other).ok()) continue;
-    Concentrate(kMaxTrims, &other);
-    const double log_likelihood = LogLikelihood(other, sigma_px);
-    if (!(log_likelihood > best)) continue;
-    best = log_likelihood;
+    Concentrate(kStretchTrims, &other);
+    const double cost = TruncatedCost(other, sigma_px);
+    if (!(cost < least)) continue;
+    least = cost;
     *conic = other;
   }
   Trim(*conic);
   return true;
 }
 
-double EllipseFitter::LogLikelihood(const Matrix3d& conic, double sigma_px) {
+// Twice the logarithm of the likelihood ratio, negative, of the points at hand to points anywhere
+// within reach; to the larger of both for each point (Torr and Zisserman, CVIU 2000).
+double EllipseFitter::TruncatedCost(const Matrix3d& conic, double sigma_px) {
   MeasureDistances(conic);
-  const double peak = 2.0 * kGatherPx.back() / (std::sqrt(2.0 * kPi) * sigma_px);
+  const double anywhere =
+      2.0 * std::log(2.0 * kGatherPx.back() / (std::sqrt(2.0 * kPi) * sigma_px));
   double sum = 0.0;
-  for (const double d : distances_) {
-    const double r = d / sigma_px;
-    sum += std::log(1.0 + peak * std::exp(-0.5 * r * r));
-  }
+  for (const double d : distances_) sum += std::min(d * d / (sigma_px * sigma_px), anywhere);
   return sum;
 }
 

@@ -66,7 +66,7 @@ class EllipseFitter {
   void AppendPoints(const Arc& arc);
   bool FitTrimmed(Eigen::Matrix3d* conic, int max_trims);
   bool FitLikeliest(Eigen::Matrix3d* conic);
-  double LogLikelihood(const Eigen::Matrix3d& conic, double sigma_px);
+  double TruncatedCost(const Eigen::Matrix3d& conic, double sigma_px);
   void Concentrate(int max_trims, Eigen::Matrix3d* conic);
   void Trim(const Eigen::Matrix3d& conic);
   void MeasureDistances(const Eigen::Matrix3d& conic);
