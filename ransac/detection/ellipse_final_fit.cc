@@ -29,7 +29,9 @@ constexpr int kMaxTrims = 10;
 constexpr double kRimSigmaPx = 0.1;
 constexpr std::size_t kStretches = 8;
 constexpr double kStretchShare = 0.6;
-constexpr int kStretchTrims = 3;
+constexpr int kStretchTrims = 1;
+// As many points as this, at least half as many, tell which fit is the best.
+constexpr std::size_t kStretchPoints = 120;
 // However much of it there is, a contour that misses by more is a blob's.
 constexpr double kMostMiss = 1.4;
 // No contour is known better than this, whatever its scatter says.
@@ -138,8 +140,11 @@ bool EllipseFitter::FitLikeliest(Matrix3d* conic) {
   supporter_.AverageStrength(&support_);
   const double sigma_px = std::hypot(kRimSigmaPx, support_.sigma_px);
   if (Rms(fit_points_, *conic) < sigma_px) return true;
+  const std::size_t step = 1 + fit_points_.size() / kStretchPoints;
+  const std::size_t n = fit_points_.size() / step;
+  for (std::size_t i = 0; i < n; ++i) fit_points_[i] = fit_points_[i * step];
+  fit_points_.resize(n);
   double least = TruncatedCost(*conic, sigma_px);
-  const std::size_t n = fit_points_.size();
   stretch_.resize(static_cast<std::size_t>(kStretchShare * static_cast<double>(n)));
   for (std::size_t k = 0; k < kStretches; ++k) {
     for (std::size_t i = 0; i < stretch_.size(); ++i)
