@@ -4,9 +4,11 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <chrono>
 #include <functional>
 
 #include "apps/common/document.h"
+#include "apps/common/text.h"
 #include "apps/studio/page.h"
 
 namespace circline::apps {
@@ -195,7 +197,14 @@ class StudioServer::Routes {
   void Post(const char* address, Endpoint endpoint) {
     server_.Post(address, [this, endpoint](const Request&, Response& response,
                                            const httplib::ContentReader& reader) {
-      Guarded(&response, [&] { SetJson((studio_->*endpoint)(ReadBody(reader)), &response); });
+      Guarded(&response, [&] {
+        const auto started = std::chrono::steady_clock::now();
+        SetJson((studio_->*endpoint)(ReadBody(reader)), &response);
+        const std::chrono::duration<double, std::milli> took =
+            std::chrono::steady_clock::now() - started;
+        // Of the answer's milliseconds, those that are not the browser's.
+        response.set_header("Server-Timing", "work;dur=" + FormatFixed(took.count(), 2));
+      });
     });
   }
 

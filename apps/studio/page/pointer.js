@@ -9,6 +9,7 @@ const HANDLE_PX = 10, LINE_PX = 7, SNAP_PX = 7;  // Of the screen.
 
 let drag = null;  // {move(point, event), end(point, event), moved, start}
 let pending = null;  // The first line of an angle.
+let lensAt = null, lensFrame = 0;  // The pointer moves more often than frames are shown.
 
 const screenOf = (event) => {
   const box = canvas.getBoundingClientRect();
@@ -110,6 +111,7 @@ function dragHandle(handle) {
   select(handle.selection);
   const isCenter = handle.center !== undefined;
   return {
+    isHandle: true,
     move(point) {
       if (!this.moved) remember();
       const circle = isCenter && app.doc.scene.circles[handle.selection.index];
@@ -118,9 +120,12 @@ function dragHandle(handle) {
       [list[at], list[at + 1]] = round(point);
       changed('doc');
     },
-    end() {},
+    end() { changed(this.moved ? 'doc' : 'view'); },  // From all points, and with the panel.
   };
 }
+
+// Whether a handle follows the pointer.
+export const isDragging = () => Boolean(drag && drag.isHandle && drag.moved);
 
 function drawLine(start) {
   return {
@@ -225,7 +230,12 @@ function showLens(screen) {
   lens.hidden = !shown;
   if (!shown) return;
   lens.classList.toggle('left', screen[0] > canvas.clientWidth / 2 && screen[1] < canvas.clientHeight / 2);
-  drawLens(lens, toPhoto(screen));
+  lensAt = toPhoto(screen);
+  if (lensFrame) return;
+  lensFrame = requestAnimationFrame(() => {
+    lensFrame = 0;
+    if (!lens.hidden) drawLens(lens, lensAt);
+  });
 }
 
 // What was found, and what the detection takes it for.

@@ -11,6 +11,18 @@ function freshId(list, stem) {
 }
 
 // The sigma of a point that a person sets, pixels: about one pixel of the screen.
+// The entry with contours of fewer points, evenly chosen: what is enough to see where a pose goes.
+export function thinned(entry, points) {
+  if (!entry.circles) return entry;
+  const thin = ({contour, ...rest}) => {
+    if (!contour || contour.length <= 2 * points) return {contour, ...rest};
+    const step = contour.length / 2 / points;
+    const kept = Array.from({length: points}, (_, i) => 2 * Math.floor(i * step));
+    return {contour: kept.flatMap((at) => contour.slice(at, at + 2)), ...rest};
+  };
+  return {...entry, circles: entry.circles.map(thin)};
+}
+
 export const handSigma = (scale) => Math.max(0.3, Math.round(10 / scale) / 10);
 
 // Whether a said contour is one that is found now: its length and ends tell.
