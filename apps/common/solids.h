@@ -16,6 +16,7 @@ struct BoxEdge {
   std::array<bool, 3> far{};            // Whether it lies at the far end along the other two.
   std::vector<Eigen::Vector2d> points;  // Pixels, 2 or more.
   double sigma_px = 0.0;                // Standard deviation of each coordinate; 0 = not known.
+  double shared_px = 0.0;               // Of what all points have in common, beside it.
 };
 
 struct BoxObservation {

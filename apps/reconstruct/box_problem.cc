@@ -4,6 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+
+#include "circline/estimators/line.h"
+#include "circline/estimators/observations.h"
 
 namespace circline::apps {
 
@@ -12,27 +16,49 @@ BoxProblem::BoxProblem(const Camera& camera, const BoxObservation& box, const Bo
     : camera_(camera), box_(box), options_(options), wear_px_(wear_px), state_(*state) {
   AddCamera();
   for (const std::size_t e : edges) AddEdge(box.edges[e]);
+  line_blocks_.reserve(options.lines.size());  // Ceres keeps pointers into it.
+  for (const FaceLine& line : options.lines) AddLine(line);
   AddPriors();
 }
 
 bool BoxProblem::Solve() {
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_QR;
+  if (!lines_.empty()) {  // Each line's own unknowns are eliminated first.
+    solver.linear_solver_type = ceres::DENSE_SCHUR;
+    solver.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    std::vector<double*> blocks;
+    problem_.GetParameterBlocks(&blocks);
+    for (double* block : blocks) {
+      solver.linear_solver_ordering->AddElementToGroup(block, IsOfOneLine(block) ? 0 : 1);
+    }
+  }
   solver.logging_type = ceres::SILENT;
   solver.max_num_iterations = 100;
   for (const double stretch : {30.0, 5.0, 1.0}) {  // A start many sigmas off is no outlier.
     Weighing wide;
     wide.stretch = stretch;
-    for (FeatureCost* cost : costs_) cost->set_weighing(wide);
+    SetWeighing(wide);
     ceres::Solve(solver, &problem_, &summary_);
   }
   return summary_.IsSolutionUsable() && std::isfinite(summary_.final_cost);
 }
 
+bool BoxProblem::IsOfOneLine(const double* block) const {
+  return std::any_of(line_blocks_.begin(), line_blocks_.end(),
+                     [block](const auto& own) { return own.data() == block; });
+}
+
+void BoxProblem::SetWeighing(const Weighing& weighing) {
+  for (const auto* costs : {&edges_, &lines_}) {
+    for (FeatureCost* cost : *costs) cost->set_weighing(weighing);
+  }
+}
+
 std::vector<double> BoxProblem::Misses() const {
   std::vector<double> misses, distances;
   const std::array<double*, 7> blocks = Blocks();
-  for (const FeatureCost* cost : costs_) {
+  for (const FeatureCost* cost : edges_) {
     cost->Distances(blocks.data(), &distances);
     double sum = 0.0;
     for (const double d : distances) sum += d * d;
@@ -44,7 +70,7 @@ std::vector<double> BoxProblem::Misses() const {
 bool BoxProblem::Covariance(Eigen::Matrix<double, 9, 9>* covariance, double* focal_sigma) {
   Weighing inliers;
   inliers.inliers_only = true;
-  for (FeatureCost* cost : costs_) cost->set_weighing(inliers);
+  SetWeighing(inliers);
   ceres::Covariance::Options how;
   how.algorithm_type = ceres::DENSE_SVD;
   how.null_space_rank = 0;
@@ -111,7 +137,7 @@ void BoxProblem::AddCamera() {
 
 void BoxProblem::AddEdge(const BoxEdge& edge) {
   NoiseModel noise = options_.noise;
-  const double shared = std::hypot(noise.line_px, wear_px_);
+  const double shared = std::hypot(noise.line_px, std::hypot(wear_px_, edge.shared_px));
   noise.line_px = shared;
   // An edge bends as a whole.
   noise.correlation_px = std::numeric_limits<double>::max();
@@ -122,10 +148,45 @@ void BoxProblem::AddEdge(const BoxEdge& edge) {
                (edge.sigma_px * edge.sigma_px);
   auto* cost =
       new BoxEdgeCost(ImagePoints(camera_, edge.points, {}, how), edge.axis, edge.far, has_camera_);
-  costs_.push_back(cost);
+  edges_.push_back(cost);
   const std::array<double*, 7> all = Blocks();
   problem_.AddResidualBlock(cost, nullptr,
                             std::vector<double*>(all.begin(), all.end() - (has_camera_ ? 0 : 1)));
+}
+
+// As EstimatePose has the lines of a pencil.
+void BoxProblem::AddLine(const FaceLine& line) {
+  const NoiseModel& noise = options_.noise;
+  std::vector<CalibratedPoint> calibrated;
+  CalibrateInliers(camera_, line.points, {}, &calibrated);
+  LineFit fit;
+  if (calibrated.size() < 2 || !FitLine(calibrated, 1.0, &fit).ok()) return;
+  ImagePoints::Options how;
+  how.sigma_px = line.sigma_px;
+  how.loss = LossType::kCauchy;
+  how.weight = noise.LineWeight(line.sigma_px, line.points, {});
+  DirectionLineCost::Options options;
+  options.direction_sigma = noise.line_direction_rad;
+  options.camera = has_camera_;
+  auto* cost = new DirectionLineCost(ImagePoints(camera_, line.points, {}, how), fit.line, options);
+  double* const direction = directions_.col(line.axis).data();
+  line_blocks_.push_back({0.0, 0.0});
+  std::vector<double*> blocks = {state_.rotation.coeffs().data(), direction,
+                                 line_blocks_.back().data()};
+  if (has_camera_) blocks.push_back(state_.camera.data());
+  cost->Start(blocks.data(), line_blocks_.back().data());
+  lines_.push_back(cost);
+  const bool is_first = !problem_.HasParameterBlock(direction);
+  problem_.AddResidualBlock(cost, nullptr, blocks);
+  if (!is_first) return;
+  const double lean = noise.pencil_axis_rad;
+  if (lean > 0.0) {
+    problem_.SetManifold(direction, new ceres::SphereManifold<3>);
+    problem_.AddResidualBlock(NewDirectionPrior(Eigen::Vector3d::Unit(line.axis), lean), nullptr,
+                              direction);
+  } else {
+    problem_.SetParameterBlockConstant(direction);
+  }
 }
 
 void BoxProblem::AddPriors() {

@@ -42,7 +42,10 @@ class BoxProblem {
   std::array<double*, 7> Blocks() const;
   void AddCamera();
   void AddEdge(const BoxEdge& edge);
+  void AddLine(const FaceLine& line);
   void AddPriors();
+  bool IsOfOneLine(const double* block) const;
+  void SetWeighing(const Weighing& weighing);
 
   const Camera& camera_;
   const BoxObservation& box_;
@@ -51,7 +54,9 @@ class BoxProblem {
   BoxState& state_;
   bool has_camera_ = false;
   ceres::Problem problem_;
-  std::vector<FeatureCost*> costs_;  // The problem owns them.
+  std::vector<FeatureCost*> edges_, lines_;                   // The problem owns them.
+  Eigen::Matrix3d directions_ = Eigen::Matrix3d::Identity();  // Columns: of lines along each axis.
+  std::vector<std::array<double, 2>> line_blocks_;            // As DirectionLineCost has them.
   ceres::Solver::Summary summary_;
 };
 

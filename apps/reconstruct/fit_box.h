@@ -30,10 +30,18 @@ struct BoxFit {
   std::vector<std::string> notes;  // What was left out.
 };
 
+// A line on one of a box's faces, parallel to its edges along an axis: what is printed there is.
+struct FaceLine {
+  int axis = 0;
+  std::vector<Eigen::Vector2d> points;  // Pixels, 2 or more.
+  double sigma_px = 0.0;                // Standard deviation of each across the line; > 0.
+};
+
 struct BoxOptions {
   NoiseModel noise;
   CameraSigma camera;
   double point_sigma_px = 0.3;  // Of points of which nothing else is known; > 0.
+  std::vector<FaceLine> lines;  // They tell the box's directions, beside its edges.
 };
 
 // `start`: the box's axes in the camera (columns), where about known; besides, they are found from

@@ -191,7 +191,7 @@ Status ReconstructBox(const CompareOptions& options, const ImageRun& run, BoxObs
             : CameraOf(shown->estimate.hypotheses.front(), run.observations.camera);
     status = TraceBox(run.photo, camera, box_options, CandidateAxes(run), &box, &fit);
   } else {
-    status = FitBox(run.image->observations.camera, box, box_options, {}, &fit);
+    status = FitMarkedBox(run.photo, run.image->observations.camera, box_options, &box, &fit);
   }
   if (!status.ok()) return status;
   made->model = BoxModel(fit);

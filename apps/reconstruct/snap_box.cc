@@ -21,7 +21,10 @@ constexpr double kLeastCosine =
 constexpr double kOnLinePx = 1.0;
 constexpr double kStepPx = 0.5;       // Of the offsets tried at either end.
 constexpr double kLeastShare = 0.34;  // Of the samples that must have a point on the line.
-constexpr double kRivalShare = 0.6;   // Of the best line's points that one farther out must have.
+// Of the best line's points that another one must have to be its rival, which may be the edge.
+constexpr double kRivalShare = 0.6;
+// How often a rival, and not the line taken, is the edge: about one edge in four (box-camprodon).
+constexpr double kRivalIsRight = 0.25;
 constexpr double kLeastSigmaPx = 0.05;
 constexpr double kProlongedShare = 0.6;  // Of an edge, beyond its ends.
 
@@ -30,7 +33,7 @@ struct NearPoint {
   double share;   // Of the way along the edge.
   double offset;  // Across it, outwards, pixels.
   int sample;
-  int index;  // Of the EdgeMap's points.
+  const EdgePoint* point;
 };
 
 // An edge as the photo should show it.
@@ -74,21 +77,31 @@ bool Expect(const BoxFit& fit, int axis, int corner, ExpectedEdge* edge) {
   return true;
 }
 
-std::vector<NearPoint> PointsNear(const EdgeMap& edges, const ExpectedEdge& edge, double reach_px) {
+// The point in the pixel, if it lies on an edge across `across`.
+const EdgePoint* PointAcross(const EdgeMap& edges, const Vector2d& at, const Vector2d& across) {
+  const int index =
+      edges.PointAt(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())));
+  if (index < 0) return nullptr;
+  const EdgePoint& point = edges.points[static_cast<std::size_t>(index)];
+  return std::abs(point.Normal().dot(across)) < kLeastCosine ? nullptr : &point;
+}
+
+// By sample.
+std::vector<NearPoint> PointsNear(const PhotoEdges& edges, const ExpectedEdge& edge,
+                                  double reach_px) {
   std::vector<NearPoint> near;
   for (std::size_t i = 0; i < edge.samples.size(); ++i) {
-    int last = -1;
-    for (double offset = -reach_px; offset <= reach_px; offset += 0.5) {
-      const Vector2d at = edge.samples[i] + offset * edge.across;
-      const int index = edges.PointAt(static_cast<int>(std::lround(at.x())),
-                                      static_cast<int>(std::lround(at.y())));
-      if (index < 0 || index == last) continue;
-      last = index;
-      const EdgePoint& point = edges.points[static_cast<std::size_t>(index)];
-      if (std::abs(point.Normal().dot(edge.across)) < kLeastCosine) continue;
-      near.push_back({static_cast<double>(i) / static_cast<double>(edge.samples.size() - 1),
-                      edge.across.dot(point.Position() - edge.samples[i]), static_cast<int>(i),
-                      index});
+    const double share = static_cast<double>(i) / static_cast<double>(edge.samples.size() - 1);
+    for (const EdgeMap& map : edges) {
+      const EdgePoint* last = nullptr;
+      for (double offset = -reach_px; offset <= reach_px; offset += 0.5) {
+        const Vector2d at = edge.samples[i] + offset * edge.across;
+        const EdgePoint* point = PointAcross(map, at, edge.across);
+        if (point == nullptr || point == last) continue;
+        last = point;
+        near.push_back({share, edge.across.dot(point->Position() - edge.samples[i]),
+                        static_cast<int>(i), point});
+      }
     }
   }
   return near;
@@ -106,13 +119,29 @@ int CountOnLine(const std::vector<NearPoint>& near, double a, double b) {
   return count;
 }
 
-// The line's offsets at both ends, or none with points on a third of the samples.
+// A line by its offsets at both ends, and how many samples have a point on it.
+struct Candidate {
+  double a, b;
+  int count;
+};
+
+// Root mean square distance, along the edge, of the lines with at least `least` points from the one
+// with offsets `a` and `b`.
+double RivalsPx(const std::vector<Candidate>& candidates, double least, double a, double b) {
+  double squares = 0.0, count = 0.0;
+  for (const Candidate& candidate : candidates) {
+    if (candidate.count < least) continue;
+    const double da = candidate.a - a, db = candidate.b - b;
+    squares += (da * da + da * db + db * db) / 3.0;
+    count += 1.0;
+  }
+  return std::sqrt(squares / count);
+}
+
+// The line's offsets at both ends, and what its points share as it may be another line. False where
+// none has points on a third of the samples.
 bool FindOffsets(const std::vector<NearPoint>& near, const ExpectedEdge& edge, double reach_px,
-                 double* a, double* b) {
-  struct Candidate {
-    double a, b;
-    int count;
-  };
+                 bool is_marked, double* a, double* b, double* shared_px) {
   std::vector<Candidate> candidates;
   int most = 0;
   for (double p = -reach_px; p <= reach_px; p += kStepPx) {
@@ -123,12 +152,11 @@ bool FindOffsets(const std::vector<NearPoint>& near, const ExpectedEdge& edge, d
   }
   if (most < kLeastShare * static_cast<double>(edge.samples.size())) return false;
   const double least =
-      edge.is_outline
-          ? std::max(kRivalShare * most, kLeastShare * static_cast<double>(edge.samples.size()))
-          : most;
+      std::max(kRivalShare * most, kLeastShare * static_cast<double>(edge.samples.size()));
+  const double least_of_edge = edge.is_outline || is_marked ? least : most;
   double best = -1e9;
   for (const Candidate& candidate : candidates) {
-    if (candidate.count < least) continue;
+    if (candidate.count < least_of_edge) continue;
     // Of the outline how far out, of others how near to where it was expected.
     const double merit = edge.is_outline ? candidate.a + candidate.b
                                          : -std::abs(candidate.a) - std::abs(candidate.b);
@@ -137,6 +165,7 @@ bool FindOffsets(const std::vector<NearPoint>& near, const ExpectedEdge& edge, d
     *a = candidate.a;
     *b = candidate.b;
   }
+  if (is_marked) *shared_px = std::sqrt(kRivalIsRight) * RivalsPx(candidates, least, *a, *b);
   // To the middle of its points.
   for (int pass = 0; pass < 3; ++pass) {
     Eigen::Matrix2d moments = 1e-6 * Eigen::Matrix2d::Identity();
@@ -155,7 +184,7 @@ bool FindOffsets(const std::vector<NearPoint>& near, const ExpectedEdge& edge, d
 }
 
 // Pixels with an edge point on the prolonged line, from a little beyond either corner on.
-double Overrun(const EdgeMap& edges, const ExpectedEdge& edge, double a, double b) {
+double Overrun(const PhotoEdges& edges, const ExpectedEdge& edge, double a, double b) {
   const Vector2d from = edge.samples.front() + a * edge.across,
                  to = edge.samples.back() + b * edge.across, along = (to - from).normalized(),
                  across(-along.y(), along.x());
@@ -165,11 +194,10 @@ double Overrun(const EdgeMap& edges, const ExpectedEdge& edge, double a, double 
     for (double beyond = kCornerShare * length + 4.0; beyond < kProlongedShare * length + 4.0;
          beyond += 1.0) {
       const Vector2d at = (sense < 0.0 ? from : to) + sense * beyond * along;
-      const int index = edges.PointAt(static_cast<int>(std::lround(at.x())),
-                                      static_cast<int>(std::lround(at.y())));
-      if (index < 0) continue;
-      const EdgePoint& point = edges.points[static_cast<std::size_t>(index)];
-      if (std::abs(point.Normal().dot(across)) > kLeastCosine) overrun += 1.0;
+      const bool runs_on = std::any_of(edges.begin(), edges.end(), [&](const EdgeMap& map) {
+        return PointAcross(map, at, across) != nullptr;
+      });
+      if (runs_on) overrun += 1.0;
     }
   }
   return overrun;
@@ -177,15 +205,15 @@ double Overrun(const EdgeMap& edges, const ExpectedEdge& edge, double a, double 
 
 }  // namespace
 
-SnappedBox SnapBox(const EdgeMap& edges, const BoxFit& fit, double reach_px) {
+SnappedBox SnapBox(const PhotoEdges& edges, const BoxFit& fit, double reach_px, bool is_marked) {
   SnappedBox snapped;
   for (int axis = 0; axis < 3; ++axis) {
     for (int corner = 0; corner < 8; ++corner) {
       ExpectedEdge expected;
       if ((corner >> axis & 1) != 0 || !Expect(fit, axis, corner, &expected)) continue;
       const std::vector<NearPoint> near = PointsNear(edges, expected, reach_px);
-      double a = 0.0, b = 0.0;
-      if (!FindOffsets(near, expected, reach_px, &a, &b)) continue;
+      double a = 0.0, b = 0.0, shared_px = 0.0;
+      if (!FindOffsets(near, expected, reach_px, is_marked, &a, &b, &shared_px)) continue;
       snapped.overrun_px += Overrun(edges, expected, a, b);
       snapped.covered_px += expected.length_px * CountOnLine(near, a, b) /
                             static_cast<double>(expected.samples.size());
@@ -193,13 +221,13 @@ SnappedBox SnapBox(const EdgeMap& edges, const BoxFit& fit, double reach_px) {
       edge.axis = axis;
       for (int k = 0; k < 3; ++k) edge.far[static_cast<std::size_t>(k)] = (corner >> k & 1) != 0;
       edge.sigma_px = kLeastSigmaPx;
-      std::set<int> taken;  // A point may be near to several samples.
+      edge.shared_px = shared_px;
+      std::set<const EdgePoint*> taken;  // A point may be near to several samples.
       for (const NearPoint& point : near) {
         if (std::abs(point.offset - a - point.share * (b - a)) > kOnLinePx) continue;
-        if (!taken.insert(point.index).second) continue;
-        const EdgePoint& found = edges.points[static_cast<std::size_t>(point.index)];
-        edge.points.push_back(found.Position());
-        edge.sigma_px = std::max(edge.sigma_px, static_cast<double>(found.sigma_px));
+        if (!taken.insert(point.point).second) continue;
+        edge.points.push_back(point.point->Position());
+        edge.sigma_px = std::max(edge.sigma_px, static_cast<double>(point.point->sigma_px));
       }
       if (edge.points.size() >= 3) snapped.edges.push_back(std::move(edge));
     }

@@ -16,11 +16,18 @@ struct SnappedBox {
   double covered_px = 0.0, overrun_px = 0.0;
 };
 
+// The photo's edges: of a colour photo those of each channel, as a box may be as bright as what is
+// behind it, and of another colour.
+using PhotoEdges = std::vector<EdgeMap>;
+
 // Of each visible edge of the box the edge points of the photo that form a line within `reach_px`
 // of where `fit` has it, nearly in its direction. Where there are several lines: of the outline the
 // outermost, as prints and bevels lie inside of it; of an edge between two visible faces the one
-// with most points. Edges of which the photo shows less than a third are left out.
-SnappedBox SnapBox(const EdgeMap& edges, const BoxFit& fit, double reach_px);
+// with most points or, where a person has marked the box (`is_marked`) so that it is known well,
+// the one nearest to where it was expected, as prints lie on either side of it. `shared_px` of a
+// marked box's edges is how far off the others lie. Edges of which the photo shows less than a
+// third are left out.
+SnappedBox SnapBox(const PhotoEdges& edges, const BoxFit& fit, double reach_px, bool is_marked);
 
 }  // namespace circline::apps
 

@@ -8,9 +8,11 @@
 
 #include "apps/reconstruct/box_geometry.h"
 #include "apps/reconstruct/box_tracer.h"
+#include "apps/reconstruct/face_lines.h"
 #include "apps/reconstruct/snap_box.h"
 #include "circline/ransac/detection/edge_shift.h"
 #include "circline/ransac/detection/edges.h"
+#include "circline/ransac/detection/segment_meetings.h"
 
 namespace circline::apps {
 namespace {
@@ -29,7 +31,11 @@ constexpr double kLeastEdgeShare = 0.05;
 constexpr std::size_t kMostPolished = 24;  // Traces that are fitted, the best supported ones.
 constexpr double kCoarseReachPx = 8.0;     // From where a trace has an edge, and a fit.
 constexpr double kFineReachPx = 3.0;
-constexpr double kGapWeight = 0.25;  // Of what no edge point covers.
+// From where a person has marked an edge: up to 5 px, and often a printed border (box-camprodon).
+constexpr double kMarkedReachPx = 5.0;
+constexpr double kAgreeSigmas = 2.0;  // Of lengths by the marks, and by what the photo shows there.
+constexpr double kGapWeight = 0.25;   // Of what no edge point covers.
+constexpr double kCopyPx = 1.5;       // Of a line from the same one in another channel.
 constexpr char kNoBox[] =
     "no box is sure enough in the photo: too few edges lie where its own would; mark its edges";
 constexpr char kTooSlender[] =
@@ -97,14 +103,17 @@ TracedBox FromFit(const BoxFit& fit, const TracedBox& before) {
   return box;
 }
 
-// Fitted to the edges that the photo has within each reach, one after the other.
-Status SnapAndFit(const EdgeMap& edges, const Camera& camera, const BoxOptions& options,
-                  const std::vector<double>& reaches_px, BoxObservation* box, BoxFit* fit) {
+// Fitted to the edges that the photo has within each reach, one after the other; of a marked box
+// also to the lines on its faces.
+Status SnapAndFit(const PhotoEdges& edges, const std::vector<DetectedLine>& lines,
+                  const Camera& camera, BoxOptions options, const std::vector<double>& reaches_px,
+                  bool is_marked, BoxObservation* box, BoxFit* fit) {
   for (std::size_t i = 0; i < reaches_px.size(); ++i) {
     BoxObservation seen;
     seen.id = box->id;
     const Eigen::Matrix3d start = fit->cam_from_box.rotation;
-    seen.edges = SnapBox(edges, *fit, reaches_px[i]).edges;
+    seen.edges = SnapBox(edges, *fit, reaches_px[i], is_marked).edges;
+    if (is_marked) options.lines = FaceLines(lines, *fit);
     if (i + 1 == reaches_px.size()) {
       box->edges = seen.edges;
       seen = *box;
@@ -115,22 +124,61 @@ Status SnapAndFit(const EdgeMap& edges, const Camera& camera, const BoxOptions& 
   return Status::Ok();
 }
 
-Status DetectPhotoLines(const cv::Mat& photo, const Camera& camera, EdgeMap* edge_map,
-                        std::vector<DetectedLine>* lines) {
-  EdgeMap& edges = *edge_map;
-  cv::Mat gray;
-  Status status = ToGray(photo, &gray);
-  if (status.ok()) status = DetectEdges(gray, EdgeOptions(), &edges);
-  std::vector<DetectedLine> bent;  // Worn edges are.
-  if (status.ok()) status = DetectLines(edges, camera, LineOptions(), lines, nullptr, &bent);
-  if (status.ok()) UndoEdgeShift(edges, camera, lines);
-  lines->insert(lines->end(), bent.begin(), bent.end());
-  return status;
+// Whether the lengths of two fits of a box agree within their standard deviations.
+bool Agree(const BoxFit& a, const BoxFit& b) {
+  for (int k = 0; k < 3; ++k) {
+    const double variance = a.covariance(6 + k, 6 + k) + b.covariance(6 + k, 6 + k);
+    if (std::abs(a.length[k] - b.length[k]) > kAgreeSigmas * std::sqrt(variance)) return false;
+  }
+  return true;
+}
+
+// The photo, or each channel of it.
+std::vector<cv::Mat> Channels(const cv::Mat& photo) {
+  std::vector<cv::Mat> channels;
+  cv::split(photo, channels);
+  constexpr std::size_t kColors = 3;  // Not how opaque it is.
+  if (channels.size() > kColors) channels.resize(kColors);
+  return channels;
+}
+
+double LengthPx(const DetectedLine& line) { return (line.ends[1] - line.ends[0]).norm(); }
+
+// Of lines that lie along a longer one, as those of several channels do, the longer one.
+void DropCopies(std::vector<DetectedLine>* lines) {
+  std::stable_sort(lines->begin(), lines->end(), [](const DetectedLine& a, const DetectedLine& b) {
+    return LengthPx(a) > LengthPx(b);
+  });
+  std::vector<DetectedLine> kept;
+  for (DetectedLine& line : *lines) {
+    const bool is_copy = std::any_of(kept.begin(), kept.end(), [&line](const DetectedLine& longer) {
+      return LiesAlong(line.ends, longer.ends, kCopyPx);
+    });
+    if (!is_copy) kept.push_back(std::move(line));
+  }
+  *lines = std::move(kept);
+}
+
+Status DetectPhotoLines(const std::vector<cv::Mat>& channels, const Camera& camera,
+                        PhotoEdges* edges, std::vector<DetectedLine>* lines) {
+  for (const cv::Mat& channel : channels) {
+    edges->emplace_back();
+    Status status = DetectEdges(channel, EdgeOptions(), &edges->back());
+    std::vector<DetectedLine> straight, bent;  // Worn edges are bent.
+    if (status.ok())
+      status = DetectLines(edges->back(), camera, LineOptions(), &straight, nullptr, &bent);
+    if (!status.ok()) return status;
+    UndoEdgeShift(edges->back(), camera, &straight);
+    lines->insert(lines->end(), straight.begin(), straight.end());
+    lines->insert(lines->end(), bent.begin(), bent.end());
+  }
+  if (edges->size() > 1) DropCopies(lines);
+  return Status::Ok();
 }
 
 // The traces that lines support best, fitted to the photo's edges, and of these the one of which
 // edge points cover most, less gaps and what runs on beyond corners.
-TracedBox Polished(const EdgeMap& edges, const Camera& camera, const BoxOptions& options,
+TracedBox Polished(const PhotoEdges& edges, const Camera& camera, const BoxOptions& options,
                    std::vector<TracedBox> found) {
   std::stable_sort(found.begin(), found.end(),
                    [](const TracedBox& a, const TracedBox& b) { return a.score > b.score; });
@@ -140,9 +188,9 @@ TracedBox Polished(const EdgeMap& edges, const Camera& camera, const BoxOptions&
     if (!std::isfinite(trace.score)) continue;
     BoxFit fit = Named(trace, camera);
     BoxObservation box;
-    if (!SnapAndFit(edges, camera, options, {kCoarseReachPx}, &box, &fit).ok()) continue;
+    if (!SnapAndFit(edges, {}, camera, options, {kCoarseReachPx}, false, &box, &fit).ok()) continue;
     TracedBox fitted = FromFit(fit, trace);
-    const SnappedBox seen = SnapBox(edges, fit, kFineReachPx);
+    const SnappedBox seen = SnapBox(edges, fit, kFineReachPx, false);
     const double gaps_px =
         std::max(0.0, VisibleEdgesPx(fitted, camera.fx).all_px - seen.covered_px);
     fitted.score = seen.covered_px - kGapWeight * gaps_px - seen.overrun_px;
@@ -156,23 +204,48 @@ TracedBox Polished(const EdgeMap& edges, const Camera& camera, const BoxOptions&
 Status TraceBox(const cv::Mat& photo, const Camera& camera, const BoxOptions& options,
                 const std::vector<Eigen::Matrix3d>& axes, BoxObservation* box, BoxFit* fit) {
   std::vector<DetectedLine> lines;
-  EdgeMap edges;
-  Status status = DetectPhotoLines(photo, camera, &edges, &lines);
+  PhotoEdges edges;
+  cv::Mat gray;
+  Status status = ToGray(photo, &gray);
+  if (status.ok()) status = DetectPhotoLines({gray}, camera, &edges, &lines);
   if (!status.ok()) return status;
   const std::vector<FlatLine> flat = FlatLines(lines, camera);
   std::vector<TracedBox> found = TraceLines(lines, flat, camera, axes);
   const TracedBox best = Polished(edges, camera, options, std::move(found));
   if (!std::isfinite(best.score)) return Status::Refused(kNoBox);
   *fit = Named(best, camera);
-  status = SnapAndFit(edges, camera, options, {kCoarseReachPx, 5.0, kFineReachPx}, box, fit);
+  status =
+      SnapAndFit(edges, {}, camera, options, {kCoarseReachPx, 5.0, kFineReachPx}, false, box, fit);
   if (!status.ok()) return status;
-  const double covered_px = SnapBox(edges, *fit, kFineReachPx).covered_px;
   const VisibleLength visible = VisibleEdgesPx(FromFit(*fit, best), camera.fx);
   if (fit->edges.size() < kLeastEdges || !(visible.all_px > 0.0) ||
-      covered_px < kLeastCovered * visible.all_px)
+      SnapBox(edges, *fit, kFineReachPx, false).covered_px < kLeastCovered * visible.all_px)
     return Status::Refused(kNoBox);
   if (visible.shortest_px < kLeastEdgeShare * std::max(photo.cols, photo.rows))
     return Status::Refused(kTooSlender);
+  return Status::Ok();
+}
+
+Status FitMarkedBox(const cv::Mat& photo, const Camera& camera, const BoxOptions& options,
+                    BoxObservation* box, BoxFit* fit) {
+  const bool is_stated = std::any_of(box->edges.begin(), box->edges.end(),
+                                     [](const BoxEdge& edge) { return edge.sigma_px > 0.0; });
+  Status status = FitBox(camera, *box, options, {}, fit);
+  if (!status.ok() || is_stated) return status;
+  PhotoEdges edges;
+  std::vector<DetectedLine> lines;
+  status = DetectPhotoLines(Channels(photo), camera, &edges, &lines);
+  if (!status.ok()) return status;
+  BoxObservation seen = *box;
+  BoxFit moved = *fit;
+  status = SnapAndFit(edges, lines, camera, options, {kMarkedReachPx, 4.0, kFineReachPx}, true,
+                      &seen, &moved);
+  if (!status.ok() || moved.edges.size() < std::max(fit->edges.size(), kLeastEdges) ||
+      !Agree(*fit, moved))
+    return Status::Ok();
+  moved.notes.insert(moved.notes.begin(), fit->notes.begin(), fit->notes.end());
+  *fit = std::move(moved);
+  *box = std::move(seen);
   return Status::Ok();
 }
 

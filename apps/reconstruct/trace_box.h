@@ -24,6 +24,13 @@ namespace circline::apps {
 Status TraceBox(const cv::Mat& photo, const Camera& camera, const BoxOptions& options,
                 const std::vector<Eigen::Matrix3d>& axes, BoxObservation* box, BoxFit* fit);
 
+// The box whose edges a person has marked, up to a few pixels beside where they are: fitted to the
+// edges that the photo shows there, in each of its colours, and to the lines on its faces, which
+// tell its directions; `box` then has these edges. To the marks where they state a standard
+// deviation, and where the photo shows fewer edges or a box of other lengths.
+Status FitMarkedBox(const cv::Mat& photo, const Camera& camera, const BoxOptions& options,
+                    BoxObservation* box, BoxFit* fit);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_RECONSTRUCT_TRACE_BOX_H_

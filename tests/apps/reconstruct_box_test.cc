@@ -34,8 +34,9 @@ class ReconstructBox : public testing::Test {
     return RunProgram(CIRCLINE_RECONSTRUCT,
                       "--scene='" + scene + "' --output='" + folder_ / "out" + "' " + flags);
   }
-  // The upper nearest corner and its three edges, and the far edges of the faces.
-  std::string Marked(const std::string& more) const {
+  // The upper nearest corner and its three edges, and the far edges of the faces. The upper far
+  // edge along x is marked by so much beside where it is.
+  std::string Marked(const std::string& more, const Eigen::Vector2d& beside = {0.0, 0.0}) const {
     const auto edge = [](const char* along, const char* far, const Eigen::Vector2d& a,
                          const Eigen::Vector2d& b) {
       return std::string("{ along: \"") + along + "\", far: \"" + far +
@@ -45,9 +46,9 @@ class ReconstructBox : public testing::Test {
     return ", solids: [ { id: \"carton\", kind: \"box\", corner: " + Numbers({c(0, 0, 1)}) +
            ", x: " + Numbers({c(1, 0, 1)}) + ", y: " + Numbers({c(0, 1, 1)}) +
            ", z: " + Numbers({c(0, 0, 0)}) + ", edges: [ " +
-           edge("x", "y", c(0, 1, 1), c(1, 1, 1)) + ", " + edge("y", "x", c(1, 0, 1), c(1, 1, 1)) +
-           ", " + edge("x", "z", c(0, 0, 0), c(1, 0, 0)) + ", " +
-           edge("y", "z", c(0, 0, 0), c(0, 1, 0)) + " ]" + more + " } ]";
+           edge("x", "y", c(0, 1, 1) + beside, c(1, 1, 1) + beside) + ", " +
+           edge("y", "x", c(1, 0, 1), c(1, 1, 1)) + ", " + edge("x", "z", c(0, 0, 0), c(1, 0, 0)) +
+           ", " + edge("y", "z", c(0, 0, 0), c(0, 1, 0)) + " ]" + more + " } ]";
   }
   std::map<std::string, MeasuredRow> Measured() const {
     return ReadMeasurements(folder_ / "out/measurements.csv");
@@ -135,6 +136,18 @@ TEST_F(ReconstructBox, ModelsWhatIsMarked) {
 }
 
 // The photo ends before the box does: what lies beyond its border is transparent, all else shown.
+TEST_F(ReconstructBox, MeasuresTheEdgesThatAreMarked) {
+  const Eigen::Vector2d beside(0.0, 1.5);
+  std::map<std::string, double> error;  // By what the marks state.
+  for (const char* stated : {"", ", sigma_px: 1."}) {
+    const Outcome outcome = Run(Marked(std::string(", length: [0.9, 0., 0.]") + stated, beside));
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    error[stated] = std::abs(Measured().at("length carton y").value / 0.6 - 1.0);
+  }
+  EXPECT_LT(error[""], 0.005);
+  EXPECT_GT(error[", sigma_px: 1."], 0.01);  // They are taken at their word.
+}
+
 TEST_F(ReconstructBox, LeavesOutWhatThePhotoDoesNotShow) {
   const cv::Mat photo = cv::imread(folder_ / "box.png", cv::IMREAD_GRAYSCALE);
   const double right = std::floor(box_.Corner(1, 0, 1).x()) - 60.0;

@@ -1,0 +1,58 @@
+#include "apps/reconstruct/face_lines.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "apps/reconstruct/box_geometry.h"
+#include "circline/ransac/detection/segment_meetings.h"
+
+namespace circline::apps {
+namespace {
+
+// Of a line's plane through the camera against an axis along which it is taken to be: what a fit's
+// direction may be off.
+constexpr double kAlongRad = 0.04;
+// Of the photo's longer side: shorter lines are letters.
+constexpr double kLeastShare = 0.03;
+// Of a face, about its middle: its edges are no lines on it.
+constexpr double kWithin = 0.98;
+
+// Where the photo has the face across `axis`; none if it is not seen.
+std::optional<ConvexRegion> SeenFace(const BoxFit& fit, int axis, bool far) {
+  if (!FaceIsSeen(fit.cam_from_box, fit.length, axis, far)) return std::nullopt;
+  std::vector<Eigen::Vector2d> corners;
+  for (int corner = 0; corner < 8; ++corner) {
+    if ((corner >> axis & 1) != (far ? 1 : 0)) continue;
+    corners.emplace_back();
+    const Eigen::Vector3d at =
+        fit.cam_from_box.rotation * BoxCorner(fit.length, corner) + fit.cam_from_box.translation;
+    if (!CameraToPixel(fit.camera, at, &corners.back())) return std::nullopt;
+  }
+  return ConvexRegion(std::move(corners), kWithin);
+}
+
+}  // namespace
+
+std::vector<FaceLine> FaceLines(const std::vector<DetectedLine>& lines, const BoxFit& fit) {
+  std::vector<FaceLine> found;
+  const double least_px = kLeastShare * std::max(fit.camera.width, fit.camera.height);
+  for (int across = 0; across < 3; ++across) {
+    for (const bool far : {false, true}) {
+      const std::optional<ConvexRegion> face = SeenFace(fit, across, far);
+      if (!face) continue;
+      for (const DetectedLine& line : lines) {
+        if (line.length_px < least_px || !face->Contains(line.ends)) continue;
+        for (int axis = 0; axis < 3; ++axis) {
+          const double miss = fit.cam_from_box.rotation.col(axis).dot(line.fit.line.normalized());
+          if (axis == across || std::abs(miss) > kAlongRad) continue;
+          found.push_back({axis, line.points, line.sigma_px});
+        }
+      }
+    }
+  }
+  return found;
+}
+
+}  // namespace circline::apps
