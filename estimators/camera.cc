@@ -118,23 +118,23 @@ Distorted Distort(const Camera& camera, const Eigen::Vector2d& x) {
 }  // namespace
 
 Status Camera::Validate() const {
-  const std::string name = id.empty() ? "camera" : "camera '" + id + "'";
+  const auto wrong = [this](const char* what) {
+    return Status::Invalid((id.empty() ? "camera" : "camera '" + id + "'") + ": " + what);
+  };
   constexpr double kMinFocal = 1e-3, kMaxFocal = 1e9;  // Pixels; squares stay far from overflow.
   for (double f : {fx, fy}) {
     if (!(f >= kMinFocal) || !(f <= kMaxFocal)) {
-      return Status::Invalid(
-          name + ": the focal lengths fx, fy must be positive pixels, 1e-3 to 1e9 (camera_matrix)");
+      return wrong("the focal lengths fx, fy must be positive pixels, 1e-3 to 1e9 (camera_matrix)");
     }
   }
   if (!std::isfinite(cx) || !std::isfinite(cy)) {
-    return Status::Invalid(name + ": the principal point cx, cy must be finite (camera_matrix)");
+    return wrong("the principal point cx, cy must be finite (camera_matrix)");
   }
-  if (width < 0 || height < 0)
-    return Status::Invalid(name + ": width and height must not be negative");
+  if (width < 0 || height < 0) return wrong("width and height must not be negative");
   for (double k : distortion) {
-    if (!std::isfinite(k)) return Status::Invalid(name + ": distortion must be finite");
+    if (!std::isfinite(k)) return wrong("distortion must be finite");
     if (model == CameraModel::kPinhole && k != 0.0)
-      return Status::Invalid(name + ": a pinhole camera has no distortion: say model 'opencv'");
+      return wrong("a pinhole camera has no distortion: say model 'opencv'");
   }
   return Status::Ok();
 }

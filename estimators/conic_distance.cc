@@ -10,10 +10,16 @@
 #include "circline/estimators/weights.h"
 
 namespace circline {
+
 PointDistances::PointDistances(const std::vector<CalibratedPoint>& points,
-                               const std::vector<double>* weights, const Normalization& n) {
+                               const std::vector<double>* weights, const Normalization& n,
+                               std::vector<double>* memory)
+    : data_(nullptr, 0, kEnd) {
   // Filled up to whole lanes with points of no weight.
-  data_.resize(static_cast<Eigen::Index>((points.size() + kLanes - 1) / kLanes * kLanes), kEnd);
+  const std::size_t rows = (points.size() + kLanes - 1) / kLanes * kLanes;
+  if (memory == nullptr) memory = &own_memory_;
+  memory->resize(rows * kEnd);
+  new (&data_) decltype(data_)(memory->data(), static_cast<Eigen::Index>(rows), kEnd);
   const double inverse = 1.0 / n.scale;
   const auto append = [&](const CalibratedPoint& p, double weight) {
     data_(size_, kX) = (p.x.x() - n.center_x) * inverse;

@@ -14,8 +14,11 @@ namespace circline {
 // Points that count, normalised, column by column: what is read and written once a pass.
 class PointDistances {
  public:
+  // `memory` (optional) is used as long as this lives, and is kept for others.
   PointDistances(const std::vector<CalibratedPoint>& points, const std::vector<double>* weights,
-                 const Normalization& normalization);
+                 const Normalization& normalization, std::vector<double>* memory);
+  PointDistances(const PointDistances&) = delete;
+  PointDistances& operator=(const PointDistances&) = delete;
 
   // Sums over the points at signed distances r to an ellipse (pixels, negative inside), weights w.
   struct NormalEquations {
@@ -47,7 +50,8 @@ class PointDistances {
   auto At(Column column, Eigen::Index i) { return data_.col(column).segment<kLanes>(i); }
   double FindFeet(Eigen::Index i, const Eigen::Matrix3d& conic, double level);
 
-  Eigen::Array<double, Eigen::Dynamic, kEnd> data_;
+  std::vector<double> own_memory_;
+  Eigen::Map<Eigen::Array<double, Eigen::Dynamic, kEnd>> data_;
   Eigen::Index size_ = 0;
 };
 

@@ -56,6 +56,7 @@ struct Problem {
   const std::vector<CalibratedPoint>& points;
   const std::vector<double>* weights;
   double sigma_px;
+  std::vector<double>* memory;  // May be null.
   Normalization normalization;
   Moments means;
 
@@ -83,7 +84,7 @@ bool IsHyperbola(const Problem& problem, const Minimum& best) {
 // `other` (optional): where to look for a second minimum if the first was hard to reach.
 Status Refine(const Problem& problem, const Eigen::Matrix3d& initial, const Eigen::Matrix3d* other,
               ConicFit* fit) {
-  PointDistances contour(problem.points, problem.weights, problem.normalization);
+  PointDistances contour(problem.points, problem.weights, problem.normalization, problem.memory);
   Minimum best;
   bool found = MinimizeDistances(initial, &contour, &best);
   constexpr int kHard = 7;  // Three steps are usual; more say that the cost is far from quadratic.
@@ -124,9 +125,9 @@ Status FitConicDirect(const std::vector<CalibratedPoint>& points, Eigen::Matrix3
 }
 
 Status FitConic(const std::vector<CalibratedPoint>& points, double sigma_px, ConicFit* fit,
-                const std::vector<double>* weights) {
+                const std::vector<double>* weights, std::vector<double>* memory) {
   if (points.size() < 5) return Status::Refused("an ellipse needs five points");
-  Problem problem{points, weights, sigma_px, {}, {}};
+  Problem problem{points, weights, sigma_px, memory, {}, {}};
   Eigen::Matrix3d initial, circle;
   if (!problem.Normalize() || !FitEllipse(problem.means, &initial)) return NoEllipse();
   const bool has_circle = FitCircle(problem.means, &circle);
@@ -137,7 +138,7 @@ Status RefineConic(const std::vector<CalibratedPoint>& points, double sigma_px,
                    const Eigen::Matrix3d& initial, ConicFit* fit,
                    const std::vector<double>* weights) {
   if (points.size() < 5) return Status::Refused("an ellipse needs five points");
-  Problem problem{points, weights, sigma_px, {}, {}};
+  Problem problem{points, weights, sigma_px, nullptr, {}, {}};
   if (!problem.Normalize()) return NoEllipse();
   Eigen::Matrix3d normalized;
   if (!NormalizeEllipse(TransformConic(initial, problem.normalization.Inverse()), &normalized)) {

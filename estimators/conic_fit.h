@@ -42,9 +42,11 @@ struct ConicFit {
 // (NEES 5 +- 0.3) for whole ellipses up to a noise of a twentieth of the shorter semi-axis and for
 // arcs of 90 degrees up to 2 % of the longer one. What a short arc says of the far side bends: the
 // entries of the conic of a 90 degrees' arc are calibrated up to 0.5 %, and spread wider beyond.
-// 12 us for 100 points of a whole ellipse, 17 us for an arc of 90 degrees.
+// 12 us for 100 points of a whole ellipse, 17 us for an arc of 90 degrees. Allocates once, nothing
+// with `memory` (optional) that has served as many points before.
 Status FitConic(const std::vector<CalibratedPoint>& points, double sigma_px, ConicFit* fit,
-                const std::vector<double>* weights = nullptr);
+                const std::vector<double>* weights = nullptr,
+                std::vector<double>* memory = nullptr);
 
 // Closed form: hyper-accurate algebraic least squares (Kanatani and Rangarajan 2011), and where
 // that is not an ellipse, the ellipse-constrained least squares of Halir and Flusser 1998. 0.3 us,

@@ -19,23 +19,23 @@ bool Finite(const Segment& s) { return s[0].allFinite() && s[1].allFinite(); }
 bool NonNegative(double value) { return value >= 0.0 && std::isfinite(value); }
 
 Status ValidateCircle(const CircleObservation& circle) {
-  const std::string name = "circle '" + circle.id + "'";
-  if (!Finite(circle.points)) return Status::Invalid(name + ": a contour point is not finite");
+  const auto wrong = [&](const char* what) {
+    return Status::Invalid("circle '" + circle.id + "': " + what);
+  };
+  if (!Finite(circle.points)) return wrong("a contour point is not finite");
   if (!circle.inliers.empty() && circle.inliers.size() != circle.points.size()) {
-    return Status::Invalid(name + ": the inlier mask has another length than the contour");
+    return wrong("the inlier mask has another length than the contour");
   }
   if (!circle.normals.empty() && circle.normals.size() != circle.points.size()) {
-    return Status::Invalid(name + ": normals must be one for each point, or none");
+    return wrong("normals must be one for each point, or none");
   }
-  if (!Finite(circle.normals)) return Status::Invalid(name + ": a normal is not finite");
-  if (!NonNegative(circle.sigma_px)) return Status::Invalid(name + ": sigma_px must be 0 or more");
-  if (!NonNegative(circle.radius)) return Status::Invalid(name + ": radius must be 0 or more");
-  if (!NonNegative(circle.radius_sigma))
-    return Status::Invalid(name + ": radius_sigma must be 0 or more");
-  if (circle.center && !circle.center->allFinite())
-    return Status::Invalid(name + ": center is not finite");
+  if (!Finite(circle.normals)) return wrong("a normal is not finite");
+  if (!NonNegative(circle.sigma_px)) return wrong("sigma_px must be 0 or more");
+  if (!NonNegative(circle.radius)) return wrong("radius must be 0 or more");
+  if (!NonNegative(circle.radius_sigma)) return wrong("radius_sigma must be 0 or more");
+  if (circle.center && !circle.center->allFinite()) return wrong("center is not finite");
   for (const Segment& s : circle.diameters) {
-    if (!Finite(s)) return Status::Invalid(name + ": a diameter is not finite");
+    if (!Finite(s)) return wrong("a diameter is not finite");
   }
   return Status::Ok();
 }
@@ -54,15 +54,17 @@ Status ValidateRadiusGroups(const Observations& observations) {
 }
 
 Status ValidatePencil(const PencilObservation& pencil) {
-  const std::string name = "pencil '" + pencil.id + "'";
-  if (!NonNegative(pencil.sigma_px)) return Status::Invalid(name + ": sigma_px must be 0 or more");
+  const auto wrong = [&](const char* what) {
+    return Status::Invalid("pencil '" + pencil.id + "': " + what);
+  };
+  if (!NonNegative(pencil.sigma_px)) return wrong("sigma_px must be 0 or more");
   for (const LineObservation& line : pencil.lines) {
-    if (!Finite(line.points)) return Status::Invalid(name + ": a segment is not finite");
+    if (!Finite(line.points)) return wrong("a segment is not finite");
     if (!NonNegative(line.sigma_px)) {
-      return Status::Invalid(name + ": sigma_px of a line must be 0 or more");
+      return wrong("sigma_px of a line must be 0 or more");
     }
     if (!line.inliers.empty() && line.inliers.size() != line.points.size()) {
-      return Status::Invalid(name + ": an inlier mask has another length than its line");
+      return wrong("an inlier mask has another length than its line");
     }
   }
   return Status::Ok();
@@ -89,6 +91,22 @@ bool NamesPlane(const Observations& observations, const std::string& plane) {
          std::any_of(observations.circles.begin(), observations.circles.end(), is_on) ||
          std::any_of(observations.pencils.begin(), observations.pencils.end(), is_on);
 }
+
+// The ids so far. Few are compared one by one, which allocates nothing.
+class Ids {
+ public:
+  // False where it has been there.
+  template <typename Features>
+  bool Insert(const Features& features, std::size_t i) {
+    constexpr std::size_t kFew = 64;
+    if (features.size() > kFew) return ids_.insert(features[i].id).second;
+    return std::none_of(features.begin(), features.begin() + static_cast<std::ptrdiff_t>(i),
+                        [&](const auto& other) { return other.id == features[i].id; });
+  }
+
+ private:
+  std::set<std::string> ids_;
+};
 
 Status ValidateKnown(const Observations& observations) {
   std::set<std::string> pencils;
@@ -144,18 +162,16 @@ Status Observations::Validate() const {
   Status status = camera.Validate();
   if (status.ok() && !NonNegative(stated_focal_px))
     status = Status::Invalid("stated_focal_px must be 0 or more");
-  std::set<std::string> circle_ids, pencil_ids;
-  for (const CircleObservation& circle : circles) {
-    if (status.ok()) status = ValidateCircle(circle);
-    if (status.ok() && !circle_ids.insert(circle.id).second) {
-      status = Status::Invalid("two circles have the id '" + circle.id + "'");
-    }
+  Ids circle_ids, pencil_ids;
+  for (std::size_t i = 0; i < circles.size() && status.ok(); ++i) {
+    status = ValidateCircle(circles[i]);
+    if (status.ok() && !circle_ids.Insert(circles, i))
+      status = Status::Invalid("two circles have the id '" + circles[i].id + "'");
   }
-  for (const PencilObservation& pencil : pencils) {
-    if (status.ok()) status = ValidatePencil(pencil);
-    if (status.ok() && !pencil_ids.insert(pencil.id).second) {
-      status = Status::Invalid("two pencils have the id '" + pencil.id + "'");
-    }
+  for (std::size_t i = 0; i < pencils.size() && status.ok(); ++i) {
+    status = ValidatePencil(pencils[i]);
+    if (status.ok() && !pencil_ids.Insert(pencils, i))
+      status = Status::Invalid("two pencils have the id '" + pencils[i].id + "'");
   }
   if (status.ok()) status = ValidateRadiusGroups(*this);
   if (status.ok()) status = ValidateFrame(*this);
@@ -298,36 +314,49 @@ int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& p
                      const std::vector<std::uint8_t>& inliers,
                      std::vector<CalibratedPoint>* points) {
   if (inliers.empty()) return PixelsToCalibrated(camera, pixels, points);
-  std::vector<Eigen::Vector2d> kept;
-  kept.reserve(pixels.size());
+  points->clear();
+  points->reserve(pixels.size());
+  int dropped = 0;
+  CalibratedPoint point;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (inliers[i] != 0) kept.push_back(pixels[i]);
+    if (inliers[i] == 0) continue;
+    if (PixelToCalibrated(camera, pixels[i], &point)) {
+      points->push_back(point);
+    } else {
+      ++dropped;
+    }
   }
-  return PixelsToCalibrated(camera, kept, points);
+  return dropped;
 }
 
 void FitDirect(double default_sigma_px, Observations* observations,
-               std::vector<std::string>* problems, const NoiseModel& noise) {
-  const auto report = [problems](const std::string& what, const Status& status) {
-    if (problems != nullptr && !status.ok()) problems->push_back(what + ": " + status.message);
+               std::vector<std::string>* problems, const NoiseModel& noise, FitMemory* memory) {
+  const auto report = [problems](const char* kind, const std::string& id, int line,
+                                 const Status& status) {
+    if (problems == nullptr || status.ok()) return;
+    const std::string which = line >= 0 ? ", line " + std::to_string(line) : std::string();
+    problems->push_back(kind + (" '" + id + "'") + which + ": " + status.message);
   };
   const auto sigma = [default_sigma_px](double own) { return own > 0.0 ? own : default_sigma_px; };
-  std::vector<CalibratedPoint> points;
+  FitMemory own_memory;
+  if (memory == nullptr) memory = &own_memory;
+  std::vector<CalibratedPoint>& points = memory->points;
+  std::vector<LineFit>& fits = memory->fits;
   for (CircleObservation& circle : observations->circles) {
     if (circle.fit) continue;
     observations->num_dropped_points +=
         CalibrateInliers(observations->camera, circle.points, circle.inliers, &points);
     ConicFit fit;
     const double sigma_px = sigma(circle.sigma_px);
-    const Status status = FitConic(points, sigma_px, &fit);
+    const Status status = FitConic(points, sigma_px, &fit, nullptr, &memory->numbers);
     if (status.ok()) {
       fit.ScaleCovariance(1.0 / noise.ContourWeight(sigma_px, circle.points, circle.inliers));
       circle.fit = fit;
     }
-    report("circle '" + circle.id + "'", status);
+    report("circle", circle.id, -1, status);
   }
   for (PencilObservation& pencil : observations->pencils) {
-    std::vector<LineFit> fits;
+    fits.clear();
     for (std::size_t i = 0; i < pencil.lines.size(); ++i) {
       LineObservation& line = pencil.lines[i];
       if (!line.fit) {
@@ -340,7 +369,7 @@ void FitDirect(double default_sigma_px, Observations* observations,
           fit.covariance /= noise.LineWeight(sigma_px, line.points, line.inliers);
           line.fit = fit;
         }
-        report("pencil '" + pencil.id + "', line " + std::to_string(i), status);
+        report("pencil", pencil.id, static_cast<int>(i), status);
       }
       if (line.fit && line.is_parallel)
         fits.push_back(WithDirectionError(*line.fit, noise.line_direction_rad));
@@ -349,7 +378,7 @@ void FitDirect(double default_sigma_px, Observations* observations,
     VanishingPointFit fit;
     const Status status = FitVanishingPoint(fits, &fit);
     if (status.ok()) pencil.fit = fit;
-    report("pencil '" + pencil.id + "'", status);
+    report("pencil", pencil.id, -1, status);
   }
 }
 

@@ -170,6 +170,13 @@ int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& p
                      const std::vector<std::uint8_t>& inliers,
                      std::vector<CalibratedPoint>* points);
 
+// What FitDirect needs in between, for callers that keep it from photo to photo.
+struct FitMemory {
+  std::vector<CalibratedPoint> points;  // Of one feature.
+  std::vector<double> numbers;          // Of a contour.
+  std::vector<LineFit> fits;            // Of one pencil's lines.
+};
+
 // Fills every fit that is absent by the direct (non-robust) maximum-likelihood fits, taking
 // `default_sigma_px` where a feature states no sigma of its own. What cannot be fitted stays
 // without a fit; `problems` (optional) receives one sentence for each. Covariances include the
@@ -177,7 +184,7 @@ int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& p
 // pencil's direction.
 void FitDirect(double default_sigma_px, Observations* observations,
                std::vector<std::string>* problems = nullptr,
-               const NoiseModel& noise = NoiseModel::Exact());
+               const NoiseModel& noise = NoiseModel::Exact(), FitMemory* memory = nullptr);
 
 }  // namespace circline
 

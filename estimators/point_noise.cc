@@ -7,11 +7,7 @@
 namespace circline {
 namespace {
 
-// An estimate of a variance, and what it is worth: Gaussian residuals that would say as much.
-struct Scatter {
-  double variance = 0.0;  // px^2.
-  double freedom = 0.0;   // Degrees of freedom; 0 = nothing is redundant.
-};
+using Scatter = PointNoiseMeter::Scatter;
 
 // Posterior mean of a variance with a scaled inverse chi-square prior of `worth` degrees of
 // freedom: (worth prior + sum of squares) / (freedom + worth - 2), which is finite from two degrees
@@ -46,89 +42,14 @@ Scatter FromMost(const std::vector<double>& residuals, std::vector<double>* size
   return FromSquares(squares / (n * kVarianceWithinGate), n, parameters);
 }
 
-class NoiseMeter {
- public:
-  NoiseMeter(const Observations& fitted, const NoiseModel& model)
-      : fitted_(fitted), model_(model) {}
+double Count(const std::vector<std::uint8_t>& mask) {
+  return static_cast<double>(mask.size()) -
+         static_cast<double>(std::count(mask.begin(), mask.end(), 0));
+}
 
-  Scatter OfCircle(const CircleObservation& circle) {
-    if (circle.sigma_px > 0.0 || !circle.fit) return {};
-    constexpr double kParameters = 5.0;
-    const double rms = circle.fit->rms_px;
-    const auto shared = [&](Scatter scatter) {
-      const double worth =
-          model_.ContourFreedom(std::sqrt(scatter.variance), circle.points, circle.inliers);
-      scatter.freedom = std::min(scatter.freedom, worth);
-      return scatter;
-    };
-    if (!circle.inliers.empty())
-      return shared(FromSquares(rms * rms, Count(circle.inliers), kParameters));
-    CalibrateInliers(fitted_.camera, circle.points, circle.inliers, &points_);
-    residuals_.clear();
-    for (const CalibratedPoint& p : points_)
-      residuals_.push_back(ConicDistancePx(p, circle.fit->conic));
-    return shared(FromMost(residuals_, &sizes_, kParameters));
-  }
-
-  Scatter OfLine(const PencilObservation& pencil, const LineObservation& line) {
-    if (LineSigma(pencil, line) > 0.0 || !line.fit || IsSegment(line)) return {};
-    constexpr double kParameters = 2.0;
-    const double rms = line.fit->rms_px;
-    const auto shared = [&](Scatter scatter) {
-      const double worth =
-          model_.LineFreedom(std::sqrt(scatter.variance), line.points, line.inliers);
-      scatter.freedom = std::min(scatter.freedom, worth);
-      return scatter;
-    };
-    if (!line.inliers.empty())
-      return shared(FromSquares(rms * rms, Count(line.inliers), kParameters));
-    CalibrateInliers(fitted_.camera, line.points, line.inliers, &points_);
-    residuals_.clear();
-    for (const CalibratedPoint& p : points_)
-      residuals_.push_back(LineDistancePx(p, line.fit->line));
-    return shared(FromMost(residuals_, &sizes_, kParameters));
-  }
-
-  // All segments of two points together: their misses of the vanishing point in standard
-  // deviations, if the end points' were 1 px.
-  Scatter OfSegments(const PencilObservation& pencil) {
-    if (!pencil.fit) return {};
-    residuals_.clear();
-    double num_lines = 0.0, squares = 0.0;
-    bool has_masks = true;
-    for (const LineObservation& line : pencil.lines) {
-      if (!line.fit || !line.is_parallel) continue;
-      num_lines += 1.0;
-      if (LineSigma(pencil, line) > 0.0 || !IsSegment(line)) continue;
-      has_masks = has_masks && !line.inliers.empty();
-      CalibrateInliers(fitted_.camera, line.points, line.inliers, &points_);
-      LineFit unit;
-      if (!FitLine(points_, 1.0, &unit).ok()) continue;
-      residuals_.push_back(VanishingPointResidual(unit, pencil.fit->direction));
-      squares += residuals_.back() * residuals_.back();
-    }
-    if (residuals_.empty()) return {};
-    // The two parameters of the vanishing point, shared out among all lines.
-    const double n = static_cast<double>(residuals_.size()), parameters = 2.0 * n / num_lines;
-    return has_masks ? FromSquares(squares / n, n, parameters)
-                     : FromMost(residuals_, &sizes_, parameters);
-  }
-
-  static bool IsSegment(const LineObservation& line) {
-    return line.inliers.empty() ? line.points.size() == 2 : Count(line.inliers) == 2.0;
-  }
-
- private:
-  static double Count(const std::vector<std::uint8_t>& mask) {
-    return static_cast<double>(mask.size()) -
-           static_cast<double>(std::count(mask.begin(), mask.end(), 0));
-  }
-
-  const Observations& fitted_;
-  const NoiseModel& model_;
-  std::vector<CalibratedPoint> points_;
-  std::vector<double> residuals_, sizes_;
-};
+bool IsSegment(const LineObservation& line) {
+  return line.inliers.empty() ? line.points.size() == 2 : Count(line.inliers) == 2.0;
+}
 
 double Freedom(const std::vector<Scatter>& scatters) {
   double freedom = 0.0;
@@ -136,69 +57,145 @@ double Freedom(const std::vector<Scatter>& scatters) {
   return freedom;
 }
 
+}  // namespace
+
+Scatter PointNoiseMeter::OfCircle(const CircleObservation& circle) {
+  if (circle.sigma_px > 0.0 || !circle.fit) return {};
+  constexpr double kParameters = 5.0;
+  const double rms = circle.fit->rms_px;
+  const auto shared = [&](Scatter scatter) {
+    const double worth =
+        model_->ContourFreedom(std::sqrt(scatter.variance), circle.points, circle.inliers);
+    scatter.freedom = std::min(scatter.freedom, worth);
+    return scatter;
+  };
+  if (!circle.inliers.empty())
+    return shared(FromSquares(rms * rms, Count(circle.inliers), kParameters));
+  CalibrateInliers(fitted_->camera, circle.points, circle.inliers, &points_);
+  residuals_.clear();
+  for (const CalibratedPoint& p : points_)
+    residuals_.push_back(ConicDistancePx(p, circle.fit->conic));
+  return shared(FromMost(residuals_, &sizes_, kParameters));
+}
+
+Scatter PointNoiseMeter::OfLine(const PencilObservation& pencil, const LineObservation& line) {
+  if (LineSigma(pencil, line) > 0.0 || !line.fit || IsSegment(line)) return {};
+  constexpr double kParameters = 2.0;
+  const double rms = line.fit->rms_px;
+  const auto shared = [&](Scatter scatter) {
+    const double worth =
+        model_->LineFreedom(std::sqrt(scatter.variance), line.points, line.inliers);
+    scatter.freedom = std::min(scatter.freedom, worth);
+    return scatter;
+  };
+  if (!line.inliers.empty())
+    return shared(FromSquares(rms * rms, Count(line.inliers), kParameters));
+  CalibrateInliers(fitted_->camera, line.points, line.inliers, &points_);
+  residuals_.clear();
+  for (const CalibratedPoint& p : points_) residuals_.push_back(LineDistancePx(p, line.fit->line));
+  return shared(FromMost(residuals_, &sizes_, kParameters));
+}
+
+// All segments of two points together: their misses of the vanishing point in standard
+// deviations, if the end points' were 1 px.
+Scatter PointNoiseMeter::OfSegments(const PencilObservation& pencil) {
+  if (!pencil.fit) return {};
+  residuals_.clear();
+  double num_lines = 0.0, squares = 0.0;
+  bool has_masks = true;
+  for (const LineObservation& line : pencil.lines) {
+    if (!line.fit || !line.is_parallel) continue;
+    num_lines += 1.0;
+    if (LineSigma(pencil, line) > 0.0 || !IsSegment(line)) continue;
+    has_masks = has_masks && !line.inliers.empty();
+    CalibrateInliers(fitted_->camera, line.points, line.inliers, &points_);
+    LineFit unit;
+    if (!FitLine(points_, 1.0, &unit).ok()) continue;
+    residuals_.push_back(VanishingPointResidual(unit, pencil.fit->direction));
+    squares += residuals_.back() * residuals_.back();
+  }
+  if (residuals_.empty()) return {};
+  // The two parameters of the vanishing point, shared out among all lines.
+  const double n = static_cast<double>(residuals_.size()), parameters = 2.0 * n / num_lines;
+  return has_masks ? FromSquares(squares / n, n, parameters)
+                   : FromMost(residuals_, &sizes_, parameters);
+}
+
 // The noise that half of the degrees of freedom exceed.
-double Common(std::vector<Scatter> scatters, double default_px, double worth = 1.0) {
+double PointNoiseMeter::Common(const std::vector<Scatter>& scatters, double default_px,
+                               double worth) {
   const double freedom = Freedom(scatters);
-  for (Scatter& s : scatters) {
+  sorted_ = scatters;
+  for (Scatter& s : sorted_) {
     // The median of chi-square over its mean (Wilson and Hilferty 1931), so that few degrees of
     // freedom each do not pull the median down.
     const double cube_root = 1.0 - 2.0 / (9.0 * std::max(1.0, s.freedom));
     s.variance /= cube_root * cube_root * cube_root;
   }
   if (!(freedom > 0.0)) return default_px;
-  std::sort(scatters.begin(), scatters.end(),
+  std::sort(sorted_.begin(), sorted_.end(),
             [](const Scatter& a, const Scatter& b) { return a.variance < b.variance; });
   double below = 0.0;
   std::size_t i = 0;
-  while (below + scatters[i].freedom < 0.5 * freedom) below += scatters[i++].freedom;
-  return Shrink({scatters[i].variance, freedom}, default_px, worth);
+  while (below + sorted_[i].freedom < 0.5 * freedom) below += sorted_[i++].freedom;
+  return Shrink({sorted_[i].variance, freedom}, default_px, worth);
 }
-
-}  // namespace
 
 PointNoise MeasurePointNoise(const Observations& fitted, const NoiseModel& model,
                              double conic_default_px, double line_default_px) {
-  NoiseMeter meter(fitted, model);
   PointNoise noise;
-  std::vector<Scatter> circles, lines;
-  for (const CircleObservation& circle : fitted.circles) circles.push_back(meter.OfCircle(circle));
-  // One for each pencil's segments, then one for each of its lines.
+  PointNoiseMeter().Measure(fitted, model, &noise, conic_default_px, line_default_px);
+  return noise;
+}
+
+void PointNoiseMeter::Measure(const Observations& fitted, const NoiseModel& model,
+                              PointNoise* noise, double conic_default_px, double line_default_px) {
+  fitted_ = &fitted;
+  model_ = &model;
+  circles_.clear();
+  lines_.clear();
+  for (const CircleObservation& circle : fitted.circles) circles_.push_back(OfCircle(circle));
   for (const PencilObservation& pencil : fitted.pencils) {
-    lines.push_back(meter.OfSegments(pencil));
-    for (const LineObservation& line : pencil.lines) lines.push_back(meter.OfLine(pencil, line));
+    lines_.push_back(OfSegments(pencil));
+    for (const LineObservation& line : pencil.lines) lines_.push_back(OfLine(pencil, line));
   }
   // A photo is about as sharp along its lines as along its contours. Where many points of the one
   // kind say how sharp, that counts as ten residuals of the other would: segments have few of their
   // own, and so have small contours.
   constexpr double kMany = 20.0, kWorth = 10.0;
-  const bool many_on_circles = Freedom(circles) >= kMany, many_on_lines = Freedom(lines) >= kMany;
+  const bool many_on_circles = Freedom(circles_) >= kMany, many_on_lines = Freedom(lines_) >= kMany;
   const double ratio = line_default_px / conic_default_px;
   const bool lines_tell = many_on_lines && !many_on_circles;
   const double conic_worth = lines_tell ? kWorth : 1.0;
-  noise.conic_px = Common(
-      circles, lines_tell ? Common(lines, line_default_px) / ratio : conic_default_px, conic_worth);
-  for (std::size_t i = 0; i < circles.size(); ++i) {
+  noise->conic_px =
+      Common(circles_, lines_tell ? Common(lines_, line_default_px) / ratio : conic_default_px,
+             conic_worth);
+  noise->circles.clear();
+  for (std::size_t i = 0; i < circles_.size(); ++i) {
     const double stated = fitted.circles[i].sigma_px;
-    noise.circles.push_back(stated > 0.0 ? stated
-                                         : Shrink(circles[i], noise.conic_px, conic_worth));
+    noise->circles.push_back(stated > 0.0 ? stated
+                                          : Shrink(circles_[i], noise->conic_px, conic_worth));
   }
   const double worth = many_on_circles ? kWorth : 1.0;
-  noise.line_worth = worth;
-  noise.line_px = Common(lines, many_on_circles ? noise.conic_px * ratio : line_default_px, worth);
+  noise->line_worth = worth;
+  noise->line_px =
+      Common(lines_, many_on_circles ? noise->conic_px * ratio : line_default_px, worth);
   std::size_t next = 0;
+  noise->lines.resize(fitted.pencils.size());
+  auto of_pencil_lines = noise->lines.begin();
   for (const PencilObservation& pencil : fitted.pencils) {
-    const Scatter segments = lines[next++];
-    std::vector<double>& sigmas = noise.lines.emplace_back();
+    const Scatter segments = lines_[next++];
+    std::vector<double>& sigmas = *of_pencil_lines++;
+    sigmas.clear();
     for (const LineObservation& line : pencil.lines) {
-      const Scatter own = lines[next++];
+      const Scatter own = lines_[next++];
       const double stated = LineSigma(pencil, line);
-      const bool of_pencil = NoiseMeter::IsSegment(line) && line.is_parallel;
+      const bool of_pencil = IsSegment(line) && line.is_parallel;
       sigmas.push_back(stated > 0.0 ? stated
-                       : of_pencil  ? Shrink(segments, noise.line_px, worth)
-                                    : Shrink(own, noise.line_px));
+                       : of_pencil  ? Shrink(segments, noise->line_px, worth)
+                                    : Shrink(own, noise->line_px));
     }
   }
-  return noise;
 }
 
 }  // namespace circline

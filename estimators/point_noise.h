@@ -18,6 +18,9 @@ struct PointNoise {
   std::vector<std::vector<double>> lines;  // By pencil, by line.
 };
 
+// Defaults, pixels.
+constexpr double kConicDefaultPx = 0.3, kLineDefaultPx = 0.4;
+
 // A feature that states its noise has that. Any other has the scatter of its points about its own
 // fit, shrunk towards the common noise of its kind; segments of two points have that of their
 // pencil's segments about its vanishing point. The common noise is the median over the features,
@@ -37,7 +40,35 @@ struct PointNoise {
 // 0.2 us a feature with a mask, 30 ns a point without (no lens distortion).
 PointNoise MeasurePointNoise(const Observations& fitted,
                              const NoiseModel& model = NoiseModel::Exact(),
-                             double conic_default_px = 0.3, double line_default_px = 0.4);
+                             double conic_default_px = kConicDefaultPx,
+                             double line_default_px = kLineDefaultPx);
+
+// The same for one photo after the other, in memory that it keeps.
+class PointNoiseMeter {
+ public:
+  // As MeasurePointNoise.
+  void Measure(const Observations& fitted, const NoiseModel& model, PointNoise* noise,
+               double conic_default_px = kConicDefaultPx, double line_default_px = kLineDefaultPx);
+
+  // An estimate of a variance, and what it is worth: Gaussian residuals that would say as much.
+  struct Scatter {
+    double variance = 0.0;  // px^2.
+    double freedom = 0.0;   // Degrees of freedom; 0 = nothing is redundant.
+  };
+
+ private:
+  Scatter OfCircle(const CircleObservation& circle);
+  Scatter OfLine(const PencilObservation& pencil, const LineObservation& line);
+  Scatter OfSegments(const PencilObservation& pencil);
+  double Common(const std::vector<Scatter>& scatters, double default_px, double worth = 1.0);
+
+  const Observations* fitted_ = nullptr;
+  const NoiseModel* model_ = nullptr;
+  std::vector<CalibratedPoint> points_;
+  std::vector<double> residuals_, sizes_;
+  // By circle; one for each pencil's segments, then one for each of its lines; in order of size.
+  std::vector<Scatter> circles_, lines_, sorted_;
+};
 
 }  // namespace circline
 

@@ -162,6 +162,12 @@ PlaneCircleContourCost::PlaneCircleContourCost(ImagePoints points, Blocks blocks
                     (blocks.tilt_and_height ? kPriorRows : 0));
 }
 
+void PlaneCircleContourCost::Exchange(ImagePoints* points) {
+  std::swap(points_, *points);
+  set_num_residuals(RankOf(points_, blocks_.offset, blocks_.camera) + 1 +
+                    (blocks_.tilt_and_height ? kPriorRows : 0));
+}
+
 void PlaneCircleContourCost::Distances(const double* const* parameters,
                                        std::vector<double>* distances) const {
   const PlaneCircle circle(parameters, blocks_.tilt_and_height);

@@ -99,6 +99,9 @@ class PlaneCircleContourCost : public FeatureCost {
   };
   // Of the points of its contour.
   PlaneCircleContourCost(ImagePoints points, Blocks blocks);
+  // Takes other points and gives back its own: from frame to frame, without new memory. Not in a
+  // problem.
+  void Exchange(ImagePoints* points);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
 
@@ -123,6 +126,8 @@ class DirectionLineCost : public FeatureCost {
   };
   // `fit`: any line near, calibrated coordinates of the camera of the points (FitLine).
   DirectionLineCost(ImagePoints points, const Eigen::Vector3d& fit, Options options);
+  // As PlaneCircleContourCost's.
+  void Exchange(ImagePoints* points, const Eigen::Vector3d& fit);
   // As FeatureCost says.
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
@@ -190,6 +195,8 @@ class PlanePointCost : public FeatureCost {
   // Seen at `pixel`, of which each coordinate has this standard deviation.
   PlanePointCost(const Camera& camera, const Eigen::Vector2d& pixel, double sigma_px, LossType loss,
                  bool camera_block = false);
+  // Seen elsewhere: from frame to frame.
+  void Reset(const Camera& camera, const Eigen::Vector2d& pixel, double sigma_px);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "circline/estimators/noise_model.h"
@@ -17,22 +18,33 @@
 namespace circline {
 
 // `sigma_px`: of each coordinate, what neighbours share not included; it takes the place of that in
-// `options`. None where there are too few points for a contour (5), a line (2).
+// `options`. False where there are too few points for a contour (5), a line (2).
+inline bool FillEvidencePoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
+                               const std::vector<std::uint8_t>& inliers, double sigma_px,
+                               bool is_contour, const NoiseModel& noise,
+                               ImagePoints::Options options, ImagePoints* points) {
+  if (pixels.empty()) return false;
+  const double shared = is_contour ? noise.contour_px : noise.line_px;
+  const double sigma = std::hypot(sigma_px, shared);
+  options.sigma_px = sigma;
+  points->Reset(camera, pixels, inliers, options);
+  if (points->size() < (is_contour ? 5U : 2U)) return false;
+  const double weight = is_contour ? noise.ContourWeight(sigma_px, pixels, inliers)
+                                   : noise.LineWeight(sigma_px, pixels, inliers);
+  points->set_weight(weight * (sigma * sigma) / (sigma_px * sigma_px));
+  return true;
+}
+
+// The same, made anew.
 inline std::optional<ImagePoints> EvidencePoints(const Camera& camera,
                                                  const std::vector<Eigen::Vector2d>& pixels,
                                                  const std::vector<std::uint8_t>& inliers,
                                                  double sigma_px, bool is_contour,
                                                  const NoiseModel& noise,
-                                                 ImagePoints::Options options) {
-  if (pixels.empty()) return {};
-  const double shared = is_contour ? noise.contour_px : noise.line_px;
-  const double sigma = std::hypot(sigma_px, shared);
-  options.sigma_px = sigma;
-  ImagePoints points(camera, pixels, inliers, options);
-  if (points.size() < (is_contour ? 5U : 2U)) return {};
-  const double weight = is_contour ? noise.ContourWeight(sigma_px, pixels, inliers)
-                                   : noise.LineWeight(sigma_px, pixels, inliers);
-  points.set_weight(weight * (sigma * sigma) / (sigma_px * sigma_px));
+                                                 const ImagePoints::Options& options) {
+  std::optional<ImagePoints> points(std::in_place);
+  if (!FillEvidencePoints(camera, pixels, inliers, sigma_px, is_contour, noise, options, &*points))
+    points.reset();
   return points;
 }
 

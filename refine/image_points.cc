@@ -131,9 +131,16 @@ double SumWithCamera(std::size_t n, const ImagePoints::Options& options, const W
 
 }  // namespace
 
-ImagePoints::ImagePoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
-                         const std::vector<std::uint8_t>& inliers, const Options& options)
-    : camera_(camera), options_(options) {
+void ImagePoints::Reset(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
+                        const std::vector<std::uint8_t>& inliers, const Options& options) {
+  camera_ = camera;
+  camera_.id.clear();  // Cameras are copied when they are shifted: a long name would allocate.
+  options_ = options;
+  normalization_.setIdentity();
+  lens_.clear();
+  points_.clear();
+  pixels_.clear();
+  normalized_.clear();
   if (camera.model == CameraModel::kPinhole) options_.num_distortion = 0;
   for (int k = 0; k < options_.num_distortion; ++k) lens_.emplace_back(camera, k);
   points_.reserve(pixels.size());

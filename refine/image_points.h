@@ -3,7 +3,7 @@
 //
 // The residual of a point is its distance from the curve in pixels of the photo as taken, over its
 // standard deviation, under the loss. Curves are conics and lines in calibrated coordinates of the
-// camera. Allocates when it is made and never after.
+// camera. Allocates when it is made, or takes more points than ever before, and else never.
 #ifndef CIRCLINE_REFINE_IMAGE_POINTS_H_
 #define CIRCLINE_REFINE_IMAGE_POINTS_H_
 
@@ -66,7 +66,13 @@ class ImagePoints {
   // Points with inliers[i] == 0 are left out (`inliers` may be empty), and so are those that the
   // camera cannot undistort.
   ImagePoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
-              const std::vector<std::uint8_t>& inliers, const Options& options);
+              const std::vector<std::uint8_t>& inliers, const Options& options) {
+    Reset(camera, pixels, inliers, options);
+  }
+  ImagePoints() = default;  // None.
+  // Takes these in place of its own, in their memory.
+  void Reset(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
+             const std::vector<std::uint8_t>& inliers, const Options& options);
 
   std::size_t size() const { return points_.size(); }  // Of those that were not left out.
   const std::vector<CalibratedPoint>& points() const { return points_; }  // Undistorted.

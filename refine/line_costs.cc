@@ -59,6 +59,13 @@ DirectionLineCost::DirectionLineCost(ImagePoints points, const Eigen::Vector3d& 
                     (options.direction_sigma > 0.0 ? 1 : 0));
 }
 
+void DirectionLineCost::Exchange(ImagePoints* points, const Eigen::Vector3d& fit) {
+  std::swap(points_, *points);
+  fit_ = fit.normalized();
+  set_num_residuals(LineRank(points_, options_.camera) + 1 +
+                    (options_.direction_sigma > 0.0 ? 1 : 0));
+}
+
 bool DirectionLineCost::Place(const double* const* parameters, Placed* placed) const {
   Placed& p = *placed;
   p.R = RotationFromBlock(parameters[0]);
@@ -207,6 +214,13 @@ PlanePointCost::PlanePointCost(const Camera& camera, const Eigen::Vector2d& pixe
   for (const int size : {4, 3, 2}) mutable_parameter_block_sizes()->push_back(size);
   if (camera_block) mutable_parameter_block_sizes()->push_back(kCameraSize);
   set_num_residuals(3);
+}
+
+void PlanePointCost::Reset(const Camera& camera, const Eigen::Vector2d& pixel, double sigma_px) {
+  camera_ = camera;
+  camera_.id.clear();  // As ImagePoints' camera.
+  pixel_ = pixel;
+  sigma_px_ = sigma_px;
 }
 
 double PlanePointCost::MissPx(const double* const* parameters) const {

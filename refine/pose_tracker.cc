@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
@@ -11,6 +10,7 @@
 
 #include "circline/estimators/point_noise.h"
 #include "circline/refine/chi_square.h"
+#include "circline/refine/scratch.h"
 #include "circline/refine/track_frame.h"
 #include "circline/refine/track_map.h"
 #include "circline/refine/track_ranking.h"
@@ -23,46 +23,36 @@ namespace circline {
 class PoseTracker::Implementation {
  public:
   explicit Implementation(const TrackerOptions& options)
-      : options_(options), options_status_(options.Validate()) {}
+      : options_(options), options_status_(options.Validate()), frame_(options_.estimation, map_) {}
 
-  TrackedPose Update(const Observations& observations, double time, const MotionPrior& motion) {
-    TrackedPose tracked;
-    tracked.timestamp_s = time;
-    tracked.estimate.solver = "tracker";
-    Status status = options_status_;
-    if (status.ok() && !std::isfinite(time)) status = Status::Invalid("the time must be finite");
-    if (status.ok() && time < time_)
-      status = Status::Invalid("the time must not be before that of the last call");
-    if (status.ok()) status = motion.Validate();
-    if (status.ok()) status = observations.Validate();
-    tracked.estimate.status = status;
-    if (!status.ok()) return tracked;
-
-    const double dt = states_.empty() ? 0.0 : time - time_;
-    if (!states_.empty() && motion.relative && !(dt > 0.0)) {
-      tracked.estimate.status = Status::Invalid("a relative motion takes time: give a later one");
-      return tracked;
+  void Update(const Observations& observations, double time, const MotionPrior& motion,
+              TrackedPose* tracked) {
+    const Status status = Validate(observations, time, motion);
+    Begin(time, status, tracked);
+    if (!status.ok()) {
+      tracked->estimate.hypotheses.clear();
+      return;
     }
+    const double dt = states_.empty() ? 0.0 : time - time_;
     time_ = time;
     Prepare(observations);
     if (states_.empty() || time - used_ > options_.max_gap_s) {
-      Start(observations, &tracked);
-      return tracked;
+      Start(observations, tracked);
+      return;
     }
     Move(dt, motion);
     if (states_.empty()) {
-      Start(observations, &tracked);
-      tracked.estimate.notes.emplace_back(
+      Start(observations, tracked);
+      tracked->estimate.notes.emplace_back(
           "the motion left the range of numbers: the track starts anew");
-      return tracked;
+      return;
     }
     Refine();
     if (fits_.empty()) {
-      Predicted(observations, &tracked);
-      return tracked;
+      Predicted(observations, tracked);
+      return;
     }
-    Use(&tracked);
-    return tracked;
+    Use(tracked);
   }
 
   std::optional<PoseHypothesis> Predict(double time) const {
@@ -70,13 +60,13 @@ class PoseTracker::Implementation {
     if (states_.empty() || !(time >= time_) || !(time - used_ <= options_.max_gap_s)) return {};
     TrackState state = states_.front();
     MoveOn(map_, options_, time - time_, &state);
-    PoseHypothesis h = HypothesisOf(map_, state, fitted_.camera);
-    h.probability = std::exp(state.log_weight);
+    PoseHypothesis h;
+    FillHypothesis(map_, state, fitted_.camera, &h);
     return h;
   }
 
   void Reset() {
-    states_.clear();
+    spare_states_.Resize(0, &states_);
     time_ = used_ = -std::numeric_limits<double>::infinity();
     contradictions_ = frames_ = 0;
   }
@@ -84,13 +74,37 @@ class PoseTracker::Implementation {
   const TrackerOptions& options() const { return options_; }
 
  private:
+  Status Validate(const Observations& observations, double time, const MotionPrior& motion) const {
+    if (!options_status_.ok()) return options_status_;
+    if (!std::isfinite(time)) return Status::Invalid("the time must be finite");
+    if (time < time_) return Status::Invalid("the time must not be before that of the last call");
+    Status status = motion.Validate();
+    if (status.ok()) status = observations.Validate();
+    if (status.ok() && !states_.empty() && motion.relative && !(time > time_))
+      status = Status::Invalid("a relative motion takes time: give a later one");
+    return status;
+  }
+
+  // What a caller's TrackedPose has is of no account, but for its memory.
+  static void Begin(double time, const Status& status, TrackedPose* tracked) {
+    tracked->timestamp_s = time;
+    tracked->reinitialized = tracked->relocalized = tracked->predicted_only = false;
+    tracked->frames_since_start = 0;
+    PoseEstimate& estimate = tracked->estimate;
+    estimate.status = status;
+    estimate.solver = "tracker";
+    estimate.decided_by.clear();
+    estimate.notes.clear();
+  }
+
   void Prepare(const Observations& observations) {
     constexpr double kDefaultSigmaPx = 0.4;  // For fits that nobody has made yet.
     const double scale = options_.estimation.line_loss.scale_px;
     fitted_ = observations;
     problems_.clear();
-    FitDirect(scale > 0.0 ? scale : kDefaultSigmaPx, &fitted_, &problems_);
-    noise_ = MeasurePointNoise(fitted_, options_.estimation.noise_model);
+    FitDirect(scale > 0.0 ? scale : kDefaultSigmaPx, &fitted_, &problems_, NoiseModel::Exact(),
+              &fit_memory_);
+    noise_meter_.Measure(fitted_, options_.estimation.noise_model, &noise_);
   }
 
   // Begins a track with the poses of a single frame; the track before ends where there are any.
@@ -105,19 +119,19 @@ class PoseTracker::Implementation {
     used_ = time_;
     const Observations resolved = ResolveWorld(fitted_);
     StartMap(resolved, estimate.hypotheses, options_, &map_, &states_);
-    const TrackFrame frame(resolved, noise_, options_.estimation, map_);
+    frame_.Reset(resolved, noise_);
     std::vector<TrackFit> fits;
     for (std::size_t i = 0; i < states_.size(); ++i) {
       const TrackState& state = states_[i];
       const double log_focal = std::log(estimate.hypotheses[i].focal_scale);
       TrackFit fit;
-      if (!state.IsInRange() || !frame.RefineHere(state, log_focal, options_, &fit)) continue;
+      if (!state.IsInRange() || !frame_.RefineHere(state, log_focal, options_, &fit)) continue;
       ConditionOnPriors(&fit.state);
       fit.state.log_weight = state.log_weight;  // Its evidence has been counted.
       fits.push_back(std::move(fit));
     }
     // What cannot be refined here cannot be carried on; the frame's answer stands.
-    if (!fits.empty()) Rank(options_, &fits);
+    if (!fits.empty()) Rank(options_, &frame_.spares, &fits);
     states_.clear();
     for (TrackFit& fit : fits) states_.push_back(std::move(fit.state));
     if (fitted_.frame.plane.empty()) map_.plane = NamedPlane(fitted_, map_.plane);
@@ -129,21 +143,18 @@ class PoseTracker::Implementation {
     std::vector<TrackState> starts =
         Relocated(map_, states_, tracked->estimate.hypotheses, options_);
     if (starts.empty()) return false;
-    fits_.clear();
-    frame_ = std::make_unique<TrackFrame>(fitted_, noise_, options_.estimation, map_);
-    frame_->KeepCheapest(static_cast<std::size_t>(options_.max_hypotheses), &starts);
+    frame_.spares.Resize(0, &fits_);
+    frame_.Reset(fitted_, noise_);
+    frame_.KeepCheapest(static_cast<std::size_t>(options_.max_hypotheses), &starts);
     for (const TrackState& start : starts) {
       const double log_focal = start.x[map_.block(TrackMap::kCamera).offset];
       TrackFit fit;
-      if (frame_->RefineHere(start, log_focal, options_, &fit) && Agrees(fit))
+      if (frame_.RefineHere(start, log_focal, options_, &fit) && Agrees(fit))
         fits_.push_back(std::move(fit));
     }
     if (fits_.empty()) return false;
-    Merge(map_, MergedWeight::kLarger, &fits_);
-    Rank(options_, &fits_);
-    states_.clear();
-    for (const TrackFit& fit : fits_) states_.push_back(fit.state);
-    tracked->estimate.hypotheses.clear();
+    Merge(map_, MergedWeight::kLarger, &frame_.spares, &fits_);
+    TakeFits();
     tracked->relocalized = true;
     Use(tracked);
     tracked->estimate.notes.emplace_back("the track was lost, and is back in its world");
@@ -164,7 +175,7 @@ class PoseTracker::Implementation {
   }
 
   // What is known of the first pose counts in those that follow.
-  void ConditionOnPriors(TrackState* state) const {
+  void ConditionOnPriors(TrackState* state) {
     const EstimationOptions& known = options_.estimation;
     if (known.pose_prior) {
       PosePrior prior = *known.pose_prior;
@@ -175,9 +186,9 @@ class PoseTracker::Implementation {
         P.bottomLeftCorner<3, 3>().setZero();
         P.bottomRightCorner<3, 3>() = kNothing * kNothing * Eigen::Matrix3d::Identity();
       }
-      Condition(map_, prior, state);
+      Condition(map_, prior, &scratch_, state);
     }
-    if (known.gravity_prior) Condition(map_, *known.gravity_prior, state);
+    if (known.gravity_prior) Condition(map_, *known.gravity_prior, &scratch_, state);
   }
 
   // The name of the world's plane if the caller gave it, else none: a conventional name means
@@ -198,48 +209,55 @@ class PoseTracker::Implementation {
       } else {
         MoveOn(map_, options_, dt, &state);
       }
-      if (motion.absolute) Condition(map_, *motion.absolute, &state);
-      if (motion.gravity) Condition(map_, *motion.gravity, &state);
+      if (motion.absolute) Condition(map_, *motion.absolute, &scratch_, &state);
+      if (motion.gravity) Condition(map_, *motion.gravity, &scratch_, &state);
     }
     states_.erase(std::remove_if(states_.begin(), states_.end(),
                                  [](const TrackState& state) { return !state.IsInRange(); }),
                   states_.end());
-    if (!states_.empty()) Rank(options_, &states_);  // For a frame that says nothing more.
+    if (!states_.empty()) Rank(options_, &spare_states_, &states_);  // For a frame without more.
   }
 
   // Fills fits_, ranked; empty where the frame says nothing or contradicts all hypotheses.
   void Refine() {
-    fits_.clear();
-    frame_ = std::make_unique<TrackFrame>(fitted_, noise_, options_.estimation, map_);
-    is_blank_ = frame_->empty();
+    frame_.spares.Resize(0, &fits_);
+    frame_.Reset(fitted_, noise_);
+    is_blank_ = frame_.empty();
     if (is_blank_) return;
-    for (std::size_t i = 0; i < states_.size(); ++i) {
-      std::vector<TrackFit> own;
-      frame_->Refine(states_[i], options_, &own);
-      Merge(map_, MergedWeight::kLarger, &own);
-      std::move(own.begin(), own.end(), std::back_inserter(fits_));
+    for (const TrackState& state : states_) {
+      frame_.spares.Resize(0, &own_fits_);
+      frame_.Refine(state, options_, &own_fits_);
+      Merge(map_, MergedWeight::kLarger, &frame_.spares, &own_fits_);
+      for (TrackFit& fit : own_fits_) fits_.push_back(std::move(fit));
+      own_fits_.clear();
     }
     if (std::none_of(fits_.begin(), fits_.end(),
                      [&](const TrackFit& fit) { return Agrees(fit); })) {
-      fits_.clear();
+      frame_.spares.Resize(0, &fits_);
       return;
     }
-    Merge(map_, MergedWeight::kSum, &fits_);
-    Rank(options_, &fits_);
-    states_.clear();
-    for (const TrackFit& fit : fits_) states_.push_back(fit.state);
+    Merge(map_, MergedWeight::kSum, &frame_.spares, &fits_);
+    TakeFits();
   }
 
-  void Answer(TrackedPose* tracked) const {
+  // The fits' states take the place of those before.
+  void TakeFits() {
+    Rank(options_, &frame_.spares, &fits_);
+    spare_states_.Resize(fits_.size(), &states_);
+    for (std::size_t i = 0; i < fits_.size(); ++i) states_[i] = fits_[i].state;
+  }
+
+  void Answer(TrackedPose* tracked) {
     PoseEstimate& estimate = tracked->estimate;
     estimate.notes = problems_;
+    estimate.hypotheses.resize(states_.size());
     for (std::size_t i = 0; i < states_.size(); ++i) {
-      PoseHypothesis h = HypothesisOf(map_, states_[i], fitted_.camera);
-      h.probability = std::exp(states_[i].log_weight);
-      if (!fits_.empty()) FillFrame(*frame_, fits_[i], &h, i == 0 ? &estimate.notes : nullptr);
-      estimate.hypotheses.push_back(std::move(h));
+      PoseHypothesis& h = estimate.hypotheses[i];
+      FillHypothesis(map_, states_[i], fitted_.camera, &h);
+      if (!fits_.empty())
+        FillFrame(frame_, fits_[i], &h, i == 0 ? &estimate.notes : nullptr, &distances_);
     }
-    estimate.decided_by = DecidedByFrames(estimate.hypotheses);
+    DecidedByFrames(estimate.hypotheses, &estimate.decided_by);
   }
 
   void Predicted(const Observations& observations, TrackedPose* tracked) {
@@ -269,11 +287,16 @@ class PoseTracker::Implementation {
   int contradictions_ = 0, frames_ = 0;
   // Of the present frame; kept for their memory.
   Observations fitted_;
+  FitMemory fit_memory_;
+  PointNoiseMeter noise_meter_;
   PointNoise noise_;
   std::vector<std::string> problems_;
-  std::unique_ptr<TrackFrame> frame_;
-  std::vector<TrackFit> fits_;
+  TrackFrame frame_;
+  std::vector<TrackFit> fits_, own_fits_;  // The latter of one hypothesis.
   bool is_blank_ = false;
+  Spares<TrackState> spare_states_;
+  Scratch scratch_;
+  std::vector<double> distances_;
 };
 
 PoseTracker::PoseTracker(const TrackerOptions& options)
@@ -283,12 +306,19 @@ PoseTracker::PoseTracker(PoseTracker&&) noexcept = default;
 PoseTracker& PoseTracker::operator=(PoseTracker&&) noexcept = default;
 
 TrackedPose PoseTracker::Update(const Observations& observations, double timestamp_s) {
-  return implementation_->Update(observations, timestamp_s, MotionPrior());
+  return Update(observations, timestamp_s, MotionPrior());
 }
 
 TrackedPose PoseTracker::Update(const Observations& observations, double timestamp_s,
                                 const MotionPrior& motion) {
-  return implementation_->Update(observations, timestamp_s, motion);
+  TrackedPose tracked;
+  implementation_->Update(observations, timestamp_s, motion, &tracked);
+  return tracked;
+}
+
+void PoseTracker::Update(const Observations& observations, double timestamp_s,
+                         const MotionPrior& motion, TrackedPose* tracked) {
+  implementation_->Update(observations, timestamp_s, motion, tracked);
 }
 
 std::optional<PoseHypothesis> PoseTracker::Predict(double timestamp_s) const {

@@ -42,6 +42,13 @@
 // options that do not pass their Validate) is refused in words and changes nothing. A frame without
 // evidence gives the predicted pose, predicted_only, and a message that says so.
 //
+// Memory. Nothing is allocated but by ceres::Problem and ceres::Solve in a frame that has no more
+// features, points and hypotheses than frames before, where the answer goes into a TrackedPose that
+// is kept from frame to frame. What does allocate: an answer that is returned by value; Predict;
+// first frames, and features that are new to the map; what is said in words (notes, a status that
+// is not ok); an axis that is drawn apart from the lines; ids and names beyond 15 characters in an
+// answer that has not had them.
+//
 // Cost: bounded by TrackerOptions::max_hypotheses and max_evaluations
 // (`circline_benchmark --benchmark_filter=Tracker`). Not thread-safe: one tracker a thread; several
 // trackers share nothing.
@@ -141,6 +148,9 @@ class PoseTracker {
   TrackedPose Update(const Observations& observations, double timestamp_s);
   TrackedPose Update(const Observations& observations, double timestamp_s,
                      const MotionPrior& motion);
+  // The same into the caller's answer, in the memory that it has.
+  void Update(const Observations& observations, double timestamp_s, const MotionPrior& motion,
+              TrackedPose* tracked);
 
   // The best hypothesis moved on to that time, with the circles of the map (camera frame) and its
   // directions: where a detector may look. None where nothing is tracked, the time is before the

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <utility>
 
@@ -37,15 +38,27 @@ double OneOf(double stated, double option, double measured) {
 
 }  // namespace
 
-TrackFrame::TrackFrame(const Observations& fitted, const PointNoise& noise,
-                       const EstimationOptions& options, const TrackMap& map)
-    : observations_(fitted), options_(options), map_(map) {
-  for (const TrackMap::Circle& circle : map.circles) {
+std::string TrackFrame::Term::Name() const {
+  switch (kind) {
+    case Kind::kCircle:
+      return "circle '" + id + "'";
+    case Kind::kCenter:
+      return "the centre of circle '" + id.substr(0, id.rfind('.')) + "'";
+    case Kind::kLine:
+      break;
+  }
+  return "line '" + id + "'";
+}
+
+void TrackFrame::Reset(const Observations& fitted, const PointNoise& noise) {
+  observations_ = &fitted;
+  num_terms_ = 0;
+  best_circle_ = best_observation_ = -1;
+  for (const TrackMap::Circle& circle : map_.circles) {
     const int index = FindCircle(fitted, circle.id);
     if (index >= 0) AddCircle(static_cast<std::size_t>(index), circle, noise);
   }
-  const double deviation = options.noise_model.line_direction_rad;
-  for (const TrackMap::Direction& direction : map.directions) {
+  for (const TrackMap::Direction& direction : map_.directions) {
     const std::optional<Segment>* axis = direction.id == kXAxisId   ? &fitted.frame.x_axis
                                          : direction.id == kYAxisId ? &fitted.frame.y_axis
                                                                     : nullptr;
@@ -55,25 +68,36 @@ TrackFrame::TrackFrame(const Observations& fitted, const PointNoise& noise,
     }
     const int index = FindPencil(fitted, direction.id);
     if (index < 0) continue;
-    const PencilObservation& pencil = fitted.pencils[static_cast<std::size_t>(index)];
-    for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
-      const LineObservation& line = pencil.lines[j];
-      const double sigma = OneOf(LineSigma(pencil, line), options.line_loss.scale_px,
-                                 noise.lines[static_cast<std::size_t>(index)][j]);
-      AddLine(line, sigma, direction.block, deviation, pencil.id + "[" + std::to_string(j) + "]");
-    }
+    AddPencil(fitted.pencils[static_cast<std::size_t>(index)],
+              noise.lines[static_cast<std::size_t>(index)], direction);
   }
+}
+
+// One of an earlier frame, whose cost function takes new points, or one without.
+TrackFrame::Term& TrackFrame::AddTerm(Term::Kind kind, int layout) {
+  std::size_t i = num_terms_;
+  while (i < terms_.size() && (terms_[i].kind != kind || terms_[i].layout != layout)) ++i;
+  if (i == terms_.size()) terms_.emplace_back();
+  if (i != num_terms_) std::swap(terms_[num_terms_], terms_[i]);
+  Term& term = terms_[num_terms_++];
+  term.kind = kind;
+  term.layout = layout;
+  term.blocks.clear();
+  term.id.clear();
+  term.free_twice_cost = 0.0;
+  term.own = 0;
+  term.parent = -1;
+  return term;
 }
 
 void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle,
                            const PointNoise& noise) {
-  const CircleObservation& seen = observations_.circles[index];
+  const CircleObservation& seen = observations_->circles[index];
   if (!seen.fit) return;
   const double sigma = OneOf(seen.sigma_px, options_.conic_loss.scale_px, noise.circles[index]);
-  std::optional<ImagePoints> points =
-      EvidencePoints(observations_.camera, seen.points, seen.inliers, sigma, true,
-                     options_.noise_model, PointOptions(options_, true));
-  if (!points) return;
+  if (!FillEvidencePoints(observations_->camera, seen.points, seen.inliers, sigma, true,
+                          options_.noise_model, PointOptions(options_, true), &points_))
+    return;
   PlaneCircleContourCost::Blocks blocks;
   blocks.tilt_and_height = circle.tilt >= 0;
   // What the map knows of them is in its own Gaussian.
@@ -81,77 +105,99 @@ void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle,
   blocks.tilt_sigma = blocks.height_sigma = kNothing;
   blocks.offset = circle.offset >= 0;
   blocks.camera = map_.has_camera();
-  Term term;
+  const int parent = static_cast<int>(num_terms_);
+  Term& term = AddTerm(Term::Kind::kCircle, (blocks.tilt_and_height ? 1 : 0) +
+                                                (blocks.offset ? 2 : 0) + (blocks.camera ? 4 : 0));
   term.blocks = {TrackMap::kRotation, TrackMap::kTranslation, circle.center, circle.radius};
   if (blocks.tilt_and_height) term.blocks.push_back(circle.tilt);
   if (blocks.offset) term.blocks.push_back(circle.offset);
   if (blocks.camera) term.blocks.push_back(TrackMap::kCamera);
   term.id = circle.id;
-  term.name = "circle '" + circle.id + "'";
   term.dof = 5;
-  term.free_twice_cost = FreeTwiceCost(*points, seen.fit->conic);
-  const ImagePoints::Options& contour = points->options();
+  term.free_twice_cost = FreeTwiceCost(points_, seen.fit->conic);
+  const ImagePoints::Options& contour = points_.options();
   const double mark_sigma = contour.sigma_px / std::sqrt(contour.weight);
-  term.cost = std::make_unique<PlaneCircleContourCost>(std::move(*points), blocks);
-  terms_.push_back(std::move(term));
-  const int parent = static_cast<int>(terms_.size()) - 1;
+  if (term.cost == nullptr)
+    term.cost = std::make_unique<PlaneCircleContourCost>(ImagePoints(), blocks);
+  static_cast<PlaneCircleContourCost&>(*term.cost).Exchange(&points_);
   const auto is_better = [&](const CircleObservation& other) {
     return seen.fit->Covariance().trace() < other.fit->Covariance().trace();
   };
   if (best_observation_ < 0 ||
-      is_better(observations_.circles[static_cast<std::size_t>(best_observation_)])) {
+      is_better(observations_->circles[static_cast<std::size_t>(best_observation_)])) {
     best_observation_ = static_cast<int>(index);
     best_circle_ = static_cast<int>(&circle - map_.circles.data());
   }
   if (!seen.center) return;
-  Term mark;
+  AddCenter(seen, circle, mark_sigma);
+  terms_[num_terms_ - 1].parent = parent;
+}
+
+void TrackFrame::AddCenter(const CircleObservation& seen, const TrackMap::Circle& circle,
+                           double sigma_px) {
+  const bool has_camera = map_.has_camera();
+  Term& mark = AddTerm(Term::Kind::kCenter, has_camera ? 1 : 0);
   mark.blocks = {TrackMap::kRotation, TrackMap::kTranslation, circle.center};
-  if (map_.has_camera()) mark.blocks.push_back(TrackMap::kCamera);
-  mark.id = circle.id + ".center";
-  mark.name = "the centre of circle '" + circle.id + "'";
+  if (has_camera) mark.blocks.push_back(TrackMap::kCamera);
+  mark.id = circle.id;
+  mark.id += ".center";
   mark.dof = 2;
-  mark.parent = parent;
-  mark.cost = std::make_unique<PlanePointCost>(observations_.camera, *seen.center, mark_sigma,
-                                               options_.line_loss.type, map_.has_camera());
-  terms_.push_back(std::move(mark));
+  if (mark.cost == nullptr) {
+    mark.cost = std::make_unique<PlanePointCost>(observations_->camera, *seen.center, sigma_px,
+                                                 options_.line_loss.type, has_camera);
+  }
+  static_cast<PlanePointCost&>(*mark.cost).Reset(observations_->camera, *seen.center, sigma_px);
 }
 
 // An axis drawn apart from the pencils' lines.
 void TrackFrame::AddAxis(const std::optional<Segment>& axis, const TrackMap::Direction& direction) {
   int pencil, index;
-  if (!axis || FindAxisLine(observations_, *axis, &pencil, &index)) return;
+  if (!axis || FindAxisLine(*observations_, *axis, &pencil, &index)) return;
   constexpr double kDrawnSigmaPx = 0.5;  // Of points drawn by hand.
   const double scale = options_.line_loss.scale_px, sigma = scale > 0.0 ? scale : kDrawnSigmaPx;
   LineObservation line;
   line.points = {(*axis)[0], (*axis)[1]};
   std::vector<CalibratedPoint> points;
   LineFit fit;
-  CalibrateInliers(observations_.camera, line.points, {}, &points);
+  CalibrateInliers(observations_->camera, line.points, {}, &points);
   if (points.size() < 2 || !FitLine(points, sigma, &fit).ok()) return;
   line.fit = fit;
-  AddLine(line, sigma, direction.block, 0.0, direction.id);
+  AddLine(line, sigma, direction, 0.0, -1);
 }
 
-void TrackFrame::AddLine(const LineObservation& line, double sigma_px, int direction,
-                         double deviation, const std::string& id) {
+void TrackFrame::AddPencil(const PencilObservation& pencil, const std::vector<double>& sigmas,
+                           const TrackMap::Direction& direction) {
+  for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
+    const LineObservation& line = pencil.lines[j];
+    const double sigma = OneOf(LineSigma(pencil, line), options_.line_loss.scale_px, sigmas[j]);
+    AddLine(line, sigma, direction, options_.noise_model.line_direction_rad, static_cast<int>(j));
+  }
+}
+
+void TrackFrame::AddLine(const LineObservation& line, double sigma_px,
+                         const TrackMap::Direction& direction, double deviation, int number) {
   if (!line.fit) return;
-  std::optional<ImagePoints> points =
-      EvidencePoints(observations_.camera, line.points, line.inliers, sigma_px, false,
-                     options_.noise_model, PointOptions(options_, false));
-  if (!points) return;
-  Term term;
-  term.blocks = {TrackMap::kRotation, direction, kOwn};
-  if (map_.has_camera()) term.blocks.push_back(TrackMap::kCamera);
-  term.id = id;
-  term.name = "line '" + id + "'";
-  term.dof = 1;
-  term.own = deviation > 0.0 ? 2 : 1;
-  term.free_twice_cost = FreeTwiceCost(*points, line.fit->line);
+  if (!FillEvidencePoints(observations_->camera, line.points, line.inliers, sigma_px, false,
+                          options_.noise_model, PointOptions(options_, false), &points_))
+    return;
   DirectionLineCost::Options options;
   options.direction_sigma = deviation;
   options.camera = map_.has_camera();
-  term.cost = std::make_unique<DirectionLineCost>(std::move(*points), line.fit->line, options);
-  terms_.push_back(std::move(term));
+  Term& term = AddTerm(Term::Kind::kLine, (deviation > 0.0 ? 1 : 0) + (map_.has_camera() ? 2 : 0));
+  term.blocks = {TrackMap::kRotation, direction.block, kOwn};
+  if (map_.has_camera()) term.blocks.push_back(TrackMap::kCamera);
+  term.id = direction.id;
+  if (number >= 0) {
+    char text[16];
+    std::snprintf(text, sizeof(text), "[%d]", number);
+    term.id += text;
+  }
+  term.dof = 1;
+  term.own = deviation > 0.0 ? 2 : 1;
+  term.free_twice_cost = FreeTwiceCost(points_, line.fit->line);
+  if (term.cost == nullptr)
+    term.cost = std::make_unique<DirectionLineCost>(ImagePoints(), line.fit->line, options);
+  static_cast<DirectionLineCost&>(*term.cost).Exchange(&points_, line.fit->line);
 }
 
 void TrackFrame::Parameters(const Term& term, const double* x, const double* own,
@@ -162,10 +208,10 @@ void TrackFrame::Parameters(const Term& term, const double* x, const double* own
   }
 }
 
-// Both poses of the best known circle, turned about its normal as the prediction is.
-std::vector<CameraPose> TrackFrame::CircleStarts(const TrackState& prior) const {
-  std::vector<CameraPose> starts;
-  if (best_circle_ < 0) return starts;
+// Both poses of the best known circle, turned about its normal as the prediction is; how many.
+int TrackFrame::CircleStarts(const TrackState& prior, CameraPose* starts) const {
+  int num_starts = 0;
+  if (best_circle_ < 0) return num_starts;
   const TrackMap::Circle& circle = map_.circles[static_cast<std::size_t>(best_circle_)];
   const CameraPose predicted = prior.Pose(map_);
   const double* center = prior.x.data() + map_.block(circle.center).offset;
@@ -174,16 +220,16 @@ std::vector<CameraPose> TrackFrame::CircleStarts(const TrackState& prior) const 
   const bool faces = normal.dot(predicted.rotation * in_plane + predicted.translation) < 0.0;
   std::array<CirclePose, 2> poses;
   const int count = CirclePoses(
-      observations_.circles[static_cast<std::size_t>(best_observation_)].fit->conic, &poses);
+      observations_->circles[static_cast<std::size_t>(best_observation_)].fit->conic, &poses);
   for (int i = 0; i < count; ++i) {
     const CirclePose& p = poses[static_cast<std::size_t>(i)];
     CameraPose start;
     start.rotation =
         RotationBetween(normal, faces ? p.normal : Eigen::Vector3d(-p.normal)) * predicted.rotation;
     start.translation = radius * p.center - start.rotation * in_plane;
-    if (start.rotation.allFinite() && start.translation.allFinite()) starts.push_back(start);
+    if (start.rotation.allFinite() && start.translation.allFinite()) starts[num_starts++] = start;
   }
-  return starts;
+  return num_starts;
 }
 
 // A term's own unknowns at the present pose. False where it cannot lie there.
@@ -202,10 +248,10 @@ bool TrackFrame::Begin(const TrackState& prior, const CameraPose& start, TrackFi
   CameraPose pose = start;
   if (!map_.has_position()) pose.translation = prior.Pose(map_).translation;
   fit->state.SetPose(map_, pose);
-  fit->own.assign(2 * terms_.size(), 0.0);
-  fit->active.assign(terms_.size(), 1);
+  fit->own.assign(2 * num_terms_, 0.0);
+  fit->active.assign(num_terms_, 1);
   bool any = false;
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
+  for (std::size_t i = 0; i < num_terms_; ++i) {
     fit->active[i] = Place(i, fit) ? 1 : 0;
     any = any || fit->active[i] != 0;
   }
@@ -216,7 +262,7 @@ double TrackFrame::TermsCost(const TrackFit& fit) const {
   constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
   double residuals[kMaxResiduals], cost = 0.0;
   const double* parameters[8];
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
+  for (std::size_t i = 0; i < num_terms_; ++i) {
     if (fit.active[i] == 0) continue;
     Parameters(terms_[i], fit.state.x.data(), fit.own.data(), parameters);
     if (!terms_[i].cost->Evaluate(parameters, residuals, nullptr))
@@ -233,17 +279,18 @@ namespace {
 double PriorCost(const TrackMap& map, const TrackState& prior, const CameraPose& pose) {
   const int size = map.tangent(TrackMap::kTurnRate);
   const CameraPose mean = prior.Pose(map);
-  Eigen::VectorXd e(size);
-  e.head<3>() = LogRotation(mean.rotation.transpose() * pose.rotation);
-  if (size == 6) e.tail<3>() = pose.translation - mean.translation;
-  const Eigen::LLT<Eigen::MatrixXd> llt(prior.covariance.topLeftCorner(size, size));
-  return llt.info() == Eigen::Success ? 0.5 * e.dot(llt.solve(e)) : 0.0;
+  BlockMatrix e(size, 1), root = prior.covariance.topLeftCorner(size, size);
+  e.topRows<3>() = LogRotation(mean.rotation.transpose() * pose.rotation);
+  if (size == 6) e.bottomRows<3>() = pose.translation - mean.translation;
+  if (!FactorInPlace(root)) return 0.0;
+  HalfSolveInPlace(root, e);
+  return 0.5 * e.squaredNorm();
 }
 
 }  // namespace
 
 bool TrackFrame::RefineHere(const TrackState& prior, double log_focal,
-                            const TrackerOptions& options, TrackFit* fit) const {
+                            const TrackerOptions& options, TrackFit* fit) {
   // From this camera, through which lines are placed, too.
   TrackState start = prior;
   if (!map_.camera_is_considered) start.x[map_.block(TrackMap::kCamera).offset] = log_focal;
@@ -268,40 +315,33 @@ void TrackFrame::KeepCheapest(std::size_t most, std::vector<TrackState>* states)
 }
 
 void TrackFrame::Refine(const TrackState& prior, const TrackerOptions& options,
-                        std::vector<TrackFit>* fits) const {
-  struct Start {
-    CameraPose pose;
-    double prior_cost, cost;
-  };
-  std::vector<Start> starts;
-  TrackFit begun;
-  std::vector<CameraPose> poses = CircleStarts(prior);
-  const std::size_t num_circle_poses = poses.size();
-  poses.push_back(prior.Pose(map_));
-  for (const CameraPose& pose : poses) {
-    const double prior_cost = PriorCost(map_, prior, pose);
-    const double cost =
-        Begin(prior, pose, &begun) ? TermsCost(begun) : std::numeric_limits<double>::infinity();
-    starts.push_back({pose, prior_cost, prior_cost + cost});
+                        std::vector<TrackFit>* fits) {
+  std::array<CameraPose, 3> poses;
+  std::array<double, 3> prior_costs, costs;
+  const auto num_circle_poses = static_cast<std::size_t>(CircleStarts(prior, poses.data()));
+  poses[num_circle_poses] = prior.Pose(map_);
+  std::size_t best = 0;
+  for (std::size_t i = 0; i <= num_circle_poses; ++i) {
+    prior_costs[i] = PriorCost(map_, prior, poses[i]);
+    costs[i] = prior_costs[i] + (Begin(prior, poses[i], &begun_)
+                                     ? TermsCost(begun_)
+                                     : std::numeric_limits<double>::infinity());
+    if (costs[i] < costs[best]) best = i;
   }
-  const auto best = static_cast<std::size_t>(
-      std::min_element(starts.begin(), starts.end(),
-                       [](const Start& a, const Start& b) { return a.cost < b.cost; }) -
-      starts.begin());
+  const auto refine = [&](const CameraPose& pose) {
+    TrackFit fit = spares.Take();
+    if (Begin(prior, pose, &fit) && RefineFrom(prior, options, &fit)) {
+      fits->push_back(std::move(fit));
+    } else {
+      spares.Give(std::move(fit));
+    }
+  };
+  refine(poses[best]);
   // The circle's other pose, where the prior does not exclude it.
   constexpr double kExcluded = 20.0;  // Of cost.
-  std::vector<std::size_t> chosen = {best};
-  if (num_circle_poses == 2) {
-    const std::size_t other = best < 2                                      ? 1 - best
-                              : starts[0].prior_cost > starts[1].prior_cost ? 0
-                                                                            : 1;
-    if (starts[other].prior_cost < kExcluded) chosen.push_back(other);
-  }
-  for (const std::size_t i : chosen) {
-    TrackFit fit;
-    if (Begin(prior, starts[i].pose, &fit) && RefineFrom(prior, options, &fit))
-      fits->push_back(std::move(fit));
-  }
+  if (num_circle_poses < 2) return;
+  const std::size_t other = best < 2 ? 1 - best : prior_costs[0] > prior_costs[1] ? 0 : 1;
+  if (prior_costs[other] < kExcluded) refine(poses[other]);
 }
 
 }  // namespace circline

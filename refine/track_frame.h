@@ -1,19 +1,24 @@
 // One frame's evidence, prepared once for all hypotheses of a tracker, and what it makes of each:
-// the posterior, as the next frame's prior, and the evidence. Internal: not installed.
+// the posterior, as the next frame's prior, and the evidence. Keeps its memory from frame to frame.
+// Internal: not installed.
 #ifndef CIRCLINE_REFINE_TRACK_FRAME_H_
 #define CIRCLINE_REFINE_TRACK_FRAME_H_
+
+#include <ceres/solver.h>
 
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "circline/estimators/observations.h"
 #include "circline/estimators/point_noise.h"
 #include "circline/refine/cost_functions.h"
 #include "circline/refine/estimate_pose.h"
+#include "circline/refine/scratch.h"
 #include "circline/refine/track_prior.h"
 #include "circline/refine/track_state.h"
 
@@ -33,65 +38,96 @@ struct TrackFit {
 
 class TrackFrame {
  public:
-  // `fitted`: with fits; it and the options outlive this. Features that the map does not have take
-  // no part.
-  TrackFrame(const Observations& fitted, const PointNoise& noise, const EstimationOptions& options,
-             const TrackMap& map);
+  // Of no features yet; options and map outlive this.
+  TrackFrame(const EstimationOptions& options, const TrackMap& map)
+      : options_(options), map_(map) {}
 
-  bool empty() const { return terms_.empty(); }
+  // Takes a frame's features in place of those before. `fitted`: with fits; it is used until the
+  // next call. Features that the map does not have take no part.
+  void Reset(const Observations& fitted, const PointNoise& noise);
+
+  bool empty() const { return num_terms_ == 0; }
   // Refines a hypothesis that has been moved on, from all starts that may lead to minima of its
-  // own: the prediction, and both poses of the best known circle. One fit for each minimum found.
-  void Refine(const TrackState& prior, const TrackerOptions& options,
-              std::vector<TrackFit>* fits) const;
+  // own: the prediction, and both poses of the best known circle. Adds one fit for each minimum
+  // found.
+  void Refine(const TrackState& prior, const TrackerOptions& options, std::vector<TrackFit>* fits);
 
   // Refines one from where it is, but from this focal length (shift of log f). False where that
   // fails.
   bool RefineHere(const TrackState& prior, double log_focal, const TrackerOptions& options,
-                  TrackFit* fit) const;
+                  TrackFit* fit);
 
   // Of states where they are, those that the frame's terms cost least, in their order.
   void KeepCheapest(std::size_t most, std::vector<TrackState>* states) const;
 
   struct Term {
-    std::unique_ptr<FeatureCost> cost;
+    enum class Kind { kCircle, kCenter, kLine };
+    Kind kind = Kind::kLine;
     std::vector<int> blocks;  // Of the map; kOwn: its own unknowns.
-    std::string id, name;
+    std::string id;
     double free_twice_cost = 0.0;
     int dof = 0;      // Of its residuals, less its own unknowns.
     int own = 0;      // Number of unknowns of its own.
     int parent = -1;  // A term without which it says nothing.
+    int layout = 0;   // Which optional blocks its cost function has.
+    std::unique_ptr<FeatureCost> cost;
+
+    std::string Name() const;  // For people.
   };
   static constexpr int kOwn = -1;
-  const std::vector<Term>& terms() const { return terms_; }
+  std::size_t size() const { return num_terms_; }
+  const Term& term(std::size_t i) const { return terms_[i]; }
   void Parameters(const Term& term, const double* x, const double* own, const double** out) const;
+
+  Spares<TrackFit> spares;  // Fits are taken from here; who is done with one gives it back.
 
  private:
   class Information;
 
+  Term& AddTerm(Term::Kind kind, int layout);
   void AddCircle(std::size_t index, const TrackMap::Circle& circle, const PointNoise& noise);
+  void AddCenter(const CircleObservation& seen, const TrackMap::Circle& circle, double sigma_px);
   void AddAxis(const std::optional<Segment>& axis, const TrackMap::Direction& direction);
-  void AddLine(const LineObservation& line, double sigma_px, int direction, double deviation,
-               const std::string& id);
-  std::vector<CameraPose> CircleStarts(const TrackState& prior) const;
+  void AddPencil(const PencilObservation& pencil, const std::vector<double>& sigmas,
+                 const TrackMap::Direction& direction);
+  // `number`: of its pencil's lines; -1: an axis.
+  void AddLine(const LineObservation& line, double sigma_px, const TrackMap::Direction& direction,
+               double deviation, int number);
+  int CircleStarts(const TrackState& prior, CameraPose* starts) const;
   bool Begin(const TrackState& prior, const CameraPose& start, TrackFit* fit) const;
   double TermsCost(const TrackFit& fit) const;
-  int Solve(const TrackPrior& prior, int max_evaluations, TrackFit* fit) const;
+  int Solve(int max_evaluations, TrackFit* fit);
   double Excess(const Term& term, const TrackFit& fit) const;
   bool Place(std::size_t term, TrackFit* fit) const;
   int LeastOdd(TrackFit* fit) const;
-  bool LeaveOutWorst(double gate_probability, TrackFit* fit) const;
-  bool Score(const TrackPrior& prior, double gate_probability, TrackFit* fit) const;
-  void MoveOthers(const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& step,
-                  TrackState* state) const;
-  std::vector<std::uint8_t> Used(const TrackFit& fit) const;
-  bool Update(const TrackState& before, const TrackPrior& prior, TrackFit* fit) const;
-  bool RefineFrom(const TrackState& prior, const TrackerOptions& options, TrackFit* fit) const;
+  bool LeaveOutWorst(double gate_probability, TrackFit* fit);
+  bool Score(double gate_probability, TrackFit* fit) const;
+  void MoveOthers(const Scratch::Vector& step, TrackState* state) const;
+  bool UpdateOthers(const TrackState& before, const Scratch::Matrix& posterior,
+                    const Scratch::Matrix& turn, TrackFit* fit);
+  bool ResetPrior(const TrackState& before, const TrackFit& fit);
+  bool Update(const TrackState& before, TrackFit* fit);
+  bool RefineFrom(const TrackState& prior, const TrackerOptions& options, TrackFit* fit);
 
-  const Observations& observations_;
   const EstimationOptions& options_;
   const TrackMap& map_;
-  std::vector<Term> terms_;
+  const Observations* observations_ = nullptr;
+  std::vector<Term> terms_;  // The first num_terms_; the others wait for a frame with more.
+  std::size_t num_terms_ = 0;
   int best_circle_ = -1, best_observation_ = -1;  // In the map, in the observations.
+
+  // Memory.
+  ceres::Solver::Summary summary_;  // Made of a sentence.
+  TrackPrior prior_;                // Of the last solve.
+  Scratch scratch_;
+  ImagePoints points_;
+  TrackFit begun_;
+  std::vector<std::uint8_t> used_;                   // By block.
+  std::vector<double*> parameters_;                  // Of a residual.
+  std::vector<std::pair<double, std::size_t>> odd_;  // Terms by how much they contradict.
+  std::vector<Eigen::Index> rows_, others_;          // Of the covariance: that a frame has, or not.
+  std::vector<Eigen::Index> columns_;                // Of the information, by block; -1: none.
+  std::vector<Scratch::Matrix> plus_;                // Manifolds' derivatives, by block.
 };
 
 }  // namespace circline

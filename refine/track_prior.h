@@ -5,11 +5,12 @@
 
 #include <ceres/cost_function.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "circline/refine/scratch.h"
 #include "circline/refine/track_state.h"
 
 namespace circline {
@@ -20,33 +21,39 @@ namespace circline {
 // phi(t) = (f tx / tz, f ty / tz, log(tz / f)), f the focal length's share; a Gaussian of t itself
 // would claim to know what its curved ridge only happens to cross. A camera that is only considered
 // stays at its mean: L L^T is then the covariance of the others given that.
-struct TrackPrior {
-  // `used`: by block of the map. Not ok where the covariance is not positive definite.
-  TrackPrior(const TrackMap& map, const TrackState& state, const std::vector<std::uint8_t>& used);
-  bool ok() const { return llt.info() == Eigen::Success; }
+class TrackPrior {
+ public:
+  TrackPrior();
+  ~TrackPrior();
 
-  // phi of the unknowns, one after the other.
-  Eigen::VectorXd Ambient(const TrackMap& map, const Eigen::VectorXd& x) const;
-  // Derivatives of Moved() by the unknowns, at x.
-  Eigen::MatrixXd ChartsAt(const TrackMap& map, const Eigen::VectorXd& x) const;
-  // How far the unknowns are from the mean, as tangents there.
-  Eigen::VectorXd Moved(const TrackMap& map, const Eigen::VectorXd& x) const {
-    return charts * (Ambient(map, x) - mean);
-  }
+  // Makes it that of a state, in the memory of the one before. `used`: by block of the map. False
+  // where the covariance is not positive definite.
+  bool Reset(const TrackMap& map, const TrackState& state, const std::vector<std::uint8_t>& used);
+
+  // |z|^2; not finite where phi is not.
+  double TwiceCost(const TrackMap& map, const Eigen::VectorXd& x) const;
+  // How far the unknowns are from the mean, as tangents there; and its derivatives by them.
+  void Moved(const TrackMap& map, const Eigen::VectorXd& x, Scratch::Vector* moved) const;
+  void ChartsAt(const TrackMap& map, const Eigen::VectorXd& x, Scratch::Matrix* out) const;
+
+  // Residuals of `blocks`. Keeps its memory: for one thread.
+  ceres::CostFunction* cost() const;
 
   std::vector<int> blocks;                     // Of the unknowns, in the map; constants left out.
   std::vector<Eigen::Index> rows, considered;  // In the state's covariance: theirs, the camera's.
-  Eigen::MatrixXd charts, A;
-  Eigen::VectorXd mean;
-  Eigen::LLT<Eigen::MatrixXd> llt;
-  Eigen::MatrixXd follow;  // By how much the mean follows what is considered.
-  Eigen::MatrixXd considered_covariance;
-  std::unique_ptr<ceres::CostFunction> cost;  // By `blocks`.
+  Scratch::Matrix charts{nullptr, 0, 0};       // M.
+  Scratch::Matrix root{nullptr, 0, 0};         // L.
+  Scratch::Matrix follow{nullptr, 0, 0};       // By how much the mean follows what is considered.
+  Scratch::Matrix considered_covariance{nullptr, 0, 0};
 
  private:
-  Eigen::VectorXd Raw(const TrackMap& map, const Eigen::VectorXd& x) const;
-  // First rows of the translation and of the camera in phi; -1: not charted, not an unknown.
-  Eigen::Index translation_ = -1, camera_ = -1;
+  class ChartedCost;
+
+  // phi(x) - phi(mean) of the unknowns, one after the other.
+  void Difference(const TrackMap& map, const Eigen::VectorXd& x, Scratch::Vector* out) const;
+
+  std::unique_ptr<ChartedCost> cost_;
+  mutable Scratch scratch_;
 };
 
 }  // namespace circline

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
+#include <utility>
 
 #include "circline/estimators/basics.h"
 #include "circline/refine/camera_shifts.h"
@@ -51,9 +53,14 @@ void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& c
                    PoseHypothesis* h) {
   const CameraPose& pose = h->cam_from_world;
   const auto at = [&](int block) { return state.x.data() + map.block(block).offset; };
-  const Camera shifted = ShiftedCamera(camera, at(TrackMap::kCamera));
+  const double* shifts = at(TrackMap::kCamera);
+  std::optional<Camera> shifted;
+  if (std::any_of(shifts, shifts + kCameraSize, [](double shift) { return shift != 0.0; }))
+    shifted = ShiftedCamera(camera, shifts);
+  h->circles.resize(map.circles.size());
+  auto circle = h->circles.begin();
   for (const TrackMap::Circle& c : map.circles) {
-    CircleEstimate estimate;
+    CircleEstimate& estimate = *circle++;
     estimate.id = c.id;
     estimate.radius = std::abs(at(c.radius)[0]);
     Eigen::Vector3d center(at(c.center)[0], at(c.center)[1], 0.0), normal(0.0, 0.0, 1.0);
@@ -64,25 +71,30 @@ void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& c
     estimate.center = pose.rotation * center + pose.translation;
     estimate.normal = (pose.rotation * normal).normalized();
     if (estimate.normal.dot(estimate.center) > 0.0) estimate.normal = -estimate.normal;
-    CameraToPixel(shifted, estimate.center, &estimate.center_px);
-    h->circles.push_back(estimate);
+    estimate.center_px.setZero();
+    CameraToPixel(shifted ? *shifted : camera, estimate.center, &estimate.center_px);
   }
+  h->pencils.resize(map.directions.size());
+  auto pencil = h->pencils.begin();
   for (const TrackMap::Direction& d : map.directions) {
-    PencilEstimate estimate;
+    PencilEstimate& estimate = *pencil++;
     estimate.id = d.id;
     const Block& block = map.block(d.block);
     const Eigen::Vector3d in_world = Eigen::Map<const Eigen::Vector3d>(at(d.block)).normalized();
     estimate.direction = pose.rotation * in_world;
     const Eigen::Index rows = block.tangent_size();
-    Eigen::MatrixXd J(3, 3 + rows);
+    Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> J(3, 3 + rows);
     J.leftCols<3>() = -CrossMatrix(in_world);
     if (rows > 0) J.rightCols(rows) = PlusJacobianOf(block, at(d.block));
-    std::vector<Eigen::Index> columns = {0, 1, 2};
-    for (Eigen::Index k = 0; k < rows; ++k) columns.push_back(map.tangent(d.block) + k);
-    const Eigen::Matrix3d covariance = J * state.covariance(columns, columns) * J.transpose();
+    const Eigen::Index first = map.tangent(d.block);
+    BlockMatrix joint(3 + rows, 3 + rows);  // Of the turn and the direction.
+    joint.topLeftCorner<3, 3>() = state.covariance.topLeftCorner<3, 3>();
+    joint.topRightCorner(3, rows) = state.covariance.block(0, first, 3, rows);
+    joint.bottomLeftCorner(rows, 3) = state.covariance.block(first, 0, rows, 3);
+    joint.bottomRightCorner(rows, rows) = state.covariance.block(first, first, rows, rows);
+    const Eigen::Matrix3d covariance = J * joint * J.transpose();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
     estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
-    h->pencils.push_back(estimate);
   }
 }
 
@@ -104,50 +116,62 @@ void FillCamera(const TrackMap& map, const TrackState& state, const Camera& came
 
 }  // namespace
 
-std::string DecidedByFrames(const std::vector<PoseHypothesis>& hypotheses) {
-  if (hypotheses.size() < 2) return "only one pose fits the evidence of all frames";
+void DecidedByFrames(const std::vector<PoseHypothesis>& hypotheses, std::string* decided_by) {
   constexpr double kSure = 0.95;
-  if (hypotheses[0].probability < kSure)
-    return "nothing decides: several poses explain the evidence of all frames";
-  char text[120];
-  std::snprintf(text, sizeof(text), "all frames so far: odds of %.3g to the second pose",
-                hypotheses[0].probability / std::max(hypotheses[1].probability, 1e-300));
-  return text;
+  if (hypotheses.size() < 2) {
+    *decided_by = "only one pose fits the evidence of all frames";
+  } else if (hypotheses[0].probability < kSure) {
+    *decided_by = "nothing decides: several poses explain the evidence of all frames";
+  } else {
+    char text[120];
+    std::snprintf(text, sizeof(text), "all frames so far: odds of %.3g to the second pose",
+                  hypotheses[0].probability / std::max(hypotheses[1].probability, 1e-300));
+    *decided_by = text;
+  }
 }
 
-PoseHypothesis HypothesisOf(const TrackMap& map, const TrackState& state, const Camera& camera) {
-  PoseHypothesis h;
-  h.cam_from_world = state.Pose(map);
-  h.metric = map.metric;
-  h.origin_observed = map.origin_observed;
-  h.structure = map.plane;
-  FillCovariance(map, state, &h);
-  FillLandmarks(map, state, camera, &h);
-  FillCamera(map, state, camera, &h);
-  return h;
+void FillHypothesis(const TrackMap& map, const TrackState& state, const Camera& camera,
+                    PoseHypothesis* h) {
+  // All but what keeps memory for what comes.
+  PoseHypothesis fresh;
+  fresh.structure.swap(h->structure);
+  fresh.free_directions.swap(h->free_directions);
+  fresh.left_out.swap(h->left_out);
+  fresh.circles.swap(h->circles);
+  fresh.pencils.swap(h->pencils);
+  *h = std::move(fresh);
+  h->free_directions.clear();
+  h->left_out.clear();
+  h->cam_from_world = state.Pose(map);
+  h->probability = std::exp(state.log_weight);
+  h->metric = map.metric;
+  h->origin_observed = map.origin_observed;
+  h->structure = map.plane;
+  FillCovariance(map, state, h);
+  FillLandmarks(map, state, camera, h);
+  FillCamera(map, state, camera, h);
 }
 
 void FillFrame(const TrackFrame& frame, const TrackFit& fit, PoseHypothesis* h,
-               std::vector<std::string>* notes) {
+               std::vector<std::string>* notes, std::vector<double>* distances) {
   h->cost = fit.cost;
   double squares = 0.0;
-  std::vector<double> distances;
   const double* parameters[8];
-  for (std::size_t i = 0; i < frame.terms().size(); ++i) {
-    const TrackFrame::Term& term = frame.terms()[i];
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const TrackFrame::Term& term = frame.term(i);
     if (fit.active[i] == 0) {
       if (term.parent >= 0 && fit.active[static_cast<std::size_t>(term.parent)] == 0) continue;
       h->left_out.push_back(term.id);
       if (notes != nullptr)
-        notes->push_back(term.name + ": left out, it contradicts the pose found");
+        notes->push_back(term.Name() + ": left out, it contradicts the pose found");
       continue;
     }
     const ImagePoints* points = term.cost->points();
     if (points == nullptr) continue;
     frame.Parameters(term, fit.state.x.data(), fit.own.data(), parameters);
-    term.cost->Distances(parameters, &distances);
-    h->num_observations += static_cast<int>(distances.size());
-    for (const double d : distances) {
+    term.cost->Distances(parameters, distances);
+    h->num_observations += static_cast<int>(distances->size());
+    for (const double d : *distances) {
       if (!(std::abs(d) <= kInlierSigmas * points->options().sigma_px)) continue;
       ++h->num_inliers;
       squares += d * d;

@@ -11,16 +11,18 @@
 
 namespace circline {
 
-// Pose, covariance, free directions, circles and directions of the map; everything but the
-// probability and what a frame says of it.
-PoseHypothesis HypothesisOf(const TrackMap& map, const TrackState& state, const Camera& camera);
+// Pose, probability, covariance, free directions, circles and directions of the map, in the memory
+// that the hypothesis has; nothing that a frame says of it.
+void FillHypothesis(const TrackMap& map, const TrackState& state, const Camera& camera,
+                    PoseHypothesis* hypothesis);
 
 // PoseEstimate::decided_by, of ranked hypotheses.
-std::string DecidedByFrames(const std::vector<PoseHypothesis>& hypotheses);
+void DecidedByFrames(const std::vector<PoseHypothesis>& hypotheses, std::string* decided_by);
 
 // What a frame says of a hypothesis: inliers, cost, what was left out and in words why.
+// `distances`: memory.
 void FillFrame(const TrackFrame& frame, const TrackFit& fit, PoseHypothesis* hypothesis,
-               std::vector<std::string>* notes);
+               std::vector<std::string>* notes, std::vector<double>* distances);
 
 }  // namespace circline
 

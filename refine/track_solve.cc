@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -16,52 +15,51 @@
 
 namespace circline {
 
-// The blocks of the map that the active terms have to do with.
-std::vector<std::uint8_t> TrackFrame::Used(const TrackFit& fit) const {
-  std::vector<std::uint8_t> used(map_.blocks().size(), 0);
-  used[TrackMap::kRotation] = used[TrackMap::kTranslation] = 1;
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
+// The prior of the blocks of the map that the active terms have to do with.
+bool TrackFrame::ResetPrior(const TrackState& before, const TrackFit& fit) {
+  used_.assign(map_.blocks().size(), 0);
+  used_[TrackMap::kRotation] = used_[TrackMap::kTranslation] = 1;
+  for (std::size_t i = 0; i < num_terms_; ++i) {
     if (fit.active[i] == 0) continue;
     for (const int b : terms_[i].blocks) {
-      if (b >= 0) used[static_cast<std::size_t>(b)] = 1;
+      if (b >= 0) used_[static_cast<std::size_t>(b)] = 1;
     }
   }
-  return used;
+  return prior_.Reset(map_, before, used_);
 }
 
 // Returns the number of evaluations.
-int TrackFrame::Solve(const TrackPrior& prior, int max_evaluations, TrackFit* fit) const {
+int TrackFrame::Solve(int max_evaluations, TrackFit* fit) {
   ceres::Problem problem(OwnsNothing());
   double* x = fit->state.x.data();
-  int unknowns = static_cast<int>(prior.rows.size());
-  std::vector<double*> blocks;
-  for (const int b : prior.blocks) {
+  int unknowns = static_cast<int>(prior_.rows.size());
+  parameters_.clear();
+  for (const int b : prior_.blocks) {
     const Block& block = map_.block(b);
     problem.AddParameterBlock(x + block.offset, block.size,
                               const_cast<ceres::Manifold*>(block.manifold));  // Not owned.
-    blocks.push_back(x + block.offset);
+    parameters_.push_back(x + block.offset);
   }
-  problem.AddResidualBlock(prior.cost.get(), nullptr, blocks);
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
+  problem.AddResidualBlock(prior_.cost(), nullptr, parameters_);
+  for (std::size_t i = 0; i < num_terms_; ++i) {
     if (fit->active[i] == 0) continue;
-    blocks.clear();
+    parameters_.clear();
     for (const int b : terms_[i].blocks) {
       double* values = b == kOwn ? fit->own.data() + 2 * i : x + map_.block(b).offset;
-      blocks.push_back(values);
+      parameters_.push_back(values);
       if (b == kOwn) {
         problem.AddParameterBlock(values, terms_[i].own);
         unknowns += terms_[i].own;
-      } else if (std::find(prior.blocks.begin(), prior.blocks.end(), b) == prior.blocks.end()) {
+      } else if (std::find(prior_.blocks.begin(), prior_.blocks.end(), b) == prior_.blocks.end()) {
         problem.AddParameterBlock(values, map_.block(b).size);
         problem.SetParameterBlockConstant(values);
       }
     }
-    problem.AddResidualBlock(terms_[i].cost.get(), nullptr, blocks);
+    problem.AddResidualBlock(terms_[i].cost.get(), nullptr, parameters_);
   }
-  ceres::Solver::Summary summary;
   // Ceres evaluates once before the first iteration.
-  ceres::Solve(NearbyOptions(unknowns, std::max(1, max_evaluations - 1), 1.0), &problem, &summary);
-  return static_cast<int>(summary.iterations.size());
+  ceres::Solve(NearbyOptions(unknowns, std::max(1, max_evaluations - 1), 1.0), &problem, &summary_);
+  return static_cast<int>(summary_.iterations.size());
 }
 
 // By how much twice a term's cost exceeds that of its own free fit; infinite where it has none.
@@ -78,31 +76,31 @@ double TrackFrame::Excess(const Term& term, const TrackFit& fit) const {
 
 // Makes the terms inactive that contradict the others most: at a compromise of all, any may seem
 // to. True where there were any.
-bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) const {
-  std::vector<std::pair<double, std::size_t>> odd;
+bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) {
+  odd_.clear();
   std::ptrdiff_t num_whole = 0;
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
+  for (std::size_t i = 0; i < num_terms_; ++i) {
     if (terms_[i].parent < 0) ++num_whole;
     if (fit->active[i] == 0) {
       if (terms_[i].parent < 0) num_whole -= 2;  // Less than half of all may be left out.
       continue;
     }
     const double beyond = Excess(terms_[i], *fit) - ChiSquareLimit(terms_[i].dof, gate_probability);
-    if (beyond > 0.0) odd.emplace_back(beyond, i);
+    if (beyond > 0.0) odd_.emplace_back(beyond, i);
   }
-  std::sort(odd.begin(), odd.end(), [](const auto& a, const auto& b) {
+  std::sort(odd_.begin(), odd_.end(), [](const auto& a, const auto& b) {
     return a.first != b.first ? a.first > b.first : a.second < b.second;
   });
   bool any = false;
-  for (const auto& [beyond, i] : odd) {
+  for (const auto& [beyond, i] : odd_) {
     constexpr double kComparable = 0.5;  // Of the worst.
     // One of two says nothing of which is wrong: the frame contradicts.
     const bool is_whole = terms_[i].parent < 0;
-    if (beyond < kComparable * odd.front().first || (is_whole && num_whole <= 2)) break;
+    if (beyond < kComparable * odd_.front().first || (is_whole && num_whole <= 2)) break;
     fit->active[i] = 0;
     num_whole -= is_whole ? 2 : 0;
     any = true;
-    for (std::size_t k = 0; k < terms_.size(); ++k) {
+    for (std::size_t k = 0; k < num_terms_; ++k) {
       if (terms_[k].parent == static_cast<int>(i)) fit->active[k] = 0;
     }
   }
@@ -113,7 +111,7 @@ bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) const {
 int TrackFrame::LeastOdd(TrackFit* fit) const {
   int least = -1;
   double excess = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
+  for (std::size_t i = 0; i < num_terms_; ++i) {
     const Term& term = terms_[i];
     const bool has_parent =
         term.parent < 0 || fit->active[static_cast<std::size_t>(term.parent)] != 0;
@@ -127,15 +125,13 @@ int TrackFrame::LeastOdd(TrackFit* fit) const {
 }
 
 bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& options,
-                            TrackFit* fit) const {
-  const double gate = options.gate_probability / static_cast<double>(terms_.size());
+                            TrackFit* fit) {
+  const double gate = options.gate_probability / static_cast<double>(num_terms_);
   constexpr int kFew = 2;  // Evaluations that come to nothing.
   int left = options.max_evaluations;
-  std::optional<TrackPrior> prior;  // Of the last solve.
   const auto solve = [&](TrackFit* at) {
-    prior.emplace(map_, before, Used(*at));
-    if (!prior->ok()) return false;
-    left -= Solve(*prior, left, at);
+    if (!ResetPrior(before, *at)) return false;
+    left -= Solve(left, at);
     return at->state.x.allFinite();
   };
   if (!solve(fit)) return false;
@@ -145,26 +141,32 @@ bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& opti
     if (!solve(fit)) return false;
   }
   // What seemed to contradict may have agreed but for the worst: back, one by one, while it does.
-  while (has_dropped && left > kFew) {
-    TrackFit with = *fit;
+  bool agrees = has_dropped;
+  while (agrees && left > kFew) {
+    TrackFit with = spares.Take();
+    with = *fit;
     const int back = LeastOdd(&with);
-    if (back < 0) break;
-    const Term& term = terms_[static_cast<std::size_t>(back)];
-    with.active[static_cast<std::size_t>(back)] = 1;
-    if (!solve(&with) || Excess(term, with) > ChiSquareLimit(term.dof, gate)) {
-      prior.emplace(map_, before, Used(*fit));
-      break;
+    agrees = back >= 0;
+    if (agrees) {
+      const Term& term = terms_[static_cast<std::size_t>(back)];
+      with.active[static_cast<std::size_t>(back)] = 1;
+      agrees = solve(&with) && Excess(term, with) <= ChiSquareLimit(term.dof, gate);
+      if (agrees) {
+        std::swap(*fit, with);
+      } else if (!ResetPrior(before, *fit)) {
+        return false;
+      }
     }
-    *fit = std::move(with);
+    spares.Give(std::move(with));
   }
-  return Score(*prior, gate, fit) && Update(before, *prior, fit);
+  return Score(gate, fit) && Update(before, fit);
 }
 
 // What is left out costs what clutter would: as much as what just agrees.
-bool TrackFrame::Score(const TrackPrior& prior, double gate_probability, TrackFit* fit) const {
+bool TrackFrame::Score(double gate_probability, TrackFit* fit) const {
   double left_out = 0.0, free = 0.0;
   fit->dof = 0;
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
+  for (std::size_t i = 0; i < num_terms_; ++i) {
     const Term& term = terms_[i];
     if (fit->active[i] != 0) {
       fit->dof += term.dof;
@@ -173,8 +175,7 @@ bool TrackFrame::Score(const TrackPrior& prior, double gate_probability, TrackFi
       left_out += 0.5 * (term.free_twice_cost + ChiSquareLimit(term.dof, gate_probability));
     }
   }
-  const Eigen::VectorXd z = prior.A * (prior.Ambient(map_, fit->state.x) - prior.mean);
-  const double cost = TermsCost(*fit) + 0.5 * z.squaredNorm();
+  const double cost = TermsCost(*fit) + 0.5 * prior_.TwiceCost(map_, fit->state.x);
   fit->misfit = 2.0 * cost - free;
   fit->cost = cost + left_out;
   return std::isfinite(fit->cost);

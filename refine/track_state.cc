@@ -11,7 +11,8 @@
 namespace circline {
 namespace {
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kCameraSize,
+                               kCameraSize>;
 
 // d exp(v) = exp(v) at the left: exp([v + dv]x) = exp([J dv]x) exp([v]x), to second order in v.
 Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& v) {
@@ -23,36 +24,38 @@ Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& v) {
          (angle - std::sin(angle)) / (angle * angle * angle) * V * V;
 }
 
+// Of pose and velocities, which come first.
+using MotionMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 12, 12>;
+
 // The rows and columns of one block's tangent; none for a constant one.
-Eigen::Block<Eigen::MatrixXd> Corner(const TrackMap& map, int a, int b, Eigen::MatrixXd* M) {
+Eigen::Block<MotionMatrix> Corner(const TrackMap& map, int a, int b, MotionMatrix* M) {
   return M->block(map.tangent(a), map.tangent(b), map.block(a).tangent_size(),
                   map.block(b).tangent_size());
 }
 
-// Kalman's update by a measurement z = J x + noise: x moves by K z.
-void KalmanUpdate(const TrackMap& map, const Eigen::MatrixXd& J, const Eigen::VectorXd& z,
-                  const Eigen::MatrixXd& noise, TrackState* state) {
+// Kalman's update by a measurement z = J x + noise of the pose, whose tangents come first: x moves
+// by K z.
+void KalmanUpdate(const TrackMap& map, const BlockMatrix& J, const BlockVector& z,
+                  const BlockMatrix& noise, Scratch* scratch, TrackState* state) {
+  const Scratch::Scope scope(scratch);
   Eigen::MatrixXd& P = state->covariance;
-  const Eigen::MatrixXd PJt = P * J.transpose(), S = J * PJt + noise;
-  const Eigen::LLT<Eigen::MatrixXd> llt(S);
-  if (llt.info() != Eigen::Success) return;
-  const Eigen::VectorXd weighed = llt.solve(z), dx = PJt * weighed;
-  const double log_det = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
-  state->log_weight -= 0.5 * (z.dot(weighed) + log_det);
-  P -= PJt * llt.solve(PJt.transpose());
-  P = 0.5 * (P + P.transpose()).eval();
+  Scratch::Matrix JP = scratch->NewMatrix(J.rows(), P.cols()),
+                  gain = scratch->NewMatrix(J.rows(), P.cols());
+  JP.noalias() = J * P.topRows(J.cols());
+  BlockMatrix root = noise;
+  root.noalias() += JP.leftCols(J.cols()) * J.transpose();
+  if (!FactorInPlace(root)) return;
+  gain = JP;
+  SolveInPlace(root, gain);
+  BlockMatrix weighed = z;
+  SolveInPlace(root, weighed);
+  state->log_weight -= 0.5 * (z.dot(weighed.col(0)) + LogDetOfRoot(root));
+  P.noalias() -= JP.transpose() * gain;
+  Symmetrize(&P);
   for (int i = 0; i < map.size(); ++i) {
     const Block& block = map.block(i);
-    if (block.tangent_size() == 0) continue;
-    double* values = state->x.data() + block.offset;
-    const Eigen::VectorXd step = dx.segment(map.tangent(i), block.tangent_size());
-    if (block.manifold == nullptr) {
-      Eigen::Map<Eigen::VectorXd>(values, block.size) += step;
-      continue;
-    }
-    Eigen::VectorXd moved(block.size);
-    block.manifold->Plus(values, step.data(), moved.data());
-    std::copy(moved.data(), moved.data() + block.size, values);
+    const BlockVector step = gain.middleCols(map.tangent(i), block.tangent_size()).transpose() * z;
+    Plus(block, step, state->x.data() + block.offset);
   }
 }
 
@@ -124,18 +127,30 @@ void TrackState::Append(const TrackMap& map, int index, const double* values,
   covariance.bottomRightCorner(more, more) = block_covariance;
 }
 
-Eigen::MatrixXd ChartOf(const Block& block, const double* at) {
-  if (block.manifold == nullptr) return Eigen::MatrixXd::Identity(block.size, block.size);
+BlockMatrix ChartOf(const Block& block, const double* at) {
+  if (block.manifold == nullptr) return BlockMatrix::Identity(block.size, block.size);
   RowMajor J(block.tangent_size(), block.size);
   block.manifold->MinusJacobian(at, J.data());
   return J;
 }
 
-Eigen::MatrixXd PlusJacobianOf(const Block& block, const double* at) {
-  if (block.manifold == nullptr) return Eigen::MatrixXd::Identity(block.size, block.size);
+BlockMatrix PlusJacobianOf(const Block& block, const double* at) {
+  if (block.manifold == nullptr) return BlockMatrix::Identity(block.size, block.size);
   RowMajor J(block.size, block.tangent_size());
   block.manifold->PlusJacobian(at, J.data());
   return J;
+}
+
+void Plus(const Block& block, const BlockVector& step, double* values) {
+  if (block.tangent_size() == 0) return;
+  Eigen::Map<Eigen::VectorXd> all(values, block.size);
+  if (block.manifold == nullptr) {
+    all += step;
+    return;
+  }
+  BlockVector moved(block.size);
+  block.manifold->Plus(values, step.data(), moved.data());
+  all = moved;
 }
 
 // X_cam moves as R' = exp([w dt]x) R, t' = exp([w dt]x) t + V v dt: a constant twist (w, v). Its
@@ -154,7 +169,7 @@ void MoveOn(const TrackMap& map, const TrackerOptions& options, double dt, Track
 
   // F of the first rows; it is the identity for all that follows.
   const int n = map.tangent(M::kCamera);
-  Eigen::MatrixXd F = Eigen::MatrixXd::Identity(n, n), Q = Eigen::MatrixXd::Zero(n, n);
+  MotionMatrix F = MotionMatrix::Identity(n, n), Q = MotionMatrix::Zero(n, n);
   const Eigen::Matrix3d back = moved.rotation.transpose();
   Corner(map, M::kRotation, M::kTurnRate, &F) = dt * back * V;
   const double w2 = options.turn_rate_sigma * options.turn_rate_sigma * dt;
@@ -184,8 +199,14 @@ void MoveOn(const TrackMap& map, const TrackerOptions& options, double dt, Track
     Corner(map, M::kVelocity, M::kVelocity, &Q) = v2 * unit;
   }
   Eigen::MatrixXd& P = state->covariance;
-  P.topRows(n) = (F * P.topRows(n)).eval();
-  P.leftCols(n) = (P.leftCols(n) * F.transpose()).eval();
+  for (Eigen::Index k = 0; k < P.cols(); ++k) {
+    const BlockVector column = P.col(k).head(n);
+    P.col(k).head(n).noalias() = F * column;
+  }
+  for (Eigen::Index k = 0; k < P.rows(); ++k) {
+    const BlockVector row = P.row(k).head(n).transpose();
+    P.row(k).head(n).noalias() = (F * row).transpose();
+  }
   P.topLeftCorner(n, n) += Q;
 }
 
@@ -223,28 +244,27 @@ void MoveBy(const TrackMap& map, const TrackerOptions& options, const RelativePo
   if (has_shift) P.diagonal().segment<3>(first + 3).array() += v * v * dt;
 }
 
-void Condition(const TrackMap& map, const PosePrior& prior, TrackState* state) {
+void Condition(const TrackMap& map, const PosePrior& prior, Scratch* scratch, TrackState* state) {
   const CameraPose pose = state->Pose(map);
   const int rows = map.has_position() ? 6 : 3;
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, state->covariance.rows());
-  J.block<3, 3>(0, map.tangent(TrackMap::kRotation)) = pose.rotation;
-  Eigen::VectorXd z(rows);
+  BlockMatrix J = BlockMatrix::Zero(rows, rows);
+  J.topLeftCorner<3, 3>() = pose.rotation;
+  BlockVector z(rows);
   z.head<3>() = LogRotation(prior.mean.rotation * pose.rotation.transpose());
   if (rows == 6) {
-    J.block<3, 3>(3, map.tangent(TrackMap::kTranslation)).setIdentity();
+    J.bottomRightCorner<3, 3>().setIdentity();
     z.tail<3>() = prior.mean.translation - pose.translation;
   }
   const Eigen::Map<const Matrix6d> noise(prior.covariance.data());
-  KalmanUpdate(map, J, z, noise.topLeftCorner(rows, rows), state);
+  KalmanUpdate(map, J, z, noise.topLeftCorner(rows, rows), scratch, state);
 }
 
-void Condition(const TrackMap& map, const GravityPrior& prior, TrackState* state) {
+void Condition(const TrackMap& map, const GravityPrior& prior, Scratch* scratch,
+               TrackState* state) {
   const Eigen::Matrix3d R = state->Pose(map).rotation;
-  const Eigen::Vector3d predicted = R * prior.in_world;
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, state->covariance.rows());
-  J.block<3, 3>(0, map.tangent(TrackMap::kRotation)) = -R * CrossMatrix(prior.in_world);
+  const Eigen::Matrix3d J = -R * CrossMatrix(prior.in_world);
   const Eigen::Matrix3d noise = prior.sigma_rad * prior.sigma_rad * Eigen::Matrix3d::Identity();
-  KalmanUpdate(map, J, prior.in_camera - predicted, noise, state);
+  KalmanUpdate(map, J, prior.in_camera - R * prior.in_world, noise, scratch, state);
 }
 
 }  // namespace circline

@@ -14,6 +14,7 @@
 #include "circline/estimators/pose.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/pose_tracker.h"
+#include "circline/refine/scratch.h"
 
 namespace circline {
 
@@ -83,9 +84,14 @@ struct TrackState {
 };
 
 // Coordinates about a place: MinusJacobian at the place, which is linear, times the difference.
-// Tangent by ambient size.
-Eigen::MatrixXd ChartOf(const Block& block, const double* at);
-Eigen::MatrixXd PlusJacobianOf(const Block& block, const double* at);
+// Tangent by ambient size. Matrices of one block do not allocate.
+using BlockMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCameraSize, kCameraSize>;
+using BlockVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCameraSize, 1>;
+BlockMatrix ChartOf(const Block& block, const double* at);
+BlockMatrix PlusJacobianOf(const Block& block, const double* at);
+// Moves a block by a tangent.
+void Plus(const Block& block, const BlockVector& step, double* values);
 
 // Moves a hypothesis on by dt seconds at its own velocity, with the noise of the options.
 void MoveOn(const TrackMap& map, const TrackerOptions& options, double dt, TrackState* state);
@@ -93,8 +99,8 @@ void MoveOn(const TrackMap& map, const TrackerOptions& options, double dt, Track
 void MoveBy(const TrackMap& map, const TrackerOptions& options, const RelativePose& motion,
             double dt, TrackState* state);
 // Conditions a hypothesis on what is known of its pose (Kalman's update), its probability included.
-void Condition(const TrackMap& map, const PosePrior& prior, TrackState* state);
-void Condition(const TrackMap& map, const GravityPrior& prior, TrackState* state);
+void Condition(const TrackMap& map, const PosePrior& prior, Scratch* scratch, TrackState* state);
+void Condition(const TrackMap& map, const GravityPrior& prior, Scratch* scratch, TrackState* state);
 
 }  // namespace circline
 

@@ -9,11 +9,8 @@
 namespace circline {
 namespace {
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-double LogDet(const Eigen::LLT<Eigen::MatrixXd>& llt) {
-  return 2.0 * llt.matrixLLT().diagonal().array().log().sum();
-}
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
+                               CurveModel::kMaxSize + 6, kCameraSize>;
 
 }  // namespace
 
@@ -21,153 +18,186 @@ double LogDet(const Eigen::LLT<Eigen::MatrixXd>& llt) {
 // own unknowns are eliminated; `log_det` grows by theirs.
 class TrackFrame::Information {
  public:
-  Information(const TrackFrame& frame, const TrackPrior& prior, const TrackFit& fit)
-      : frame_(frame),
-        fit_(fit),
-        columns_(frame.map_.blocks().size(), -1),
-        plus_(frame.map_.blocks().size()) {
-    const TrackMap& map = frame.map_;
-    const auto n = static_cast<Eigen::Index>(prior.rows.size()),
-               c = static_cast<Eigen::Index>(prior.considered.size());
-    Eigen::MatrixXd plus = Eigen::MatrixXd::Zero(prior.charts.cols(), n);
+  Information(TrackFrame* frame, const TrackFit& fit)
+      : H(frame->scratch_.NewMatrix(Size(*frame), Size(*frame))),
+        turn(frame->scratch_.NewMatrix(frame->prior_.root.rows(), frame->prior_.root.rows())),
+        frame_(*frame),
+        fit_(fit) {
+    const TrackPrior& prior = frame_.prior_;
+    const TrackMap& map = frame_.map_;
+    const Eigen::Index n = turn.rows(), c = H.rows() - n;
+    frame_.columns_.assign(map.blocks().size(), -1);
+    frame_.plus_.clear();
+    frame_.plus_.resize(map.blocks().size(), Scratch::Matrix(nullptr, 0, 0));
+    Scratch::Matrix plus = frame_.scratch_.NewMatrix(prior.charts.cols(), n),
+                    charts = frame_.scratch_.NewMatrix(n, prior.charts.cols()),
+                    J = frame_.scratch_.NewMatrix(n, n + c);
+    plus.setZero();
     Eigen::Index column = 0, ambient = 0;
-    const auto add = [&](int b) {
-      const Block& block = map.block(b);
-      columns_[static_cast<std::size_t>(b)] = column;
-      plus_[static_cast<std::size_t>(b)] = PlusJacobianOf(block, fit.state.x.data() + block.offset);
-      column += block.tangent_size();
-    };
     for (const int b : prior.blocks) {
       const Block& block = map.block(b);
-      add(b);
-      const Eigen::Index first = columns_[static_cast<std::size_t>(b)];
-      plus.block(ambient, first, block.size, block.tangent_size()) =
-          plus_[static_cast<std::size_t>(b)];
+      plus.block(ambient, column, block.size, block.tangent_size()) = AddBlock(b, column);
+      column += block.tangent_size();
       ambient += block.size;
     }
-    turn = prior.ChartsAt(map, fit.state.x) * plus;
-    if (c > 0) add(TrackMap::kCamera);
+    if (c > 0) AddBlock(TrackMap::kCamera, column);
+    prior.ChartsAt(map, fit.state.x, &charts);
+    turn.noalias() = charts * plus;
     // The prior's residual, and how it follows what is considered.
-    Eigen::MatrixXd J(n, n + c);
-    J.leftCols(n) = prior.llt.matrixL().solve(turn);
-    if (c > 0) J.rightCols(c) = -prior.llt.matrixL().solve(prior.follow);
-    H = J.transpose() * J;
+    J.leftCols(n) = turn;
+    J.rightCols(c) = -prior.follow;
+    HalfSolveInPlace(prior.root, J);
+    H.noalias() = J.transpose() * J;
   }
 
   // False where the term cannot be evaluated.
   bool Add(std::size_t index, const Weighing& weighing) {
+    const Scratch::Scope scope(&frame_.scratch_);
     const Term& term = frame_.terms_[index];
     const double* parameters[8];
     double* jacobians[8];
     RowMajor ambient[8];
     frame_.Parameters(term, fit_.state.x.data(), fit_.own.data(), parameters);
     const int rows = term.cost->num_residuals();
-    Eigen::VectorXd residuals(rows);
+    Scratch::Vector residuals = frame_.scratch_.NewVector(rows);
     for (std::size_t k = 0; k < term.blocks.size(); ++k) {
       const int b = term.blocks[k];
       jacobians[k] = nullptr;
-      if (b >= 0 && columns_[static_cast<std::size_t>(b)] < 0) continue;
+      if (b >= 0 && frame_.columns_[static_cast<std::size_t>(b)] < 0) continue;
       ambient[k].resize(rows, term.cost->parameter_block_sizes()[k]);
       jacobians[k] = ambient[k].data();
     }
     if (!term.cost->EvaluateWith(weighing, parameters, residuals.data(), jacobians)) return false;
-    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, H.cols());
+    Scratch::Matrix J = frame_.scratch_.NewMatrix(rows, H.cols());
+    J.setZero();
     for (std::size_t k = 0; k < term.blocks.size(); ++k) {
       if (jacobians[k] == nullptr || term.blocks[k] == kOwn) continue;
       const auto b = static_cast<std::size_t>(term.blocks[k]);
-      J.middleCols(columns_[b], plus_[b].cols()).noalias() = ambient[k] * plus_[b];
+      const Scratch::Matrix& plus = frame_.plus_[b];
+      J.middleCols(frame_.columns_[b], plus.cols()).noalias() = ambient[k] * plus;
     }
     if (term.own > 0) {
       const auto at = std::find(term.blocks.begin(), term.blocks.end(), kOwn);
       const RowMajor& own = ambient[static_cast<std::size_t>(at - term.blocks.begin())];
-      const Eigen::LLT<Eigen::MatrixXd> llt(own.transpose() * own);
-      if (llt.info() != Eigen::Success) return true;  // Without inliers.
-      log_det += LogDet(llt);
-      const Eigen::MatrixXd B = own.transpose() * J;
-      H.noalias() -= B.transpose() * llt.solve(B);
+      BlockMatrix root = own.transpose() * own;
+      if (!FactorInPlace(root)) return true;  // Without inliers.
+      log_det += LogDetOfRoot(root);
+      Scratch::Matrix B = frame_.scratch_.NewMatrix(own.cols(), H.cols());
+      B.noalias() = own.transpose() * J;
+      HalfSolveInPlace(root, B);
+      H.noalias() -= B.transpose() * B;
     }
     H.noalias() += J.transpose() * J;
     return true;
   }
 
-  Eigen::MatrixXd H;
-  Eigen::MatrixXd turn;  // The unknowns' tangents at the minimum, in the prior's charts.
+  Scratch::Matrix H;
+  Scratch::Matrix turn;  // The unknowns' tangents at the minimum, in the prior's charts.
   double log_det = 0.0;
 
  private:
-  const TrackFrame& frame_;
+  static Eigen::Index Size(const TrackFrame& frame) {
+    return static_cast<Eigen::Index>(frame.prior_.rows.size() + frame.prior_.considered.size());
+  }
+
+  const Scratch::Matrix& AddBlock(int index, Eigen::Index column) {
+    const auto b = static_cast<std::size_t>(index);
+    const Block& block = frame_.map_.block(index);
+    frame_.columns_[b] = column;
+    Rebind(frame_.scratch_.NewMatrix(block.size, block.tangent_size()), &frame_.plus_[b]);
+    frame_.plus_[b] = PlusJacobianOf(block, fit_.state.x.data() + block.offset);
+    return frame_.plus_[b];
+  }
+
+  TrackFrame& frame_;
   const TrackFit& fit_;
-  std::vector<Eigen::Index> columns_;  // By block; -1: none.
-  std::vector<Eigen::MatrixXd> plus_;  // Their manifolds' derivatives.
 };
 
 // The posterior about the minimum, and Laplace's evidence: exp(-cost) over sqrt(det H det P). What
 // is considered stays as it was, and adds S C S^T, S = dx / dc = -H_xx^-1 H_xc, C its covariance
 // (Schmidt 1966). The unknowns that no term has to do with follow as they are correlated.
-bool TrackFrame::Update(const TrackState& before, const TrackPrior& prior, TrackFit* fit) const {
-  Information information(*this, prior, *fit);
+bool TrackFrame::Update(const TrackState& before, TrackFit* fit) {
+  const Scratch::Scope scope(&scratch_);
+  Information information(this, *fit);
   // As a covariance of this library is: of the inliers, and no better than the losses are tuned to.
   const bool is_trivial = options_.conic_loss.type == LossType::kTrivial &&
                           options_.line_loss.type == LossType::kTrivial;
   constexpr double kTuned = 0.95;
   const Weighing weighing{true, kInlierSigmas, is_trivial ? 1.0 : kTuned};
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
+  for (std::size_t i = 0; i < num_terms_; ++i) {
     if (fit->active[i] != 0 && !information.Add(i, weighing)) return false;
   }
-  const auto n = static_cast<Eigen::Index>(prior.rows.size()),
-             c = static_cast<Eigen::Index>(prior.considered.size());
-  const Eigen::LLT<Eigen::MatrixXd> llt(information.H.topLeftCorner(n, n));
-  if (llt.info() != Eigen::Success) return false;
-  const double log_det = information.log_det + LogDet(llt) + LogDet(prior.llt);
-  Eigen::MatrixXd S(n, c);
-  if (c > 0) S = -llt.solve(information.H.topRightCorner(n, c));
-  const Eigen::MatrixXd SC = S * prior.considered_covariance;
-  Eigen::MatrixXd posterior(n + c, n + c), turn = Eigen::MatrixXd::Identity(n + c, n + c);
-  posterior << llt.solve(Eigen::MatrixXd::Identity(n, n)) + SC * S.transpose(), SC, SC.transpose(),
-      prior.considered_covariance;
+  const Eigen::Index n = information.turn.rows(), c = information.H.rows() - n;
+  Scratch::Matrix root = scratch_.NewMatrix(n, n), S = scratch_.NewMatrix(n, c),
+                  SC = scratch_.NewMatrix(n, c), inverse = scratch_.NewMatrix(n, n),
+                  posterior = scratch_.NewMatrix(n + c, n + c),
+                  turn = scratch_.NewMatrix(n + c, n + c);
+  root = information.H.topLeftCorner(n, n);
+  if (!FactorInPlace(root)) return false;
+  const double log_det = information.log_det + LogDetOfRoot(root) + LogDetOfRoot(prior_.root);
+  S = -information.H.topRightCorner(n, c);
+  SolveInPlace(root, S);
+  SC.noalias() = S * prior_.considered_covariance;
+  inverse.setIdentity();
+  SolveInPlace(root, inverse);
+  inverse.noalias() += SC * S.transpose();
+  posterior << inverse, SC, SC.transpose(), prior_.considered_covariance;
+  turn.setIdentity();
   turn.topLeftCorner(n, n) = information.turn;
 
-  std::vector<Eigen::Index> rows = prior.rows, others;
-  rows.insert(rows.end(), prior.considered.begin(), prior.considered.end());
-  std::vector<std::uint8_t> is_used(static_cast<std::size_t>(map_.tangent_size()), 0);
-  for (const Eigen::Index r : rows) is_used[static_cast<std::size_t>(r)] = 1;
-  for (Eigen::Index r = 0; r < map_.tangent_size(); ++r) {
-    if (is_used[static_cast<std::size_t>(r)] == 0) others.push_back(r);
-  }
+  rows_ = prior_.rows;
+  rows_.insert(rows_.end(), prior_.considered.begin(), prior_.considered.end());
   Eigen::MatrixXd& P = fit->state.covariance;
-  P(rows, rows) = posterior;
-  if (!others.empty()) {
-    const Eigen::LLT<Eigen::MatrixXd> all(before.covariance(rows, rows));
-    if (all.info() != Eigen::Success) return false;
-    const Eigen::MatrixXd across = before.covariance(rows, others);
-    const Eigen::MatrixXd gain = all.solve(across).transpose(), moved = gain * turn;
-    const Eigen::MatrixXd with = moved * posterior;
-    P(others, others) =
-        before.covariance(others, others) - gain * across + with * moved.transpose();
-    P(others, rows) = with;
-    P(rows, others) = with.transpose();
-    MoveOthers(others, gain.leftCols(n) * prior.Moved(map_, fit->state.x), &fit->state);
-  }
-  P = 0.5 * (P + P.transpose()).eval();
+  Scatter(posterior, rows_, rows_, &P);
+  if (!UpdateOthers(before, posterior, turn, fit)) return false;
+  Symmetrize(&P);
   fit->state.log_weight = before.log_weight - fit->cost - 0.5 * log_det;
   return fit->state.x.allFinite() && P.allFinite() && std::isfinite(fit->state.log_weight);
 }
 
-// `step`: of these rows of the covariance, whole blocks.
-void TrackFrame::MoveOthers(const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& step,
-                            TrackState* state) const {
+// The unknowns that the frame has nothing to do with.
+bool TrackFrame::UpdateOthers(const TrackState& before, const Scratch::Matrix& posterior,
+                              const Scratch::Matrix& turn, TrackFit* fit) {
+  others_.clear();
+  for (Eigen::Index r = 0; r < map_.tangent_size(); ++r) {
+    if (std::find(rows_.begin(), rows_.end(), r) == rows_.end()) others_.push_back(r);
+  }
+  const auto m = static_cast<Eigen::Index>(rows_.size()),
+             o = static_cast<Eigen::Index>(others_.size()), n = prior_.root.rows();
+  if (o == 0) return true;
+  // All transposed.
+  Scratch::Matrix root = scratch_.NewMatrix(m, m), across = scratch_.NewMatrix(m, o),
+                  gain = scratch_.NewMatrix(m, o), moved = scratch_.NewMatrix(m, o),
+                  with = scratch_.NewMatrix(m, o), others = scratch_.NewMatrix(o, o);
+  Gather(before.covariance, rows_, rows_, &root);
+  if (!FactorInPlace(root)) return false;
+  Gather(before.covariance, rows_, others_, &across);
+  gain = across;
+  SolveInPlace(root, gain);
+  moved.noalias() = turn.transpose() * gain;
+  with.noalias() = posterior * moved;
+  Gather(before.covariance, others_, others_, &others);
+  others.noalias() -= gain.transpose() * across;
+  others.noalias() += with.transpose() * moved;
+  Eigen::MatrixXd& P = fit->state.covariance;
+  Scatter(others, others_, others_, &P);
+  Scatter(with, rows_, others_, &P);
+  Scatter(with.transpose(), others_, rows_, &P);
+  Scratch::Vector by = scratch_.NewVector(n), step = scratch_.NewVector(o);
+  prior_.Moved(map_, fit->state.x, &by);
+  step.noalias() = gain.topRows(n).transpose() * by;
+  MoveOthers(step, &fit->state);
+  return true;
+}
+
+// `step`: of others_, whole blocks.
+void TrackFrame::MoveOthers(const Scratch::Vector& step, TrackState* state) const {
   for (int b = 0; b < map_.size(); ++b) {
     const Block& block = map_.block(b);
-    const auto first = std::lower_bound(rows.begin(), rows.end(), map_.tangent(b));
-    if (block.tangent_size() == 0 || first == rows.end() || *first != map_.tangent(b)) continue;
-    const Eigen::VectorXd own = step.segment(first - rows.begin(), block.tangent_size());
-    double* values = state->x.data() + block.offset;
-    if (block.manifold == nullptr) {
-      Eigen::Map<Eigen::VectorXd>(values, block.size) += own;
-    } else {
-      const Eigen::VectorXd at = Eigen::Map<Eigen::VectorXd>(values, block.size);
-      block.manifold->Plus(at.data(), own.data(), values);
-    }
+    const auto first = std::lower_bound(others_.begin(), others_.end(), map_.tangent(b));
+    if (block.tangent_size() == 0 || first == others_.end() || *first != map_.tangent(b)) continue;
+    const BlockVector own = step.segment(first - others_.begin(), block.tangent_size());
+    Plus(block, own, state->x.data() + block.offset);
   }
 }
 
