@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "circline/estimators/circle_pose.h"
+#include "circline/refine/curvature_bias.h"
 #include "circline/refine/evidence_points.h"
 
 namespace circline {
@@ -95,7 +96,8 @@ void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle,
   const CircleObservation& seen = observations_->circles[index];
   if (!seen.fit) return;
   const double sigma = OneOf(seen.sigma_px, options_.conic_loss.scale_px, noise.circles[index]);
-  if (!FillEvidencePoints(observations_->camera, seen.points, seen.inliers, sigma, true,
+  RemoveCurvatureBias(observations_->camera, seen.points, seen.fit->conic, sigma, &pixels_);
+  if (!FillEvidencePoints(observations_->camera, pixels_, seen.inliers, sigma, true,
                           options_.noise_model, PointOptions(options_, true), &points_))
     return;
   PlaneCircleContourCost::Blocks blocks;

@@ -86,10 +86,18 @@ bool IsRight(const CameraPose& truth, const PoseHypothesis& h, double sigma) {
   return NormalError(truth, h) < std::max(kSigmas * sigma, 0.5 * to_other);
 }
 
+// Near the line of sight both poses are right. The bound is that of the one whose minimum the truth
+// belongs to: the nearest.
+bool IsNearest(const CameraPose& truth, const std::vector<PoseHypothesis>& hypotheses) {
+  const double first = NormalError(truth, hypotheses.front());
+  return std::all_of(hypotheses.begin(), hypotheses.end(),
+                     [&](const PoseHypothesis& h) { return NormalError(truth, h) >= first; });
+}
+
 struct Score {
   int frames = 0, right = 0, told = 0, told_right = 0, sure_wrong = 0, predicted = 0, restarts = 0,
       began_wrong_and_told = 0, ended_right = 0;
-  // Of the first hypothesis where it is right and in the map of the first frame.
+  // Of the first hypothesis where it is right, none is nearer, and in the map of the first frame.
   double squared = 0.0, bound = 0.0, nees = 0.0;
   int measured = 0;
   Calibration calibration;
@@ -135,7 +143,8 @@ void RunSequence(const Setting& setting, LossType loss, std::uint64_t seed, Scor
       ++score->told;
       score->told_right += right ? 1 : 0;
     }
-    if (right && !setting.odometry && world_is_first && k >= kFramesOfMotion) {
+    if (right && IsNearest(frame.pose, tracked.estimate.hypotheses) && !setting.odometry &&
+        world_is_first && k >= kFramesOfMotion) {
       const Eigen::Matrix3d R = frame.pose.rotation;
       const Eigen::Vector3d tilt = R.transpose() * first.cam_from_world.rotation.col(2);
       const Eigen::Matrix<double, 2, 3> across = R.leftCols<2>().transpose();
