@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "circline/estimators/basics.h"
-#include "circline/ransac/crowds.h"
+#include "circline/ransac/dense_clusters.h"
 #include "circline/ransac/false_alarms.h"
 #include "circline/ransac/inlier_weights.h"
 
@@ -50,8 +50,8 @@ ConicCandidate ConicSearch::Polished(const ConicModel::Value& value) const {
 // holds an ellipse with more inliers than the contour has. Both have far less likelihood than the
 // contour, whose inliers lie close to it and have nothing beside them. So where less than half of
 // the points are inliers, searches from other seeds and, where the ellipse explains its inliers
-// badly, among the points that are not near it and among those that do not crowd, are compared by
-// likelihood. With directions, which need so few draws that an ellipse through parts of two rims
+// badly, among the points that are not near it and among those outside dense clusters, are compared
+// by likelihood. With directions, which need so few draws that an ellipse through parts of two rims
 // may come first, there is one more seed up to two thirds.
 std::vector<ConicCandidate> ConicSearch::Run() const {
   RansacOptions options = options_.ransac;
@@ -66,7 +66,7 @@ std::vector<ConicCandidate> ConicSearch::Run() const {
   const bool good = IsGood(candidates[0], num_inliers);
   const bool are_most = good && 2 * num_inliers >= n;
   if (are_most && (!oriented_ || 3 * num_inliers >= 2 * n)) return candidates;
-  if (!good) SearchAmong(Uncrowded(), options, num_inliers, &candidates);
+  if (!good) SearchAmong(OutsideClusters(), options, num_inliers, &candidates);
   constexpr double kBad = 2.0;
   if (candidates[0].log_likelihood < kBad * num_inliers) {
     SearchAmong(FarFrom(candidates[0]), options, num_inliers, &candidates);
@@ -124,11 +124,12 @@ std::vector<int> ConicSearch::FarFrom(const ConicCandidate& candidate) const {
   return indices;
 }
 
-std::vector<int> ConicSearch::Uncrowded() const {
+std::vector<int> ConicSearch::OutsideClusters() const {
   constexpr int kSome = 300;  // Points, in random order, that stand for all.
-  std::vector<int> indices = circline::Uncrowded(model_.NumData(), kSome, [this](int i, int j) {
-    return model_.PixelsBetween(i, j) < kCrowdThresholds * options_.ransac.threshold;
-  });
+  std::vector<int> indices =
+      circline::OutsideClusters(model_.NumData(), kSome, [this](int i, int j) {
+        return model_.PixelsBetween(i, j) < kClusterThresholds * options_.ransac.threshold;
+      });
   for (int& i : indices) i = model_.PointIndex(i);
   return indices;
 }

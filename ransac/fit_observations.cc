@@ -10,7 +10,7 @@
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/point_noise.h"
-#include "circline/ransac/crowds.h"
+#include "circline/ransac/dense_clusters.h"
 #include "circline/ransac/fit_directions.h"
 #include "circline/ransac/line_model.h"
 #include "circline/ransac/robust_conic.h"
@@ -30,7 +30,7 @@ class PointFitter {
       circle.inliers.clear();
       circle.second.reset();
       circles_.back().status = FitCircle(circles_.back(), nullptr, &circle);
-      if (LeaveCrowdsOut(circle.points, circle.inliers, &circles_.back()))
+      if (LeaveClustersOut(circle.points, circle.inliers, &circles_.back()))
         circles_.back().status = FitCircle(circles_.back(), nullptr, &circle);
     }
     for (PencilObservation& pencil : run_.observations.pencils) {
@@ -43,7 +43,7 @@ class PointFitter {
         line.inliers.clear();
         line.is_parallel = true;
         features.back().status = FitLine(features.back(), &line);
-        if (LeaveCrowdsOut(line.points, line.inliers, &features.back()))
+        if (LeaveClustersOut(line.points, line.inliers, &features.back()))
           features.back().status = FitLine(features.back(), &line);
       }
     }
@@ -95,24 +95,24 @@ class PointFitter {
   }
 
   // Where a fit has found many outliers, it may itself have followed some, or have found nothing:
-  // leaves out what crowds. False where there is nothing to leave out.
-  bool LeaveCrowdsOut(const std::vector<Eigen::Vector2d>& pixels,
-                      const std::vector<std::uint8_t>& inliers, FittedFeature* f) const {
+  // leaves dense clusters out. False where there are none.
+  bool LeaveClustersOut(const std::vector<Eigen::Vector2d>& pixels,
+                        const std::vector<std::uint8_t>& inliers, FittedFeature* f) const {
     if (!inliers.empty() && !HasManyOutliers(inliers)) return false;
     const auto pixel = [&](int i) -> const Eigen::Vector2d& {
       return pixels[static_cast<std::size_t>(f->indices[static_cast<std::size_t>(i)])];
     };
-    const double radius = kCrowdThresholds * Gate(*f);
+    const double radius = kClusterThresholds * Gate(*f);
     constexpr int kMost = 4000;  // Points, evenly taken, that stand for all.
     const int n = static_cast<int>(f->points.size()), step = n / kMost + 1;
-    const std::vector<int> strung = Uncrowded(n, (n - 1) / step + 1, [&](int i, int j) {
+    const std::vector<int> spread = OutsideClusters(n, (n - 1) / step + 1, [&](int i, int j) {
       return (pixel(i) - pixel(j * step)).squaredNorm() < radius * radius;
     });
-    if (strung.size() == f->points.size()) return false;
+    if (spread.size() == f->points.size()) return false;
     FittedFeature rest = *f;
     rest.points.clear();
     rest.indices.clear();
-    for (const int i : strung) {
+    for (const int i : spread) {
       rest.points.push_back(f->points[static_cast<std::size_t>(i)]);
       rest.indices.push_back(f->indices[static_cast<std::size_t>(i)]);
     }

@@ -9,8 +9,8 @@
 namespace circline {
 namespace {
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
-                               CurveModel::kMaxSize + 6, kCameraSize>;
+using CurveJacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
+                                    CurveModel::kMaxSize + 6, kCameraSize>;
 
 }  // namespace
 
@@ -56,7 +56,7 @@ class TrackFrame::Information {
     const Term& term = frame_.terms_[index];
     const double* parameters[8];
     double* jacobians[8];
-    RowMajor ambient[8];
+    CurveJacobian ambient[8];
     frame_.Parameters(term, fit_.state.x.data(), fit_.own.data(), parameters);
     const int rows = term.cost->num_residuals();
     Scratch::Vector residuals = frame_.scratch_.NewVector(rows);
@@ -78,7 +78,7 @@ class TrackFrame::Information {
     }
     if (term.own > 0) {
       const auto at = std::find(term.blocks.begin(), term.blocks.end(), kOwn);
-      const RowMajor& own = ambient[static_cast<std::size_t>(at - term.blocks.begin())];
+      const CurveJacobian& own = ambient[static_cast<std::size_t>(at - term.blocks.begin())];
       BlockMatrix root = own.transpose() * own;
       if (!FactorInPlace(root)) return true;  // Without inliers.
       log_det += LogDetOfRoot(root);

@@ -11,8 +11,8 @@
 namespace circline::apps {
 namespace {
 
-// Of a line's plane through the camera against an axis along which it is taken to be: what a fit's
-// direction may be off.
+// Of a line's plane through the camera against an axis along which it is taken to be, radians: what
+// a fit's direction may be off. This and the next two are guesses, tried with no other value.
 constexpr double kAlongRad = 0.04;
 // Of the photo's longer side: shorter lines are letters.
 constexpr double kLeastShare = 0.03;

@@ -23,7 +23,7 @@ constexpr double kStepPx = 0.5;       // Of the offsets tried at either end.
 constexpr double kLeastShare = 0.34;  // Of the samples that must have a point on the line.
 // Of the best line's points that another one must have to be its rival, which may be the edge.
 constexpr double kRivalShare = 0.6;
-// How often a rival, and not the line taken, is the edge: about one edge in four (box-camprodon).
+// Probability that a rival, and not the line taken, is the edge. Chosen on box-camprodon.
 constexpr double kRivalIsRight = 0.25;
 constexpr double kLeastSigmaPx = 0.05;
 constexpr double kProlongedShare = 0.6;  // Of an edge, beyond its ends.

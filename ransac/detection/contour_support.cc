@@ -101,13 +101,14 @@ bool Contour::ToPixel(const Vector2d& x, Vector2d* pixel) const {
   return true;
 }
 
-void Supporter::Take(const std::vector<int>& points) {
+void EdgeCollector::Take(const std::vector<int>& points) {
   for (const int i : points) taken_[static_cast<std::size_t>(i)] = 1;
 }
 
 // The edge points in the pixels within `steps` of a sample along its normal, in order. Gathered
 // before they are looked at: the photo is large, and so all its pixels are fetched at once.
-int Supporter::PointsAcross(const ContourSample& s, int steps, std::array<int, 16>* points) const {
+int EdgeCollector::PointsAcross(const ContourSample& s, int steps,
+                                std::array<int, 16>* points) const {
   std::size_t count = 0;
   double x = s.pixel.x() - steps * s.normal.x(), y = s.pixel.y() - steps * s.normal.y();
   for (int step = -steps; step <= steps; ++step) {
@@ -120,7 +121,8 @@ int Supporter::PointsAcross(const ContourSample& s, int steps, std::array<int, 1
   return static_cast<int>(count);
 }
 
-QuickSupport Supporter::QuickLook(const std::vector<ContourSample>& samples, double reach) const {
+QuickSupport EdgeCollector::QuickLook(const std::vector<ContourSample>& samples,
+                                      double reach) const {
   const int steps = std::min(static_cast<int>(reach + 0.5), kMaxSteps);
   std::array<int, 3> across{};
   int any = 0;
@@ -145,8 +147,8 @@ QuickSupport Supporter::QuickLook(const std::vector<ContourSample>& samples, dou
   return {{across[0] / n, across[1] / n, across[2] / n}, any / n};
 }
 
-void Supporter::Collect(const std::vector<ContourSample>& samples, BrightSide bright, double reach,
-                        Support* support) {
+void EdgeCollector::Collect(const std::vector<ContourSample>& samples, BrightSide bright,
+                            double reach, Support* support) {
   const std::size_t n = samples.size();
   nearest_.resize(n);
   for (std::size_t k = 0; k < n; ++k) nearest_[k] = Strongest(samples[k], bright, reach);
@@ -172,7 +174,7 @@ void Supporter::Collect(const std::vector<ContourSample>& samples, BrightSide br
 
 // Angle between the gradient at an edge point and the contour's normal beside it, which has turned
 // since the sample by curvature times distance.
-double Supporter::NormalMiss(const ContourSample& s, const EdgePoint& p) {
+double EdgeCollector::NormalMiss(const ContourSample& s, const EdgePoint& p) {
   const Vector2d tangent(-s.normal.y(), s.normal.x());
   const double curvature = s.turn / std::max(s.length, 1e-9);
   const double side = s.normal.dot(p.Normal()) < 0.0 ? -1.0 : 1.0;
@@ -182,7 +184,7 @@ double Supporter::NormalMiss(const ContourSample& s, const EdgePoint& p) {
 
 // The free edge point near the contour at a sample with the right direction: of several the
 // strongest, with allowance for distance, as shadows and fringes run beside rims; or -1.
-int Supporter::Strongest(const ContourSample& s, BrightSide bright, double reach) const {
+int EdgeCollector::Strongest(const ContourSample& s, BrightSide bright, double reach) const {
   std::array<int, 16> points;
   const int count =
       PointsAcross(s, std::min(static_cast<int>(std::ceil(reach)), kMaxSteps), &points);
@@ -206,7 +208,7 @@ int Supporter::Strongest(const ContourSample& s, BrightSide bright, double reach
   return best;
 }
 
-void Supporter::AverageStrength(Support* support) {
+void EdgeCollector::AverageStrength(Support* support) {
   support->gradient = 0.0;
   sigmas_.clear();
   for (const int i : support->points) {
@@ -219,7 +221,7 @@ void Supporter::AverageStrength(Support* support) {
 }
 
 // in_run_[k]: sample k lies in a supported run that is long enough, small holes closed.
-void Supporter::FindRuns(const std::vector<ContourSample>& samples) {
+void EdgeCollector::FindRuns(const std::vector<ContourSample>& samples) {
   const std::size_t n = samples.size();
   in_run_.assign(n, 0);
   double perimeter = 0.0;
@@ -258,7 +260,7 @@ void Supporter::FindRuns(const std::vector<ContourSample>& samples) {
 }
 
 // Where to start, so that no run is cut by the start of the contour; n if there is no hole.
-std::size_t Supporter::BehindHole(const std::vector<ContourSample>& samples) const {
+std::size_t EdgeCollector::BehindHole(const std::vector<ContourSample>& samples) const {
   const std::size_t n = samples.size();
   double hole = 0.0;
   for (std::size_t k = 0; k < 2 * n; ++k) {
@@ -269,7 +271,7 @@ std::size_t Supporter::BehindHole(const std::vector<ContourSample>& samples) con
 }
 
 // Removes repetitions, keeps the order.
-void Supporter::Unique(std::vector<int>* points) {
+void EdgeCollector::Unique(std::vector<int>* points) {
   stamp_.resize(map_.points.size(), 0);
   ++now_;
   const auto seen = [this](int i) {

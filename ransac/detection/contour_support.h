@@ -67,10 +67,10 @@ struct QuickSupport {
 };
 
 // Finds the edge points along a sampled contour, and keeps book of which are already taken.
-class Supporter {
+class EdgeCollector {
  public:
-  // `map` must outlive the supporter.
-  explicit Supporter(const EdgeMap& map) : map_(map), taken_(map.points.size(), 0) {}
+  // `map` must outlive the collector.
+  explicit EdgeCollector(const EdgeMap& map) : map_(map), taken_(map.points.size(), 0) {}
 
   // Marks points as belonging to an accepted ellipse: they support no other.
   void Take(const std::vector<int>& points);

@@ -109,12 +109,12 @@ cv::Rect EllipseFitter::Surroundings() const {
 double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) {
   constexpr double kNone = -std::numeric_limits<double>::infinity();
   if (!Gather(*candidate, 0.7, kGatherPx.back())) return kNone;
-  Straighten(candidate->conic, e);
+  UndoCurvatureBias(candidate->conic, e);
   if (fit_points_.size() < 6 || !FitLikeliest(&candidate->conic)) return kNone;
   const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
   // What is gathered about a fit to all that is as near depends less on where the first started.
   if (!Gather(*candidate, 0.7, reach)) return kNone;
-  Straighten(candidate->conic, e);
+  UndoCurvatureBias(candidate->conic, e);
   if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic, 1)) return kNone;
   if (!Gather(*candidate, 0.7, reach) || !FitSupport(candidate->conic, e)) return kNone;
   candidate->conic = e->fit.conic;
@@ -137,7 +137,7 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
 // two. The one that the points are likeliest for, each of the rim or anywhere within reach.
 bool EllipseFitter::FitLikeliest(Matrix3d* conic) {
   if (!FitTrimmed(conic, kMaxTrims)) return false;
-  supporter_.AverageStrength(&support_);
+  collector_.AverageStrength(&support_);
   const double sigma_px = std::hypot(kRimSigmaPx, support_.sigma_px);
   if (Rms(fit_points_, *conic) < sigma_px) return true;
   const std::size_t step = 1 + fit_points_.size() / kStretchPoints;
@@ -173,7 +173,7 @@ double EllipseFitter::TruncatedCost(const Matrix3d& conic, double sigma_px) {
 }
 
 // The edge points of the support where they would lie if the contour, `conic`, were straight.
-void EllipseFitter::Straighten(const Matrix3d& conic, DetectedEllipse* e) {
+void EllipseFitter::UndoCurvatureBias(const Matrix3d& conic, DetectedEllipse* e) {
   e->points.clear();
   e->contour.clear();
   fit_points_.clear();
@@ -201,7 +201,7 @@ double EllipseFitter::MedianBlur() {
 }
 
 bool EllipseFitter::FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
-  Straighten(initial, e);
+  UndoCurvatureBias(initial, e);
   if (fit_points_.size() < 6) return false;
   if (!RefineConic(fit_points_, 1.0, initial, &e->fit).ok()) return false;
   if (DropOutliers(e)) {

@@ -70,7 +70,7 @@ EllipseFitter::EllipseFitter(const EdgeMap& map, const Camera& camera,
       options_(options),
       calibrated_(map, camera),
       contour_(camera),
-      supporter_(map),
+      collector_(map),
       max_axis_px_(kMaxAxisDiagonals * std::hypot(map.width, map.height)) {}
 
 bool EllipseFitter::FitArcs(std::initializer_list<const Arc*> arcs, EllipseCandidate* candidate) {
@@ -85,7 +85,7 @@ bool EllipseFitter::FitArcs(std::initializer_list<const Arc*> arcs, EllipseCandi
 bool EllipseFitter::FindAlong(const Matrix3d& conic, EllipseCandidate* candidate) {
   if (!contour_.Project(conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
   if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
-  const std::array<double, 3> across = supporter_.QuickLook(samples_, kQuickPx).across;
+  const std::array<double, 3> across = collector_.QuickLook(samples_, kQuickPx).across;
   if (across[static_cast<std::size_t>(BrightSide::kEither)] < kQuickShare) return false;
   constexpr auto kIn = static_cast<std::size_t>(BrightSide::kInside),
                  kOut = static_cast<std::size_t>(BrightSide::kOutside);
@@ -98,7 +98,7 @@ bool EllipseFitter::Improve(EllipseCandidate* candidate) {
   const EllipseCandidate rough = *candidate;
   if (!contour_.Project(rough.conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
   if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
-  const QuickSupport look = supporter_.QuickLook(samples_, kQuickPx);
+  const QuickSupport look = collector_.QuickLook(samples_, kQuickPx);
   const double own = look.across[static_cast<std::size_t>(rough.bright)];
   if (own >= std::max(kQuickShare, kQuickAcross * look.any) && Refit(candidate)) return true;
   // Before a busy ground the bright side changes along the contour.
@@ -120,8 +120,8 @@ void EllipseFitter::Take(const DetectedEllipse& e) {
   candidate.conic = e.fit.conic;
   candidate.bright = e.bright;
   // What a wider gathering finds belongs to it as well.
-  if (Gather(candidate, 0.7, kGatherPx[1])) supporter_.Take(support_.points);
-  supporter_.Take(e.points);
+  if (Gather(candidate, 0.7, kGatherPx[1])) collector_.Take(support_.points);
+  collector_.Take(e.points);
 }
 
 bool EllipseFitter::LiesOn(const DetectedEllipse& e, const Matrix3d& conic, double reach_px) {
@@ -249,7 +249,7 @@ bool EllipseFitter::Refit(EllipseCandidate* candidate) {
 
 double EllipseFitter::ShapeMiss(double rms_px, const Matrix3d& conic,
                                 const std::vector<int>& points) {
-  supporter_.AverageStrength(&support_);
+  collector_.AverageStrength(&support_);
   EllipseShape shape;
   shape.rms_px = rms_px;
   shape.slope_deg = SlopeDeg(map_, conic, points, &calibrated_);
@@ -262,7 +262,7 @@ bool EllipseFitter::Gather(const EllipseCandidate& candidate, double spacing, do
                            int max_samples) {
   if (!contour_.Project(candidate.conic, 0.7 * options_.min_axis_px, max_axis_px_)) return false;
   if (!contour_.SampleEvery(spacing, &samples_, max_samples)) return false;
-  supporter_.Collect(samples_, candidate.bright, reach, &support_);
+  collector_.Collect(samples_, candidate.bright, reach, &support_);
   return support_.points.size() >= 6;
 }
 

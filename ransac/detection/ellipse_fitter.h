@@ -50,7 +50,7 @@ class EllipseFitter {
 
   // Marks the ellipse's points: they support no other.
   void Take(const DetectedEllipse& e);
-  bool IsTaken(int i) const { return supporter_.IsTaken(i); }
+  bool IsTaken(int i) const { return collector_.IsTaken(i); }
 
   // Whether a conic passes within `reach_px` of the ellipse's points. (A dozen of them are looked
   // at.)
@@ -82,7 +82,7 @@ class EllipseFitter {
   bool SecondLook(EllipseCandidate* candidate, DetectedEllipse* e);
   cv::Rect Surroundings() const;
   double FinalFit(EllipseCandidate* candidate, DetectedEllipse* e);
-  void Straighten(const Eigen::Matrix3d& conic, DetectedEllipse* e);
+  void UndoCurvatureBias(const Eigen::Matrix3d& conic, DetectedEllipse* e);
   double MedianBlur();
   bool FitSupport(const Eigen::Matrix3d& initial, DetectedEllipse* e);
   bool DropOutliers(DetectedEllipse* e);
@@ -92,7 +92,7 @@ class EllipseFitter {
   const EllipseOptions& options_;
   CalibratedEdges calibrated_;
   Contour contour_;
-  Supporter supporter_;
+  EdgeCollector collector_;
   const double max_axis_px_;
   // Scratch.
   std::vector<CalibratedPoint> fit_points_, trimmed_, stretch_;

@@ -74,7 +74,7 @@ TEST(Contour, RefusesWhatIsTooSmallTooLargeOrNoEllipse) {
   EXPECT_FALSE(contour.Project(Matrix3d::Identity(), 4.0, 1000.0));
 }
 
-TEST(Supporter, MeasuresCoverageAndRemembersWhatIsTaken) {
+TEST(EdgeCollector, MeasuresCoverageAndRemembersWhatIsTaken) {
   // A dark disc of which a third is cut away by its own colour.
   const Camera camera = TestCamera(200, 200);
   const cv::Mat image = Develop(Render(200, 200, [](double u, double v) {
@@ -87,27 +87,27 @@ TEST(Supporter, MeasuresCoverageAndRemembersWhatIsTaken) {
   ASSERT_TRUE(contour.Project(PixelCircle(camera, 100.0, 100.0, 50.0), 4.0, 1000.0));
   std::vector<ContourSample> samples;
   ASSERT_TRUE(contour.SampleEvery(1.0, &samples));
-  Supporter supporter(map);
-  const QuickSupport look = supporter.QuickLook(samples, 2.0);
+  EdgeCollector collector(map);
+  const QuickSupport look = collector.QuickLook(samples, 2.0);
   EXPECT_NEAR(look.across[0], 2.0 / 3.0, 0.08);
   EXPECT_LT(look.across[1], 0.05);  // The wrong side bright.
   EXPECT_NEAR(look.across[2], look.across[0], 0.05);
   EXPECT_NEAR(look.any, 2.0 / 3.0, 0.1);
   Support support;
-  supporter.Collect(samples, BrightSide::kOutside, 2.0, &support);
-  supporter.AverageStrength(&support);
+  collector.Collect(samples, BrightSide::kOutside, 2.0, &support);
+  collector.AverageStrength(&support);
   EXPECT_NEAR(support.Coverage(), 2.0 / 3.0, 0.04);
   EXPECT_NEAR(support.turn, 4.0 * kPi / 3.0, 0.25);
   EXPECT_LT(support.normal_median, 0.03);
   EXPECT_NEAR(static_cast<double>(support.points.size()), 4.0 * kPi / 3.0 * 50.0, 40.0);
   EXPECT_GT(support.gradient, 20.0);
-  supporter.Take(support.points);
-  EXPECT_TRUE(supporter.IsTaken(support.points[0]));
-  supporter.Collect(samples, BrightSide::kOutside, 2.0, &support);
+  collector.Take(support.points);
+  EXPECT_TRUE(collector.IsTaken(support.points[0]));
+  collector.Collect(samples, BrightSide::kOutside, 2.0, &support);
   EXPECT_LT(support.Coverage(), 0.05);
 }
 
-TEST(Supporter, MeasuresNormalsAtThePointsThemselves) {
+TEST(EdgeCollector, MeasuresNormalsAtThePointsThemselves) {
   // The rim of a small disc turns by 12 degrees from one pixel to the next.
   const Camera camera = TestCamera(60, 60);
   const cv::Mat image = Develop(Render(60, 60, [](double u, double v) {
@@ -119,14 +119,14 @@ TEST(Supporter, MeasuresNormalsAtThePointsThemselves) {
   ASSERT_TRUE(contour.Project(PixelCircle(camera, 30.2, 29.7, 5.0), 4.0, 1000.0));
   std::vector<ContourSample> samples;
   ASSERT_TRUE(contour.SampleCount(40, &samples));
-  Supporter supporter(map);
+  EdgeCollector collector(map);
   Support support;
-  supporter.Collect(samples, BrightSide::kOutside, 1.5, &support);
+  collector.Collect(samples, BrightSide::kOutside, 1.5, &support);
   EXPECT_GT(support.Coverage(), 0.99);
   EXPECT_LT(support.normal_median, 1.0 * kDegree);
 }
 
-TEST(Supporter, TakesEitherBrightSideIfAsked) {
+TEST(EdgeCollector, TakesEitherBrightSideIfAsked) {
   // A grey disc, half before black and half before white.
   const Camera camera = TestCamera(120, 120);
   const cv::Mat image = Develop(Render(120, 120, [](double u, double v) {
@@ -138,13 +138,13 @@ TEST(Supporter, TakesEitherBrightSideIfAsked) {
   ASSERT_TRUE(contour.Project(PixelCircle(camera, 60.0, 60.0, 30.0), 4.0, 1000.0));
   std::vector<ContourSample> samples;
   ASSERT_TRUE(contour.SampleEvery(1.0, &samples));
-  Supporter supporter(map);
+  EdgeCollector collector(map);
   Support support;
   for (const BrightSide side : {BrightSide::kOutside, BrightSide::kInside}) {
-    supporter.Collect(samples, side, 1.5, &support);
+    collector.Collect(samples, side, 1.5, &support);
     EXPECT_NEAR(support.Coverage(), 0.5, 0.08);
   }
-  supporter.Collect(samples, BrightSide::kEither, 1.5, &support);
+  collector.Collect(samples, BrightSide::kEither, 1.5, &support);
   EXPECT_GT(support.Coverage(), 0.9);
 }
 

@@ -1,8 +1,7 @@
-// Outliers that lie in one place may look like a piece of a curve to a robust fit. What gives them
-// away is that they crowd: the points of a contour or a line are strung along it. Internal: not
-// installed.
-#ifndef CIRCLINE_RANSAC_CROWDS_H_
-#define CIRCLINE_RANSAC_CROWDS_H_
+// Outliers in a dense cluster may look like a piece of a curve to a robust fit. Their many
+// neighbours tell: the points of a contour or a line are spread along it. Internal: not installed.
+#ifndef CIRCLINE_RANSAC_DENSE_CLUSTERS_H_
+#define CIRCLINE_RANSAC_DENSE_CLUSTERS_H_
 
 #include <algorithm>
 #include <cstddef>
@@ -14,7 +13,7 @@ namespace circline {
 // two are neighbours, within three thresholds of an inlier. `stand_ins`: so many, the first `j`,
 // count for all; near() must spread them over all points where they are fewer than n.
 template <typename Near>
-std::vector<int> Uncrowded(int n, int stand_ins, const Near& near) {
+std::vector<int> OutsideClusters(int n, int stand_ins, const Near& near) {
   if (n == 0) return {};
   std::vector<int> neighbors(static_cast<std::size_t>(n), 0);
   for (int i = 0; i < n; ++i) {
@@ -31,8 +30,9 @@ std::vector<int> Uncrowded(int n, int stand_ins, const Near& near) {
   return indices;
 }
 
-constexpr double kCrowdThresholds = 3.0;
+// Radius of the neighbourhood, thresholds of an inlier.
+constexpr double kClusterThresholds = 3.0;
 
 }  // namespace circline
 
-#endif  // CIRCLINE_RANSAC_CROWDS_H_
+#endif  // CIRCLINE_RANSAC_DENSE_CLUSTERS_H_
