@@ -8,6 +8,8 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+}  // namespace
+
 // Where phi has the translation and the focal length; -1: not charted, not an unknown.
 struct Charted {
   Eigen::Index translation = -1, camera = -1;
@@ -60,8 +62,6 @@ struct Charted {
     }
   }
 };
-
-}  // namespace
 
 // Residuals A (phi(x) - phi(mean)) of several blocks.
 class TrackPrior::ChartedCost final : public ceres::CostFunction {

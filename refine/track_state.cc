@@ -11,8 +11,8 @@
 namespace circline {
 namespace {
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kCameraSize,
-                               kCameraSize>;
+using BlockJacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
+                                    kCameraSize, kCameraSize>;
 
 // d exp(v) = exp(v) at the left: exp([v + dv]x) = exp([J dv]x) exp([v]x), to second order in v.
 Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& v) {
@@ -129,14 +129,14 @@ void TrackState::Append(const TrackMap& map, int index, const double* values,
 
 BlockMatrix ChartOf(const Block& block, const double* at) {
   if (block.manifold == nullptr) return BlockMatrix::Identity(block.size, block.size);
-  RowMajor J(block.tangent_size(), block.size);
+  BlockJacobian J(block.tangent_size(), block.size);
   block.manifold->MinusJacobian(at, J.data());
   return J;
 }
 
 BlockMatrix PlusJacobianOf(const Block& block, const double* at) {
   if (block.manifold == nullptr) return BlockMatrix::Identity(block.size, block.size);
-  RowMajor J(block.size, block.tangent_size());
+  BlockJacobian J(block.size, block.tangent_size());
   block.manifold->PlusJacobian(at, J.data());
   return J;
 }
