@@ -13,11 +13,11 @@ namespace {
 
 // Of a line's plane through the camera against an axis along which it is taken to be, radians: what
 // a fit's direction may be off. This and the next two are guesses, tried with no other value.
-constexpr double kAlongRad = 0.04;
+constexpr double kLineAlongRad = 0.04;
 // Of the photo's longer side: shorter lines are letters.
-constexpr double kLeastShare = 0.03;
+constexpr double kLeastLineShare = 0.03;
 // Of a face, about its middle: its edges are no lines on it.
-constexpr double kWithin = 0.98;
+constexpr double kWithinFace = 0.98;
 
 // Where the photo has the face across `axis`; none if it is not seen.
 std::optional<ConvexRegion> SeenFace(const BoxFit& fit, int axis, bool far) {
@@ -30,14 +30,14 @@ std::optional<ConvexRegion> SeenFace(const BoxFit& fit, int axis, bool far) {
         fit.cam_from_box.rotation * BoxCorner(fit.length, corner) + fit.cam_from_box.translation;
     if (!CameraToPixel(fit.camera, at, &corners.back())) return std::nullopt;
   }
-  return ConvexRegion(std::move(corners), kWithin);
+  return ConvexRegion(std::move(corners), kWithinFace);
 }
 
 }  // namespace
 
 std::vector<FaceLine> FaceLines(const std::vector<DetectedLine>& lines, const BoxFit& fit) {
   std::vector<FaceLine> found;
-  const double least_px = kLeastShare * std::max(fit.camera.width, fit.camera.height);
+  const double least_px = kLeastLineShare * std::max(fit.camera.width, fit.camera.height);
   for (int across = 0; across < 3; ++across) {
     for (const bool far : {false, true}) {
       const std::optional<ConvexRegion> face = SeenFace(fit, across, far);
@@ -46,7 +46,7 @@ std::vector<FaceLine> FaceLines(const std::vector<DetectedLine>& lines, const Bo
         if (line.length_px < least_px || !face->Contains(line.ends)) continue;
         for (int axis = 0; axis < 3; ++axis) {
           const double miss = fit.cam_from_box.rotation.col(axis).dot(line.fit.line.normalized());
-          if (axis == across || std::abs(miss) > kAlongRad) continue;
+          if (axis == across || std::abs(miss) > kLineAlongRad) continue;
           found.push_back({axis, line.points, line.sigma_px});
         }
       }
