@@ -18,8 +18,10 @@ struct PointNoise {
   std::vector<std::vector<double>> lines;  // By pencil, by line.
 };
 
-// Defaults, pixels.
-constexpr double kConicDefaultPx = 0.3, kLineDefaultPx = 0.4;
+// Noise of contour points where nothing tells, pixels.
+constexpr double kConicDefaultPx = 0.3;
+// The same of lines' points.
+constexpr double kLineDefaultPx = 0.4;
 
 // A feature that states its noise has that. Any other has the scatter of its points about its own
 // fit, shrunk towards the common noise of its kind; segments of two points have that of their
