@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 
 namespace circline {
@@ -65,7 +68,20 @@ void MovePencil(const Camera& camera, const Matrix3d& homography, const Matrix3d
     line.points.resize(m);
     line.inliers.clear();
   }
-  if (pencil->fit) pencil->fit->direction = rotation * pencil->fit->direction;
+  if (!pencil->fit) return;
+  pencil->fit->direction = rotation * pencil->fit->direction;
+  pencil->fit->covariance = rotation * pencil->fit->covariance * rotation.transpose();
+}
+
+// Where lines run that were followed, whose pencil nobody has fitted in this frame: as all frames
+// before say.
+std::optional<VanishingPointFit> KnownDirection(const PoseHypothesis& last, const std::string& id) {
+  const auto known = std::find_if(last.pencils.begin(), last.pencils.end(),
+                                  [&](const PencilEstimate& p) { return p.id == id; });
+  if (known == last.pencils.end()) return std::nullopt;
+  const Vector3d& v = known->direction;
+  const double sigma = known->sigma_deg * kDegree;
+  return VanishingPointFit{v, sigma * sigma * (Matrix3d::Identity() - v * v.transpose())};
 }
 
 }  // namespace
@@ -89,6 +105,7 @@ Observations MoveObservations(const Observations& observations, const PoseHypoth
   }
   const Matrix3d rotation = next.rotation * from.rotation.transpose();
   for (PencilObservation& pencil : moved.pencils) {
+    if (!pencil.fit) pencil.fit = KnownDirection(last, pencil.id);
     const bool is_on_plane = pencil.plane == moved.frame.plane && !pencil.plane.empty();
     MovePencil(moved.camera, is_on_plane ? on_plane : at_origin, rotation, &pencil);
   }

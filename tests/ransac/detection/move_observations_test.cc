@@ -1,0 +1,38 @@
+#include "circline/ransac/detection/move_observations.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+#include "circline/estimators/basics.h"
+#include "tests/pinhole_camera.h"
+
+namespace circline {
+namespace {
+
+// Lines that are followed have no vanishing point of their own in the frame; what a new look finds
+// must not take their name if it runs otherwise.
+TEST(MoveObservations, PencilsThatNobodyHasFittedRunAsTheTrackSays) {
+  Observations held;
+  held.camera = PinholeCamera();
+  held.pencils.resize(2);
+  held.pencils[0].id = "L0";
+  held.pencils[1].id = "L1";  // Not known to the track.
+  PoseHypothesis last;
+  last.cam_from_world.translation = {0.0, 0.0, 5.0};
+  const Eigen::Vector3d direction = Eigen::Vector3d(1.0, 0.2, -0.4).normalized();
+  last.pencils = {{"L0", direction, 0.5}};
+  CameraPose next = last.cam_from_world;
+  next.rotation = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  const Observations moved = MoveObservations(held, last, next);
+  ASSERT_TRUE(moved.pencils[0].fit);
+  const VanishingPointFit& fit = *moved.pencils[0].fit;
+  EXPECT_LT((fit.direction - next.rotation * direction).norm(), 1e-12);
+  // Two components of half a degree, across the direction.
+  EXPECT_NEAR(fit.covariance.trace(), 2.0 * 0.25 * kDegree * kDegree, 1e-12);
+  EXPECT_LT((fit.covariance * fit.direction).norm(), 1e-12);
+  EXPECT_FALSE(moved.pencils[1].fit);
+}
+
+}  // namespace
+}  // namespace circline
