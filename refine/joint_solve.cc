@@ -170,7 +170,6 @@ Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_i
   const double least_cost = std::max(FreeCost(*state), kNothing / kLittleCost * state->cost);
   ceres::Solver::Options options =
       NearbyOptions(unknowns, max_iterations + losses.num_steps(), least_cost);
-  options.jacobi_scaling = false;  // A Cholesky factorisation does not mind the units.
   ceres::Solver::Summary summary;
   for (bool is_done = false; !is_done;) {
     Watch watch(rival, FreeCost(*state), unknowns, losses);
