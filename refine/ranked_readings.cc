@@ -11,6 +11,7 @@
 
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/joint_result.h"
+#include "circline/refine/merged_humps.h"
 #include "circline/refine/pose_seeds.h"
 #include "circline/refine/reading_search.h"
 
@@ -198,6 +199,7 @@ Status RankReadings(const JointProblem& problem, const PointNoise& noise,
   if (!status.ok()) return status;
   const std::vector<std::size_t> read_again = AddSecondReadings(problem, noise, &all);
   estimate->hypotheses = Ranked(all);
+  MergeHumps(&estimate->hypotheses);
   const PoseHypothesis& best = estimate->hypotheses.front();
   const auto notes_of = std::find_if(all.begin(), all.end(), [&](const Refined& r) {
     return r.hypothesis.cost == best.cost && r.hypothesis.structure == best.structure;

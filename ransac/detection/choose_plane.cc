@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/conic.h"
 #include "circline/ransac/detection/local_pencils.h"
 #include "circline/ransac/detection/segment_meetings.h"
 
@@ -50,15 +51,36 @@ double JointSupport(const PlacedPencil& a, const PlacedPencil& b, double diagona
   return is_plane ? 2.0 * std::min(of_a, of_b) * std::sqrt(share) : 0.0;
 }
 
+// Whether one circle is about the middle of another, but not concentric with it: such are edges of
+// one solid (the rims of a cup, a saucer, a collar, a wheel), at different heights, rounded. None
+// is an exact circle: a plane that they share would choose one of two poses by how they err.
+bool AreOfOneSolid(const CircleObservation& a, const CircleObservation& b) {
+  // Centres apart by this share of the larger one's semi-minor axis. What lies on a disc by chance
+  // is within it once in ten times.
+  constexpr double kSameMiddle = 0.3;
+  if (!a.concentric.empty() && a.concentric == b.concentric) return false;
+  Ellipse first, second;
+  return ConicToEllipse(a.fit->conic, &first) && ConicToEllipse(b.fit->conic, &second) &&
+         (first.center - second.center).norm() < kSameMiddle * std::max(first.b, second.b);
+}
+
 }  // namespace
 
 bool IsNear(const PlacedPencil& pencil, const Eigen::Vector3d& direction) {
   return pencil.direction.vector.cross(direction).norm() < kDistinctSine;
 }
 
+// The best supported rim of a solid speaks for all.
+bool PlaneChooser::IsOfSolidIn(const Plane& plane, std::size_t i) const {
+  return std::any_of(plane.circles.begin(), plane.circles.end(), [&](int other) {
+    return AreOfOneSolid(circles_[i].observation,
+                         circles_[static_cast<std::size_t>(other)].observation);
+  });
+}
+
 void PlaneChooser::AddCircles(Plane* plane) const {
   for (std::size_t i = 0; i < circles_.size(); ++i) {
-    if (!CanLieIn(*circles_[i].observation.fit, plane->normal)) continue;
+    if (IsOfSolidIn(*plane, i) || !CanLieIn(*circles_[i].observation.fit, plane->normal)) continue;
     plane->circles.push_back(static_cast<int>(i));
     plane->support_px += kCircleWeight * circles_[i].support_px;
   }

@@ -51,6 +51,7 @@ class PlaneChooser {
   Plane Choose(const Plane& of_circles, std::vector<PlacedPencil>* pencils) const;
 
  private:
+  bool IsOfSolidIn(const Plane& plane, std::size_t i) const;
   void AddCircles(Plane* plane) const;
   Plane GrowFrom(const UncertainDirection& seed) const;
   UncertainDirection MeanNormal(const Plane& plane) const;

@@ -128,8 +128,9 @@ TEST(AssembleObservations, ACircleChoosesThePairOfPencilsThatItAgreesWith) {
 
 TEST(AssembleObservations, CirclesAloneAgreeOnAPlane) {
   const Vector3d normal = Vector3d(0.3, 0.5, -1.0), other = Vector3d(-0.6, 0.1, -0.7);
-  const Observations found =
-      Assemble({Circle(other, 300.0), Circle(normal, 200.0), Circle(normal, 180.0)}, {});
+  const Observations found = Assemble({Circle(other, 300.0), Circle(normal, 200.0),
+                                       Circle(normal, 180.0, Vector3d(-1.5, 0.2, 6.0))},
+                                      {});
   ASSERT_EQ(found.circles.size(), 3U);
   EXPECT_EQ(found.circles[0].id, "c0");
   EXPECT_EQ(found.circles[0].plane, "p0");
@@ -148,7 +149,7 @@ std::size_t SharingAPlane(int circles, int on_plane, Random* random) {
       const double x = random->Normal(), y = random->Normal(), z = random->Normal();
       normal = Vector3d(x, y, -std::abs(z));
     }
-    const double u = random->Uniform(-2.0, 2.0), v = random->Uniform(-1.5, 1.5);
+    const double u = random->Uniform(-6.0, 6.0), v = random->Uniform(-4.5, 4.5);
     CircleEvidence circle = Circle(normal, 100.0, {u, v, 6.0}, kVariance);
     if (circle.num_normals > 0) evidence.push_back(std::move(circle));
   }
@@ -156,6 +157,24 @@ std::size_t SharingAPlane(int circles, int on_plane, Random* random) {
   return static_cast<std::size_t>(
       std::count_if(found.circles.begin(), found.circles.end(),
                     [](const CircleObservation& c) { return c.plane == "p0"; }));
+}
+
+// The rims of a cup are at different heights and rounded: together they would choose a pose by how
+// they err. Rings of a marker are concentric, and say so.
+TEST(AssembleObservations, OneRimOfASolidSpeaksForAll) {
+  const Vector3d normal = Vector3d(0.2, -0.6, -1.0).normalized(), center(0.5, 0.2, 6.0);
+  for (const bool is_marker : {false, true}) {
+    CircleEvidence outer = Circle(normal, 600.0, center),
+                   inner = Circle(normal, 400.0, (center - 0.1 * normal) / 0.8);
+    if (is_marker) outer.observation.concentric = inner.observation.concentric = "g0";
+    const Observations found =
+        Assemble({outer, inner, Circle(normal, 300.0, Vector3d(-2.0, 1.0, 7.0))}, {});
+    const auto in_plane =
+        std::count_if(found.circles.begin(), found.circles.end(),
+                      [](const CircleObservation& circle) { return circle.plane == "p0"; });
+    EXPECT_EQ(in_plane, is_marker ? 3 : 2);
+    EXPECT_EQ(found.circles[0].plane, "p0");
+  }
 }
 
 // Of many, some agree by accident: that is no plane.

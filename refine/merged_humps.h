@@ -1,0 +1,18 @@
+// Hypotheses that are one pose. Internal: not installed.
+#ifndef CIRCLINE_REFINE_MERGED_HUMPS_H_
+#define CIRCLINE_REFINE_MERGED_HUMPS_H_
+
+#include <vector>
+
+#include "circline/estimators/pose.h"
+
+namespace circline {
+
+// Of ranked hypotheses those that are less apart than they are wide become one, as probable as they
+// are together: the pose of the most probable, with the covariance of all about it. They stay
+// ranked. The two poses of a lone circle stay two, however near.
+void MergeHumps(std::vector<PoseHypothesis>* hypotheses);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_MERGED_HUMPS_H_
