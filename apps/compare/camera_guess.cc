@@ -31,6 +31,7 @@ double FocalOfFov(double fov_deg, int width, int height) {
 }
 
 std::string SureTo(double sigma, double doubtful) {
+  if (!(sigma > 0.0)) return ", taken as exact";
   std::string words = ", +- " + FormatShort(100.0 * sigma) + " %";
   if (doubtful > 0.0) {
     words +=
@@ -94,8 +95,9 @@ GuessedCamera CameraGuess::ForPhoto(const std::string& path, int width, int heig
 
 std::string DescribeGuess(const CameraGuess& guess) {
   if (guess.fov_deg > 0.0 || guess.focal_px > 0.0) {
-    return "the camera is a guess, its focal length good to " +
-           FormatShort(100.0 * guess.Stated().log_focal.value_or(kGuessSigma)) +
+    const double sigma = guess.Stated().log_focal.value_or(kGuessSigma);
+    if (!(sigma > 0.0)) return "the camera is a guess, its focal length taken as exact";
+    return "the camera is a guess, its focal length good to " + FormatShort(100.0 * sigma) +
            " % (--focal_sigma); what the photo says of it counts";
   }
   return "no camera is given: each photo has the focal length of its EXIF data, else that of " +

@@ -88,6 +88,14 @@ TEST_F(CompareInputs, SaysHowWellAGuessIsKnown) {
   check("--focal_px=300 --focal_sigma=0.1", "good to 10.0 %", "+- 10.0 %", 0.1);
 }
 
+TEST_F(CompareInputs, SaysThatAGuessIsTakenAsExact) {
+  const Outcome outcome = Run("--fov_deg=50 --focal_sigma=0 --solvers=single_circle");
+  ASSERT_EQ(outcome.exit_code, 0);
+  EXPECT_CONTAINS(outcome.err, "its focal length taken as exact");
+  EXPECT_CONTAINS(ReadJsonLines(folder_ / "out/observations.jsonl").at(0)["camera_from"].dump(),
+                  "--fov_deg=50.0, taken as exact");
+}
+
 // A noise model that says how well the camera is known says so of a guess too.
 TEST_F(CompareInputs, NoiseModelCountsForAGuess) {
   ASSERT_EQ(Run("--focal_px=300 --noise=exact --focal_sigma=0").exit_code, 0);
