@@ -76,7 +76,7 @@ Status MoveToLikeliestFocal(const EdgeMap& edges, const DetectionOptions& option
       if (!status.ok()) return status;
     }
     const double moved = LikeliestLogFocal(*evidence, pencils, camera, options.noise_model.camera,
-                                           std::log(stated_px / camera.fx));
+                                           std::log(stated_px / camera.fx), diagonal_px);
     if (std::abs(moved) < kSame) break;
     camera.fx *= std::exp(moved);
     camera.fy *= std::exp(moved);

@@ -105,14 +105,17 @@ std::vector<int> OneOfEachEdge(const LineSet& set, const std::vector<int>& subse
   return edges;
 }
 
+std::vector<LineFit> FitsOf(const LineSet& set, const std::vector<int>& subset) {
+  std::vector<LineFit> fits;
+  for (const int i : subset) fits.push_back(set.fits[static_cast<std::size_t>(i)]);
+  return fits;
+}
+
 // Boxes, boards and rooms have right angles: the direction orthogonal to `axis` that lines[subset]
 // have the best evidence of, if any.
 std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::vector<int>& subset,
                                                const Vector3d& axis) {
-  std::vector<LineFit> pool;
-  for (const int i : OneOfEachEdge(set, subset)) {
-    pool.push_back(set.fits[static_cast<std::size_t>(i)]);
-  }
+  const std::vector<LineFit> pool = FitsOf(set, OneOfEachEdge(set, subset));
   const std::optional<Vector3d> best = OrthogonalEvidence(pool, axis, kSearchSigmaRad).Best();
   if (!best) return std::nullopt;
   FoundPencil found;
@@ -187,6 +190,12 @@ Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, st
   }
   LongestFirst(pencils);
   return Status::Ok();
+}
+
+std::vector<LineFit> EdgesAround(const std::vector<DetectedLine>& lines,
+                                 const DetectedPencil& pencil, double diagonal_px) {
+  const LineSet set(lines, diagonal_px);
+  return FitsOf(set, OneOfEachEdge(set, LinesAround(set, pencil)));
 }
 
 LineFit WithSharedError(const DetectedLine& line, double shared_px) {

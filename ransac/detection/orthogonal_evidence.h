@@ -29,7 +29,14 @@ class OrthogonalEvidence {
   // to the axis; none where there are no odds above kMinLogOdds.
   std::optional<Eigen::Vector3d> Best() const;
 
+  // Logarithm of the odds of the best of these to none, whatever they are; the lines' evidence of
+  // the third direction counts where it speaks for it.
+  double HighestLogOdds() const;
+
  private:
+  // The directions that single lines have if they are at right angles to the axis.
+  std::vector<Eigen::Vector3d> Proposals() const;
+
   Eigen::Vector3d axis_;
   std::vector<LineOdds> lines_;
 };

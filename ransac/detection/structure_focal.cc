@@ -8,6 +8,7 @@
 
 #include "circline/estimators/conic.h"
 #include "circline/ransac/detection/circle_grid.h"
+#include "circline/ransac/detection/orthogonal_evidence.h"
 #include "circline/ransac/detection/uncertain_direction.h"
 
 namespace circline {
@@ -25,7 +26,9 @@ constexpr double kReach = 2.5;
 // Half the longer side of the photo over the focal length: tangents of 5 and 60 degrees.
 constexpr double kNarrowest = 0.0874887, kWidest = 1.7320508;
 // More circles, and more pencils, add little but accidents.
-constexpr std::size_t kMaxCircles = 16, kMaxSeeds = 6, kMaxPencils = 4;
+constexpr std::size_t kMaxCircles = 16, kMaxSeeds = 6, kMaxPencils = 4, kMaxEdges = 40;
+// Edges of one thing may miss their direction by this, radians.
+constexpr double kSpreadRad = 3e-3;
 // Of circles that are of the plane that most are of.
 constexpr double kPlaneShare = 0.5;
 // The circles of a plane have its normal within this of that of one of them, degrees.
@@ -49,6 +52,15 @@ UncertainDirection Refocused(const UncertainDirection& direction, const Vector3d
   return out;
 }
 
+LineFit Refocused(const LineFit& fit, const Vector3d& scale) {
+  const UncertainDirection normal =
+      Refocused(UncertainDirection{fit.line, fit.covariance}, scale.cwiseInverse());
+  LineFit out = fit;
+  out.line = normal.vector;
+  out.covariance = normal.covariance;
+  return out;
+}
+
 ConicFit Refocused(const ConicFit& fit, const Vector3d& scale) {
   const Matrix3d inverse = scale.cwiseInverse().asDiagonal();
   ConicFit out = fit;
@@ -63,7 +75,7 @@ ConicFit Refocused(const ConicFit& fit, const Vector3d& scale) {
 class StructureEvidence {
  public:
   StructureEvidence(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
-                    const Camera& camera)
+                    const Camera& camera, double diagonal_px)
       : camera_(camera) {
     for (const CircleEvidence& circle : evidence.circles) {
       conics_.push_back(&*circle.observation.fit);
@@ -82,16 +94,21 @@ class StructureEvidence {
       });
       if (is_new && directions_.size() < kMaxPencils) directions_.push_back(direction);
     }
+    if (IsEmpty() && !pencils.empty()) {
+      edges_ = EdgesAround(evidence.lines, pencils[0], diagonal_px);
+      if (edges_.size() > kMaxEdges) edges_.resize(kMaxEdges);
+    }
   }
 
-  bool IsEmpty() const { return conics_.size() < 2 && directions_.size() < 2; }
+  bool IsEmpty() const { return conics_.size() < 2 && directions_.size() < 2 && edges_.size() < 2; }
 
   // Logarithm of the evidence at a focal length, against that of no structure.
   double At(double log_focal) {
     const Vector3d scale = Scale(log_focal);
     std::vector<UncertainDirection> directions;
     for (const UncertainDirection& d : directions_) directions.push_back(Refocused(d, scale));
-    return RightAngles(directions) + Circles(log_focal, scale);
+    return RightAngles(directions) + EdgesAtRightAngles(directions, scale) +
+           Circles(log_focal, scale);
   }
 
  private:
@@ -103,6 +120,16 @@ class StructureEvidence {
       }
     }
     return sum;
+  }
+
+  // Of the edges around the only pencil as those of one thing with it.
+  double EdgesAtRightAngles(const std::vector<UncertainDirection>& directions,
+                            const Vector3d& scale) const {
+    if (edges_.empty()) return 0.0;
+    std::vector<LineFit> edges;
+    for (const LineFit& edge : edges_) edges.push_back(Refocused(edge, scale));
+    const OrthogonalEvidence evidence(edges, directions[0].vector, kSpreadRad);
+    return std::log1p(std::exp(evidence.HighestLogOdds()));
   }
 
   // Of the plane that explains most of them, and of the lattice that they have in it.
@@ -185,6 +212,7 @@ class StructureEvidence {
   std::vector<const ConicFit*> conics_;
   std::vector<double> peaks_;  // Of each circle's likelihood, against that of any plane.
   std::vector<UncertainDirection> directions_;
+  std::vector<LineFit> edges_;  // Around the only pencil.
   std::vector<UncertainDirection> lattice_;
   double lattice_at_ = std::numeric_limits<double>::infinity();
   Vector3d lattice_normal_ = Vector3d::Zero();
@@ -202,8 +230,9 @@ double LogPrior(double off, const CameraSigma& sigma) {
 }  // namespace
 
 double LikeliestLogFocal(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
-                         const Camera& camera, const CameraSigma& sigma, double prior_log_focal) {
-  StructureEvidence structure(evidence, pencils, camera);
+                         const Camera& camera, const CameraSigma& sigma, double prior_log_focal,
+                         double diagonal_px) {
+  StructureEvidence structure(evidence, pencils, camera, diagonal_px);
   if (structure.IsEmpty()) return prior_log_focal;
   const double half = 0.5 * std::max(camera.width, camera.height) / camera.fx;
   // No lens is further from another one than that, however little is known.

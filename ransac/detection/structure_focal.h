@@ -6,7 +6,9 @@
 // for structure is compared over the focal lengths that are possible beforehand: how likely the
 // directions of the longest pencils are at right angles in pairs, whether the circles have one
 // plane, and whether the rows and columns of their lattice are at right angles there; each part as
-// the odds of a mixture, so that what has no part in a structure costs its share and no more.
+// the odds of a mixture, so that what has no part in a structure costs its share and no more. Where
+// there is one pencil and nothing else, the edges around it tell at which focal length they are at
+// right angles to it: a box has too few of them for a second pencil.
 #ifndef CIRCLINE_RANSAC_DETECTION_STRUCTURE_FOCAL_H_
 #define CIRCLINE_RANSAC_DETECTION_STRUCTURE_FOCAL_H_
 
@@ -22,7 +24,8 @@ namespace circline {
 // calibrated and about which its prior is, `prior_log_focal` off. `pencils` are those of
 // DetectPencilsApart. Where the photo has no structure it is the prior's. 5 ms for 12 circles.
 double LikeliestLogFocal(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
-                         const Camera& camera, const CameraSigma& sigma, double prior_log_focal);
+                         const Camera& camera, const CameraSigma& sigma, double prior_log_focal,
+                         double diagonal_px = kUsualDiagonalPx);
 
 }  // namespace circline
 

@@ -27,26 +27,33 @@ Camera Guess(double factor) {
   return camera;
 }
 
-// Edges along two or three directions at right angles, seen through a camera that is guessed.
+// An edge along the direction, seen through a camera that is guessed.
+void AddEdge(const Eigen::Vector3d& direction, double factor, Random* random,
+             PhotoEvidence* evidence) {
+  const double u = random->Uniform(120.0, 360.0), v = random->Uniform(80.0, 260.0);
+  const DetectedLine line =
+      detection_test::MakeLine(TestCamera(), u, v, direction, 90.0, 0.0, 0.1, random);
+  evidence->lines.emplace_back();
+  EXPECT_TRUE(LineFromSegment(Guess(factor), line.ends, 0.1, &evidence->lines.back()).ok());
+}
+
+// Along two or three directions at right angles.
 PhotoEvidence Edges(const Eigen::Matrix3d& axes, int num_directions, double factor) {
   Random random(3);
   PhotoEvidence evidence;
-  for (int k = 0; k < 60; ++k) {
-    const double u = random.Uniform(120.0, 360.0), v = random.Uniform(80.0, 260.0);
-    const DetectedLine line = detection_test::MakeLine(
-        TestCamera(), u, v, axes.col(k % num_directions), 90.0, 0.0, 0.1, &random);
-    evidence.lines.emplace_back();
-    EXPECT_TRUE(LineFromSegment(Guess(factor), line.ends, 0.1, &evidence.lines.back()).ok());
-  }
+  for (int k = 0; k < 60; ++k) AddEdge(axes.col(k % num_directions), factor, &random, &evidence);
   return evidence;
+}
+
+double FromEdges(const PhotoEvidence& evidence, double factor, const CameraSigma& sigma) {
+  std::vector<DetectedPencil> pencils;
+  EXPECT_TRUE(DetectPencilsApart(evidence.lines, 3, 1, &pencils, 600.0).ok());
+  return LikeliestLogFocal(evidence, pencils, Guess(factor), sigma, 0.0);
 }
 
 double FromEdges(const Eigen::Matrix3d& axes, int num_directions, double factor,
                  const CameraSigma& sigma) {
-  const PhotoEvidence evidence = Edges(axes, num_directions, factor);
-  std::vector<DetectedPencil> pencils;
-  EXPECT_TRUE(DetectPencilsApart(evidence.lines, 3, 1, &pencils, 600.0).ok());
-  return LikeliestLogFocal(evidence, pencils, Guess(factor), sigma, 0.0);
+  return FromEdges(Edges(axes, num_directions, factor), factor, sigma);
 }
 
 // Whatever the guess, right angles are found where they are.
@@ -57,6 +64,18 @@ TEST(LikeliestLogFocal, RightAnglesTell) {
       EXPECT_NEAR(FromEdges(axes, num_directions, factor, Wide(0.5)), -std::log(factor), 0.05)
           << num_directions << " " << factor;
     }
+  }
+}
+
+// A box with print along one of its directions: two edges along each of the others are no pencils.
+TEST(LikeliestLogFocal, EdgesAroundTheOnlyPencilTell) {
+  const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.5, 0.6, 0.1));
+  for (const double factor : {0.6, 1.0, 1.6}) {
+    Random random(3);
+    PhotoEvidence evidence;
+    for (int k = 0; k < 20; ++k) AddEdge(axes.col(0), factor, &random, &evidence);
+    for (int k = 0; k < 4; ++k) AddEdge(axes.col(1 + k % 2), factor, &random, &evidence);
+    EXPECT_NEAR(FromEdges(evidence, factor, Wide(0.5)), -std::log(factor), 0.05) << factor;
   }
 }
 
