@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "circline/estimators/conic.h"
-#include "circline/ransac/detection/circle_grid.h"
 #include "circline/ransac/detection/orthogonal_evidence.h"
 #include "circline/ransac/detection/uncertain_direction.h"
 
@@ -20,7 +19,6 @@ using Eigen::Vector3d;
 // Steps of log focal length: a third of what a degree of a right angle is worth at 30 degrees of
 // tilt.
 constexpr double kStep = 0.02;
-constexpr double kLatticeStep = 0.15;
 // The prior is searched over so many of its standard deviations.
 constexpr double kReach = 2.5;
 // Half the longer side of the photo over the focal length: tangents of 5 and 60 degrees.
@@ -75,8 +73,7 @@ ConicFit Refocused(const ConicFit& fit, const Vector3d& scale) {
 class StructureEvidence {
  public:
   StructureEvidence(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
-                    const Camera& camera, double diagonal_px)
-      : camera_(camera) {
+                    double diagonal_px) {
     for (const CircleEvidence& circle : evidence.circles) {
       conics_.push_back(&*circle.observation.fit);
       const UncertainDirection& normal = circle.normals[0];
@@ -103,12 +100,11 @@ class StructureEvidence {
   bool IsEmpty() const { return conics_.size() < 2 && directions_.size() < 2 && edges_.size() < 2; }
 
   // Logarithm of the evidence at a focal length, against that of no structure.
-  double At(double log_focal) {
+  double At(double log_focal) const {
     const Vector3d scale = Scale(log_focal);
     std::vector<UncertainDirection> directions;
     for (const UncertainDirection& d : directions_) directions.push_back(Refocused(d, scale));
-    return RightAngles(directions) + EdgesAtRightAngles(directions, scale) +
-           Circles(log_focal, scale);
+    return RightAngles(directions) + EdgesAtRightAngles(directions, scale) + Circles(scale);
   }
 
  private:
@@ -132,25 +128,21 @@ class StructureEvidence {
     return std::log1p(std::exp(evidence.HighestLogOdds()));
   }
 
-  // Of the plane that explains most of them, and of the lattice that they have in it.
-  double Circles(double log_focal, const Vector3d& scale) {
+  // Of the plane that explains most of them.
+  double Circles(const Vector3d& scale) const {
     if (conics_.size() < 2) return 0.0;
     std::vector<ConicFit> all(std::min(conics_.size(), kMaxCircles));
     for (std::size_t i = 0; i < all.size(); ++i) all[i] = Refocused(*conics_[i], scale);
     double best = 0.0;
-    UncertainDirection plane;
     for (std::size_t seed = 0; seed < std::min(all.size(), kMaxSeeds); ++seed) {
       std::array<UncertainDirection, 2> normals;
       const int count = CircleNormals(all[seed], &normals);
       for (int k = 0; k < count; ++k) {
         const UncertainDirection mean = MeanOfPlane(all, normals[static_cast<std::size_t>(k)]);
-        const double evidence = PlaneEvidence(all, mean);
-        if (!(evidence > best)) continue;
-        best = evidence;
-        plane = mean;
+        best = std::max(best, PlaneEvidence(all, mean));
       }
     }
-    return best > 0.0 ? best + Lattice(log_focal, scale, plane.vector) : 0.0;
+    return best;
   }
 
   static UncertainDirection MeanOfPlane(const std::vector<ConicFit>& all,
@@ -174,48 +166,10 @@ class StructureEvidence {
     return sum;
   }
 
-  // Its rows and columns hardly depend on the focal length: they are looked for anew after
-  // kLatticeStep, and in another plane.
-  double Lattice(double log_focal, const Vector3d& scale, const Vector3d& normal) {
-    constexpr double kOtherPlane = 0.3;  // Sine.
-    const bool is_near = std::abs(log_focal - lattice_at_) <= kLatticeStep;
-    const Vector3d moved =
-        is_near ? Scale(log_focal - lattice_at_).cwiseInverse().cwiseProduct(lattice_normal_).eval()
-                : normal;
-    if (!is_near || !(moved.normalized().cross(normal).norm() <= kOtherPlane)) {
-      lattice_ = FindLatticeAt(log_focal, scale, normal);
-      lattice_at_ = log_focal;
-      lattice_normal_ = normal;
-    }
-    std::vector<UncertainDirection> directions;
-    for (const UncertainDirection& direction : lattice_)
-      directions.push_back(Refocused(direction, Scale(log_focal - lattice_at_)));
-    return RightAngles(directions);
-  }
-
-  std::vector<UncertainDirection> FindLatticeAt(double log_focal, const Vector3d& scale,
-                                                const Vector3d& normal) const {
-    Camera camera = camera_;
-    camera.fx *= std::exp(log_focal);
-    camera.fy *= std::exp(log_focal);
-    const Matrix3d inverse = scale.cwiseInverse().asDiagonal();
-    std::vector<Matrix3d> conics;
-    for (const ConicFit* fit : conics_) conics.push_back(inverse * fit->conic * inverse);
-    std::vector<UncertainDirection> directions;
-    for (const DetectedPencil& pencil : FindGridPencils(camera, conics, normal)) {
-      directions.push_back({pencil.observation.fit->direction, pencil.observation.fit->covariance});
-    }
-    return directions;
-  }
-
-  const Camera& camera_;
   std::vector<const ConicFit*> conics_;
   std::vector<double> peaks_;  // Of each circle's likelihood, against that of any plane.
   std::vector<UncertainDirection> directions_;
   std::vector<LineFit> edges_;  // Around the only pencil.
-  std::vector<UncertainDirection> lattice_;
-  double lattice_at_ = std::numeric_limits<double>::infinity();
-  Vector3d lattice_normal_ = Vector3d::Zero();
 };
 
 double LogPrior(double off, const CameraSigma& sigma) {
@@ -232,7 +186,7 @@ double LogPrior(double off, const CameraSigma& sigma) {
 double LikeliestLogFocal(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
                          const Camera& camera, const CameraSigma& sigma, double prior_log_focal,
                          double diagonal_px) {
-  StructureEvidence structure(evidence, pencils, camera, diagonal_px);
+  const StructureEvidence structure(evidence, pencils, diagonal_px);
   if (structure.IsEmpty()) return prior_log_focal;
   const double half = 0.5 * std::max(camera.width, camera.height) / camera.fx;
   // No lens is further from another one than that, however little is known.

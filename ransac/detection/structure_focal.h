@@ -4,11 +4,10 @@
 // Right angles and common planes are judged in calibrated coordinates: at a wrong focal length the
 // discs of one sheet lie in different planes and the walls of a house are oblique. So the evidence
 // for structure is compared over the focal lengths that are possible beforehand: how likely the
-// directions of the longest pencils are at right angles in pairs, whether the circles have one
-// plane, and whether the rows and columns of their lattice are at right angles there; each part as
-// the odds of a mixture, so that what has no part in a structure costs its share and no more. Where
-// there is one pencil and nothing else, the edges around it tell at which focal length they are at
-// right angles to it: a box has too few of them for a second pencil.
+// directions of the longest pencils are at right angles in pairs, and whether the circles have one
+// plane; each part as the odds of a mixture, so that what has no part in a structure costs its
+// share and no more. Where there is one pencil and nothing else, the edges around it tell at which
+// focal length they are at right angles to it: a box has too few of them for a second pencil.
 #ifndef CIRCLINE_RANSAC_DETECTION_STRUCTURE_FOCAL_H_
 #define CIRCLINE_RANSAC_DETECTION_STRUCTURE_FOCAL_H_
 
