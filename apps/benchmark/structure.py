@@ -68,7 +68,8 @@ def sure_answers(args, scene, flags, scratch):
         for line in map(json.loads, lines):
             name = os.path.splitext(os.path.basename(line['image']))[0]
             photos.add(name)
-            if line['hypothesis'] == 0 and line['probability'] >= SURE:
+            # A normal that is not told is of no plane.
+            if line['hypothesis'] == 0 and line['probability'] >= SURE and line['sigma_normal_deg'] is not None:
                 rotation = numpy.array(line['rotation']).reshape(3, 3)
                 answers[name] = (rotation[:, 2], line['sigma_normal_deg'])
     return answers, photos
