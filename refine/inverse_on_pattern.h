@@ -20,13 +20,21 @@ class InverseOnPattern {
   explicit InverseOnPattern(const Sparse& matrix) : factor_(matrix) {
     if (ok()) Invert();
   }
-  bool ok() const { return factor_.info() == Eigen::Success; }
+  bool ok() const { return factor_.info() == Eigen::Success && factor_.vectorD().minCoeff() > 0.0; }
   // Zero outside the pattern.
   double operator()(int row, int col) const {
     const auto& order = factor_.permutationP().indices();
     const int i = std::max(order[row], order[col]), j = std::min(order[row], order[col]);
     return i == j ? diagonal_[i] : inverse_.coeff(i, j);
   }
+  // To an entry of the pattern, and to the one that mirrors it.
+  void Add(int row, int col, double value) {
+    const auto& order = factor_.permutationP().indices();
+    const int i = std::max(order[row], order[col]), j = std::min(order[row], order[col]);
+    (i == j ? diagonal_[i] : inverse_.coeffRef(i, j)) += value;
+  }
+  // The inverse times this.
+  Eigen::MatrixXd Times(const Eigen::MatrixXd& right) const { return factor_.solve(right); }
 
  private:
   // With A = L D L': the column j of the inverse Z below the diagonal is -Z_II L_Ij, where I are

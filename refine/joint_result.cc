@@ -195,7 +195,7 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
           R * Eigen::Map<const Eigen::Vector3d>(state.x.data() + block.offset).normalized();
       Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * turns;
       std::vector<int> columns = rotation;
-      if (block.tangent_size() > 0) {
+      if (at.column(blocks->direction) >= 0) {
         Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> plus(
             3, block.tangent_size());
         block.manifold->PlusJacobian(state.x.data() + block.offset, plus.data());

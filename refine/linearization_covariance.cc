@@ -1,5 +1,5 @@
-// Covariance from the assembled system: elimination of what features have of their own and of the
-// leaves, and the way back.
+// Covariance from the assembled system: elimination of all but the core, and the way back; and how
+// far each feature contradicts the others.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -10,24 +10,6 @@ namespace circline {
 namespace {
 
 constexpr double kNoInformation = 1e-12;  // Of an eigenvalue, at unit diagonal.
-
-// Solves the first k equations of a symmetric system for their own unknowns (Goodnight 1979): A, B
-// of [A B; B^T C] become -A^-1 and A^-1 B, and C becomes C - B^T A^-1 B. False where A is not
-// positive definite.
-bool Sweep(Eigen::Index k, Eigen::MatrixXd* system) {
-  Eigen::VectorXd column(system->rows());
-  for (Eigen::Index p = 0; p < k; ++p) {
-    const double pivot = (*system)(p, p);
-    if (!(pivot > 0.0) || !std::isfinite(pivot)) return false;
-    column = system->col(p) / pivot;
-    for (Eigen::Index j = 0; j < system->cols(); ++j)
-      system->col(j) -= (pivot * column[j]) * column;
-    system->col(p) = column;
-    system->row(p) = column.transpose();
-    (*system)(p, p) = -1.0 / pivot;
-  }
-  return system->allFinite();
-}
 
 // Pseudo-inverse on the observed subspace, which units do not matter to, and the directions without
 // information. `diagonal`: what the information would be if all else were known.
@@ -51,126 +33,92 @@ bool PseudoInverse(const Eigen::MatrixXd& A, const Eigen::VectorXd& diagonal,
 
 }  // namespace
 
-// A group's own unknowns out of the information of the shared ones.
-bool Linearization::Eliminate(Group* group) {
-  std::vector<int> target;
-  for (const std::size_t index : group->rows) {
-    for (const int column : rows_[index].columns) {
-      if (column >= 0 &&
-          std::find(group->shared.begin(), group->shared.end(), column) == group->shared.end())
-        group->shared.push_back(column);
-    }
-  }
-  const int k = group->size, n = static_cast<int>(group->shared.size());
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(k + n, k + n);
-  for (const std::size_t index : group->rows) {
-    const Rows& rows = rows_[index];
-    target.clear();
-    for (const int column : rows.columns)
-      target.push_back(column < 0 ? -1 - column : k + IndexIn(group->shared, column));
-    for (std::size_t a = 0; a < target.size(); ++a) {
-      for (std::size_t b = 0; b <= a; ++b) {
-        const auto i = static_cast<Eigen::Index>(a), j = static_cast<Eigen::Index>(b);
-        const double sum = rows.J.col(i).dot(rows.J.col(j));
-        A(target[a], target[b]) += sum;
-        if (a != b) A(target[b], target[a]) += sum;
+// The information of the core, all others unknown; empty where these carry none.
+Eigen::MatrixXd Linearization::EliminateOthers() {
+  const int core = core_size(), others = static_cast<int>(groups_.size()) - core;
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(core, core),
+                  across = Eigen::MatrixXd::Zero(others, core);
+  std::vector<Eigen::Triplet<double>> entries;
+  for (const std::vector<std::size_t>& parts : together_) {
+    const Rows rows = Together(parts);
+    const Eigen::MatrixXd H = rows.J.transpose() * rows.J;
+    for (Eigen::Index a = 0; a < H.rows(); ++a) {
+      const int i = rows.columns[static_cast<std::size_t>(a)];
+      for (Eigen::Index b = 0; b < H.cols(); ++b) {
+        const int j = rows.columns[static_cast<std::size_t>(b)];
+        if (j >= core) {
+          if (i >= core) entries.emplace_back(i - core, j - core, H(a, b));
+        } else if (i >= core) {
+          across(i - core, j) += H(a, b);
+        } else {
+          information(i, j) += H(a, b);
+        }
       }
     }
   }
-  if (!Sweep(k, &A)) return false;
-  group->inverse = -A.topLeftCorner(k, k);
-  group->gain = A.topRightCorner(k, n);
-  for (int a = 0; a < n; ++a) {
-    for (int b = 0; b < n; ++b)
-      Add(group->shared[static_cast<std::size_t>(a)], group->shared[static_cast<std::size_t>(b)],
-          A(k + a, k + b));
-  }
-  return true;
+  diagonal_ = information.diagonal();
+  if (others == 0) return information;
+  InverseOnPattern::Sparse own(others, others);
+  own.setFromTriplets(entries.begin(), entries.end());
+  others_.emplace(own);
+  if (!others_->ok()) return {};
+  gain_ = others_->Times(across);
+  information -= across.transpose() * gain_;
+  return information;
 }
 
-// A leaf out of the core's information.
-bool Linearization::Eliminate(std::size_t index) {
-  Leaf& leaf = leaves_[index];
-  const auto& [own, with_core] = information_.leaves[index];
-  Eigen::MatrixXd unused;
-  if (!PseudoInverse(own, own.diagonal(), &leaf.inverse, &unused)) return false;
-  for (int column = 0; column < core_size(); ++column) {
-    if (!with_core.col(column).isZero(0.0)) leaf.meets.push_back(column);
-  }
-  const Eigen::MatrixXd met = with_core(Eigen::all, leaf.meets);
-  leaf.gain = leaf.inverse * met;
-  information_.core(leaf.meets, leaf.meets) -= met.transpose() * leaf.gain;
-  leaf.covariance = leaf.inverse;
-  leaf.with_core.setZero(leaf.size, core_size());
-  return true;
-}
-
-// F where the leaves follow the core, by the core's columns. What is left of it can be little: that
-// is why it is worked out before it is squared.
-Eigen::MatrixXd Linearization::AlongCore(const Overcounted& over) const {
-  const int core = core_size(), e = num_estimated_;
-  Eigen::MatrixXd along = Eigen::MatrixXd::Zero(over.F.rows(), e);
-  for (Eigen::Index k = 0; k < over.F.cols(); ++k) {
-    const int column = over.columns[static_cast<std::size_t>(k)];
-    if (column < e) {
-      along.col(column) += over.F.col(k);
-    } else if (column >= core) {
-      const Leaf& leaf = leaves_[LeafAt(column)];
-      for (std::size_t i = 0; i < leaf.meets.size(); ++i) {
-        const double gain = leaf.gain(column - leaf.first, static_cast<Eigen::Index>(i));
-        if (leaf.meets[i] < e) along.col(leaf.meets[i]) -= gain * over.F.col(k);
-      }
-    }
-  }
-  return along;
-}
-
-// A^-1 F^T S F A^-1, A^-1 of the core `inverse`, and what it comes to in the leaves.
+// A^-1 F^T S F A^-1, A^-1 of the core `inverse`, and what it comes to in the others that F has.
+// What is left of F where the others follow the core can be little: it is worked out before it is
+// squared.
 void Linearization::AddOvercounted(const Eigen::MatrixXd& inverse) {
   const int core = core_size(), e = num_estimated_;
-  Eigen::Index num_rows = 0;
-  for (const Overcounted& over : overcounted_) num_rows += over.F.rows();
-  Eigen::MatrixXd G(num_rows, e), SG(num_rows, e);
-  Eigen::Index first = 0;
   for (const Overcounted& over : overcounted_) {
-    const Eigen::Index rows = over.F.rows();
-    G.middleRows(first, rows) = AlongCore(over) * inverse;
-    SG.middleRows(first, rows) = over.S * G.middleRows(first, rows);
-    const auto own = std::find_if(over.columns.begin(), over.columns.end(),
-                                  [&](int column) { return column >= core; });
-    if (own != over.columns.end()) {
-      Leaf& leaf = leaves_[LeafAt(*own)];
-      Eigen::MatrixXd of_leaf = Eigen::MatrixXd::Zero(rows, leaf.size);
-      for (std::size_t k = 0; k < over.columns.size(); ++k) {
-        if (over.columns[k] >= core)
-          of_leaf.col(over.columns[k] - leaf.first) = over.F.col(static_cast<Eigen::Index>(k));
+    std::vector<int> own;  // Of the others.
+    std::vector<Eigen::Index> at;
+    Eigen::MatrixXd along = Eigen::MatrixXd::Zero(over.F.rows(), core);
+    for (Eigen::Index k = 0; k < over.F.cols(); ++k) {
+      const int column = over.columns[static_cast<std::size_t>(k)];
+      if (column < core) {
+        along.col(column) += over.F.col(k);
+        continue;
       }
-      of_leaf *= leaf.inverse;
-      leaf.covariance += of_leaf.transpose() * over.S * of_leaf;
-      leaf.with_core.leftCols(e) += of_leaf.transpose() * SG.middleRows(first, rows);
+      along -= over.F.col(k) * gain_.row(column - core);
+      own.push_back(column - core);
+      at.push_back(k);
     }
-    first += rows;
+    const Eigen::MatrixXd G = along.leftCols(e) * inverse;
+    covariance_.topLeftCorner(e, e) += G.transpose() * over.S * G;
+    const auto n = static_cast<Eigen::Index>(own.size());
+    Eigen::MatrixXd of_own(n, n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j < n; ++j)
+        of_own(i, j) =
+            (*others_)(own[static_cast<std::size_t>(i)], own[static_cast<std::size_t>(j)]);
+    }
+    of_own = over.F(Eigen::all, at) * of_own;
+    const Eigen::MatrixXd with_core = of_own.transpose() * over.S * G,
+                          more = of_own.transpose() * over.S * of_own;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const int row = own[static_cast<std::size_t>(i)];
+      with_core_.row(row).head(e) += with_core.row(i);
+      for (Eigen::Index j = 0; j <= i; ++j)
+        others_->Add(row, own[static_cast<std::size_t>(j)], more(i, j));
+    }
   }
-  covariance_.topLeftCorner(e, e) += G.transpose() * SG;
 }
 
 bool Linearization::ComputeCovariance() {
-  for (Group& group : groups_) {
-    if (ok_ && !group.rows.empty()) ok_ = Eliminate(&group);
-  }
   if (!ok_) return false;
-  const Eigen::VectorXd diagonal = information_.core.diagonal();
-  for (std::size_t i = 0; i < leaves_.size(); ++i) {
-    if (!Eliminate(i)) return false;
-  }
+  const Eigen::MatrixXd information = EliminateOthers();
   const int n = core_size(), e = num_estimated_, c = n - e;
-  Eigen::MatrixXd inverse, nulls;
-  if (!PseudoInverse(information_.core.topLeftCorner(e, e), diagonal.head(e), &inverse, &nulls))
+  Eigen::MatrixXd inverse;
+  if (information.rows() != n ||
+      !PseudoInverse(information.topLeftCorner(e, e), diagonal_.head(e), &inverse, &null_space_))
     return false;
   covariance_.setZero(n, n);
   covariance_.topLeftCorner(e, e) = inverse;
+  with_core_.setZero(gain_.rows(), n);
   AddOvercounted(inverse);
-  null_space_ = nulls;
   if (c > 0) {
     const CameraSigma& sigma = problem_.camera_sigma();
     Eigen::VectorXd ambient = Eigen::VectorXd::Zero(kCameraSize);
@@ -179,7 +127,7 @@ bool Linearization::ComputeCovariance() {
     const Eigen::MatrixXd P = PlusJacobian(JointProblem::kCamera);
     const Eigen::MatrixXd prior =
         P.transpose() * ambient.cwiseAbs2().asDiagonal() * P;  // P selects.
-    const Eigen::MatrixXd follow = -inverse * information_.core.topRightCorner(e, c);
+    const Eigen::MatrixXd follow = -inverse * information.topRightCorner(e, c);
     covariance_.topLeftCorner(e, e) += follow * prior * follow.transpose();
     covariance_.topRightCorner(e, c) = follow * prior;
     covariance_.bottomLeftCorner(c, e) = covariance_.topRightCorner(e, c).transpose();
@@ -191,55 +139,71 @@ bool Linearization::ComputeCovariance() {
 Eigen::MatrixXd Linearization::Covariance(const std::vector<int>& columns) const {
   const auto n = static_cast<Eigen::Index>(columns.size());
   const int core = core_size();
-  std::vector<int> met;  // Of the core's columns, by those of `columns` or their leaves.
-  for (const int column : columns) {
-    if (column < core) {
-      met.push_back(column);
-    } else {
-      const std::vector<int>& meets = leaves_[LeafAt(column)].meets;
-      met.insert(met.end(), meets.begin(), meets.end());
-    }
-  }
-  std::sort(met.begin(), met.end());
-  met.erase(std::unique(met.begin(), met.end()), met.end());
-  const auto at = [&met](int column) {
-    return std::lower_bound(met.begin(), met.end(), column) - met.begin();
-  };
-  const auto m = static_cast<Eigen::Index>(met.size());
-  Eigen::MatrixXd by_core = Eigen::MatrixXd::Zero(n, m), with_core = by_core;
+  Eigen::MatrixXd by_core = Eigen::MatrixXd::Zero(n, core), with_core = by_core;
   for (Eigen::Index i = 0; i < n; ++i) {
     const int column = columns[static_cast<std::size_t>(i)];
     if (column < core) {
-      by_core(i, at(column)) = 1.0;
-      continue;
+      by_core(i, column) = 1.0;
+    } else {
+      by_core.row(i) = -gain_.row(column - core);
+      with_core.row(i) = with_core_.row(column - core);
     }
-    const Leaf& leaf = leaves_[LeafAt(column)];
-    const int row = column - leaf.first;
-    for (std::size_t k = 0; k < leaf.meets.size(); ++k)
-      by_core(i, at(leaf.meets[k])) = -leaf.gain(row, static_cast<Eigen::Index>(k));
-    for (Eigen::Index k = 0; k < m; ++k)
-      with_core(i, k) = leaf.with_core(row, met[static_cast<std::size_t>(k)]);
   }
   const Eigen::MatrixXd across = with_core * by_core.transpose();
   Eigen::MatrixXd covariance =
-      by_core * covariance_(met, met) * by_core.transpose() + across + across.transpose();
+      by_core * covariance_ * by_core.transpose() + across + across.transpose();
   for (Eigen::Index i = 0; i < n; ++i) {
-    const int a = columns[static_cast<std::size_t>(i)];
-    for (Eigen::Index j = 0; a >= core && j < n; ++j) {
-      const int b = columns[static_cast<std::size_t>(j)];
-      const Leaf& leaf = leaves_[LeafAt(a)];
-      if (b >= core && LeafAt(b) == LeafAt(a))
-        covariance(i, j) += leaf.covariance(a - leaf.first, b - leaf.first);
+    const int a = columns[static_cast<std::size_t>(i)] - core;
+    for (Eigen::Index j = 0; a >= 0 && j < n; ++j) {
+      const int b = columns[static_cast<std::size_t>(j)] - core;
+      if (b >= 0) covariance(i, j) += (*others_)(a, b);
     }
   }
   return covariance;
 }
 
-double Linearization::OwnVariance(int block, int coordinate) const {
-  const int group = problem_.blocks()[static_cast<std::size_t>(block)].group,
-            own = own_columns_[static_cast<std::size_t>(block)] + coordinate;
-  const Group& of = groups_[static_cast<std::size_t>(group)];
-  return of.rows.empty() ? 0.0 : of.inverse(own, own);
+// With the leverage S = J Sigma J^T of the feature's residuals f, the others would cost 1/2 f^T S
+// (I - S)^-1 f less without it. Where S is 1 the feature alone fixes an unknown: no test there.
+Linearization::Misfit Linearization::MisfitOf(std::size_t feature,
+                                              const std::vector<std::size_t>& parts) const {
+  const std::vector<Feature>& features = problem_.features();
+  Misfit misfit{-features[feature].free_twice_cost, features[feature].dof};
+  for (const std::size_t part : parts) {
+    misfit.d2 += rows_[part].f.squaredNorm();
+    const auto own = static_cast<std::size_t>(rows_[part].feature);
+    if (own == feature) continue;
+    misfit.d2 -= features[own].free_twice_cost;
+    misfit.dof += features[own].dof;
+  }
+  misfit.d2 = std::max(0.0, misfit.d2);
+  const Rows all = Together(parts);
+  const Eigen::MatrixXd S = all.J * Covariance(all.columns) * all.J.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(S);
+  for (Eigen::Index k = 0; k < S.rows(); ++k) {
+    const double s = std::clamp(eigen.eigenvalues()[k], 0.0, 1.0),
+                 along = eigen.eigenvectors().col(k).dot(all.f);
+    constexpr double kAlone = 1e-6;
+    if (1.0 - s > kAlone) misfit.d2 += along * along * s / (1.0 - s);
+  }
+  return misfit;
+}
+
+// What says nothing without a feature is a part of it.
+std::vector<Linearization::Misfit> Linearization::Misfits() const {
+  const std::vector<Feature>& features = problem_.features();
+  std::vector<Misfit> misfits(features.size());
+  std::vector<std::vector<std::size_t>> parts(features.size());
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    if (rows_[i].feature < 0) continue;
+    const auto feature = static_cast<std::size_t>(rows_[i].feature);
+    parts[feature].push_back(i);
+    if (features[feature].parent >= 0)
+      parts[static_cast<std::size_t>(features[feature].parent)].push_back(i);
+  }
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    if (state_.active[i] != 0 && !parts[i].empty()) misfits[i] = MisfitOf(i, parts[i]);
+  }
+  return misfits;
 }
 
 }  // namespace circline
