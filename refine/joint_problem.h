@@ -78,16 +78,12 @@ struct State {
   std::vector<double> x;             // All parameter blocks.
   std::vector<std::uint8_t> active;  // By feature.
   double cost = 0.0;                 // Of the active terms, priors included.
-  bool is_rough = false;             // Not at a minimum, which would contradict itself.
 };
 
 // A minimum that has been found. Another competes where it costs no more than so much above it.
 struct Rival {
   double cost = std::numeric_limits<double>::infinity();
   double gap = 0.0;
-  // Where the features miss their own free fits by more than this, cost, they contradict each
-  // other: the place of the minimum is enough, roughly.
-  double contradiction = std::numeric_limits<double>::infinity();
 };
 
 class JointProblem {
@@ -110,7 +106,7 @@ class JointProblem {
   Status Solve(int max_iterations, State* state, const Rival& rival = Rival()) const;
   // The same from a start that may be far off, where much lies in the tails of the losses: under
   // wide ones first, which narrow to their own width.
-  Status SolveGraduated(int max_iterations, State* state, const Rival& rival = Rival()) const;
+  Status SolveGraduated(int max_iterations, State* state) const;
 
   // Of the active features' own free fits: no pose costs less.
   double FreeCost(const State& state) const;

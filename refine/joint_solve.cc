@@ -60,18 +60,14 @@ class Narrowing : public ceres::EvaluationCallback {
 // Ends where a step, taken or not, changes the cost by little, or where the steps that would follow
 // do (near the minimum under a loss they shrink at a constant rate), however large the cost of all
 // points is: of many features one or another creeps in the tails of its loss long after the pose
-// stands; where more steps like it would not lead to what competes; and where features that
-// contradict each other, so that many points lie in the tails of the loss, make the steps creep.
+// stands; and where more steps like it would not lead to what competes.
 class Watch : public ceres::IterationCallback {
  public:
-  Watch(const Rival& rival, double free_cost, int unknowns, const Narrowing& losses)
+  Watch(const Rival& rival, int unknowns, const Narrowing& losses)
       : losses_(losses),
         was_wide_(losses.is_wide()),
         little_(kLittleCost * std::max(1.0, unknowns / kFew)),
-        most_(rival.cost + rival.gap),
-        contradicted_(free_cost + rival.contradiction),
-        free_cost_(free_cost) {}
-  bool creeps() const { return num_slow_ == kMostSlow; }
+        most_(rival.cost + rival.gap) {}
   // The first step after the losses have narrowed led upwards: ceres compared its cost with that of
   // the wider ones.
   bool has_risen() const { return has_risen_; }
@@ -91,25 +87,17 @@ class Watch : public ceres::IterationCallback {
     const double rest = converges ? summary.cost_change * rate / (1.0 - rate) : summary.cost_change;
     if (std::min(std::abs(summary.cost_change), std::abs(rest)) < little_)
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
-    constexpr double kSlow = 0.003;  // Of what is above the free fits.
-    const bool is_slow = summary.cost > contradicted_ && summary.step_is_successful &&
-                         summary.cost_change < kSlow * (summary.cost - free_cost_);
-    num_slow_ = is_slow ? num_slow_ + 1 : 0;
-    if (creeps()) return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     const bool is_hopeless =
         summary.step_is_successful && summary.cost - kMoreSteps * summary.cost_change > most_;
     return is_hopeless ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
   }
 
  private:
-  static constexpr int kMostSlow = 2;   // Steps, one after the other.
   static constexpr double kFew = 20.0;  // Unknowns: a pose's and a camera's, not tuned.
   const Narrowing& losses_;
   bool was_wide_, has_risen_ = false;
   double narrowed_cost_ = std::numeric_limits<double>::infinity();
-  double little_, most_, contradicted_, free_cost_;
-  double last_change_ = 0.0;
-  int num_slow_ = 0;
+  double little_, most_, last_change_ = 0.0;
 };
 
 bool HasBoundedLoss(const EstimationOptions& options) {
@@ -172,10 +160,9 @@ Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_i
       NearbyOptions(unknowns, max_iterations + losses.num_steps(), least_cost);
   ceres::Solver::Summary summary;
   for (bool is_done = false; !is_done;) {
-    Watch watch(rival, FreeCost(*state), unknowns, losses);
+    Watch watch(rival, unknowns, losses);
     options.callbacks = {&watch};
     ceres::Solve(options, &problem, &summary);
-    state->is_rough = watch.creeps();
     is_done = !summary.IsSolutionUsable() || (!losses.is_wide() && !watch.has_risen());
     if (losses.is_wide()) losses.Narrow();  // A minimum of the wider ones.
   }
@@ -207,10 +194,10 @@ double JointProblem::LargestMiss(const State& state) const {
   return std::sqrt(most);
 }
 
-Status JointProblem::SolveGraduated(int max_iterations, State* state, const Rival& rival) const {
+Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
   if (options_.conic_loss.type == LossType::kTrivial &&
       options_.line_loss.type == LossType::kTrivial) {
-    return Solve(max_iterations, state, rival);
+    return Solve(max_iterations, state);
   }
   constexpr double kWidest = 300.0, kNarrower = 0.25;
   // A loss that is bounded soon has no slope to follow.
@@ -218,7 +205,7 @@ Status JointProblem::SolveGraduated(int max_iterations, State* state, const Riva
   std::vector<double> widths;
   for (double width = std::min(LargestMiss(*state), kWidest); width > near; width *= kNarrower)
     widths.push_back(width);
-  return SolveNarrowing(widths, max_iterations, state, rival);
+  return SolveNarrowing(widths, max_iterations, state, Rival());
 }
 
 }  // namespace circline

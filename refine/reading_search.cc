@@ -22,9 +22,6 @@ constexpr std::size_t kMostSamples = 8;  // Beside these, of what agrees with on
 // number, for time (circline_benchmark --benchmark_filter=CirclesOfAPlane), not chosen on photos.
 constexpr std::size_t kMostCircles = 6;
 constexpr double kHopeless = 300.0;  // Gaps that no start comes down.
-// Cost beyond what chance has features miss their free fits by: several times what leaving out one
-// costs, and its chi-square limit besides.
-constexpr double kContradiction = 100.0;
 constexpr double kNoRival = std::numeric_limits<double>::infinity();
 
 using Reading = std::vector<std::uint8_t>;  // By feature: takes part.
@@ -72,7 +69,6 @@ class ReadingSearch {
         ++most;
       }
     }
-    FinishRough();
     return minima_.empty() ? last_ : Status::Ok();
   }
 
@@ -161,10 +157,6 @@ class ReadingSearch {
 
   // A minimum for the answer, with all that agrees with it.
   void Keep(State state) {
-    if (state.is_rough) {
-      rough_.push_back(std::move(state));
-      return;
-    }
     if (HasOutliers(state)) return;
     TakeBackWhatFits(problem_, &state);
     const auto known = std::find_if(minima_.begin(), minima_.end(), [&](const State& other) {
@@ -174,23 +166,6 @@ class ReadingSearch {
       minima_.push_back(std::move(state));
     } else if (state.cost < known->cost) {
       *known = std::move(state);
-    }
-  }
-
-  // What contradicts itself competes where nothing else explains the evidence better.
-  void FinishRough() {
-    double best = BestKept();
-    std::stable_sort(rough_.begin(), rough_.end(),
-                     [](const State& a, const State& b) { return a.cost < b.cost; });
-    for (State& state : rough_) {
-      const double left_out = LeftOutCost(problem_, state);
-      if (problem_.FreeCost(state) + left_out > best + MaxGap()) continue;
-      if (!problem_.Solve(problem_.options().max_iterations, &state, {best - left_out, MaxGap()})
-               .ok())
-        continue;
-      state.cost += left_out;
-      best = std::min(best, state.cost);
-      Keep(std::move(state));
     }
   }
 
@@ -219,10 +194,8 @@ class ReadingSearch {
   bool SolveFrom(bool is_consistent, double best, State* state) {
     const int max_iterations = problem_.options().max_iterations;
     const double left_out = LeftOutCost(problem_, *state);
-    const double contradiction = 0.5 * DegreesOfFreedom(*state) + kContradiction;
-    last_ = is_consistent
-                ? problem_.Solve(max_iterations, state, {best - left_out, MaxGap()})
-                : problem_.SolveGraduated(max_iterations, state, {kNoRival, 0.0, contradiction});
+    last_ = is_consistent ? problem_.Solve(max_iterations, state, {best - left_out, MaxGap()})
+                          : problem_.SolveGraduated(max_iterations, state);
     if (!last_.ok()) return false;
     state->cost += left_out;
     return true;
@@ -317,7 +290,7 @@ class ReadingSearch {
 
   const JointProblem& problem_;
   const std::vector<Seed>& seeds_;
-  std::vector<State> minima_, rough_;
+  std::vector<State> minima_;
   Status last_ = Status::Failed("no seed pose could be refined");
 };
 
