@@ -29,21 +29,6 @@ bool IsSameMinimum(const JointProblem& problem, const Refined& a, const Refined&
   return IsSamePose(problem, a.state, b.state, tolerance);
 }
 
-// Where the focal length is an unknown the posterior can be so flat that refinements stop at many
-// places: those within a standard deviation of each other are one.
-bool IsSameHump(const PoseHypothesis& a, const PoseHypothesis& b) {
-  if (!(a.focal_sigma > 0.0) || !(b.focal_sigma > 0.0) || a.structure != b.structure) return false;
-  const double sigma = std::min(a.focal_sigma / a.focal_scale, b.focal_sigma / b.focal_scale);
-  if (!(std::abs(std::log(a.focal_scale / b.focal_scale)) <= sigma)) return false;
-  const Eigen::Matrix3d &A = a.cam_from_world.rotation, &B = b.cam_from_world.rotation;
-  // Of a rotation that is free about the normal the normals are compared.
-  Eigen::Vector3d turn = LogRotation(A * B.transpose());
-  if (a.RotationIsFree()) turn = A.col(2).cross(B.col(2));
-  const Eigen::Vector3d variance =
-      a.Covariance().diagonal().head<3>().cwiseMin(b.Covariance().diagonal().head<3>());
-  return (turn.array().square() <= variance.array()).all();
-}
-
 // Hypotheses of all minima that compete.
 Status FillHypotheses(const JointProblem& problem, const std::vector<State>& minima,
                       std::vector<Refined>* hypotheses) {
@@ -64,15 +49,7 @@ Status FillHypotheses(const JointProblem& problem, const std::vector<State>& min
     const bool known = std::any_of(all.begin(), all.end(), [&](const Refined& r) {
       return IsSameMinimum(problem, r, refined);
     });
-    if (known) continue;
-    const auto hump = std::find_if(all.begin(), all.end(), [&](const Refined& r) {
-      return IsSameHump(r.hypothesis, refined.hypothesis);
-    });
-    if (hump == all.end()) {
-      all.push_back(std::move(refined));
-    } else if (refined.hypothesis.cost < hump->hypothesis.cost) {
-      *hump = std::move(refined);
-    }
+    if (!known) all.push_back(std::move(refined));
   }
   if (all.empty()) return last;
   constexpr double kAnySigmaPx = 0.5;  // Every feature has its own.
