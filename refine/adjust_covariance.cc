@@ -7,6 +7,7 @@
 #include "circline/refine/adjust_problem.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/inverse_on_pattern.h"
+#include "circline/refine/nearby_solve.h"
 
 namespace circline {
 
@@ -57,7 +58,7 @@ AdjustProblem::Covariances AdjustProblem::Covariance(int end) const {
   Weighing inliers;
   inliers.inliers_only = true;
   for (const Feature& feature : features_) feature.cost->set_weighing(inliers);
-  ceres::Problem problem(NothingOwned());
+  ceres::Problem problem(OwnsNothing());
   Fill(all_free_, end, &problem);
   ceres::CRSMatrix crs;
   ceres::Problem::EvaluateOptions evaluate;

@@ -152,7 +152,6 @@ class AdjustProblem {
   // Of photos before `end`.
   void Fill(const std::vector<const ceres::Manifold*>& cameras, int end,
             ceres::Problem* problem) const;
-  static ceres::Problem::Options NothingOwned();
   Covariances OfPriors() const;
   Matrix6d PoseCovariance(int photo, const InverseOnPattern& inverse,
                           const std::map<const double*, int>& offsets) const;

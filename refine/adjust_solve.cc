@@ -7,16 +7,9 @@
 
 #include "circline/refine/adjust_problem.h"
 #include "circline/refine/block_chain.h"
+#include "circline/refine/nearby_solve.h"
 
 namespace circline {
-
-ceres::Problem::Options AdjustProblem::NothingOwned() {
-  ceres::Problem::Options ownership;
-  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  return ownership;
-}
 
 // Whether features that take part have its blocks.
 bool AdjustProblem::IsOf(const Prior& prior, const ceres::Problem& problem) {
@@ -58,7 +51,7 @@ Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
   Weighing weighing;
   weighing.stretch = stretch;
   for (const Feature& feature : features_) feature.cost->set_weighing(weighing);
-  ceres::Problem problem(NothingOwned());
+  ceres::Problem problem(OwnsNothing());
   Fill(coarse ? coarse_free_ : all_free_, static_cast<int>(photos_.size()), &problem);
   if (problem.NumResidualBlocks() == 0)
     return Status::Refused("no photo has evidence in its plane");
@@ -131,7 +124,7 @@ void AdjustProblem::Judge() {
 }
 
 double AdjustProblem::Misfit() const {
-  ceres::Problem problem(NothingOwned());
+  ceres::Problem problem(OwnsNothing());
   Fill(all_free_, static_cast<int>(photos_.size()), &problem);
   double chi2 = 0.0;
   int rows = 0, unknowns = 0;
