@@ -17,11 +17,10 @@ constexpr std::size_t kMaxSeeds = 16;
 // Directions nearer than this (a sine; 3 degrees) are one.
 constexpr double kDistinctSine = 0.0523;
 // Two pencils of one plane cross or form corners, while the edges of a box and the stripes of a
-// cushion behind it do not: this share of either's length meets the other. If they are at right
-// angles, as those of houses are, the share of one is enough (few of a front's many uprights may
-// meet the few cornices that are seen), or the lower one of both.
+// cushion behind it do not: this share of either's length meets the other. At right angles, as
+// those of houses are, any is enough: few of a front's many uprights may meet the few cornices that
+// are seen.
 constexpr double kMinSpanningShare = 0.3;
-constexpr double kMinRectangularShare = 0.1;
 // The rim of a circle that agrees with two pencils counts as much as this many times its length in
 // lines: it is rarer than a line, and fixes both directions.
 constexpr double kCircleWeight = 3.0;
@@ -43,11 +42,8 @@ double JointSupport(const PlacedPencil& a, const PlacedPencil& b, double diagona
   const double of_a = MeetingLength(a.ends, b.ends, diagonal_px),
                of_b = MeetingLength(b.ends, a.ends, diagonal_px);
   const double share = std::min(of_a / a.support_px, of_b / b.support_px);
-  const double larger_share = std::max(of_a / a.support_px, of_b / b.support_px);
   const bool is_plane =
-      share >= kMinSpanningShare ||
-      (share >= kMinRectangularShare && Rectangular(a.direction, b.direction)) ||
-      (larger_share >= kMinSpanningShare && LogOddsOfRightAngle(a.direction, b.direction) > 0.0);
+      share >= kMinSpanningShare || LogOddsOfRightAngle(a.direction, b.direction) > 0.0;
   return is_plane ? 2.0 * std::min(of_a, of_b) * std::sqrt(share) : 0.0;
 }
 
@@ -157,6 +153,7 @@ Plane PlaneChooser::Best(const Plane& of_circles, const std::vector<PlacedPencil
       plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
       plane.support_px = JointSupport(pencils[i], pencils[j], options_.diagonal_px);
       if (!(plane.support_px > 0.0)) continue;
+      plane.support_px *= PrecisionShare(plane.normal);
       AddCircles(&plane);
       consider(plane);
     }

@@ -88,6 +88,11 @@ bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
   return true;
 }
 
+double PrecisionShare(const UncertainDirection& direction) {
+  const double model = kModelSigmaDeg * kDegree;
+  return model / std::sqrt(model * model + direction.covariance.trace());
+}
+
 double LikelihoodRatio(const UncertainDirection& normal, const Vector3d& plane) {
   constexpr double kNearby = 0.5;  // Cosine of an angle that no standard deviation spans.
   const double cosine = normal.vector.dot(plane);

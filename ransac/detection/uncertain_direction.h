@@ -35,6 +35,10 @@ bool Rectangular(const UncertainDirection& a, const UncertainDirection& b);
 bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
                    UncertainDirection* normal);
 
+// How precisely a direction is known, as a share of what it would be known to without any error of
+// measurement: two fronts' short edges that pass for parallel make a long pencil, and a vague one.
+double PrecisionShare(const UncertainDirection& direction);
+
 // How much likelier it is to measure `normal` where a plane has the normal `plane`, but for what no
 // covariance knows, than where planes lie any way.
 double LikelihoodRatio(const UncertainDirection& normal, const Eigen::Vector3d& plane);
