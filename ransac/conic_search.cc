@@ -50,9 +50,9 @@ ConicCandidate ConicSearch::Polished(const ConicModel::Value& value) const {
 // holds an ellipse with more inliers than the contour has. Both have far less likelihood than the
 // contour, whose inliers lie close to it and have nothing beside them. So where less than half of
 // the points are inliers, searches from other seeds and, where the ellipse explains its inliers
-// badly, among the points that are not near it and among those outside dense clusters, are compared
-// by likelihood. With directions, which need so few draws that an ellipse through parts of two rims
-// may come first, there is one more seed up to two thirds.
+// badly, among the points outside dense clusters, are compared by likelihood. With directions,
+// which need so few draws that an ellipse through parts of two rims may come first, there is one
+// more seed up to two thirds.
 std::vector<ConicCandidate> ConicSearch::Run() const {
   RansacOptions options = options_.ransac;
   // One sample is often not good enough: a second all-inlier sample.
@@ -67,10 +67,6 @@ std::vector<ConicCandidate> ConicSearch::Run() const {
   const bool are_most = good && 2 * num_inliers >= n;
   if (are_most && (!oriented_ || 3 * num_inliers >= 2 * n)) return candidates;
   if (!good) SearchAmong(OutsideClusters(), options, num_inliers, &candidates);
-  constexpr double kBad = 2.0;
-  if (candidates[0].log_likelihood < kBad * num_inliers) {
-    SearchAmong(FarFrom(candidates[0]), options, num_inliers, &candidates);
-  }
   const int num_seeds = are_most ? 2 : 3;
   for (int k = 1; k < num_seeds; ++k) {
     options.seed = Random(options.seed).Next();
@@ -112,16 +108,6 @@ bool ConicSearch::IsGood(const ConicCandidate& candidate, int num_inliers) const
   constexpr double kGood = 3.0;
   return candidate.log_likelihood >= kGood * num_inliers &&
          model_.Accept(candidate.value, options_.ransac.threshold);
-}
-
-// Points that do not lie near the candidate.
-std::vector<int> ConicSearch::FarFrom(const ConicCandidate& candidate) const {
-  std::vector<int> indices;
-  for (int i = 0; i < model_.NumData(); ++i) {
-    const double distance = std::abs(candidate.weights.residuals[static_cast<std::size_t>(i)]);
-    if (distance > 3.0 * options_.ransac.threshold) indices.push_back(model_.PointIndex(i));
-  }
-  return indices;
 }
 
 std::vector<int> ConicSearch::OutsideClusters() const {

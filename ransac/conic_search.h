@@ -72,7 +72,6 @@ class ConicSearch {
     Ransac<ConicModel>(options).Run(model_, report);
   }
   bool IsGood(const ConicCandidate& candidate, int num_inliers) const;
-  std::vector<int> FarFrom(const ConicCandidate& candidate) const;
   std::vector<int> OutsideClusters() const;
   void SearchAmong(const std::vector<int>& indices, const RansacOptions& options, int num_inliers,
                    std::vector<ConicCandidate>* candidates) const;

@@ -33,15 +33,6 @@ constexpr double kQuickShare = 0.25;
 constexpr double kQuickAcross = 0.4;
 // Samples of a contour, at most, while a candidate is being improved.
 constexpr int kRoughSamples = 120;
-// The other bright side is looked at too if it adds this share.
-constexpr double kOtherSideShare = 0.15;
-// Before each refit, this share of the smallest arc must be there, and what chance may explain is
-// so many orders of magnitude more than in the end: refits add little to a contour.
-constexpr double kEarlyShare = 0.7;
-constexpr double kEarlyLog10 = 6.0;
-// ... and gradients this near to the contour's normals, degrees: of accidental ones within the 25
-// that count as support the median is 12.
-constexpr double kEarlyNormalDeg = 10.0;
 // While a candidate is still being refined, it may miss the limits by this factor.
 constexpr double kShapeSlack = 1.5;
 // Largest ellipse, in diagonals of the photo.
@@ -95,19 +86,11 @@ bool EllipseFitter::FindAlong(const Matrix3d& conic, EllipseCandidate* candidate
 }
 
 bool EllipseFitter::Improve(EllipseCandidate* candidate) {
-  const EllipseCandidate rough = *candidate;
-  if (!contour_.Project(rough.conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
+  if (!contour_.Project(candidate->conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
   if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
   const QuickSupport look = collector_.QuickLook(samples_, kQuickPx);
-  const double own = look.across[static_cast<std::size_t>(rough.bright)];
-  if (own >= std::max(kQuickShare, kQuickAcross * look.any) && Refit(candidate)) return true;
-  // Before a busy ground the bright side changes along the contour.
-  const double either = look.across[static_cast<std::size_t>(BrightSide::kEither)];
-  if (either < std::max(kQuickShare, own) + kOtherSideShare) return false;
-  if (either < 2.0 * kQuickAcross * look.any) return false;
-  *candidate = rough;
-  candidate->bright = BrightSide::kEither;
-  return Refit(candidate);
+  const double own = look.across[static_cast<std::size_t>(candidate->bright)];
+  return own >= std::max(kQuickShare, kQuickAcross * look.any) && Refit(candidate);
 }
 
 double EllipseFitter::Coverage(const EllipseCandidate& candidate) {
@@ -232,8 +215,6 @@ double EllipseFitter::Rms(const std::vector<CalibratedPoint>& points, const Matr
 bool EllipseFitter::Refit(EllipseCandidate* candidate) {
   for (std::size_t round = 0; round + 1 < kGatherPx.size(); ++round) {
     if (!Gather(*candidate, 1.5, kGatherPx[round], kRoughSamples)) return false;
-    if (!Plausible(candidate->bright, kEarlyShare, kEarlyLog10)) return false;
-    if (ToDegrees(support_.normal_median) > kEarlyNormalDeg) return false;
     CalibrateSupport(kRoughSamples);
     if (!FitTrimmed(&candidate->conic, 1)) return false;
   }
@@ -280,12 +261,11 @@ void EllipseFitter::CalibrateSupport(std::size_t limit) {
   }
 }
 
-// Enough of the contour, and more than chance explains. Before the end `share` of the one will do,
-// and `slack` orders of magnitude less of the other.
-bool EllipseFitter::Plausible(BrightSide bright, double share, double slack) const {
-  if (support_.Coverage() * 360.0 < share * options_.min_arc_deg) return false;
-  if (ToDegrees(support_.turn) < share * options_.min_arc_deg) return false;
-  return Log10FalseAlarms(support_, bright) <= kMaxLog10FalseAlarms + slack;
+// Enough of the contour, and more than chance explains.
+bool EllipseFitter::Plausible(BrightSide bright) const {
+  if (support_.Coverage() * 360.0 < options_.min_arc_deg) return false;
+  if (ToDegrees(support_.turn) < options_.min_arc_deg) return false;
+  return Log10FalseAlarms(support_, bright) <= kMaxLog10FalseAlarms;
 }
 
 }  // namespace circline

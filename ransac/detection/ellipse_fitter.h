@@ -78,7 +78,7 @@ class EllipseFitter {
   bool Gather(const EllipseCandidate& candidate, double spacing, double reach,
               int max_samples = 20000);
   void CalibrateSupport(std::size_t limit);
-  bool Plausible(BrightSide bright, double share = 1.0, double slack = 0.0) const;
+  bool Plausible(BrightSide bright) const;
   bool SecondLook(EllipseCandidate* candidate, DetectedEllipse* e);
   cv::Rect Surroundings() const;
   double FinalFit(EllipseCandidate* candidate, DetectedEllipse* e);
