@@ -51,8 +51,8 @@ void MergeHumps(std::vector<PoseHypothesis>* hypotheses) {
                    h.probability * (h.Covariance() + step * step.transpose())) /
                       all,
                   &*one);
-    one->probability = all;
-    most = std::max(most, all);
+    one->probability = std::min(1.0, all);  // Rounding may exceed it.
+    most = std::max(most, one->probability);
   }
   // Ties keep their order (RankHypotheses).
   constexpr double kTie = 1.1;
