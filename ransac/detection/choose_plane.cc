@@ -18,9 +18,11 @@ constexpr std::size_t kMaxSeeds = 16;
 constexpr double kDistinctSine = 0.0523;
 // Two pencils of one plane cross or form corners, while the edges of a box and the stripes of a
 // cushion behind it do not: this share of either's length meets the other. At right angles, as
-// those of houses are, any is enough: few of a front's many uprights may meet the few cornices that
-// are seen.
+// those of houses are, a lower one of one of them is enough (few of a front's many uprights may
+// meet the few cornices that are seen); through a camera that is a guess, where right angles look
+// some degrees off, of both.
 constexpr double kMinSpanningShare = 0.3;
+constexpr double kMinRectangularShare = 0.1;
 // The rim of a circle that agrees with two pencils counts as much as this many times its length in
 // lines: it is rarer than a line, and fixes both directions.
 constexpr double kCircleWeight = 3.0;
@@ -42,8 +44,11 @@ double JointSupport(const PlacedPencil& a, const PlacedPencil& b, double diagona
   const double of_a = MeetingLength(a.ends, b.ends, diagonal_px),
                of_b = MeetingLength(b.ends, a.ends, diagonal_px);
   const double share = std::min(of_a / a.support_px, of_b / b.support_px);
-  const bool is_plane =
-      share >= kMinSpanningShare || LogOddsOfRightAngle(a.direction, b.direction) > 0.0;
+  const double larger_share = std::max(of_a / a.support_px, of_b / b.support_px);
+  const bool is_rectangle =
+      (share >= kMinRectangularShare && Rectangular(a.direction, b.direction)) ||
+      (larger_share >= kMinRectangularShare && LogOddsOfRightAngle(a.direction, b.direction) > 0.0);
+  const bool is_plane = share >= kMinSpanningShare || is_rectangle;
   return is_plane ? 2.0 * std::min(of_a, of_b) * std::sqrt(share) : 0.0;
 }
 
