@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """How well one photo tells a box's size, and do circle and lines agree? Prints a table and a line for each claim; the last line is
 `N passed, N failed`.
 

@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Does the first of a circle's two poses stay the same from frame to frame? Exit code 1 if refinement makes it jump more often.
 
   ties.py [FRAMES] [--compare=build/release/bin/circline_compare] [--flags='--threads=1'] [--verbose]
