@@ -45,6 +45,7 @@ void MergeHumps(std::vector<PoseHypothesis>* hypotheses) {
       merged.push_back(std::move(h));
       continue;
     }
+    if (h.cost < one->cost) std::swap(h, *one);
     const Vector6d step = StepBetween(*one, h);
     const double all = one->probability + h.probability;
     SetCovariance((one->probability * one->Covariance() +
