@@ -146,8 +146,7 @@ double PlaneChooser::LogOdds(const UncertainDirection& normal) const {
 // The plane with most support: of two pencils and the circles that agree, or of circles alone.
 Plane PlaneChooser::Best(const Plane& of_circles, const std::vector<PlacedPencil>& pencils) const {
   Plane best;
-  const auto consider = [&best](Plane plane) {
-    plane.support_px *= PrecisionShare(plane.normal);
+  const auto consider = [&best](const Plane& plane) {
     if (plane.support_px > best.support_px) best = plane;
   };
   for (std::size_t i = 0; i < pencils.size(); ++i) {
@@ -159,6 +158,7 @@ Plane PlaneChooser::Best(const Plane& of_circles, const std::vector<PlacedPencil
       plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
       plane.support_px = JointSupport(pencils[i], pencils[j], options_.diagonal_px);
       if (!(plane.support_px > 0.0)) continue;
+      plane.support_px *= PrecisionShare(plane.normal);
       AddCircles(&plane);
       consider(plane);
     }
