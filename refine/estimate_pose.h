@@ -77,7 +77,8 @@ struct EstimationOptions {
 
 // Refines every hypothesis of the closed forms on all evidence, in one ceres::Problem. Features
 // that contradict the rest as a whole are left out and named (PoseHypothesis::left_out, `notes`);
-// the readings that keep them stay among the hypotheses. `registry` null means the built-in
+// the readings that keep them stay among the hypotheses. Poses less than two standard deviations
+// apart are one hypothesis, but for those of a lone circle. `registry` null means the built-in
 // solvers; else its closed forms give the seeds. Never throws, never returns NaN. Thread-safe.
 PoseEstimate EstimatePose(const Observations& observations, const EstimationOptions& options = {},
                           const SolverRegistry* registry = nullptr);
