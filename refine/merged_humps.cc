@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace circline {
@@ -35,34 +36,27 @@ bool AreHumpsOfOne(const PoseHypothesis& a, const PoseHypothesis& b) {
 }  // namespace
 
 void MergeHumps(std::vector<PoseHypothesis>* hypotheses) {
+  const auto log_posterior = [](const PoseHypothesis& h) { return -h.cost + 0.5 * h.log_det; };
   std::vector<PoseHypothesis> merged;
-  double most = 0.0;
   for (PoseHypothesis& h : *hypotheses) {
     const auto one = std::find_if(merged.begin(), merged.end(),
                                   [&](const PoseHypothesis& m) { return AreHumpsOfOne(m, h); });
     if (one == merged.end()) {
-      most = std::max(most, h.probability);
       merged.push_back(std::move(h));
       continue;
     }
     if (h.cost < one->cost) std::swap(h, *one);
+    const double log_odds = log_posterior(h) - log_posterior(*one),
+                 share = 1.0 / (1.0 + std::exp(-log_odds));
     const Vector6d step = StepBetween(*one, h);
-    const double all = one->probability + h.probability;
-    SetCovariance((one->probability * one->Covariance() +
-                   h.probability * (h.Covariance() + step * step.transpose())) /
-                      all,
-                  &*one);
-    one->probability = std::min(1.0, all);  // Rounding may exceed it.
-    most = std::max(most, one->probability);
+    SetCovariance(
+        (1.0 - share) * one->Covariance() + share * (h.Covariance() + step * step.transpose()),
+        &*one);
+    // Twice log(1 + odds), without overflow.
+    one->log_det += 2.0 * (std::max(log_odds, 0.0) + std::log1p(std::exp(-std::abs(log_odds))));
   }
-  // Ties keep their order (RankHypotheses).
-  constexpr double kTie = 1.1;
-  std::stable_sort(merged.begin(), merged.end(),
-                   [most](const PoseHypothesis& a, const PoseHypothesis& b) {
-                     const bool ta = kTie * a.probability > most, tb = kTie * b.probability > most;
-                     return ta != tb ? ta : !ta && a.probability > b.probability;
-                   });
   *hypotheses = std::move(merged);
+  RankHypotheses(hypotheses);
 }
 
 }  // namespace circline

@@ -8,9 +8,9 @@
 
 namespace circline {
 
-// Of ranked hypotheses those that are less apart than they are wide become one, as probable as they
-// are together: the pose that fits best, with the covariance of all about it. They stay ranked. The
-// two poses of a lone circle stay two, however near.
+// Hypotheses that are less apart than they are wide become one: the pose that fits best, with the
+// covariance of all about it, and with the volume of all (log_det), so that it is as probable as
+// they are together. Ranks what is left. The two poses of a lone circle stay two, however near.
 void MergeHumps(std::vector<PoseHypothesis>* hypotheses);
 
 }  // namespace circline

@@ -15,8 +15,9 @@ namespace {
 using Eigen::Vector3d;
 
 // 7 to 1, the odds before that there is no such direction. Of 0, 1, 2 and 2.5, on simulated streets
-// (seeds 11 to 13; others had no part in it), turntable-teabox and photos at other sizes
-// (structure.py): below, more of these disagree, above, more streets have no second direction.
+// (seeds 11 to 13), turntable-teabox, and photos of streets and boxes at other sizes (structure.py;
+// scene-lund-more and box-camprodon-more among them): below, more of these disagree, above, more
+// streets have no second direction.
 constexpr double kMinLogOdds = 2.0;
 // A line so nearly orthogonal to the axis (a sine) has no direction orthogonal to it.
 constexpr double kMinCross = 0.05;

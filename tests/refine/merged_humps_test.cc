@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <vector>
 
 #include "circline/estimators/basics.h"
@@ -18,7 +19,7 @@ PoseHypothesis Turned(double sigmas, double probability) {
   PoseHypothesis h;
   h.cam_from_world.rotation = ExpRotation(Vector3d(0.0, sigmas * kSigma, 0.0));
   h.cam_from_world.translation = Vector3d::UnitZ();
-  h.probability = probability;
+  h.cost = -std::log(probability);
   SetCovariance(kSigma * kSigma * Matrix6d::Identity(), &h);
   return h;
 }
