@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "circline/estimators/aspect_sigma.h"
 #include "circline/estimators/closed_form_errors.h"
 
 namespace circline {
@@ -104,7 +105,7 @@ std::vector<Error> ErrorsOf(const MeasuredInputs& inputs, const Camera& camera,
     }
     if (inputs[i].kind == InputKind::kConic) contrasts.insert(inputs[i].contrast);
   }
-  for (const CoordinateChange& change : CameraErrors(noise.camera, camera)) {
+  for (const CoordinateChange& change : CameraErrors(SigmaOf(noise.camera, camera), camera)) {
     errors.push_back([change](double part, MeasuredInputs* moved) {
       for (MeasuredInput& input : *moved) ChangeCoordinates(change(part), &input);
     });

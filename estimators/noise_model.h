@@ -29,8 +29,10 @@ constexpr double kDoubtfulShare = 0.1;
 // How well a camera is known. Standard deviations; 0 = exact. The defaults are those of a good
 // calibration.
 struct CameraSigma {
-  double log_focal = 0.002;         // Of log f, f the common factor of fx and fy.
-  double log_aspect = 0.001;        // Of log (fy / fx).
+  double log_focal = 0.002;  // Of log f, f the common factor of fx and fy.
+  // Of log (fy / fx). A NoiseModel's, if not 0, is that of square pixels: where fx and fy of a
+  // camera differ by more, as analogue video's do, it is taken to be so much, at most 0.02.
+  double log_aspect = 0.001;
   double principal_point_px = 1.0;  // Of each coordinate, pixels.
   double k1 = 0.0;                  // Of the first distortion coefficient.
   // Of log f where the figure given is a placeholder, as one in ten (kDoubtfulShare) of those that

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/aspect_sigma.h"
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/mostly_exact.h"
@@ -240,7 +241,8 @@ JointProblem::JointProblem(const Observations& observations, const EstimationOpt
                            const PointNoise& noise)
     : observations_(observations),
       options_(options),
-      camera_sigma_(options.camera_sigma.value_or(options.noise_model.camera)) {
+      camera_sigma_(
+          options.camera_sigma.value_or(SigmaOf(options.noise_model.camera, observations.camera))) {
   JointProblemBuilder(noise, this).Build();
 }
 

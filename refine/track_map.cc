@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "circline/estimators/aspect_sigma.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/plane_circle.h"
 
@@ -251,7 +252,8 @@ void AddDirections(const Observations& frame, const TrackMap& map, bool shares_a
 void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& hypotheses,
               const TrackerOptions& options, TrackMap* map, std::vector<TrackState>* states) {
   const EstimationOptions& estimation = options.estimation;
-  const CameraSigma sigma = estimation.camera_sigma.value_or(estimation.noise_model.camera);
+  const CameraSigma sigma =
+      estimation.camera_sigma.value_or(SigmaOf(estimation.noise_model.camera, resolved.camera));
   const auto takes_part = [&](const CircleObservation& c) {
     return c.fit && c.plane == resolved.frame.plane;
   };

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "circline/estimators/aspect_sigma.h"
+
 namespace circline {
 namespace {
 
@@ -46,6 +48,22 @@ TEST(NoiseModel, NamesBadFields) {
   model = NoiseModel();
   model.camera.log_focal = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(model.Validate().message.find("camera.log_focal"), std::string::npos);
+}
+
+TEST(NoiseModel, TrustsTheAspectOfSquarePixelsOnly) {
+  const auto sigma = [](double log_aspect, double fy) {
+    Camera camera;
+    camera.fx = 500.0;
+    camera.fy = fy;
+    CameraSigma general;
+    general.log_aspect = log_aspect;
+    return SigmaOf(general, camera).log_aspect;
+  };
+  EXPECT_EQ(sigma(0.001, 500.0), 0.001);
+  EXPECT_NEAR(sigma(0.001, 500.0 * std::exp(-0.014)), 0.014, 1e-12);
+  EXPECT_EQ(sigma(0.03, 510.0), 0.03);
+  EXPECT_EQ(sigma(0.001, 375.0), 0.02);  // Squeezed on purpose.
+  EXPECT_EQ(sigma(0.0, 510.0), 0.0);     // Exact.
 }
 
 }  // namespace
