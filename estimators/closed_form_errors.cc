@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "circline/estimators/aspect_sigma.h"
 #include "circline/estimators/line_pose.h"
 
 namespace circline {
@@ -168,7 +167,7 @@ std::vector<Perturbation> Perturbations(const Inputs& inputs, const NoiseModel& 
     all.push_back([](double part, Inputs* in) { in->radius *= 1.0 + part * in->radius_sigma; });
   if (inputs.length > 0.0 && inputs.length_sigma > 0.0)
     all.push_back([](double part, Inputs* in) { in->length *= 1.0 + part * in->length_sigma; });
-  for (const CoordinateChange& change : CameraErrors(SigmaOf(noise.camera, camera), camera))
+  for (const CoordinateChange& change : CameraErrors(noise.SigmaOf(camera), camera))
     all.push_back([change](double part, Inputs* in) { ChangeCoordinates(change(part), in); });
   AddOffsets(noise.contour_offset_px, camera, inputs, &all);
   return all;

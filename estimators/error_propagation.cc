@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "circline/estimators/aspect_sigma.h"
 #include "circline/estimators/closed_form_errors.h"
 
 namespace circline {
@@ -105,7 +104,7 @@ std::vector<Error> ErrorsOf(const MeasuredInputs& inputs, const Camera& camera,
     }
     if (inputs[i].kind == InputKind::kConic) contrasts.insert(inputs[i].contrast);
   }
-  for (const CoordinateChange& change : CameraErrors(SigmaOf(noise.camera, camera), camera)) {
+  for (const CoordinateChange& change : CameraErrors(noise.SigmaOf(camera), camera)) {
     errors.push_back([change](double part, MeasuredInputs* moved) {
       for (MeasuredInput& input : *moved) ChangeCoordinates(change(part), &input);
     });

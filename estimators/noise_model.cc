@@ -74,6 +74,16 @@ Status NoiseModel::Validate() const {
   return status.ok() ? camera.Validate() : status;
 }
 
+CameraSigma NoiseModel::SigmaOf(const Camera& taken_by) const {
+  constexpr double kOfAnalogueVideo = 0.02;
+  CameraSigma sigma = camera;
+  if (sigma.log_aspect > 0.0) {
+    const double found = std::abs(std::log(taken_by.fy / taken_by.fx));
+    sigma.log_aspect = std::max(sigma.log_aspect, std::min(found, kOfAnalogueVideo));
+  }
+  return sigma;
+}
+
 double NoiseModel::Weight(double shared_px, double sigma_px, double num_points,
                           double length_px) const {
   const double independent =

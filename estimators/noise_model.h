@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "circline/estimators/camera.h"
 #include "circline/estimators/export.h"
 #include "circline/estimators/status.h"
 
@@ -29,10 +30,8 @@ constexpr double kDoubtfulShare = 0.1;
 // How well a camera is known. Standard deviations; 0 = exact. The defaults are those of a good
 // calibration.
 struct CameraSigma {
-  double log_focal = 0.002;  // Of log f, f the common factor of fx and fy.
-  // Of log (fy / fx). A NoiseModel's, if not 0, is that of square pixels: where fx and fy of a
-  // camera differ by more, as analogue video's do, it is taken to be so much, at most 0.02.
-  double log_aspect = 0.001;
+  double log_focal = 0.002;         // Of log f, f the common factor of fx and fy.
+  double log_aspect = 0.001;        // Of log (fy / fx).
   double principal_point_px = 1.0;  // Of each coordinate, pixels.
   double k1 = 0.0;                  // Of the first distortion coefficient.
   // Of log f where the figure given is a placeholder, as one in ten (kDoubtfulShare) of those that
@@ -73,7 +72,7 @@ struct NoiseModel {
   // A known radius or length that states no sigma of its own, relative.
   double radius = 0.001;
   double length = 0.001;
-  CameraSigma camera;  // The camera, where nothing else is said of it.
+  CameraSigma camera;  // Of cameras of square pixels, where nothing else is said of them: SigmaOf.
   // Standard deviation, from photo to photo, of the logarithm of the figures of contours, and of
   // those of lines (shared error, tilt, height, deviation): some worlds are more exact than others,
   // and where a photo has many features they tell. 0: the figures are believed as they are.
@@ -84,6 +83,12 @@ struct NoiseModel {
   // Ok, or a sentence that names the field that is negative or not finite, or a correlation length
   // that is not positive.
   Status Validate() const;
+
+  // `camera` as it holds for this one. Pixels that a calibration found not to be square are those
+  // of analogue video, sampled and smeared along its lines, or the calibration is off by as much:
+  // the aspect is known to |log (fy / fx)|, at most 0.02 (photos may be squeezed on purpose), if to
+  // no less than camera.log_aspect; where that is 0 it is exact. Seen on dots (visp36), 0.014.
+  CameraSigma SigmaOf(const Camera& taken_by) const;
 
   // What a feature of `num_points` points over a length of `length_px` counts, from 0 to 1, beside
   // one whose points share no error: sigma^2 / (sigma^2 + (n / m) shared^2), m = length /

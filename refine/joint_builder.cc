@@ -7,7 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "circline/estimators/aspect_sigma.h"
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/mostly_exact.h"
@@ -242,7 +241,7 @@ JointProblem::JointProblem(const Observations& observations, const EstimationOpt
     : observations_(observations),
       options_(options),
       camera_sigma_(
-          options.camera_sigma.value_or(SigmaOf(options.noise_model.camera, observations.camera))) {
+          options.camera_sigma.value_or(options.noise_model.SigmaOf(observations.camera))) {
   JointProblemBuilder(noise, this).Build();
 }
 

@@ -9,7 +9,6 @@
 #include <string>
 #include <utility>
 
-#include "circline/estimators/aspect_sigma.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/plane_circle.h"
 
@@ -253,7 +252,7 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
               const TrackerOptions& options, TrackMap* map, std::vector<TrackState>* states) {
   const EstimationOptions& estimation = options.estimation;
   const CameraSigma sigma =
-      estimation.camera_sigma.value_or(SigmaOf(estimation.noise_model.camera, resolved.camera));
+      estimation.camera_sigma.value_or(estimation.noise_model.SigmaOf(resolved.camera));
   const auto takes_part = [&](const CircleObservation& c) {
     return c.fit && c.plane == resolved.frame.plane;
   };

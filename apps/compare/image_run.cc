@@ -197,7 +197,8 @@ int SetLargestRadius(double radius, Observations* observations) {
 
 CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image) {
   if (image.guessed_sigma) return *image.guessed_sigma;
-  const CameraSigma common = options.camera_sigma.value_or(options.noise_model.camera);
+  const CameraSigma common =
+      options.camera_sigma.value_or(options.noise_model.SigmaOf(image.observations.camera));
   CameraSigma sigma = image.camera_sigma.Over(common);
   if (options.camera_sigma) sigma.log_focal = common.log_focal;
   return sigma;

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "circline/estimators/aspect_sigma.h"
-
 namespace circline {
 namespace {
 
@@ -55,9 +53,9 @@ TEST(NoiseModel, TrustsTheAspectOfSquarePixelsOnly) {
     Camera camera;
     camera.fx = 500.0;
     camera.fy = fy;
-    CameraSigma general;
-    general.log_aspect = log_aspect;
-    return SigmaOf(general, camera).log_aspect;
+    NoiseModel model;
+    model.camera.log_aspect = log_aspect;
+    return model.SigmaOf(camera).log_aspect;
   };
   EXPECT_EQ(sigma(0.001, 500.0), 0.001);
   EXPECT_NEAR(sigma(0.001, 500.0 * std::exp(-0.014)), 0.014, 1e-12);
