@@ -19,11 +19,12 @@ constexpr int kSectors = 32;  // Of half a turn: narrow against a wall.
 }  // namespace
 
 Eigen::Matrix3d LeanShape(const PencilObservation& pencil) {
-  if (!pencil.fit) return Eigen::Matrix3d::Identity();
+  constexpr double kVariance = kLeaning * kLeaning;
+  if (!pencil.fit) return kVariance * Eigen::Matrix3d::Identity();
   const Eigen::Vector3d v = pencil.fit->direction;
   Eigen::Matrix<double, 3, 2> across;
   across << v.unitOrthogonal(), v.cross(v.unitOrthogonal());
-  const Eigen::Matrix3d one_wall = across * across.transpose();
+  const Eigen::Matrix3d one_wall = kVariance * across * across.transpose();
   // Of each sector's lines: a line of normal n and variance s^2 measures n . v.
   struct Sector {
     Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
@@ -64,7 +65,7 @@ Eigen::Matrix3d LeanShape(const PencilObservation& pencil) {
   const Eigen::Matrix2d shape = eigen.eigenvectors() *
                                 eigen.eigenvalues().cwiseMax(1.0).asDiagonal() *
                                 eigen.eigenvectors().transpose();
-  return across * shape * across.transpose();
+  return kVariance * across * shape * across.transpose();
 }
 
 }  // namespace circline

@@ -6,6 +6,8 @@
 
 #include <cmath>
 
+#include "circline/estimators/pencil_lean.h"
+
 namespace circline {
 
 // The mixture of a narrow Gaussian, with its share, and a wide one; standard deviations in those of
@@ -33,15 +35,16 @@ class TwoGaussians : public ceres::LossFunction {
 // Most axes and lines, of boards and doors, are exact, most prints do not bleed; the walls of old
 // houses lean by a degree. Of a residual in standard deviations, the mixture of a Gaussian so many
 // times as narrow and one somewhat wider: where all are near, exact; where they contradict each
-// other, a compromise. The covariance is that of the residual's Gaussian all the same.
+// other, a compromise. Covariances count the residual's own Gaussian all the same, and axes one
+// that leans (LeanShape).
 class MostlyExact final : public TwoGaussians {
  public:
-  MostlyExact() : TwoGaussians(kExact, 1.0 / kNarrower, kWider) {}
+  MostlyExact() : TwoGaussians(kExact, 1.0 / kNarrower, kLeaning) {}
 
  private:
   static constexpr double kNarrower = 8.0;  // Of 3, 6 and 8, on photographs of boards.
-  // Of 0.1 to 0.8, and 1 to 3, on streets (scene-lund, -more) and a bent sheet (robot10x10).
-  static constexpr double kExact = 0.5, kWider = 1.5;
+  // Of 0.1 to 0.8, on streets (scene-lund, -more) and a bent sheet (robot10x10).
+  static constexpr double kExact = 0.5;
 };
 
 }  // namespace circline

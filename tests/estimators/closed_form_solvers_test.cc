@@ -8,6 +8,7 @@
 #include <string>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/pencil_lean.h"
 #include "tests/plane_scene.h"
 #include "tests/trials.h"
 
@@ -474,7 +475,7 @@ TEST(ClosedFormSolversTest, TheNoiseModelIsInTheCovariance) {
   const Observations with_lines = observations;
   for (PencilObservation& pencil : observations.pencils) pencil.lines.clear();
   const Matrix6d leaning = covariance("orthogonal_vanishing_points", noise);
-  EXPECT_NEAR((leaning.topLeftCorner<3, 3>().trace()), 2.5 * 1e-4, 0.3e-4);
+  EXPECT_NEAR((leaning.topLeftCorner<3, 3>().trace()), 2.5 * kLeaning * kLeaning * 1e-4, 0.6e-4);
   EXPECT_GT((apart.topLeftCorner<3, 3>().trace()), (leaning.topLeftCorner<3, 3>().trace()));
   observations = with_lines;
   EXPECT_LT(covariance("orthogonal_vanishing_points", NoiseModel::Exact()).trace(), 1e-5);

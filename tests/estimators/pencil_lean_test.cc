@@ -12,6 +12,8 @@
 namespace circline {
 namespace {
 
+constexpr double kVariance = kLeaning * kLeaning;
+
 // Lines on walls, each wall seen at an angle to the right of the view's middle, radians, and
 // leaning by its own two components across the vertical.
 std::vector<LineFit> LinesOnWalls(const std::vector<double>& walls, double lean, Random* random) {
@@ -48,11 +50,11 @@ TEST(PencilLean, OneWallTurnsItsDirectionAsItLeans) {
   // the fit makes no more of it than of a wall that is twisted by that.
   for (double at = -1.5; at < 1.5; at += 0.01) {
     const Eigen::Matrix3d shape = LeanShape(Pencil(LinesOnWalls({at}, 0.0, &random)));
-    EXPECT_LT(shape.norm(), 1.0 + 1.0 / (0.3 * 0.3));
+    EXPECT_LT(shape.norm(), kVariance * (1.0 + 1.0 / (0.3 * 0.3)));
   }
   PencilObservation without_lines;
   without_lines.fit = pencil.fit;
-  EXPECT_LT((LeanShape(without_lines) - across).norm(), 1e-12);
+  EXPECT_LT((LeanShape(without_lines) - kVariance * across).norm(), 1e-12);
 }
 
 // Two walls that lean apart look as if they converged: the direction tips towards the camera.
@@ -63,14 +65,14 @@ TEST(PencilLean, WallsLeftAndRightTipTheDirection) {
   double squares = 0.0;
   for (int draw = 0; draw < kDraws; ++draw) {
     Random random(static_cast<std::uint64_t>(draw) + 1);
-    const Eigen::Vector3d v = Pencil(LinesOnWalls(walls, kLean, &random)).fit->direction;
+    const Eigen::Vector3d v = Pencil(LinesOnWalls(walls, kLeaning * kLean, &random)).fit->direction;
     squares += std::pow(v.z() / v.y(), 2.0);
   }
   Random random(1);
   const Eigen::Matrix3d shape = LeanShape(Pencil(LinesOnWalls(walls, 0.0, &random)));
   EXPECT_NEAR(std::sqrt(squares / kDraws), kLean * std::sqrt(shape(2, 2)), 0.1 * kLean * 1.8);
-  EXPECT_NEAR(std::sqrt(shape(2, 2)), 1.0 / (std::sqrt(2.0) * std::sin(0.4)), 0.15);
-  EXPECT_NEAR(shape(0, 0), 1.0, 1e-6);  // The mean of two walls is no better than one.
+  EXPECT_NEAR(std::sqrt(shape(2, 2)), kLeaning / (std::sqrt(2.0) * std::sin(0.4)), 0.15);
+  EXPECT_NEAR(shape(0, 0), kVariance, 1e-6);  // The mean of two walls is no better than one.
 }
 
 }  // namespace
