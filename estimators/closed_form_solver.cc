@@ -115,12 +115,12 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
 
   const std::vector<Candidate> candidates = recipe_.evaluate(inputs);
   const std::vector<Perturbation> errors =
-      Perturbations(inputs, options_.noise_model, evidence.camera);
+      Perturbations(inputs.Moved(), options_.noise_model, evidence.camera);
   Inputs moved;
   const std::vector<Eigen::MatrixXd> sensitivities = Sensitivities(
       [&](std::size_t error, double part) {
         moved = inputs;
-        errors[error](part, &moved);
+        errors[error](part, moved.Moved());
         return recipe_.evaluate(moved);
       },
       errors.size(), candidates);
