@@ -30,6 +30,14 @@ bool JointProblem::IsActive(const Term& term, const State& state) const {
   return true;
 }
 
+void JointProblem::SeeThrough(const State& state) const {
+  const double* camera = state.x.data() + blocks_[kCamera].offset;
+  for (const Term& term : terms_) {
+    if (camera_is_estimated_ && term.weighed != nullptr && IsActive(term, state))
+      term.weighed->SeeThrough(camera);
+  }
+}
+
 void JointProblem::Parameters(const Term& term, const State& state, const double** out) const {
   for (std::size_t k = 0; k < term.blocks.size(); ++k)
     out[k] = state.x.data() + blocks_[static_cast<std::size_t>(term.blocks[k])].offset;

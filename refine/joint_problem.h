@@ -129,6 +129,9 @@ class JointProblem {
   // What the observations say that has no part in the problem, and why, a sentence each.
   const std::vector<std::string>& unused() const { return unused_; }
 
+  // Undistorts the points as the camera of this state has them, where it is estimated: for all that
+  // is asked of that camera until the next call.
+  void SeeThrough(const State& state) const;
   bool IsActive(const Term& term, const State& state) const;
   void Parameters(const Term& term, const State& state, const double** out) const;
   bool IsMetric(const State& state) const;

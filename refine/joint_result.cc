@@ -355,6 +355,7 @@ double JointProblem::InlierShare(const State& state) const {
 Status FillRefined(const JointProblem& problem, State state, Refined* refined) {
   *refined = Refined();
   PoseHypothesis* h = &refined->hypothesis;
+  problem.SeeThrough(state);
   const double inflation = CountInliers(problem, state, h);
   h->cost = problem.Cost(state) + LeftOutCost(problem, state);
   Linearization at(problem, state, Weighing{true, kInlierSigmas, 1.0 / inflation});

@@ -286,6 +286,7 @@ Status JointProblem::Start(const CameraPose& given, double log_focal,
       Eigen::Quaterniond(seed.rotation).normalized();
   Eigen::Map<Eigen::Vector3d>(state->x.data() + blocks_[kTranslation].offset) = seed.translation;
   const double* camera = state->x.data() + blocks_[kCamera].offset;
+  SeeThrough(*state);
   const Placed placed = PlaceCircles(camera, state);
   if (!circles_.empty() && placed.num_circles == 0) {
     return Status::Refused(
