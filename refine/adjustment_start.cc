@@ -106,13 +106,12 @@ void Adjustment::Estimate() {
   ParallelFor(count, options_.num_threads, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     if (is_valid_[i]) {
-      prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], options_.noise_model);
-      inputs_[i].observations = &prepared_[i].observations;
-      inputs_[i].noise = prepared_[i].noise;
+      prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions());
+      inputs_[i].observations = &prepared_[i];
       if (start_ != nullptr) {
-        CoarsePose(prepared_[i], prepared_[i].noise, PoseOptions(), &estimates_[i]);
+        CoarsePose(prepared_[i], PoseOptions(), &estimates_[i]);
       } else {
-        estimates_[i] = EstimatePose(prepared_[i].observations, PoseOptions());
+        estimates_[i] = EstimatePose(prepared_[i], PoseOptions());
       }
     } else {
       estimates_[i].status = out_.photos[i].status;

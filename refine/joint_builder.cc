@@ -236,13 +236,12 @@ void JointProblemBuilder::AddPriors() {
   }
 }
 
-JointProblem::JointProblem(const Observations& observations, const EstimationOptions& options,
-                           const PointNoise& noise)
+JointProblem::JointProblem(const Observations& observations, const EstimationOptions& options)
     : observations_(observations),
       options_(options),
       camera_sigma_(
           options.camera_sigma.value_or(options.noise_model.SigmaOf(observations.camera))) {
-  JointProblemBuilder(noise, this).Build();
+  JointProblemBuilder(this).Build();
 }
 
 }  // namespace circline

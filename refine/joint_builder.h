@@ -20,8 +20,8 @@ namespace circline {
 
 class JointProblemBuilder {
  public:
-  JointProblemBuilder(const PointNoise& noise, JointProblem* problem)
-      : p_(*problem), obs_(p_.observations_), model_(p_.options_.noise_model), noise_(noise) {}
+  explicit JointProblemBuilder(JointProblem* problem)
+      : p_(*problem), obs_(p_.observations_), model_(p_.options_.noise_model) {}
 
   void Build();
 
@@ -83,7 +83,6 @@ class JointProblemBuilder {
   JointProblem& p_;
   const Observations& obs_;
   const NoiseModel& model_;
-  const PointNoise& noise_;
   bool has_camera_ = false, is_metric_ = false;
   int origin_point_ = -1;  // Constant block (0, 0).
   std::string origin_circle_;

@@ -110,9 +110,7 @@ int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
 void JointProblemBuilder::AddCircle(std::size_t index) {
   const CircleObservation& circle = obs_.circles[index];
   if (!InPlane(circle)) return;
-  const double stated = circle.sigma_px > 0.0 ? circle.sigma_px : p_.options_.conic_loss.scale_px;
-  std::optional<ImagePoints> points =
-      Points(circle.points, circle.inliers, stated > 0.0 ? stated : noise_.circles[index], true);
+  std::optional<ImagePoints> points = Points(circle.points, circle.inliers, circle.sigma_px, true);
   if (!points) return;
   Feature feature{Feature::Kind::kCircle, circle.id, "circle '" + circle.id + "'"};
   feature.dof = circle.radius > 0.0 ? 3 : 2;
@@ -156,7 +154,7 @@ void JointProblemBuilder::AddMark(const CircleObservation& circle, const ImagePo
 void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size_t index,
                                       int center, int group, int feature) {
   const Segment& segment = circle.diameters[index];
-  const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : DrawnSigma();
+  const double sigma = circle.sigma_px;
   std::optional<ImagePoints> points = Points({segment[0], segment[1]}, {}, sigma, false);
   LineFit fit;
   if (!points || !FitLine(points->points(), sigma, &fit).ok()) return;

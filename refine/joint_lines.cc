@@ -98,9 +98,7 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
                     "pencil '" + pencil.id + "', line " + std::to_string(j)};
     feature.observation = static_cast<int>(index);
     feature.line = static_cast<int>(j);
-    const double own = LineSigma(pencil, line);
-    const double stated = own > 0.0 ? own : p_.options_.line_loss.scale_px;
-    const double sigma = stated > 0.0 ? stated : noise_.lines[index][j];
+    const double sigma = LineSigma(pencil, line);
     const int axis = AxisOfLine(index, j);
     if (axis >= 0) {
       AddAxisLine(line, sigma, axis, feature.id, feature.name);

@@ -23,7 +23,6 @@
 #include <vector>
 
 #include "circline/estimators/observations.h"
-#include "circline/estimators/point_noise.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
 #include "circline/refine/cost_functions.h"
@@ -88,10 +87,10 @@ struct Rival {
 
 class JointProblem {
  public:
-  // `observations` fitted and resolved (ResolveWorld); they and the options outlive this. Features
-  // without a fit, of other planes, or without any tie to the world frame take no part.
-  JointProblem(const Observations& observations, const EstimationOptions& options,
-               const PointNoise& noise);
+  // `observations` fitted and resolved (ResolveWorld), each feature with its noise (StateNoise);
+  // they and the options outlive this. Features without a fit, of other planes, or without any tie
+  // to the world frame take no part.
+  JointProblem(const Observations& observations, const EstimationOptions& options);
 
   // All unknowns at a seed: its rotation and plane, circles by their points in that plane, the rest
   // by its own fits. Features that cannot lie in that plane in front of the camera are made

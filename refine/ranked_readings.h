@@ -5,7 +5,6 @@
 
 #include <vector>
 
-#include "circline/estimators/point_noise.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
 #include "circline/refine/joint_problem.h"
@@ -14,8 +13,8 @@ namespace circline {
 
 // Fills the hypotheses of all minima that compete, of the second ellipses of circles that these
 // leave out besides, and adds the notes of the best one. Not ok: no minimum gives a hypothesis.
-Status RankReadings(const JointProblem& problem, const PointNoise& noise,
-                    const std::vector<State>& minima, PoseEstimate* estimate);
+Status RankReadings(const JointProblem& problem, const std::vector<State>& minima,
+                    PoseEstimate* estimate);
 
 }  // namespace circline
 
