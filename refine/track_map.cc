@@ -40,18 +40,19 @@ bool PlaceCircle(const Camera& camera, const CircleObservation& circle, const Ca
 class MapBuilder {
  public:
   MapBuilder(const Observations& frame, const TrackerOptions& options, TrackMap* map,
-             std::vector<TrackState>* states)
+             Kept<TrackFit>* states)
       : frame_(frame), noise_(options.estimation.noise_model), map_(*map), states_(*states) {}
 
   // `is_first`: it fixes the origin and the unit.
   void AddCircle(const CircleObservation& circle, bool is_first) {
     if (map_.circles.size() >= kMaxCircles) return;
     std::vector<Eigen::Vector3d> placed;
-    for (const TrackState& state : states_) {
+    for (const TrackFit& fit : states_) {
+      const CameraPose pose = fit.state.Pose(map_);
       Eigen::Vector3d at;
       // Beyond a hypothesis' horizon: anywhere, and the frames to come decide.
-      if (!PlaceCircle(frame_.camera, circle, state.Pose(map_), &at))
-        at = Eigen::Vector3d(0.0, 0.0, state.Pose(map_).translation.norm());
+      if (!PlaceCircle(frame_.camera, circle, pose, &at))
+        at = Eigen::Vector3d(0.0, 0.0, pose.translation.norm());
       placed.push_back(at);
     }
     TrackMap::Circle added;
@@ -94,7 +95,8 @@ class MapBuilder {
     }
     const bool is_constant = manifold == nullptr;
     const int block = map_.AddBlock(3, std::move(manifold), is_constant);
-    for (TrackState& state : states_) {
+    for (TrackFit& fit : states_) {
+      TrackState& state = fit.state;
       Eigen::Vector3d d = state.Pose(map_).rotation.transpose() * in_camera;
       if (!is_free) d = Eigen::Vector3d::Unit(static_cast<int>(role));
       if (is_free && in_plane) d.z() = 0.0;
@@ -113,7 +115,8 @@ class MapBuilder {
  private:
   // Standard deviation of an unknown length.
   Eigen::VectorXd Length(std::size_t i, int size) const {
-    return Eigen::VectorXd::Constant(size, kUnknown * states_[i].Pose(map_).translation.norm());
+    return Eigen::VectorXd::Constant(size,
+                                     kUnknown * states_[i].state.Pose(map_).translation.norm());
   }
 
   // `of(i)`: values and standard deviations for the i-th hypothesis.
@@ -122,8 +125,8 @@ class MapBuilder {
     for (std::size_t i = 0; i < states_.size(); ++i) {
       const auto [values, sigma] = of(i);
       const Eigen::Index size = map_.block(block).tangent_size();
-      states_[i].Append(map_, block, values.data(),
-                        Eigen::MatrixXd(sigma.head(size).cwiseAbs2().asDiagonal()));
+      states_[i].state.Append(map_, block, values.data(),
+                              Eigen::MatrixXd(sigma.head(size).cwiseAbs2().asDiagonal()));
     }
   }
 
@@ -171,7 +174,7 @@ class MapBuilder {
   const Observations& frame_;
   const NoiseModel& noise_;
   TrackMap& map_;
-  std::vector<TrackState>& states_;
+  Kept<TrackFit>& states_;
 };
 
 // Pose, velocities and camera of a hypothesis, as a first frame's evidence finds them.
@@ -249,7 +252,7 @@ void AddDirections(const Observations& frame, const TrackMap& map, bool shares_a
 }  // namespace
 
 void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& hypotheses,
-              const TrackerOptions& options, TrackMap* map, std::vector<TrackState>* states) {
+              const TrackerOptions& options, TrackMap* map, Kept<TrackFit>* states) {
   const EstimationOptions& estimation = options.estimation;
   const CameraSigma sigma =
       estimation.camera_sigma.value_or(estimation.noise_model.SigmaOf(resolved.camera));
@@ -262,10 +265,10 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
   map->metric = hypotheses.front().metric;
   map->origin_observed = hypotheses.front().origin_observed;
   map->plane = resolved.frame.plane;
-  states->clear();
+  states->Shorten(0);
   const double log_focal = sigma.log_focal > 0.0 ? StatedLogFocal(resolved) : 0.0;
   for (const PoseHypothesis& h : hypotheses)
-    states->push_back(FirstState(*map, h, options, sigma, log_focal));
+    states->Add().state = FirstState(*map, h, options, sigma, log_focal);
   MapBuilder builder(resolved, options, map, states);
   if (has_position) {
     const auto is_at_origin = [&](const CircleObservation& c) {
@@ -282,7 +285,7 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
 }
 
 void ExtendMap(const Observations& fitted, const TrackerOptions& options, TrackMap* map,
-               std::vector<TrackState>* states) {
+               Kept<TrackFit>* states) {
   MapBuilder builder(fitted, options, map, states);
   for (const CircleObservation& circle : fitted.circles) {
     const bool is_known = std::any_of(map->circles.begin(), map->circles.end(),

@@ -3,8 +3,6 @@
 #ifndef CIRCLINE_REFINE_TRACK_RANKING_H_
 #define CIRCLINE_REFINE_TRACK_RANKING_H_
 
-#include <vector>
-
 #include "circline/refine/pose_tracker.h"
 #include "circline/refine/scratch.h"
 #include "circline/refine/track_frame.h"
@@ -15,14 +13,11 @@ namespace circline {
 // Minima that several starts lead to are one, its weight the larger one of two starts of a
 // hypothesis, or the sum of the probabilities of two hypotheses.
 enum class MergedWeight { kLarger, kSum };
-void Merge(const TrackMap& map, MergedWeight weight, Spares<TrackFit>* spares,
-           std::vector<TrackFit>* fits);
+void Merge(const TrackMap& map, MergedWeight weight, Kept<TrackFit>* fits);
 
 // Log weights to log probabilities; drops what is improbable and orders the rest. The first stays
 // first unless another one is clearly more probable.
-void Rank(const TrackerOptions& options, Spares<TrackState>* spares,
-          std::vector<TrackState>* states);
-void Rank(const TrackerOptions& options, Spares<TrackFit>* spares, std::vector<TrackFit>* fits);
+void Rank(const TrackerOptions& options, Kept<TrackFit>* fits);
 
 }  // namespace circline
 

@@ -157,8 +157,8 @@ void FillFrame(const TrackFrame& frame, const TrackFit& fit, PoseHypothesis* h,
   h->cost = fit.cost;
   double squares = 0.0;
   const double* parameters[8];
-  for (std::size_t i = 0; i < frame.size(); ++i) {
-    const TrackFrame::Term& term = frame.term(i);
+  for (std::size_t i = 0; i < frame.terms().size(); ++i) {
+    const TrackFrame::Term& term = frame.terms()[i];
     if (fit.active[i] == 0) {
       if (term.parent >= 0 && fit.active[static_cast<std::size_t>(term.parent)] == 0) continue;
       h->left_out.push_back(term.id);

@@ -19,7 +19,7 @@ namespace circline {
 bool TrackFrame::ResetPrior(const TrackState& before, const TrackFit& fit) {
   used_.assign(map_.blocks().size(), 0);
   used_[TrackMap::kRotation] = used_[TrackMap::kTranslation] = 1;
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     if (fit.active[i] == 0) continue;
     for (const int b : terms_[i].blocks) {
       if (b >= 0) used_[static_cast<std::size_t>(b)] = 1;
@@ -41,7 +41,7 @@ int TrackFrame::Solve(int max_evaluations, TrackFit* fit) {
     parameters_.push_back(x + block.offset);
   }
   problem.AddResidualBlock(prior_.cost(), nullptr, parameters_);
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     if (fit->active[i] == 0) continue;
     parameters_.clear();
     for (const int b : terms_[i].blocks) {
@@ -79,7 +79,7 @@ double TrackFrame::Excess(const Term& term, const TrackFit& fit) const {
 bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) {
   odd_.clear();
   std::ptrdiff_t num_whole = 0;
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     if (terms_[i].parent < 0) ++num_whole;
     if (fit->active[i] == 0) {
       if (terms_[i].parent < 0) num_whole -= 2;  // Less than half of all may be left out.
@@ -100,7 +100,7 @@ bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) {
     fit->active[i] = 0;
     num_whole -= is_whole ? 2 : 0;
     any = true;
-    for (std::size_t k = 0; k < num_terms_; ++k) {
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
       if (terms_[k].parent == static_cast<int>(i)) fit->active[k] = 0;
     }
   }
@@ -111,7 +111,7 @@ bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) {
 int TrackFrame::LeastOdd(TrackFit* fit) const {
   int least = -1;
   double excess = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     const Term& term = terms_[i];
     const bool has_parent =
         term.parent < 0 || fit->active[static_cast<std::size_t>(term.parent)] != 0;
@@ -126,7 +126,7 @@ int TrackFrame::LeastOdd(TrackFit* fit) const {
 
 bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& options,
                             TrackFit* fit) {
-  const double gate = options.gate_probability / static_cast<double>(num_terms_);
+  const double gate = options.gate_probability / static_cast<double>(terms_.size());
   constexpr int kFew = 2;  // Evaluations that come to nothing.
   int left = options.max_evaluations;
   const auto solve = [&](TrackFit* at) {
@@ -143,21 +143,17 @@ bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& opti
   // What seemed to contradict may have agreed but for the worst: back, one by one, while it does.
   bool agrees = has_dropped;
   while (agrees && left > kFew) {
-    TrackFit with = spares.Take();
-    with = *fit;
-    const int back = LeastOdd(&with);
-    agrees = back >= 0;
+    with_ = *fit;
+    const int back = LeastOdd(&with_);
+    if (back < 0) break;
+    const Term& term = terms_[static_cast<std::size_t>(back)];
+    with_.active[static_cast<std::size_t>(back)] = 1;
+    agrees = solve(&with_) && Excess(term, with_) <= ChiSquareLimit(term.dof, gate);
     if (agrees) {
-      const Term& term = terms_[static_cast<std::size_t>(back)];
-      with.active[static_cast<std::size_t>(back)] = 1;
-      agrees = solve(&with) && Excess(term, with) <= ChiSquareLimit(term.dof, gate);
-      if (agrees) {
-        std::swap(*fit, with);
-      } else if (!ResetPrior(before, *fit)) {
-        return false;
-      }
+      std::swap(*fit, with_);
+    } else if (!ResetPrior(before, *fit)) {
+      return false;
     }
-    spares.Give(std::move(with));
   }
   return Score(gate, fit) && Update(before, fit);
 }
@@ -166,7 +162,7 @@ bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& opti
 bool TrackFrame::Score(double gate_probability, TrackFit* fit) const {
   double left_out = 0.0, free = 0.0;
   fit->dof = 0;
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     const Term& term = terms_[i];
     if (fit->active[i] != 0) {
       fit->dof += term.dof;
