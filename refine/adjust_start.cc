@@ -12,7 +12,7 @@
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
-#include "circline/refine/pose_seeds.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 
@@ -82,18 +82,13 @@ double CoarsePose(const Observations& photo, const EstimationOptions& options,
   std::vector<std::string> unused;
   const std::vector<Seed> seeds = CollectSeeds(photo, registry.solvers(), 0.0, &unused);
   const JointProblem problem(photo, options);
-  State state, best;
-  double least = std::numeric_limits<double>::infinity();
-  for (const Seed& seed : seeds) {
-    if (!problem.Start(seed.pose, 0.0, problem.FirstReading(), &state).ok()) continue;
-    const double cost = state.cost + LeftOutCost(problem, state);
-    if (!(cost < least)) continue;
-    least = cost;
-    best = state;
-  }
+  Status last;
+  std::vector<SeedStart> starts = StartsOf(problem, seeds, problem.FirstReading(), &last);
   if (estimate != nullptr)
     estimate->status = Status::Refused("no closed form leads to a pose that can be refined");
-  if (!std::isfinite(least) || !problem.Solve(kIterations, &best).ok()) return least + impossible;
+  if (starts.empty()) return std::numeric_limits<double>::infinity();
+  State& best = starts.front().state;
+  if (!problem.Solve(kIterations, &best).ok()) return starts.front().cost + impossible;
   Refined refined;
   if (estimate != nullptr && FillRefined(problem, best, &refined).ok()) {
     estimate->status = Status::Ok();

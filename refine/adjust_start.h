@@ -14,6 +14,11 @@
 
 namespace circline {
 
+// For each photo the first one of the same camera that shows nearly the same: four fifths of the
+// features of each lie within `distance`, of the photo's diagonal, of one of the other; -1 where
+// there is none. Ids mean nothing here.
+std::vector<int> NearlyEqualViews(const std::vector<Observations>& photos, double distance);
+
 // Calls work(0) .. work(count - 1) on so many threads. What one of them throws ends the rest, and
 // is thrown again.
 void ParallelFor(int count, int num_threads, const std::function<void(int)>& work);

@@ -6,18 +6,9 @@
 #include <cstdio>
 #include <utility>
 
+#include "circline/refine/statistics.h"
+
 namespace circline {
-namespace {
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-}  // namespace
-
 // From wide losses to narrow ones, the camera's coarse parameters first.
 void Adjustment::SolveOnce() {
   constexpr double kWidest = 300.0, kNear = 3.0, kNarrower = 0.25;

@@ -4,8 +4,9 @@
 #include <map>
 #include <mutex>
 
+#include "circline/refine/adjust_start.h"
 #include "circline/refine/adjustment.h"
-#include "circline/refine/equal_views.h"
+#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {
@@ -234,14 +235,13 @@ void Adjustment::ScaleWorlds() {
     }
   }
   for (auto& [world, own] : ratios) {
-    const auto middle = own.begin() + static_cast<std::ptrdiff_t>(own.size() / 2);
-    std::nth_element(own.begin(), middle, own.end());
+    const double scale = Median(std::move(own));
     for (auto& [id, circle] : layouts_[static_cast<std::size_t>(world)])
-      circle = {*middle * circle.center, *middle * circle.radius};
+      circle = {scale * circle.center, scale * circle.radius};
     for (AdjustInput& input : inputs_) {
-      if (input.takes_part && input.world == world) input.pose.translation *= *middle;
+      if (input.takes_part && input.world == world) input.pose.translation *= scale;
     }
-    if (world == 0 && given_frame_) given_frame_->scale /= *middle;
+    if (world == 0 && given_frame_) given_frame_->scale /= scale;
   }
 }
 

@@ -110,20 +110,14 @@ namespace {
 constexpr int kPriorRows = 3;
 constexpr double kHeld = 1e-6;  // Stands for a standard deviation of 0.
 
-// In the world: centre (cx, cy, height * r) and normal (tilt, 1).
-struct PlaneCircle {
-  Eigen::Vector3d center, normal;
-  double radius;
+PlaneCircle InWorld(const double* const* parameters, bool tilted) {
+  return {parameters[2], parameters[3][0], tilted ? parameters[4] : nullptr};
+}
 
-  PlaneCircle(const double* const* parameters, bool tilt_and_height) : radius(parameters[3][0]) {
-    const double* tilt = tilt_and_height ? parameters[4] : nullptr;
-    center = {parameters[2][0], parameters[2][1], tilt != nullptr ? tilt[2] * radius : 0.0};
-    normal = {tilt != nullptr ? tilt[0] : 0.0, tilt != nullptr ? tilt[1] : 0.0, 1.0};
-  }
-  CircleInCamera InCamera(const Eigen::Matrix3d& R, const double* translation) const {
-    return {R * center + Eigen::Vector3d(translation), R * normal, radius};
-  }
-};
+CircleInCamera InCamera(const PlaneCircle& circle, const Eigen::Matrix3d& R,
+                        const double* translation) {
+  return {R * circle.center + Eigen::Vector3d(translation), R * circle.normal, circle.radius};
+}
 
 }  // namespace
 
@@ -136,18 +130,18 @@ PlaneCircleContourCost::PlaneCircleContourCost(ImagePoints points, Blocks blocks
 
 void PlaneCircleContourCost::Distances(const double* const* parameters,
                                        std::vector<double>* distances) const {
-  const PlaneCircle circle(parameters, blocks_.tilt_and_height);
-  points()->ConicDistances(
-      ImageOfCircle(circle.InCamera(RotationFromBlock(parameters[0]), parameters[1])),
-      Offset(parameters), CameraShifts(parameters), distances);
+  const CircleInCamera circle = InCamera(InWorld(parameters, blocks_.tilt_and_height),
+                                         RotationFromBlock(parameters[0]), parameters[1]);
+  points()->ConicDistances(ImageOfCircle(circle), Offset(parameters), CameraShifts(parameters),
+                           distances);
 }
 
 bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double* const* parameters,
                                           double* residuals, double** jacobians) const {
   const bool tilted = blocks_.tilt_and_height;
   const Eigen::Matrix3d R = RotationFromBlock(parameters[0]);
-  const PlaneCircle in_world(parameters, tilted);
-  const CircleInCamera circle = in_world.InCamera(R, parameters[1]);
+  const PlaneCircle in_world = InWorld(parameters, tilted);
+  const CircleInCamera circle = InCamera(in_world, R, parameters[1]);
   Rows U;
   if (!(circle.p.z() > 0.0) || !(circle.r > 0.0) ||
       !SumAbout(ImageOfCircle(circle), weighing, parameters, residuals, jacobians, &U))

@@ -1,10 +1,9 @@
-#include "circline/refine/imperfection_scales.h"
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "circline/refine/linearization.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 namespace {

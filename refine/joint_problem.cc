@@ -66,17 +66,10 @@ bool JointProblem::OriginIsPlaced(const State& state) const {
 
 double JointProblem::TwiceCost(const Term& term, const State& state,
                                const Weighing& weighing) const {
-  constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
-  double residuals[kMaxResiduals];
   const double* parameters[8];
   Parameters(term, state, parameters);
-  const bool evaluated = term.weighed != nullptr
-                             ? term.weighed->EvaluateWith(weighing, parameters, residuals, nullptr)
-                             : term.cost->Evaluate(parameters, residuals, nullptr);
-  if (!evaluated) return std::numeric_limits<double>::infinity();
-  double rho[3] = {0.0, 0.0, 0.0};
-  for (int i = 0; i < term.cost->num_residuals(); ++i) rho[0] += residuals[i] * residuals[i];
-  if (term.loss != nullptr) term.loss->Evaluate(rho[0], rho);
+  double rho[3] = {TwiceCostOf(*term.cost, term.weighed, weighing, parameters), 0.0, 0.0};
+  if (term.loss != nullptr && std::isfinite(rho[0])) term.loss->Evaluate(rho[0], rho);
   return rho[0];
 }
 

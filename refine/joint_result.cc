@@ -148,22 +148,11 @@ void FillCircles(const JointProblem& problem, const State& state, Refined* refin
     return state.x.data() + problem.blocks()[static_cast<std::size_t>(block)].offset;
   };
   for (const JointProblem::CircleBlocks& c : problem.circles()) {
-    const double radius = at(c.radius)[0];
     if (state.active[static_cast<std::size_t>(c.feature)] == 0) continue;
     CircleEstimate estimate;
     estimate.id = problem.observations().circles[static_cast<std::size_t>(c.observation)].id;
-    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ(),
-                    center(at(c.center)[0], at(c.center)[1], 0.0);
-    if (c.tilt >= 0) {
-      normal.head<2>() = Eigen::Vector2d(at(c.tilt)[0], at(c.tilt)[1]);
-      center.z() = at(c.tilt)[2] * radius;
-    }
-    const Eigen::Vector3d in_camera = pose.rotation * center + pose.translation;
-    estimate.normal = (pose.rotation * normal).normalized();
-    if (estimate.normal.dot(in_camera) > 0.0) estimate.normal = -estimate.normal;
-    estimate.center = unit * in_camera;
-    estimate.radius = unit * std::abs(radius);
-    CameraToPixel(shifted, in_camera, &estimate.center_px);
+    const double* tilt = c.tilt >= 0 ? at(c.tilt) : nullptr;
+    PlaceEstimate({at(c.center), at(c.radius)[0], tilt}, pose, unit, shifted, &estimate);
     refined->hypothesis.circles.push_back(estimate);
   }
 }
@@ -215,8 +204,7 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
     } else {
       continue;
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-    estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
+    estimate.sigma_deg = LargestSigmaDeg(covariance);
     h->pencils.push_back(estimate);
   }
 }
@@ -322,6 +310,22 @@ double LogDet(const JointProblem& problem, const Linearization& at) {
 }
 
 }  // namespace
+
+void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double unit,
+                   const Camera& camera, CircleEstimate* estimate) {
+  const Eigen::Vector3d in_camera = pose.rotation * circle.center + pose.translation;
+  estimate->normal = (pose.rotation * circle.normal).normalized();
+  if (estimate->normal.dot(in_camera) > 0.0) estimate->normal = -estimate->normal;
+  estimate->center = unit * in_camera;
+  estimate->radius = unit * std::abs(circle.radius);
+  estimate->center_px.setZero();
+  CameraToPixel(camera, in_camera, &estimate->center_px);
+}
+
+double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
+}
 
 bool DropOutliers(const JointProblem& problem, State* state) {
   std::vector<int> dropped;

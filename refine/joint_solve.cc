@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "circline/refine/block_chain.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/nearby_solve.h"
 
@@ -185,16 +186,12 @@ Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_i
 
 // Of all features, root mean square over its points, standard deviations.
 double JointProblem::LargestMiss(const State& state) const {
-  constexpr double kNoLoss = 1e4;  // So wide a loss is none.
-  Weighing weighing;
-  weighing.stretch = kNoLoss;
   double most = 0.0;
+  const double* parameters[8];
   for (const Term& term : terms_) {
     if (term.weighed == nullptr || !IsActive(term, state)) continue;
-    const ImagePoints* points = term.weighed->points();
-    const double num_points =
-        points != nullptr ? points->options().weight * static_cast<double>(points->size()) : 1.0;
-    most = std::max(most, TwiceCost(term, state, weighing) / std::max(1.0, num_points));
+    Parameters(term, state, parameters);
+    most = std::max(most, MeanSquareOf(*term.weighed, parameters));
   }
   return std::sqrt(most);
 }

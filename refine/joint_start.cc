@@ -11,6 +11,7 @@
 #include "circline/refine/block_chain.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/plane_circle.h"
+#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {
@@ -49,18 +50,8 @@ bool JointProblem::Ray(const Eigen::Vector2d& pixel, const double* camera,
 bool JointProblem::PlaceCircle(const CircleBlocks& c, const double* camera, State* state,
                                Eigen::Vector3d* circle) const {
   const CameraPose pose = PoseAt(*state);
-  const Eigen::Vector3d n = pose.rotation.col(2);
-  const double distance = n.dot(pose.translation);
-  std::vector<Eigen::Vector2d> in_plane;
   const ImagePoints& points = *terms_[static_cast<std::size_t>(c.term)].weighed->points();
-  for (const CalibratedPoint& p : points.points()) {
-    const Eigen::Vector3d ray = Refocused(p.Homogeneous(), camera[0]);
-    const double depth = distance / n.dot(ray);
-    if (!(depth > 0.0) || !std::isfinite(depth)) return false;
-    const Eigen::Vector3d X = pose.rotation.transpose() * (depth * ray - pose.translation);
-    in_plane.emplace_back(X.x(), X.y());
-  }
-  if (!FitPlaneCircle(in_plane, circle)) return false;
+  if (!FitPlaneCircle(points.points(), camera[0], pose, circle)) return false;
   const Eigen::Vector3d center(circle->x(), circle->y(), 0.0);
   if (!((pose.rotation * center + pose.translation).z() > 0.0)) return false;
   const Block& center_block = blocks_[static_cast<std::size_t>(c.center)];
@@ -149,13 +140,7 @@ void JointProblem::PlaceScale(Placed placed, const double* camera, State* state)
     }
   }
   Eigen::Map<Eigen::Vector3d> t(state->x.data() + blocks_[kTranslation].offset);
-  double scale = 1.0 / t.norm();
-  if (!placed.scales.empty()) {
-    const auto middle =
-        placed.scales.begin() + static_cast<std::ptrdiff_t>(placed.scales.size() / 2);
-    std::nth_element(placed.scales.begin(), middle, placed.scales.end());
-    scale = *middle;
-  }
+  const double scale = placed.scales.empty() ? 1.0 / t.norm() : Median(std::move(placed.scales));
   t *= scale;
   std::vector<std::uint8_t> scaled(blocks_.size(), 0);
   const auto apply = [&](int index) {

@@ -9,14 +9,11 @@
 #include <vector>
 
 #include "circline/estimators/point_noise.h"
-#include "circline/refine/chi_square.h"
 #include "circline/refine/scratch.h"
+#include "circline/refine/statistics.h"
 #include "circline/refine/track_frame.h"
-#include "circline/refine/track_map.h"
-#include "circline/refine/track_ranking.h"
-#include "circline/refine/track_relocate.h"
-#include "circline/refine/track_result.h"
 #include "circline/refine/track_state.h"
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 

@@ -1,5 +1,3 @@
-#include "circline/refine/ranked_readings.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -11,9 +9,8 @@
 
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/joint_result.h"
-#include "circline/refine/merged_humps.h"
 #include "circline/refine/pose_seeds.h"
-#include "circline/refine/reading_search.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 namespace {

@@ -11,12 +11,9 @@
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/focal_starts.h"
 #include "circline/estimators/point_noise.h"
-#include "circline/refine/imperfection_scales.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/pose_seeds.h"
-#include "circline/refine/ranked_readings.h"
-#include "circline/refine/reading_search.h"
 
 namespace circline {
 namespace {
@@ -148,20 +145,13 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
 // The noise model as the photo's own features have it, at the minimum that the best seed leads to;
 // the seed then starts there.
 NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* seeds) {
-  const std::vector<std::uint8_t> reading = problem.FirstReading();
-  State state, best;
-  Seed* best_seed = nullptr;
-  double least = std::numeric_limits<double>::infinity();
-  for (Seed& seed : *seeds) {
-    if (!problem.Start(seed.pose, seed.log_focal, reading, &state).ok()) continue;
-    const double cost = state.cost + LeftOutCost(problem, state);
-    if (!(cost < least)) continue;
-    least = cost;
-    best = state;
-    best_seed = &seed;
-  }
-  if (best_seed == nullptr || !problem.SolveGraduated(problem.options().max_iterations, &best).ok())
+  Status unused;
+  std::vector<SeedStart> starts = StartsOf(problem, *seeds, problem.FirstReading(), &unused);
+  if (starts.empty()) return problem.options().noise_model;
+  State& best = starts.front().state;
+  if (!problem.SolveGraduated(problem.options().max_iterations, &best).ok())
     return problem.options().noise_model;
+  Seed* best_seed = &(*seeds)[starts.front().seed];
   best_seed->pose = problem.PoseAt(best);
   best_seed->log_focal = problem.LogFocalAt(best);
   return ScaledNoiseModel(problem, best);

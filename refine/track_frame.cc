@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "circline/estimators/circle_pose.h"
+#include "circline/refine/block_chain.h"
 #include "circline/refine/curvature_bias.h"
 #include "circline/refine/evidence_points.h"
 
@@ -248,18 +249,17 @@ bool TrackFrame::Begin(const TrackState& prior, const CameraPose& start, TrackFi
   return any;
 }
 
-double TrackFrame::TermsCost(const TrackFit& fit) const {
-  constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
-  double residuals[kMaxResiduals], cost = 0.0;
+// Twice a term's cost; infinite where it has none.
+double TrackFrame::TwiceCost(std::size_t index, const TrackFit& fit) const {
   const double* parameters[8];
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
-    if (fit.active[i] == 0) continue;
-    Parameters(terms_[i], fit.state.x.data(), fit.own.data(), parameters);
-    if (!terms_[i].cost->Evaluate(parameters, residuals, nullptr))
-      return std::numeric_limits<double>::infinity();
-    for (int k = 0; k < terms_[i].cost->num_residuals(); ++k)
-      cost += 0.5 * residuals[k] * residuals[k];
-  }
+  Parameters(terms_[index], fit.state.x.data(), fit.own.data(), parameters);
+  return TwiceCostOf(*terms_[index].cost, nullptr, Weighing(), parameters);
+}
+
+double TrackFrame::TermsCost(const TrackFit& fit) const {
+  double cost = 0.0;
+  for (std::size_t i = 0; i < terms_.size(); ++i)
+    cost += fit.active[i] != 0 ? 0.5 * TwiceCost(i, fit) : 0.0;
   return cost;
 }
 

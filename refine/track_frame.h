@@ -92,7 +92,8 @@ class TrackFrame {
   bool Begin(const TrackState& prior, const CameraPose& start, TrackFit* fit) const;
   double TermsCost(const TrackFit& fit) const;
   int Solve(int max_evaluations, TrackFit* fit);
-  double Excess(const Term& term, const TrackFit& fit) const;
+  double TwiceCost(std::size_t term, const TrackFit& fit) const;
+  double Excess(std::size_t term, const TrackFit& fit) const;
   bool Place(std::size_t term, TrackFit* fit) const;
   int LeastOdd(TrackFit* fit) const;
   bool LeaveOutWorst(double gate_probability, TrackFit* fit);

@@ -1,5 +1,3 @@
-#include "circline/refine/track_map.h"
-
 #include <ceres/sphere_manifold.h>
 
 #include <Eigen/Dense>
@@ -11,6 +9,7 @@
 
 #include "circline/refine/manifolds.h"
 #include "circline/refine/plane_circle.h"
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 namespace {
@@ -19,23 +18,6 @@ namespace {
 constexpr double kUnknown = 1.0;
 // Bounds what a call costs; features beyond these stay without a part.
 constexpr std::size_t kMaxCircles = 64, kMaxDirections = 32;
-
-// A circle by its points in the plane Z = 0: (cx, cy, r). False where it cannot lie there.
-bool PlaceCircle(const Camera& camera, const CircleObservation& circle, const CameraPose& pose,
-                 Eigen::Vector3d* placed) {
-  const Eigen::Vector3d n = pose.rotation.col(2);
-  const double distance = n.dot(pose.translation);
-  std::vector<CalibratedPoint> points;
-  std::vector<Eigen::Vector2d> in_plane;
-  CalibrateInliers(camera, circle.points, circle.inliers, &points);
-  for (const CalibratedPoint& p : points) {
-    const Eigen::Vector3d ray = p.Homogeneous();
-    const double depth = distance / n.dot(ray);
-    if (!(depth > 0.0) || !std::isfinite(depth)) return false;
-    in_plane.emplace_back((pose.rotation.transpose() * (depth * ray - pose.translation)).head<2>());
-  }
-  return in_plane.size() >= 3 && FitPlaneCircle(in_plane, placed);
-}
 
 class MapBuilder {
  public:
@@ -47,11 +29,13 @@ class MapBuilder {
   void AddCircle(const CircleObservation& circle, bool is_first) {
     if (map_.circles.size() >= kMaxCircles) return;
     std::vector<Eigen::Vector3d> placed;
+    std::vector<CalibratedPoint> points;
+    CalibrateInliers(frame_.camera, circle.points, circle.inliers, &points);
     for (const TrackFit& fit : states_) {
       const CameraPose pose = fit.state.Pose(map_);
       Eigen::Vector3d at;
       // Beyond a hypothesis' horizon: anywhere, and the frames to come decide.
-      if (!PlaceCircle(frame_.camera, circle, pose, &at))
+      if (!FitPlaneCircle(points, 0.0, pose, &at))
         at = Eigen::Vector3d(0.0, 0.0, pose.translation.norm());
       placed.push_back(at);
     }

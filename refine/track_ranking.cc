@@ -1,11 +1,11 @@
-#include "circline/refine/track_ranking.h"
-
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <utility>
+
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 namespace {

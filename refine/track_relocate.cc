@@ -1,5 +1,3 @@
-#include "circline/refine/track_relocate.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 namespace {

@@ -1,5 +1,3 @@
-#include "circline/refine/track_result.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
@@ -10,6 +8,8 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/refine/camera_shifts.h"
+#include "circline/refine/joint_result.h"
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 namespace {
@@ -62,17 +62,8 @@ void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& c
   for (const TrackMap::Circle& c : map.circles) {
     CircleEstimate& estimate = *circle++;
     estimate.id = c.id;
-    estimate.radius = std::abs(at(c.radius)[0]);
-    Eigen::Vector3d center(at(c.center)[0], at(c.center)[1], 0.0), normal(0.0, 0.0, 1.0);
-    if (c.tilt >= 0) {
-      normal.head<2>() = Eigen::Vector2d(at(c.tilt)[0], at(c.tilt)[1]);
-      center.z() = at(c.tilt)[2] * estimate.radius;
-    }
-    estimate.center = pose.rotation * center + pose.translation;
-    estimate.normal = (pose.rotation * normal).normalized();
-    if (estimate.normal.dot(estimate.center) > 0.0) estimate.normal = -estimate.normal;
-    estimate.center_px.setZero();
-    CameraToPixel(shifted ? *shifted : camera, estimate.center, &estimate.center_px);
+    PlaceEstimate({at(c.center), at(c.radius)[0], c.tilt >= 0 ? at(c.tilt) : nullptr}, pose, 1.0,
+                  shifted ? *shifted : camera, &estimate);
   }
   h->pencils.resize(map.directions.size());
   auto pencil = h->pencils.begin();
@@ -92,9 +83,7 @@ void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& c
     joint.topRightCorner(3, rows) = state.covariance.block(0, first, 3, rows);
     joint.bottomLeftCorner(rows, 3) = state.covariance.block(first, 0, rows, 3);
     joint.bottomRightCorner(rows, rows) = state.covariance.block(first, first, rows, rows);
-    const Eigen::Matrix3d covariance = J * joint * J.transpose();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-    estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
+    estimate.sigma_deg = LargestSigmaDeg(J * joint * J.transpose());
   }
 }
 

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "circline/refine/chi_square.h"
 #include "circline/refine/nearby_solve.h"
+#include "circline/refine/statistics.h"
 #include "circline/refine/track_frame.h"
 
 namespace circline {
@@ -63,15 +63,8 @@ int TrackFrame::Solve(int max_evaluations, TrackFit* fit) {
 }
 
 // By how much twice a term's cost exceeds that of its own free fit; infinite where it has none.
-double TrackFrame::Excess(const Term& term, const TrackFit& fit) const {
-  constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
-  double residuals[kMaxResiduals], twice_cost = 0.0;
-  const double* parameters[8];
-  Parameters(term, fit.state.x.data(), fit.own.data(), parameters);
-  if (!term.cost->Evaluate(parameters, residuals, nullptr))
-    return std::numeric_limits<double>::infinity();
-  for (int k = 0; k < term.cost->num_residuals(); ++k) twice_cost += residuals[k] * residuals[k];
-  return twice_cost - term.free_twice_cost;
+double TrackFrame::Excess(std::size_t index, const TrackFit& fit) const {
+  return TwiceCost(index, fit) - terms_[index].free_twice_cost;
 }
 
 // Makes the terms inactive that contradict the others most: at a compromise of all, any may seem
@@ -85,7 +78,7 @@ bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) {
       if (terms_[i].parent < 0) num_whole -= 2;  // Less than half of all may be left out.
       continue;
     }
-    const double beyond = Excess(terms_[i], *fit) - ChiSquareLimit(terms_[i].dof, gate_probability);
+    const double beyond = Excess(i, *fit) - ChiSquareLimit(terms_[i].dof, gate_probability);
     if (beyond > 0.0) odd_.emplace_back(beyond, i);
   }
   std::sort(odd_.begin(), odd_.end(), [](const auto& a, const auto& b) {
@@ -116,7 +109,7 @@ int TrackFrame::LeastOdd(TrackFit* fit) const {
     const bool has_parent =
         term.parent < 0 || fit->active[static_cast<std::size_t>(term.parent)] != 0;
     if (fit->active[i] != 0 || !has_parent || !Place(i, fit)) continue;
-    const double its = Excess(term, *fit);
+    const double its = Excess(i, *fit);
     if (!(its < excess)) continue;
     excess = its;
     least = static_cast<int>(i);
@@ -146,9 +139,9 @@ bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& opti
     with_ = *fit;
     const int back = LeastOdd(&with_);
     if (back < 0) break;
-    const Term& term = terms_[static_cast<std::size_t>(back)];
-    with_.active[static_cast<std::size_t>(back)] = 1;
-    agrees = solve(&with_) && Excess(term, with_) <= ChiSquareLimit(term.dof, gate);
+    const auto i = static_cast<std::size_t>(back);
+    with_.active[i] = 1;
+    agrees = solve(&with_) && Excess(i, with_) <= ChiSquareLimit(terms_[i].dof, gate);
     if (agrees) {
       std::swap(*fit, with_);
     } else if (!ResetPrior(before, *fit)) {
