@@ -32,7 +32,7 @@ class JointProblemBuilder {
     const int size = static_cast<int>(value.size());
     return AddBlock(size, std::move(value), {}, true);
   }
-  int AddTerm(std::unique_ptr<ceres::CostFunction> cost, std::vector<int> blocks, int feature = -1,
+  int AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature = -1,
               int group = -1);
   int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature,
                      int group);

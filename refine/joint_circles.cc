@@ -50,7 +50,7 @@ void JointProblemBuilder::AddPoint(const Eigen::Vector2d& pixel, double sigma_px
                                    int feature, int group) {
   CalibratedPoint unused;
   if (!PixelToCalibrated(obs_.camera, pixel, &unused)) {
-    p_.unused_.push_back(p_.features_[static_cast<std::size_t>(feature)].name +
+    p_.unused_.push_back(p_.feature(feature).name +
                          ": not used, it lies where the camera model cannot undistort it");
     return;
   }
@@ -86,8 +86,8 @@ int JointProblemBuilder::RadiusBlock(const CircleObservation& circle, int featur
   const int block =
       AddBlock(1, {known ? circle.radius : 1.0}, {}, known && !(sigma > 0.0), grouped ? -1 : group);
   if (known && sigma > 0.0) {
-    AddTerm(std::unique_ptr<ceres::CostFunction>(NewLogPrior(circle.radius, sigma)), {block},
-            grouped ? -1 : feature, grouped ? -1 : group);
+    AddTerm(NewLogPrior(circle.radius, sigma), {block}, grouped ? -1 : feature,
+            grouped ? -1 : group);
   }
   if (grouped) radius_groups_[circle.radius_group] = block;
   return block;
@@ -100,8 +100,7 @@ int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
   int& block = offsets_[contrast];
   if (block < 0 && (num_circles_[contrast] > 1 || circle.radius > 0.0)) {
     block = AddBlock(1, {0.0});
-    AddTerm(std::unique_ptr<ceres::CostFunction>(NewGaussianPrior({model_.contour_offset_px})),
-            {block});
+    AddTerm(NewGaussianPrior({model_.contour_offset_px}), {block});
     p_.terms_.back().loss = std::make_unique<MostlyExact>();
   }
   return block;

@@ -74,10 +74,9 @@ int JointProblemBuilder::DirectionBlock(std::size_t index) {
   tie.dof = is_free ? 1 : 2;
   tie.observation = static_cast<int>(index);
   const int feature = AddFeature(tie);
-  AddTerm(std::unique_ptr<ceres::CostFunction>(
-              is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma)
-                      : NewDirectionPrior(axis, sigma)),
-          {block}, feature);
+  AddTerm(
+      is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma) : NewDirectionPrior(axis, sigma),
+      {block}, feature);
   p_.terms_.back().loss = std::make_unique<MostlyExact>();
   if (!is_free) p_.terms_.back().lean_shape = LeanShape(pencil);
   return block;

@@ -30,6 +30,13 @@
 
 namespace circline {
 
+// Matrices of one block do not allocate.
+using BlockMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCameraSize, kCameraSize>;
+using BlockVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCameraSize, 1>;
+
+BlockMatrix PlusJacobianOf(const ceres::Manifold& manifold, const double* at);
+
 // One parameter block.
 struct Block {
   int offset, size;                           // In State::x.
@@ -39,6 +46,10 @@ struct Block {
 
   int tangent_size() const {
     return is_constant ? 0 : manifold != nullptr ? manifold->TangentSize() : size;
+  }
+  // Of its manifold, constant or not: ambient by tangent size.
+  BlockMatrix PlusJacobian(const double* at) const {
+    return manifold != nullptr ? PlusJacobianOf(*manifold, at) : BlockMatrix::Identity(size, size);
   }
 };
 
@@ -77,6 +88,8 @@ struct State {
   std::vector<double> x;             // All parameter blocks.
   std::vector<std::uint8_t> active;  // By feature.
   double cost = 0.0;                 // Of the active terms, priors included.
+
+  bool Has(int feature) const { return active[static_cast<std::size_t>(feature)] != 0; }
 };
 
 // A minimum that has been found. Another competes where it costs no more than so much above it.
@@ -112,9 +125,7 @@ class JointProblem {
   // Infinity where it cannot be evaluated.
   double Cost(const State& state, const Weighing& weighing = Weighing()) const;
   CameraPose PoseAt(const State& state) const;
-  double LogFocalAt(const State& state) const {
-    return state.x[static_cast<std::size_t>(blocks_[kCamera].offset)];
-  }
+  double LogFocalAt(const State& state) const { return *At(kCamera, state); }
   // Share of the contours' and lines' points within their gate.
   double InlierShare(const State& state) const;
 
@@ -123,6 +134,12 @@ class JointProblem {
   const std::vector<Block>& blocks() const { return blocks_; }
   const std::vector<Term>& terms() const { return terms_; }
   const std::vector<Feature>& features() const { return features_; }
+  const Block& block(int i) const { return blocks_[static_cast<std::size_t>(i)]; }
+  const Term& term(int i) const { return terms_[static_cast<std::size_t>(i)]; }
+  const Feature& feature(int i) const { return features_[static_cast<std::size_t>(i)]; }
+  // A block's values.
+  const double* At(int i, const State& state) const { return state.x.data() + block(i).offset; }
+  double* At(int i, State* state) const { return state->x.data() + block(i).offset; }
   // Features that a fit has not found to contradict their like.
   std::vector<std::uint8_t> FirstReading() const;
   // What the observations say that has no part in the problem, and why, a sentence each.
@@ -146,6 +163,9 @@ class JointProblem {
   struct CircleBlocks {
     int observation, feature, term, center, radius, tilt;
   };
+  const CircleObservation& ObservationOf(const CircleBlocks& circle) const {
+    return observations_.circles[static_cast<std::size_t>(circle.observation)];
+  }
   // Pencil of a direction (observation -1: an axis drawn alone), and its lines.
   struct PencilBlocks {
     int observation, direction;

@@ -88,7 +88,7 @@ class MapBuilder {
       d = d.norm() > kNone ? d.normalized() : Eigen::Vector3d::UnitX();
       Eigen::Vector3d sigma = Eigen::Vector3d::Constant(is_free ? kUnknown : lean);
       if (in_plane) sigma.z() = lean;
-      const Eigen::MatrixXd plus = PlusJacobianOf(map_.block(block), d.data());
+      const Eigen::MatrixXd plus = map_.block(block).PlusJacobian(d.data());
       Eigen::MatrixXd covariance = plus.transpose() * sigma.cwiseAbs2().asDiagonal() * plus;
       if (is_constant) covariance.resize(0, 0);
       state.Append(map_, block, d.data(), covariance);

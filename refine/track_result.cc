@@ -76,7 +76,7 @@ void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& c
     const Eigen::Index rows = block.tangent_size();
     Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> J(3, 3 + rows);
     J.leftCols<3>() = -CrossMatrix(in_world);
-    if (rows > 0) J.rightCols(rows) = PlusJacobianOf(block, at(d.block));
+    if (rows > 0) J.rightCols(rows) = block.PlusJacobian(at(d.block));
     const Eigen::Index first = map.tangent(d.block);
     BlockMatrix joint(3 + rows, 3 + rows);  // Of the turn and the direction.
     joint.topLeftCorner<3, 3>() = state.covariance.topLeftCorner<3, 3>();

@@ -134,13 +134,6 @@ BlockMatrix ChartOf(const Block& block, const double* at) {
   return J;
 }
 
-BlockMatrix PlusJacobianOf(const Block& block, const double* at) {
-  if (block.manifold == nullptr) return BlockMatrix::Identity(block.size, block.size);
-  BlockJacobian J(block.size, block.tangent_size());
-  block.manifold->PlusJacobian(at, J.data());
-  return J;
-}
-
 void Plus(const Block& block, const BlockVector& step, double* values) {
   if (block.tangent_size() == 0) return;
   Eigen::Map<Eigen::VectorXd> all(values, block.size);

@@ -84,12 +84,8 @@ struct TrackState {
 };
 
 // Coordinates about a place: MinusJacobian at the place, which is linear, times the difference.
-// Tangent by ambient size. Matrices of one block do not allocate.
-using BlockMatrix =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCameraSize, kCameraSize>;
-using BlockVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCameraSize, 1>;
+// Tangent by ambient size.
 BlockMatrix ChartOf(const Block& block, const double* at);
-BlockMatrix PlusJacobianOf(const Block& block, const double* at);
 // Moves a block by a tangent.
 void Plus(const Block& block, const BlockVector& step, double* values);
 

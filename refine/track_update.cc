@@ -105,7 +105,7 @@ class TrackFrame::Information {
     const Block& block = frame_.map_.block(index);
     frame_.columns_[b] = column;
     Rebind(frame_.scratch_.NewMatrix(block.size, block.tangent_size()), &frame_.plus_[b]);
-    frame_.plus_[b] = PlusJacobianOf(block, fit_.state.x.data() + block.offset);
+    frame_.plus_[b] = block.PlusJacobian(fit_.state.x.data() + block.offset);
     return frame_.plus_[b];
   }
 
