@@ -15,10 +15,20 @@
 
 namespace circline {
 
+EstimationOptions PoseOptions(const AdjustOptions& options) {
+  EstimationOptions pose;
+  pose.conic_loss = options.conic_loss;
+  pose.line_loss = options.line_loss;
+  pose.noise_model = options.noise_model;
+  // In the pose's covariance only: the camera is not what the photo says of it.
+  pose.camera_sigma = CameraSigma::Exact();
+  return pose;
+}
+
 AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
                              const std::vector<CameraPrior>& priors, const AdjustOptions& options,
                              const GivenFrame* given)
-    : photos_(photos), options_(options) {
+    : photos_(photos), options_(options), pose_options_(PoseOptions(options)) {
   for (const CameraPrior& prior : priors) {
     for (int k = 4; k < kCameraSize; ++k) {
       if (prior.sigma[static_cast<std::size_t>(k)] > 0.0)
@@ -142,11 +152,8 @@ std::optional<ImagePoints> AdjustProblem::Points(const AdjustInput& input,
                                                  const std::vector<Eigen::Vector2d>& pixels,
                                                  const std::vector<std::uint8_t>& inliers,
                                                  double sigma_px, bool is_circle) const {
-  ImagePoints::Options options;
-  options.loss = (is_circle ? options_.conic_loss : options_.line_loss).type;
-  options.num_distortion = num_distortion_;
   return EvidencePoints(input.observations->camera, pixels, inliers, sigma_px, is_circle,
-                        options_.noise_model, options);
+                        pose_options_, num_distortion_);
 }
 
 void AdjustProblem::AddKnownRadius(int world, const CircleObservation& circle, double* radius) {

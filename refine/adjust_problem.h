@@ -54,6 +54,9 @@ struct CameraPrior {
   std::array<double, kCameraSize> mean{}, sigma{};  // 0 = held.
 };
 
+// How each photo's own pose is estimated.
+EstimationOptions PoseOptions(const AdjustOptions& options);
+
 class AdjustProblem {
  public:
   // `priors`: by camera. `given`: where the world lies in the frame of given poses; null: there are
@@ -157,6 +160,7 @@ class AdjustProblem {
 
   const std::vector<AdjustInput>& photos_;
   const AdjustOptions& options_;
+  const EstimationOptions pose_options_;
   int num_distortion_ = 0;
   std::deque<std::array<double, kCameraSize>> values_;  // One block each; their addresses stay.
   std::map<double*, Block> blocks_;

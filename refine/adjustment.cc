@@ -109,7 +109,7 @@ void Adjustment::SeeAnew() {
   ParallelFor(static_cast<int>(given_.size()), options_.num_threads, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     if (!inputs_[i].takes_part) return;
-    prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions());
+    prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions(options_));
     inputs_[i].pose = problem_->PoseAt(index);
     inputs_[i].layout = &layouts_[static_cast<std::size_t>(inputs_[i].world)];
   });

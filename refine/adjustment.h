@@ -48,7 +48,6 @@ class Adjustment {
   Status FindCameras();
   Status CheckGivenPoses();
   void SetAsideEqualViews();
-  EstimationOptions PoseOptions() const;
   void Estimate();
   void FindCamera(std::size_t camera);
   Status Start();

@@ -88,16 +88,6 @@ void Adjustment::SetAsideEqualViews() {
   }
 }
 
-EstimationOptions Adjustment::PoseOptions() const {
-  EstimationOptions pose;
-  pose.conic_loss = options_.conic_loss;
-  pose.line_loss = options_.line_loss;
-  pose.noise_model = options_.noise_model;
-  // In the pose's covariance only: the camera is not what the photo says of it.
-  pose.camera_sigma = CameraSigma::Exact();
-  return pose;
-}
-
 // Every photo through the cameras as they stand.
 void Adjustment::Estimate() {
   const int count = static_cast<int>(given_.size());
@@ -107,12 +97,12 @@ void Adjustment::Estimate() {
   ParallelFor(count, options_.num_threads, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     if (is_valid_[i]) {
-      prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions());
+      prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions(options_));
       inputs_[i].observations = &prepared_[i];
       if (start_ != nullptr) {
-        CoarsePose(prepared_[i], PoseOptions(), &estimates_[i]);
+        CoarsePose(prepared_[i], PoseOptions(options_), &estimates_[i]);
       } else {
-        estimates_[i] = EstimatePose(prepared_[i], PoseOptions());
+        estimates_[i] = EstimatePose(prepared_[i], PoseOptions(options_));
       }
     } else {
       estimates_[i].status = out_.photos[i].status;
@@ -136,7 +126,7 @@ void Adjustment::FindCamera(std::size_t c) {
     used.push_back(members[static_cast<std::size_t>(i)]);
   std::vector<const Observations*> pointers;
   for (const Observations& photo : used) pointers.push_back(&photo);
-  EstimationOptions pose = PoseOptions();
+  EstimationOptions pose = PoseOptions(options_);
   pose.conic_distance = ConicDistanceType::kSampson;  // Cheaper.
   CameraSweep sweep(pointers, guesses_[c], pose, options_.num_threads);
   const bool has_radial = ShiftSigmas(cameras_[c], priors_[c], options_)[4] > 0.0;

@@ -166,6 +166,31 @@ void ImagePoints::Reset(const Camera& camera, const std::vector<Eigen::Vector2d>
   for (const CalibratedPoint& q : points_) normalized_.push_back(Normalize(q));
 }
 
+void ImagePoints::RemoveCurvatureBias(const Eigen::Matrix3d& conic, double sigma_px) {
+  for (std::size_t i = 0; i < size(); ++i) {
+    CalibratedPoint& p = points_[i];
+    // The curve's foot of the point, by Newton's method along the gradient.
+    constexpr int kSteps = 2;
+    Eigen::Vector2d gradient;
+    Eigen::Vector3d foot = p.Homogeneous();
+    for (int step = 0; step < kSteps; ++step) {
+      gradient = 2.0 * (conic * foot).head<2>();
+      foot.head<2>() -= foot.dot(conic * foot) / gradient.squaredNorm() * gradient;
+    }
+    const Eigen::Vector2d on_photo = p.GradientPerPixel(2.0 * (conic * foot).head<2>()),
+                          normal = on_photo.normalized();
+    const Eigen::Vector2d along = NormGradient(p, {-normal.y(), normal.x()});
+    const double curvature = 2.0 * along.dot(conic.topLeftCorner<2, 2>() * along) / on_photo.norm();
+    // The expansion holds where the noise is below the radius of curvature.
+    const double bend = std::min(1.0, curvature * sigma_px);
+    const Eigen::Vector2d back = -0.5 * sigma_px * bend * normal;
+    if (!back.allFinite()) continue;
+    pixels_[i] += back;
+    p.x += NormGradient(p, back);
+    normalized_[i] = Normalize(p);
+  }
+}
+
 // Newton's method, from where a camera without a lens would move the undistorted point.
 CalibratedPoint ImagePoints::Undistorted(std::size_t i, const Camera& shifted) const {
   CalibratedPoint p = points_[i];
@@ -176,10 +201,7 @@ CalibratedPoint ImagePoints::Undistorted(std::size_t i, const Camera& shifted) c
     p.x_from_pixel = {1.0 / focal.x(), 0.0, 0.0, 1.0 / focal.y()};
     return p;
   }
-  const auto move = [&p](const Eigen::Vector2d& pixels) {
-    p.x += Eigen::Vector2d(p.x_from_pixel[0] * pixels.x() + p.x_from_pixel[1] * pixels.y(),
-                           p.x_from_pixel[2] * pixels.x() + p.x_from_pixel[3] * pixels.y());
-  };
+  const auto move = [&p](const Eigen::Vector2d& pixels) { p.x += NormGradient(p, pixels); };
   const Eigen::Vector2d given(camera_.fx, camera_.fy);
   move(given.cwiseProduct(straight) + Eigen::Vector2d(camera_.cx, camera_.cy) - pixels_[i]);
   constexpr int kMaxSteps = 20;
@@ -281,9 +303,7 @@ namespace {
 Eigen::Vector2d MoveInwards(const Eigen::Matrix3d& conic, double pixels, CalibratedPoint* p) {
   const Eigen::Vector2d inwards =
       -p->GradientPerPixel((conic * p->Homogeneous()).head<2>()).normalized();
-  const std::array<double, 4>& J = p->x_from_pixel;
-  p->x += pixels * Eigen::Vector2d(J[0] * inwards.x() + J[1] * inwards.y(),
-                                   J[2] * inwards.x() + J[3] * inwards.y());
+  p->x += pixels * NormGradient(*p, inwards);
   return inwards;
 }
 

@@ -74,6 +74,13 @@ class ImagePoints {
   void Reset(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
              const std::vector<std::uint8_t>& inliers, const Options& options);
 
+  // Moves them back to where they would lie on average without noise, along the normals of a fit
+  // (calibrated, negative inside). Points of an ellipse whose both coordinates have noise lie
+  // outside of it by kappa sigma^2 / 2, kappa the curvature: noise along the contour leads away
+  // from it. In one photo that is little against the noise; over many frames, which average the
+  // noise out, it tilts small and steep ellipses by up to a standard deviation.
+  void RemoveCurvatureBias(const Eigen::Matrix3d& conic, double sigma_px);
+
   std::size_t size() const { return points_.size(); }  // Of those that were not left out.
   const std::vector<CalibratedPoint>& points() const { return points_; }  // Undistorted.
   const std::vector<Eigen::Vector2d>& pixels() const { return pixels_; }  // Of the same points.

@@ -63,11 +63,8 @@ std::vector<int> JointProblemBuilder::WithCamera(std::vector<int> blocks) const 
 std::optional<ImagePoints> JointProblemBuilder::Points(const std::vector<Eigen::Vector2d>& pixels,
                                                        const std::vector<std::uint8_t>& inliers,
                                                        double sigma_px, bool is_circle) const {
-  ImagePoints::Options options;
-  options.loss = (is_circle ? p_.options_.conic_loss : p_.options_.line_loss).type;
-  options.distance = p_.options_.conic_distance;
-  options.num_distortion = p_.camera_sigma_.k1 > 0.0 ? 1 : 0;
-  return EvidencePoints(obs_.camera, pixels, inliers, sigma_px, is_circle, model_, options);
+  return EvidencePoints(obs_.camera, pixels, inliers, sigma_px, is_circle, p_.options_,
+                        p_.camera_sigma_.k1 > 0.0 ? 1 : 0);
 }
 
 void JointProblemBuilder::Build() {

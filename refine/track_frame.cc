@@ -11,7 +11,6 @@
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/refine/block_chain.h"
-#include "circline/refine/curvature_bias.h"
 #include "circline/refine/evidence_points.h"
 
 namespace circline {
@@ -25,13 +24,8 @@ Eigen::Matrix3d RotationBetween(const Eigen::Vector3d& from, const Eigen::Vector
   return ExpRotation(std::atan2(sine, from.dot(to)) * axis);
 }
 
-ImagePoints::Options PointOptions(const EstimationOptions& options, bool is_circle) {
-  ImagePoints::Options points;
-  points.loss = (is_circle ? options.conic_loss : options.line_loss).type;
-  points.distance = options.conic_distance;
-  const CameraSigma& sigma = options.camera_sigma.value_or(options.noise_model.camera);
-  points.num_distortion = sigma.k1 > 0.0 ? 1 : 0;
-  return points;
+int NumDistortion(const EstimationOptions& options) {
+  return options.camera_sigma.value_or(options.noise_model.camera).k1 > 0.0 ? 1 : 0;
 }
 
 }  // namespace
@@ -86,10 +80,10 @@ TrackFrame::Term& TrackFrame::AddTerm(Term::Kind kind, int layout) {
 void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle) {
   const CircleObservation& seen = observations_->circles[index];
   if (!seen.fit) return;
-  RemoveCurvatureBias(observations_->camera, seen.points, seen.fit->conic, seen.sigma_px, &pixels_);
-  if (!FillEvidencePoints(observations_->camera, pixels_, seen.inliers, seen.sigma_px, true,
-                          options_.noise_model, PointOptions(options_, true), &points_))
+  if (!FillEvidencePoints(observations_->camera, seen.points, seen.inliers, seen.sigma_px, true,
+                          options_, NumDistortion(options_), &points_))
     return;
+  points_.RemoveCurvatureBias(seen.fit->conic, seen.sigma_px);
   PlaneCircleContourCost::Blocks blocks;
   blocks.tilt_and_height = circle.tilt >= 0;
   // What the map knows of them is in its own Gaussian.
@@ -169,7 +163,7 @@ void TrackFrame::AddLine(const LineObservation& line, double sigma_px,
                          const TrackMap::Direction& direction, double deviation, int number) {
   if (!line.fit) return;
   if (!FillEvidencePoints(observations_->camera, line.points, line.inliers, sigma_px, false,
-                          options_.noise_model, PointOptions(options_, false), &points_))
+                          options_, NumDistortion(options_), &points_))
     return;
   DirectionLineCost::Options options;
   options.direction_sigma = deviation;

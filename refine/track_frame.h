@@ -116,7 +116,6 @@ class TrackFrame {
   TrackPrior prior_;                // Of the last solve.
   Scratch scratch_;
   ImagePoints points_;
-  std::vector<Eigen::Vector2d> pixels_;
   TrackFit begun_, with_;
   std::vector<std::uint8_t> used_;                   // By block.
   std::vector<double*> parameters_;                  // Of a residual.

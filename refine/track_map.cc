@@ -45,21 +45,20 @@ class MapBuilder {
     added.radius = SharedBlock(circle, &TrackMap::Circle::radius);
     if (added.center < 0) {
       added.center = map_.AddBlock(2, {}, is_first);
-      Append(added.center, [&](std::size_t i) {
-        return std::pair(Eigen::VectorXd(placed[i].head<2>()), Length(i, 2));
-      });
+      for (std::size_t i = 0; i < placed.size(); ++i)
+        states_[i].state.Append(map_, added.center, Eigen::VectorXd(placed[i].head<2>()),
+                                Length(i, 2));
     }
     if (added.radius < 0) {
       added.radius = map_.AddBlock(1, {}, is_first);
       const double stated = circle.radius_sigma > 0.0 ? circle.radius_sigma : noise_.radius;
       constexpr double kExact = 1e-6;  // Stands for a radius that is known exactly.
-      Append(added.radius, [&](std::size_t i) {
-        const bool known = map_.metric && circle.radius > 0.0;
+      const bool known = map_.metric && circle.radius > 0.0;
+      for (std::size_t i = 0; i < placed.size(); ++i) {
         const double radius = known ? circle.radius : placed[i].z();
-        const Eigen::VectorXd sigma =
-            known ? Eigen::VectorXd::Constant(1, radius * std::max(stated, kExact)) : Length(i, 1);
-        return std::pair(Eigen::VectorXd(Eigen::VectorXd::Constant(1, radius)), sigma);
-      });
+        states_[i].state.Append(map_, added.radius, One(radius),
+                                known ? One(radius * std::max(stated, kExact)) : Length(i, 1));
+      }
     }
     AddImperfections(circle, &added);
     map_.circles.push_back(std::move(added));
@@ -103,15 +102,12 @@ class MapBuilder {
                                      kUnknown * states_[i].state.Pose(map_).translation.norm());
   }
 
-  // `of(i)`: values and standard deviations for the i-th hypothesis.
-  template <typename Of>
-  void Append(int block, const Of& of) {
-    for (std::size_t i = 0; i < states_.size(); ++i) {
-      const auto [values, sigma] = of(i);
-      const Eigen::Index size = map_.block(block).tangent_size();
-      states_[i].state.Append(map_, block, values.data(),
-                              Eigen::MatrixXd(sigma.head(size).cwiseAbs2().asDiagonal()));
-    }
+  static Eigen::VectorXd One(double value) { return Eigen::VectorXd::Constant(1, value); }
+
+  // The same to all hypotheses, about zeros.
+  void Append(int block, const Eigen::VectorXd& sigmas) {
+    for (TrackFit& fit : states_)
+      fit.state.Append(map_, block, Eigen::VectorXd::Zero(sigmas.size()), sigmas);
   }
 
   // Of a circle of the map with the same centre, or the same radius; -1 where there is none.
@@ -137,10 +133,7 @@ class MapBuilder {
       added->tilt = map_.AddBlock(3);
       const double tilt = std::max(noise_.circle_tilt_rad, kExact),
                    height = std::max(noise_.circle_height, kExact);
-      Append(added->tilt, [&](std::size_t) {
-        return std::pair(Eigen::VectorXd(Eigen::Vector3d::Zero()),
-                         Eigen::VectorXd(Eigen::Vector3d(tilt, tilt, height)));
-      });
+      Append(added->tilt, Eigen::Vector3d(tilt, tilt, height));
     }
     if (!(noise_.contour_offset_px > 0.0)) return;
     added->contrast = std::clamp(circle.contrast, -1, 1);
@@ -149,10 +142,7 @@ class MapBuilder {
     }
     if (added->offset >= 0) return;
     added->offset = map_.AddBlock(1);
-    Append(added->offset, [&](std::size_t) {
-      return std::pair(Eigen::VectorXd(Eigen::VectorXd::Zero(1)),
-                       Eigen::VectorXd(Eigen::VectorXd::Constant(1, noise_.contour_offset_px)));
-    });
+    Append(added->offset, One(noise_.contour_offset_px));
   }
 
   const Observations& frame_;
@@ -171,19 +161,13 @@ TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const Tracke
   // A turn that nothing fixes is what the first frame's convention says.
   constexpr double kConvention = 1e-4;  // Radians.
   const Eigen::Vector3d turn(kUnknown, kUnknown, h.RotationIsFree() ? kConvention : kUnknown);
-  const auto diagonal = [&](int block, const Eigen::VectorXd& sigmas) {
-    const Eigen::Index size = map.block(block).tangent_size();
-    return Eigen::MatrixXd(sigmas.head(size).cwiseAbs2().asDiagonal());
-  };
-  const auto all = [](double value) { return Eigen::VectorXd(Eigen::Vector3d::Constant(value)); };
+  const auto all = [](double value) { return Eigen::VectorXd::Constant(3, value).eval(); };
   const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(kCameraSize);
-  state.Append(map, TrackMap::kRotation, q.coeffs().data(), diagonal(TrackMap::kRotation, turn));
-  state.Append(map, TrackMap::kTranslation, h.cam_from_world.translation.data(),
-               diagonal(TrackMap::kTranslation, all(kUnknown * distance)));
-  state.Append(map, TrackMap::kTurnRate, zeros.data(),
-               diagonal(TrackMap::kTurnRate, all(options.initial_turn_rate_sigma)));
-  state.Append(map, TrackMap::kVelocity, zeros.data(),
-               diagonal(TrackMap::kVelocity, all(options.initial_velocity_sigma * distance)));
+  state.Append(map, TrackMap::kRotation, Eigen::VectorXd(q.coeffs()), Eigen::VectorXd(turn));
+  state.Append(map, TrackMap::kTranslation, Eigen::VectorXd(h.cam_from_world.translation),
+               all(kUnknown * distance));
+  state.Append(map, TrackMap::kTurnRate, zeros, all(options.initial_turn_rate_sigma));
+  state.Append(map, TrackMap::kVelocity, zeros, all(options.initial_velocity_sigma * distance));
   Eigen::VectorXd camera = zeros;
   camera.head<5>() << sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
       sigma.principal_point_px, sigma.k1;

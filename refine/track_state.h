@@ -78,7 +78,9 @@ struct TrackState {
   CameraPose Pose(const TrackMap& map) const;
   void SetPose(const TrackMap& map, const CameraPose& pose);
   bool IsInRange() const;  // Squares of all numbers, and their sums, are finite.
-  // Takes in a block that has been added to the map.
+  // Takes in a block that has been added to the map, its numbers independent or not.
+  void Append(const TrackMap& map, int block, const Eigen::VectorXd& values,
+              const Eigen::VectorXd& sigmas);
   void Append(const TrackMap& map, int block, const double* values,
               const Eigen::MatrixXd& block_covariance);
 };
