@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "circline/estimators/line_pose.h"
 
@@ -45,47 +46,58 @@ void AddAngularError(double sigma_rad, const Eigen::Matrix3d& shape, Measured* m
   m->columns.rightCols<2>() = sigma_rad * v.norm() * across * SquareRoot(C);
 }
 
-// All inputs after the change of calibrated coordinates x' = A x.
-void ChangeCoordinates(const Eigen::Matrix3d& A, Inputs* inputs) {
-  const Eigen::Matrix3d inverse = A.inverse();
-  const auto conic = [&](Measured* m) {
-    if (m->present()) {
-      m->value = ConicToVector(TransformConic(VectorToConic(Vector6d(m->value)), inverse));
-    }
-  };
-  conic(&inputs->conic);
-  for (Measured& more : inputs->more_conics) conic(&more);
-  for (Measured* m :
-       {&inputs->center, &inputs->origin, &inputs->directions[0], &inputs->directions[1]}) {
-    if (m->present()) m->value = (A * m->value).eval();
+// After the change of calibrated coordinates x' = A x.
+void ChangeCoordinates(const Eigen::Matrix3d& A, const MovedInput& input) {
+  Eigen::Map<Eigen::Vector3d> vector(input.value);
+  Eigen::Map<Vector6d> conic(input.value);
+  switch (input.kind) {
+    case InputKind::kPoint:
+      vector = (A * vector).eval();
+      return;
+    case InputKind::kLine:
+      vector = (A.inverse().transpose() * vector).eval();
+      return;
+    case InputKind::kConic:
+      conic = ConicToVector(TransformConic(VectorToConic(conic), A.inverse()));
+      return;
+    case InputKind::kNumber:
+      return;
   }
-  for (Measured* m : {&inputs->x_line, &inputs->y_line, &inputs->line}) {
-    if (m->present()) m->value = (inverse.transpose() * m->value).eval();
-  }
-  for (auto* pair : {&inputs->x_sense, &inputs->y_sense, &inputs->length_points}) {
-    if (!*pair) continue;
-    for (Eigen::Vector3d& ray : **pair) ray = (A * ray).eval();
-  }
-  inputs->rough = (A * inputs->rough).eval();
 }
 
-void Grow(double by, Measured* conic) {
-  conic->value = ConicToVector(GrownEllipse(VectorToConic(Vector6d(conic->value)), by));
-}
+// A change of calibrated coordinates, x' = A x, by `part` of a standard deviation.
+using CoordinateChange = std::function<Eigen::Matrix3d(double part)>;
 
-void AddOffsets(double sigma_px, const Camera& camera, const Inputs& inputs,
-                std::vector<Perturbation>* all) {
-  const double sigma = sigma_px / std::sqrt(camera.fx * camera.fy);
-  for (const int contrast : {-1, 0, 1}) {
-    const std::vector<int>& of = inputs.contrasts;
-    if (sigma == 0.0 || std::find(of.begin(), of.end(), contrast) == of.end()) continue;
-    all->push_back([=](double part, Inputs* in) {
-      if (in->contrasts[0] == contrast) Grow(part * sigma, &in->conic);
-      for (std::size_t i = 0; i < in->more_conics.size(); ++i) {
-        if (in->contrasts[i + 1] == contrast) Grow(part * sigma, &in->more_conics[i]);
-      }
+// What the errors of focal length, aspect and principal point do.
+std::vector<CoordinateChange> CameraErrors(const CameraSigma& sigma, const Camera& camera) {
+  std::vector<CoordinateChange> all;
+  const auto add = [&all](double deviation, double x_scale, double y_scale, double x, double y) {
+    if (deviation == 0.0) return;
+    all.push_back([=](double part) {
+      const double s = part * deviation;
+      Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
+      A(0, 0) = std::exp(s * x_scale);
+      A(1, 1) = std::exp(s * y_scale);
+      A(0, 2) = s * x;
+      A(1, 2) = s * y;
+      return A;
     });
-  }
+  };
+  add(sigma.log_focal, 1.0, 1.0, 0.0, 0.0);
+  add(sigma.log_aspect, 0.0, 1.0, 0.0, 0.0);
+  add(sigma.principal_point_px, 0.0, 0.0, 1.0 / camera.fx, 0.0);
+  add(sigma.principal_point_px, 0.0, 0.0, 0.0, 1.0 / camera.fy);
+  return all;
+}
+
+// Both semi-axes longer by so much: of the curve at a distance from an ellipse, the ellipse nearest
+// to it. The same conic where that is none.
+Eigen::Matrix3d GrownEllipse(const Eigen::Matrix3d& conic, double by) {
+  Ellipse ellipse;
+  if (!ConicToEllipse(conic, &ellipse) || !(ellipse.b + by > 0.0)) return conic;
+  ellipse.a += by;
+  ellipse.b += by;
+  return EllipseToConic(ellipse);
 }
 
 // Of one candidate or more.
@@ -147,59 +159,37 @@ void AddModelErrors(const NoiseModel& noise, Inputs* inputs) {
   if (inputs->length_sigma == 0.0) inputs->length_sigma = noise.length;
 }
 
-std::vector<Perturbation> Perturbations(const Inputs& inputs, const NoiseModel& noise,
-                                        const Camera& camera) {
+std::vector<Perturbation> Perturbations(const std::vector<MovedInput>& inputs,
+                                        const NoiseModel& noise, const Camera& camera) {
   std::vector<Perturbation> all;
-  Inputs copy = inputs;
-  const std::vector<Measured*> measured = copy.All();
-  for (std::size_t i = 0; i < measured.size(); ++i) {
-    for (Eigen::Index k = 0; k < measured[i]->columns.cols(); ++k) {
-      if (measured[i]->columns.col(k).isZero(0.0)) continue;
-      all.push_back([i, k](double part, Inputs* in) {
-        Measured* m = in->All()[i];
-        m->value += part * m->columns.col(k);
+  std::set<int> contrasts;
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    for (Eigen::Index k = 0; k < inputs[i].columns.cols(); ++k) {
+      const Eigen::VectorXd column = inputs[i].columns.col(k);
+      if (column.isZero(0.0)) continue;
+      all.push_back([i, column](double part, const std::vector<MovedInput>& moved) {
+        Eigen::Map<Eigen::VectorXd>(moved[i].value, column.size()) += part * column;
       });
     }
+    if (inputs[i].kind == InputKind::kConic) contrasts.insert(inputs[i].contrast);
   }
-  if (inputs.line.present() && inputs.angle_sigma > 0.0)
-    all.push_back([](double part, Inputs* in) { in->angle += part * in->angle_sigma; });
-  if (inputs.radius > 0.0 && inputs.radius_sigma > 0.0)
-    all.push_back([](double part, Inputs* in) { in->radius *= 1.0 + part * in->radius_sigma; });
-  if (inputs.length > 0.0 && inputs.length_sigma > 0.0)
-    all.push_back([](double part, Inputs* in) { in->length *= 1.0 + part * in->length_sigma; });
-  for (const CoordinateChange& change : CameraErrors(noise.SigmaOf(camera), camera))
-    all.push_back([change](double part, Inputs* in) { ChangeCoordinates(change(part), in); });
-  AddOffsets(noise.contour_offset_px, camera, inputs, &all);
-  return all;
-}
-
-std::vector<CoordinateChange> CameraErrors(const CameraSigma& sigma, const Camera& camera) {
-  std::vector<CoordinateChange> all;
-  const auto add = [&all](double deviation, double x_scale, double y_scale, double x, double y) {
-    if (deviation == 0.0) return;
-    all.push_back([=](double part) {
-      const double s = part * deviation;
-      Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
-      A(0, 0) = std::exp(s * x_scale);
-      A(1, 1) = std::exp(s * y_scale);
-      A(0, 2) = s * x;
-      A(1, 2) = s * y;
-      return A;
+  for (const CoordinateChange& change : CameraErrors(noise.SigmaOf(camera), camera)) {
+    all.push_back([change](double part, const std::vector<MovedInput>& moved) {
+      for (const MovedInput& input : moved) ChangeCoordinates(change(part), input);
     });
-  };
-  add(sigma.log_focal, 1.0, 1.0, 0.0, 0.0);
-  add(sigma.log_aspect, 0.0, 1.0, 0.0, 0.0);
-  add(sigma.principal_point_px, 0.0, 0.0, 1.0 / camera.fx, 0.0);
-  add(sigma.principal_point_px, 0.0, 0.0, 0.0, 1.0 / camera.fy);
+  }
+  const double offset = noise.contour_offset_px / std::sqrt(camera.fx * camera.fy);
+  for (const int contrast : contrasts) {
+    if (offset == 0.0) continue;
+    all.push_back([=](double part, const std::vector<MovedInput>& moved) {
+      for (const MovedInput& input : moved) {
+        if (input.kind != InputKind::kConic || input.contrast != contrast) continue;
+        Eigen::Map<Vector6d> conic(input.value);
+        conic = ConicToVector(GrownEllipse(VectorToConic(conic), part * offset));
+      }
+    });
+  }
   return all;
-}
-
-Eigen::Matrix3d GrownEllipse(const Eigen::Matrix3d& conic, double by) {
-  Ellipse ellipse;
-  if (!ConicToEllipse(conic, &ellipse) || !(ellipse.b + by > 0.0)) return conic;
-  ellipse.a += by;
-  ellipse.b += by;
-  return EllipseToConic(ellipse);
 }
 
 std::vector<Eigen::MatrixXd> Sensitivities(const PerturbedCandidates& perturbed,

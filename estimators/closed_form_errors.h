@@ -13,7 +13,7 @@
 namespace circline {
 
 // One independent error: moves the inputs by `part` of its standard deviation.
-using Perturbation = std::function<void(double part, Inputs* inputs)>;
+using Perturbation = std::function<void(double part, const std::vector<MovedInput>& inputs)>;
 
 // Adds what of the noise model is private to one input: a pencil against its axis, a circle against
 // its plane, a radius or length that states no sigma.
@@ -22,17 +22,8 @@ void AddModelErrors(const NoiseModel& noise, Inputs* inputs);
 // The errors of the inputs, and those that the noise model has for all of them at once: the
 // camera's, by the affine change of calibrated coordinates (k1 has none), and the offsets of
 // contours.
-std::vector<Perturbation> Perturbations(const Inputs& inputs, const NoiseModel& noise,
-                                        const Camera& camera);
-
-// A change of calibrated coordinates, x' = A x, by `part` of a standard deviation.
-using CoordinateChange = std::function<Eigen::Matrix3d(double part)>;
-// What the errors of focal length, aspect and principal point do.
-std::vector<CoordinateChange> CameraErrors(const CameraSigma& sigma, const Camera& camera);
-
-// Both semi-axes longer by so much: of the curve at a distance from an ellipse, the ellipse nearest
-// to it. The same conic where that is none.
-Eigen::Matrix3d GrownEllipse(const Eigen::Matrix3d& conic, double by);
+std::vector<Perturbation> Perturbations(const std::vector<MovedInput>& inputs,
+                                        const NoiseModel& noise, const Camera& camera);
 
 // All candidates with one error, by its index, at `part` of its standard deviation.
 using PerturbedCandidates = std::function<std::vector<Candidate>(std::size_t error, double part)>;

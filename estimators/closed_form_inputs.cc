@@ -229,11 +229,32 @@ Measured::Measured(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covarianc
   columns = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
-std::vector<Measured*> Inputs::All() {
-  std::vector<Measured*> all = {&conic,         &center,        &x_line, &y_line,
-                                &directions[0], &directions[1], &line,   &origin};
-  for (Measured& more : more_conics) all.push_back(&more);
-  for (Measured& tilt : tilts) all.push_back(&tilt);
+std::vector<MovedInput> Inputs::Moved() {
+  std::vector<MovedInput> all;
+  const auto add = [&all](InputKind kind, Measured* m, int contrast = 0) {
+    if (m->present()) all.push_back({kind, m->value.data(), m->columns, contrast});
+  };
+  const auto add_number = [&all](double* value, double sigma) {
+    all.push_back({InputKind::kNumber, value, Eigen::MatrixXd::Constant(1, 1, sigma)});
+  };
+  add(InputKind::kConic, &conic, contrasts.empty() ? 0 : contrasts[0]);
+  add(InputKind::kPoint, &center);
+  add(InputKind::kLine, &x_line);
+  add(InputKind::kLine, &y_line);
+  for (Measured& direction : directions) add(InputKind::kPoint, &direction);
+  add(InputKind::kLine, &line);
+  add(InputKind::kPoint, &origin);
+  for (std::size_t i = 0; i < more_conics.size(); ++i)
+    add(InputKind::kConic, &more_conics[i], contrasts[i + 1]);
+  for (Measured& tilt : tilts) add(InputKind::kNumber, &tilt);
+  if (line.present()) add_number(&angle, angle_sigma);
+  add_number(&radius, radius * radius_sigma);
+  add_number(&length, length * length_sigma);
+  for (auto* pair : {&x_sense, &y_sense, &length_points}) {
+    if (!*pair) continue;
+    for (Eigen::Vector3d& ray : **pair) all.push_back({InputKind::kPoint, ray.data(), {}});
+  }
+  all.push_back({InputKind::kPoint, rough.data(), {}});
   return all;
 }
 

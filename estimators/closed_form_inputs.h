@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/error_propagation.h"
 #include "circline/estimators/observations.h"
 
 namespace circline {
@@ -21,6 +22,14 @@ struct Measured {
   Measured() = default;
   Measured(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance);
   bool present() const { return value.size() > 0; }
+};
+
+// Numbers that errors move, in place: of one input, or such as follow the camera alone.
+struct MovedInput {
+  InputKind kind;
+  double* value;
+  Eigen::MatrixXd columns;  // As Measured has them; none: exact.
+  int contrast = 0;         // Of a conic: CircleObservation::contrast.
 };
 
 using RayPair = std::array<Eigen::Vector3d, 2>;
@@ -55,8 +64,8 @@ struct Inputs {
   std::optional<RayPair> length_points;     // Metric scale from two points ...
   double length = 0.0, length_sigma = 0.0;  // ... of the plane, or 0; relative.
 
-  // Every perturbable input.
-  std::vector<Measured*> All();
+  // All of them.
+  std::vector<MovedInput> Moved();
   bool IsMetric() const { return (conic.present() && radius > 0.0) || length > 0.0; }
 };
 

@@ -1,11 +1,10 @@
-#include "circline/estimators/closed_form_poses.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 
 #include "circline/estimators/circular_points.h"
+#include "circline/estimators/closed_form_recipes.h"
 #include "circline/estimators/line_pose.h"
 
 namespace circline {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -14,7 +13,6 @@ namespace circline {
 namespace {
 
 using MeasuredInputs = std::vector<MeasuredInput>;
-using Error = std::function<void(double part, MeasuredInputs* inputs)>;
 
 bool AreFinite(const std::vector<double>& numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
@@ -64,62 +62,24 @@ MeasuredInput Input(InputKind kind, const Vector& value, const Matrix& covarianc
   return input;
 }
 
-Measured WithColumns(const MeasuredInput& input) {
-  const auto size = static_cast<Eigen::Index>(input.value.size());
-  return Measured(Eigen::Map<const Eigen::VectorXd>(input.value.data(), size),
-                  Eigen::Map<const Eigen::MatrixXd>(input.covariance.data(), size, size));
+std::vector<MovedInput> MovedOf(MeasuredInputs* inputs) {
+  std::vector<MovedInput> moved;
+  for (MeasuredInput& input : *inputs)
+    moved.push_back({input.kind, input.value.data(), {}, input.contrast});
+  return moved;
 }
 
-void SetValue(const Eigen::VectorXd& value, MeasuredInput* input) {
-  input->value.assign(value.data(), value.data() + value.size());
-}
-
-// After the change of calibrated coordinates x' = A x.
-void ChangeCoordinates(const Eigen::Matrix3d& A, MeasuredInput* input) {
-  switch (input->kind) {
-    case InputKind::kPoint:
-      return SetValue(A * input->AsVector(), input);
-    case InputKind::kLine:
-      return SetValue(A.inverse().transpose() * input->AsVector(), input);
-    case InputKind::kConic:
-      return SetValue(ConicToVector(TransformConic(input->AsConic(), A.inverse())), input);
-    case InputKind::kNumber:
-      return;
-  }
-}
-
-std::vector<Error> ErrorsOf(const MeasuredInputs& inputs, const Camera& camera,
-                            const NoiseModel& noise) {
-  std::vector<Error> errors;
-  std::set<int> contrasts;
+std::vector<Perturbation> ErrorsOf(MeasuredInputs inputs, const Camera& camera,
+                                   const NoiseModel& noise) {
+  std::vector<MovedInput> moved = MovedOf(&inputs);
   for (std::size_t i = 0; i < inputs.size(); ++i) {
-    const Measured measured = WithColumns(inputs[i]);
-    for (Eigen::Index k = 0; k < measured.columns.cols(); ++k) {
-      const Eigen::VectorXd column = measured.columns.col(k);
-      if (column.isZero(0.0)) continue;
-      errors.push_back([i, column](double part, MeasuredInputs* moved) {
-        MeasuredInput& input = (*moved)[i];
-        Eigen::Map<Eigen::VectorXd>(input.value.data(), column.size()) += part * column;
-      });
-    }
-    if (inputs[i].kind == InputKind::kConic) contrasts.insert(inputs[i].contrast);
+    const auto size = static_cast<Eigen::Index>(inputs[i].value.size());
+    moved[i].columns =
+        Measured(Eigen::Map<const Eigen::VectorXd>(inputs[i].value.data(), size),
+                 Eigen::Map<const Eigen::MatrixXd>(inputs[i].covariance.data(), size, size))
+            .columns;
   }
-  for (const CoordinateChange& change : CameraErrors(noise.SigmaOf(camera), camera)) {
-    errors.push_back([change](double part, MeasuredInputs* moved) {
-      for (MeasuredInput& input : *moved) ChangeCoordinates(change(part), &input);
-    });
-  }
-  const double offset = noise.contour_offset_px / std::sqrt(camera.fx * camera.fy);
-  for (const int contrast : contrasts) {
-    if (offset == 0.0) continue;
-    errors.push_back([=](double part, MeasuredInputs* moved) {
-      for (MeasuredInput& input : *moved) {
-        if (input.kind != InputKind::kConic || input.contrast != contrast) continue;
-        SetValue(ConicToVector(GrownEllipse(input.AsConic(), part * offset)), &input);
-      }
-    });
-  }
-  return errors;
+  return Perturbations(moved, noise, camera);
 }
 
 Candidate ToCandidate(const ClosedFormPose& pose) {
@@ -190,13 +150,13 @@ Status PropagateErrors(const ClosedForm& closed_form, const std::vector<Measured
   if (status.ok()) status = camera.Validate();
   if (status.ok()) status = noise_model.Validate();
   if (!status.ok()) return status;
-  const std::vector<Error> errors = ErrorsOf(inputs, camera, noise_model);
+  const std::vector<Perturbation> errors = ErrorsOf(inputs, camera, noise_model);
   CheckedClosedForm checked(closed_form);
   const std::vector<Candidate> candidates = checked(inputs);
   const std::vector<Eigen::MatrixXd> sensitivities = Sensitivities(
       [&](std::size_t error, double part) {
         MeasuredInputs moved = inputs;
-        errors[error](part, &moved);
+        errors[error](part, MovedOf(&moved));
         return checked(moved);
       },
       errors.size(), candidates);

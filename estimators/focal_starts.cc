@@ -33,11 +33,7 @@ void AddErrorOfGuess(const Observations& observations, double sigma_px, const No
     const double factor = std::exp(side == 0 ? kStep : -kStep);
     refitted.camera.fx *= factor;
     refitted.camera.fy *= factor;
-    for (CircleObservation& circle : refitted.circles) circle.fit.reset();
-    for (PencilObservation& pencil : refitted.pencils) {
-      pencil.fit.reset();
-      for (LineObservation& line : pencil.lines) line.fit.reset();
-    }
+    ResetFits(&refitted);
     FitDirect(sigma_px, &refitted, nullptr, noise);
     moved[side] = FocalStartsOfFits(refitted, sigma_px, noise, nullptr);
   }

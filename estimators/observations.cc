@@ -329,6 +329,14 @@ int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& p
   return dropped;
 }
 
+void ResetFits(Observations* observations) {
+  for (CircleObservation& circle : observations->circles) circle.fit.reset();
+  for (PencilObservation& pencil : observations->pencils) {
+    pencil.fit.reset();
+    for (LineObservation& line : pencil.lines) line.fit.reset();
+  }
+}
+
 void FitDirect(double default_sigma_px, Observations* observations,
                std::vector<std::string>* problems, const NoiseModel& noise, FitMemory* memory) {
   const auto report = [problems](const char* kind, const std::string& id, int line,

@@ -170,6 +170,9 @@ int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& p
                      const std::vector<std::uint8_t>& inliers,
                      std::vector<CalibratedPoint>* points);
 
+// Takes all fits away.
+void ResetFits(Observations* observations);
+
 // What FitDirect needs in between, for callers that keep it from photo to photo.
 struct FitMemory {
   std::vector<CalibratedPoint> points;  // Of one feature.

@@ -148,6 +148,22 @@ PointNoise MeasurePointNoise(const Observations& fitted, const NoiseModel& model
   return noise;
 }
 
+void StateNoise(const PointNoise& noise, double conic_px, double line_px,
+                Observations* observations) {
+  for (std::size_t i = 0; i < observations->circles.size(); ++i) {
+    double& sigma = observations->circles[i].sigma_px;
+    if (!(sigma > 0.0)) sigma = conic_px > 0.0 ? conic_px : noise.circles[i];
+  }
+  for (std::size_t i = 0; i < observations->pencils.size(); ++i) {
+    PencilObservation& pencil = observations->pencils[i];
+    for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
+      double& sigma = pencil.lines[j].sigma_px;
+      sigma = LineSigma(pencil, pencil.lines[j]);
+      if (!(sigma > 0.0)) sigma = line_px > 0.0 ? line_px : noise.lines[i][j];
+    }
+  }
+}
+
 void PointNoiseMeter::Measure(const Observations& fitted, const NoiseModel& model,
                               PointNoise* noise, double conic_default_px, double line_default_px) {
   fitted_ = &fitted;

@@ -45,6 +45,11 @@ PointNoise MeasurePointNoise(const Observations& fitted,
                              double conic_default_px = kConicDefaultPx,
                              double line_default_px = kLineDefaultPx);
 
+// Makes it what the features state that state no noise of their own; of a kind with a figure of its
+// own, `conic_px` or `line_px`, that.
+void StateNoise(const PointNoise& noise, double conic_px, double line_px,
+                Observations* observations);
+
 // The same for one photo after the other, in memory that it keeps.
 class PointNoiseMeter {
  public:

@@ -3,15 +3,15 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <numeric>
 
 #include "circline/refine/adjust_problem.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/inverse_on_pattern.h"
+#include "circline/refine/joint_problem.h"
 #include "circline/refine/nearby_solve.h"
 
 namespace circline {
-
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 AdjustProblem::Covariances AdjustProblem::OfPriors() const {
   Covariances out;
@@ -39,19 +39,12 @@ Matrix6d AdjustProblem::PoseCovariance(int photo, const InverseOnPattern& invers
   if (translation != offsets.end()) {
     const ceres::Manifold* manifold = blocks_.at(translations_[i]).manifold;
     const int size = manifold != nullptr ? manifold->TangentSize() : 3;
-    RowMajor plus = RowMajor::Identity(3, size);
-    if (manifold != nullptr) manifold->PlusJacobian(translations_[i], plus.data());
-    slopes.block(3, static_cast<int>(columns.size()), 3, size) = plus;
+    slopes.block(3, static_cast<int>(columns.size()), 3, size) =
+        circline::Block{0, 3, manifold}.PlusJacobian(translations_[i]);
     for (int k = 0; k < size; ++k) columns.push_back(translation->second + k);
   }
-  const int count = static_cast<int>(columns.size());
-  Eigen::MatrixXd tangents(count, count);
-  for (int a = 0; a < count; ++a) {
-    for (int b = 0; b < count; ++b)
-      tangents(a, b) =
-          inverse(columns[static_cast<std::size_t>(a)], columns[static_cast<std::size_t>(b)]);
-  }
-  return slopes.leftCols(count) * tangents * slopes.leftCols(count).transpose();
+  const auto by = slopes.leftCols(static_cast<Eigen::Index>(columns.size()));
+  return by * inverse(columns) * by.transpose();
 }
 
 AdjustProblem::Covariances AdjustProblem::Covariance(int end) const {
@@ -89,14 +82,11 @@ AdjustProblem::Covariances AdjustProblem::Covariance(int end) const {
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const auto own = offsets.find(cameras_[c]);
     if (own == offsets.end()) continue;
-    const int count = problem.ParameterBlockTangentSize(cameras_[c]);
-    Eigen::MatrixXd small(count, count);
-    for (int a = 0; a < count; ++a) {
-      for (int b = 0; b < count; ++b) small(a, b) = inverse(own->second + a, own->second + b);
-    }
-    RowMajor plus(int{kCameraSize}, count);
-    all_free_[c]->PlusJacobian(cameras_[c], plus.data());
-    out.cameras[c] = plus * small * plus.transpose();
+    std::vector<int> columns(
+        static_cast<std::size_t>(problem.ParameterBlockTangentSize(cameras_[c])));
+    std::iota(columns.begin(), columns.end(), own->second);
+    const BlockMatrix plus = PlusJacobianOf(*all_free_[c], cameras_[c]);
+    out.cameras[c] = plus * inverse(columns) * plus.transpose();
   }
   if (!given_.empty()) {
     const int at = offsets.at(given_[2]);

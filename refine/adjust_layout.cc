@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "circline/refine/layout_alignment.h"
+#include "circline/refine/statistics.h"
 
 namespace circline {
 
@@ -64,11 +64,7 @@ class Aligner {
 
   SharedLayout Run() {
     while (const Candidate* next = Next()) Place(*next);
-    if (!misfits_.empty()) {
-      const auto middle = misfits_.begin() + static_cast<std::ptrdiff_t>(misfits_.size() / 2);
-      std::nth_element(misfits_.begin(), middle, misfits_.end());
-      out_.misfit = *middle;
-    }
+    out_.misfit = Median(std::move(misfits_));
     return std::move(out_);
   }
 

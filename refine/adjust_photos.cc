@@ -20,11 +20,7 @@ bool RigidWorldFromName(const std::string& name, RigidWorld* rigid) {
 }
 
 Status AdjustOptions::Validate() const {
-  EstimationOptions same;
-  same.conic_loss = conic_loss;
-  same.line_loss = line_loss;
-  same.noise_model = noise_model;
-  Status status = same.Validate();
+  Status status = PoseOptions(*this).Validate();
   for (const auto& [id, sigma] : camera_sigma) {
     if (status.ok()) status = sigma.Validate();
   }

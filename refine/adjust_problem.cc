@@ -15,10 +15,20 @@
 
 namespace circline {
 
+EstimationOptions PoseOptions(const AdjustOptions& options) {
+  EstimationOptions pose;
+  pose.conic_loss = options.conic_loss;
+  pose.line_loss = options.line_loss;
+  pose.noise_model = options.noise_model;
+  // In the pose's covariance only: the camera is not what the photo says of it.
+  pose.camera_sigma = CameraSigma::Exact();
+  return pose;
+}
+
 AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
                              const std::vector<CameraPrior>& priors, const AdjustOptions& options,
                              const GivenFrame* given)
-    : photos_(photos), options_(options) {
+    : photos_(photos), options_(options), pose_options_(PoseOptions(options)) {
   for (const CameraPrior& prior : priors) {
     for (int k = 4; k < kCameraSize; ++k) {
       if (prior.sigma[static_cast<std::size_t>(k)] > 0.0)
@@ -103,11 +113,8 @@ void AdjustProblem::AddPhoto(int photo) {
   rotations_[i] = NewBlock(4, {q.x(), q.y(), q.z(), q.w()}, NewManifold<WorldRotationManifold>(3));
   translations_[i] = NewBlock(3, {t.x(), t.y(), t.z()});
   const Observations& obs = *input.observations;
-  for (std::size_t k = 0; k < obs.circles.size(); ++k) {
-    const CircleObservation& circle = obs.circles[k];
-    if (!circle.fit || circle.plane != obs.frame.plane) continue;
-    const double stated = circle.sigma_px > 0.0 ? circle.sigma_px : options_.conic_loss.scale_px;
-    AddCircle(photo, circle, stated > 0.0 ? stated : input.noise.circles[k]);
+  for (const CircleObservation& circle : obs.circles) {
+    if (circle.fit && circle.plane == obs.frame.plane) AddCircle(photo, circle);
   }
   for (std::size_t k = 0; k < obs.pencils.size(); ++k) AddPencil(photo, k);
 }
@@ -145,11 +152,8 @@ std::optional<ImagePoints> AdjustProblem::Points(const AdjustInput& input,
                                                  const std::vector<Eigen::Vector2d>& pixels,
                                                  const std::vector<std::uint8_t>& inliers,
                                                  double sigma_px, bool is_circle) const {
-  ImagePoints::Options options;
-  options.loss = (is_circle ? options_.conic_loss : options_.line_loss).type;
-  options.num_distortion = num_distortion_;
   return EvidencePoints(input.observations->camera, pixels, inliers, sigma_px, is_circle,
-                        options_.noise_model, options);
+                        pose_options_, num_distortion_);
 }
 
 void AdjustProblem::AddKnownRadius(int world, const CircleObservation& circle, double* radius) {
@@ -204,10 +208,11 @@ double* AdjustProblem::OffsetOf(int photo, const CircleObservation& circle) {
   return offset;
 }
 
-void AdjustProblem::AddCircle(int photo, const CircleObservation& circle, double sigma_px) {
+void AdjustProblem::AddCircle(int photo, const CircleObservation& circle) {
   const auto i = static_cast<std::size_t>(photo);
   const AdjustInput& input = photos_[i];
-  std::optional<ImagePoints> points = Points(input, circle.points, circle.inliers, sigma_px, true);
+  std::optional<ImagePoints> points =
+      Points(input, circle.points, circle.inliers, circle.sigma_px, true);
   const Circle* made = points ? CircleOf(photo, circle) : nullptr;
   if (made == nullptr) return;
   const NoiseModel& model = options_.noise_model;
@@ -227,8 +232,8 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle, double
              blocks);
   if (!circle.center) return;
   AddFeature(photo, circle.id + ".center",
-             std::make_unique<PlanePointCost>(input.observations->camera, *circle.center, sigma_px,
-                                              options_.conic_loss.type, true),
+             std::make_unique<PlanePointCost>(input.observations->camera, *circle.center,
+                                              circle.sigma_px, options_.conic_loss.type, true),
              {rotations_[i], translations_[i], made->center, blocks.back()});
 }
 
@@ -272,11 +277,8 @@ void AdjustProblem::AddPencil(int photo, std::size_t index) {
   for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
     const LineObservation& line = pencil.lines[j];
     if (!line.fit) continue;
-    const double own = LineSigma(pencil, line);
-    const double stated = own > 0.0 ? own : options_.line_loss.scale_px;
     std::optional<ImagePoints> points =
-        Points(input, line.points, line.inliers,
-               stated > 0.0 ? stated : input.noise.lines[index][j], false);
+        Points(input, line.points, line.inliers, LineSigma(pencil, line), false);
     if (!points) continue;
     DirectionLineCost::Options options;
     options.direction_sigma = options_.noise_model.line_direction_rad;

@@ -20,7 +20,6 @@
 #include <vector>
 
 #include "circline/estimators/observations.h"
-#include "circline/estimators/point_noise.h"
 #include "circline/estimators/pose.h"
 #include "circline/refine/adjust_layout.h"
 #include "circline/refine/adjust_photos.h"
@@ -32,8 +31,7 @@ class InverseOnPattern;
 
 // A photo as the problem takes it. All outlive the problem.
 struct AdjustInput {
-  const Observations* observations = nullptr;  // Fitted and resolved, through the camera at start.
-  PointNoise noise;
+  const Observations* observations = nullptr;  // As of Prepare, through the camera at start.
   int camera = 0;
   int world = 0;                   // Photos of one world share circles and pencils of one id.
   CameraPose pose;                 // To start from, of that world.
@@ -55,6 +53,9 @@ struct AdjustInput {
 struct CameraPrior {
   std::array<double, kCameraSize> mean{}, sigma{};  // 0 = held.
 };
+
+// How each photo's own pose is estimated.
+EstimationOptions PoseOptions(const AdjustOptions& options);
 
 class AdjustProblem {
  public:
@@ -135,7 +136,7 @@ class AdjustProblem {
   void AddPhoto(int photo);
   void SetGauge();
   void AddGivenPoses(const GivenFrame& given);
-  void AddCircle(int photo, const CircleObservation& circle, double sigma_px);
+  void AddCircle(int photo, const CircleObservation& circle);
   Circle* CircleOf(int photo, const CircleObservation& circle);
   void AddKnownRadius(int world, const CircleObservation& circle, double* radius);
   double* OffsetOf(int photo, const CircleObservation& circle);
@@ -159,6 +160,7 @@ class AdjustProblem {
 
   const std::vector<AdjustInput>& photos_;
   const AdjustOptions& options_;
+  const EstimationOptions pose_options_;
   int num_distortion_ = 0;
   std::deque<std::array<double, kCameraSize>> values_;  // One block each; their addresses stay.
   std::map<double*, Block> blocks_;

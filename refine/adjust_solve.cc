@@ -73,22 +73,10 @@ Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
 }
 
 double AdjustProblem::LargestMiss() const {
-  constexpr double kNoLoss = 1e4;
-  Weighing weighing;
-  weighing.stretch = kNoLoss;
   double most = 0.0;
-  std::vector<double> residuals;
   for (const Feature& feature : features_) {
-    if (!feature.active) continue;
-    residuals.resize(static_cast<std::size_t>(feature.cost->num_residuals()));
-    if (!feature.cost->EvaluateWith(weighing, feature.blocks.data(), residuals.data(), nullptr))
-      continue;
-    const ImagePoints* points = feature.cost->points();
-    const double count =
-        points == nullptr ? 1.0 : points->options().weight * static_cast<double>(points->size());
-    double sum = 0.0;
-    for (const double r : residuals) sum += r * r;
-    most = std::max(most, sum / std::max(1.0, count));
+    const double square = feature.active ? MeanSquareOf(*feature.cost, feature.blocks.data()) : 0.0;
+    if (std::isfinite(square)) most = std::max(most, square);
   }
   return std::sqrt(most);
 }
@@ -135,9 +123,9 @@ double AdjustProblem::Misfit() const {
   }
   for (const Prior& prior : priors_) {
     if (!IsOf(prior, problem)) continue;
-    std::vector<double> residuals(static_cast<std::size_t>(prior.cost->num_residuals()));
-    if (!prior.cost->Evaluate(prior.blocks.data(), residuals.data(), nullptr)) continue;
-    for (const double r : residuals) chi2 += r * r;
+    const double own = TwiceCostOf(*prior.cost, nullptr, Weighing(), prior.blocks.data());
+    if (!std::isfinite(own)) continue;
+    chi2 += own;
     rows += prior.cost->num_residuals();
   }
   std::vector<double*> all;
@@ -216,15 +204,8 @@ GivenFrame AdjustProblem::GivenFrameAt() const {
 std::vector<AdjustedCircle> AdjustProblem::Circles() const {
   std::vector<AdjustedCircle> out;
   for (const auto& [key, circle] : circles_) {
-    AdjustedCircle made;
-    made.id = circle.id;
-    made.photo = key.first - 1;
-    made.radius = *circle.radius;
-    const double height = circle.tilt != nullptr ? circle.tilt[2] * made.radius : 0.0;
-    made.center = {circle.center[0], circle.center[1], height};
-    if (circle.tilt != nullptr)
-      made.normal = Eigen::Vector3d(circle.tilt[0], circle.tilt[1], 1.0).normalized();
-    out.push_back(made);
+    const PlaneCircle at(circle.center, *circle.radius, circle.tilt);
+    out.push_back({circle.id, key.first - 1, at.center, at.normal.normalized(), at.radius});
   }
   return out;
 }

@@ -12,7 +12,7 @@
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
-#include "circline/refine/pose_seeds.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 
@@ -39,20 +39,17 @@ void ParallelFor(int count, int num_threads, const std::function<void(int)>& wor
   if (thrown) std::rethrow_exception(thrown);
 }
 
-PreparedPhoto Prepare(const Observations& given, const Camera& camera, const NoiseModel& noise) {
+Observations Prepare(const Observations& given, const Camera& camera,
+                     const EstimationOptions& options, const PointNoise* noise) {
   constexpr double kDefaultSigmaPx = 0.4;  // For fits only.
-  PreparedPhoto photo{given, {}};
-  Observations& obs = photo.observations;
-  obs.camera = camera;
-  for (CircleObservation& circle : obs.circles) circle.fit.reset();
-  for (PencilObservation& pencil : obs.pencils) {
-    pencil.fit.reset();
-    for (LineObservation& line : pencil.lines) line.fit.reset();
-  }
-  obs = ResolveWorld(obs);
-  FitDirect(kDefaultSigmaPx, &obs);
-  obs = ResolveWorld(obs);
-  photo.noise = MeasurePointNoise(obs, noise);
+  Observations photo = given;
+  photo.camera = camera;
+  ResetFits(&photo);
+  photo = ResolveWorld(photo);
+  FitDirect(kDefaultSigmaPx, &photo);
+  photo = ResolveWorld(photo);
+  StateNoise(noise != nullptr ? *noise : MeasurePointNoise(photo, options.noise_model),
+             options.conic_loss.scale_px, options.line_loss.scale_px, &photo);
   return photo;
 }
 
@@ -75,29 +72,23 @@ int NumImpossible(const Observations& observations) {
 
 }  // namespace
 
-double CoarsePose(const PreparedPhoto& photo, const PointNoise& noise,
-                  const EstimationOptions& options, PoseEstimate* estimate) {
+double CoarsePose(const Observations& photo, const EstimationOptions& options,
+                  PoseEstimate* estimate) {
   constexpr int kIterations = 3;
   constexpr double kImpossible = 0.5 * kInlierSigmas * kInlierSigmas;  // As an outlier.
-  const double impossible = kImpossible * NumImpossible(photo.observations);
+  const double impossible = kImpossible * NumImpossible(photo);
   SolverRegistry registry;
   AddClosedFormSolvers(&registry);
   std::vector<std::string> unused;
-  const std::vector<Seed> seeds =
-      CollectSeeds(photo.observations, registry.solvers(), 0.0, &unused);
-  const JointProblem problem(photo.observations, options, noise);
-  State state, best;
-  double least = std::numeric_limits<double>::infinity();
-  for (const Seed& seed : seeds) {
-    if (!problem.Start(seed.pose, 0.0, problem.FirstReading(), &state).ok()) continue;
-    const double cost = state.cost + LeftOutCost(problem, state);
-    if (!(cost < least)) continue;
-    least = cost;
-    best = state;
-  }
+  const std::vector<Seed> seeds = CollectSeeds(photo, registry.solvers(), 0.0, &unused);
+  const JointProblem problem(photo, options);
+  Status last;
+  std::vector<SeedStart> starts = StartsOf(problem, seeds, problem.FirstReading(), &last);
   if (estimate != nullptr)
     estimate->status = Status::Refused("no closed form leads to a pose that can be refined");
-  if (!std::isfinite(least) || !problem.Solve(kIterations, &best).ok()) return least + impossible;
+  if (starts.empty()) return std::numeric_limits<double>::infinity();
+  State& best = starts.front().state;
+  if (!problem.Solve(kIterations, &best).ok()) return starts.front().cost + impossible;
   Refined refined;
   if (estimate != nullptr && FillRefined(problem, best, &refined).ok()) {
     estimate->status = Status::Ok();
@@ -116,7 +107,7 @@ CameraSweep::CameraSweep(std::vector<const Observations*> photos, const Camera& 
       least_(photos_.size(), std::numeric_limits<double>::infinity()) {
   ParallelFor(static_cast<int>(photos_.size()), num_threads_, [&](int i) {
     const auto index = static_cast<std::size_t>(i);
-    noise_[index] = Prepare(*photos_[index], given_, options_.noise_model).noise;
+    noise_[index] = MeasurePointNoise(Prepare(*photos_[index], given_, options_));
   });
 }
 
@@ -125,8 +116,8 @@ std::vector<double> CameraSweep::CostsAt(const std::vector<Camera>& cameras) {
   ParallelFor(static_cast<int>(photos_.size()), num_threads_, [&](int i) {
     const auto index = static_cast<std::size_t>(i);
     for (const Camera& camera : cameras) {
-      costs[index].push_back(CoarsePose(Prepare(*photos_[index], camera, options_.noise_model),
-                                        noise_[index], options_, nullptr));
+      const Observations photo = Prepare(*photos_[index], camera, options_, &noise_[index]);
+      costs[index].push_back(CoarsePose(photo, options_, nullptr));
       least_[index] = std::min(least_[index], costs[index].back());
     }
   });

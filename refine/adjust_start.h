@@ -14,23 +14,24 @@
 
 namespace circline {
 
+// For each photo the first one of the same camera that shows nearly the same: four fifths of the
+// features of each lie within `distance`, of the photo's diagonal, of one of the other; -1 where
+// there is none. Ids mean nothing here.
+std::vector<int> NearlyEqualViews(const std::vector<Observations>& photos, double distance);
+
 // Calls work(0) .. work(count - 1) on so many threads. What one of them throws ends the rest, and
 // is thrown again.
 void ParallelFor(int count, int num_threads, const std::function<void(int)>& work);
 
-// Photos as they are refined: fitted, resolved (ResolveWorld), with the noise of their points.
-struct PreparedPhoto {
-  Observations observations;
-  PointNoise noise;
-};
-// All fits anew, through this camera.
-PreparedPhoto Prepare(const Observations& given, const Camera& camera, const NoiseModel& noise);
+// A photo as it is refined: fitted anew through this camera, resolved (ResolveWorld), each feature
+// with its noise, which is measured where `noise` is null.
+Observations Prepare(const Observations& given, const Camera& camera,
+                     const EstimationOptions& options, const PointNoise* noise = nullptr);
 
 // A pose of a photo after a few steps from the best closed form, and how badly it explains the
-// photo: the robust cost, half of chi^2, that of the points in `noise`; infinity where there is
-// none. `estimate` may be null.
-double CoarsePose(const PreparedPhoto& photo, const PointNoise& noise,
-                  const EstimationOptions& options, PoseEstimate* estimate);
+// photo: the robust cost, half of chi^2; infinity where there is none. `estimate` may be null.
+double CoarsePose(const Observations& photo, const EstimationOptions& options,
+                  PoseEstimate* estimate);
 
 // Cameras that might have taken some photos, by how well these are explained.
 class CameraSweep {

@@ -6,18 +6,9 @@
 #include <cstdio>
 #include <utility>
 
+#include "circline/refine/statistics.h"
+
 namespace circline {
-namespace {
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-}  // namespace
-
 // From wide losses to narrow ones, the camera's coarse parameters first.
 void Adjustment::SolveOnce() {
   constexpr double kWidest = 300.0, kNear = 3.0, kNarrower = 0.25;
@@ -118,8 +109,7 @@ void Adjustment::SeeAnew() {
   ParallelFor(static_cast<int>(given_.size()), options_.num_threads, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     if (!inputs_[i].takes_part) return;
-    prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], options_.noise_model);
-    inputs_[i].noise = prepared_[i].noise;
+    prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions(options_));
     inputs_[i].pose = problem_->PoseAt(index);
     inputs_[i].layout = &layouts_[static_cast<std::size_t>(inputs_[i].world)];
   });

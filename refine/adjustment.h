@@ -48,7 +48,6 @@ class Adjustment {
   Status FindCameras();
   Status CheckGivenPoses();
   void SetAsideEqualViews();
-  EstimationOptions PoseOptions() const;
   void Estimate();
   void FindCamera(std::size_t camera);
   Status Start();
@@ -76,7 +75,7 @@ class Adjustment {
   std::vector<CameraSigma> priors_;
   std::vector<Camera> guesses_;         // As given.
   std::vector<std::uint8_t> is_valid_;  // By photo.
-  std::vector<PreparedPhoto> prepared_;
+  std::vector<Observations> prepared_;
   std::vector<AdjustInput> inputs_;
   std::vector<PoseEstimate> estimates_;
   std::vector<Layout> layouts_;            // By world.

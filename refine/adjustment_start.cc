@@ -4,8 +4,9 @@
 #include <map>
 #include <mutex>
 
+#include "circline/refine/adjust_start.h"
 #include "circline/refine/adjustment.h"
-#include "circline/refine/equal_views.h"
+#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {
@@ -87,16 +88,6 @@ void Adjustment::SetAsideEqualViews() {
   }
 }
 
-EstimationOptions Adjustment::PoseOptions() const {
-  EstimationOptions pose;
-  pose.conic_loss = options_.conic_loss;
-  pose.line_loss = options_.line_loss;
-  pose.noise_model = options_.noise_model;
-  // In the pose's covariance only: the camera is not what the photo says of it.
-  pose.camera_sigma = CameraSigma::Exact();
-  return pose;
-}
-
 // Every photo through the cameras as they stand.
 void Adjustment::Estimate() {
   const int count = static_cast<int>(given_.size());
@@ -106,13 +97,12 @@ void Adjustment::Estimate() {
   ParallelFor(count, options_.num_threads, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     if (is_valid_[i]) {
-      prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], options_.noise_model);
-      inputs_[i].observations = &prepared_[i].observations;
-      inputs_[i].noise = prepared_[i].noise;
+      prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions(options_));
+      inputs_[i].observations = &prepared_[i];
       if (start_ != nullptr) {
-        CoarsePose(prepared_[i], prepared_[i].noise, PoseOptions(), &estimates_[i]);
+        CoarsePose(prepared_[i], PoseOptions(options_), &estimates_[i]);
       } else {
-        estimates_[i] = EstimatePose(prepared_[i].observations, PoseOptions());
+        estimates_[i] = EstimatePose(prepared_[i], PoseOptions(options_));
       }
     } else {
       estimates_[i].status = out_.photos[i].status;
@@ -136,7 +126,7 @@ void Adjustment::FindCamera(std::size_t c) {
     used.push_back(members[static_cast<std::size_t>(i)]);
   std::vector<const Observations*> pointers;
   for (const Observations& photo : used) pointers.push_back(&photo);
-  EstimationOptions pose = PoseOptions();
+  EstimationOptions pose = PoseOptions(options_);
   pose.conic_distance = ConicDistanceType::kSampson;  // Cheaper.
   CameraSweep sweep(pointers, guesses_[c], pose, options_.num_threads);
   const bool has_radial = ShiftSigmas(cameras_[c], priors_[c], options_)[4] > 0.0;
@@ -235,14 +225,13 @@ void Adjustment::ScaleWorlds() {
     }
   }
   for (auto& [world, own] : ratios) {
-    const auto middle = own.begin() + static_cast<std::ptrdiff_t>(own.size() / 2);
-    std::nth_element(own.begin(), middle, own.end());
+    const double scale = Median(std::move(own));
     for (auto& [id, circle] : layouts_[static_cast<std::size_t>(world)])
-      circle = {*middle * circle.center, *middle * circle.radius};
+      circle = {scale * circle.center, scale * circle.radius};
     for (AdjustInput& input : inputs_) {
-      if (input.takes_part && input.world == world) input.pose.translation *= *middle;
+      if (input.takes_part && input.world == world) input.pose.translation *= scale;
     }
-    if (world == 0 && given_frame_) given_frame_->scale /= *middle;
+    if (world == 0 && given_frame_) given_frame_->scale /= scale;
   }
 }
 

@@ -1,5 +1,3 @@
-#include "circline/refine/agreeing_lines.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -10,6 +8,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/refine/circle_planes.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 namespace {

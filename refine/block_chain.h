@@ -6,8 +6,10 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <limits>
 
 #include "circline/estimators/pose.h"
+#include "circline/refine/cost_functions.h"
 #include "circline/refine/image_points.h"
 
 namespace circline {
@@ -46,6 +48,41 @@ void WriteCameraJacobian(const Eigen::MatrixBase<Derived>& J, int num_residuals,
   out.setZero();
   out.topLeftCorner(J.rows(), J.cols()) = J;
 }
+
+// Sum of squared residuals, of a feature weighed so; infinite where they cannot be evaluated.
+inline double TwiceCostOf(const ceres::CostFunction& cost, const FeatureCost* feature,
+                          const Weighing& weighing, const double* const* parameters) {
+  constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
+  double residuals[kMaxResiduals], sum = 0.0;
+  const bool evaluated = feature != nullptr
+                             ? feature->EvaluateWith(weighing, parameters, residuals, nullptr)
+                             : cost.Evaluate(parameters, residuals, nullptr);
+  if (!evaluated) return std::numeric_limits<double>::infinity();
+  for (int i = 0; i < cost.num_residuals(); ++i) sum += residuals[i] * residuals[i];
+  return sum;
+}
+
+// Mean square over a feature's points without any loss, standard deviations.
+inline double MeanSquareOf(const FeatureCost& cost, const double* const* parameters) {
+  Weighing weighing;
+  weighing.stretch = 1e4;  // So wide a loss is none.
+  const ImagePoints* points = cost.points();
+  const double count =
+      points == nullptr ? 1.0 : points->options().weight * static_cast<double>(points->size());
+  return TwiceCostOf(cost, &cost, weighing, parameters) / std::max(1.0, count);
+}
+
+// A circle of the plane Z = 0 in the world: centre (2), radius and, where it is not null, its tilt
+// and height (3), as PlaneCircleContourCost has them.
+struct PlaneCircle {
+  Eigen::Vector3d center, normal;  // The latter of any length.
+  double radius;
+
+  PlaneCircle(const double* xy, double r, const double* tilt)
+      : center(xy[0], xy[1], tilt != nullptr ? tilt[2] * r : 0.0),
+        normal(tilt != nullptr ? tilt[0] : 0.0, tilt != nullptr ? tilt[1] : 0.0, 1.0),
+        radius(r) {}
+};
 
 // Without derivatives the whole cost is one residual.
 inline void CostOnly(double twice_cost, int num_residuals, double* residuals) {

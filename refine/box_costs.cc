@@ -4,12 +4,11 @@
 
 #include "circline/refine/block_chain.h"
 #include "circline/refine/cost_functions.h"
-#include "circline/refine/line_root.h"
 
 namespace circline {
 namespace {
 
-enum Block { kRotation, kTranslation, kLength, kSkew = kLength + 3, kCamera };
+enum Block { kRotation, kTranslation, kLength, kSkew = kLength + 3 };
 
 // d (S v) / d skew, S = I + half the skew, symmetric: strain without rotation.
 Eigen::Matrix3d BySkew(const Eigen::Vector3d& v) {
@@ -46,30 +45,22 @@ struct BoxEdgeCost::Placed {
 };
 
 BoxEdgeCost::BoxEdgeCost(ImagePoints points, int axis, const std::array<bool, 3>& far, bool camera)
-    : points_(std::move(points)), axis_(axis), far_(far), has_camera_(camera) {
-  for (const int size : {4, 3, 1, 1, 1, 3}) mutable_parameter_block_sizes()->push_back(size);
-  if (camera) mutable_parameter_block_sizes()->push_back(kCameraSize);
-  set_num_residuals(LineRank(points_, camera) + 1);
-}
+    : CurveCost(std::move(points), 2, {4, 3, 1, 1, 1, 3}, false, camera, 0),
+      axis_(axis),
+      far_(far) {}
 
 void BoxEdgeCost::Distances(const double* const* parameters, std::vector<double>* distances) const {
   const Placed placed(*this, parameters);
-  points_.LineDistances(placed.p.cross(placed.d), has_camera_ ? parameters[kCamera] : nullptr,
-                        distances);
+  points()->LineDistances(placed.p.cross(placed.d), CameraShifts(parameters), distances);
 }
 
 bool BoxEdgeCost::EvaluateWith(const Weighing& weighing, const double* const* parameters,
                                double* residuals, double** jacobians) const {
   const Placed e(*this, parameters);
-  const bool camera_variable = has_camera_ && jacobians != nullptr && jacobians[kCamera] != nullptr;
   const int rows = num_residuals();
-  CurveModel model;
-  if (!SumLineInto(points_, e.p.cross(e.d), has_camera_ ? parameters[kCamera] : nullptr, weighing,
-                   camera_variable, rows, residuals, jacobians != nullptr ? &model : nullptr))
-    return false;
+  Rows U;
+  if (!SumAbout(e.p.cross(e.d), weighing, parameters, residuals, jacobians, &U)) return false;
   if (jacobians == nullptr) return true;
-  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), rows, residuals);
-  const auto U = root.U.leftCols(3);
   const Eigen::Matrix3d by_p = -CrossMatrix(e.d), by_d = CrossMatrix(e.p);
   const Eigen::Matrix3d by_corner = by_p * e.R, by_along = by_d * e.R;
   WriteJacobian(
@@ -87,8 +78,6 @@ bool BoxEdgeCost::EvaluateWith(const Weighing& weighing, const double* const* pa
   }
   WriteJacobian(U * (by_corner * BySkew(e.corner) + by_along * BySkew(e.along)), rows, kSkew,
                 jacobians);
-  if (camera_variable)
-    WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, kCamera, jacobians);
   return true;
 }
 

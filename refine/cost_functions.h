@@ -61,15 +61,61 @@ class FeatureCost : public ceres::CostFunction {
                          std::vector<double>* distances) const {
     distances->clear();
   }
+  // As ImagePoints::SeeThrough: for evaluations to come with these camera shifts.
+  virtual void SeeThrough(const double* /*camera*/) {}
 
  private:
   Weighing weighing_;
 };
 
+// Points about a curve, the image of a contour or a line: what these cost functions share.
+class CurveCost : public FeatureCost {
+ public:
+  const ImagePoints* points() const override { return &points_; }
+  void SeeThrough(const double* camera) override { points_.SeeThrough(camera); }
+
+ protected:
+  // `curve_rank`: degrees of freedom of the curve, 5 of a conic, 2 of a line. The blocks are those
+  // of these sizes, then the contour's offset and the camera's shifts, where there are any; the
+  // last `num_priors` residuals are not of the points.
+  CurveCost(ImagePoints points, int curve_rank, const std::vector<int>& sizes, bool has_offset,
+            bool has_camera, int num_priors);
+  void ExchangePoints(ImagePoints* points);
+
+  double Offset(const double* const* parameters) const {
+    return offset_block_ >= 0 ? parameters[offset_block_][0] : 0.0;
+  }
+  const double* CameraShifts(const double* const* parameters) const {
+    return camera_block_ >= 0 ? parameters[camera_block_] : nullptr;
+  }
+  // Derivatives of the points' residuals by a curve: ConicToVector of its Normalized(), or a line.
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
+                             CurveModel::kMaxSize, 6>;
+  // Writes the points' residuals about a conic or a line, and their derivatives by the optional
+  // blocks; `U` receives those by the curve, where any are asked for. False where a point has no
+  // finite cost.
+  bool SumAbout(const Eigen::Matrix3d& conic, const Weighing& weighing,
+                const double* const* parameters, double* residuals, double** jacobians,
+                Rows* U) const;
+  bool SumAbout(const Eigen::Vector3d& line, const Weighing& weighing,
+                const double* const* parameters, double* residuals, double** jacobians,
+                Rows* U) const;
+  int num_curve_residuals() const { return num_residuals() - num_priors_; }
+
+ private:
+  int Rank(bool camera_is_variable) const;
+  template <typename Sum>
+  bool EvaluateSum(const Sum& sum, double* residuals, double** jacobians, Rows* U) const;
+
+  ImagePoints points_;
+  int curve_rank_, num_priors_;
+  int offset_block_ = -1, camera_block_ = -1;  // -1: there is none.
+};
+
 // Contour of a circle of the world: rotation, translation, center (3), normal (3, any length but 0:
 // ceres::SphereManifold<3>), radius (1), [contour offset (1, pixels of the photo, outwards)],
 // [camera].
-class CircleContourCost : public FeatureCost {
+class CircleContourCost : public CurveCost {
  public:
   // Which of the blocks in brackets there are.
   struct Blocks {
@@ -79,18 +125,13 @@ class CircleContourCost : public FeatureCost {
   CircleContourCost(ImagePoints points, Blocks blocks);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
-  const ImagePoints* points() const override { return &points_; }
   void Distances(const double* const* parameters, std::vector<double>* distances) const override;
-
- private:
-  ImagePoints points_;
-  Blocks blocks_;
 };
 
 // Contour of a circle of the plane Z = 0: rotation, translation, center (2), radius (1), [tilt and
 // height (3)], [contour offset (1)], [camera]. The circle's own plane is Z = 0 but for a tilt (the
 // X and Y of its normal, radians) and a height (in radii), which have a Gaussian prior here.
-class PlaneCircleContourCost : public FeatureCost {
+class PlaneCircleContourCost : public CurveCost {
  public:
   // Which of the blocks in brackets there are, and the prior of tilt and height.
   struct Blocks {
@@ -101,15 +142,12 @@ class PlaneCircleContourCost : public FeatureCost {
   PlaneCircleContourCost(ImagePoints points, Blocks blocks);
   // Takes other points and gives back its own: from frame to frame, without new memory. Not in a
   // problem.
-  void Exchange(ImagePoints* points);
+  void Exchange(ImagePoints* points) { ExchangePoints(points); }
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
-
-  const ImagePoints* points() const override { return &points_; }
   void Distances(const double* const* parameters, std::vector<double>* distances) const override;
 
  private:
-  ImagePoints points_;
   Blocks blocks_;
 };
 
@@ -117,7 +155,7 @@ class PlaneCircleContourCost : public FeatureCost {
 // the direction, an angle about it, radians, from where it is nearest to `fit`; and, unless
 // direction_sigma is 0, by how much its own direction deviates from the common one, radians, which
 // has a prior here of that standard deviation; most lines are more exact.
-class DirectionLineCost : public FeatureCost {
+class DirectionLineCost : public CurveCost {
  public:
   // What else is unknown of the line.
   struct Options {
@@ -131,7 +169,6 @@ class DirectionLineCost : public FeatureCost {
   // As FeatureCost says.
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
-  const ImagePoints* points() const override { return &points_; }
   void Distances(const double* const* parameters, std::vector<double>* distances) const override;
 
   // The block `line` that its points ask for, where all else is as in `parameters`: to start from.
@@ -142,7 +179,6 @@ class DirectionLineCost : public FeatureCost {
   struct Placed;
   bool Place(const double* const* parameters, Placed* placed) const;
 
-  ImagePoints points_;
   Eigen::Vector3d fit_;  // Unit.
   Options options_;
 };
@@ -150,19 +186,13 @@ class DirectionLineCost : public FeatureCost {
 // Line of the plane Z = 0: rotation, translation, point (2, a point of the line), angle (1, of its
 // direction from X towards Y, radians), [camera]. A drawn axis has its point at the origin and its
 // angle held; a diameter shares the circle's centre.
-class PlaneLineCost : public FeatureCost {
+class PlaneLineCost : public CurveCost {
  public:
   // Of the points along it.
   explicit PlaneLineCost(ImagePoints points, bool camera = false);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
-
-  const ImagePoints* points() const override { return &points_; }
   void Distances(const double* const* parameters, std::vector<double>* distances) const override;
-
- private:
-  ImagePoints points_;
-  bool has_camera_;
 };
 
 // Edge of a box: rotation, translation, length x (1), length y (1), length z (1), skew (3),
@@ -170,22 +200,19 @@ class PlaneLineCost : public FeatureCost {
 // 2): along which this one runs; far[k]: whether it lies at the far end of the box along axis k
 // (that of `axis` itself has no meaning). `skew`: by how much the corner's angles (yz), (zx), (xy)
 // are below a right angle, radians, half of it at either edge; cartons lean (NewGaussianPrior).
-class BoxEdgeCost : public FeatureCost {
+class BoxEdgeCost : public CurveCost {
  public:
   // Of the points along it.
   BoxEdgeCost(ImagePoints points, int axis, const std::array<bool, 3>& far, bool camera = false);
   bool EvaluateWith(const Weighing& weighing, const double* const* parameters, double* residuals,
                     double** jacobians) const override;
-  const ImagePoints* points() const override { return &points_; }
   void Distances(const double* const* parameters, std::vector<double>* distances) const override;
 
  private:
   struct Placed;
 
-  ImagePoints points_;
   int axis_;
   std::array<bool, 3> far_;
-  bool has_camera_;
 };
 
 // Image of a point of the plane Z = 0: rotation, translation, point (2), [camera]. The residual is

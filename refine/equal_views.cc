@@ -1,9 +1,9 @@
-#include "circline/refine/equal_views.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+
+#include "circline/refine/adjust_start.h"
 
 namespace circline {
 namespace {

@@ -12,22 +12,26 @@
 #include <vector>
 
 #include "circline/estimators/noise_model.h"
+#include "circline/refine/estimate_pose.h"
 #include "circline/refine/image_points.h"
 #include "circline/refine/square_root.h"
 
 namespace circline {
 
-// `sigma_px`: of each coordinate, what neighbours share not included; it takes the place of that in
-// `options`. False where there are too few points for a contour (5), a line (2).
+// `sigma_px`: of each coordinate, what neighbours share not included. Losses, distance and noise
+// model are those of `how`; so many distortion coefficients have derivatives. False where there are
+// too few points for a contour (5), a line (2).
 inline bool FillEvidencePoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
                                const std::vector<std::uint8_t>& inliers, double sigma_px,
-                               bool is_contour, const NoiseModel& noise,
-                               ImagePoints::Options options, ImagePoints* points) {
+                               bool is_contour, const EstimationOptions& how, int num_distortion,
+                               ImagePoints* points) {
   if (pixels.empty()) return false;
+  const NoiseModel& noise = how.noise_model;
   const double shared = is_contour ? noise.contour_px : noise.line_px;
   const double sigma = std::hypot(sigma_px, shared);
-  options.sigma_px = sigma;
-  points->Reset(camera, pixels, inliers, options);
+  points->Reset(camera, pixels, inliers,
+                {sigma, 1.0, (is_contour ? how.conic_loss : how.line_loss).type, how.conic_distance,
+                 num_distortion});
   if (points->size() < (is_contour ? 5U : 2U)) return false;
   const double weight = is_contour ? noise.ContourWeight(sigma_px, pixels, inliers)
                                    : noise.LineWeight(sigma_px, pixels, inliers);
@@ -40,10 +44,10 @@ inline std::optional<ImagePoints> EvidencePoints(const Camera& camera,
                                                  const std::vector<Eigen::Vector2d>& pixels,
                                                  const std::vector<std::uint8_t>& inliers,
                                                  double sigma_px, bool is_contour,
-                                                 const NoiseModel& noise,
-                                                 const ImagePoints::Options& options) {
+                                                 const EstimationOptions& how, int num_distortion) {
   std::optional<ImagePoints> points(std::in_place);
-  if (!FillEvidencePoints(camera, pixels, inliers, sigma_px, is_contour, noise, options, &*points))
+  if (!FillEvidencePoints(camera, pixels, inliers, sigma_px, is_contour, how, num_distortion,
+                          &*points))
     points.reset();
   return points;
 }

@@ -12,7 +12,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/noise_model.h"
-#include "circline/refine/layout_alignment.h"
+#include "circline/refine/adjust_layout.h"
 
 namespace circline {
 namespace {

@@ -141,6 +141,7 @@ void ImagePoints::Reset(const Camera& camera, const std::vector<Eigen::Vector2d>
   points_.clear();
   pixels_.clear();
   normalized_.clear();
+  seen_.clear();
   if (camera.model == CameraModel::kPinhole) options_.num_distortion = 0;
   for (int k = 0; k < options_.num_distortion; ++k) lens_.emplace_back(camera, k);
   points_.reserve(pixels.size());
@@ -165,30 +166,42 @@ void ImagePoints::Reset(const Camera& camera, const std::vector<Eigen::Vector2d>
   for (const CalibratedPoint& q : points_) normalized_.push_back(Normalize(q));
 }
 
-namespace {
-
-bool IsShifted(const double* shifts) {
-  return shifts != nullptr &&
-         std::any_of(shifts, shifts + kCameraSize, [](double v) { return v != 0.0; });
+void ImagePoints::RemoveCurvatureBias(const Eigen::Matrix3d& conic, double sigma_px) {
+  for (std::size_t i = 0; i < size(); ++i) {
+    CalibratedPoint& p = points_[i];
+    // The curve's foot of the point, by Newton's method along the gradient.
+    constexpr int kSteps = 2;
+    Eigen::Vector2d gradient;
+    Eigen::Vector3d foot = p.Homogeneous();
+    for (int step = 0; step < kSteps; ++step) {
+      gradient = 2.0 * (conic * foot).head<2>();
+      foot.head<2>() -= foot.dot(conic * foot) / gradient.squaredNorm() * gradient;
+    }
+    const Eigen::Vector2d on_photo = p.GradientPerPixel(2.0 * (conic * foot).head<2>()),
+                          normal = on_photo.normalized();
+    const Eigen::Vector2d along = NormGradient(p, {-normal.y(), normal.x()});
+    const double curvature = 2.0 * along.dot(conic.topLeftCorner<2, 2>() * along) / on_photo.norm();
+    // The expansion holds where the noise is below the radius of curvature.
+    const double bend = std::min(1.0, curvature * sigma_px);
+    const Eigen::Vector2d back = -0.5 * sigma_px * bend * normal;
+    if (!back.allFinite()) continue;
+    pixels_[i] += back;
+    p.x += NormGradient(p, back);
+    normalized_[i] = Normalize(p);
+  }
 }
 
-}  // namespace
-
 // Newton's method, from where a camera without a lens would move the undistorted point.
-CalibratedPoint ImagePoints::At(std::size_t i, const Camera* shifted) const {
+CalibratedPoint ImagePoints::Undistorted(std::size_t i, const Camera& shifted) const {
   CalibratedPoint p = points_[i];
-  if (shifted == nullptr) return p;
-  const Eigen::Vector2d focal(shifted->fx, shifted->fy), middle(shifted->cx, shifted->cy),
+  const Eigen::Vector2d focal(shifted.fx, shifted.fy), middle(shifted.cx, shifted.cy),
       straight = (pixels_[i] - middle).cwiseQuotient(focal);
-  if (shifted->model == CameraModel::kPinhole) {
+  if (shifted.model == CameraModel::kPinhole) {
     p.x = straight;
     p.x_from_pixel = {1.0 / focal.x(), 0.0, 0.0, 1.0 / focal.y()};
     return p;
   }
-  const auto move = [&p](const Eigen::Vector2d& pixels) {
-    p.x += Eigen::Vector2d(p.x_from_pixel[0] * pixels.x() + p.x_from_pixel[1] * pixels.y(),
-                           p.x_from_pixel[2] * pixels.x() + p.x_from_pixel[3] * pixels.y());
-  };
+  const auto move = [&p](const Eigen::Vector2d& pixels) { p.x += NormGradient(p, pixels); };
   const Eigen::Vector2d given(camera_.fx, camera_.fy);
   move(given.cwiseProduct(straight) + Eigen::Vector2d(camera_.cx, camera_.cy) - pixels_[i]);
   constexpr int kMaxSteps = 20;
@@ -197,7 +210,7 @@ CalibratedPoint ImagePoints::At(std::size_t i, const Camera* shifted) const {
   for (int step = 0; step < kMaxSteps; ++step) {
     Eigen::Vector2d pixel;
     std::array<double, 4> J;
-    DistortWithJacobian(*shifted, p.x, &pixel, &J);
+    DistortWithJacobian(shifted, p.x, &pixel, &J);
     const double inverse = 1.0 / (J[0] * J[3] - J[1] * J[2]);
     p.x_from_pixel = {J[3] * inverse, -J[1] * inverse, -J[2] * inverse, J[0] * inverse};
     const Eigen::Vector2d miss = pixels_[i] - pixel;
@@ -209,23 +222,78 @@ CalibratedPoint ImagePoints::At(std::size_t i, const Camera* shifted) const {
   return p;
 }
 
-Eigen::Vector3d ImagePoints::Middle(const double* camera) const {
-  if (!IsShifted(camera)) return normalization_.col(2);
-  const Camera shifted = ShiftedCamera(camera_, camera);
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < size(); ++i) middle += At(i, &shifted).Homogeneous();
-  return middle / middle.z();
-}
-
-CalibratedPoint ImagePoints::NormalizedAt(std::size_t i, const Camera* shifted) const {
-  return shifted == nullptr ? normalized_[i] : Normalize(At(i, shifted));
-}
-
 CalibratedPoint ImagePoints::Normalize(CalibratedPoint p) const {
   const double inverse = 1.0 / normalization_(0, 0);
   p.x = inverse * (p.x - normalization_.topRightCorner<2, 1>());
   for (double& v : p.x_from_pixel) v *= inverse;
   return p;
+}
+
+// The points as the camera with some shifts has them.
+class ImagePoints::View {
+ public:
+  View(const ImagePoints& points, const double* shifts) : points_(points) {
+    is_shifted_ = shifts != nullptr &&
+                  std::any_of(shifts, shifts + kCameraSize, [](double v) { return v != 0.0; });
+    if (!is_shifted_) {
+      seen_ = points.points_.data();
+    } else if (!points.seen_.empty() && std::equal(shifts, shifts + kCameraSize, points.seen_by_)) {
+      seen_ = points.seen_.data();
+    }
+    if (is_shifted_) shifted_ = ShiftedCamera(points.camera_, shifts);
+  }
+
+  CalibratedPoint At(std::size_t i) const {
+    return seen_ != nullptr ? seen_[i] : points_.Undistorted(i, *shifted_);
+  }
+  // Of At(i).
+  CalibratedPoint Normalized(std::size_t i, const CalibratedPoint& seen) const {
+    return is_shifted_ ? points_.Normalize(seen) : points_.normalized_[i];
+  }
+
+  // Distance r to a curve that stays while the camera shifts: the same as if the pixel moved the
+  // other way (`by_pixel`, d r / d pixel), but for the size of a pixel, by which r itself changes.
+  // That a lens is bent between the point and the curve is left out.
+  template <typename Row>
+  void FillCameraColumns(std::size_t i, const CalibratedPoint& p, double r,
+                         const Eigen::Vector2d& by_pixel, Row* row, int first) const {
+    const Camera& camera = is_shifted_ ? *shifted_ : points_.camera_;
+    const Eigen::Vector2d offset = points_.pixels_[i] - Eigen::Vector2d(camera.cx, camera.cy);
+    const Eigen::Vector2d across = by_pixel.normalized();
+    row->tail(row->size() - first).setZero();
+    (*row)[first] = r - by_pixel.dot(offset);
+    (*row)[first + 1] = r * across.y() * across.y() - by_pixel.y() * offset.y();
+    (*row)[first + 2] = -by_pixel.x();
+    (*row)[first + 3] = -by_pixel.y();
+    Eigen::Matrix2d pixel_from_x;
+    for (int k = 0; k < points_.options_.num_distortion; ++k) {
+      const Eigen::Vector2d pixel =
+          points_.lens_[static_cast<std::size_t>(k)].At(camera, p.x, &pixel_from_x);
+      (*row)[first + 4 + k] =
+          r * across.dot(pixel_from_x * NormGradient(p, across)) - by_pixel.dot(pixel);
+    }
+  }
+
+ private:
+  const ImagePoints& points_;
+  bool is_shifted_ = false;
+  std::optional<Camera> shifted_;
+  const CalibratedPoint* seen_ = nullptr;  // Null: undistorted one by one.
+};
+
+void ImagePoints::SeeThrough(const double* camera) {
+  if (!seen_.empty() && std::equal(camera, camera + kCameraSize, seen_by_)) return;
+  seen_.clear();
+  const View view(*this, camera);
+  std::copy(camera, camera + kCameraSize, seen_by_);
+  for (std::size_t i = 0; i < size(); ++i) seen_.push_back(view.At(i));
+}
+
+Eigen::Vector3d ImagePoints::Middle(const double* camera) const {
+  const View view(*this, camera);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < size(); ++i) middle += view.At(i).Homogeneous();
+  return middle / middle.z();
 }
 
 namespace {
@@ -235,35 +303,11 @@ namespace {
 Eigen::Vector2d MoveInwards(const Eigen::Matrix3d& conic, double pixels, CalibratedPoint* p) {
   const Eigen::Vector2d inwards =
       -p->GradientPerPixel((conic * p->Homogeneous()).head<2>()).normalized();
-  const std::array<double, 4>& J = p->x_from_pixel;
-  p->x += pixels * Eigen::Vector2d(J[0] * inwards.x() + J[1] * inwards.y(),
-                                   J[2] * inwards.x() + J[3] * inwards.y());
+  p->x += pixels * NormGradient(*p, inwards);
   return inwards;
 }
 
 }  // namespace
-
-// Distance r to a curve that stays while the camera shifts: the same as if the pixel moved the
-// other way (`by_pixel`, d r / d pixel), but for the size of a pixel, by which r itself changes.
-// That a lens is bent between the point and the curve is left out.
-template <typename Row>
-void ImagePoints::FillCameraColumns(std::size_t i, const CalibratedPoint& p, const Camera& camera,
-                                    double r, const Eigen::Vector2d& by_pixel, Row* row,
-                                    int first) const {
-  const Eigen::Vector2d offset = pixels_[i] - Eigen::Vector2d(camera.cx, camera.cy);
-  const Eigen::Vector2d across = by_pixel.normalized();
-  row->tail(row->size() - first).setZero();
-  (*row)[first] = r - by_pixel.dot(offset);
-  (*row)[first + 1] = r * across.y() * across.y() - by_pixel.y() * offset.y();
-  (*row)[first + 2] = -by_pixel.x();
-  (*row)[first + 3] = -by_pixel.y();
-  Eigen::Matrix2d pixel_from_x;
-  for (int k = 0; k < options_.num_distortion; ++k) {
-    const Eigen::Vector2d pixel = lens_[static_cast<std::size_t>(k)].At(camera, p.x, &pixel_from_x);
-    (*row)[first + 4 + k] =
-        r * across.dot(pixel_from_x * NormGradient(p, across)) - by_pixel.dot(pixel);
-  }
-}
 
 // The distance is wanted orthogonally, and defined. The smallest radius of curvature of an ellipse
 // of semi-axes a >= b is b^2 / a.
@@ -281,46 +325,61 @@ bool ImagePoints::IsOrthogonal(const Eigen::Matrix3d& conic, double* level) cons
   return b2 / std::sqrt(a2) < kSmallRadii * options_.sigma_px * per_pixel;
 }
 
-double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, const double* camera,
-                             const Weighing& weighing, const Variables& variables,
-                             CurveModel* model) const {
-  const Eigen::Matrix3d C = Normalized(conic);
-  std::optional<Camera> shifted;
-  if (IsShifted(camera)) shifted = ShiftedCamera(camera_, camera);
-  const Camera* changed = shifted ? &*shifted : nullptr;
-  const Camera& seen_by = shifted ? *shifted : camera_;
-  double level = 0.0;
-  const bool orthogonal = IsOrthogonal(C, &level);
-  const auto distance = [&](std::size_t i, auto* row) {
-    const CalibratedPoint seen = At(i, changed);
-    CalibratedPoint p = changed == nullptr ? normalized_[i] : Normalize(seen);
+// A point's distance from a conic, and where `row` is not null its derivatives.
+class ImagePoints::ToConic {
+ public:
+  ToConic(const ImagePoints& points, const Eigen::Matrix3d& conic, double offset_px,
+          const double* camera, bool offset_is_variable)
+      : view_(points, camera),
+        C_(points.Normalized(conic)),
+        offset_px_(offset_px),
+        offset_is_variable_(offset_is_variable),
+        is_orthogonal_(points.IsOrthogonal(C_, &level_)) {}
+
+  template <typename Row>
+  double operator()(std::size_t i, Row* row) const {
+    const Eigen::Matrix3d& C = C_;
+    const CalibratedPoint seen = view_.At(i);
+    CalibratedPoint p = view_.Normalized(i, seen);
     Eigen::Vector2d inwards = Eigen::Vector2d::Zero();
-    if (offset_px != 0.0 || (row != nullptr && variables.offset))
-      inwards = MoveInwards(C, offset_px, &p);
+    if (offset_px_ != 0.0 || (row != nullptr && offset_is_variable_))
+      inwards = MoveInwards(C, offset_px_, &p);
     if (row == nullptr) {
-      return orthogonal ? OrthogonalDistance(p, C, level, nullptr)
-                        : 0.5 * p.Homogeneous().dot(C * p.Homogeneous()) /
-                              p.GradientPerPixel((C * p.Homogeneous()).template head<2>()).norm();
+      return is_orthogonal_ ? OrthogonalDistance(p, C, level_, nullptr)
+                            : 0.5 * p.Homogeneous().dot(C * p.Homogeneous()) /
+                                  p.GradientPerPixel((C * p.Homogeneous()).head<2>()).norm();
     }
     Vector6d by_conic;
-    const double d =
-        orthogonal ? OrthogonalDistance(p, C, level, &by_conic) : ConicDistance(p, C, &by_conic);
+    const double d = is_orthogonal_ ? OrthogonalDistance(p, C, level_, &by_conic)
+                                    : ConicDistance(p, C, &by_conic);
     row->template head<6>() = by_conic;
-    constexpr int kSize = std::remove_pointer_t<decltype(row)>::RowsAtCompileTime;
-    if constexpr (kSize > 6) {
-      const Eigen::Vector2d g = (C * p.Homogeneous()).template head<2>();
+    if constexpr (Row::RowsAtCompileTime > 6) {
+      const Eigen::Vector2d g = (C * p.Homogeneous()).head<2>();
       const Eigen::Vector2d G = p.GradientPerPixel(g);
       Eigen::Vector2d by_pixel = G.normalized();
-      if (!orthogonal) {  // Sampson's denominator moves with the point, too.
+      if (!is_orthogonal_) {  // Sampson's denominator moves with the point, too.
         const Eigen::Vector2d by_x =
             (g - d * C.topLeftCorner<2, 2>() * NormGradient(p, by_pixel)) / G.norm();
         by_pixel = p.GradientPerPixel(by_x);
       }
-      (*row)[6] = variables.offset ? by_pixel.dot(inwards) : 0.0;
-      if constexpr (kSize > 7) FillCameraColumns(i, seen, seen_by, d, by_pixel, row, 7);
+      (*row)[6] = offset_is_variable_ ? by_pixel.dot(inwards) : 0.0;
+      if constexpr (Row::RowsAtCompileTime > 7)
+        view_.FillCameraColumns(i, seen, d, by_pixel, row, 7);
     }
     return d;
-  };
+  }
+
+ private:
+  View view_;
+  Eigen::Matrix3d C_;
+  double offset_px_, level_ = 0.0;
+  bool offset_is_variable_, is_orthogonal_;
+};
+
+double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, const double* camera,
+                             const Weighing& weighing, const Variables& variables,
+                             CurveModel* model) const {
+  const ToConic distance(*this, conic, offset_px, camera, variables.offset);
   if (model == nullptr || (!variables.offset && !variables.camera))
     return SumPoints<6>(size(), options_, weighing, distance, model);
   if (!variables.camera) return SumPoints<7>(size(), options_, weighing, distance, model);
@@ -339,19 +398,15 @@ double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, con
 double ImagePoints::SumLine(const Eigen::Vector3d& line, const double* camera,
                             const Weighing& weighing, bool camera_variable,
                             CurveModel* model) const {
-  std::optional<Camera> shifted;
-  if (IsShifted(camera)) shifted = ShiftedCamera(camera_, camera);
-  const Camera* changed = shifted ? &*shifted : nullptr;
-  const Camera& seen_by = shifted ? *shifted : camera_;
+  const View view(*this, camera);
   const auto distance = [&](std::size_t i, auto* row) {
-    const CalibratedPoint p = At(i, changed);
+    const CalibratedPoint p = view.At(i);
     if (row == nullptr) return LineDistancePx(p, line);
     Eigen::Vector3d by_line;
     const double d = LineDistance(p, line, &by_line);
     row->template head<3>() = by_line;
-    if constexpr (std::remove_pointer_t<decltype(row)>::RowsAtCompileTime > 3) {
-      FillCameraColumns(i, p, seen_by, d, p.GradientPerPixel(line.head<2>()).normalized(), row, 3);
-    }
+    if constexpr (std::remove_pointer_t<decltype(row)>::RowsAtCompileTime > 3)
+      view.FillCameraColumns(i, p, d, p.GradientPerPixel(line.head<2>()).normalized(), row, 3);
     return d;
   };
   if (model == nullptr || !camera_variable)
@@ -361,30 +416,17 @@ double ImagePoints::SumLine(const Eigen::Vector3d& line, const double* camera,
 
 void ImagePoints::ConicDistances(const Eigen::Matrix3d& conic, double offset_px,
                                  const double* camera, std::vector<double>* distances) const {
-  const Eigen::Matrix3d C = Normalized(conic);
-  std::optional<Camera> shifted;
-  if (IsShifted(camera)) shifted = ShiftedCamera(camera_, camera);
-  const Camera* changed = shifted ? &*shifted : nullptr;
-  double level = 0.0;
-  const bool orthogonal = IsOrthogonal(C, &level);
+  const ToConic distance(*this, conic, offset_px, camera, false);
   distances->clear();
-  Vector6d unused;
-  for (std::size_t i = 0; i < size(); ++i) {
-    CalibratedPoint p = NormalizedAt(i, changed);
-    if (offset_px != 0.0) MoveInwards(C, offset_px, &p);
-    distances->push_back(orthogonal ? OrthogonalDistance(p, C, level, nullptr)
-                                    : ConicDistance(p, C, &unused));
-  }
+  for (std::size_t i = 0; i < size(); ++i)
+    distances->push_back(distance(i, static_cast<Vector6d*>(nullptr)));
 }
 
 void ImagePoints::LineDistances(const Eigen::Vector3d& line, const double* camera,
                                 std::vector<double>* distances) const {
-  std::optional<Camera> shifted;
-  if (IsShifted(camera)) shifted = ShiftedCamera(camera_, camera);
-  const Camera* changed = shifted ? &*shifted : nullptr;
+  const View view(*this, camera);
   distances->clear();
-  for (std::size_t i = 0; i < size(); ++i)
-    distances->push_back(LineDistancePx(At(i, changed), line));
+  for (std::size_t i = 0; i < size(); ++i) distances->push_back(LineDistancePx(view.At(i), line));
 }
 
 }  // namespace circline

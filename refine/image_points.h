@@ -74,11 +74,21 @@ class ImagePoints {
   void Reset(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
              const std::vector<std::uint8_t>& inliers, const Options& options);
 
+  // Moves them back to where they would lie on average without noise, along the normals of a fit
+  // (calibrated, negative inside). Points of an ellipse whose both coordinates have noise lie
+  // outside of it by kappa sigma^2 / 2, kappa the curvature: noise along the contour leads away
+  // from it. In one photo that is little against the noise; over many frames, which average the
+  // noise out, it tilts small and steep ellipses by up to a standard deviation.
+  void RemoveCurvatureBias(const Eigen::Matrix3d& conic, double sigma_px);
+
   std::size_t size() const { return points_.size(); }  // Of those that were not left out.
   const std::vector<CalibratedPoint>& points() const { return points_; }  // Undistorted.
   const std::vector<Eigen::Vector2d>& pixels() const { return pixels_; }  // Of the same points.
   const Options& options() const { return options_; }  // As given; no distortion of a pinhole.
   void set_weight(double weight) { options_.weight = weight; }  // Options::weight.
+  // Keeps the points as the camera with these kCameraSize shifts has them: what is asked for with
+  // the same shifts then takes no undistortion, as it does with any others.
+  void SeeThrough(const double* camera);
   // Of the kCameraSize shifts these come first and have derivatives; those of the others are zero.
   int num_camera() const { return 4 + options_.num_distortion; }
 
@@ -115,19 +125,19 @@ class ImagePoints {
   }
 
  private:
-  CalibratedPoint At(std::size_t i, const Camera* shifted) const;
+  class View;
+  class ToConic;
+  CalibratedPoint Undistorted(std::size_t i, const Camera& shifted) const;
   CalibratedPoint Normalize(CalibratedPoint p) const;
-  CalibratedPoint NormalizedAt(std::size_t i, const Camera* shifted) const;
   bool IsOrthogonal(const Eigen::Matrix3d& conic, double* level) const;
-  template <typename Row>
-  void FillCameraColumns(std::size_t i, const CalibratedPoint& p, const Camera& camera, double r,
-                         const Eigen::Vector2d& by_pixel, Row* row, int first) const;
 
   Camera camera_;
   Options options_;
   std::vector<Eigen::Vector2d> pixels_;
   std::vector<CalibratedPoint> points_, normalized_;  // The latter about the points' middle.
-  std::vector<LensSlope> lens_;                       // By distortion coefficient.
+  std::vector<CalibratedPoint> seen_;                 // SeeThrough, and its shifts.
+  double seen_by_[kCameraSize] = {};
+  std::vector<LensSlope> lens_;                                  // By distortion coefficient.
   Eigen::Matrix3d normalization_ = Eigen::Matrix3d::Identity();  // Calibrated from normalised.
 };
 

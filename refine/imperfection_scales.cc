@@ -1,10 +1,9 @@
-#include "circline/refine/imperfection_scales.h"
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "circline/refine/linearization.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 namespace {
@@ -70,8 +69,7 @@ NoiseModel ScaledNoiseModel(const JointProblem& problem, const State& minimum) {
   const auto add = [&](int feature, int term, double deviations, std::vector<Misfit>* out) {
     const auto f = static_cast<std::size_t>(feature);
     if (minimum.active[f] == 0) return;
-    const double weight =
-        problem.terms()[static_cast<std::size_t>(term)].weighed->points()->options().weight;
+    const double weight = problem.term(term).weighed->points()->options().weight;
     const double dof = found[f].dof;
     out->push_back({std::min(found[f].d2, kMost * dof), dof, (1.0 + deviations) / weight - 1.0});
   };
@@ -83,7 +81,7 @@ NoiseModel ScaledNoiseModel(const JointProblem& problem, const State& minimum) {
     add(c.feature, c.term, deviations, &circles);
   }
   for (const JointProblem::LineBlocks& l : problem.lines()) {
-    const bool is_soft = problem.blocks()[static_cast<std::size_t>(l.line)].size > 1;
+    const bool is_soft = problem.block(l.line).size > 1;
     add(l.feature, l.term,
         is_soft ? PriorShare(at.OwnVariance(l.line, 1), model.line_direction_rad) : 0.0, &lines);
   }

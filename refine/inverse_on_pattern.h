@@ -5,6 +5,7 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -26,6 +27,13 @@ class InverseOnPattern {
     const auto& order = factor_.permutationP().indices();
     const int i = std::max(order[row], order[col]), j = std::min(order[row], order[col]);
     return i == j ? diagonal_[i] : inverse_.coeff(i, j);
+  }
+  // Of these rows and columns.
+  Eigen::MatrixXd operator()(const std::vector<int>& at) const {
+    const auto n = static_cast<Eigen::Index>(at.size());
+    return Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index i, Eigen::Index j) {
+      return (*this)(at[static_cast<std::size_t>(i)], at[static_cast<std::size_t>(j)]);
+    });
   }
   // To an entry of the pattern, and to the one that mirrors it.
   void Add(int row, int col, double value) {

@@ -35,17 +35,17 @@ int JointProblemBuilder::AddBlock(int size, std::vector<double> value,
   return static_cast<int>(p_.blocks_.size()) - 1;
 }
 
-int JointProblemBuilder::AddTerm(std::unique_ptr<ceres::CostFunction> cost, std::vector<int> blocks,
-                                 int feature, int group) {
-  p_.terms_.push_back({std::move(cost), std::move(blocks), feature, group, nullptr, nullptr});
+int JointProblemBuilder::AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature,
+                                 int group) {
+  p_.terms_.push_back({std::unique_ptr<ceres::CostFunction>(owned), std::move(blocks), feature,
+                       group, nullptr, nullptr});
   return static_cast<int>(p_.terms_.size()) - 1;
 }
 
 int JointProblemBuilder::AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks,
                                         int feature, int group) {
-  FeatureCost* weighed = cost.get();
-  const int term = AddTerm(std::unique_ptr<ceres::CostFunction>(std::move(cost)),
-                           WithCamera(std::move(blocks)), feature, group);
+  FeatureCost* weighed = cost.release();
+  const int term = AddTerm(weighed, WithCamera(std::move(blocks)), feature, group);
   p_.terms_.back().weighed = weighed;
   return term;
 }
@@ -63,11 +63,8 @@ std::vector<int> JointProblemBuilder::WithCamera(std::vector<int> blocks) const 
 std::optional<ImagePoints> JointProblemBuilder::Points(const std::vector<Eigen::Vector2d>& pixels,
                                                        const std::vector<std::uint8_t>& inliers,
                                                        double sigma_px, bool is_circle) const {
-  ImagePoints::Options options;
-  options.loss = (is_circle ? p_.options_.conic_loss : p_.options_.line_loss).type;
-  options.distance = p_.options_.conic_distance;
-  options.num_distortion = p_.camera_sigma_.k1 > 0.0 ? 1 : 0;
-  return EvidencePoints(obs_.camera, pixels, inliers, sigma_px, is_circle, model_, options);
+  return EvidencePoints(obs_.camera, pixels, inliers, sigma_px, is_circle, p_.options_,
+                        p_.camera_sigma_.k1 > 0.0 ? 1 : 0);
 }
 
 void JointProblemBuilder::Build() {
@@ -116,8 +113,7 @@ void JointProblemBuilder::AddCameraPrior(std::vector<double> sigmas) {
   const auto add = [this](const std::vector<double>& gaussian) {
     std::vector<double> mean(kCameraSize, 0.0);
     mean[0] = StatedLogFocal(obs_);
-    AddTerm(std::unique_ptr<ceres::CostFunction>(NewGaussianPrior(gaussian, mean)),
-            {JointProblem::kCamera});
+    AddTerm(NewGaussianPrior(gaussian, mean), {JointProblem::kCamera});
   };
   const double narrow = sigmas[0], wide = p_.camera_sigma_.doubtful_log_focal;
   if (wide > narrow) {
@@ -146,14 +142,11 @@ void JointProblemBuilder::AddAngle(std::size_t index) {
     }
     blocks[k] = direction->second;
   }
-  if (p_.blocks_[static_cast<std::size_t>(blocks[0])].is_constant &&
-      p_.blocks_[static_cast<std::size_t>(blocks[1])].is_constant) {
+  if (p_.block(blocks[0]).is_constant && p_.block(blocks[1]).is_constant) {
     p_.unused_.push_back(name + ": not used, both run along axes, which are orthogonal");
     return;
   }
-  AddTerm(std::unique_ptr<ceres::CostFunction>(
-              NewAngleCost(known.value, std::max(known.sigma, kExactAngle))),
-          {blocks[0], blocks[1]});
+  AddTerm(NewAngleCost(known.value, std::max(known.sigma, kExactAngle)), {blocks[0], blocks[1]});
 }
 
 void JointProblemBuilder::AddLength(std::size_t index) {
@@ -178,9 +171,7 @@ void JointProblemBuilder::AddLength(std::size_t index) {
   AddPoint(known.points[0], DrawnSigma(), a, f, group);
   AddPoint(known.points[1], DrawnSigma(), b, f, group);
   const double sigma = known.sigma > 0.0 ? known.sigma : model_.length;
-  AddTerm(std::unique_ptr<ceres::CostFunction>(
-              NewLengthCost(known.value, std::max(sigma, kExactLength))),
-          {a, b}, f, group);
+  AddTerm(NewLengthCost(known.value, std::max(sigma, kExactLength)), {a, b}, f, group);
   p_.lengths_.push_back({a, b, f, known.value});
   is_metric_ = true;
 }
@@ -221,28 +212,27 @@ void JointProblemBuilder::AddPriors() {
       covariance.bottomRightCorner<3, 3>() += kUnknown * kUnknown * more;
     }
     if (ceres::CostFunction* cost = NewPosePrior(prior.mean.rotation, mean, covariance)) {
-      p_.pose_priors_.push_back(AddTerm(std::unique_ptr<ceres::CostFunction>(cost),
-                                        {JointProblem::kRotation, JointProblem::kTranslation}));
+      p_.pose_priors_.push_back(
+          AddTerm(cost, {JointProblem::kRotation, JointProblem::kTranslation}));
       p_.x_is_fixed_ = true;
     }
   }
   if (p_.options_.gravity_prior) {
     const GravityPrior& prior = *p_.options_.gravity_prior;
-    p_.pose_priors_.push_back(AddTerm(std::unique_ptr<ceres::CostFunction>(NewDirectionMeasurement(
-                                          prior.in_world, prior.in_camera, prior.sigma_rad)),
-                                      {JointProblem::kRotation}));
+    p_.pose_priors_.push_back(
+        AddTerm(NewDirectionMeasurement(prior.in_world, prior.in_camera, prior.sigma_rad),
+                {JointProblem::kRotation}));
     constexpr double kAlongNormal = 1e-3;  // Then it does not tell the spin about it.
     p_.x_is_fixed_ = p_.x_is_fixed_ || prior.in_world.head<2>().norm() > kAlongNormal;
   }
 }
 
-JointProblem::JointProblem(const Observations& observations, const EstimationOptions& options,
-                           const PointNoise& noise)
+JointProblem::JointProblem(const Observations& observations, const EstimationOptions& options)
     : observations_(observations),
       options_(options),
       camera_sigma_(
           options.camera_sigma.value_or(options.noise_model.SigmaOf(observations.camera))) {
-  JointProblemBuilder(noise, this).Build();
+  JointProblemBuilder(this).Build();
 }
 
 }  // namespace circline

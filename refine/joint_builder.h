@@ -20,8 +20,8 @@ namespace circline {
 
 class JointProblemBuilder {
  public:
-  JointProblemBuilder(const PointNoise& noise, JointProblem* problem)
-      : p_(*problem), obs_(p_.observations_), model_(p_.options_.noise_model), noise_(noise) {}
+  explicit JointProblemBuilder(JointProblem* problem)
+      : p_(*problem), obs_(p_.observations_), model_(p_.options_.noise_model) {}
 
   void Build();
 
@@ -32,7 +32,7 @@ class JointProblemBuilder {
     const int size = static_cast<int>(value.size());
     return AddBlock(size, std::move(value), {}, true);
   }
-  int AddTerm(std::unique_ptr<ceres::CostFunction> cost, std::vector<int> blocks, int feature = -1,
+  int AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature = -1,
               int group = -1);
   int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature,
                      int group);
@@ -83,7 +83,6 @@ class JointProblemBuilder {
   JointProblem& p_;
   const Observations& obs_;
   const NoiseModel& model_;
-  const PointNoise& noise_;
   bool has_camera_ = false, is_metric_ = false;
   int origin_point_ = -1;  // Constant block (0, 0).
   std::string origin_circle_;

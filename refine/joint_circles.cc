@@ -50,7 +50,7 @@ void JointProblemBuilder::AddPoint(const Eigen::Vector2d& pixel, double sigma_px
                                    int feature, int group) {
   CalibratedPoint unused;
   if (!PixelToCalibrated(obs_.camera, pixel, &unused)) {
-    p_.unused_.push_back(p_.features_[static_cast<std::size_t>(feature)].name +
+    p_.unused_.push_back(p_.feature(feature).name +
                          ": not used, it lies where the camera model cannot undistort it");
     return;
   }
@@ -86,8 +86,8 @@ int JointProblemBuilder::RadiusBlock(const CircleObservation& circle, int featur
   const int block =
       AddBlock(1, {known ? circle.radius : 1.0}, {}, known && !(sigma > 0.0), grouped ? -1 : group);
   if (known && sigma > 0.0) {
-    AddTerm(std::unique_ptr<ceres::CostFunction>(NewLogPrior(circle.radius, sigma)), {block},
-            grouped ? -1 : feature, grouped ? -1 : group);
+    AddTerm(NewLogPrior(circle.radius, sigma), {block}, grouped ? -1 : feature,
+            grouped ? -1 : group);
   }
   if (grouped) radius_groups_[circle.radius_group] = block;
   return block;
@@ -100,8 +100,7 @@ int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
   int& block = offsets_[contrast];
   if (block < 0 && (num_circles_[contrast] > 1 || circle.radius > 0.0)) {
     block = AddBlock(1, {0.0});
-    AddTerm(std::unique_ptr<ceres::CostFunction>(NewGaussianPrior({model_.contour_offset_px})),
-            {block});
+    AddTerm(NewGaussianPrior({model_.contour_offset_px}), {block});
     p_.terms_.back().loss = std::make_unique<MostlyExact>();
   }
   return block;
@@ -110,9 +109,7 @@ int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
 void JointProblemBuilder::AddCircle(std::size_t index) {
   const CircleObservation& circle = obs_.circles[index];
   if (!InPlane(circle)) return;
-  const double stated = circle.sigma_px > 0.0 ? circle.sigma_px : p_.options_.conic_loss.scale_px;
-  std::optional<ImagePoints> points =
-      Points(circle.points, circle.inliers, stated > 0.0 ? stated : noise_.circles[index], true);
+  std::optional<ImagePoints> points = Points(circle.points, circle.inliers, circle.sigma_px, true);
   if (!points) return;
   Feature feature{Feature::Kind::kCircle, circle.id, "circle '" + circle.id + "'"};
   feature.dof = circle.radius > 0.0 ? 3 : 2;
@@ -156,7 +153,7 @@ void JointProblemBuilder::AddMark(const CircleObservation& circle, const ImagePo
 void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size_t index,
                                       int center, int group, int feature) {
   const Segment& segment = circle.diameters[index];
-  const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : DrawnSigma();
+  const double sigma = circle.sigma_px;
   std::optional<ImagePoints> points = Points({segment[0], segment[1]}, {}, sigma, false);
   LineFit fit;
   if (!points || !FitLine(points->points(), sigma, &fit).ok()) return;

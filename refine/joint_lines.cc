@@ -74,10 +74,9 @@ int JointProblemBuilder::DirectionBlock(std::size_t index) {
   tie.dof = is_free ? 1 : 2;
   tie.observation = static_cast<int>(index);
   const int feature = AddFeature(tie);
-  AddTerm(std::unique_ptr<ceres::CostFunction>(
-              is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma)
-                      : NewDirectionPrior(axis, sigma)),
-          {block}, feature);
+  AddTerm(
+      is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma) : NewDirectionPrior(axis, sigma),
+      {block}, feature);
   p_.terms_.back().loss = std::make_unique<MostlyExact>();
   if (!is_free) p_.terms_.back().lean_shape = LeanShape(pencil);
   return block;
@@ -98,9 +97,7 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
                     "pencil '" + pencil.id + "', line " + std::to_string(j)};
     feature.observation = static_cast<int>(index);
     feature.line = static_cast<int>(j);
-    const double own = LineSigma(pencil, line);
-    const double stated = own > 0.0 ? own : p_.options_.line_loss.scale_px;
-    const double sigma = stated > 0.0 ? stated : noise_.lines[index][j];
+    const double sigma = LineSigma(pencil, line);
     const int axis = AxisOfLine(index, j);
     if (axis >= 0) {
       AddAxisLine(line, sigma, axis, feature.id, feature.name);

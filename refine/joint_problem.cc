@@ -9,6 +9,13 @@
 
 namespace circline {
 
+BlockMatrix PlusJacobianOf(const ceres::Manifold& manifold, const double* at) {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kCameraSize, kCameraSize>
+      J(manifold.AmbientSize(), manifold.TangentSize());
+  manifold.PlusJacobian(at, J.data());
+  return J;
+}
+
 std::vector<std::uint8_t> JointProblem::FirstReading() const {
   std::vector<std::uint8_t> reading(features_.size(), 1);
   for (std::size_t i = 0; i < features_.size(); ++i) {
@@ -24,25 +31,30 @@ std::vector<std::uint8_t> JointProblem::FirstReading() const {
 }
 
 bool JointProblem::IsActive(const Term& term, const State& state) const {
-  for (int f = term.feature; f >= 0; f = features_[static_cast<std::size_t>(f)].parent) {
-    if (state.active[static_cast<std::size_t>(f)] == 0) return false;
+  for (int f = term.feature; f >= 0; f = feature(f).parent) {
+    if (!state.Has(f)) return false;
   }
   return true;
 }
 
+void JointProblem::SeeThrough(const State& state) const {
+  const double* camera = At(kCamera, state);
+  for (const Term& term : terms_) {
+    if (camera_is_estimated_ && term.weighed != nullptr && IsActive(term, state))
+      term.weighed->SeeThrough(camera);
+  }
+}
+
 void JointProblem::Parameters(const Term& term, const State& state, const double** out) const {
-  for (std::size_t k = 0; k < term.blocks.size(); ++k)
-    out[k] = state.x.data() + blocks_[static_cast<std::size_t>(term.blocks[k])].offset;
+  for (std::size_t k = 0; k < term.blocks.size(); ++k) out[k] = At(term.blocks[k], state);
 }
 
 bool JointProblem::IsMetric(const State& state) const {
-  const auto is_active = [&](int f) { return state.active[static_cast<std::size_t>(f)] != 0; };
-  return std::any_of(
-             circles_.begin(), circles_.end(),
-             [&](const CircleBlocks& c) {
-               return is_active(c.feature) &&
-                      observations_.circles[static_cast<std::size_t>(c.observation)].radius > 0.0;
-             }) ||
+  const auto is_active = [&](int f) { return state.Has(f); };
+  return std::any_of(circles_.begin(), circles_.end(),
+                     [&](const CircleBlocks& c) {
+                       return is_active(c.feature) && ObservationOf(c).radius > 0.0;
+                     }) ||
          std::any_of(lengths_.begin(), lengths_.end(),
                      [&](const LengthBlocks& l) { return is_active(l.feature); });
 }
@@ -52,23 +64,16 @@ bool JointProblem::OriginIsPlaced(const State& state) const {
   const int block = circles_[static_cast<std::size_t>(center_at_origin_)].center;
   return observations_.frame.origin ||
          std::any_of(circles_.begin(), circles_.end(), [&](const CircleBlocks& c) {
-           return c.center == block && state.active[static_cast<std::size_t>(c.feature)] != 0;
+           return c.center == block && state.Has(c.feature);
          });
 }
 
 double JointProblem::TwiceCost(const Term& term, const State& state,
                                const Weighing& weighing) const {
-  constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
-  double residuals[kMaxResiduals];
   const double* parameters[8];
   Parameters(term, state, parameters);
-  const bool evaluated = term.weighed != nullptr
-                             ? term.weighed->EvaluateWith(weighing, parameters, residuals, nullptr)
-                             : term.cost->Evaluate(parameters, residuals, nullptr);
-  if (!evaluated) return std::numeric_limits<double>::infinity();
-  double rho[3] = {0.0, 0.0, 0.0};
-  for (int i = 0; i < term.cost->num_residuals(); ++i) rho[0] += residuals[i] * residuals[i];
-  if (term.loss != nullptr) term.loss->Evaluate(rho[0], rho);
+  double rho[3] = {TwiceCostOf(*term.cost, term.weighed, weighing, parameters), 0.0, 0.0};
+  if (term.loss != nullptr && std::isfinite(rho[0])) term.loss->Evaluate(rho[0], rho);
   return rho[0];
 }
 
@@ -89,9 +94,8 @@ double JointProblem::Cost(const State& state, const Weighing& weighing) const {
 
 CameraPose JointProblem::PoseAt(const State& state) const {
   CameraPose pose;
-  pose.rotation = RotationFromBlock(state.x.data() + blocks_[kRotation].offset);
-  pose.translation =
-      Eigen::Map<const Eigen::Vector3d>(state.x.data() + blocks_[kTranslation].offset);
+  pose.rotation = RotationFromBlock(At(kRotation, state));
+  pose.translation = Eigen::Map<const Eigen::Vector3d>(At(kTranslation, state));
   return pose;
 }
 

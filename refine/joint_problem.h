@@ -23,13 +23,19 @@
 #include <vector>
 
 #include "circline/estimators/observations.h"
-#include "circline/estimators/point_noise.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
 #include "circline/refine/cost_functions.h"
 #include "circline/refine/estimate_pose.h"
 
 namespace circline {
+
+// Matrices of one block do not allocate.
+using BlockMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCameraSize, kCameraSize>;
+using BlockVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCameraSize, 1>;
+
+BlockMatrix PlusJacobianOf(const ceres::Manifold& manifold, const double* at);
 
 // One parameter block.
 struct Block {
@@ -40,6 +46,10 @@ struct Block {
 
   int tangent_size() const {
     return is_constant ? 0 : manifold != nullptr ? manifold->TangentSize() : size;
+  }
+  // Of its manifold, constant or not: ambient by tangent size.
+  BlockMatrix PlusJacobian(const double* at) const {
+    return manifold != nullptr ? PlusJacobianOf(*manifold, at) : BlockMatrix::Identity(size, size);
   }
 };
 
@@ -78,6 +88,8 @@ struct State {
   std::vector<double> x;             // All parameter blocks.
   std::vector<std::uint8_t> active;  // By feature.
   double cost = 0.0;                 // Of the active terms, priors included.
+
+  bool Has(int feature) const { return active[static_cast<std::size_t>(feature)] != 0; }
 };
 
 // A minimum that has been found. Another competes where it costs no more than so much above it.
@@ -88,10 +100,10 @@ struct Rival {
 
 class JointProblem {
  public:
-  // `observations` fitted and resolved (ResolveWorld); they and the options outlive this. Features
-  // without a fit, of other planes, or without any tie to the world frame take no part.
-  JointProblem(const Observations& observations, const EstimationOptions& options,
-               const PointNoise& noise);
+  // `observations` fitted and resolved (ResolveWorld), each feature with its noise (StateNoise);
+  // they and the options outlive this. Features without a fit, of other planes, or without any tie
+  // to the world frame take no part.
+  JointProblem(const Observations& observations, const EstimationOptions& options);
 
   // All unknowns at a seed: its rotation and plane, circles by their points in that plane, the rest
   // by its own fits. Features that cannot lie in that plane in front of the camera are made
@@ -113,9 +125,7 @@ class JointProblem {
   // Infinity where it cannot be evaluated.
   double Cost(const State& state, const Weighing& weighing = Weighing()) const;
   CameraPose PoseAt(const State& state) const;
-  double LogFocalAt(const State& state) const {
-    return state.x[static_cast<std::size_t>(blocks_[kCamera].offset)];
-  }
+  double LogFocalAt(const State& state) const { return *At(kCamera, state); }
   // Share of the contours' and lines' points within their gate.
   double InlierShare(const State& state) const;
 
@@ -124,11 +134,20 @@ class JointProblem {
   const std::vector<Block>& blocks() const { return blocks_; }
   const std::vector<Term>& terms() const { return terms_; }
   const std::vector<Feature>& features() const { return features_; }
+  const Block& block(int i) const { return blocks_[static_cast<std::size_t>(i)]; }
+  const Term& term(int i) const { return terms_[static_cast<std::size_t>(i)]; }
+  const Feature& feature(int i) const { return features_[static_cast<std::size_t>(i)]; }
+  // A block's values.
+  const double* At(int i, const State& state) const { return state.x.data() + block(i).offset; }
+  double* At(int i, State* state) const { return state->x.data() + block(i).offset; }
   // Features that a fit has not found to contradict their like.
   std::vector<std::uint8_t> FirstReading() const;
   // What the observations say that has no part in the problem, and why, a sentence each.
   const std::vector<std::string>& unused() const { return unused_; }
 
+  // Undistorts the points as the camera of this state has them, where it is estimated: for all that
+  // is asked of that camera until the next call.
+  void SeeThrough(const State& state) const;
   bool IsActive(const Term& term, const State& state) const;
   void Parameters(const Term& term, const State& state, const double** out) const;
   bool IsMetric(const State& state) const;
@@ -144,6 +163,9 @@ class JointProblem {
   struct CircleBlocks {
     int observation, feature, term, center, radius, tilt;
   };
+  const CircleObservation& ObservationOf(const CircleBlocks& circle) const {
+    return observations_.circles[static_cast<std::size_t>(circle.observation)];
+  }
   // Pencil of a direction (observation -1: an axis drawn alone), and its lines.
   struct PencilBlocks {
     int observation, direction;

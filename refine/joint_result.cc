@@ -34,7 +34,7 @@ template <typename Visit>
 void ForEachPoint(const JointProblem& problem, const State& state, const Visit& visit) {
   const double* parameters[8];
   for (const JointProblem::PointBlocks& p : problem.points()) {
-    const Term& term = problem.terms()[static_cast<std::size_t>(p.term)];
+    const Term& term = problem.term(p.term);
     if (!problem.IsActive(term, state)) continue;
     problem.Parameters(term, state, parameters);
     const auto& cost = static_cast<const PlanePointCost&>(*term.cost);
@@ -56,8 +56,7 @@ double CountInliers(const JointProblem& problem, const State& state, PoseHypothe
   double squares = 0.0, slopes = 0.0, inliers = 0.0, points = 0.0, unknowns = 3.0;
   ForEachCurve(problem, state,
                [&](int f, const ImagePoints& set, const std::vector<double>& distances) {
-                 const bool is_circle =
-                     problem.features()[static_cast<std::size_t>(f)].kind == Feature::Kind::kCircle;
+                 const bool is_circle = problem.feature(f).kind == Feature::Kind::kCircle;
                  unknowns += is_circle ? 3.0 : 1.0;
                  points += static_cast<double>(distances.size());
                  for (const double d : distances) {
@@ -99,12 +98,7 @@ Eigen::MatrixXd PoseFromCore(const JointProblem& problem, const State& state,
   T.block(0, at.column(JointProblem::kRotation), 3, turns) = pose.rotation.leftCols(turns);
   const Block& t = blocks[JointProblem::kTranslation];
   if (t.tangent_size() == 0) return T;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> J =
-      Eigen::Matrix3d::Identity();
-  if (t.manifold != nullptr) {
-    J.resize(3, t.tangent_size());
-    t.manifold->PlusJacobian(state.x.data() + t.offset, J.data());
-  }
+  const BlockMatrix J = t.PlusJacobian(state.x.data() + t.offset);
   // A direction has no length.
   const Eigen::Vector3d direction = pose.translation.normalized();
   Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
@@ -142,28 +136,15 @@ double UnitOf(const JointProblem& problem, const State& state) {
 void FillCircles(const JointProblem& problem, const State& state, Refined* refined) {
   const double unit = UnitOf(problem, state);
   const CameraPose pose = problem.PoseAt(state);
-  const double* camera = state.x.data() + problem.blocks()[JointProblem::kCamera].offset;
+  const double* camera = problem.At(JointProblem::kCamera, state);
   const Camera shifted = ShiftedCamera(problem.observations().camera, camera);
-  const auto at = [&](int block) {
-    return state.x.data() + problem.blocks()[static_cast<std::size_t>(block)].offset;
-  };
+  const auto at = [&](int block) { return problem.At(block, state); };
   for (const JointProblem::CircleBlocks& c : problem.circles()) {
-    const double radius = at(c.radius)[0];
-    if (state.active[static_cast<std::size_t>(c.feature)] == 0) continue;
+    if (!state.Has(c.feature)) continue;
     CircleEstimate estimate;
-    estimate.id = problem.observations().circles[static_cast<std::size_t>(c.observation)].id;
-    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ(),
-                    center(at(c.center)[0], at(c.center)[1], 0.0);
-    if (c.tilt >= 0) {
-      normal.head<2>() = Eigen::Vector2d(at(c.tilt)[0], at(c.tilt)[1]);
-      center.z() = at(c.tilt)[2] * radius;
-    }
-    const Eigen::Vector3d in_camera = pose.rotation * center + pose.translation;
-    estimate.normal = (pose.rotation * normal).normalized();
-    if (estimate.normal.dot(in_camera) > 0.0) estimate.normal = -estimate.normal;
-    estimate.center = unit * in_camera;
-    estimate.radius = unit * std::abs(radius);
-    CameraToPixel(shifted, in_camera, &estimate.center_px);
+    estimate.id = problem.ObservationOf(c).id;
+    const double* tilt = c.tilt >= 0 ? at(c.tilt) : nullptr;
+    PlaceEstimate({at(c.center), at(c.radius)[0], tilt}, pose, unit, shifted, &estimate);
     refined->hypothesis.circles.push_back(estimate);
   }
 }
@@ -190,15 +171,13 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
     estimate.id = pencil.id;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
     if (blocks != all.end() && blocks->observation == static_cast<int>(i)) {
-      const Block& block = problem.blocks()[static_cast<std::size_t>(blocks->direction)];
+      const Block& block = problem.block(blocks->direction);
       estimate.direction =
           R * Eigen::Map<const Eigen::Vector3d>(state.x.data() + block.offset).normalized();
       Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * turns;
       std::vector<int> columns = rotation;
       if (at.column(blocks->direction) >= 0) {
-        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> plus(
-            3, block.tangent_size());
-        block.manifold->PlusJacobian(state.x.data() + block.offset, plus.data());
+        const BlockMatrix plus = block.PlusJacobian(state.x.data() + block.offset);
         J.conservativeResize(3, J.cols() + plus.cols());
         J.rightCols(plus.cols()) = R * plus;
         for (int k = 0; k < block.tangent_size(); ++k)
@@ -215,8 +194,7 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
     } else {
       continue;
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-    estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
+    estimate.sigma_deg = LargestSigmaDeg(covariance);
     h->pencils.push_back(estimate);
   }
 }
@@ -265,8 +243,7 @@ void FillFocal(const JointProblem& problem, const State& state, const Linearizat
   PoseHypothesis* h = &refined->hypothesis;
   // The manifold leaves out what is held; the focal length comes first.
   const int column = at.column(JointProblem::kCamera);
-  const double* shifts =
-      state.x.data() + problem.blocks()[static_cast<std::size_t>(JointProblem::kCamera)].offset;
+  const double* shifts = problem.At(JointProblem::kCamera, state);
   h->camera = ShiftedCamera(problem.observations().camera, shifts);
   h->focal_scale = std::exp(shifts[0]);
   h->focal_sigma = h->focal_scale * std::sqrt(std::max(0.0, at.covariance()(column, column)));
@@ -295,8 +272,7 @@ void FillFocal(const JointProblem& problem, const State& state, const Linearizat
 void FillLeftOut(const JointProblem& problem, const State& state, Refined* refined) {
   for (std::size_t i = 0; i < problem.features().size(); ++i) {
     const Feature& f = problem.features()[i];
-    const bool parent_is_out =
-        f.parent >= 0 && state.active[static_cast<std::size_t>(f.parent)] == 0;
+    const bool parent_is_out = f.parent >= 0 && !state.Has(f.parent);
     if (state.active[i] != 0 || parent_is_out) continue;
     refined->hypothesis.left_out.push_back(f.id);
     refined->notes.push_back(f.name + ": left out, it contradicts the pose found");
@@ -323,14 +299,29 @@ double LogDet(const JointProblem& problem, const Linearization& at) {
 
 }  // namespace
 
+void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double unit,
+                   const Camera& camera, CircleEstimate* estimate) {
+  const Eigen::Vector3d in_camera = pose.rotation * circle.center + pose.translation;
+  estimate->normal = (pose.rotation * circle.normal).normalized();
+  if (estimate->normal.dot(in_camera) > 0.0) estimate->normal = -estimate->normal;
+  estimate->center = unit * in_camera;
+  estimate->radius = unit * std::abs(circle.radius);
+  estimate->center_px.setZero();
+  CameraToPixel(camera, in_camera, &estimate->center_px);
+}
+
+double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
+}
+
 bool DropOutliers(const JointProblem& problem, State* state) {
   std::vector<int> dropped;
   ForEachCurve(problem, *state,
                [&](int f, const ImagePoints& points, const std::vector<double>& distances) {
                  const auto inliers = std::count_if(distances.begin(), distances.end(),
                                                     [&](double d) { return IsInlier(d, points); });
-                 const bool is_circle =
-                     problem.features()[static_cast<std::size_t>(f)].kind == Feature::Kind::kCircle;
+                 const bool is_circle = problem.feature(f).kind == Feature::Kind::kCircle;
                  if (inliers < (is_circle ? 5 : 2)) dropped.push_back(f);
                });
   ForEachPoint(problem, *state, [&](int f, const PlanePointCost& cost, double miss) {
@@ -355,6 +346,7 @@ double JointProblem::InlierShare(const State& state) const {
 Status FillRefined(const JointProblem& problem, State state, Refined* refined) {
   *refined = Refined();
   PoseHypothesis* h = &refined->hypothesis;
+  problem.SeeThrough(state);
   const double inflation = CountInliers(problem, state, h);
   h->cost = problem.Cost(state) + LeftOutCost(problem, state);
   Linearization at(problem, state, Weighing{true, kInlierSigmas, 1.0 / inflation});

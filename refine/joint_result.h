@@ -9,6 +9,7 @@
 
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
+#include "circline/refine/block_chain.h"
 #include "circline/refine/joint_problem.h"
 
 namespace circline {
@@ -22,6 +23,14 @@ struct Refined {
   State state;
   std::vector<std::string> notes;  // What was left out, and why.
 };
+
+// Where a circle of the world's plane lies in the camera frame, its lengths times `unit`; nothing
+// else of the estimate.
+void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double unit,
+                   const Camera& camera, CircleEstimate* estimate);
+
+// Standard deviation of a direction of this covariance, the larger of two components, degrees.
+double LargestSigmaDeg(const Eigen::Matrix3d& covariance);
 
 // Fills everything but the probability from a minimum. Not ok: no feature has inliers, or some
 // number is not finite.

@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "circline/refine/block_chain.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/nearby_solve.h"
 
@@ -17,13 +18,15 @@ namespace {
 
 // Losses that start wide and narrow to their own width after every few steps (graduated
 // non-convexity; Black and Rangarajan 1996), all within one call of ceres: it asks for the cost and
-// the derivatives where a step has led, and gets them under the next width.
+// the derivatives where a step has led, and gets them under the next width; and points that are
+// undistorted once for both.
 class Narrowing : public ceres::EvaluationCallback {
  public:
   using Set = std::function<void(const Weighing&)>;
-  // `widths`: tuning constants, in those of the losses, one after the other.
-  Narrowing(const Set& set, const std::vector<double>& widths, int steps)
-      : set_(set), widths_(widths), steps_each_(steps) {
+  // `widths`: tuning constants, in those of the losses, one after the other. `see` undistorts.
+  Narrowing(const Set& set, const std::function<void()>& see, const std::vector<double>& widths,
+            int steps)
+      : set_(set), see_(see), widths_(widths), steps_each_(steps) {
     Apply();
   }
   ~Narrowing() override { set_(Weighing()); }
@@ -37,6 +40,7 @@ class Narrowing : public ceres::EvaluationCallback {
     Apply();
   }
   void PrepareForEvaluation(bool jacobians, bool is_new_point) override {
+    if (is_new_point) see_();
     const bool has_stepped = jacobians && !is_new_point;
     if (is_wide() && has_stepped && ++steps_ == steps_each_) Narrow();
   }
@@ -51,6 +55,7 @@ class Narrowing : public ceres::EvaluationCallback {
   }
 
   const Set& set_;
+  const std::function<void()>& see_;
   const std::vector<double>& widths_;
   int steps_each_;
   std::size_t next_ = 0;
@@ -127,9 +132,10 @@ Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_i
   };
   // A wide loss is nearly that of least squares, of which one step comes near enough for the next
   // width; not one that is bounded, and soon flat.
-  Narrowing losses(set_weighing, widths, HasBoundedLoss(options_) ? 2 : 1);
+  const std::function<void()> see = [this, state] { SeeThrough(*state); };
+  Narrowing losses(set_weighing, see, widths, HasBoundedLoss(options_) ? 2 : 1);
   ceres::Problem::Options of_problem = OwnsNothing();
-  if (losses.is_wide()) of_problem.evaluation_callback = &losses;
+  if (losses.is_wide() || camera_is_estimated_) of_problem.evaluation_callback = &losses;
   ceres::Problem problem(of_problem);
   std::vector<double*> blocks;
   std::vector<std::uint8_t> added(blocks_.size(), 0);
@@ -180,16 +186,12 @@ Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_i
 
 // Of all features, root mean square over its points, standard deviations.
 double JointProblem::LargestMiss(const State& state) const {
-  constexpr double kNoLoss = 1e4;  // So wide a loss is none.
-  Weighing weighing;
-  weighing.stretch = kNoLoss;
   double most = 0.0;
+  const double* parameters[8];
   for (const Term& term : terms_) {
     if (term.weighed == nullptr || !IsActive(term, state)) continue;
-    const ImagePoints* points = term.weighed->points();
-    const double num_points =
-        points != nullptr ? points->options().weight * static_cast<double>(points->size()) : 1.0;
-    most = std::max(most, TwiceCost(term, state, weighing) / std::max(1.0, num_points));
+    Parameters(term, state, parameters);
+    most = std::max(most, MeanSquareOf(*term.weighed, parameters));
   }
   return std::sqrt(most);
 }

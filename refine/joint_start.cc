@@ -8,9 +8,11 @@
 #include <vector>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/metrology.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/plane_circle.h"
+#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {
@@ -24,14 +26,9 @@ Eigen::Vector3d Refocused(const Eigen::Vector3d& ray, double log_focal) {
 }  // namespace
 
 bool JointProblem::PlanePoint(const State& state, const Eigen::Vector3d& ray, double* xy) const {
-  const CameraPose pose = PoseAt(state);
-  const Eigen::Vector3d n = pose.rotation.col(2);
-  const double along = n.dot(ray), distance = n.dot(pose.translation);
-  constexpr double kHorizon = 1e-9;
-  if (!(along * distance > kHorizon * std::abs(distance) * ray.norm())) return false;
-  const Eigen::Vector3d X = pose.rotation.transpose() * (distance / along * ray - pose.translation);
-  xy[0] = X.x();
-  xy[1] = X.y();
+  Eigen::Vector2d point;
+  if (!PointOnPlane(PoseAt(state), ray, &point)) return false;
+  std::copy(point.data(), point.data() + 2, xy);
   return true;
 }
 
@@ -49,26 +46,15 @@ bool JointProblem::Ray(const Eigen::Vector2d& pixel, const double* camera,
 bool JointProblem::PlaceCircle(const CircleBlocks& c, const double* camera, State* state,
                                Eigen::Vector3d* circle) const {
   const CameraPose pose = PoseAt(*state);
-  const Eigen::Vector3d n = pose.rotation.col(2);
-  const double distance = n.dot(pose.translation);
-  std::vector<Eigen::Vector2d> in_plane;
-  const ImagePoints& points = *terms_[static_cast<std::size_t>(c.term)].weighed->points();
-  for (const CalibratedPoint& p : points.points()) {
-    const Eigen::Vector3d ray = Refocused(p.Homogeneous(), camera[0]);
-    const double depth = distance / n.dot(ray);
-    if (!(depth > 0.0) || !std::isfinite(depth)) return false;
-    const Eigen::Vector3d X = pose.rotation.transpose() * (depth * ray - pose.translation);
-    in_plane.emplace_back(X.x(), X.y());
-  }
-  if (!FitPlaneCircle(in_plane, circle)) return false;
+  const ImagePoints& points = *term(c.term).weighed->points();
+  if (!FitPlaneCircle(points.points(), camera[0], pose, circle)) return false;
   const Eigen::Vector3d center(circle->x(), circle->y(), 0.0);
   if (!((pose.rotation * center + pose.translation).z() > 0.0)) return false;
-  const Block& center_block = blocks_[static_cast<std::size_t>(c.center)];
+  const Block& center_block = block(c.center);
   if (!center_block.is_constant)
     std::copy(circle->data(), circle->data() + 2, state->x.data() + center_block.offset);
-  if (!(observations_.circles[static_cast<std::size_t>(c.observation)].radius > 0.0))
-    state->x[static_cast<std::size_t>(blocks_[static_cast<std::size_t>(c.radius)].offset)] =
-        circle->z();
+  if (!(ObservationOf(c).radius > 0.0))
+    state->x[static_cast<std::size_t>(block(c.radius).offset)] = circle->z();
   return true;
 }
 
@@ -88,7 +74,7 @@ JointProblem::Placed JointProblem::PlaceCircles(const double* camera, State* sta
         center_at_origin_ >= 0 &&
         c.center == circles_[static_cast<std::size_t>(center_at_origin_)].center;
     if (is_at_origin && !placed.origin) placed.origin = circle.head<2>();
-    const double known = observations_.circles[static_cast<std::size_t>(c.observation)].radius;
+    const double known = ObservationOf(c).radius;
     if (known > 0.0) placed.scales.push_back(known / circle.z());
   }
   return placed;
@@ -114,7 +100,7 @@ bool JointProblem::PlaceOrigin(const Placed& placed, const double* camera, State
     if (!seen || !PlanePoint(*state, ray, xy)) return false;
   }
   const Eigen::Matrix3d R = PoseAt(*state).rotation;
-  Eigen::Map<Eigen::Vector3d> t(state->x.data() + blocks_[kTranslation].offset);
+  Eigen::Map<Eigen::Vector3d> t(At(kTranslation, state));
   t += R * Eigen::Vector3d(xy[0], xy[1], 0.0);
   std::vector<std::uint8_t> moved(blocks_.size(), 0);
   for (const CircleBlocks& c : circles_) {
@@ -133,29 +119,21 @@ void JointProblem::PlaceScale(Placed placed, const double* camera, State* state)
   for (const LengthBlocks& l : lengths_) {
     Eigen::Vector3d ray;
     bool is_seen = true;
-    double* ends[2] = {state->x.data() + blocks_[static_cast<std::size_t>(l.a)].offset,
-                       state->x.data() + blocks_[static_cast<std::size_t>(l.b)].offset};
-    const Segment& pixels = observations_
-                                .known_lengths[static_cast<std::size_t>(
-                                    features_[static_cast<std::size_t>(l.feature)].observation)]
-                                .points;
+    double* ends[2] = {At(l.a, state), At(l.b, state)};
+    const Segment& pixels =
+        observations_.known_lengths[static_cast<std::size_t>(feature(l.feature).observation)]
+            .points;
     for (std::size_t k = 0; k < 2; ++k)
       is_seen = Ray(pixels[k], camera, &ray) && PlanePoint(*state, ray, ends[k]) && is_seen;
     const double length = std::hypot(ends[0][0] - ends[1][0], ends[0][1] - ends[1][1]);
     if (!is_seen || !(length > 0.0)) {
       state->active[static_cast<std::size_t>(l.feature)] = 0;
-    } else if (state->active[static_cast<std::size_t>(l.feature)] != 0) {
+    } else if (state->Has(l.feature)) {
       placed.scales.push_back(l.length / length);
     }
   }
-  Eigen::Map<Eigen::Vector3d> t(state->x.data() + blocks_[kTranslation].offset);
-  double scale = 1.0 / t.norm();
-  if (!placed.scales.empty()) {
-    const auto middle =
-        placed.scales.begin() + static_cast<std::ptrdiff_t>(placed.scales.size() / 2);
-    std::nth_element(placed.scales.begin(), middle, placed.scales.end());
-    scale = *middle;
-  }
+  Eigen::Map<Eigen::Vector3d> t(At(kTranslation, state));
+  const double scale = placed.scales.empty() ? 1.0 / t.norm() : Median(std::move(placed.scales));
   t *= scale;
   std::vector<std::uint8_t> scaled(blocks_.size(), 0);
   const auto apply = [&](int index) {
@@ -167,8 +145,7 @@ void JointProblem::PlaceScale(Placed placed, const double* camera, State* state)
   };
   for (const CircleBlocks& c : circles_) {
     apply(c.center);
-    if (!(observations_.circles[static_cast<std::size_t>(c.observation)].radius > 0.0))
-      apply(c.radius);
+    if (!(ObservationOf(c).radius > 0.0)) apply(c.radius);
   }
   for (const LengthBlocks& l : lengths_) {
     apply(l.a);
@@ -177,10 +154,10 @@ void JointProblem::PlaceScale(Placed placed, const double* camera, State* state)
 }
 
 bool JointProblem::PlaceLine(const LineBlocks& l, State* state) const {
-  const Term& term = terms_[static_cast<std::size_t>(l.term)];
+  const Term& term = this->term(l.term);
   const double* parameters[8];
   Parameters(term, *state, parameters);
-  double* line = state->x.data() + blocks_[static_cast<std::size_t>(l.line)].offset;
+  double* line = At(l.line, state);
   return static_cast<const DirectionLineCost&>(*term.cost).Start(parameters, line);
 }
 
@@ -194,17 +171,17 @@ bool JointProblem::Admit(std::size_t feature, State* state) const {
   const auto circle = std::find_if(circles_.begin(), circles_.end(), is_it);
   if (circle == circles_.end()) return false;
   const std::vector<double> before = state->x;
-  const double* camera = state->x.data() + blocks_[kCamera].offset;
+  const double* camera = At(kCamera, state);
   Eigen::Vector3d unused;
   if (!PlaceCircle(*circle, camera, state, &unused)) return false;
   // What it shares with circles that take part stays where these have it.
   for (int CircleBlocks::*const block : {&CircleBlocks::center, &CircleBlocks::radius}) {
     const bool is_shared = std::any_of(circles_.begin(), circles_.end(), [&](const auto& other) {
       return other.feature != circle->feature && other.*block == (*circle).*block &&
-             state->active[static_cast<std::size_t>(other.feature)] != 0;
+             state->Has(other.feature);
     });
     if (!is_shared) continue;
-    const Block& shared = blocks_[static_cast<std::size_t>((*circle).*block)];
+    const Block& shared = this->block((*circle).*block);
     std::copy_n(before.begin() + shared.offset, shared.size, state->x.begin() + shared.offset);
   }
   return true;
@@ -226,15 +203,14 @@ void JointProblem::PlaceLines(const double* camera, State* state) const {
     d.z() = 0.0;
     if (!(d.norm() > 0.0)) continue;
     d.normalize();
-    std::copy(d.data(), d.data() + 3,
-              state->x.data() + blocks_[static_cast<std::size_t>(p.direction)].offset);
+    std::copy(d.data(), d.data() + 3, At(p.direction, state));
   }
   for (const LineBlocks& l : lines_) {
     std::uint8_t& is_active = state->active[static_cast<std::size_t>(l.feature)];
     if (is_active != 0 && !PlaceLine(l, state)) is_active = 0;
   }
   for (const PlaneLineBlocks& l : plane_lines_) {
-    const Block& angle = blocks_[static_cast<std::size_t>(l.angle)];
+    const Block& angle = block(l.angle);
     if (angle.is_constant) continue;
     const double grow = std::exp(camera[0]);
     const Eigen::Vector3d line(grow * l.fit.x(), grow * l.fit.y(), l.fit.z());
@@ -261,7 +237,7 @@ Eigen::Matrix3d JointProblem::SenseOfPriors(const CameraPose& seed) const {
       const double* parameters[2] = {q.coeffs().data(), seed.translation.data()};
       double cost = 0.0, r[6];
       for (const int index : pose_priors_) {
-        const ceres::CostFunction& prior = *terms_[static_cast<std::size_t>(index)].cost;
+        const ceres::CostFunction& prior = *term(index).cost;
         if (!prior.Evaluate(parameters, r, nullptr)) return seed.rotation;
         cost += Eigen::Map<const Eigen::VectorXd>(r, prior.num_residuals()).squaredNorm();
       }
@@ -282,10 +258,11 @@ Status JointProblem::Start(const CameraPose& given, double log_focal,
   state->x = defaults_;
   state->active = reading;
   if (camera_is_estimated_) state->x[static_cast<std::size_t>(blocks_[kCamera].offset)] = log_focal;
-  Eigen::Map<Eigen::Quaterniond>(state->x.data() + blocks_[kRotation].offset) =
+  Eigen::Map<Eigen::Quaterniond>(At(kRotation, state)) =
       Eigen::Quaterniond(seed.rotation).normalized();
-  Eigen::Map<Eigen::Vector3d>(state->x.data() + blocks_[kTranslation].offset) = seed.translation;
-  const double* camera = state->x.data() + blocks_[kCamera].offset;
+  Eigen::Map<Eigen::Vector3d>(At(kTranslation, state)) = seed.translation;
+  const double* camera = At(kCamera, state);
+  SeeThrough(*state);
   const Placed placed = PlaceCircles(camera, state);
   if (!circles_.empty() && placed.num_circles == 0) {
     return Status::Refused(

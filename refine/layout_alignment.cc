@@ -1,12 +1,13 @@
 // Pairs of circles, and the similarity that maps them onto each other.
-#include "circline/refine/layout_alignment.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
 #include <utility>
+
+#include "circline/refine/adjust_layout.h"
+#include "circline/refine/statistics.h"
 
 namespace circline {
 
@@ -60,9 +61,7 @@ bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
   std::vector<double> misses;
   for (const auto& [own, shared] : alignment->pairs)
     misses.push_back(Miss(from[own].circle, to[shared].circle, alignment->to_shared));
-  const auto middle = misses.begin() + static_cast<std::ptrdiff_t>(misses.size() / 2);
-  std::nth_element(misses.begin(), middle, misses.end());
-  alignment->misfit = *middle;
+  alignment->misfit = Median(std::move(misses));
   return true;
 }
 

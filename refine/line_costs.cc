@@ -8,8 +8,8 @@
 #include "circline/estimators/basics.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/cost_functions.h"
-#include "circline/refine/line_root.h"
 #include "circline/refine/mostly_exact.h"
+#include "circline/refine/square_root.h"
 
 namespace circline {
 namespace {
@@ -51,19 +51,14 @@ struct DirectionLineCost::Placed {
 
 DirectionLineCost::DirectionLineCost(ImagePoints points, const Eigen::Vector3d& fit,
                                      Options options)
-    : points_(std::move(points)), fit_(fit.normalized()), options_(options) {
-  for (const int size : {4, 3, options.direction_sigma > 0.0 ? 2 : 1})
-    mutable_parameter_block_sizes()->push_back(size);
-  if (options.camera) mutable_parameter_block_sizes()->push_back(kCameraSize);
-  set_num_residuals(LineRank(points_, options.camera) + 1 +
-                    (options.direction_sigma > 0.0 ? 1 : 0));
-}
+    : CurveCost(std::move(points), 2, {4, 3, options.direction_sigma > 0.0 ? 2 : 1}, false,
+                options.camera, options.direction_sigma > 0.0 ? 1 : 0),
+      fit_(fit.normalized()),
+      options_(options) {}
 
 void DirectionLineCost::Exchange(ImagePoints* points, const Eigen::Vector3d& fit) {
-  std::swap(points_, *points);
+  ExchangePoints(points);
   fit_ = fit.normalized();
-  set_num_residuals(LineRank(points_, options_.camera) + 1 +
-                    (options_.direction_sigma > 0.0 ? 1 : 0));
 }
 
 bool DirectionLineCost::Place(const double* const* parameters, Placed* placed) const {
@@ -91,7 +86,7 @@ void DirectionLineCost::Distances(const double* const* parameters,
   Placed placed;
   distances->clear();
   if (Place(parameters, &placed))
-    points_.LineDistances(placed.line, options_.camera ? parameters[3] : nullptr, distances);
+    points()->LineDistances(placed.line, CameraShifts(parameters), distances);
 }
 
 // The line through the vanishing point and the middle of the points.
@@ -100,7 +95,7 @@ bool DirectionLineCost::Start(const double* const* parameters, double* line) con
   const double* with[4] = {parameters[0], parameters[1], line, nullptr};
   Placed placed;
   if (!Place(with, &placed)) return false;
-  const Eigen::Vector3d middle = points_.Middle(options_.camera ? parameters[3] : nullptr);
+  const Eigen::Vector3d middle = points()->Middle(CameraShifts(parameters));
   const double along = placed.line.dot(middle), across = placed.by_angle.dot(middle);
   if (!(std::hypot(along, across) > 0.0)) return false;
   line[0] = across != 0.0 ? std::atan(-along / across) : 0.5 * kPi;
@@ -112,26 +107,21 @@ bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* con
   Placed p;
   if (!Place(parameters, &p)) return false;
   const bool soft = options_.direction_sigma > 0.0;
-  const bool camera_variable = options_.camera && jacobians != nullptr && jacobians[3] != nullptr;
-  const int rows = num_residuals(), line_rows = rows - (soft ? 1 : 0);
-  CurveModel model;
-  if (!SumLineInto(points_, p.line, options_.camera ? parameters[3] : nullptr, weighing,
-                   camera_variable, line_rows, residuals, jacobians != nullptr ? &model : nullptr))
-    return false;
+  const int rows = num_residuals(), line_rows = num_curve_residuals();
+  Rows U;
+  if (!SumAbout(p.line, weighing, parameters, residuals, jacobians, &U)) return false;
   const double deviation = soft ? p.e / options_.direction_sigma : 0.0;
   const AsSquare prior(deviation);
   if (soft) residuals[line_rows] = weighing.inliers_only ? deviation : prior.value;
   if (jacobians == nullptr) return true;
-  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), line_rows, residuals);
-  if (camera_variable) WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, 3, jacobians);
   for (int k = 0; k < 3; ++k) {
     if (jacobians[k] != nullptr)
       std::fill_n(jacobians[k], rows * parameter_block_sizes()[static_cast<std::size_t>(k)], 0.0);
   }
   const Eigen::Matrix<double, 3, 4> by_quaternion = DeltaFromQuaternion(parameters[0]);
   const int own_size = soft ? 2 : 1;
-  for (int row = 0; row < static_cast<int>(root.U.rows()); ++row) {
-    const Eigen::Vector3d u = root.U.row(row).head<3>();
+  for (int row = 0; row < static_cast<int>(U.rows()); ++row) {
+    const Eigen::Vector3d u = U.row(row).head<3>();
     const Eigen::Vector3d by_world = p.R.transpose() * p.ByDirection(fit_, u);
     if (jacobians[0] != nullptr) {
       Eigen::Map<Eigen::RowVector4d>(jacobians[0] + 4 * row) =
@@ -152,11 +142,7 @@ bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* con
 // --- A line of the plane ---
 
 PlaneLineCost::PlaneLineCost(ImagePoints points, bool camera)
-    : points_(std::move(points)), has_camera_(camera) {
-  for (const int size : {4, 3, 2, 1}) mutable_parameter_block_sizes()->push_back(size);
-  if (camera) mutable_parameter_block_sizes()->push_back(kCameraSize);
-  set_num_residuals(LineRank(points_, camera) + 1);
-}
+    : CurveCost(std::move(points), 2, {4, 3, 2, 1}, false, camera, 0) {}
 
 namespace {
 
@@ -178,21 +164,16 @@ struct PlaneLine {
 void PlaneLineCost::Distances(const double* const* parameters,
                               std::vector<double>* distances) const {
   const PlaneLine line(parameters);
-  points_.LineDistances(line.p.cross(line.d), has_camera_ ? parameters[4] : nullptr, distances);
+  points()->LineDistances(line.p.cross(line.d), CameraShifts(parameters), distances);
 }
 
 bool PlaneLineCost::EvaluateWith(const Weighing& weighing, const double* const* parameters,
                                  double* residuals, double** jacobians) const {
   const PlaneLine line(parameters);
-  const bool camera_variable = has_camera_ && jacobians != nullptr && jacobians[4] != nullptr;
   const int rows = num_residuals();
-  CurveModel model;
-  if (!SumLineInto(points_, line.p.cross(line.d), has_camera_ ? parameters[4] : nullptr, weighing,
-                   camera_variable, rows, residuals, jacobians != nullptr ? &model : nullptr))
-    return false;
+  Rows U;
+  if (!SumAbout(line.p.cross(line.d), weighing, parameters, residuals, jacobians, &U)) return false;
   if (jacobians == nullptr) return true;
-  const LineRoot root = WriteLine(model, LineRank(points_, camera_variable), rows, residuals);
-  const auto U = root.U.leftCols(3);
   const Eigen::Matrix3d by_p = -CrossMatrix(line.d), by_d = CrossMatrix(line.p);
   WriteJacobian(
       U * (by_p * (-line.R * CrossMatrix(line.X)) + by_d * (-line.R * CrossMatrix(line.D))) *
@@ -202,7 +183,6 @@ bool PlaneLineCost::EvaluateWith(const Weighing& weighing, const double* const* 
   WriteJacobian(U * by_p * line.R.leftCols<2>(), rows, 2, jacobians);
   const Eigen::Vector3d turned(-line.D.y(), line.D.x(), 0.0);
   WriteJacobian(U * (by_d * (line.R * turned)), rows, 3, jacobians);
-  if (camera_variable) WriteCameraJacobian(root.U.rightCols(root.U.cols() - 3), rows, 4, jacobians);
   return true;
 }
 

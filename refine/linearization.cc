@@ -55,12 +55,9 @@ void Linearization::LayOut() {
 
 const Eigen::MatrixXd& Linearization::PlusJacobian(int index) {
   Eigen::MatrixXd& plus = plus_[static_cast<std::size_t>(index)];
-  if (plus.size() > 0) return plus;
-  const Block& block = problem_.blocks()[static_cast<std::size_t>(index)];
-  if (block.manifold == nullptr) return plus = Eigen::MatrixXd::Identity(block.size, block.size);
-  RowMajor J(block.size, block.manifold->TangentSize());
-  block.manifold->PlusJacobian(state_.x.data() + block.offset, J.data());
-  return plus = J;
+  const Block& block = problem_.block(index);
+  if (plus.size() == 0) plus = block.PlusJacobian(state_.x.data() + block.offset);
+  return plus;
 }
 
 bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
@@ -74,8 +71,7 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
   rows.columns.reserve(kMostColumns);
   std::size_t ambient_size = 0;
   for (const int index : term.blocks)
-    ambient_size +=
-        static_cast<std::size_t>(problem_.blocks()[static_cast<std::size_t>(index)].size);
+    ambient_size += static_cast<std::size_t>(problem_.block(index).size);
   ambient_.resize(ambient_size * static_cast<std::size_t>(num_rows));
   double* next = ambient_.data();
   for (std::size_t k = 0; k < term.blocks.size(); ++k) {
@@ -83,7 +79,7 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
     jacobians[k] = nullptr;
     if (column(block) < 0) continue;
     jacobians[k] = next;
-    next += num_rows * problem_.blocks()[static_cast<std::size_t>(block)].size;
+    next += num_rows * problem_.block(block).size;
     const auto size = static_cast<int>(PlusJacobian(block).cols());
     for (int c = 0; c < size; ++c) rows.columns.push_back(column(block) + c);
   }
@@ -161,7 +157,7 @@ Linearization::Rows Linearization::Together(const std::vector<std::size_t>& part
 }
 
 double Linearization::OwnVariance(int block, int coordinate) const {
-  const int group = problem_.blocks()[static_cast<std::size_t>(block)].group;
+  const int group = problem_.block(block).group;
   const Rows all = Together(together_[static_cast<std::size_t>(group)]);
   std::vector<Eigen::Index> own;
   Eigen::Index at = -1;

@@ -89,13 +89,8 @@ void Linearization::AddOvercounted(const Eigen::MatrixXd& inverse) {
     const Eigen::MatrixXd G = along.leftCols(e) * inverse;
     covariance_.topLeftCorner(e, e) += G.transpose() * over.S * G;
     const auto n = static_cast<Eigen::Index>(own.size());
-    Eigen::MatrixXd of_own(n, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j)
-        of_own(i, j) =
-            (*others_)(own[static_cast<std::size_t>(i)], own[static_cast<std::size_t>(j)]);
-    }
-    of_own = over.F(Eigen::all, at) * of_own;
+    if (n == 0) continue;
+    const Eigen::MatrixXd of_own = over.F(Eigen::all, at) * (*others_)(own);
     const Eigen::MatrixXd with_core = of_own.transpose() * over.S * G,
                           more = of_own.transpose() * over.S * of_own;
     for (Eigen::Index i = 0; i < n; ++i) {

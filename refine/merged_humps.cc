@@ -1,9 +1,9 @@
-#include "circline/refine/merged_humps.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "circline/refine/readings.h"
 
 namespace circline {
 namespace {

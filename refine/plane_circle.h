@@ -7,6 +7,9 @@
 #include <cmath>
 #include <vector>
 
+#include "circline/estimators/camera.h"
+#include "circline/estimators/pose.h"
+
 namespace circline {
 
 // Circle of least squares of x^2 + y^2 + .. (Kasa 1976): (cx, cy, r). False for points in line.
@@ -28,6 +31,21 @@ inline bool FitPlaneCircle(const std::vector<Eigen::Vector2d>& points, Eigen::Ve
   const Eigen::Vector2d center = A.inverse() * b;
   *circle << mean + center, std::sqrt(squared + center.squaredNorm());
   return circle->allFinite();
+}
+
+// The circle of the plane Z = 0 through calibrated points, as a camera of exp(log_focal) times the
+// focal length sees them (distortion left out). False where they do not all lie before the camera.
+inline bool FitPlaneCircle(const std::vector<CalibratedPoint>& points, double log_focal,
+                           const CameraPose& pose, Eigen::Vector3d* circle) {
+  const double shrink = std::exp(-log_focal), distance = pose.rotation.col(2).dot(pose.translation);
+  std::vector<Eigen::Vector2d> in_plane;
+  for (const CalibratedPoint& p : points) {
+    const Eigen::Vector3d ray(shrink * p.x.x(), shrink * p.x.y(), 1.0);
+    const double depth = distance / pose.rotation.col(2).dot(ray);
+    if (!(depth > 0.0) || !std::isfinite(depth)) return false;
+    in_plane.emplace_back((pose.rotation.transpose() * (depth * ray - pose.translation)).head<2>());
+  }
+  return in_plane.size() >= 3 && FitPlaneCircle(in_plane, circle);
 }
 
 }  // namespace circline

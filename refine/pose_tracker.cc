@@ -9,14 +9,11 @@
 #include <vector>
 
 #include "circline/estimators/point_noise.h"
-#include "circline/refine/chi_square.h"
 #include "circline/refine/scratch.h"
+#include "circline/refine/statistics.h"
 #include "circline/refine/track_frame.h"
-#include "circline/refine/track_map.h"
-#include "circline/refine/track_ranking.h"
-#include "circline/refine/track_relocate.h"
-#include "circline/refine/track_result.h"
 #include "circline/refine/track_state.h"
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 
@@ -33,32 +30,31 @@ class PoseTracker::Implementation {
       tracked->estimate.hypotheses.clear();
       return;
     }
-    const double dt = states_.empty() ? 0.0 : time - time_;
+    const double dt = hypotheses_.empty() ? 0.0 : time - time_;
     time_ = time;
     Prepare(observations);
-    if (states_.empty() || time - used_ > options_.max_gap_s) {
+    if (hypotheses_.empty() || time - used_ > options_.max_gap_s) {
       Start(observations, tracked);
       return;
     }
     Move(dt, motion);
-    if (states_.empty()) {
+    if (hypotheses_.empty()) {
       Start(observations, tracked);
       tracked->estimate.notes.emplace_back(
           "the motion left the range of numbers: the track starts anew");
       return;
     }
-    Refine();
-    if (fits_.empty()) {
+    if (Refine()) {
+      Use(tracked);
+    } else {
       Predicted(observations, tracked);
-      return;
     }
-    Use(tracked);
   }
 
   std::optional<PoseHypothesis> Predict(double time) const {
     // Beyond the gap the next frame begins anew: nothing is expected.
-    if (states_.empty() || !(time >= time_) || !(time - used_ <= options_.max_gap_s)) return {};
-    TrackState state = states_.front();
+    if (hypotheses_.empty() || !(time >= time_) || !(time - used_ <= options_.max_gap_s)) return {};
+    TrackState state = hypotheses_[0].state;
     MoveOn(map_, options_, time - time_, &state);
     PoseHypothesis h;
     FillHypothesis(map_, state, fitted_.camera, &h);
@@ -66,7 +62,7 @@ class PoseTracker::Implementation {
   }
 
   void Reset() {
-    spare_states_.Resize(0, &states_);
+    hypotheses_.Shorten(0);
     time_ = used_ = -std::numeric_limits<double>::infinity();
     contradictions_ = frames_ = 0;
   }
@@ -80,7 +76,7 @@ class PoseTracker::Implementation {
     if (time < time_) return Status::Invalid("the time must not be before that of the last call");
     Status status = motion.Validate();
     if (status.ok()) status = observations.Validate();
-    if (status.ok() && !states_.empty() && motion.relative && !(time > time_))
+    if (status.ok() && !hypotheses_.empty() && motion.relative && !(time > time_))
       status = Status::Invalid("a relative motion takes time: give a later one");
     return status;
   }
@@ -105,6 +101,7 @@ class PoseTracker::Implementation {
     FitDirect(scale > 0.0 ? scale : kDefaultSigmaPx, &fitted_, &problems_, NoiseModel::Exact(),
               &fit_memory_);
     noise_meter_.Measure(fitted_, options_.estimation.noise_model, &noise_);
+    StateNoise(noise_, options_.estimation.conic_loss.scale_px, scale, &fitted_);
   }
 
   // Begins a track with the poses of a single frame; the track before ends where there are any.
@@ -113,27 +110,24 @@ class PoseTracker::Implementation {
     estimate = EstimatePose(observations, options_.estimation);
     estimate.solver = "tracker";
     if (!estimate.status.ok() || Relocalize(tracked)) return;
-    if (!states_.empty()) estimate.notes.emplace_back("the track was lost and starts anew");
+    if (!hypotheses_.empty()) estimate.notes.emplace_back("the track was lost and starts anew");
     tracked->reinitialized = true;
     contradictions_ = frames_ = 0;
     used_ = time_;
     const Observations resolved = ResolveWorld(fitted_);
-    StartMap(resolved, estimate.hypotheses, options_, &map_, &states_);
-    frame_.Reset(resolved, noise_);
-    std::vector<TrackFit> fits;
-    for (std::size_t i = 0; i < states_.size(); ++i) {
-      const TrackState& state = states_[i];
+    StartMap(resolved, estimate.hypotheses, options_, &map_, &fits_);
+    frame_.Reset(resolved);
+    hypotheses_.Shorten(0);
+    for (std::size_t i = 0; i < fits_.size(); ++i) {
+      const TrackState& start = fits_[i].state;
       const double log_focal = std::log(estimate.hypotheses[i].focal_scale);
-      TrackFit fit;
-      if (!state.IsInRange() || !frame_.RefineHere(state, log_focal, options_, &fit)) continue;
-      ConditionOnPriors(&fit.state);
-      fit.state.log_weight = state.log_weight;  // Its evidence has been counted.
-      fits.push_back(std::move(fit));
+      if (!start.IsInRange() || !RefineHere(start, log_focal, &hypotheses_)) continue;
+      TrackState& state = hypotheses_[hypotheses_.size() - 1].state;
+      ConditionOnPriors(&state);
+      state.log_weight = start.log_weight;  // Its evidence has been counted.
     }
     // What cannot be refined here cannot be carried on; the frame's answer stands.
-    if (!fits.empty()) Rank(options_, &frame_.spares, &fits);
-    states_.clear();
-    for (TrackFit& fit : fits) states_.push_back(std::move(fit.state));
+    if (!hypotheses_.empty()) Rank(options_, &hypotheses_);
     if (fitted_.frame.plane.empty()) map_.plane = NamedPlane(fitted_, map_.plane);
   }
 
@@ -141,19 +135,18 @@ class PoseTracker::Implementation {
   // agrees with the rest.
   bool Relocalize(TrackedPose* tracked) {
     std::vector<TrackState> starts =
-        Relocated(map_, states_, tracked->estimate.hypotheses, options_);
+        Relocated(map_, hypotheses_, tracked->estimate.hypotheses, options_);
     if (starts.empty()) return false;
-    frame_.spares.Resize(0, &fits_);
-    frame_.Reset(fitted_, noise_);
+    fits_.Shorten(0);
+    frame_.Reset(fitted_);
     frame_.KeepCheapest(static_cast<std::size_t>(options_.max_hypotheses), &starts);
     for (const TrackState& start : starts) {
       const double log_focal = start.x[map_.block(TrackMap::kCamera).offset];
-      TrackFit fit;
-      if (frame_.RefineHere(start, log_focal, options_, &fit) && Agrees(fit))
-        fits_.push_back(std::move(fit));
+      if (RefineHere(start, log_focal, &fits_) && !Agrees(fits_[fits_.size() - 1]))
+        fits_.Shorten(fits_.size() - 1);
     }
     if (fits_.empty()) return false;
-    Merge(map_, MergedWeight::kLarger, &frame_.spares, &fits_);
+    Merge(map_, MergedWeight::kLarger, &fits_);
     TakeFits();
     tracked->relocalized = true;
     Use(tracked);
@@ -161,17 +154,24 @@ class PoseTracker::Implementation {
     return true;
   }
 
+  // Adds the fit where there is one.
+  bool RefineHere(const TrackState& start, double log_focal, Kept<TrackFit>* fits) {
+    if (frame_.RefineHere(start, log_focal, options_, &fits->Add())) return true;
+    fits->Shorten(fits->size() - 1);
+    return false;
+  }
+
   bool Agrees(const TrackFit& fit) const {
     return fit.misfit <= ChiSquareLimit(std::max(1, fit.dof), options_.gate_probability);
   }
 
-  // The frame's part is in states_ and fits_.
+  // The frame's part is in the hypotheses.
   void Use(TrackedPose* tracked) {
     contradictions_ = 0;
     used_ = time_;
     tracked->frames_since_start = ++frames_;
-    Answer(tracked);
-    ExtendMap(fitted_, options_, &map_, &states_);
+    Answer(true, tracked);
+    ExtendMap(fitted_, options_, &map_, &hypotheses_);
   }
 
   // What is known of the first pose counts in those that follow.
@@ -203,7 +203,9 @@ class PoseTracker::Implementation {
 
   // Keeps the states that numbers can hold.
   void Move(double dt, const MotionPrior& motion) {
-    for (TrackState& state : states_) {
+    std::size_t kept = 0;
+    for (TrackFit& hypothesis : hypotheses_) {
+      TrackState& state = hypothesis.state;
       if (motion.relative) {
         MoveBy(map_, options_, *motion.relative, dt, &state);
       } else {
@@ -211,51 +213,49 @@ class PoseTracker::Implementation {
       }
       if (motion.absolute) Condition(map_, *motion.absolute, &scratch_, &state);
       if (motion.gravity) Condition(map_, *motion.gravity, &scratch_, &state);
+      if (state.IsInRange()) std::swap(hypotheses_[kept++], hypothesis);
     }
-    states_.erase(std::remove_if(states_.begin(), states_.end(),
-                                 [](const TrackState& state) { return !state.IsInRange(); }),
-                  states_.end());
-    if (!states_.empty()) Rank(options_, &spare_states_, &states_);  // For a frame without more.
+    hypotheses_.Shorten(kept);
+    if (kept > 0) Rank(options_, &hypotheses_);  // For a frame without more.
   }
 
-  // Fills fits_, ranked; empty where the frame says nothing or contradicts all hypotheses.
-  void Refine() {
-    frame_.spares.Resize(0, &fits_);
-    frame_.Reset(fitted_, noise_);
+  // False, the hypotheses as they were, where the frame says nothing or contradicts all of them.
+  bool Refine() {
+    fits_.Shorten(0);
+    frame_.Reset(fitted_);
     is_blank_ = frame_.empty();
-    if (is_blank_) return;
-    for (const TrackState& state : states_) {
-      frame_.spares.Resize(0, &own_fits_);
-      frame_.Refine(state, options_, &own_fits_);
-      Merge(map_, MergedWeight::kLarger, &frame_.spares, &own_fits_);
-      for (TrackFit& fit : own_fits_) fits_.push_back(std::move(fit));
-      own_fits_.clear();
+    if (is_blank_) return false;
+    for (const TrackFit& hypothesis : hypotheses_) {
+      own_fits_.Shorten(0);
+      frame_.Refine(hypothesis.state, options_, &own_fits_);
+      Merge(map_, MergedWeight::kLarger, &own_fits_);
+      for (TrackFit& fit : own_fits_) std::swap(fits_.Add(), fit);
     }
     if (std::none_of(fits_.begin(), fits_.end(),
                      [&](const TrackFit& fit) { return Agrees(fit); })) {
-      frame_.spares.Resize(0, &fits_);
-      return;
+      return false;
     }
-    Merge(map_, MergedWeight::kSum, &frame_.spares, &fits_);
+    Merge(map_, MergedWeight::kSum, &fits_);
     TakeFits();
+    return true;
   }
 
-  // The fits' states take the place of those before.
+  // In place of the hypotheses before.
   void TakeFits() {
-    Rank(options_, &frame_.spares, &fits_);
-    spare_states_.Resize(fits_.size(), &states_);
-    for (std::size_t i = 0; i < fits_.size(); ++i) states_[i] = fits_[i].state;
+    Rank(options_, &fits_);
+    std::swap(hypotheses_, fits_);
   }
 
-  void Answer(TrackedPose* tracked) {
+  // `with_frame`: which has a part in the hypotheses.
+  void Answer(bool with_frame, TrackedPose* tracked) {
     PoseEstimate& estimate = tracked->estimate;
     estimate.notes = problems_;
-    estimate.hypotheses.resize(states_.size());
-    for (std::size_t i = 0; i < states_.size(); ++i) {
+    estimate.hypotheses.resize(hypotheses_.size());
+    for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
       PoseHypothesis& h = estimate.hypotheses[i];
-      FillHypothesis(map_, states_[i], fitted_.camera, &h);
-      if (!fits_.empty())
-        FillFrame(frame_, fits_[i], &h, i == 0 ? &estimate.notes : nullptr, &distances_);
+      FillHypothesis(map_, hypotheses_[i].state, fitted_.camera, &h);
+      if (with_frame)
+        FillFrame(frame_, hypotheses_[i], &h, i == 0 ? &estimate.notes : nullptr, &distances_);
     }
     DecidedByFrames(estimate.hypotheses, &estimate.decided_by);
   }
@@ -273,7 +273,7 @@ class PoseTracker::Implementation {
     }
     tracked->predicted_only = true;
     tracked->frames_since_start = ++frames_;
-    Answer(tracked);
+    Answer(false, tracked);
     tracked->estimate.status.message =
         is_blank_ ? "nothing of the map is seen in this frame: the pose is predicted"
                   : "the frame contradicts all hypotheses: the pose is predicted without it";
@@ -282,7 +282,7 @@ class PoseTracker::Implementation {
   TrackerOptions options_;
   Status options_status_;
   TrackMap map_;
-  std::vector<TrackState> states_;
+  Kept<TrackFit> hypotheses_;
   double time_ = -std::numeric_limits<double>::infinity(), used_ = time_;  // Seconds.
   int contradictions_ = 0, frames_ = 0;
   // Of the present frame; kept for their memory.
@@ -292,9 +292,8 @@ class PoseTracker::Implementation {
   PointNoise noise_;
   std::vector<std::string> problems_;
   TrackFrame frame_;
-  std::vector<TrackFit> fits_, own_fits_;  // The latter of one hypothesis.
+  Kept<TrackFit> fits_, own_fits_;  // The latter of one hypothesis.
   bool is_blank_ = false;
-  Spares<TrackState> spare_states_;
   Scratch scratch_;
   std::vector<double> distances_;
 };

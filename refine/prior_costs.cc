@@ -9,6 +9,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/cost_functions.h"
+#include "circline/refine/given_poses.h"
 
 namespace circline {
 namespace {
@@ -94,6 +95,13 @@ struct GaussianResidual {
   }
 };
 
+// ceres' order of a quaternion is w first.
+template <typename T>
+void ToCeres(const Eigen::Quaterniond& q, T* out) {
+  const double values[4] = {q.w(), q.x(), q.y(), q.z()};
+  for (int k = 0; k < 4; ++k) out[k] = static_cast<T>(values[k]);
+}
+
 struct PoseResidual {
   Eigen::Quaterniond inverse_mean;
   Eigen::Vector3d translation;
@@ -101,17 +109,43 @@ struct PoseResidual {
 
   template <typename T>
   bool operator()(const T* q, const T* t, T* residual) const {
-    // ceres' order of a quaternion is w first.
     const T rotation[4] = {q[3], q[0], q[1], q[2]};
-    const T mean[4] = {static_cast<T>(inverse_mean.w()), static_cast<T>(inverse_mean.x()),
-                       static_cast<T>(inverse_mean.y()), static_cast<T>(inverse_mean.z())};
-    T difference[4], delta[6];
+    T mean[4], difference[4], delta[6];
+    ToCeres(inverse_mean, mean);
     ceres::QuaternionProduct(rotation, mean, difference);
     ceres::QuaternionToAngleAxis(difference, delta);
     for (int k = 0; k < 3; ++k) delta[3 + k] = t[k] - translation[k];
     for (int k = 0; k < 6; ++k) {
       residual[k] = static_cast<T>(0.0);
       for (int i = 0; i < 6; ++i) residual[k] += square_root(k, i) * delta[i];
+    }
+    return true;
+  }
+};
+
+// A pose against one that is known in another frame and unit.
+struct GivenPoseResidual {
+  Eigen::Quaterniond rotation;
+  Eigen::Vector3d translation;
+  double rotation_sigma, translation_sigma;
+
+  template <typename T>
+  bool operator()(const T* q, const T* t, const T* frame_q, const T* frame_t, const T* log_scale,
+                  T* residual) const {
+    using std::exp;
+    T given[4];
+    ToCeres(rotation, given);
+    const T frame[4] = {frame_q[3], frame_q[0], frame_q[1], frame_q[2]};
+    const T inverse[4] = {q[3], -q[0], -q[1], -q[2]};
+    T expected[4], difference[4], moved[3];
+    ceres::QuaternionProduct(given, frame, expected);
+    ceres::QuaternionProduct(expected, inverse, difference);
+    ceres::QuaternionToAngleAxis(difference, residual);
+    ceres::UnitQuaternionRotatePoint(given, frame_t, moved);
+    for (int k = 0; k < 3; ++k) {
+      residual[k] /= rotation_sigma;
+      residual[3 + k] =
+          (t[k] - (moved[k] + translation[k]) * exp(-log_scale[0])) / translation_sigma;
     }
     return true;
   }
@@ -182,6 +216,13 @@ ceres::CostFunction* NewPosePrior(const Eigen::Matrix3d& rotation,
   return new ceres::AutoDiffCostFunction<PoseResidual, 6, 4, 3>(
       new PoseResidual{Eigen::Quaterniond(rotation).conjugate(), translation,
                        llt.matrixL().solve(Matrix6d::Identity())});
+}
+
+ceres::CostFunction* NewGivenPosePrior(const Eigen::Matrix3d& rotation,
+                                       const Eigen::Vector3d& translation, double rotation_sigma,
+                                       double translation_sigma) {
+  return new ceres::AutoDiffCostFunction<GivenPoseResidual, 6, 4, 3, 4, 3, 1>(new GivenPoseResidual{
+      Eigen::Quaterniond(rotation), translation, rotation_sigma, translation_sigma});
 }
 
 ceres::CostFunction* NewDirectionMeasurement(const Eigen::Vector3d& in_world,

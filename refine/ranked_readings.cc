@@ -1,5 +1,3 @@
-#include "circline/refine/ranked_readings.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -11,9 +9,8 @@
 
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/joint_result.h"
-#include "circline/refine/merged_humps.h"
 #include "circline/refine/pose_seeds.h"
-#include "circline/refine/reading_search.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 namespace {
@@ -98,13 +95,13 @@ double StrangerCost(const JointProblem& problem, std::size_t circle) {
 
 // Hypotheses that take the second ellipse of a contour for the circle, from the poses that are
 // known.
-std::vector<Refined> ReadSecond(const JointProblem& problem, const PointNoise& noise,
-                                const std::vector<Refined>& known, std::size_t circle) {
+std::vector<Refined> ReadSecond(const JointProblem& problem, const std::vector<Refined>& known,
+                                std::size_t circle) {
   Observations other = problem.observations();
   CircleObservation& read = other.circles[circle];
   read.fit = read.second->fit;
   read.inliers = read.second->inliers;
-  const JointProblem rival(other, problem.options(), noise);
+  const JointProblem rival(other, problem.options());
   std::vector<Seed> seeds;
   for (const Refined& refined : known)
     seeds.push_back({problem.PoseAt(refined.state), problem.LogFocalAt(refined.state), 1});
@@ -147,8 +144,7 @@ std::vector<std::size_t> LeftOutWithSecond(const JointProblem& problem,
 
 // A circle that contradicts the rest may have been misread: of two rims on one contour the wrong
 // one. Returns the circles that were read again.
-std::vector<std::size_t> AddSecondReadings(const JointProblem& problem, const PointNoise& noise,
-                                           std::vector<Refined>* all) {
+std::vector<std::size_t> AddSecondReadings(const JointProblem& problem, std::vector<Refined>* all) {
   const std::vector<CircleObservation>& observed = problem.observations().circles;
   if (std::none_of(observed.begin(), observed.end(),
                    [](const CircleObservation& circle) { return circle.second.has_value(); })) {
@@ -157,7 +153,7 @@ std::vector<std::size_t> AddSecondReadings(const JointProblem& problem, const Po
   const std::vector<Refined> first = *all;
   const std::vector<std::size_t> circles = LeftOutWithSecond(problem, Ranked(first));
   for (const std::size_t i : circles) {
-    std::vector<Refined> more = ReadSecond(problem, noise, first, i);
+    std::vector<Refined> more = ReadSecond(problem, first, i);
     std::move(more.begin(), more.end(), std::back_inserter(*all));
   }
   const double most = LeastCost(*all) + problem.options().max_cost_gap;
@@ -169,12 +165,12 @@ std::vector<std::size_t> AddSecondReadings(const JointProblem& problem, const Po
 
 }  // namespace
 
-Status RankReadings(const JointProblem& problem, const PointNoise& noise,
-                    const std::vector<State>& minima, PoseEstimate* estimate) {
+Status RankReadings(const JointProblem& problem, const std::vector<State>& minima,
+                    PoseEstimate* estimate) {
   std::vector<Refined> all;
   const Status status = FillHypotheses(problem, minima, &all);
   if (!status.ok()) return status;
-  const std::vector<std::size_t> read_again = AddSecondReadings(problem, noise, &all);
+  const std::vector<std::size_t> read_again = AddSecondReadings(problem, &all);
   estimate->hypotheses = Ranked(all);
   MergeHumps(&estimate->hypotheses);
   const PoseHypothesis& best = estimate->hypotheses.front();

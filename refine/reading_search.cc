@@ -1,5 +1,3 @@
-#include "circline/refine/reading_search.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -8,10 +6,10 @@
 #include <set>
 #include <utility>
 
-#include "circline/refine/agreeing_lines.h"
-#include "circline/refine/chi_square.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/linearization.h"
+#include "circline/refine/readings.h"
+#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {
@@ -82,34 +80,12 @@ class ReadingSearch {
     double parent_cost;  // Of the minimum that it leaves something out of.
   };
 
-  struct Start {
-    State state;
-    double cost;  // With what is left out.
-    std::size_t seed;
-  };
-
   std::vector<Seed> SeedsAt(const std::vector<State>& minima) const {
     std::vector<Seed> seeds;
     for (const State& minimum : minima)
       seeds.push_back({problem_.PoseAt(minimum), problem_.LogFocalAt(minimum),
                        static_cast<int>(seeds.size()) + 1});
     return seeds;
-  }
-
-  // All seeds that can start, the cheapest first.
-  std::vector<Start> Starts(const Candidate& candidate) {
-    std::vector<Start> starts;
-    for (std::size_t i = 0; i < candidate.seeds.size(); ++i) {
-      const Seed& seed = candidate.seeds[i];
-      State state;
-      last_ = problem_.Start(seed.pose, seed.log_focal, candidate.reading, &state);
-      if (!last_.ok()) continue;
-      const double cost = state.cost + LeftOutCost(problem_, state);
-      starts.push_back({std::move(state), cost, i});
-    }
-    std::stable_sort(starts.begin(), starts.end(),
-                     [](const Start& a, const Start& b) { return a.cost < b.cost; });
-    return starts;
   }
 
   // The minima that the seeds lead to, in the order of the seeds.
@@ -121,7 +97,7 @@ class ReadingSearch {
     const int best_circle = BestCircle(candidate);
     double best = std::numeric_limits<double>::infinity();
     bool is_consistent = false;  // The best one explains all that is to take part.
-    for (Start& start : Starts(candidate)) {
+    for (SeedStart& start : StartsOf(problem_, seeds, candidate.reading, &last_)) {
       State& state = start.state;
       // Where all evidence agrees, one circle's planes are those of all.
       const int source = seeds[start.seed].source;
@@ -305,6 +281,21 @@ bool IsSamePose(const JointProblem& problem, const State& a, const State& b, dou
     return false;
   if (A.col(2).cross(B.col(2)).norm() > tolerance) return false;
   return problem.spin_is_free() || A.col(0).cross(B.col(0)).norm() < tolerance;
+}
+
+std::vector<SeedStart> StartsOf(const JointProblem& problem, const std::vector<Seed>& seeds,
+                                const std::vector<std::uint8_t>& reading, Status* last) {
+  std::vector<SeedStart> starts;
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    State state;
+    *last = problem.Start(seeds[i].pose, seeds[i].log_focal, reading, &state);
+    if (!last->ok()) continue;
+    const double cost = state.cost + LeftOutCost(problem, state);
+    starts.push_back({std::move(state), cost, i});
+  }
+  std::stable_sort(starts.begin(), starts.end(),
+                   [](const SeedStart& a, const SeedStart& b) { return a.cost < b.cost; });
+  return starts;
 }
 
 Status FindMinima(const JointProblem& problem, const std::vector<Seed>& seeds,

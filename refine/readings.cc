@@ -11,12 +11,9 @@
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/focal_starts.h"
 #include "circline/estimators/point_noise.h"
-#include "circline/refine/imperfection_scales.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/pose_seeds.h"
-#include "circline/refine/ranked_readings.h"
-#include "circline/refine/reading_search.h"
 
 namespace circline {
 namespace {
@@ -148,47 +145,22 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
 // The noise model as the photo's own features have it, at the minimum that the best seed leads to;
 // the seed then starts there.
 NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* seeds) {
-  const std::vector<std::uint8_t> reading = problem.FirstReading();
-  State state, best;
-  Seed* best_seed = nullptr;
-  double least = std::numeric_limits<double>::infinity();
-  for (Seed& seed : *seeds) {
-    if (!problem.Start(seed.pose, seed.log_focal, reading, &state).ok()) continue;
-    const double cost = state.cost + LeftOutCost(problem, state);
-    if (!(cost < least)) continue;
-    least = cost;
-    best = state;
-    best_seed = &seed;
-  }
-  if (best_seed == nullptr || !problem.SolveGraduated(problem.options().max_iterations, &best).ok())
+  Status unused;
+  std::vector<SeedStart> starts = StartsOf(problem, *seeds, problem.FirstReading(), &unused);
+  if (starts.empty()) return problem.options().noise_model;
+  State& best = starts.front().state;
+  if (!problem.SolveGraduated(problem.options().max_iterations, &best).ok())
     return problem.options().noise_model;
+  Seed* best_seed = &(*seeds)[starts.front().seed];
   best_seed->pose = problem.PoseAt(best);
   best_seed->log_focal = problem.LogFocalAt(best);
   return ScaledNoiseModel(problem, best);
 }
 
-// Every feature with the noise that it has in the refinement, for the closed forms.
-void FillNoise(const EstimationOptions& options, const PointNoise& noise, Observations* resolved) {
-  for (std::size_t i = 0; i < resolved->circles.size(); ++i) {
-    double& sigma = resolved->circles[i].sigma_px;
-    if (!(sigma > 0.0)) sigma = options.conic_loss.scale_px;
-    if (!(sigma > 0.0)) sigma = noise.circles[i];
-  }
-  for (std::size_t i = 0; i < resolved->pencils.size(); ++i) {
-    PencilObservation& pencil = resolved->pencils[i];
-    for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
-      double& sigma = pencil.lines[j].sigma_px;
-      if (!(sigma > 0.0)) sigma = pencil.sigma_px;
-      if (!(sigma > 0.0)) sigma = options.line_loss.scale_px;
-      if (!(sigma > 0.0)) sigma = noise.lines[i][j];
-    }
-  }
-}
-
-Status RefineResolved(const Observations& resolved, const PointNoise& noise,
+Status RefineResolved(const Observations& resolved,
                       const std::vector<std::shared_ptr<const Solver>>& seeders,
                       const EstimationOptions& options, PoseEstimate* estimate) {
-  const JointProblem as_stated(resolved, options, noise);
+  const JointProblem as_stated(resolved, options);
   estimate->notes.insert(estimate->notes.end(), as_stated.unused().begin(),
                          as_stated.unused().end());
   std::vector<std::string> reasons;
@@ -199,7 +171,7 @@ Status RefineResolved(const Observations& resolved, const PointNoise& noise,
   std::optional<JointProblem> scaled;
   if (HasManyFeatures(as_stated)) {
     scaled_options.noise_model = ScaledToFirstMinimum(as_stated, &seeds);
-    scaled.emplace(resolved, scaled_options, noise);
+    scaled.emplace(resolved, scaled_options);
   }
   const JointProblem& problem = scaled ? *scaled : as_stated;
   std::vector<State> minima;
@@ -208,7 +180,7 @@ Status RefineResolved(const Observations& resolved, const PointNoise& noise,
     reasons.insert(reasons.begin(), "no pose agrees with all evidence: " + status.message);
     return NoSeed(resolved, reasons);
   }
-  return RankReadings(problem, noise, minima, estimate);
+  return RankReadings(problem, minima, estimate);
 }
 
 }  // namespace
@@ -227,9 +199,9 @@ PoseEstimate RefineSeeds(const std::string& name,
   FitDirect(options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDefaultSigmaPx,
             &resolved, &estimate.notes);
   resolved = ResolveWorld(resolved);
-  const PointNoise noise = MeasurePointNoise(resolved, options.noise_model);
-  FillNoise(options, noise, &resolved);
-  estimate.status = RefineResolved(resolved, noise, seeders, options, &estimate);
+  StateNoise(MeasurePointNoise(resolved, options.noise_model), options.conic_loss.scale_px,
+             options.line_loss.scale_px, &resolved);
+  estimate.status = RefineResolved(resolved, seeders, options, &estimate);
   if (estimate.status.ok()) estimate.decided_by = DecidedBy(estimate.hypotheses);
   return estimate;
 }

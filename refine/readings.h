@@ -1,15 +1,20 @@
 // From seeds to ranked hypotheses: every reading of the evidence (which features take part) that
-// competes, refined from every start. What EstimatePose and the refined solvers share. Internal:
-// not installed.
+// competes, refined from every start. What EstimatePose and the refined solvers share, and the
+// steps of it. Internal: not installed.
 #ifndef CIRCLINE_REFINE_READINGS_H_
 #define CIRCLINE_REFINE_READINGS_H_
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/solver_registry.h"
 #include "circline/refine/estimate_pose.h"
+#include "circline/refine/joint_problem.h"
+#include "circline/refine/pose_seeds.h"
 
 namespace circline {
 
@@ -18,6 +23,74 @@ namespace circline {
 PoseEstimate RefineSeeds(const std::string& name,
                          const std::vector<std::shared_ptr<const Solver>>& seeders,
                          const Observations& observations, const EstimationOptions& options);
+
+// --- imperfection_scales.cc: how exact this photo's world is, against what the noise model takes
+// it for: a board is flatter than a box, a box straighter than a street. ---
+
+// Whether there are features enough for any scale.
+bool HasManyFeatures(const JointProblem& problem);
+
+// The noise model with the standard deviations that many features of one kind have, each its own
+// draw (tilt, height and shared error of contours; deviation and shared error of lines), scaled to
+// how far these features contradict each other at a minimum. NoiseModel::spread says by how much
+// its own figures may be off.
+NoiseModel ScaledNoiseModel(const JointProblem& problem, const State& minimum);
+
+// --- reading_search.cc ---
+
+// Radians. Solutions stop within a few hundredths of a standard deviation, and those of hopeless
+// evidence have a tenth of a radian.
+inline constexpr double kSamePose = 1e-3;
+
+// One pose, up to what the evidence cannot tell: the spin about the normal where that is free, and
+// the senses of the axes, which are settled by convention and may tip over.
+bool IsSamePose(const JointProblem& problem, const State& a, const State& b,
+                double tolerance = kSamePose);
+
+// A seed's unknowns.
+struct SeedStart {
+  State state;
+  double cost;  // With what is left out.
+  std::size_t seed;
+};
+// Of all seeds that can start, the cheapest first; `last` receives what became of the last seed.
+std::vector<SeedStart> StartsOf(const JointProblem& problem, const std::vector<Seed>& seeds,
+                                const std::vector<std::uint8_t>& reading, Status* last);
+
+// All minima of all readings that compete, in the order of the seeds; their cost is with what is
+// left out. A feature that contradicts the others as a whole makes a reading without it, and the
+// one with it stays. Not ok: no seed could be refined.
+Status FindMinima(const JointProblem& problem, const std::vector<Seed>& seeds,
+                  std::vector<State>* minima);
+
+// --- agreeing_lines.cc: readings of lines along the axes, of which some do not run as the others
+// do. ---
+
+struct AgreeingLines {
+  std::vector<std::uint8_t> reading;  // Without the lines that do not agree.
+  std::vector<Seed> seeds;            // The planes, turned such that one of them fits.
+  int num_lines = 0;                  // That agree.
+};
+
+// In a circle's plane one line along an axis tells how the world is turned: the sample of a search
+// by consensus. For each such line, and each plane of the best known circle among the seeds, the
+// lines that agree with it as far as the plane and they themselves are known; those with most lines
+// first, at most `max_readings`, each reading once. None where all lines agree, or there are many.
+std::vector<AgreeingLines> FindAgreeingLines(const JointProblem& problem,
+                                             const std::vector<Seed>& seeds,
+                                             std::size_t max_readings);
+
+// --- ranked_readings.cc, merged_humps.cc ---
+
+// Fills the hypotheses of all minima that compete, of the second ellipses of circles that these
+// leave out besides, and adds the notes of the best one. Not ok: no minimum gives a hypothesis.
+Status RankReadings(const JointProblem& problem, const std::vector<State>& minima,
+                    PoseEstimate* estimate);
+
+// Hypotheses that are less apart than they are wide become one: the pose that fits best, with the
+// covariance of all about it, and with the volume of all (log_det), so that it is as probable as
+// they are together. Ranks what is left. The two poses of a lone circle stay two, however near.
+void MergeHumps(std::vector<PoseHypothesis>* hypotheses);
 
 }  // namespace circline
 

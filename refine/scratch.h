@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cstddef>
-#include <memory>
+#include <deque>
 #include <utility>
 #include <vector>
 
@@ -22,48 +22,31 @@ class Scratch {
   // What is taken during its life is free again at its end.
   class Scope {
    public:
-    explicit Scope(Scratch* scratch)
-        : scratch_(*scratch), chunk_(scratch->chunk_), used_(scratch->used_) {}
-    ~Scope() {
-      scratch_.chunk_ = chunk_;
-      scratch_.used_ = used_;
-    }
+    explicit Scope(Scratch* scratch) : scratch_(*scratch), used_(scratch->used_) {}
+    ~Scope() { scratch_.used_ = used_; }
     Scope(const Scope&) = delete;
     Scope& operator=(const Scope&) = delete;
 
    private:
     Scratch& scratch_;
-    std::size_t chunk_, used_;
+    std::size_t used_;
   };
 
   // Their values are anything.
   Matrix NewMatrix(Eigen::Index rows, Eigen::Index cols) { return {Take(rows * cols), rows, cols}; }
   Vector NewVector(Eigen::Index size) { return {Take(size), size}; }
-  void Clear() { chunk_ = used_ = 0; }
+  void Clear() { used_ = 0; }
 
  private:
-  double* Take(Eigen::Index numbers) {
-    constexpr std::size_t kLeast = 4096;  // Numbers of a chunk.
-    const auto size = static_cast<std::size_t>(numbers);
-    while (chunk_ < chunks_.size() && used_ + size > chunks_[chunk_].size) {
-      ++chunk_;
-      used_ = 0;
-    }
-    if (chunk_ == chunks_.size()) {
-      const std::size_t room = std::max(kLeast, size);
-      chunks_.push_back({std::make_unique<double[]>(room), room});
-    }
-    double* out = chunks_[chunk_].numbers.get() + used_;
-    used_ += size;
-    return out;
+  double* Take(Eigen::Index size) {
+    if (used_ == buffers_.size()) buffers_.emplace_back();
+    Eigen::VectorXd& buffer = buffers_[used_++];
+    if (buffer.size() < size) buffer.resize(size);
+    return buffer.data();
   }
 
-  struct Chunk {
-    std::unique_ptr<double[]> numbers;
-    std::size_t size;
-  };
-  std::vector<Chunk> chunks_;
-  std::size_t chunk_ = 0, used_ = 0;  // Where the next matrix goes.
+  std::deque<Eigen::VectorXd> buffers_;  // One a matrix.
+  std::size_t used_ = 0;                 // The first ones.
 };
 
 // Points a map to another one's memory, as Eigen documents it.
@@ -117,28 +100,40 @@ inline void Symmetrize(Eigen::MatrixXd* M) {
   }
 }
 
-// Objects that nobody has now, kept for their memory.
+// A vector that keeps what it no longer has, for the memory in it.
 template <typename T>
-class Spares {
+class Kept {
  public:
-  T Take() {
-    if (spares_.empty()) return T();
-    T out = std::move(spares_.back());
-    spares_.pop_back();
-    return out;
+  // Of any value.
+  T& Add() {
+    if (size_ == all_.size()) all_.emplace_back();
+    return all_[size_++];
   }
-  void Give(T&& spare) { spares_.push_back(std::move(spare)); }
-  // Their first ones stay.
-  void Resize(std::size_t size, std::vector<T>* all) {
-    while (all->size() > size) {
-      Give(std::move(all->back()));
-      all->pop_back();
+  // One of those kept that `fits`, else a new one.
+  template <typename Fits>
+  T& Recycle(const Fits& fits) {
+    const auto one = std::find_if(end(), all_.end(), fits);
+    if (one == all_.end()) {
+      all_.emplace_back();
+      std::swap(all_[size_], all_.back());
+    } else {
+      std::swap(*one, *end());
     }
-    while (all->size() < size) all->push_back(Take());
+    return all_[size_++];
   }
+  void Shorten(std::size_t size) { size_ = size; }
+  std::size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  T& operator[](std::size_t i) { return all_[i]; }
+  const T& operator[](std::size_t i) const { return all_[i]; }
+  auto begin() { return all_.begin(); }
+  auto end() { return all_.begin() + static_cast<std::ptrdiff_t>(size_); }
+  auto begin() const { return all_.begin(); }
+  auto end() const { return all_.begin() + static_cast<std::ptrdiff_t>(size_); }
 
  private:
-  std::vector<T> spares_;
+  std::vector<T> all_;
+  std::size_t size_ = 0;
 };
 
 }  // namespace circline

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "circline/estimators/circle_pose.h"
-#include "circline/refine/curvature_bias.h"
+#include "circline/refine/block_chain.h"
 #include "circline/refine/evidence_points.h"
 
 namespace circline {
@@ -24,17 +24,8 @@ Eigen::Matrix3d RotationBetween(const Eigen::Vector3d& from, const Eigen::Vector
   return ExpRotation(std::atan2(sine, from.dot(to)) * axis);
 }
 
-ImagePoints::Options PointOptions(const EstimationOptions& options, bool is_circle) {
-  ImagePoints::Options points;
-  points.loss = (is_circle ? options.conic_loss : options.line_loss).type;
-  points.distance = options.conic_distance;
-  const CameraSigma& sigma = options.camera_sigma.value_or(options.noise_model.camera);
-  points.num_distortion = sigma.k1 > 0.0 ? 1 : 0;
-  return points;
-}
-
-double OneOf(double stated, double option, double measured) {
-  return stated > 0.0 ? stated : option > 0.0 ? option : measured;
+int NumDistortion(const EstimationOptions& options) {
+  return options.camera_sigma.value_or(options.noise_model.camera).k1 > 0.0 ? 1 : 0;
 }
 
 }  // namespace
@@ -51,13 +42,13 @@ std::string TrackFrame::Term::Name() const {
   return "line '" + id + "'";
 }
 
-void TrackFrame::Reset(const Observations& fitted, const PointNoise& noise) {
+void TrackFrame::Reset(const Observations& fitted) {
   observations_ = &fitted;
-  num_terms_ = 0;
+  terms_.Shorten(0);
   best_circle_ = best_observation_ = -1;
   for (const TrackMap::Circle& circle : map_.circles) {
     const int index = FindCircle(fitted, circle.id);
-    if (index >= 0) AddCircle(static_cast<std::size_t>(index), circle, noise);
+    if (index >= 0) AddCircle(static_cast<std::size_t>(index), circle);
   }
   for (const TrackMap::Direction& direction : map_.directions) {
     const std::optional<Segment>* axis = direction.id == kXAxisId   ? &fitted.frame.x_axis
@@ -68,19 +59,14 @@ void TrackFrame::Reset(const Observations& fitted, const PointNoise& noise) {
       continue;
     }
     const int index = FindPencil(fitted, direction.id);
-    if (index < 0) continue;
-    AddPencil(fitted.pencils[static_cast<std::size_t>(index)],
-              noise.lines[static_cast<std::size_t>(index)], direction);
+    if (index >= 0) AddPencil(fitted.pencils[static_cast<std::size_t>(index)], direction);
   }
 }
 
 // One of an earlier frame, whose cost function takes new points, or one without.
 TrackFrame::Term& TrackFrame::AddTerm(Term::Kind kind, int layout) {
-  std::size_t i = num_terms_;
-  while (i < terms_.size() && (terms_[i].kind != kind || terms_[i].layout != layout)) ++i;
-  if (i == terms_.size()) terms_.emplace_back();
-  if (i != num_terms_) std::swap(terms_[num_terms_], terms_[i]);
-  Term& term = terms_[num_terms_++];
+  Term& term =
+      terms_.Recycle([&](const Term& old) { return old.kind == kind && old.layout == layout; });
   term.kind = kind;
   term.layout = layout;
   term.blocks.clear();
@@ -91,15 +77,13 @@ TrackFrame::Term& TrackFrame::AddTerm(Term::Kind kind, int layout) {
   return term;
 }
 
-void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle,
-                           const PointNoise& noise) {
+void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle) {
   const CircleObservation& seen = observations_->circles[index];
   if (!seen.fit) return;
-  const double sigma = OneOf(seen.sigma_px, options_.conic_loss.scale_px, noise.circles[index]);
-  RemoveCurvatureBias(observations_->camera, seen.points, seen.fit->conic, sigma, &pixels_);
-  if (!FillEvidencePoints(observations_->camera, pixels_, seen.inliers, sigma, true,
-                          options_.noise_model, PointOptions(options_, true), &points_))
+  if (!FillEvidencePoints(observations_->camera, seen.points, seen.inliers, seen.sigma_px, true,
+                          options_, NumDistortion(options_), &points_))
     return;
+  points_.RemoveCurvatureBias(seen.fit->conic, seen.sigma_px);
   PlaneCircleContourCost::Blocks blocks;
   blocks.tilt_and_height = circle.tilt >= 0;
   // What the map knows of them is in its own Gaussian.
@@ -107,7 +91,7 @@ void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle,
   blocks.tilt_sigma = blocks.height_sigma = kNothing;
   blocks.offset = circle.offset >= 0;
   blocks.camera = map_.has_camera();
-  const int parent = static_cast<int>(num_terms_);
+  const int parent = static_cast<int>(terms_.size());
   Term& term = AddTerm(Term::Kind::kCircle, (blocks.tilt_and_height ? 1 : 0) +
                                                 (blocks.offset ? 2 : 0) + (blocks.camera ? 4 : 0));
   term.blocks = {TrackMap::kRotation, TrackMap::kTranslation, circle.center, circle.radius};
@@ -132,7 +116,7 @@ void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle,
   }
   if (!seen.center) return;
   AddCenter(seen, circle, mark_sigma);
-  terms_[num_terms_ - 1].parent = parent;
+  terms_[terms_.size() - 1].parent = parent;
 }
 
 void TrackFrame::AddCenter(const CircleObservation& seen, const TrackMap::Circle& circle,
@@ -167,12 +151,11 @@ void TrackFrame::AddAxis(const std::optional<Segment>& axis, const TrackMap::Dir
   AddLine(line, sigma, direction, 0.0, -1);
 }
 
-void TrackFrame::AddPencil(const PencilObservation& pencil, const std::vector<double>& sigmas,
-                           const TrackMap::Direction& direction) {
+void TrackFrame::AddPencil(const PencilObservation& pencil, const TrackMap::Direction& direction) {
   for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
     const LineObservation& line = pencil.lines[j];
-    const double sigma = OneOf(LineSigma(pencil, line), options_.line_loss.scale_px, sigmas[j]);
-    AddLine(line, sigma, direction, options_.noise_model.line_direction_rad, static_cast<int>(j));
+    AddLine(line, LineSigma(pencil, line), direction, options_.noise_model.line_direction_rad,
+            static_cast<int>(j));
   }
 }
 
@@ -180,7 +163,7 @@ void TrackFrame::AddLine(const LineObservation& line, double sigma_px,
                          const TrackMap::Direction& direction, double deviation, int number) {
   if (!line.fit) return;
   if (!FillEvidencePoints(observations_->camera, line.points, line.inliers, sigma_px, false,
-                          options_.noise_model, PointOptions(options_, false), &points_))
+                          options_, NumDistortion(options_), &points_))
     return;
   DirectionLineCost::Options options;
   options.direction_sigma = deviation;
@@ -204,7 +187,7 @@ void TrackFrame::AddLine(const LineObservation& line, double sigma_px,
 
 void TrackFrame::Parameters(const Term& term, const double* x, const double* own,
                             const double** out) const {
-  const auto index = static_cast<std::size_t>(&term - terms_.data());
+  const auto index = static_cast<std::size_t>(&term - &terms_[0]);
   for (std::size_t k = 0; k < term.blocks.size(); ++k) {
     out[k] = term.blocks[k] == kOwn ? own + 2 * index : x + map_.block(term.blocks[k]).offset;
   }
@@ -250,28 +233,27 @@ bool TrackFrame::Begin(const TrackState& prior, const CameraPose& start, TrackFi
   CameraPose pose = start;
   if (!map_.has_position()) pose.translation = prior.Pose(map_).translation;
   fit->state.SetPose(map_, pose);
-  fit->own.assign(2 * num_terms_, 0.0);
-  fit->active.assign(num_terms_, 1);
+  fit->own.assign(2 * terms_.size(), 0.0);
+  fit->active.assign(terms_.size(), 1);
   bool any = false;
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     fit->active[i] = Place(i, fit) ? 1 : 0;
     any = any || fit->active[i] != 0;
   }
   return any;
 }
 
-double TrackFrame::TermsCost(const TrackFit& fit) const {
-  constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
-  double residuals[kMaxResiduals], cost = 0.0;
+// Twice a term's cost; infinite where it has none.
+double TrackFrame::TwiceCost(std::size_t index, const TrackFit& fit) const {
   const double* parameters[8];
-  for (std::size_t i = 0; i < num_terms_; ++i) {
-    if (fit.active[i] == 0) continue;
-    Parameters(terms_[i], fit.state.x.data(), fit.own.data(), parameters);
-    if (!terms_[i].cost->Evaluate(parameters, residuals, nullptr))
-      return std::numeric_limits<double>::infinity();
-    for (int k = 0; k < terms_[i].cost->num_residuals(); ++k)
-      cost += 0.5 * residuals[k] * residuals[k];
-  }
+  Parameters(terms_[index], fit.state.x.data(), fit.own.data(), parameters);
+  return TwiceCostOf(*terms_[index].cost, nullptr, Weighing(), parameters);
+}
+
+double TrackFrame::TermsCost(const TrackFit& fit) const {
+  double cost = 0.0;
+  for (std::size_t i = 0; i < terms_.size(); ++i)
+    cost += fit.active[i] != 0 ? 0.5 * TwiceCost(i, fit) : 0.0;
   return cost;
 }
 
@@ -317,7 +299,7 @@ void TrackFrame::KeepCheapest(std::size_t most, std::vector<TrackState>* states)
 }
 
 void TrackFrame::Refine(const TrackState& prior, const TrackerOptions& options,
-                        std::vector<TrackFit>* fits) {
+                        Kept<TrackFit>* fits) {
   std::array<CameraPose, 3> poses;
   std::array<double, 3> prior_costs, costs;
   const auto num_circle_poses = static_cast<std::size_t>(CircleStarts(prior, poses.data()));
@@ -331,12 +313,9 @@ void TrackFrame::Refine(const TrackState& prior, const TrackerOptions& options,
     if (costs[i] < costs[best]) best = i;
   }
   const auto refine = [&](const CameraPose& pose) {
-    TrackFit fit = spares.Take();
-    if (Begin(prior, pose, &fit) && RefineFrom(prior, options, &fit)) {
-      fits->push_back(std::move(fit));
-    } else {
-      spares.Give(std::move(fit));
-    }
+    TrackFit& fit = fits->Add();
+    if (!Begin(prior, pose, &fit) || !RefineFrom(prior, options, &fit))
+      fits->Shorten(fits->size() - 1);
   };
   refine(poses[best]);
   // The circle's other pose, where the prior does not exclude it.

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "circline/estimators/observations.h"
-#include "circline/estimators/point_noise.h"
 #include "circline/refine/cost_functions.h"
 #include "circline/refine/estimate_pose.h"
 #include "circline/refine/scratch.h"
@@ -42,15 +41,15 @@ class TrackFrame {
   TrackFrame(const EstimationOptions& options, const TrackMap& map)
       : options_(options), map_(map) {}
 
-  // Takes a frame's features in place of those before. `fitted`: with fits; it is used until the
-  // next call. Features that the map does not have take no part.
-  void Reset(const Observations& fitted, const PointNoise& noise);
+  // Takes a frame's features in place of those before. `fitted`: with fits and noise; it is used
+  // until the next call. Features that the map does not have take no part.
+  void Reset(const Observations& fitted);
 
-  bool empty() const { return num_terms_ == 0; }
+  bool empty() const { return terms_.empty(); }
   // Refines a hypothesis that has been moved on, from all starts that may lead to minima of its
   // own: the prediction, and both poses of the best known circle. Adds one fit for each minimum
   // found.
-  void Refine(const TrackState& prior, const TrackerOptions& options, std::vector<TrackFit>* fits);
+  void Refine(const TrackState& prior, const TrackerOptions& options, Kept<TrackFit>* fits);
 
   // Refines one from where it is, but from this focal length (shift of log f). False where that
   // fails.
@@ -75,21 +74,17 @@ class TrackFrame {
     std::string Name() const;  // For people.
   };
   static constexpr int kOwn = -1;
-  std::size_t size() const { return num_terms_; }
-  const Term& term(std::size_t i) const { return terms_[i]; }
+  const Kept<Term>& terms() const { return terms_; }
   void Parameters(const Term& term, const double* x, const double* own, const double** out) const;
-
-  Spares<TrackFit> spares;  // Fits are taken from here; who is done with one gives it back.
 
  private:
   class Information;
 
   Term& AddTerm(Term::Kind kind, int layout);
-  void AddCircle(std::size_t index, const TrackMap::Circle& circle, const PointNoise& noise);
+  void AddCircle(std::size_t index, const TrackMap::Circle& circle);
   void AddCenter(const CircleObservation& seen, const TrackMap::Circle& circle, double sigma_px);
   void AddAxis(const std::optional<Segment>& axis, const TrackMap::Direction& direction);
-  void AddPencil(const PencilObservation& pencil, const std::vector<double>& sigmas,
-                 const TrackMap::Direction& direction);
+  void AddPencil(const PencilObservation& pencil, const TrackMap::Direction& direction);
   // `number`: of its pencil's lines; -1: an axis.
   void AddLine(const LineObservation& line, double sigma_px, const TrackMap::Direction& direction,
                double deviation, int number);
@@ -97,7 +92,8 @@ class TrackFrame {
   bool Begin(const TrackState& prior, const CameraPose& start, TrackFit* fit) const;
   double TermsCost(const TrackFit& fit) const;
   int Solve(int max_evaluations, TrackFit* fit);
-  double Excess(const Term& term, const TrackFit& fit) const;
+  double TwiceCost(std::size_t term, const TrackFit& fit) const;
+  double Excess(std::size_t term, const TrackFit& fit) const;
   bool Place(std::size_t term, TrackFit* fit) const;
   int LeastOdd(TrackFit* fit) const;
   bool LeaveOutWorst(double gate_probability, TrackFit* fit);
@@ -112,8 +108,7 @@ class TrackFrame {
   const EstimationOptions& options_;
   const TrackMap& map_;
   const Observations* observations_ = nullptr;
-  std::vector<Term> terms_;  // The first num_terms_; the others wait for a frame with more.
-  std::size_t num_terms_ = 0;
+  Kept<Term> terms_;
   int best_circle_ = -1, best_observation_ = -1;  // In the map, in the observations.
 
   // Memory.
@@ -121,8 +116,7 @@ class TrackFrame {
   TrackPrior prior_;                // Of the last solve.
   Scratch scratch_;
   ImagePoints points_;
-  std::vector<Eigen::Vector2d> pixels_;
-  TrackFit begun_;
+  TrackFit begun_, with_;
   std::vector<std::uint8_t> used_;                   // By block.
   std::vector<double*> parameters_;                  // Of a residual.
   std::vector<std::pair<double, std::size_t>> odd_;  // Terms by how much they contradict.

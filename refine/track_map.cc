@@ -1,5 +1,3 @@
-#include "circline/refine/track_map.h"
-
 #include <ceres/sphere_manifold.h>
 
 #include <Eigen/Dense>
@@ -11,6 +9,7 @@
 
 #include "circline/refine/manifolds.h"
 #include "circline/refine/plane_circle.h"
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 namespace {
@@ -20,38 +19,24 @@ constexpr double kUnknown = 1.0;
 // Bounds what a call costs; features beyond these stay without a part.
 constexpr std::size_t kMaxCircles = 64, kMaxDirections = 32;
 
-// A circle by its points in the plane Z = 0: (cx, cy, r). False where it cannot lie there.
-bool PlaceCircle(const Camera& camera, const CircleObservation& circle, const CameraPose& pose,
-                 Eigen::Vector3d* placed) {
-  const Eigen::Vector3d n = pose.rotation.col(2);
-  const double distance = n.dot(pose.translation);
-  std::vector<CalibratedPoint> points;
-  std::vector<Eigen::Vector2d> in_plane;
-  CalibrateInliers(camera, circle.points, circle.inliers, &points);
-  for (const CalibratedPoint& p : points) {
-    const Eigen::Vector3d ray = p.Homogeneous();
-    const double depth = distance / n.dot(ray);
-    if (!(depth > 0.0) || !std::isfinite(depth)) return false;
-    in_plane.emplace_back((pose.rotation.transpose() * (depth * ray - pose.translation)).head<2>());
-  }
-  return in_plane.size() >= 3 && FitPlaneCircle(in_plane, placed);
-}
-
 class MapBuilder {
  public:
   MapBuilder(const Observations& frame, const TrackerOptions& options, TrackMap* map,
-             std::vector<TrackState>* states)
+             Kept<TrackFit>* states)
       : frame_(frame), noise_(options.estimation.noise_model), map_(*map), states_(*states) {}
 
   // `is_first`: it fixes the origin and the unit.
   void AddCircle(const CircleObservation& circle, bool is_first) {
     if (map_.circles.size() >= kMaxCircles) return;
     std::vector<Eigen::Vector3d> placed;
-    for (const TrackState& state : states_) {
+    std::vector<CalibratedPoint> points;
+    CalibrateInliers(frame_.camera, circle.points, circle.inliers, &points);
+    for (const TrackFit& fit : states_) {
+      const CameraPose pose = fit.state.Pose(map_);
       Eigen::Vector3d at;
       // Beyond a hypothesis' horizon: anywhere, and the frames to come decide.
-      if (!PlaceCircle(frame_.camera, circle, state.Pose(map_), &at))
-        at = Eigen::Vector3d(0.0, 0.0, state.Pose(map_).translation.norm());
+      if (!FitPlaneCircle(points, 0.0, pose, &at))
+        at = Eigen::Vector3d(0.0, 0.0, pose.translation.norm());
       placed.push_back(at);
     }
     TrackMap::Circle added;
@@ -60,21 +45,20 @@ class MapBuilder {
     added.radius = SharedBlock(circle, &TrackMap::Circle::radius);
     if (added.center < 0) {
       added.center = map_.AddBlock(2, {}, is_first);
-      Append(added.center, [&](std::size_t i) {
-        return std::pair(Eigen::VectorXd(placed[i].head<2>()), Length(i, 2));
-      });
+      for (std::size_t i = 0; i < placed.size(); ++i)
+        states_[i].state.Append(map_, added.center, Eigen::VectorXd(placed[i].head<2>()),
+                                Length(i, 2));
     }
     if (added.radius < 0) {
       added.radius = map_.AddBlock(1, {}, is_first);
       const double stated = circle.radius_sigma > 0.0 ? circle.radius_sigma : noise_.radius;
       constexpr double kExact = 1e-6;  // Stands for a radius that is known exactly.
-      Append(added.radius, [&](std::size_t i) {
-        const bool known = map_.metric && circle.radius > 0.0;
+      const bool known = map_.metric && circle.radius > 0.0;
+      for (std::size_t i = 0; i < placed.size(); ++i) {
         const double radius = known ? circle.radius : placed[i].z();
-        const Eigen::VectorXd sigma =
-            known ? Eigen::VectorXd::Constant(1, radius * std::max(stated, kExact)) : Length(i, 1);
-        return std::pair(Eigen::VectorXd(Eigen::VectorXd::Constant(1, radius)), sigma);
-      });
+        states_[i].state.Append(map_, added.radius, One(radius),
+                                known ? One(radius * std::max(stated, kExact)) : Length(i, 1));
+      }
     }
     AddImperfections(circle, &added);
     map_.circles.push_back(std::move(added));
@@ -94,7 +78,8 @@ class MapBuilder {
     }
     const bool is_constant = manifold == nullptr;
     const int block = map_.AddBlock(3, std::move(manifold), is_constant);
-    for (TrackState& state : states_) {
+    for (TrackFit& fit : states_) {
+      TrackState& state = fit.state;
       Eigen::Vector3d d = state.Pose(map_).rotation.transpose() * in_camera;
       if (!is_free) d = Eigen::Vector3d::Unit(static_cast<int>(role));
       if (is_free && in_plane) d.z() = 0.0;
@@ -102,7 +87,7 @@ class MapBuilder {
       d = d.norm() > kNone ? d.normalized() : Eigen::Vector3d::UnitX();
       Eigen::Vector3d sigma = Eigen::Vector3d::Constant(is_free ? kUnknown : lean);
       if (in_plane) sigma.z() = lean;
-      const Eigen::MatrixXd plus = PlusJacobianOf(map_.block(block), d.data());
+      const Eigen::MatrixXd plus = map_.block(block).PlusJacobian(d.data());
       Eigen::MatrixXd covariance = plus.transpose() * sigma.cwiseAbs2().asDiagonal() * plus;
       if (is_constant) covariance.resize(0, 0);
       state.Append(map_, block, d.data(), covariance);
@@ -113,18 +98,16 @@ class MapBuilder {
  private:
   // Standard deviation of an unknown length.
   Eigen::VectorXd Length(std::size_t i, int size) const {
-    return Eigen::VectorXd::Constant(size, kUnknown * states_[i].Pose(map_).translation.norm());
+    return Eigen::VectorXd::Constant(size,
+                                     kUnknown * states_[i].state.Pose(map_).translation.norm());
   }
 
-  // `of(i)`: values and standard deviations for the i-th hypothesis.
-  template <typename Of>
-  void Append(int block, const Of& of) {
-    for (std::size_t i = 0; i < states_.size(); ++i) {
-      const auto [values, sigma] = of(i);
-      const Eigen::Index size = map_.block(block).tangent_size();
-      states_[i].Append(map_, block, values.data(),
-                        Eigen::MatrixXd(sigma.head(size).cwiseAbs2().asDiagonal()));
-    }
+  static Eigen::VectorXd One(double value) { return Eigen::VectorXd::Constant(1, value); }
+
+  // The same to all hypotheses, about zeros.
+  void Append(int block, const Eigen::VectorXd& sigmas) {
+    for (TrackFit& fit : states_)
+      fit.state.Append(map_, block, Eigen::VectorXd::Zero(sigmas.size()), sigmas);
   }
 
   // Of a circle of the map with the same centre, or the same radius; -1 where there is none.
@@ -150,10 +133,7 @@ class MapBuilder {
       added->tilt = map_.AddBlock(3);
       const double tilt = std::max(noise_.circle_tilt_rad, kExact),
                    height = std::max(noise_.circle_height, kExact);
-      Append(added->tilt, [&](std::size_t) {
-        return std::pair(Eigen::VectorXd(Eigen::Vector3d::Zero()),
-                         Eigen::VectorXd(Eigen::Vector3d(tilt, tilt, height)));
-      });
+      Append(added->tilt, Eigen::Vector3d(tilt, tilt, height));
     }
     if (!(noise_.contour_offset_px > 0.0)) return;
     added->contrast = std::clamp(circle.contrast, -1, 1);
@@ -162,16 +142,13 @@ class MapBuilder {
     }
     if (added->offset >= 0) return;
     added->offset = map_.AddBlock(1);
-    Append(added->offset, [&](std::size_t) {
-      return std::pair(Eigen::VectorXd(Eigen::VectorXd::Zero(1)),
-                       Eigen::VectorXd(Eigen::VectorXd::Constant(1, noise_.contour_offset_px)));
-    });
+    Append(added->offset, One(noise_.contour_offset_px));
   }
 
   const Observations& frame_;
   const NoiseModel& noise_;
   TrackMap& map_;
-  std::vector<TrackState>& states_;
+  Kept<TrackFit>& states_;
 };
 
 // Pose, velocities and camera of a hypothesis, as a first frame's evidence finds them.
@@ -184,19 +161,13 @@ TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const Tracke
   // A turn that nothing fixes is what the first frame's convention says.
   constexpr double kConvention = 1e-4;  // Radians.
   const Eigen::Vector3d turn(kUnknown, kUnknown, h.RotationIsFree() ? kConvention : kUnknown);
-  const auto diagonal = [&](int block, const Eigen::VectorXd& sigmas) {
-    const Eigen::Index size = map.block(block).tangent_size();
-    return Eigen::MatrixXd(sigmas.head(size).cwiseAbs2().asDiagonal());
-  };
-  const auto all = [](double value) { return Eigen::VectorXd(Eigen::Vector3d::Constant(value)); };
+  const auto all = [](double value) { return Eigen::VectorXd::Constant(3, value).eval(); };
   const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(kCameraSize);
-  state.Append(map, TrackMap::kRotation, q.coeffs().data(), diagonal(TrackMap::kRotation, turn));
-  state.Append(map, TrackMap::kTranslation, h.cam_from_world.translation.data(),
-               diagonal(TrackMap::kTranslation, all(kUnknown * distance)));
-  state.Append(map, TrackMap::kTurnRate, zeros.data(),
-               diagonal(TrackMap::kTurnRate, all(options.initial_turn_rate_sigma)));
-  state.Append(map, TrackMap::kVelocity, zeros.data(),
-               diagonal(TrackMap::kVelocity, all(options.initial_velocity_sigma * distance)));
+  state.Append(map, TrackMap::kRotation, Eigen::VectorXd(q.coeffs()), Eigen::VectorXd(turn));
+  state.Append(map, TrackMap::kTranslation, Eigen::VectorXd(h.cam_from_world.translation),
+               all(kUnknown * distance));
+  state.Append(map, TrackMap::kTurnRate, zeros, all(options.initial_turn_rate_sigma));
+  state.Append(map, TrackMap::kVelocity, zeros, all(options.initial_velocity_sigma * distance));
   Eigen::VectorXd camera = zeros;
   camera.head<5>() << sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
       sigma.principal_point_px, sigma.k1;
@@ -249,7 +220,7 @@ void AddDirections(const Observations& frame, const TrackMap& map, bool shares_a
 }  // namespace
 
 void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& hypotheses,
-              const TrackerOptions& options, TrackMap* map, std::vector<TrackState>* states) {
+              const TrackerOptions& options, TrackMap* map, Kept<TrackFit>* states) {
   const EstimationOptions& estimation = options.estimation;
   const CameraSigma sigma =
       estimation.camera_sigma.value_or(estimation.noise_model.SigmaOf(resolved.camera));
@@ -262,10 +233,10 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
   map->metric = hypotheses.front().metric;
   map->origin_observed = hypotheses.front().origin_observed;
   map->plane = resolved.frame.plane;
-  states->clear();
+  states->Shorten(0);
   const double log_focal = sigma.log_focal > 0.0 ? StatedLogFocal(resolved) : 0.0;
   for (const PoseHypothesis& h : hypotheses)
-    states->push_back(FirstState(*map, h, options, sigma, log_focal));
+    states->Add().state = FirstState(*map, h, options, sigma, log_focal);
   MapBuilder builder(resolved, options, map, states);
   if (has_position) {
     const auto is_at_origin = [&](const CircleObservation& c) {
@@ -282,7 +253,7 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
 }
 
 void ExtendMap(const Observations& fitted, const TrackerOptions& options, TrackMap* map,
-               std::vector<TrackState>* states) {
+               Kept<TrackFit>* states) {
   MapBuilder builder(fitted, options, map, states);
   for (const CircleObservation& circle : fitted.circles) {
     const bool is_known = std::any_of(map->circles.begin(), map->circles.end(),

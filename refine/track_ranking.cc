@@ -1,11 +1,11 @@
-#include "circline/refine/track_ranking.h"
-
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <utility>
+
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 namespace {
@@ -30,59 +30,21 @@ double LogAdd(double a, double b) {
   return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
 }
 
-double LogWeight(const TrackState& state) { return state.log_weight; }
-double LogWeight(const TrackFit& fit) { return fit.state.log_weight; }
-double& LogWeight(TrackState& state) { return state.log_weight; }
-double& LogWeight(TrackFit& fit) { return fit.state.log_weight; }
-
-template <typename T>
-void Normalize(std::vector<T>* all) {
+void Normalize(Kept<TrackFit>* fits) {
   double sum = -std::numeric_limits<double>::infinity();
-  for (const T& one : *all) sum = LogAdd(sum, LogWeight(one));
-  for (T& one : *all) LogWeight(one) -= sum;
-}
-
-// Keeps the order of those that stay; the others' memory stays, too.
-template <typename T, typename Stays>
-void Keep(const Stays& stays, Spares<T>* spares, std::vector<T>* all) {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < all->size(); ++i) {
-    if (!stays((*all)[i], i)) continue;
-    if (kept != i) std::swap((*all)[kept], (*all)[i]);
-    ++kept;
-  }
-  spares->Resize(kept, all);
-}
-
-template <typename T>
-void RankAny(const TrackerOptions& options, Spares<T>* spares, std::vector<T>* all) {
-  Normalize(all);
-  const auto is_more = [](const T& a, const T& b) { return LogWeight(a) > LogWeight(b); };
-  const auto best = std::min_element(all->begin(), all->end(), is_more);
-  if (LogWeight(*best) > LogWeight(all->front()) + std::log(options.flip_odds))
-    std::rotate(all->begin(), best, best + 1);
-  // Few: by insertion, which keeps the order of equals and needs no memory.
-  for (auto one = all->begin() + 1; one < all->end(); ++one)
-    std::rotate(std::upper_bound(all->begin() + 1, one, *one, is_more), one, one + 1);
-  const double least = std::log(options.min_probability);
-  const auto most = static_cast<std::size_t>(options.max_hypotheses);
-  Keep([&](const T& one, std::size_t i) { return i == 0 || LogWeight(one) >= least; }, spares, all);
-  if (all->size() > most) spares->Resize(most, all);
-  Normalize(all);
+  for (const TrackFit& fit : *fits) sum = LogAdd(sum, fit.state.log_weight);
+  for (TrackFit& fit : *fits) fit.state.log_weight -= sum;
 }
 
 }  // namespace
 
-void Merge(const TrackMap& map, MergedWeight weight, Spares<TrackFit>* spares,
-           std::vector<TrackFit>* fits) {
+void Merge(const TrackMap& map, MergedWeight weight, Kept<TrackFit>* fits) {
   std::size_t merged = 0;  // The first ones are different.
-  for (std::size_t i = 0; i < fits->size(); ++i) {
-    TrackFit& fit = (*fits)[i];
+  for (TrackFit& fit : *fits) {
     std::size_t same = 0;
     while (same < merged && !IsSame(map, fit, (*fits)[same])) ++same;
     if (same == merged) {
-      if (merged != i) std::swap((*fits)[merged], fit);
-      ++merged;
+      std::swap((*fits)[merged++], fit);
       continue;
     }
     TrackFit& other = (*fits)[same];
@@ -90,15 +52,29 @@ void Merge(const TrackMap& map, MergedWeight weight, Spares<TrackFit>* spares,
     if (b > a) std::swap(other, fit);
     other.state.log_weight = weight == MergedWeight::kSum ? LogAdd(a, b) : std::max(a, b);
   }
-  spares->Resize(merged, fits);
+  fits->Shorten(merged);
 }
 
-void Rank(const TrackerOptions& options, Spares<TrackState>* spares,
-          std::vector<TrackState>* states) {
-  RankAny(options, spares, states);
-}
-void Rank(const TrackerOptions& options, Spares<TrackFit>* spares, std::vector<TrackFit>* fits) {
-  RankAny(options, spares, fits);
+void Rank(const TrackerOptions& options, Kept<TrackFit>* fits) {
+  Normalize(fits);
+  const auto is_more = [](const TrackFit& a, const TrackFit& b) {
+    return a.state.log_weight > b.state.log_weight;
+  };
+  const auto best = std::min_element(fits->begin(), fits->end(), is_more);
+  if (best->state.log_weight > fits->begin()->state.log_weight + std::log(options.flip_odds))
+    std::rotate(fits->begin(), best, best + 1);
+  // Few: by insertion, which keeps the order of equals and needs no memory.
+  for (auto one = fits->begin() + 1; one < fits->end(); ++one)
+    std::rotate(std::upper_bound(fits->begin() + 1, one, *one, is_more), one, one + 1);
+  const double least = std::log(options.min_probability);
+  const auto most = static_cast<std::size_t>(options.max_hypotheses);
+  std::size_t kept = 0;
+  for (TrackFit& fit : *fits) {
+    if (kept == 0 || (kept < most && fit.state.log_weight >= least))
+      std::swap((*fits)[kept++], fit);
+  }
+  fits->Shorten(kept);
+  Normalize(fits);
 }
 
 }  // namespace circline

@@ -1,5 +1,3 @@
-#include "circline/refine/track_relocate.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 namespace {
@@ -92,12 +91,13 @@ void Forget(const TrackMap& map, const TrackerOptions& options, const CameraPose
 
 }  // namespace
 
-std::vector<TrackState> Relocated(const TrackMap& map, const std::vector<TrackState>& states,
+std::vector<TrackState> Relocated(const TrackMap& map, const Kept<TrackFit>& states,
                                   const std::vector<PoseHypothesis>& seen,
                                   const TrackerOptions& options) {
   std::vector<TrackState> out;
   if (states.empty() || !map.has_position()) return out;
-  for (const TrackState& state : states) {
+  for (const TrackFit& fit : states) {
+    const TrackState& state = fit.state;
     for (const PoseHypothesis& h : seen) {
       const std::vector<Seen> circles = CirclesOf(map, state, h);
       if (circles.empty()) continue;

@@ -1,5 +1,3 @@
-#include "circline/refine/track_result.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
@@ -10,6 +8,8 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/refine/camera_shifts.h"
+#include "circline/refine/joint_result.h"
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 namespace {
@@ -62,17 +62,8 @@ void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& c
   for (const TrackMap::Circle& c : map.circles) {
     CircleEstimate& estimate = *circle++;
     estimate.id = c.id;
-    estimate.radius = std::abs(at(c.radius)[0]);
-    Eigen::Vector3d center(at(c.center)[0], at(c.center)[1], 0.0), normal(0.0, 0.0, 1.0);
-    if (c.tilt >= 0) {
-      normal.head<2>() = Eigen::Vector2d(at(c.tilt)[0], at(c.tilt)[1]);
-      center.z() = at(c.tilt)[2] * estimate.radius;
-    }
-    estimate.center = pose.rotation * center + pose.translation;
-    estimate.normal = (pose.rotation * normal).normalized();
-    if (estimate.normal.dot(estimate.center) > 0.0) estimate.normal = -estimate.normal;
-    estimate.center_px.setZero();
-    CameraToPixel(shifted ? *shifted : camera, estimate.center, &estimate.center_px);
+    PlaceEstimate({at(c.center), at(c.radius)[0], c.tilt >= 0 ? at(c.tilt) : nullptr}, pose, 1.0,
+                  shifted ? *shifted : camera, &estimate);
   }
   h->pencils.resize(map.directions.size());
   auto pencil = h->pencils.begin();
@@ -85,16 +76,14 @@ void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& c
     const Eigen::Index rows = block.tangent_size();
     Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> J(3, 3 + rows);
     J.leftCols<3>() = -CrossMatrix(in_world);
-    if (rows > 0) J.rightCols(rows) = PlusJacobianOf(block, at(d.block));
+    if (rows > 0) J.rightCols(rows) = block.PlusJacobian(at(d.block));
     const Eigen::Index first = map.tangent(d.block);
     BlockMatrix joint(3 + rows, 3 + rows);  // Of the turn and the direction.
     joint.topLeftCorner<3, 3>() = state.covariance.topLeftCorner<3, 3>();
     joint.topRightCorner(3, rows) = state.covariance.block(0, first, 3, rows);
     joint.bottomLeftCorner(rows, 3) = state.covariance.block(first, 0, rows, 3);
     joint.bottomRightCorner(rows, rows) = state.covariance.block(first, first, rows, rows);
-    const Eigen::Matrix3d covariance = J * joint * J.transpose();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-    estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
+    estimate.sigma_deg = LargestSigmaDeg(J * joint * J.transpose());
   }
 }
 
@@ -157,8 +146,8 @@ void FillFrame(const TrackFrame& frame, const TrackFit& fit, PoseHypothesis* h,
   h->cost = fit.cost;
   double squares = 0.0;
   const double* parameters[8];
-  for (std::size_t i = 0; i < frame.size(); ++i) {
-    const TrackFrame::Term& term = frame.term(i);
+  for (std::size_t i = 0; i < frame.terms().size(); ++i) {
+    const TrackFrame::Term& term = frame.terms()[i];
     if (fit.active[i] == 0) {
       if (term.parent >= 0 && fit.active[static_cast<std::size_t>(term.parent)] == 0) continue;
       h->left_out.push_back(term.id);

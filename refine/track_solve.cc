@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "circline/refine/chi_square.h"
 #include "circline/refine/nearby_solve.h"
+#include "circline/refine/statistics.h"
 #include "circline/refine/track_frame.h"
 
 namespace circline {
@@ -19,7 +19,7 @@ namespace circline {
 bool TrackFrame::ResetPrior(const TrackState& before, const TrackFit& fit) {
   used_.assign(map_.blocks().size(), 0);
   used_[TrackMap::kRotation] = used_[TrackMap::kTranslation] = 1;
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     if (fit.active[i] == 0) continue;
     for (const int b : terms_[i].blocks) {
       if (b >= 0) used_[static_cast<std::size_t>(b)] = 1;
@@ -41,7 +41,7 @@ int TrackFrame::Solve(int max_evaluations, TrackFit* fit) {
     parameters_.push_back(x + block.offset);
   }
   problem.AddResidualBlock(prior_.cost(), nullptr, parameters_);
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     if (fit->active[i] == 0) continue;
     parameters_.clear();
     for (const int b : terms_[i].blocks) {
@@ -63,15 +63,8 @@ int TrackFrame::Solve(int max_evaluations, TrackFit* fit) {
 }
 
 // By how much twice a term's cost exceeds that of its own free fit; infinite where it has none.
-double TrackFrame::Excess(const Term& term, const TrackFit& fit) const {
-  constexpr int kMaxResiduals = CurveModel::kMaxSize + 6;
-  double residuals[kMaxResiduals], twice_cost = 0.0;
-  const double* parameters[8];
-  Parameters(term, fit.state.x.data(), fit.own.data(), parameters);
-  if (!term.cost->Evaluate(parameters, residuals, nullptr))
-    return std::numeric_limits<double>::infinity();
-  for (int k = 0; k < term.cost->num_residuals(); ++k) twice_cost += residuals[k] * residuals[k];
-  return twice_cost - term.free_twice_cost;
+double TrackFrame::Excess(std::size_t index, const TrackFit& fit) const {
+  return TwiceCost(index, fit) - terms_[index].free_twice_cost;
 }
 
 // Makes the terms inactive that contradict the others most: at a compromise of all, any may seem
@@ -79,13 +72,13 @@ double TrackFrame::Excess(const Term& term, const TrackFit& fit) const {
 bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) {
   odd_.clear();
   std::ptrdiff_t num_whole = 0;
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     if (terms_[i].parent < 0) ++num_whole;
     if (fit->active[i] == 0) {
       if (terms_[i].parent < 0) num_whole -= 2;  // Less than half of all may be left out.
       continue;
     }
-    const double beyond = Excess(terms_[i], *fit) - ChiSquareLimit(terms_[i].dof, gate_probability);
+    const double beyond = Excess(i, *fit) - ChiSquareLimit(terms_[i].dof, gate_probability);
     if (beyond > 0.0) odd_.emplace_back(beyond, i);
   }
   std::sort(odd_.begin(), odd_.end(), [](const auto& a, const auto& b) {
@@ -100,7 +93,7 @@ bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) {
     fit->active[i] = 0;
     num_whole -= is_whole ? 2 : 0;
     any = true;
-    for (std::size_t k = 0; k < num_terms_; ++k) {
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
       if (terms_[k].parent == static_cast<int>(i)) fit->active[k] = 0;
     }
   }
@@ -111,12 +104,12 @@ bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) {
 int TrackFrame::LeastOdd(TrackFit* fit) const {
   int least = -1;
   double excess = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     const Term& term = terms_[i];
     const bool has_parent =
         term.parent < 0 || fit->active[static_cast<std::size_t>(term.parent)] != 0;
     if (fit->active[i] != 0 || !has_parent || !Place(i, fit)) continue;
-    const double its = Excess(term, *fit);
+    const double its = Excess(i, *fit);
     if (!(its < excess)) continue;
     excess = its;
     least = static_cast<int>(i);
@@ -126,7 +119,7 @@ int TrackFrame::LeastOdd(TrackFit* fit) const {
 
 bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& options,
                             TrackFit* fit) {
-  const double gate = options.gate_probability / static_cast<double>(num_terms_);
+  const double gate = options.gate_probability / static_cast<double>(terms_.size());
   constexpr int kFew = 2;  // Evaluations that come to nothing.
   int left = options.max_evaluations;
   const auto solve = [&](TrackFit* at) {
@@ -143,21 +136,17 @@ bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& opti
   // What seemed to contradict may have agreed but for the worst: back, one by one, while it does.
   bool agrees = has_dropped;
   while (agrees && left > kFew) {
-    TrackFit with = spares.Take();
-    with = *fit;
-    const int back = LeastOdd(&with);
-    agrees = back >= 0;
+    with_ = *fit;
+    const int back = LeastOdd(&with_);
+    if (back < 0) break;
+    const auto i = static_cast<std::size_t>(back);
+    with_.active[i] = 1;
+    agrees = solve(&with_) && Excess(i, with_) <= ChiSquareLimit(terms_[i].dof, gate);
     if (agrees) {
-      const Term& term = terms_[static_cast<std::size_t>(back)];
-      with.active[static_cast<std::size_t>(back)] = 1;
-      agrees = solve(&with) && Excess(term, with) <= ChiSquareLimit(term.dof, gate);
-      if (agrees) {
-        std::swap(*fit, with);
-      } else if (!ResetPrior(before, *fit)) {
-        return false;
-      }
+      std::swap(*fit, with_);
+    } else if (!ResetPrior(before, *fit)) {
+      return false;
     }
-    spares.Give(std::move(with));
   }
   return Score(gate, fit) && Update(before, fit);
 }
@@ -166,7 +155,7 @@ bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& opti
 bool TrackFrame::Score(double gate_probability, TrackFit* fit) const {
   double left_out = 0.0, free = 0.0;
   fit->dof = 0;
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     const Term& term = terms_[i];
     if (fit->active[i] != 0) {
       fit->dof += term.dof;

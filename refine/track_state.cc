@@ -127,17 +127,16 @@ void TrackState::Append(const TrackMap& map, int index, const double* values,
   covariance.bottomRightCorner(more, more) = block_covariance;
 }
 
+void TrackState::Append(const TrackMap& map, int index, const Eigen::VectorXd& values,
+                        const Eigen::VectorXd& sigmas) {
+  const Eigen::VectorXd variances = sigmas.head(map.block(index).tangent_size()).cwiseAbs2();
+  Append(map, index, values.data(), Eigen::MatrixXd(variances.asDiagonal()));
+}
+
 BlockMatrix ChartOf(const Block& block, const double* at) {
   if (block.manifold == nullptr) return BlockMatrix::Identity(block.size, block.size);
   BlockJacobian J(block.tangent_size(), block.size);
   block.manifold->MinusJacobian(at, J.data());
-  return J;
-}
-
-BlockMatrix PlusJacobianOf(const Block& block, const double* at) {
-  if (block.manifold == nullptr) return BlockMatrix::Identity(block.size, block.size);
-  BlockJacobian J(block.size, block.tangent_size());
-  block.manifold->PlusJacobian(at, J.data());
   return J;
 }
 

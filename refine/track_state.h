@@ -78,18 +78,16 @@ struct TrackState {
   CameraPose Pose(const TrackMap& map) const;
   void SetPose(const TrackMap& map, const CameraPose& pose);
   bool IsInRange() const;  // Squares of all numbers, and their sums, are finite.
-  // Takes in a block that has been added to the map.
+  // Takes in a block that has been added to the map, its numbers independent or not.
+  void Append(const TrackMap& map, int block, const Eigen::VectorXd& values,
+              const Eigen::VectorXd& sigmas);
   void Append(const TrackMap& map, int block, const double* values,
               const Eigen::MatrixXd& block_covariance);
 };
 
 // Coordinates about a place: MinusJacobian at the place, which is linear, times the difference.
-// Tangent by ambient size. Matrices of one block do not allocate.
-using BlockMatrix =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCameraSize, kCameraSize>;
-using BlockVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCameraSize, 1>;
+// Tangent by ambient size.
 BlockMatrix ChartOf(const Block& block, const double* at);
-BlockMatrix PlusJacobianOf(const Block& block, const double* at);
 // Moves a block by a tangent.
 void Plus(const Block& block, const BlockVector& step, double* values);
 

@@ -105,7 +105,7 @@ class TrackFrame::Information {
     const Block& block = frame_.map_.block(index);
     frame_.columns_[b] = column;
     Rebind(frame_.scratch_.NewMatrix(block.size, block.tangent_size()), &frame_.plus_[b]);
-    frame_.plus_[b] = PlusJacobianOf(block, fit_.state.x.data() + block.offset);
+    frame_.plus_[b] = block.PlusJacobian(fit_.state.x.data() + block.offset);
     return frame_.plus_[b];
   }
 
@@ -124,7 +124,7 @@ bool TrackFrame::Update(const TrackState& before, TrackFit* fit) {
                           options_.line_loss.type == LossType::kTrivial;
   constexpr double kTuned = 0.95;
   const Weighing weighing{true, kInlierSigmas, is_trivial ? 1.0 : kTuned};
-  for (std::size_t i = 0; i < num_terms_; ++i) {
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
     if (fit->active[i] != 0 && !information.Add(i, weighing)) return false;
   }
   const Eigen::Index n = information.turn.rows(), c = information.H.rows() - n;

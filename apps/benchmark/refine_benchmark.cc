@@ -149,8 +149,7 @@ void RefineOneSeed(benchmark::State& state, void (*add)(Scene*), const Estimatio
     scene.observations = ResolveWorld(scene.observations);
   }
   RunInTurn(state, scenes, [&](std::size_t i) {
-    const PointNoise noise = MeasurePointNoise(scenes[i].observations);
-    const JointProblem problem(scenes[i].observations, options, noise);
+    const JointProblem problem(scenes[i].observations, options);
     CameraPose seed = scenes[i].pose;
     seed.rotation = ExpRotation({error, -error, error}) * seed.rotation;
     seed.translation.x() += 10.0 * error;

@@ -146,11 +146,7 @@ Status ChoosePose(const ImageRun& run, const PoseHypothesis** hypothesis) {
 // The evidence fitted anew, where the photo itself has told the camera.
 void SeeThrough(const Camera& camera, Observations* observations) {
   observations->camera = camera;
-  for (CircleObservation& circle : observations->circles) circle.fit.reset();
-  for (PencilObservation& pencil : observations->pencils) {
-    pencil.fit.reset();
-    for (LineObservation& line : pencil.lines) line.fit.reset();
-  }
+  ResetFits(observations);
   FitDirect(FLAGS_point_sigma_px, observations);
 }
 

@@ -25,8 +25,7 @@ TEST(JointProblem, AdmitsARimWithoutMovingTheOthersCentre) {
   FitDirect(scene.sigma(), &observations);
   const Observations resolved = ResolveWorld(observations);
   const EstimationOptions options;
-  const PointNoise noise = MeasurePointNoise(resolved);
-  const JointProblem problem(resolved, options, noise);
+  const JointProblem problem(resolved, options);
   ASSERT_EQ(problem.circles().size(), 2U);
   const JointProblem::CircleBlocks &out = problem.circles()[0], &in = problem.circles()[1];
   ASSERT_EQ(out.center, in.center);

@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "circline/estimators/point_noise.h"
 #include "circline/refine/nearby_solve.h"
 #include "tests/plane_scene.h"
 
@@ -98,8 +97,7 @@ TEST(Linearization, HasTheCovarianceOfAllUnknownsAtOnce) {
   const Observations resolved = RingsAndPencils();
   EstimationOptions options;
   options.camera_sigma = CameraSigma{0.05, 0.0, 0.0, 0.0, 0.0};
-  const PointNoise noise = MeasurePointNoise(resolved);
-  const JointProblem problem(resolved, options, noise);
+  const JointProblem problem(resolved, options);
   State state;
   const PlaneScene truth(0.7, 0.3);
   ASSERT_TRUE(problem.Start(truth.pose, 0.0, problem.FirstReading(), &state).ok());

@@ -1,5 +1,3 @@
-#include "circline/refine/merged_humps.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -7,6 +5,7 @@
 #include <vector>
 
 #include "circline/estimators/basics.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 namespace {

@@ -1,8 +1,11 @@
-// How large sums of squares get by chance. Internal: not installed.
-#ifndef CIRCLINE_REFINE_CHI_SQUARE_H_
-#define CIRCLINE_REFINE_CHI_SQUARE_H_
+// How large sums of squares get by chance, and what is in the middle. Internal: not installed.
+#ifndef CIRCLINE_REFINE_STATISTICS_H_
+#define CIRCLINE_REFINE_STATISTICS_H_
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 namespace circline {
 
@@ -17,6 +20,14 @@ inline double ChiSquareLimit(int dof, double p) {
   return n * root * root * root;
 }
 
+// The larger one in the middle of an even number; 0 of none.
+inline double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 }  // namespace circline
 
-#endif  // CIRCLINE_REFINE_CHI_SQUARE_H_
+#endif  // CIRCLINE_REFINE_STATISTICS_H_

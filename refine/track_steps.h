@@ -1,0 +1,65 @@
+// The steps of a tracker beside a frame's own. Internal: not installed.
+#ifndef CIRCLINE_REFINE_TRACK_STEPS_H_
+#define CIRCLINE_REFINE_TRACK_STEPS_H_
+
+#include <string>
+#include <vector>
+
+#include "circline/estimators/observations.h"
+#include "circline/estimators/pose.h"
+#include "circline/refine/pose_tracker.h"
+#include "circline/refine/scratch.h"
+#include "circline/refine/track_frame.h"
+#include "circline/refine/track_state.h"
+
+namespace circline {
+
+// --- track_map.cc: from a frame's features to a tracker's map. ---
+
+// A map of the frame's circles and directions, and a wide Gaussian about each hypothesis with its
+// probability. The first circle fixes origin and unit. `resolved`: fitted, with a world.
+void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& hypotheses,
+              const TrackerOptions& options, TrackMap* map, Kept<TrackFit>* states);
+
+// Adds what the map does not have, where each hypothesis sees it, as not known yet.
+void ExtendMap(const Observations& fitted, const TrackerOptions& options, TrackMap* map,
+               Kept<TrackFit>* states);
+
+// --- track_relocate.cc: back to a known map after a loss. ---
+
+// The states of a map where a single frame, of a world of its own, sees its circles: pose and
+// velocities as not known, landmarks and camera as they are. Circles and directions are the same
+// where their ids are. Empty where no circle of the map is seen.
+std::vector<TrackState> Relocated(const TrackMap& map, const Kept<TrackFit>& states,
+                                  const std::vector<PoseHypothesis>& seen,
+                                  const TrackerOptions& options);
+
+// --- track_ranking.cc: hypotheses against one another. ---
+
+// Minima that several starts lead to are one, its weight the larger one of two starts of a
+// hypothesis, or the sum of the probabilities of two hypotheses.
+enum class MergedWeight { kLarger, kSum };
+void Merge(const TrackMap& map, MergedWeight weight, Kept<TrackFit>* fits);
+
+// Log weights to log probabilities; drops what is improbable and orders the rest. The first stays
+// first unless another one is clearly more probable.
+void Rank(const TrackerOptions& options, Kept<TrackFit>* fits);
+
+// --- track_result.cc: a tracked hypothesis as users see it. ---
+
+// Pose, probability, covariance, free directions, circles and directions of the map, in the memory
+// that the hypothesis has; nothing that a frame says of it.
+void FillHypothesis(const TrackMap& map, const TrackState& state, const Camera& camera,
+                    PoseHypothesis* hypothesis);
+
+// PoseEstimate::decided_by, of ranked hypotheses.
+void DecidedByFrames(const std::vector<PoseHypothesis>& hypotheses, std::string* decided_by);
+
+// What a frame says of a hypothesis: inliers, cost, what was left out and in words why.
+// `distances`: memory.
+void FillFrame(const TrackFrame& frame, const TrackFit& fit, PoseHypothesis* hypothesis,
+               std::vector<std::string>* notes, std::vector<double>* distances);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_REFINE_TRACK_STEPS_H_
