@@ -11,8 +11,6 @@
 namespace circline {
 namespace {
 
-constexpr double kRounding = 1e-12;  // Of what is scaled to 1.
-
 // f^2 = |b|^2 - |a|^2 of the points a +- ib in which a plane's vanishing line meets the image of
 // one of its circles. With s the line's point at infinity and t across it, unit, s.t = 0 in the
 // first two coordinates: tau s + t lies on C where tau^2 s'Cs + 2 tau s'Ct + t'Ct = 0.

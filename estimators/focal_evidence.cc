@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/circle_focal.h"
 #include "circline/estimators/closed_form_inputs.h"
 #include "circline/estimators/closed_form_recipes.h"
@@ -16,8 +17,6 @@
 
 namespace circline {
 namespace {
-
-constexpr double kRightAngle = 1.5707963267948966;
 
 std::string Named(const char* kind, const std::string& id) {
   return std::string(kind) + " '" + id + "'";

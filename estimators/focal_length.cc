@@ -4,13 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/focal_roots.h"
 
 namespace circline {
 namespace {
-
-constexpr double kRightAngle = 1.5707963267948966;
-constexpr double kRounding = 1e-12;  // Of unit vectors.
 
 bool IsAtInfinity(const VanishingPointFit& point) {
   return std::abs(point.direction.z()) <= std::max(kRounding, std::sqrt(point.covariance(2, 2)));

@@ -12,6 +12,8 @@
 
 namespace circline {
 
+constexpr double kRounding = 1e-12;  // Of what is scaled to 1.
+
 // Log f open by more than a factor of e is no answer.
 constexpr double kMaxLogFocalVariance = 1.0;
 
