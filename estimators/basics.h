@@ -8,8 +8,8 @@
 
 namespace CIRCLINE_EXPORT circline {
 
-inline constexpr double kPi = 3.14159265358979323846;  // Half a turn in radians.
-inline constexpr double kRightAngle = 0.5 * kPi;
+inline constexpr double kPi = 3.14159265358979323846;     // Half a turn in radians.
+inline constexpr double kRightAngle = 0.5 * kPi;          // In radians.
 inline constexpr double kDegree = kPi / 180.0;            // In radians.
 inline constexpr double kSqrt2 = 1.41421356237309504880;  // Of symmetric matrices as vectors.
 

@@ -64,7 +64,7 @@ struct Inputs {
   std::optional<RayPair> length_points;     // Metric scale from two points ...
   double length = 0.0, length_sigma = 0.0;  // ... of the plane, or 0; relative.
 
-  // All of them.
+  // Every input that an error may move, by its value in this.
   std::vector<MovedInput> Moved();
   bool IsMetric() const { return (conic.present() && radius > 0.0) || length > 0.0; }
 };

@@ -9,6 +9,7 @@
 #include "circline/refine/statistics.h"
 
 namespace circline {
+
 // From wide losses to narrow ones, the camera's coarse parameters first.
 void Adjustment::SolveOnce() {
   constexpr double kWidest = 300.0, kNear = 3.0, kNarrower = 0.25;

@@ -167,6 +167,7 @@ void ImagePoints::Reset(const Camera& camera, const std::vector<Eigen::Vector2d>
 }
 
 void ImagePoints::RemoveCurvatureBias(const Eigen::Matrix3d& conic, double sigma_px) {
+  seen_.clear();
   for (std::size_t i = 0; i < size(); ++i) {
     CalibratedPoint& p = points_[i];
     // The curve's foot of the point, by Newton's method along the gradient.

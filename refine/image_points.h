@@ -86,8 +86,8 @@ class ImagePoints {
   const std::vector<Eigen::Vector2d>& pixels() const { return pixels_; }  // Of the same points.
   const Options& options() const { return options_; }  // As given; no distortion of a pinhole.
   void set_weight(double weight) { options_.weight = weight; }  // Options::weight.
-  // Keeps the points as the camera with these kCameraSize shifts has them: what is asked for with
-  // the same shifts then takes no undistortion, as it does with any others.
+  // Undistorts the points once, as the camera with these kCameraSize shifts has them, for all that
+  // is asked with the same shifts later; with others each is undistorted anew, to the same values.
   void SeeThrough(const double* camera);
   // Of the kCameraSize shifts these come first and have derivatives; those of the others are zero.
   int num_camera() const { return 4 + options_.num_distortion; }
