@@ -3,7 +3,8 @@
 //
 // The residual of a point is its distance from the curve in pixels of the photo as taken, over its
 // standard deviation, under the loss. Curves are conics and lines in calibrated coordinates of the
-// camera. Allocates when it is made, or takes more points than ever before, and else never.
+// camera. Allocates when it is made, takes more points than ever before, or is first seen through
+// another camera, and else never.
 #ifndef CIRCLINE_REFINE_IMAGE_POINTS_H_
 #define CIRCLINE_REFINE_IMAGE_POINTS_H_
 
