@@ -80,11 +80,14 @@ class CurveCost : public FeatureCost {
   // last `num_priors` residuals are not of the points.
   CurveCost(ImagePoints points, int curve_rank, const std::vector<int>& sizes, bool has_offset,
             bool has_camera, int num_priors);
+  // Takes other points and gives back its own. Not in a problem.
   void ExchangePoints(ImagePoints* points);
 
+  // The contour's offset, pixels of the photo, outwards; 0 where there is no block of it.
   double Offset(const double* const* parameters) const {
     return offset_block_ >= 0 ? parameters[offset_block_][0] : 0.0;
   }
+  // The camera's kCameraSize shifts; null where there is no block of them.
   const double* CameraShifts(const double* const* parameters) const {
     return camera_block_ >= 0 ? parameters[camera_block_] : nullptr;
   }
@@ -100,6 +103,7 @@ class CurveCost : public FeatureCost {
   bool SumAbout(const Eigen::Vector3d& line, const Weighing& weighing,
                 const double* const* parameters, double* residuals, double** jacobians,
                 Rows* U) const;
+  // The points' share of the residuals; those of priors come behind.
   int num_curve_residuals() const { return num_residuals() - num_priors_; }
 
  private:

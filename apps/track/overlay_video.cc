@@ -28,7 +28,13 @@ Status OverlayVideo::Add(const cv::Mat& picture) {
       size_ = cv::Size(picture.cols & ~1, picture.rows & ~1);
       const int codec = IsAvi(path_) ? cv::VideoWriter::fourcc('M', 'J', 'P', 'G')
                                      : cv::VideoWriter::fourcc('m', 'p', '4', 'v');
-      if (!writer_.open(temporary_path_, codec, fps_, size_))
+      // Not whatever OpenCV has: GStreamer waits for ever where memory runs out.
+      backend_ = cv::CAP_FFMPEG;
+      if (!writer_.open(temporary_path_, backend_, codec, fps_, size_) && IsAvi(path_)) {
+        backend_ = cv::CAP_OPENCV_MJPEG;
+        writer_.open(temporary_path_, backend_, codec, fps_, size_);
+      }
+      if (!writer_.isOpened())
         return Status::Failed(path_ + " cannot be written: OpenCV has no encoder for it here");
     }
     cv::Mat frame = picture;
@@ -46,7 +52,7 @@ Status OverlayVideo::Add(const cv::Mat& picture) {
 bool OverlayVideo::IsWhole() const {
   std::error_code error;
   const std::filesystem::space_info space = std::filesystem::space(temporary_path_, error);
-  cv::VideoCapture video(temporary_path_);
+  cv::VideoCapture video(temporary_path_, backend_);
   // Some files say how long they are, not how many frames they have.
   constexpr double kRounding = 1.0;
   return !error && space.available > 0 && video.isOpened() &&

@@ -30,6 +30,7 @@ class OverlayVideo {
   double fps_;
   cv::Size size_;
   cv::VideoWriter writer_;
+  int backend_ = cv::CAP_FFMPEG;  // Of OpenCV, that writes and reads it.
   int num_frames_ = 0;
   bool committed_ = false;
 };
