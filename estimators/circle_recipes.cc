@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "circline/estimators/circle_planes.h"
 #include "circline/estimators/closed_form_recipes.h"
 
 namespace circline {
@@ -171,25 +172,12 @@ Recipe CircleDiametersRecipe() {
       });
 }
 
-// Sum of the normal's variances, rad^2, by statistical linearisation.
-double NormalVariance(const Measured& conic) {
-  std::array<CirclePose, 2> poses, plus, minus;
-  if (CirclePoses(VectorToConic(conic.value), &poses) == 0) return 0.0;
-  double variance = 0.0;
-  for (Eigen::Index k = 0; k < conic.columns.cols(); ++k) {
-    const int up = CirclePoses(VectorToConic(conic.value + conic.columns.col(k)), &plus);
-    const int down = CirclePoses(VectorToConic(conic.value - conic.columns.col(k)), &minus);
-    const auto nearest = [&poses](const std::array<CirclePose, 2>& p,
-                                  int count) -> Eigen::Vector3d {
-      if (count == 0) return poses[0].normal;
-      return p[count == 2 && p[1].normal.dot(poses[0].normal) > p[0].normal.dot(poses[0].normal)
-                   ? 1
-                   : 0]
-          .normal;
-    };
-    variance += 0.25 * (nearest(plus, up) - nearest(minus, down)).squaredNorm();
-  }
-  return variance;
+// Inverse variance of the normal, rad^2, of the first of a circle's planes.
+double NormalWeight(const Measured& conic) {
+  constexpr double kRounding = 1e-18;
+  std::array<CirclePlane, 2> planes;
+  CirclePlanes(conic.value, conic.columns, &planes);
+  return 1.0 / (planes[0].covariance.trace() + kRounding);
 }
 
 Status GatherCircles(const Observations& evidence, double sigma_px, Inputs* inputs) {
@@ -199,11 +187,9 @@ Status GatherCircles(const Observations& evidence, double sigma_px, Inputs* inpu
   for (std::size_t i = 1; i < evidence.circles.size(); ++i) {
     GatherConic(evidence.circles[i], &inputs->more_conics.emplace_back(), inputs);
   }
-  constexpr double kRounding = 1e-18;
-  inputs->normal_weights = {1.0 / (NormalVariance(inputs->conic) + kRounding)};
-  for (const Measured& conic : inputs->more_conics) {
-    inputs->normal_weights.push_back(1.0 / (NormalVariance(conic) + kRounding));
-  }
+  inputs->normal_weights = {NormalWeight(inputs->conic)};
+  for (const Measured& conic : inputs->more_conics)
+    inputs->normal_weights.push_back(NormalWeight(conic));
   return Status::Ok();
 }
 

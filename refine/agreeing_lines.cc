@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
-#include "circline/refine/circle_planes.h"
+#include "circline/estimators/circle_planes.h"
 #include "circline/refine/readings.h"
 
 namespace circline {
@@ -98,8 +98,7 @@ double Miss(const PlaneSeed& plane, const NoiseModel& noise, const AxisLine& lin
     by_line = n.dot(k) * n - k;
   }
   if (line.pencil != other.pencil) squares += 2.0 * noise.pencil_axis_rad * noise.pencil_axis_rad;
-  const Eigen::Vector3d by_turn = by_normal.cross(n);
-  const double variance = by_turn.dot(plane.covariance * by_turn) +
+  const double variance = by_normal.dot(plane.covariance * by_normal) +
                           by_line.dot(line.covariance * by_line) +
                           along.dot(other.covariance * along);
   return std::abs(along.dot(k)) / std::sqrt(variance + size * size * squares);

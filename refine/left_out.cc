@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
-#include "circline/refine/circle_planes.h"
+#include "circline/estimators/circle_planes.h"
 #include "circline/refine/joint_result.h"
 
 namespace circline {
@@ -25,9 +25,9 @@ double LogNormalInformation(const CircleObservation& circle) {
   if (count == 0) return kUnknown;
   double most = 0.0;
   for (int i = 0; i < count; ++i) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> normals(
         planes[static_cast<std::size_t>(i)].covariance, Eigen::EigenvaluesOnly);
-    most = std::max(most, -std::log(turns.eigenvalues()[1] * turns.eigenvalues()[2]));
+    most = std::max(most, -std::log(normals.eigenvalues()[1] * normals.eigenvalues()[2]));
   }
   return std::isfinite(most) ? most : kUnknown;
 }

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "circline/estimators/basics.h"
-#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/circle_planes.h"
 #include "circline/estimators/conic.h"
 
 namespace circline {
@@ -180,32 +180,10 @@ UncertainDirection NormalOfCircles(const UncertainDirection& about, double sigma
 }
 
 int CircleNormals(const ConicFit& fit, std::array<UncertainDirection, 2>* normals) {
-  std::array<CirclePose, 2> poses;
-  const int count = CirclePoses(fit.conic, &poses);
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(fit.Covariance());
-  for (int i = 0; i < count; ++i) {
-    UncertainDirection& normal = (*normals)[static_cast<std::size_t>(i)];
-    normal.vector = poses[static_cast<std::size_t>(i)].normal;
-    normal.covariance.setZero();
-    for (int k = 0; k < 6; ++k) {
-      // Steps of a tenth of a standard deviation: small enough to be linear.
-      constexpr double kStep = 0.1;
-      const double sigma = std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
-      const Vector6d moved = ConicToVector(fit.conic) + kStep * sigma * eigen.eigenvectors().col(k);
-      std::array<CirclePose, 2> moved_poses;
-      const int moved_count = CirclePoses(VectorToConic(moved), &moved_poses);
-      Vector3d change = Vector3d::Zero();
-      double nearest = std::numeric_limits<double>::infinity();
-      for (int j = 0; j < moved_count; ++j) {
-        const Vector3d d = moved_poses[static_cast<std::size_t>(j)].normal - normal.vector;
-        if (d.norm() < nearest) {
-          nearest = d.norm();
-          change = d / kStep;
-        }
-      }
-      normal.covariance += change * change.transpose();
-    }
-  }
+  std::array<CirclePlane, 2> planes;
+  const int count = CirclePlanes(fit, &planes);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
+    (*normals)[i] = {planes[i].pose.normal, planes[i].covariance};
   return count;
 }
 

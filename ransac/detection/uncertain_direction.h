@@ -72,8 +72,8 @@ bool CanLieIn(const ConicFit& fit, const UncertainDirection& normal);
 UncertainDirection NormalOfCircles(const UncertainDirection& about, double sigma_deg,
                                    const std::vector<const ConicFit*>& circles);
 
-// The normals of the planes that a circle can lie in, with covariances: those of the conic's own
-// covariance, by differences. Returns how many: 0, 1 or 2.
+// The normals of the planes that a circle can lie in, with covariances of the conic's own
+// (CirclePlanes). Returns how many: 0, 1 or 2.
 int CircleNormals(const ConicFit& fit, std::array<UncertainDirection, 2>* normals);
 
 }  // namespace circline

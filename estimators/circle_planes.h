@@ -1,0 +1,26 @@
+// The planes that a circle's image allows, with what it knows of them. Internal: not installed.
+#ifndef CIRCLINE_ESTIMATORS_CIRCLE_PLANES_H_
+#define CIRCLINE_ESTIMATORS_CIRCLE_PLANES_H_
+
+#include <Eigen/Core>
+#include <array>
+
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/conic.h"
+#include "circline/estimators/conic_fit.h"
+
+namespace circline {
+
+struct CirclePlane {
+  CirclePose pose;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Of the unit normal.
+};
+
+// How many there are, as of CirclePoses. The errors of the conic (ConicToVector) are the sum of the
+// columns of a square root of its covariance, each times a number of standard deviation 1.
+int CirclePlanes(const Vector6d& conic, const Matrix6d& root, std::array<CirclePlane, 2>* planes);
+int CirclePlanes(const ConicFit& fit, std::array<CirclePlane, 2>* planes);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_CIRCLE_PLANES_H_
