@@ -15,79 +15,6 @@
 namespace circline {
 namespace {
 
-// Calls visit(feature, points, distances) for each contour and line that takes part.
-template <typename Visit>
-void ForEachCurve(const JointProblem& problem, const State& state, const Visit& visit) {
-  std::vector<double> distances;
-  const double* parameters[8];
-  for (const Term& term : problem.terms()) {
-    const ImagePoints* points = term.weighed != nullptr ? term.weighed->points() : nullptr;
-    if (points == nullptr || !problem.IsActive(term, state)) continue;
-    problem.Parameters(term, state, parameters);
-    term.weighed->Distances(parameters, &distances);
-    visit(term.feature, *points, distances);
-  }
-}
-
-// Calls visit(feature, cost, miss) for each single point that takes part.
-template <typename Visit>
-void ForEachPoint(const JointProblem& problem, const State& state, const Visit& visit) {
-  const double* parameters[8];
-  for (const JointProblem::PointBlocks& p : problem.points()) {
-    const Term& term = problem.term(p.term);
-    if (!problem.IsActive(term, state)) continue;
-    problem.Parameters(term, state, parameters);
-    const auto& cost = static_cast<const PlanePointCost&>(*term.cost);
-    visit(p.feature, cost, cost.MissPx(parameters));
-  }
-}
-
-// Within the gate of its own noise.
-bool IsInlier(double distance, const ImagePoints& points) {
-  return std::abs(distance) <= kInlierSigmas * points.options().sigma_px;
-}
-
-// Counts and rms of the inliers. Returns how much wider the estimate scatters than least squares on
-// the inliers would: the variance of an M-estimate, E[psi^2] / E[psi']^2 over residuals in standard
-// deviations (Huber 1964), where enough of them are redundant to measure it, and never less than
-// what every loss is tuned to.
-double CountInliers(const JointProblem& problem, const State& state, PoseHypothesis* h) {
-  double squares_px = 0.0;
-  double squares = 0.0, slopes = 0.0, inliers = 0.0, points = 0.0, unknowns = 3.0;
-  ForEachCurve(problem, state,
-               [&](int f, const ImagePoints& set, const std::vector<double>& distances) {
-                 const bool is_circle = problem.feature(f).kind == Feature::Kind::kCircle;
-                 unknowns += is_circle ? 3.0 : 1.0;
-                 points += static_cast<double>(distances.size());
-                 for (const double d : distances) {
-                   const double r = d / set.options().sigma_px, r2 = r * r;
-                   const LossSlopes loss = LossSlopesAt(set.options().loss, r2);
-                   squares += loss.first * loss.first * r2;
-                   slopes += loss.first + 2.0 * r2 * loss.second;
-                   if (!IsInlier(d, set)) continue;
-                   inliers += 1.0;
-                   squares_px += d * d;
-                 }
-               });
-  h->num_observations = static_cast<int>(points);
-  h->num_inliers = static_cast<int>(inliers);
-  ForEachPoint(problem, state, [&](int, const PlanePointCost& cost, double miss) {
-    ++h->num_observations;
-    if (!(miss <= kInlierSigmas * cost.sigma_px())) return;
-    ++h->num_inliers;
-    squares_px += miss * miss;
-  });
-  h->rms_px = h->num_inliers > 0 ? std::sqrt(squares_px / h->num_inliers) : 0.0;
-
-  constexpr double kTuned = 1.0 / 0.95, kEnough = 30.0;
-  const EstimationOptions& options = problem.options();
-  if (options.conic_loss.type == LossType::kTrivial && options.line_loss.type == LossType::kTrivial)
-    return 1.0;
-  if (!(points > unknowns + kEnough) || !(slopes > 0.0)) return kTuned;
-  const double redundancy = points / (points - unknowns);
-  return std::max(kTuned, redundancy * squares * inliers / (slopes * slopes));
-}
-
 // [delta, delta_t] by the core of the shared unknowns: delta in the camera frame.
 Eigen::MatrixXd PoseFromCore(const JointProblem& problem, const State& state,
                              const Linearization& at) {
@@ -313,34 +240,6 @@ void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double uni
 double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
   return std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
-}
-
-bool DropOutliers(const JointProblem& problem, State* state) {
-  std::vector<int> dropped;
-  ForEachCurve(problem, *state,
-               [&](int f, const ImagePoints& points, const std::vector<double>& distances) {
-                 const auto inliers = std::count_if(distances.begin(), distances.end(),
-                                                    [&](double d) { return IsInlier(d, points); });
-                 const bool is_circle = problem.feature(f).kind == Feature::Kind::kCircle;
-                 if (inliers < (is_circle ? 5 : 2)) dropped.push_back(f);
-               });
-  ForEachPoint(problem, *state, [&](int f, const PlanePointCost& cost, double miss) {
-    constexpr double kFar = 5.0;  // Standard deviations: no single point is so far off by chance.
-    if (!(miss <= kFar * cost.sigma_px())) dropped.push_back(f);
-  });
-  for (const int f : dropped) state->active[static_cast<std::size_t>(f)] = 0;
-  return !dropped.empty();
-}
-
-double JointProblem::InlierShare(const State& state) const {
-  std::size_t inliers = 0, points = 0;
-  ForEachCurve(*this, state,
-               [&](int, const ImagePoints& set, const std::vector<double>& distances) {
-                 points += distances.size();
-                 for (const double d : distances)
-                   inliers += std::abs(d) <= kInlierSigmas * set.options().sigma_px ? 1 : 0;
-               });
-  return points > 0 ? static_cast<double>(inliers) / static_cast<double>(points) : 0.0;
 }
 
 Status FillRefined(const JointProblem& problem, State state, Refined* refined) {

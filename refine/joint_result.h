@@ -36,8 +36,18 @@ double LargestSigmaDeg(const Eigen::Matrix3d& covariance);
 // number is not finite.
 Status FillRefined(const JointProblem& problem, State state, Refined* refined);
 
+// --- joint_inliers.cc
+
+// Counts and rms of the inliers. Returns how much wider the estimate scatters than least squares on
+// the inliers would: the variance of an M-estimate, E[psi^2] / E[psi']^2 over residuals in standard
+// deviations (Huber 1964), where enough of them are redundant to measure it, and never less than
+// what every loss is tuned to.
+double CountInliers(const JointProblem& problem, const State& state, PoseHypothesis* h);
+
 // Makes features inactive that are outliers as a whole; true where there were any.
 bool DropOutliers(const JointProblem& problem, State* state);
+
+// --- left_out.cc
 
 // What all features left out cost together: their own free fits, and what clutter would cost. A
 // feature is clutter with a probability of one in fifty; clutter may have any direction.
