@@ -45,7 +45,7 @@ struct DetectionOptions {
   // they may lie. By how much lines miss their pencil's direction is measured. Where the camera's
   // focal length is known to 10 % or worse (noise_model.camera), right angles and planes are judged
   // where they are likeliest: Observations::camera has that focal length, and stated_focal_px the
-  // one given, about which the estimate's prior still is. Twice the time.
+  // one given, about which the estimate's prior still is. Two to five times the time.
   NoiseModel noise_model;
 
   // Ok, or a sentence that names the field which is wrong.

@@ -192,10 +192,15 @@ Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, st
   return Status::Ok();
 }
 
-std::vector<LineFit> EdgesAround(const std::vector<DetectedLine>& lines,
-                                 const DetectedPencil& pencil, double diagonal_px) {
+std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
+                                      const DetectedPencil& pencil, double diagonal_px) {
   const LineSet set(lines, diagonal_px);
-  return FitsOf(set, OneOfEachEdge(set, LinesAround(set, pencil)));
+  std::vector<DetectedLine> edges;
+  for (const int i : OneOfEachEdge(set, LinesAround(set, pencil))) {
+    edges.push_back(lines[static_cast<std::size_t>(i)]);
+    edges.back().fit = set.fits[static_cast<std::size_t>(i)];
+  }
+  return edges;
 }
 
 LineFit WithSharedError(const DetectedLine& line, double shared_px) {

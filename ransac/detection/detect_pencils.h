@@ -43,9 +43,9 @@ bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>&
 
 // Fits of the lines that come near those of a pencil and are not of it, one of each edge, longest
 // first.
-std::vector<LineFit> EdgesAround(const std::vector<DetectedLine>& lines,
-                                 const DetectedPencil& pencil,
-                                 double diagonal_px = kUsualDiagonalPx);
+std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
+                                      const DetectedPencil& pencil,
+                                      double diagonal_px = kUsualDiagonalPx);
 
 // The pencil of lines[members] along `direction`, each as good as its `fits` says (one a member):
 // the line's own with a covariance that counts whatever else the line may miss the direction by.

@@ -19,12 +19,22 @@
 
 namespace circline {
 
-// Logarithm of the likeliest focal length over that of `camera`, with which `evidence` was
-// calibrated and about which its prior is, `prior_log_focal` off. `pencils` are those of
-// DetectPencilsApart. Where the photo has no structure it is the prior's. 5 ms for 12 circles.
-double LikeliestLogFocal(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
-                         const Camera& camera, const CameraSigma& sigma, double prior_log_focal,
-                         double diagonal_px = kUsualDiagonalPx);
+// Steps of log focal length: a third of what a degree of a right angle is worth at 30 degrees of
+// tilt.
+constexpr double kFocalStep = 0.02;
+
+struct LikelyFocal {
+  double log_focal = 0.0;  // Logarithm over the focal length of the camera.
+  double gain = 0.0;       // Logarithm of how much likelier it is than that one.
+};
+
+// The likeliest focal length. `evidence` was calibrated with that of `camera`; the prior is about
+// one that is `prior_log_focal` off. `pencils` are those of DetectPencilsApart. Where the photo has
+// no structure it is the prior's, without a limit to the gain. 10 ms for 12 circles.
+LikelyFocal LikeliestFocal(const PhotoEvidence& evidence,
+                           const std::vector<DetectedPencil>& pencils, const Camera& camera,
+                           const CameraSigma& sigma, double prior_log_focal,
+                           double diagonal_px = kUsualDiagonalPx);
 
 }  // namespace circline
 

@@ -48,7 +48,7 @@ PhotoEvidence Edges(const Eigen::Matrix3d& axes, int num_directions, double fact
 double FromEdges(const PhotoEvidence& evidence, double factor, const CameraSigma& sigma) {
   std::vector<DetectedPencil> pencils;
   EXPECT_TRUE(DetectPencilsApart(evidence.lines, 3, 1, &pencils, 600.0).ok());
-  return LikeliestLogFocal(evidence, pencils, Guess(factor), sigma, 0.0);
+  return LikeliestFocal(evidence, pencils, Guess(factor), sigma, 0.0).log_focal;
 }
 
 double FromEdges(const Eigen::Matrix3d& axes, int num_directions, double factor,
@@ -57,7 +57,7 @@ double FromEdges(const Eigen::Matrix3d& axes, int num_directions, double factor,
 }
 
 // Whatever the guess, right angles are found where they are.
-TEST(LikeliestLogFocal, RightAnglesTell) {
+TEST(LikeliestFocal, RightAnglesTell) {
   const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.5, 0.6, 0.1));
   for (const int num_directions : {2, 3}) {
     for (const double factor : {0.6, 1.0, 1.6}) {
@@ -68,7 +68,7 @@ TEST(LikeliestLogFocal, RightAnglesTell) {
 }
 
 // A box with print along one of its directions: two edges along each of the others are no pencils.
-TEST(LikeliestLogFocal, EdgesAroundTheOnlyPencilTell) {
+TEST(LikeliestFocal, EdgesAroundTheOnlyPencilTell) {
   const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.5, 0.6, 0.1));
   for (const double factor : {0.6, 1.0, 1.6}) {
     Random random(3);
@@ -80,7 +80,7 @@ TEST(LikeliestLogFocal, EdgesAroundTheOnlyPencilTell) {
 }
 
 // What faces the camera says nothing, and the prior stays.
-TEST(LikeliestLogFocal, FrontalEdgesLeaveThePrior) {
+TEST(LikeliestFocal, FrontalEdgesLeaveThePrior) {
   const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.0, 0.0, 0.2));
   for (const double factor : {0.6, 1.6}) {
     EXPECT_NEAR(FromEdges(axes, 2, factor, Wide(0.5)), 0.0, 0.15) << factor;
@@ -88,13 +88,51 @@ TEST(LikeliestLogFocal, FrontalEdgesLeaveThePrior) {
 }
 
 // A narrow prior is not given up for a right angle, a doubtful one is for three of them.
-TEST(LikeliestLogFocal, PriorsCount) {
+TEST(LikeliestFocal, PriorsCount) {
   const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.5, 0.6, 0.1));
   EXPECT_NEAR(FromEdges(axes, 3, 1.6, Wide(0.02)), 0.0, 0.06);
   CameraSigma doubtful = Wide(0.05);
   doubtful.doubtful_log_focal = 0.5;
   EXPECT_NEAR(FromEdges(axes, 3, 1.6, doubtful), -std::log(1.6), 0.05);
   EXPECT_NEAR(FromEdges(axes, 3, 1.6, Wide(1e20)), -std::log(1.6), 0.05);  // And it ends.
+}
+
+// An edge along the direction, as a lens bends it.
+LineObservation BentEdge(const Camera& lens, const Eigen::Vector3d& direction, Random* random) {
+  const Eigen::Vector2d pixel(random->Uniform(60.0, 420.0), random->Uniform(40.0, 300.0));
+  CalibratedPoint middle;
+  EXPECT_TRUE(PixelToCalibrated(lens, pixel, &middle));
+  LineObservation line;
+  line.sigma_px = 0.2;
+  for (int k = -5; k <= 5; ++k) {
+    Eigen::Vector2d seen;
+    EXPECT_TRUE(CameraToPixel(lens, middle.Homogeneous() + 0.02 * k * direction, &seen));
+    line.points.push_back(seen);
+  }
+  return line;
+}
+
+// A lens bends by the angle at which it sees: through another focal length the same points are
+// other lines, so a look tells the focal length however far off its own is.
+TEST(LikeliestFocal, TheLensIsLookedThroughAtEveryFocalLength) {
+  const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.5, 0.6, 0.1));
+  Camera lens = TestCamera();
+  lens.model = CameraModel::kOpenCV;
+  lens.distortion[0] = -0.3;
+  for (const double factor : {0.8, 1.0, 1.6}) {
+    Camera guess = lens;
+    guess.fx *= factor;
+    guess.fy *= factor;
+    Random random(3);
+    std::vector<DetectedPencil> pencils(3);
+    for (int k = 0; k < 36; ++k) {
+      PencilObservation& pencil = pencils[static_cast<std::size_t>(k % 3)].observation;
+      pencil.lines.push_back(BentEdge(lens, axes.col(k % 3), &random));
+      pencil.fit = VanishingPointFit{axes.col(k % 3), Eigen::Matrix3d::Identity()};
+    }
+    const LikelyFocal likeliest = LikeliestFocal(PhotoEvidence(), pencils, guess, Wide(0.5), 0.0);
+    EXPECT_NEAR(likeliest.log_focal, -std::log(factor), 0.03) << factor;
+  }
 }
 
 // Twelve discs of one sheet, all of a photo: the camera at which they have one plane, and what it
@@ -108,6 +146,7 @@ TEST(DetectObservations, DiscsOfASheetHaveTheirPlaneAtAnyGuess) {
   };
   const cv::Mat image = detection_test::Develop(
       detection_test::RenderPlane(TestCamera(), pose, 220.0, discs), 0.7, 2.0);
+  std::vector<double> focal_px;
   for (const double factor : {0.65, 1.0, 1.5}) {
     DetectionOptions options;
     const Observations sure = detection_test::Detect(image, Guess(factor), options);
@@ -116,6 +155,8 @@ TEST(DetectObservations, DiscsOfASheetHaveTheirPlaneAtAnyGuess) {
     options.noise_model.camera = Wide(0.5);
     const Observations found = detection_test::Detect(image, Guess(factor), options);
     EXPECT_NEAR(std::log(found.camera.fx / TestCamera().fx), 0.0, 0.1) << factor;
+    focal_px.push_back(found.camera.fx);
+    EXPECT_NEAR(focal_px.back(), focal_px.front(), 1e-6) << factor;
     EXPECT_NEAR(StatedLogFocal(found), std::log(Guess(factor).fx / found.camera.fx), 1e-12);
     int on_plane = 0;
     for (const CircleObservation& circle : found.circles) on_plane += circle.plane == "p0" ? 1 : 0;
