@@ -26,6 +26,7 @@ void ResetFits(Observations* observations) {
   for (CircleObservation& circle : observations->circles) circle.fit.reset();
   for (PencilObservation& pencil : observations->pencils) {
     pencil.fit.reset();
+    pencil.readings.clear();
     for (LineObservation& line : pencil.lines) line.fit.reset();
   }
 }

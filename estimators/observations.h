@@ -74,6 +74,12 @@ struct LineObservation {
 enum class PencilDirection { kX, kY, kZ, kFree };
 const char* PencilDirectionName(PencilDirection direction);  // "x", "y", "z", "free".
 
+// A direction that a pencil may have.
+struct DirectionReading {
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // Unit, camera frame, without sense.
+  double probability = 0.0;
+};
+
 // Images of lines that are parallel in space.
 struct PencilObservation {
   std::string id;                                      // Unique among the pencils.
@@ -84,6 +90,10 @@ struct PencilObservation {
   double sigma_px = 0.0;
 
   std::optional<VanishingPointFit> fit;  // Added by a fit; camera frame.
+  // Of a detected pencil along an axis: directions about the other axis, one degree apart, as all
+  // lines of the photo speak for them, whichever are its own; the probabilities sum to 1. The
+  // refinement gives those far from its pose to hypotheses of their own. Empty: as `fit` says.
+  std::vector<DirectionReading> readings;
 };
 
 // Where the user wants the world frame. All optional; where nothing is said, the plane is the first

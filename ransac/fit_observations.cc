@@ -35,6 +35,7 @@ class PointFitter {
     }
     for (PencilObservation& pencil : run_.observations.pencils) {
       pencil.fit.reset();
+      pencil.readings.clear();
       std::vector<FittedFeature>& features = lines_.emplace_back();
       for (std::size_t i = 0; i < pencil.lines.size(); ++i) {
         LineObservation& line = pencil.lines[i];

@@ -188,6 +188,8 @@ Status RankReadings(const JointProblem& problem, const std::vector<State>& minim
                               "best pose " +
                               (is_best ? "takes" : "does not take"));
   }
+  // What is known of the pose beforehand speaks against turns, too, and is not in the readings.
+  if (!problem.options().pose_prior) ShareByReadings(problem.observations(), &estimate->hypotheses);
   return Status::Ok();
 }
 

@@ -92,6 +92,12 @@ Status RankReadings(const JointProblem& problem, const std::vector<State>& minim
 // they are together. Ranks what is left. The two poses of a lone circle stay two, however near.
 void MergeHumps(std::vector<PoseHypothesis>* hypotheses);
 
+// --- direction_readings.cc ---
+
+// Where the direction of a pencil may be far from a hypothesis' (PencilObservation::readings), the
+// hypothesis shares its probability with that pose turned to there. Ranks them.
+void ShareByReadings(const Observations& observations, std::vector<PoseHypothesis>* hypotheses);
+
 }  // namespace circline
 
 #endif  // CIRCLINE_REFINE_READINGS_H_

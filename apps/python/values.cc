@@ -167,6 +167,9 @@ void BindFits(py::module_* module) {
   py::class_<ConicReading>(*module, "ConicReading", "An ellipse and the points that speak for it.")
       .def_readonly("fit", &ConicReading::fit)
       .def_readonly("inliers", &ConicReading::inliers, "One per point of the contour, 1: inlier.");
+  py::class_<DirectionReading>(*module, "DirectionReading", "A direction that a pencil may have.")
+      .def_readonly("direction", &DirectionReading::direction, "(3,), unit, without sense.")
+      .def_readonly("probability", &DirectionReading::probability);
   py::class_<LineFit>(*module, "LineFit", "A line in calibrated coordinates.")
       .def_readonly("line", &LineFit::line, "(3,), unit, without sense.")
       .def_readonly("covariance", &LineFit::covariance, "(3, 3), of the line.")

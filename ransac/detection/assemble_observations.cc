@@ -10,7 +10,9 @@
 #include "circline/ransac/detection/box_search.h"
 #include "circline/ransac/detection/choose_plane.h"
 #include "circline/ransac/detection/circle_grid.h"
+#include "circline/ransac/detection/direction_readings.h"
 #include "circline/ransac/detection/find_box.h"
+#include "circline/ransac/detection/pencil_fitter.h"
 #include "circline/ransac/detection/segment_meetings.h"
 
 namespace circline {
@@ -208,9 +210,25 @@ class Assembler {
         x.observation.direction = PencilDirection::kX;
         y.observation.direction = PencilDirection::kY;
         SetNormalRole(x.direction, y.direction);
+        if (plane.circles.empty()) ReadAgain(&x, &y);
         return;
       }
     }
+  }
+
+  // How else the less well known of two pencils may run: what lines are its own is not certain.
+  void ReadAgain(PlacedPencil* x, PlacedPencil* y) const {
+    if (x->of_grid || y->of_grid) return;
+    const auto variance = [](const PlacedPencil& p) { return p.direction.covariance.trace(); };
+    if (variance(*x) > variance(*y)) std::swap(x, y);
+    const LineSet set(lines_, options_.diagonal_px);
+    std::vector<LineFit> others;
+    for (int i = 0; i < static_cast<int>(lines_.size()); ++i) {
+      if (!set.IsTwin(i) && !std::binary_search(x->members.begin(), x->members.end(), i))
+        others.push_back(set.fits[static_cast<std::size_t>(i)]);
+    }
+    y->observation.readings =
+        ReadDirection(others, x->direction.vector, y->direction.vector, set.Count(y->members));
   }
 
   // Pencils of the plane: those that span it, then the others by support, but for repetitions.

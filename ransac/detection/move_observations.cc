@@ -68,6 +68,7 @@ void MovePencil(const Camera& camera, const Matrix3d& homography, const Matrix3d
     line.points.resize(m);
     line.inliers.clear();
   }
+  pencil->readings.clear();
   if (!pencil->fit) return;
   pencil->fit->direction = rotation * pencil->fit->direction;
   pencil->fit->covariance = rotation * pencil->fit->covariance * rotation.transpose();

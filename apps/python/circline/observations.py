@@ -12,7 +12,7 @@ from typing import List, Optional, Tuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._circline import Camera, ConicFit, ConicReading, LineFit, VanishingPointFit
+from ._circline import Camera, ConicFit, ConicReading, DirectionReading, LineFit, VanishingPointFit
 
 
 def _points() -> np.ndarray:
@@ -85,6 +85,8 @@ class PencilObservation:
     sigma_px: float = 0.0
     """Of each point's coordinates, pixels; 0: not known."""
     fit: Optional[VanishingPointFit] = None
+    readings: List[DirectionReading] = field(default_factory=list)
+    """Directions that a detected pencil may have; empty: as `fit` says."""
 
 
 @dataclass(eq=False)

@@ -1,0 +1,51 @@
+#include "circline/ransac/detection/direction_readings.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "circline/estimators/basics.h"
+#include "tests/ransac/segment_scene.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Vector3d;
+
+// Some lines run along a direction, others any way; the fit is off by up to eight degrees.
+TEST(DirectionReadings, AreProbableWhereLinesAgree) {
+  int near = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    Random random(seed);
+    const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
+    const Vector3d along = R.col(1);
+    std::vector<LineFit> lines;
+    for (int i = 0; i < 30; ++i)
+      segment_scene::AddSegment(i < 15 ? &along : nullptr, &random, &lines);
+    const double off = random.Uniform(-8.0, 8.0) * kDegree;
+    const auto readings =
+        ReadDirection(lines, R.col(0), Eigen::AngleAxisd(off, R.col(0)) * along, 15);
+    double sum = 0.0, about = 0.0;
+    for (const DirectionReading& reading : readings) {
+      EXPECT_NEAR(reading.direction.norm(), 1.0, 1e-12);
+      EXPECT_NEAR(reading.direction.dot(R.col(0)), 0.0, 1e-12);
+      sum += reading.probability;
+      if (segment_scene::AngleBetween(reading.direction, along) < 2.0 * kDegree)
+        about += reading.probability;
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-12);
+    near += about > 0.9 ? 1 : 0;
+  }
+  EXPECT_GE(near, 85);
+}
+
+TEST(DirectionReadings, WithoutLinesAllAreAlike) {
+  const auto readings = ReadDirection({}, Vector3d::UnitX(), Vector3d::UnitY(), 0);
+  ASSERT_FALSE(readings.empty());
+  for (const DirectionReading& reading : readings)
+    EXPECT_NEAR(reading.probability, 1.0 / static_cast<double>(readings.size()), 1e-12);
+}
+
+}  // namespace
+}  // namespace circline

@@ -1,0 +1,56 @@
+// Pencils whose direction is not certain (PencilObservation::readings).
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "circline/estimators/basics.h"
+#include "circline/refine/estimate_pose.h"
+#include "tests/plane_scene.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Vector3d;
+
+Observations TwoPencils(PlaneScene* scene) {
+  Observations observations = scene->Empty();
+  observations.pencils = {scene->Pencil("L0", PencilDirection::kX, Vector3d::UnitX()),
+                          scene->Pencil("L1", PencilDirection::kY, Vector3d::UnitY())};
+  return observations;
+}
+
+Vector3d TurnedY(const PlaneScene& scene, double turn_deg) {
+  const Eigen::Matrix3d& R = scene.pose.rotation;
+  return Eigen::AngleAxisd(turn_deg * kDegree, R.col(0)) * R.col(1);
+}
+
+TEST(DirectionReadings, WhatIsFarFromThePoseIsAHypothesisOfItsOwn) {
+  PlaneScene scene(0.7, 0.1);
+  Observations observations = TwoPencils(&scene);
+  observations.pencils[1].readings = {
+      {TurnedY(scene, 0.0), 0.6}, {TurnedY(scene, 1.0), 0.1}, {TurnedY(scene, 8.0), 0.3}};
+  const PoseEstimate estimate = EstimatePose(observations);
+  ASSERT_TRUE(estimate.status.ok());
+  ASSERT_EQ(estimate.hypotheses.size(), 2U);
+  EXPECT_NEAR(estimate.hypotheses[0].probability, 0.7, 1e-3);
+  EXPECT_NEAR(estimate.hypotheses[1].probability, 0.3, 1e-3);
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 1.0 * kDegree);
+  const Eigen::Matrix3d& turned = estimate.hypotheses[1].cam_from_world.rotation;
+  EXPECT_GT(std::abs(turned.col(1).dot(TurnedY(scene, 8.0))), std::cos(1.5 * kDegree));
+  EXPECT_GT(std::abs(turned.col(0).dot(scene.pose.rotation.col(0))), std::cos(1.0 * kDegree));
+}
+
+TEST(DirectionReadings, WhatIsNearIsTheSamePose) {
+  PlaneScene scene(0.7, 0.1);
+  Observations observations = TwoPencils(&scene);
+  const PoseEstimate before = EstimatePose(observations);
+  observations.pencils[1].readings = {{TurnedY(scene, -1.0), 0.5}, {-TurnedY(scene, 1.0), 0.5}};
+  const PoseEstimate after = EstimatePose(observations);
+  ASSERT_TRUE(before.status.ok() && after.status.ok());
+  ASSERT_EQ(after.hypotheses.size(), before.hypotheses.size());
+  EXPECT_EQ(after.hypotheses[0].probability, before.hypotheses[0].probability);
+}
+
+}  // namespace
+}  // namespace circline
