@@ -183,12 +183,17 @@ TEST(Simulate, StreetsAreFoundAboutAsWellAsIfMembershipWereKnown) {
                 Area(rows, "detected", 3.0), Area(rows, "known", 3.0), Area(rows, "detected", 5.0),
                 Area(rows, "known", 5.0), Area(rows, "detected", 10.0), Area(rows, "known", 10.0));
   EXPECT_CONTAINS(out.c_str(), areas);
-  int orthogonal = 0, within = 0, all = 0;
+  int orthogonal = 0, within = 0, all = 0, sure = 0, sure_and_wrong = 0;
   for (Row row : rows) {
     orthogonal += row["orthogonal"] == "1" ? 1 : 0;
     EXPECT_GE(std::stoi(row["segments"]), 12);
     EXPECT_GE(std::stoi(row["houses"]), 1);
-    if (row["detected_failed"] == "1" || std::stod(row["detected_error_any_deg"]) > 5.0) continue;
+    if (row["detected_failed"] == "1") continue;
+    const bool is_sure = std::stod(row["detected_probability"]) >= 0.9;
+    const bool is_wrong = std::stod(row["detected_error_any_deg"]) > 5.0;
+    sure += is_sure ? 1 : 0;
+    sure_and_wrong += is_sure && is_wrong ? 1 : 0;
+    if (is_wrong) continue;
     for (const std::string axis : {"x", "y", "z"}) {
       const double error = std::stod(row["detected_error_" + axis + "_deg"]);
       within += std::abs(error) <= 2.0 * std::stod(row["detected_sigma_" + axis + "_deg"]) ? 1 : 0;
@@ -201,6 +206,8 @@ TEST(Simulate, StreetsAreFoundAboutAsWellAsIfMembershipWereKnown) {
   for (const double most_deg : {3.0, 5.0, 10.0}) {
     EXPECT_GE(Area(rows, "detected", most_deg), 0.93 * Area(rows, "known", most_deg)) << most_deg;
   }
+  EXPECT_GE(sure, 0.9 * kStreets);
+  EXPECT_LE(sure_and_wrong, 0.01 * sure);
   EXPECT_GE(within, 0.9 * all - 2.0 * std::sqrt(0.09 * all));
   EXPECT_LE(within, 0.98 * all);
 }
