@@ -9,10 +9,9 @@
 namespace circline {
 namespace {
 
-// A hypothesis stands for turns of its pencil within so much of its own, which no rival has. Of 3, 4
-// and 5 degrees, on simulated streets (seeds 1 to 3): of the answers with a probability of 0.9 or
-// more 0.2, 0.5 and 0.8 % are more than 5 degrees off, and 7, 2.4 and 1.2 % of the right ones lose
-// that probability.
+// A hypothesis stands for turns of its pencil within so much of its own, which no rival has. Of 3,
+// 4 and 5 degrees, on simulated streets (seeds 1 to 3): 91, 95 and 96 % of the answers are sure,
+// and 0.6, 0.7 and 0.9 % of these wrong.
 constexpr double kOnePose = 4.0 * kDegree;
 // Rivals of less probability are not worth having.
 constexpr double kLeastShare = 1e-3;
