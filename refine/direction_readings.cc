@@ -21,7 +21,7 @@ struct Side {
   double share = 0.0, turn = 0.0;  // Probability, and the sum of turns by it.
 };
 
-// Turned as a whole about the camera's centre; what the camera sees of the axis stays.
+// The world turned about its origin, which stays where it is seen.
 PoseHypothesis Turned(const PoseHypothesis& hypothesis, const Eigen::Matrix3d& turn) {
   PoseHypothesis turned = hypothesis;
   turned.cam_from_world.rotation = turn * hypothesis.cam_from_world.rotation;
