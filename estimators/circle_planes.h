@@ -1,4 +1,5 @@
-// The planes that a circle's image allows, with what it knows of them. Internal: not installed.
+// The planes that a circle's image allows, with what it knows of them. Internal: not installed, but
+// shown to the other libraries.
 #ifndef CIRCLINE_ESTIMATORS_CIRCLE_PLANES_H_
 #define CIRCLINE_ESTIMATORS_CIRCLE_PLANES_H_
 
@@ -8,8 +9,9 @@
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/export.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 struct CirclePlane {
   CirclePose pose;
