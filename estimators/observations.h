@@ -77,7 +77,7 @@ const char* PencilDirectionName(PencilDirection direction);  // "x", "y", "z", "
 // A direction that a pencil may have.
 struct DirectionReading {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // Unit, camera frame, without sense.
-  double probability = 0.0;
+  double probability = 0.0;                             // Among those of its pencil.
 };
 
 // Images of lines that are parallel in space.
