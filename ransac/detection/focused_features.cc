@@ -88,7 +88,8 @@ FeaturesByFocal::Points FeaturesByFocal::Some(const std::vector<Vector2d>& all, 
                                               double variance) {
   const std::size_t n = std::min(all.size(), most);
   Points some{{}, variance * static_cast<double>(n) / static_cast<double>(all.size())};
-  for (std::size_t k = 0; k < n; ++k) some.pixels.push_back(all[k * (all.size() - 1) / (n - 1)]);
+  for (std::size_t k = 0; k < n; ++k)
+    some.pixels.push_back(all[k * (all.size() - 1) / std::max<std::size_t>(n - 1, 1)]);
   return some;
 }
 
