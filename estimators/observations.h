@@ -92,7 +92,8 @@ struct PencilObservation {
   std::optional<VanishingPointFit> fit;  // Added by a fit; camera frame.
   // Of a detected pencil along an axis: directions about the other axis, one degree apart, as all
   // lines of the photo speak for them, whichever are its own; the probabilities sum to 1. The
-  // refinement gives those far from its pose to hypotheses of their own. Empty: as `fit` says.
+  // refinement gives those far from its pose to hypotheses of their own: the same turned, with its
+  // covariance and inliers. Empty: as `fit` says.
   std::vector<DirectionReading> readings;
 };
 

@@ -50,11 +50,10 @@ void ShareAmong(const PencilObservation& pencil, std::vector<PoseHypothesis>* hy
       if (!(side.share > kLeastShare)) continue;
       const Eigen::AngleAxisd turn(side.turn / side.share, about);
       hypotheses->push_back(Turned((*hypotheses)[i], turn.toRotationMatrix()));
-      hypotheses->back().cost += std::log(left / side.share);
-      hypotheses->back().log_det += 2.0 * std::log(left);
+      hypotheses->back().cost -= std::log(side.share);
       hypotheses->back().structure += " + turned " + pencil.id;
     }
-    (*hypotheses)[i].log_det += 2.0 * std::log(left);
+    (*hypotheses)[i].cost -= std::log(left);
   }
 }
 

@@ -95,7 +95,8 @@ void MergeHumps(std::vector<PoseHypothesis>* hypotheses);
 // --- direction_readings.cc ---
 
 // Where the direction of a pencil may be far from a hypothesis' (PencilObservation::readings), the
-// hypothesis shares its probability with that pose turned to there. Ranks them.
+// hypothesis shares its probability with that pose turned to there, which is not refined again: its
+// covariance, rms and inliers are those of the hypothesis. Ranks them.
 void ShareByReadings(const Observations& observations, std::vector<PoseHypothesis>* hypotheses);
 
 }  // namespace circline
