@@ -25,6 +25,16 @@ EstimationOptions PoseOptions(const AdjustOptions& options) {
   return pose;
 }
 
+namespace {
+
+// The block of this key; -1 until there is one.
+template <typename Key>
+int& OneOf(const Key& key, std::map<Key, int>* blocks) {
+  return blocks->emplace(key, -1).first->second;
+}
+
+}  // namespace
+
 AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
                              const std::vector<CameraPrior>& priors, const AdjustOptions& options,
                              const GivenFrame* given)
@@ -35,8 +45,8 @@ AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
         num_distortion_ = std::max(num_distortion_, k - 3);
     }
   }
-  rotations_.assign(photos.size(), nullptr);
-  translations_.assign(photos.size(), nullptr);
+  rotations_.assign(photos.size(), -1);
+  translations_.assign(photos.size(), -1);
   AddCameras(priors);
   for (std::size_t i = 0; i < photos.size(); ++i) {
     if (photos[i].takes_part) AddPhoto(static_cast<int>(i));
@@ -45,73 +55,66 @@ AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
   if (given != nullptr) AddGivenPoses(*given);
 }
 
-double* AdjustProblem::NewBlock(int size, std::initializer_list<double> values,
-                                const ceres::Manifold* manifold, bool constant) {
-  std::array<double, kCameraSize>& block = values_.emplace_back();
-  block.fill(0.0);
-  std::copy(values.begin(), values.end(), block.begin());
-  blocks_[block.data()] = {size, manifold, constant};
-  return block.data();
-}
-
-void AdjustProblem::AddPrior(ceres::CostFunction* cost, std::vector<double*> blocks,
-                             ceres::LossFunction* loss) {
-  priors_.push_back({std::unique_ptr<ceres::CostFunction>(cost),
-                     std::unique_ptr<ceres::LossFunction>(loss), std::move(blocks)});
-}
-
 void AdjustProblem::AddFeature(int photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
-                               std::vector<double*> blocks) {
+                               std::vector<int> blocks) {
   const bool active = photos_[static_cast<std::size_t>(photo)].left_out.count(id) == 0;
-  features_.push_back({photo, id, cost.get(), std::move(blocks), active});
-  costs_.push_back(std::move(cost));
+  const int term =
+      AddFeatureTerm(std::move(cost), std::move(blocks), static_cast<int>(features_.size()));
+  features_.push_back({photo, id, term, active});
 }
 
 void AdjustProblem::AddCameras(const std::vector<CameraPrior>& priors) {
-  constexpr int kFocal = 0, kFirstRadial = 4;
   for (const CameraPrior& prior : priors) {
-    std::vector<int> held, held_at_first;
-    for (int k = 0; k < kCameraSize; ++k) {
-      const bool is_held = !(prior.sigma[static_cast<std::size_t>(k)] > 0.0);
-      if (is_held) held.push_back(k);
-      if (is_held || (k != kFocal && k != kFirstRadial)) held_at_first.push_back(k);
-    }
-    cameras_.push_back(NewBlock(kCameraSize, {}));
+    cameras_.push_back(AddBlock(kCameraSize, {}));
     camera_sigmas_.push_back(prior.sigma);
-    const auto manifold = [&](const std::vector<int>& constant) -> const ceres::Manifold* {
-      const bool all = constant.size() == kCameraSize;
-      return all ? nullptr : NewManifold<ceres::SubsetManifold>(int{kCameraSize}, constant);
-    };
-    all_free_.push_back(manifold(held));
-    coarse_free_.push_back(manifold(held_at_first));
-    AddPrior(NewGaussianPrior({prior.sigma.begin(), prior.sigma.end()},
-                              {prior.mean.begin(), prior.mean.end()}),
-             {cameras_.back()});
+    AddTerm(NewGaussianPrior({prior.sigma.begin(), prior.sigma.end()},
+                             {prior.mean.begin(), prior.mean.end()}),
+            {cameras_.back()});
+  }
+  FreeCameras(false);
+}
+
+// Of what has a prior width all, or the focal length and the first distortion coefficient only.
+void AdjustProblem::FreeCameras(bool coarse) {
+  constexpr int kFocal = 0, kFirstRadial = 4;
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    std::vector<int> held;
+    for (int k = 0; k < kCameraSize; ++k) {
+      const bool is_held = !(camera_sigmas_[c][static_cast<std::size_t>(k)] > 0.0);
+      if (is_held || (coarse && k != kFocal && k != kFirstRadial)) held.push_back(k);
+    }
+    const bool is_free = held.size() < kCameraSize;
+    block(cameras_[c]).is_constant = !is_free;
+    SetManifold(cameras_[c],
+                is_free ? std::make_unique<ceres::SubsetManifold>(kCameraSize, held) : nullptr);
   }
 }
 
+int AdjustProblem::AddRotation(const Eigen::Matrix3d& rotation) {
+  const Eigen::Quaterniond q = Eigen::Quaterniond(rotation).normalized();
+  return AddBlock(4, {q.x(), q.y(), q.z(), q.w()}, std::make_unique<WorldRotationManifold>(3));
+}
+
 void AdjustProblem::AddGivenPoses(const GivenFrame& given) {
-  const Eigen::Quaterniond q(given.rotation);
   const Eigen::Vector3d& t = given.translation;
-  given_ = {NewBlock(4, {q.x(), q.y(), q.z(), q.w()}, NewManifold<WorldRotationManifold>(3)),
-            NewBlock(3, {t.x(), t.y(), t.z()}), NewBlock(1, {std::log(given.scale)})};
+  given_ = {AddRotation(given.rotation), AddBlock(3, {t.x(), t.y(), t.z()}),
+            AddBlock(1, {std::log(given.scale)})};
   for (std::size_t i = 0; i < photos_.size(); ++i) {
-    if (rotations_[i] == nullptr || photos_[i].given == nullptr) continue;
+    if (rotations_[i] < 0 || photos_[i].given == nullptr) continue;
     const double distance = photos_[i].pose.translation.norm();
-    AddPrior(NewGivenPosePrior(photos_[i].given->rotation, photos_[i].given->translation,
-                               options_.given_rotation_sigma,
-                               options_.given_translation_sigma * distance),
-             {rotations_[i], translations_[i], given_[0], given_[1], given_[2]});
+    AddTerm(NewGivenPosePrior(photos_[i].given->rotation, photos_[i].given->translation,
+                              options_.given_rotation_sigma,
+                              options_.given_translation_sigma * distance),
+            {rotations_[i], translations_[i], given_[0], given_[1], given_[2]});
   }
 }
 
 void AdjustProblem::AddPhoto(int photo) {
   const auto i = static_cast<std::size_t>(photo);
   const AdjustInput& input = photos_[i];
-  const Eigen::Quaterniond q = Eigen::Quaterniond(input.pose.rotation).normalized();
   const Eigen::Vector3d& t = input.pose.translation;
-  rotations_[i] = NewBlock(4, {q.x(), q.y(), q.z(), q.w()}, NewManifold<WorldRotationManifold>(3));
-  translations_[i] = NewBlock(3, {t.x(), t.y(), t.z()});
+  rotations_[i] = AddRotation(input.pose.rotation);
+  translations_[i] = AddBlock(3, {t.x(), t.y(), t.z()});
   const Observations& obs = *input.observations;
   for (const CircleObservation& circle : obs.circles) {
     if (circle.fit && circle.plane == obs.frame.plane) AddCircle(photo, circle);
@@ -123,28 +126,26 @@ void AdjustProblem::AddPhoto(int photo) {
 // first photo's translation is held, but for its length where a length is known, and its spin,
 // unless a pencil fixes that.
 void AdjustProblem::SetGauge() {
-  std::set<const double*> observed;  // Translations.
+  std::set<int> observed;  // Translations.
   for (const Feature& feature : features_) {
-    if (feature.active) observed.insert(feature.blocks[1]);
+    if (feature.active) observed.insert(term(feature.term).blocks[1]);
   }
   std::map<int, bool> done;
   for (std::size_t i = 0; i < photos_.size(); ++i) {
     const int world = photos_[i].world;
-    if (rotations_[i] == nullptr) continue;
-    Block& translation = blocks_[translations_[i]];
+    if (rotations_[i] < 0) continue;
     if (observed.count(translations_[i]) == 0) {
-      translation.constant = true;  // Nothing speaks of it.
+      block(translations_[i]).is_constant = true;  // Nothing speaks of it.
       continue;
     }
     if (done[world]) continue;
     done[world] = true;
     if (has_scale_[world]) {
-      translation.manifold = NewManifold<ScaleManifold>();
+      SetManifold(translations_[i], std::make_unique<ScaleManifold>());
     } else {
-      translation.constant = true;
+      block(translations_[i]).is_constant = true;
     }
-    if (!x_is_fixed_[world])
-      blocks_[rotations_[i]].manifold = NewManifold<WorldRotationManifold>(2);
+    if (!x_is_fixed_[world]) SetManifold(rotations_[i], std::make_unique<WorldRotationManifold>(2));
   }
 }
 
@@ -156,13 +157,13 @@ std::optional<ImagePoints> AdjustProblem::Points(const AdjustInput& input,
                         pose_options_, num_distortion_);
 }
 
-void AdjustProblem::AddKnownRadius(int world, const CircleObservation& circle, double* radius) {
+void AdjustProblem::AddKnownRadius(int world, const CircleObservation& circle, int radius) {
   if (!(circle.radius > 0.0) || !known_radii_.insert(radius).second) return;
   const double sigma =
       circle.radius_sigma > 0.0 ? circle.radius_sigma : options_.noise_model.radius;
-  *radius = circle.radius;
-  if (sigma > 0.0) AddPrior(NewLogPrior(circle.radius, sigma), {radius});
-  blocks_[radius].constant = !(sigma > 0.0);
+  *Values(radius) = circle.radius;
+  if (sigma > 0.0) AddTerm(NewLogPrior(circle.radius, sigma), {radius});
+  block(radius).is_constant = !(sigma > 0.0);
   has_scale_[world] = metric_ = true;
 }
 
@@ -181,29 +182,29 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservatio
   // Where circles were matched by how they lie, ids of groups are a photo's own.
   const std::string own = input.names.empty() ? "" : std::to_string(photo) + ":";
   Circle made{id, world};
-  double*& center =
-      circle.concentric.empty() ? made.center : centers_[{world, own + circle.concentric}];
+  int& center =
+      circle.concentric.empty() ? made.center : OneOf({world, own + circle.concentric}, &centers_);
   const Eigen::Vector2d& at = start->second.center;
-  if (center == nullptr) center = NewBlock(2, {at.x(), at.y()});
+  if (center < 0) center = AddBlock(2, {at.x(), at.y()});
   made.center = center;
-  double*& radius = circle.radius_group.empty()
-                        ? made.radius
-                        : radius_groups_[{world, own + circle.radius_group}];
-  if (radius == nullptr) radius = NewBlock(1, {start->second.radius});
+  int& radius = circle.radius_group.empty()
+                    ? made.radius
+                    : OneOf({world, own + circle.radius_group}, &radius_groups_);
+  if (radius < 0) radius = AddBlock(1, {start->second.radius});
   made.radius = radius;
   AddKnownRadius(world, circle, radius);
-  if (model.circle_tilt_rad > 0.0 || model.circle_height > 0.0) made.tilt = NewBlock(3, {});
+  if (model.circle_tilt_rad > 0.0 || model.circle_height > 0.0) made.tilt = AddBlock(3, {});
   return &(circles_[{world, id}] = made);
 }
 
 // Contours of one contrast share an offset, in each photo its own.
-double* AdjustProblem::OffsetOf(int photo, const CircleObservation& circle) {
+int AdjustProblem::OffsetOf(int photo, const CircleObservation& circle) {
   const double sigma = options_.noise_model.contour_offset_px;
-  if (!(sigma > 0.0)) return nullptr;
-  double*& offset = offsets_[{photo, std::clamp(circle.contrast, -1, 1)}];
-  if (offset == nullptr) {
-    offset = NewBlock(1, {});
-    AddPrior(NewGaussianPrior({sigma}), {offset}, new MostlyExact);
+  if (!(sigma > 0.0)) return -1;
+  int& offset = OneOf({photo, std::clamp(circle.contrast, -1, 1)}, &offsets_);
+  if (offset < 0) {
+    offset = AddBlock(1, {});
+    AddTerm(NewGaussianPrior({sigma}), {offset}, -1, -1, std::make_unique<MostlyExact>());
   }
   return offset;
 }
@@ -217,16 +218,15 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle) {
   if (made == nullptr) return;
   const NoiseModel& model = options_.noise_model;
   PlaneCircleContourCost::Blocks with;
-  with.tilt_and_height = made->tilt != nullptr;
+  with.tilt_and_height = made->tilt >= 0;
   with.camera = true;
   with.tilt_sigma = model.circle_tilt_rad;
   with.height_sigma = model.circle_height;
-  std::vector<double*> blocks = {rotations_[i], translations_[i], made->center, made->radius};
-  if (made->tilt != nullptr) blocks.push_back(made->tilt);
-  if (double* offset = OffsetOf(photo, circle)) {
-    with.offset = true;
-    blocks.push_back(offset);
-  }
+  std::vector<int> blocks = {rotations_[i], translations_[i], made->center, made->radius};
+  if (made->tilt >= 0) blocks.push_back(made->tilt);
+  const int offset = OffsetOf(photo, circle);
+  with.offset = offset >= 0;
+  if (offset >= 0) blocks.push_back(offset);
   blocks.push_back(cameras_[static_cast<std::size_t>(input.camera)]);
   AddFeature(photo, circle.id, std::make_unique<PlaneCircleContourCost>(std::move(*points), with),
              blocks);
@@ -238,7 +238,7 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle) {
 }
 
 // Where a world has its pencils: along an axis, or in the plane.
-double* AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
+int AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   constexpr double kAlong = 0.98;  // Cosine: it is that axis, not one turned against it.
   const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
   const auto named = input.pencil_names.find(pencil.id);
@@ -247,8 +247,7 @@ double* AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   std::string id = is_own ? std::to_string(photo) + ":" + pencil.id : pencil.id;
   if (named != input.pencil_names.end()) id = named->second;
   Direction& made = directions_[{input.world, id}];
-  double*& block = made.block;
-  if (block != nullptr) return block;
+  if (made.block >= 0) return made.block;
   made.photo = is_own ? photo : input.world - 1;
   const double sigma = std::max(options_.noise_model.pencil_axis_rad, 1e-6);
   Eigen::Vector3d d = input.pose.rotation.transpose() * pencil.fit->direction;
@@ -257,14 +256,15 @@ double* AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
                                        : Eigen::Vector3d::Unit(static_cast<int>(pencil.direction));
   const bool is_along = !is_free && std::abs(d.dot(axis)) > kAlong;
   if (is_along) d = axis;
-  block = NewBlock(3, {d.x(), d.y(), d.z()}, NewManifold<ceres::SphereManifold<3>>());
+  made.block = AddBlock(3, {d.x(), d.y(), d.z()}, std::make_unique<ceres::SphereManifold<3>>());
   if (is_along) {
-    AddPrior(NewDirectionPrior(axis, sigma), {block}, new MostlyExact);
+    AddTerm(NewDirectionPrior(axis, sigma), {made.block}, -1, -1, std::make_unique<MostlyExact>());
     x_is_fixed_[input.world] = x_is_fixed_[input.world] || pencil.direction != PencilDirection::kZ;
   } else if (pencil.direction != PencilDirection::kZ) {
-    AddPrior(NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma), {block}, new MostlyExact);
+    AddTerm(NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma), {made.block}, -1, -1,
+            std::make_unique<MostlyExact>());
   }
-  return block;
+  return made.block;
 }
 
 void AdjustProblem::AddPencil(int photo, std::size_t index) {
@@ -273,7 +273,7 @@ void AdjustProblem::AddPencil(int photo, std::size_t index) {
   const PencilObservation& pencil = input.observations->pencils[index];
   const bool is_free = pencil.direction == PencilDirection::kFree;
   if (!pencil.fit || (is_free && pencil.plane != input.observations->frame.plane)) return;
-  double* direction = DirectionOf(photo, pencil);
+  const int direction = DirectionOf(photo, pencil);
   for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
     const LineObservation& line = pencil.lines[j];
     if (!line.fit) continue;
@@ -284,11 +284,12 @@ void AdjustProblem::AddPencil(int photo, std::size_t index) {
     options.direction_sigma = options_.noise_model.line_direction_rad;
     options.camera = true;
     auto cost = std::make_unique<DirectionLineCost>(std::move(*points), line.fit->line, options);
-    double* place = NewBlock(options.direction_sigma > 0.0 ? 2 : 1, {});
-    double* camera = cameras_[static_cast<std::size_t>(input.camera)];
-    const std::vector<double*> blocks = {rotations_[i], direction, place, camera};
-    if (!cost->Start(blocks.data(), place)) continue;
-    AddFeature(photo, pencil.id + "[" + std::to_string(j) + "]", std::move(cost), blocks);
+    const int place = AddBlock(options.direction_sigma > 0.0 ? 2 : 1, {}),
+              camera = cameras_[static_cast<std::size_t>(input.camera)];
+    const double* at[] = {Values(rotations_[i]), Values(direction), Values(place), Values(camera)};
+    if (!cost->Start(at, Values(place))) continue;
+    AddFeature(photo, pencil.id + "[" + std::to_string(j) + "]", std::move(cost),
+               {rotations_[i], direction, place, camera});
   }
 }
 

@@ -3,14 +3,9 @@
 #ifndef CIRCLINE_REFINE_ADJUST_PROBLEM_H_
 #define CIRCLINE_REFINE_ADJUST_PROBLEM_H_
 
-#include <ceres/loss_function.h>
-#include <ceres/manifold.h>
-#include <ceres/problem.h>
-
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -23,11 +18,11 @@
 #include "circline/estimators/pose.h"
 #include "circline/refine/adjust_layout.h"
 #include "circline/refine/adjust_photos.h"
-#include "circline/refine/cost_functions.h"
+#include "circline/refine/graph.h"
 
 namespace circline {
 
-class InverseOnPattern;
+class Linearization;
 
 // A photo as the problem takes it. All outlive the problem.
 struct AdjustInput {
@@ -57,7 +52,7 @@ struct CameraPrior {
 // How each photo's own pose is estimated.
 EstimationOptions PoseOptions(const AdjustOptions& options);
 
-class AdjustProblem {
+class AdjustProblem : private Graph {
  public:
   // `priors`: by camera. `given`: where the world lies in the frame of given poses; null: there are
   // none.
@@ -68,13 +63,12 @@ class AdjustProblem {
   // coefficient and the focal length are free where `coarse`.
   Status Solve(double stretch, bool coarse, int max_iterations);
   // Root mean square over the points of the worst feature, standard deviations.
-  double LargestMiss() const;
+  double LargestMiss() const { return Graph::LargestMiss(ActiveTerms(), values().data()); }
 
   struct Feature {
     int photo = 0;
     std::string id;  // As PoseHypothesis::left_out.
-    FeatureCost* cost = nullptr;
-    std::vector<double*> blocks;
+    int term = -1;
     bool active = true;
     // At the last Judge(): chi^2 of what its points agree on (a conic, a line) against the rest,
     // priors of its own imperfections included, and how many residuals that is.
@@ -105,80 +99,58 @@ class AdjustProblem {
   bool metric() const { return metric_; }
 
  private:
-  struct Block {
-    int size = 0;
-    const ceres::Manifold* manifold = nullptr;
-    bool constant = false;
-  };
-  struct Prior {
-    std::unique_ptr<ceres::CostFunction> cost;
-    std::unique_ptr<ceres::LossFunction> loss;
-    std::vector<double*> blocks;
-  };
   struct Circle {
     std::string id;
     int world = 0;
-    double *center = nullptr, *radius = nullptr, *tilt = nullptr;
+    int center = -1, radius = -1, tilt = -1;  // Blocks.
   };
 
   struct Direction {
     int photo = -1;  // As AdjustedDirection::photo.
-    double* block = nullptr;
+    int block = -1;
   };
 
-  double* NewBlock(int size, std::initializer_list<double> values,
-                   const ceres::Manifold* manifold = nullptr, bool constant = false);
-  template <typename M, typename... Args>
-  const ceres::Manifold* NewManifold(Args... args) {
-    return manifolds_.emplace_back(std::make_unique<M>(args...)).get();
-  }
   void AddCameras(const std::vector<CameraPrior>& priors);
   void AddPhoto(int photo);
   void SetGauge();
   void AddGivenPoses(const GivenFrame& given);
   void AddCircle(int photo, const CircleObservation& circle);
   Circle* CircleOf(int photo, const CircleObservation& circle);
-  void AddKnownRadius(int world, const CircleObservation& circle, double* radius);
-  double* OffsetOf(int photo, const CircleObservation& circle);
+  void AddKnownRadius(int world, const CircleObservation& circle, int radius);
+  int OffsetOf(int photo, const CircleObservation& circle);
   void AddPencil(int photo, std::size_t pencil);
-  double* DirectionOf(int photo, const PencilObservation& pencil);
+  int DirectionOf(int photo, const PencilObservation& pencil);
   std::optional<ImagePoints> Points(const AdjustInput& input,
                                     const std::vector<Eigen::Vector2d>& pixels,
                                     const std::vector<std::uint8_t>& inliers, double sigma_px,
                                     bool is_circle) const;
   void AddFeature(int photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
-                  std::vector<double*> blocks);
-  void AddPrior(ceres::CostFunction* cost, std::vector<double*> blocks,
-                ceres::LossFunction* loss = nullptr);
-  // Of photos before `end`.
-  void Fill(const std::vector<const ceres::Manifold*>& cameras, int end,
-            ceres::Problem* problem) const;
+                  std::vector<int> blocks);
+  void FreeCameras(bool coarse);
+  int AddRotation(const Eigen::Matrix3d& rotation);
+  // Of the features in force of photos before `end`, and of the priors of what these have.
+  std::vector<const Term*> ActiveTerms(int end) const;
+  std::vector<const Term*> ActiveTerms() const {
+    return ActiveTerms(static_cast<int>(photos_.size()));
+  }
   Covariances OfPriors() const;
-  Matrix6d PoseCovariance(int photo, const InverseOnPattern& inverse,
-                          const std::map<const double*, int>& offsets) const;
-  static bool IsOf(const Prior& prior, const ceres::Problem& problem);
+  Matrix6d PoseCovariance(std::size_t photo, const Linearization& at) const;
 
   const std::vector<AdjustInput>& photos_;
   const AdjustOptions& options_;
   const EstimationOptions pose_options_;
   int num_distortion_ = 0;
-  std::deque<std::array<double, kCameraSize>> values_;  // One block each; their addresses stay.
-  std::map<double*, Block> blocks_;
-  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
-  std::vector<double*> cameras_, rotations_, translations_;
-  std::vector<double*>
-      given_;  // Where poses are given, GivenFrame: rotation, translation, log scale.
+  std::vector<int> cameras_, rotations_, translations_;  // Blocks, -1: the photo takes no part.
+  // Where poses are given, GivenFrame: rotation, translation, log scale.
+  std::vector<int> given_;
   std::vector<std::array<double, kCameraSize>> camera_sigmas_;  // Of the priors.
-  std::vector<const ceres::Manifold*> all_free_, coarse_free_;  // Of the cameras.
   std::map<std::pair<int, std::string>, Circle> circles_;
   std::map<std::pair<int, std::string>, Direction> directions_;
-  std::map<std::pair<int, std::string>, double*> radius_groups_, centers_;
-  std::map<std::pair<int, int>, double*> offsets_;
+  std::map<std::pair<int, std::string>, int> radius_groups_, centers_;
+  std::map<std::pair<int, int>, int> offsets_;
   std::map<int, bool> x_is_fixed_, has_scale_;  // By world.
-  std::set<const double*> known_radii_;
-  std::vector<std::unique_ptr<FeatureCost>> costs_;
+  std::set<int> known_radii_;
   std::vector<Feature> features_;
-  std::vector<Prior> priors_;
   bool metric_ = false;
 };
 

@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "circline/refine/adjust_problem.h"
 #include "circline/refine/block_chain.h"
@@ -11,50 +12,32 @@
 
 namespace circline {
 
-// Whether features that take part have its blocks.
-bool AdjustProblem::IsOf(const Prior& prior, const ceres::Problem& problem) {
-  return std::all_of(prior.blocks.begin(), prior.blocks.end(),
-                     [&](double* values) { return problem.HasParameterBlock(values); });
-}
-
-void AdjustProblem::Fill(const std::vector<const ceres::Manifold*>& cameras, int end,
-                         ceres::Problem* problem) const {
-  const auto add = [&](const std::vector<double*>& blocks) {
-    for (double* values : blocks) {
-      if (problem->HasParameterBlock(values)) continue;
-      const Block& block = blocks_.at(values);
-      problem->AddParameterBlock(values, block.size, const_cast<ceres::Manifold*>(block.manifold));
-      if (block.constant) problem->SetParameterBlockConstant(values);
-    }
-  };
+std::vector<const Term*> AdjustProblem::ActiveTerms(int end) const {
+  std::vector<const Term*> active;
   for (const Feature& feature : features_) {
-    if (!feature.active || feature.photo >= end) continue;
-    add(feature.blocks);
-    problem->AddResidualBlock(feature.cost, nullptr, feature.blocks);
+    if (feature.active && feature.photo < end) active.push_back(&term(feature.term));
   }
-  add(given_);
-  for (const Prior& prior : priors_) {
-    if (IsOf(prior, *problem))
-      problem->AddResidualBlock(prior.cost.get(), prior.loss.get(), prior.blocks);
+  std::vector<std::uint8_t> is_used(blocks().size(), 0);
+  for (const int block : BlocksOf(active)) is_used[static_cast<std::size_t>(block)] = 1;
+  for (const int block : given_) is_used[static_cast<std::size_t>(block)] = 1;
+  for (const Term& prior : terms()) {
+    if (prior.feature < 0 && std::all_of(prior.blocks.begin(), prior.blocks.end(), [&](int block) {
+          return is_used[static_cast<std::size_t>(block)] != 0;
+        }))
+      active.push_back(&prior);
   }
-  for (std::size_t i = 0; i < cameras_.size(); ++i) {
-    if (!problem->HasParameterBlock(cameras_[i])) continue;
-    if (cameras[i] == nullptr) {
-      problem->SetParameterBlockConstant(cameras_[i]);
-    } else {
-      problem->SetManifold(cameras_[i], const_cast<ceres::Manifold*>(cameras[i]));
-    }
-  }
+  return active;
 }
 
 Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
   Weighing weighing;
   weighing.stretch = stretch;
-  for (const Feature& feature : features_) feature.cost->set_weighing(weighing);
+  const std::vector<const Term*> active = ActiveTerms();
+  if (active.empty()) return Status::Refused("no photo has evidence in its plane");
+  SetWeighing(weighing);
+  FreeCameras(coarse);
   ceres::Problem problem(OwnsNothing());
-  Fill(coarse ? coarse_free_ : all_free_, static_cast<int>(photos_.size()), &problem);
-  if (problem.NumResidualBlocks() == 0)
-    return Status::Refused("no photo has evidence in its plane");
+  Fill(active, Values(0), &problem);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = max_iterations;
@@ -66,35 +49,27 @@ Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
   options.max_trust_region_radius = 1e8;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
-  for (const Feature& feature : features_) feature.cost->set_weighing(Weighing());
+  SetWeighing(Weighing());
+  FreeCameras(false);
   return summary.IsSolutionUsable()
              ? Status::Ok()
              : Status::Failed("the photos cannot be evaluated at where they start");
 }
 
-double AdjustProblem::LargestMiss() const {
-  double most = 0.0;
-  for (const Feature& feature : features_) {
-    const double square = feature.active ? MeanSquareOf(*feature.cost, feature.blocks.data()) : 0.0;
-    if (std::isfinite(square)) most = std::max(most, square);
-  }
-  return std::sqrt(most);
-}
-
 void AdjustProblem::Judge() {
+  const double* parameters[8];
   for (Feature& feature : features_) {
-    const auto rows = static_cast<std::size_t>(feature.cost->num_residuals());
+    const Term& term = this->term(feature.term);
+    const auto rows = static_cast<std::size_t>(term.cost->num_residuals());
     std::vector<double> residuals(rows);
     std::vector<std::vector<double>> jacobians;
     std::vector<double*> pointers;
-    for (const double* block : feature.blocks) {
-      const auto size = static_cast<std::size_t>(blocks_.at(const_cast<double*>(block)).size);
-      jacobians.emplace_back(rows * size);
-    }
-    for (std::vector<double>& jacobian : jacobians) pointers.push_back(jacobian.data());
+    for (const int size : term.cost->parameter_block_sizes())
+      pointers.push_back(jacobians.emplace_back(rows * static_cast<std::size_t>(size)).data());
     feature.chi2 = 0.0;
     feature.rows = 0;
-    if (!feature.cost->Evaluate(feature.blocks.data(), residuals.data(), pointers.data())) continue;
+    Parameters(term, values().data(), parameters);
+    if (!term.cost->Evaluate(parameters, residuals.data(), pointers.data())) continue;
     // The row without derivative is what no curve explains: the noise of the points.
     for (std::size_t row = 0; row < rows; ++row) {
       bool is_rest = true;
@@ -112,28 +87,23 @@ void AdjustProblem::Judge() {
 }
 
 double AdjustProblem::Misfit() const {
-  ceres::Problem problem(OwnsNothing());
-  Fill(all_free_, static_cast<int>(photos_.size()), &problem);
   double chi2 = 0.0;
   int rows = 0, unknowns = 0;
-  for (const Feature& feature : features_) {
-    if (!feature.active) continue;
-    chi2 += feature.chi2;
-    rows += feature.rows;
-  }
-  for (const Prior& prior : priors_) {
-    if (!IsOf(prior, problem)) continue;
-    const double own = TwiceCostOf(*prior.cost, nullptr, Weighing(), prior.blocks.data());
+  const std::vector<const Term*> active = ActiveTerms();
+  for (const Term* term : active) {
+    if (term->feature >= 0) {
+      chi2 += features_[static_cast<std::size_t>(term->feature)].chi2;
+      rows += features_[static_cast<std::size_t>(term->feature)].rows;
+      continue;
+    }
+    const double* parameters[8];
+    Parameters(*term, values().data(), parameters);
+    const double own = TwiceCostOf(*term->cost, nullptr, Weighing(), parameters);
     if (!std::isfinite(own)) continue;
     chi2 += own;
-    rows += prior.cost->num_residuals();
+    rows += term->cost->num_residuals();
   }
-  std::vector<double*> all;
-  problem.GetParameterBlocks(&all);
-  for (double* values : all) {
-    if (!problem.IsParameterBlockConstant(values))
-      unknowns += problem.ParameterBlockTangentSize(values);
-  }
+  for (const int block : BlocksOf(active)) unknowns += this->block(block).tangent_size();
   return rows > unknowns ? chi2 / (rows - unknowns) : 1.0;
 }
 
@@ -147,12 +117,13 @@ Camera AdjustProblem::CameraAt(int camera) const {
   const auto member = std::find_if(photos_.begin(), photos_.end(), [&](const AdjustInput& photo) {
     return photo.camera == camera && photo.takes_part;
   });
-  return ShiftedCamera(member->observations->camera, cameras_[static_cast<std::size_t>(camera)]);
+  return ShiftedCamera(member->observations->camera,
+                       Values(cameras_[static_cast<std::size_t>(camera)]));
 }
 
 CameraPose AdjustProblem::PoseAt(int photo) const {
   const auto i = static_cast<std::size_t>(photo);
-  return {RotationFromBlock(rotations_[i]), Eigen::Vector3d(translations_[i])};
+  return {RotationFromBlock(Values(rotations_[i])), Eigen::Vector3d(Values(translations_[i]))};
 }
 
 namespace {
@@ -174,11 +145,14 @@ std::vector<Eigen::Vector2d> Across(const std::vector<Eigen::Vector2d>& pixels, 
 std::vector<std::vector<AdjustedResidual>> AdjustProblem::Residuals() const {
   std::vector<std::vector<AdjustedResidual>> out(photos_.size());
   std::vector<double> distances;
+  const double* parameters[8];
   for (const Feature& feature : features_) {
-    const ImagePoints* points = feature.cost->points();
+    const Term& term = this->term(feature.term);
+    const ImagePoints* points = term.weighed->points();
     if (!feature.active || points == nullptr) continue;
-    feature.cost->Distances(feature.blocks.data(), &distances);
-    const bool is_line = dynamic_cast<const DirectionLineCost*>(feature.cost) != nullptr;
+    Parameters(term, values().data(), parameters);
+    term.weighed->Distances(parameters, &distances);
+    const bool is_line = dynamic_cast<const DirectionLineCost*>(term.weighed) != nullptr;
     const std::vector<Eigen::Vector2d> across = Across(points->pixels(), is_line);
     const double gate = kInlierSigmas * points->options().sigma_px;
     for (std::size_t i = 0; i < distances.size(); ++i) {
@@ -193,18 +167,20 @@ std::vector<std::vector<AdjustedResidual>> AdjustProblem::Residuals() const {
 std::vector<AdjustedDirection> AdjustProblem::Directions() const {
   std::vector<AdjustedDirection> out;
   for (const auto& [key, direction] : directions_)
-    out.push_back({key.second, direction.photo, Eigen::Vector3d(direction.block)});
+    out.push_back({key.second, direction.photo, Eigen::Vector3d(Values(direction.block))});
   return out;
 }
 
 GivenFrame AdjustProblem::GivenFrameAt() const {
-  return {std::exp(*given_[2]), RotationFromBlock(given_[0]), Eigen::Vector3d(given_[1])};
+  return {std::exp(*Values(given_[2])), RotationFromBlock(Values(given_[0])),
+          Eigen::Vector3d(Values(given_[1]))};
 }
 
 std::vector<AdjustedCircle> AdjustProblem::Circles() const {
   std::vector<AdjustedCircle> out;
   for (const auto& [key, circle] : circles_) {
-    const PlaneCircle at(circle.center, *circle.radius, circle.tilt);
+    const PlaneCircle at(Values(circle.center), *Values(circle.radius),
+                         circle.tilt >= 0 ? Values(circle.tilt) : nullptr);
     out.push_back({circle.id, key.first - 1, at.center, at.normal.normalized(), at.radius});
   }
   return out;

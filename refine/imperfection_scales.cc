@@ -63,7 +63,7 @@ NoiseModel ScaledNoiseModel(const JointProblem& problem, const State& minimum) {
   NoiseModel model = problem.options().noise_model;
   Linearization at(problem, minimum, Weighing());
   if (!at.ok() || !at.ComputeCovariance()) return model;
-  const std::vector<Linearization::Misfit> found = at.Misfits();
+  const std::vector<Linearization::Misfit> found = at.Misfits(problem.features());
   // An outlier counts for no more than a feature that is kept.
   constexpr double kMost = 9.0;
   const auto add = [&](int feature, int term, double deviations, std::vector<Misfit>* out) {

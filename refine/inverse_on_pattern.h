@@ -35,12 +35,6 @@ class InverseOnPattern {
       return (*this)(at[static_cast<std::size_t>(i)], at[static_cast<std::size_t>(j)]);
     });
   }
-  // To an entry of the pattern, and to the one that mirrors it.
-  void Add(int row, int col, double value) {
-    const auto& order = factor_.permutationP().indices();
-    const int i = std::max(order[row], order[col]), j = std::min(order[row], order[col]);
-    (i == j ? diagonal_[i] : inverse_.coeffRef(i, j)) += value;
-  }
   // The inverse times this.
   Eigen::MatrixXd Times(const Eigen::MatrixXd& right) const { return factor_.solve(right); }
 

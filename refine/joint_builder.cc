@@ -19,35 +19,9 @@ constexpr double kExactLength = 1e-6;  // Relative: the same for a length.
 
 }  // namespace
 
-int JointProblemBuilder::AddBlock(int size, std::vector<double> value,
-                                  std::unique_ptr<ceres::Manifold> manifold, bool is_constant,
-                                  int group) {
-  Block block;
-  block.offset = static_cast<int>(p_.defaults_.size());
-  block.size = size;
-  block.manifold = manifold.get();
-  block.is_constant = is_constant;
-  block.group = group;
-  if (manifold != nullptr) p_.manifolds_.push_back(std::move(manifold));
-  value.resize(static_cast<std::size_t>(size));
-  p_.defaults_.insert(p_.defaults_.end(), value.begin(), value.end());
-  p_.blocks_.push_back(block);
-  return static_cast<int>(p_.blocks_.size()) - 1;
-}
-
-int JointProblemBuilder::AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature,
-                                 int group) {
-  p_.terms_.push_back({std::unique_ptr<ceres::CostFunction>(owned), std::move(blocks), feature,
-                       group, nullptr, nullptr});
-  return static_cast<int>(p_.terms_.size()) - 1;
-}
-
 int JointProblemBuilder::AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks,
                                         int feature, int group) {
-  FeatureCost* weighed = cost.release();
-  const int term = AddTerm(weighed, WithCamera(std::move(blocks)), feature, group);
-  p_.terms_.back().weighed = weighed;
-  return term;
+  return p_.AddFeatureTerm(std::move(cost), WithCamera(std::move(blocks)), feature, group);
 }
 
 int JointProblemBuilder::AddFeature(Feature feature) {
@@ -78,8 +52,8 @@ void JointProblemBuilder::Build() {
   has_camera_ = std::any_of(sigmas.begin(), sigmas.end(), [](double s) { return s > 0.0; });
   p_.camera_is_estimated_ = sigma.IsEstimated();
 
-  AddBlock(4, {0.0, 0.0, 0.0, 1.0});
-  AddBlock(3, {0.0, 0.0, 1.0});
+  p_.AddBlock(4, {0.0, 0.0, 0.0, 1.0});
+  p_.AddBlock(3, {0.0, 0.0, 1.0});
   std::vector<int> held;
   for (int k = 0; k < kCameraSize; ++k) {
     if (!(sigmas[static_cast<std::size_t>(k)] > 0.0)) held.push_back(k);
@@ -87,8 +61,8 @@ void JointProblemBuilder::Build() {
   std::unique_ptr<ceres::Manifold> manifold;
   if (!held.empty() && has_camera_)
     manifold = std::make_unique<ceres::SubsetManifold>(kCameraSize, held);
-  AddBlock(kCameraSize, std::vector<double>(kCameraSize, 0.0), std::move(manifold),
-           !p_.camera_is_estimated_);
+  p_.AddBlock(kCameraSize, std::vector<double>(kCameraSize, 0.0), std::move(manifold),
+              !p_.camera_is_estimated_);
   if (p_.camera_is_estimated_) {
     AddCameraPrior(sigmas);
   }
@@ -103,29 +77,25 @@ void JointProblemBuilder::Build() {
   for (std::size_t i = 0; i < obs_.known_lengths.size(); ++i) AddLength(i);
   AddTranslation();
   AddPriors();
-  p_.blocks_[JointProblem::kRotation].manifold =
-      p_.manifolds_.emplace_back(std::make_unique<WorldRotationManifold>(p_.x_is_fixed_ ? 3 : 2))
-          .get();
+  p_.SetManifold(JointProblem::kRotation,
+                 std::make_unique<WorldRotationManifold>(p_.x_is_fixed_ ? 3 : 2));
 }
 
 // Of the shifts of the camera, but that the focal length may be doubtful.
 void JointProblemBuilder::AddCameraPrior(std::vector<double> sigmas) {
-  const auto add = [this](const std::vector<double>& gaussian) {
-    std::vector<double> mean(kCameraSize, 0.0);
-    mean[0] = StatedLogFocal(obs_);
-    AddTerm(NewGaussianPrior(gaussian, mean), {JointProblem::kCamera});
-  };
+  std::vector<double> mean(kCameraSize, 0.0);
+  mean[0] = StatedLogFocal(obs_);
   const double narrow = sigmas[0], wide = p_.camera_sigma_.doubtful_log_focal;
   if (wide > narrow) {
     std::vector<double> focal(kCameraSize, 0.0);
     focal[0] = wide;
     sigmas[0] = 0.0;
-    add(focal);
-    p_.terms_.back().loss =
-        std::make_unique<TwoGaussians>(1.0 - kDoubtfulShare, narrow / wide, 1.0);
-    p_.terms_.back().is_mostly_exact = false;
+    const int term =
+        p_.AddTerm(NewGaussianPrior(focal, mean), {JointProblem::kCamera}, -1, -1,
+                   std::make_unique<TwoGaussians>(1.0 - kDoubtfulShare, narrow / wide, 1.0));
+    p_.term(term).is_mostly_exact = false;
   }
-  add(sigmas);
+  p_.AddTerm(NewGaussianPrior(sigmas, mean), {JointProblem::kCamera});
 }
 
 void JointProblemBuilder::AddAngle(std::size_t index) {
@@ -146,7 +116,7 @@ void JointProblemBuilder::AddAngle(std::size_t index) {
     p_.unused_.push_back(name + ": not used, both run along axes, which are orthogonal");
     return;
   }
-  AddTerm(NewAngleCost(known.value, std::max(known.sigma, kExactAngle)), {blocks[0], blocks[1]});
+  p_.AddTerm(NewAngleCost(known.value, std::max(known.sigma, kExactAngle)), {blocks[0], blocks[1]});
 }
 
 void JointProblemBuilder::AddLength(std::size_t index) {
@@ -166,31 +136,26 @@ void JointProblemBuilder::AddLength(std::size_t index) {
                   "an end of a known length"};
   feature.observation = static_cast<int>(index);
   const int f = AddFeature(feature), group = p_.num_groups_++;
-  const int a = AddBlock(2, {0.0, 0.0}, {}, false, group),
-            b = AddBlock(2, {0.0, 0.0}, {}, false, group);
+  const int a = p_.AddBlock(2, {0.0, 0.0}, {}, false, group),
+            b = p_.AddBlock(2, {0.0, 0.0}, {}, false, group);
   AddPoint(known.points[0], DrawnSigma(), a, f, group);
   AddPoint(known.points[1], DrawnSigma(), b, f, group);
   const double sigma = known.sigma > 0.0 ? known.sigma : model_.length;
-  AddTerm(NewLengthCost(known.value, std::max(sigma, kExactLength)), {a, b}, f, group);
+  p_.AddTerm(NewLengthCost(known.value, std::max(sigma, kExactLength)), {a, b}, f, group);
   p_.lengths_.push_back({a, b, f, known.value});
   is_metric_ = true;
 }
 
 void JointProblemBuilder::AddTranslation() {
-  Block& t = p_.blocks_[JointProblem::kTranslation];
   const bool has_origin = p_.origin_observed_ || p_.center_at_origin_ >= 0;
   if (is_metric_ && has_origin) return;
-  if (!is_metric_ && !has_origin) {
-    t.is_constant = true;
-    return;
-  }
-  std::unique_ptr<ceres::Manifold> manifold;
   if (is_metric_) {
-    manifold = std::make_unique<ScaleManifold>();
+    p_.SetManifold(JointProblem::kTranslation, std::make_unique<ScaleManifold>());
+  } else if (has_origin) {
+    p_.SetManifold(JointProblem::kTranslation, std::make_unique<ceres::SphereManifold<3>>());
   } else {
-    manifold = std::make_unique<ceres::SphereManifold<3>>();
+    p_.block(JointProblem::kTranslation).is_constant = true;
   }
-  t.manifold = p_.manifolds_.emplace_back(std::move(manifold)).get();
 }
 
 void JointProblemBuilder::AddPriors() {
@@ -213,15 +178,15 @@ void JointProblemBuilder::AddPriors() {
     }
     if (ceres::CostFunction* cost = NewPosePrior(prior.mean.rotation, mean, covariance)) {
       p_.pose_priors_.push_back(
-          AddTerm(cost, {JointProblem::kRotation, JointProblem::kTranslation}));
+          p_.AddTerm(cost, {JointProblem::kRotation, JointProblem::kTranslation}));
       p_.x_is_fixed_ = true;
     }
   }
   if (p_.options_.gravity_prior) {
     const GravityPrior& prior = *p_.options_.gravity_prior;
     p_.pose_priors_.push_back(
-        AddTerm(NewDirectionMeasurement(prior.in_world, prior.in_camera, prior.sigma_rad),
-                {JointProblem::kRotation}));
+        p_.AddTerm(NewDirectionMeasurement(prior.in_world, prior.in_camera, prior.sigma_rad),
+                   {JointProblem::kRotation}));
     constexpr double kAlongNormal = 1e-3;  // Then it does not tell the spin about it.
     p_.x_is_fixed_ = p_.x_is_fixed_ || prior.in_world.head<2>().norm() > kAlongNormal;
   }

@@ -26,14 +26,9 @@ class JointProblemBuilder {
   void Build();
 
  private:
-  int AddBlock(int size, std::vector<double> value, std::unique_ptr<ceres::Manifold> manifold = {},
-               bool is_constant = false, int group = -1);
-  int AddConstant(std::vector<double> value) {
-    const int size = static_cast<int>(value.size());
-    return AddBlock(size, std::move(value), {}, true);
+  int AddConstant(const std::vector<double>& value) {
+    return p_.AddBlock(static_cast<int>(value.size()), value, {}, true);
   }
-  int AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature = -1,
-              int group = -1);
   int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature,
                      int group);
   int AddFeature(Feature feature);

@@ -68,10 +68,10 @@ int JointProblemBuilder::CenterBlock(const CircleObservation& circle, int group)
     if (p_.center_at_origin_ < 0) p_.center_at_origin_ = static_cast<int>(p_.circles_.size());
     return origin_point_;
   }
-  if (circle.concentric.empty()) return AddBlock(2, {0.0, 0.0}, {}, false, group);
+  if (circle.concentric.empty()) return p_.AddBlock(2, {0.0, 0.0}, {}, false, group);
   const auto found = concentric_.find(circle.concentric);
   if (found != concentric_.end()) return found->second;
-  return concentric_[circle.concentric] = AddBlock(2, {0.0, 0.0});
+  return concentric_[circle.concentric] = p_.AddBlock(2, {0.0, 0.0});
 }
 
 int JointProblemBuilder::RadiusBlock(const CircleObservation& circle, int feature, int group) {
@@ -83,11 +83,11 @@ int JointProblemBuilder::RadiusBlock(const CircleObservation& circle, int featur
   const double sigma = circle.radius_sigma > 0.0 ? circle.radius_sigma : model_.radius;
   const bool known = circle.radius > 0.0;
   is_metric_ = is_metric_ || known;
-  const int block =
-      AddBlock(1, {known ? circle.radius : 1.0}, {}, known && !(sigma > 0.0), grouped ? -1 : group);
+  const int block = p_.AddBlock(1, {known ? circle.radius : 1.0}, {}, known && !(sigma > 0.0),
+                                grouped ? -1 : group);
   if (known && sigma > 0.0) {
-    AddTerm(NewLogPrior(circle.radius, sigma), {block}, grouped ? -1 : feature,
-            grouped ? -1 : group);
+    p_.AddTerm(NewLogPrior(circle.radius, sigma), {block}, grouped ? -1 : feature,
+               grouped ? -1 : group);
   }
   if (grouped) radius_groups_[circle.radius_group] = block;
   return block;
@@ -99,9 +99,9 @@ int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
   const std::size_t contrast = ContrastOf(circle);
   int& block = offsets_[contrast];
   if (block < 0 && (num_circles_[contrast] > 1 || circle.radius > 0.0)) {
-    block = AddBlock(1, {0.0});
-    AddTerm(NewGaussianPrior({model_.contour_offset_px}), {block});
-    p_.terms_.back().loss = std::make_unique<MostlyExact>();
+    block = p_.AddBlock(1, {0.0});
+    p_.AddTerm(NewGaussianPrior({model_.contour_offset_px}), {block}, -1, -1,
+               std::make_unique<MostlyExact>());
   }
   return block;
 }
@@ -124,7 +124,7 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   blocks.height_sigma = model_.circle_height;
   blocks.camera = has_camera_;
   std::vector<int> used = {JointProblem::kRotation, JointProblem::kTranslation, center, radius};
-  const int tilt = blocks.tilt_and_height ? AddBlock(3, {0.0, 0.0, 0.0}, {}, false, group) : -1;
+  const int tilt = blocks.tilt_and_height ? p_.AddBlock(3, {0.0, 0.0, 0.0}, {}, false, group) : -1;
   if (tilt >= 0) used.push_back(tilt);
   const int offset = OffsetBlock(circle);
   blocks.offset = offset >= 0;
@@ -163,7 +163,7 @@ void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size
   diameter.parent = feature;
   diameter.line_covariance = fit.covariance;
   const int f = AddFeature(diameter);
-  const int angle = AddBlock(1, {0.0}, {}, false, group);
+  const int angle = p_.AddBlock(1, {0.0}, {}, false, group);
   AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
                  {JointProblem::kRotation, JointProblem::kTranslation, center, angle}, f, group);
   p_.plane_lines_.push_back({angle, fit.line});

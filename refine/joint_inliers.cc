@@ -13,12 +13,12 @@ template <typename Visit>
 void ForEachCurve(const JointProblem& problem, const State& state, const Visit& visit) {
   std::vector<double> distances;
   const double* parameters[8];
-  for (const Term& term : problem.terms()) {
-    const ImagePoints* points = term.weighed != nullptr ? term.weighed->points() : nullptr;
-    if (points == nullptr || !problem.IsActive(term, state)) continue;
-    problem.Parameters(term, state, parameters);
-    term.weighed->Distances(parameters, &distances);
-    visit(term.feature, *points, distances);
+  for (const Term* term : problem.ActiveTerms(state)) {
+    const ImagePoints* points = term->weighed != nullptr ? term->weighed->points() : nullptr;
+    if (points == nullptr) continue;
+    problem.Parameters(*term, state.x.data(), parameters);
+    term->weighed->Distances(parameters, &distances);
+    visit(term->feature, *points, distances);
   }
 }
 
@@ -29,7 +29,7 @@ void ForEachPoint(const JointProblem& problem, const State& state, const Visit& 
   for (const JointProblem::PointBlocks& p : problem.points()) {
     const Term& term = problem.term(p.term);
     if (!problem.IsActive(term, state)) continue;
-    problem.Parameters(term, state, parameters);
+    problem.Parameters(term, state.x.data(), parameters);
     const auto& cost = static_cast<const PlanePointCost&>(*term.cost);
     visit(p.feature, cost, cost.MissPx(parameters));
   }

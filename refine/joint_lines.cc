@@ -67,18 +67,18 @@ int JointProblemBuilder::DirectionBlock(std::size_t index) {
                                        : Eigen::Vector3d::Unit(static_cast<int>(pencil.direction));
   const std::vector<double> value(axis.data(), axis.data() + 3);
   if (!(sigma > 0.0)) {
-    return is_free ? AddBlock(3, value, std::make_unique<InPlaneManifold>()) : AddConstant(value);
+    return is_free ? p_.AddBlock(3, value, std::make_unique<InPlaneManifold>())
+                   : AddConstant(value);
   }
-  const int block = AddBlock(3, value, std::make_unique<ceres::SphereManifold<3>>());
+  const int block = p_.AddBlock(3, value, std::make_unique<ceres::SphereManifold<3>>());
   Feature tie{Feature::Kind::kAxis, pencil.id, "the direction of pencil '" + pencil.id + "'"};
   tie.dof = is_free ? 1 : 2;
   tie.observation = static_cast<int>(index);
   const int feature = AddFeature(tie);
-  AddTerm(
+  const int term = p_.AddTerm(
       is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma) : NewDirectionPrior(axis, sigma),
-      {block}, feature);
-  p_.terms_.back().loss = std::make_unique<MostlyExact>();
-  if (!is_free) p_.terms_.back().lean_shape = LeanShape(pencil);
+      {block}, feature, -1, std::make_unique<MostlyExact>());
+  if (!is_free) p_.term(term).lean_shape = LeanShape(pencil);
   return block;
 }
 
@@ -121,7 +121,7 @@ void JointProblemBuilder::AddLine(ImagePoints points, const Eigen::Vector3d& fit
   options.direction_sigma = direction_sigma;
   options.camera = has_camera_;
   const int f = AddFeature(std::move(feature)), group = p_.num_groups_++;
-  const int own = AddBlock(direction_sigma > 0.0 ? 2 : 1, {0.0, 0.0}, {}, false, group);
+  const int own = p_.AddBlock(direction_sigma > 0.0 ? 2 : 1, {0.0, 0.0}, {}, false, group);
   const int term =
       AddFeatureTerm(std::make_unique<DirectionLineCost>(std::move(points), fit, options),
                      {JointProblem::kRotation, direction, own}, f, group);

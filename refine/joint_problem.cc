@@ -9,13 +9,6 @@
 
 namespace circline {
 
-BlockMatrix PlusJacobianOf(const ceres::Manifold& manifold, const double* at) {
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kCameraSize, kCameraSize>
-      J(manifold.AmbientSize(), manifold.TangentSize());
-  manifold.PlusJacobian(at, J.data());
-  return J;
-}
-
 std::vector<std::uint8_t> JointProblem::FirstReading() const {
   std::vector<std::uint8_t> reading(features_.size(), 1);
   for (std::size_t i = 0; i < features_.size(); ++i) {
@@ -37,16 +30,19 @@ bool JointProblem::IsActive(const Term& term, const State& state) const {
   return true;
 }
 
-void JointProblem::SeeThrough(const State& state) const {
-  const double* camera = At(kCamera, state);
-  for (const Term& term : terms_) {
-    if (camera_is_estimated_ && term.weighed != nullptr && IsActive(term, state))
-      term.weighed->SeeThrough(camera);
+std::vector<const Term*> JointProblem::ActiveTerms(const State& state) const {
+  std::vector<const Term*> active;
+  for (const Term& term : terms()) {
+    if (IsActive(term, state)) active.push_back(&term);
   }
+  return active;
 }
 
-void JointProblem::Parameters(const Term& term, const State& state, const double** out) const {
-  for (std::size_t k = 0; k < term.blocks.size(); ++k) out[k] = At(term.blocks[k], state);
+void JointProblem::SeeThrough(const State& state) const {
+  if (!camera_is_estimated_) return;
+  for (const Term* term : ActiveTerms(state)) {
+    if (term->weighed != nullptr) term->weighed->SeeThrough(At(kCamera, state));
+  }
 }
 
 bool JointProblem::IsMetric(const State& state) const {
@@ -68,15 +64,6 @@ bool JointProblem::OriginIsPlaced(const State& state) const {
          });
 }
 
-double JointProblem::TwiceCost(const Term& term, const State& state,
-                               const Weighing& weighing) const {
-  const double* parameters[8];
-  Parameters(term, state, parameters);
-  double rho[3] = {TwiceCostOf(*term.cost, term.weighed, weighing, parameters), 0.0, 0.0};
-  if (term.loss != nullptr && std::isfinite(rho[0])) term.loss->Evaluate(rho[0], rho);
-  return rho[0];
-}
-
 double JointProblem::FreeCost(const State& state) const {
   double twice_cost = 0.0;
   for (std::size_t i = 0; i < features_.size(); ++i)
@@ -86,9 +73,8 @@ double JointProblem::FreeCost(const State& state) const {
 
 double JointProblem::Cost(const State& state, const Weighing& weighing) const {
   double cost = 0.0;
-  for (const Term& term : terms_) {
-    if (IsActive(term, state)) cost += 0.5 * TwiceCost(term, state, weighing);
-  }
+  for (const Term* term : ActiveTerms(state))
+    cost += 0.5 * TwiceCost(*term, state.x.data(), weighing);
   return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
 }
 

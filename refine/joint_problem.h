@@ -10,14 +10,9 @@
 #ifndef CIRCLINE_REFINE_JOINT_PROBLEM_H_
 #define CIRCLINE_REFINE_JOINT_PROBLEM_H_
 
-#include <ceres/loss_function.h>
-#include <ceres/manifold.h>
-
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
-#include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,33 +20,10 @@
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
-#include "circline/refine/cost_functions.h"
 #include "circline/refine/estimate_pose.h"
+#include "circline/refine/graph.h"
 
 namespace circline {
-
-// Matrices of one block do not allocate.
-using BlockMatrix =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCameraSize, kCameraSize>;
-using BlockVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCameraSize, 1>;
-
-BlockMatrix PlusJacobianOf(const ceres::Manifold& manifold, const double* at);
-
-// One parameter block.
-struct Block {
-  int offset, size;                           // In State::x.
-  const ceres::Manifold* manifold = nullptr;  // Null: Euclidean.
-  bool is_constant = false;
-  int group = -1;  // The feature group that alone has it; -1: shared.
-
-  int tangent_size() const {
-    return is_constant ? 0 : manifold != nullptr ? manifold->TangentSize() : size;
-  }
-  // Of its manifold, constant or not: ambient by tangent size.
-  BlockMatrix PlusJacobian(const double* at) const {
-    return manifold != nullptr ? PlusJacobianOf(*manifold, at) : BlockMatrix::Identity(size, size);
-  }
-};
 
 // What can be left out as a whole.
 struct Feature {
@@ -66,21 +38,6 @@ struct Feature {
   double free_twice_cost = 0.0;
   // Of a line that lies in the plane, not along some direction only: the covariance of its fit.
   std::optional<Eigen::Matrix3d> line_covariance = std::nullopt;
-};
-
-// One residual block.
-struct Term {
-  std::unique_ptr<ceres::CostFunction> cost;
-  std::vector<int> blocks;
-  int feature = -1;                // -1: always there.
-  int group = -1;                  // Of the blocks that are nobody else's.
-  FeatureCost* weighed = nullptr;  // The same, where it can be weighed anew.
-  // Of a prior that is no Gaussian.
-  std::unique_ptr<ceres::LossFunction> loss;
-  // The covariance is that of the residuals without the loss; else that which the loss makes of it.
-  bool is_mostly_exact = true;
-  // Of a pencil's prior about its axis (LeanShape): counted in the covariance.
-  std::optional<Eigen::Matrix3d> lean_shape = std::nullopt;
 };
 
 // Where a refinement stands.
@@ -98,7 +55,7 @@ struct Rival {
   double gap = 0.0;
 };
 
-class JointProblem {
+class JointProblem : public Graph {
  public:
   // `observations` fitted and resolved (ResolveWorld), each feature with its noise (StateNoise);
   // they and the options outlive this. Features without a fit, of other planes, or without any tie
@@ -131,11 +88,7 @@ class JointProblem {
 
   const Observations& observations() const { return observations_; }
   const EstimationOptions& options() const { return options_; }
-  const std::vector<Block>& blocks() const { return blocks_; }
-  const std::vector<Term>& terms() const { return terms_; }
   const std::vector<Feature>& features() const { return features_; }
-  const Block& block(int i) const { return blocks_[static_cast<std::size_t>(i)]; }
-  const Term& term(int i) const { return terms_[static_cast<std::size_t>(i)]; }
   const Feature& feature(int i) const { return features_[static_cast<std::size_t>(i)]; }
   // A block's values.
   const double* At(int i, const State& state) const { return state.x.data() + block(i).offset; }
@@ -149,7 +102,7 @@ class JointProblem {
   // is asked of that camera until the next call.
   void SeeThrough(const State& state) const;
   bool IsActive(const Term& term, const State& state) const;
-  void Parameters(const Term& term, const State& state, const double** out) const;
+  std::vector<const Term*> ActiveTerms(const State& state) const;
   bool IsMetric(const State& state) const;
   // Whether anything that takes part says where the origin is.
   bool OriginIsPlaced(const State& state) const;
@@ -194,8 +147,6 @@ class JointProblem {
  private:
   friend class JointProblemBuilder;
 
-  double TwiceCost(const Term& term, const State& state, const Weighing& weighing) const;
-  double LargestMiss(const State& state) const;
   Status SolveNarrowing(const std::vector<double>& widths, int max_iterations, State* state,
                         const Rival& rival) const;
   Eigen::Matrix3d SenseOfPriors(const CameraPose& seed) const;
@@ -217,8 +168,6 @@ class JointProblem {
 
   const Observations& observations_;
   const EstimationOptions& options_;
-  std::vector<Block> blocks_;
-  std::vector<Term> terms_;
   std::vector<Feature> features_;
   std::vector<CircleBlocks> circles_;
   std::vector<PencilBlocks> pencils_;
@@ -226,9 +175,7 @@ class JointProblem {
   std::vector<PlaneLineBlocks> plane_lines_;
   std::vector<PointBlocks> points_;
   std::vector<LengthBlocks> lengths_;
-  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
   std::vector<std::string> unused_;
-  std::vector<double> defaults_;  // Of State::x.
   int num_groups_ = 0;
   std::vector<int> pose_priors_;  // Terms.
   int center_at_origin_ = -1;     // Circle (index in circles_) whose centre the origin is, or -1.

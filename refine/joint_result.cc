@@ -76,18 +76,11 @@ void FillCircles(const JointProblem& problem, const State& state, Refined* refin
   }
 }
 
-std::vector<int> RotationColumns(const JointProblem& problem, const Linearization& at) {
-  std::vector<int> columns;
-  for (int k = 0; k < problem.blocks()[JointProblem::kRotation].tangent_size(); ++k)
-    columns.push_back(at.column(JointProblem::kRotation) + k);
-  return columns;
-}
-
 // Each pencil's own direction, which leans from its axis as far as the evidence says.
 void FillPencils(const JointProblem& problem, const State& state, const Linearization& at,
                  PoseHypothesis* h) {
   const Eigen::Matrix3d R = problem.PoseAt(state).rotation;
-  const std::vector<int> rotation = RotationColumns(problem, at);
+  const std::vector<int> rotation = at.Columns(JointProblem::kRotation);
   const Eigen::MatrixXd turns = R.leftCols(static_cast<Eigen::Index>(rotation.size()));
   const std::vector<JointProblem::PencilBlocks>& all = problem.pencils();  // In the same order.
   auto blocks = all.begin();
@@ -107,8 +100,8 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
         const BlockMatrix plus = block.PlusJacobian(state.x.data() + block.offset);
         J.conservativeResize(3, J.cols() + plus.cols());
         J.rightCols(plus.cols()) = R * plus;
-        for (int k = 0; k < block.tangent_size(); ++k)
-          columns.push_back(at.column(blocks->direction) + k);
+        const std::vector<int> own = at.Columns(blocks->direction);
+        columns.insert(columns.end(), own.begin(), own.end());
       }
       covariance = J * at.Covariance(columns) * J.transpose();
     } else if (pencil.direction != PencilDirection::kFree) {
@@ -212,7 +205,7 @@ void FillLeftOut(const JointProblem& problem, const State& state, Refined* refin
 // Log determinant of the covariance of rotation and, where it is estimated, focal length; a turn
 // that the evidence says nothing of has a variance of one, and no other has more.
 double LogDet(const JointProblem& problem, const Linearization& at) {
-  std::vector<int> columns = RotationColumns(problem, at);
+  std::vector<int> columns = at.Columns(JointProblem::kRotation);
   if (problem.camera_is_estimated()) columns.push_back(at.column(JointProblem::kCamera));
   Eigen::MatrixXd covariance = at.covariance()(columns, columns);
   const Eigen::MatrixXd nulls = at.null_space()(columns, Eigen::all);

@@ -125,11 +125,7 @@ Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_i
                                      [](double value) { return std::isfinite(value); });
   if (!is_finite || (!std::isfinite(state->cost) && !std::isfinite(Cost(*state))))
     return Status::Failed("the evidence cannot be evaluated at the seed");
-  const Narrowing::Set set_weighing = [this](const Weighing& weighing) {
-    for (const Term& term : terms_) {
-      if (term.weighed != nullptr) term.weighed->set_weighing(weighing);
-    }
-  };
+  const Narrowing::Set set_weighing = [this](const Weighing& weighing) { SetWeighing(weighing); };
   // A wide loss is nearly that of least squares, of which one step comes near enough for the next
   // width; not one that is bounded, and soon flat.
   const std::function<void()> see = [this, state] { SeeThrough(*state); };
@@ -137,26 +133,7 @@ Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_i
   ceres::Problem::Options of_problem = OwnsNothing();
   if (losses.is_wide() || camera_is_estimated_) of_problem.evaluation_callback = &losses;
   ceres::Problem problem(of_problem);
-  std::vector<double*> blocks;
-  std::vector<std::uint8_t> added(blocks_.size(), 0);
-  int unknowns = 0;
-  for (const Term& term : terms_) {
-    if (!IsActive(term, *state)) continue;
-    blocks.clear();
-    for (const int index : term.blocks) {
-      const auto i = static_cast<std::size_t>(index);
-      const Block& block = blocks_[i];
-      double* values = state->x.data() + block.offset;
-      blocks.push_back(values);
-      if (added[i] != 0) continue;
-      added[i] = 1;
-      unknowns += block.tangent_size();
-      problem.AddParameterBlock(values, block.size,
-                                const_cast<ceres::Manifold*>(block.manifold));  // Not owned.
-      if (block.is_constant) problem.SetParameterBlockConstant(values);
-    }
-    problem.AddResidualBlock(term.cost.get(), term.loss.get(), blocks);
-  }
+  const int unknowns = Fill(ActiveTerms(*state), state->x.data(), &problem);
   if (unknowns == 0) return Status::Refused("nothing of the evidence ties the pose");
 
   // Ceres asks for a share of the cost, of which the free fits' is the most that is known; it falls
@@ -184,18 +161,6 @@ Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_i
                                     : Status::Failed("the refinement left the range of numbers");
 }
 
-// Of all features, root mean square over its points, standard deviations.
-double JointProblem::LargestMiss(const State& state) const {
-  double most = 0.0;
-  const double* parameters[8];
-  for (const Term& term : terms_) {
-    if (term.weighed == nullptr || !IsActive(term, state)) continue;
-    Parameters(term, state, parameters);
-    most = std::max(most, MeanSquareOf(*term.weighed, parameters));
-  }
-  return std::sqrt(most);
-}
-
 Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
   if (options_.conic_loss.type == LossType::kTrivial &&
       options_.line_loss.type == LossType::kTrivial) {
@@ -205,7 +170,8 @@ Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
   // A loss that is bounded soon has no slope to follow.
   const double near = HasBoundedLoss(options_) ? 1.5 : 3.0;
   std::vector<double> widths;
-  for (double width = std::min(LargestMiss(*state), kWidest); width > near; width *= kNarrower)
+  for (double width = std::min(LargestMiss(ActiveTerms(*state), state->x.data()), kWidest);
+       width > near; width *= kNarrower)
     widths.push_back(width);
   return SolveNarrowing(widths, max_iterations, state, Rival());
 }

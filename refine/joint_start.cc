@@ -102,12 +102,12 @@ bool JointProblem::PlaceOrigin(const Placed& placed, const double* camera, State
   const Eigen::Matrix3d R = PoseAt(*state).rotation;
   Eigen::Map<Eigen::Vector3d> t(At(kTranslation, state));
   t += R * Eigen::Vector3d(xy[0], xy[1], 0.0);
-  std::vector<std::uint8_t> moved(blocks_.size(), 0);
+  std::vector<std::uint8_t> moved(blocks().size(), 0);
   for (const CircleBlocks& c : circles_) {
     const auto block = static_cast<std::size_t>(c.center);
-    if (blocks_[block].is_constant || moved[block] != 0) continue;
+    if (blocks()[block].is_constant || moved[block] != 0) continue;
     moved[block] = 1;
-    double* center = state->x.data() + blocks_[block].offset;
+    double* center = state->x.data() + blocks()[block].offset;
     center[0] -= xy[0];
     center[1] -= xy[1];
   }
@@ -135,13 +135,13 @@ void JointProblem::PlaceScale(Placed placed, const double* camera, State* state)
   Eigen::Map<Eigen::Vector3d> t(At(kTranslation, state));
   const double scale = placed.scales.empty() ? 1.0 / t.norm() : Median(std::move(placed.scales));
   t *= scale;
-  std::vector<std::uint8_t> scaled(blocks_.size(), 0);
+  std::vector<std::uint8_t> scaled(blocks().size(), 0);
   const auto apply = [&](int index) {
     const auto i = static_cast<std::size_t>(index);
-    if (blocks_[i].is_constant || scaled[i] != 0) return;
+    if (blocks()[i].is_constant || scaled[i] != 0) return;
     scaled[i] = 1;
-    double* values = state->x.data() + blocks_[i].offset;
-    for (int k = 0; k < blocks_[i].size; ++k) values[k] *= scale;
+    double* values = state->x.data() + blocks()[i].offset;
+    for (int k = 0; k < blocks()[i].size; ++k) values[k] *= scale;
   };
   for (const CircleBlocks& c : circles_) {
     apply(c.center);
@@ -156,7 +156,7 @@ void JointProblem::PlaceScale(Placed placed, const double* camera, State* state)
 bool JointProblem::PlaceLine(const LineBlocks& l, State* state) const {
   const Term& term = this->term(l.term);
   const double* parameters[8];
-  Parameters(term, *state, parameters);
+  Parameters(term, state->x.data(), parameters);
   double* line = At(l.line, state);
   return static_cast<const DirectionLineCost&>(*term.cost).Start(parameters, line);
 }
@@ -255,9 +255,9 @@ Status JointProblem::Start(const CameraPose& given, double log_focal,
                            const std::vector<std::uint8_t>& reading, State* state) const {
   CameraPose seed = given;
   seed.rotation = SenseOfPriors(given);
-  state->x = defaults_;
+  state->x = values();
   state->active = reading;
-  if (camera_is_estimated_) state->x[static_cast<std::size_t>(blocks_[kCamera].offset)] = log_focal;
+  if (camera_is_estimated_) state->x[static_cast<std::size_t>(block(kCamera).offset)] = log_focal;
   Eigen::Map<Eigen::Quaterniond>(At(kRotation, state)) =
       Eigen::Quaterniond(seed.rotation).normalized();
   Eigen::Map<Eigen::Vector3d>(At(kTranslation, state)) = seed.translation;

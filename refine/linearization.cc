@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "circline/refine/block_chain.h"
@@ -14,49 +15,67 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 
 }  // namespace
 
-Linearization::Linearization(const JointProblem& problem, const State& state,
-                             const Weighing& weighing)
-    : problem_(problem), state_(state) {
-  LayOut();
-  together_.resize(static_cast<std::size_t>(problem.num_groups()));
-  for (const Term& term : problem.terms()) {
-    if (problem.IsActive(term, state)) ok_ = ok_ && AddTerm(term, weighing);
-  }
+Linearization::Linearization(const Graph& graph, const std::vector<const Term*>& terms,
+                             const double* x, const Weighing& weighing, Options options)
+    : graph_(graph), x_(x), options_(std::move(options)) {
+  LayOut(terms);
+  for (const Term* term : terms) ok_ = ok_ && AddTerm(*term, weighing);
 }
 
-void Linearization::LayOut() {
-  const std::vector<Block>& blocks = problem_.blocks();
-  columns_.assign(blocks.size(), -1);
-  plus_.resize(blocks.size());
+namespace {
+
+Linearization::Options OptionsOf(const JointProblem& problem) {
+  Linearization::Options options;
+  options.core = {JointProblem::kRotation, JointProblem::kTranslation};
+  if (problem.camera_is_estimated()) {
+    options.core.push_back(JointProblem::kCamera);
+  } else {
+    const CameraSigma& sigma = problem.camera_sigma();
+    options.considered_sigmas = {sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
+                                 sigma.principal_point_px, sigma.k1};
+    if (std::any_of(options.considered_sigmas.begin(), options.considered_sigmas.end(),
+                    [](double s) { return s > 0.0; }))
+      options.considered = JointProblem::kCamera;
+  }
+  return options;
+}
+
+}  // namespace
+
+Linearization::Linearization(const JointProblem& problem, const State& state,
+                             const Weighing& weighing)
+    : Linearization(problem, problem.ActiveTerms(state), state.x.data(), weighing,
+                    OptionsOf(problem)) {}
+
+void Linearization::LayOut(const std::vector<const Term*>& terms) {
+  columns_.assign(graph_.blocks().size(), -1);
+  plus_.resize(graph_.blocks().size());
   const auto add = [&](int block, int size) {
     if (size == 0 || column(block) >= 0) return;
     columns_[static_cast<std::size_t>(block)] = static_cast<int>(groups_.size());
-    groups_.resize(groups_.size() + static_cast<std::size_t>(size),
-                   blocks[static_cast<std::size_t>(block)].group);
+    groups_.resize(groups_.size() + static_cast<std::size_t>(size), graph_.block(block).group);
   };
-  for (const int block : {JointProblem::kRotation, JointProblem::kTranslation})
-    add(block, blocks[static_cast<std::size_t>(block)].tangent_size());
-  num_estimated_ = static_cast<int>(groups_.size());
-  const CameraSigma& sigma = problem_.camera_sigma();
-  if (sigma.log_focal > 0.0 || sigma.log_aspect > 0.0 || sigma.principal_point_px > 0.0 ||
-      sigma.k1 > 0.0) {
-    const Block& camera = blocks[JointProblem::kCamera];
-    add(JointProblem::kCamera,
-        camera.manifold != nullptr ? camera.manifold->TangentSize() : camera.size);
-  }
+  for (const int block : options_.core) add(block, graph_.block(block).tangent_size());
   core_size_ = static_cast<int>(groups_.size());
-  if (problem_.camera_is_estimated()) num_estimated_ = core_size_;
-  for (const Term& term : problem_.terms()) {
-    if (!problem_.IsActive(term, state_)) continue;
-    for (const int block : term.blocks)
-      add(block, blocks[static_cast<std::size_t>(block)].tangent_size());
+  for (const Term* term : terms) {
+    for (const int block : term->blocks) add(block, graph_.block(block).tangent_size());
   }
+  num_unknowns_ = static_cast<int>(groups_.size());
+  if (options_.considered >= 0)
+    add(options_.considered, static_cast<int>(PlusJacobian(options_.considered).cols()));
+}
+
+std::vector<int> Linearization::Columns(int block) const {
+  if (column(block) < 0) return {};
+  std::vector<int> columns(static_cast<std::size_t>(graph_.block(block).tangent_size()));
+  std::iota(columns.begin(), columns.end(), column(block));
+  return columns;
 }
 
 const Eigen::MatrixXd& Linearization::PlusJacobian(int index) {
   Eigen::MatrixXd& plus = plus_[static_cast<std::size_t>(index)];
-  const Block& block = problem_.block(index);
-  if (plus.size() == 0) plus = block.PlusJacobian(state_.x.data() + block.offset);
+  const Block& block = graph_.block(index);
+  if (plus.size() == 0) plus = block.PlusJacobian(x_ + block.offset);
   return plus;
 }
 
@@ -64,14 +83,14 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
   constexpr std::size_t kMaxBlocks = 8;
   const double* parameters[kMaxBlocks];
   double* jacobians[kMaxBlocks];
-  problem_.Parameters(term, state_, parameters);
+  graph_.Parameters(term, x_, parameters);
   const int num_rows = term.cost->num_residuals();
-  Rows rows{term.feature, {}, {}, Eigen::VectorXd(num_rows)};
+  Rows rows{term.feature, term.group, {}, {}, Eigen::VectorXd(num_rows)};
   constexpr std::size_t kMostColumns = 20;  // Of nearly all.
   rows.columns.reserve(kMostColumns);
   std::size_t ambient_size = 0;
   for (const int index : term.blocks)
-    ambient_size += static_cast<std::size_t>(problem_.block(index).size);
+    ambient_size += static_cast<std::size_t>(graph_.block(index).size);
   ambient_.resize(ambient_size * static_cast<std::size_t>(num_rows));
   double* next = ambient_.data();
   for (std::size_t k = 0; k < term.blocks.size(); ++k) {
@@ -79,7 +98,7 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
     jacobians[k] = nullptr;
     if (column(block) < 0) continue;
     jacobians[k] = next;
-    next += num_rows * problem_.block(block).size;
+    next += num_rows * graph_.block(block).size;
     const auto size = static_cast<int>(PlusJacobian(block).cols());
     for (int c = 0; c < size; ++c) rows.columns.push_back(column(block) + c);
   }
@@ -98,9 +117,6 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
     first += plus.cols();
   }
   if (term.loss != nullptr && weighing.inliers_only) TakeLoss(term, rows.f.squaredNorm(), &rows);
-  if (term.group < 0) together_.emplace_back();
-  (term.group < 0 ? together_.back() : together_[static_cast<std::size_t>(term.group)])
-      .push_back(rows_.size());
   rows_.push_back(std::move(rows));
   return true;
 }
@@ -118,7 +134,7 @@ void Linearization::TakeLoss(const Term& term, double twice_cost, Rows* rows) {
     if (term.lean_shape) {
       // J^T J is the plus Jacobian's P^T P over the variance of a direction's two components.
       const Eigen::MatrixXd& P = PlusJacobian(term.blocks.front());
-      over.F = problem_.PoseAt(state_).rotation * P;
+      over.F = RotationFromBlock(x_ + graph_.block(options_.core.front()).offset) * P;
       information = rows->J.squaredNorm() / P.squaredNorm();
       C = *term.lean_shape;
     }
@@ -157,8 +173,12 @@ Linearization::Rows Linearization::Together(const std::vector<std::size_t>& part
 }
 
 double Linearization::OwnVariance(int block, int coordinate) const {
-  const int group = problem_.block(block).group;
-  const Rows all = Together(together_[static_cast<std::size_t>(group)]);
+  const int group = graph_.block(block).group;
+  std::vector<std::size_t> parts;
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    if (rows_[i].group == group) parts.push_back(i);
+  }
+  const Rows all = Together(parts);
   std::vector<Eigen::Index> own;
   Eigen::Index at = -1;
   for (std::size_t c = 0; c < all.columns.size(); ++c) {

@@ -1,9 +1,9 @@
-// The joint problem at a place as one linear system: covariance, volumes, and how far each feature
-// contradicts the others. From the Jacobians of the same cost functions that ceres solves for.
-// Internal: not installed.
+// A graph at a place as one linear system: covariances, and how far each feature contradicts the
+// others. From the Jacobians of the same cost functions that ceres solves for. Internal: not
+// installed.
 //
-// The pose and the camera, the core, meet everything and are few: dense. All other unknowns meet
-// few others: sparse, and eliminated first, so that the time is linear in their number.
+// Sparse, and of the inverse only what the factor has a place for: the time is linear in the number
+// of features.
 #ifndef CIRCLINE_REFINE_LINEARIZATION_H_
 #define CIRCLINE_REFINE_LINEARIZATION_H_
 
@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "circline/refine/graph.h"
 #include "circline/refine/inverse_on_pattern.h"
 #include "circline/refine/joint_problem.h"
 
@@ -19,23 +20,38 @@ namespace circline {
 
 class Linearization {
  public:
-  // The active terms at `state`. Not ok() where some cannot be evaluated.
+  struct Options {
+    // Blocks among which some direction may have no information; a rotation first. Few, and dense.
+    std::vector<int> core;
+    // A block that is held, but whose error counts ("consider" covariance), -1: none. And the
+    // standard deviations of its numbers.
+    int considered = -1;
+    std::vector<double> considered_sigmas;
+    // Information that is added to every unknown, of what it has and in itself.
+    double floor = 0.0;
+  };
+  // Terms of a graph at x. Not ok() where some cannot be evaluated.
+  Linearization(const Graph& graph, const std::vector<const Term*>& terms, const double* x,
+                const Weighing& weighing, Options options);
+  // The active terms of one photo; pose and camera are the core, a camera that is not estimated is
+  // considered.
   Linearization(const JointProblem& problem, const State& state, const Weighing& weighing);
   bool ok() const { return ok_; }
 
-  // First column of a block in tangent space; -1 for constants and for what no active term has. The
-  // core's come first, and last of them the camera's, whether it is estimated or not.
+  // First column of a block in tangent space; -1 for constants and for what no term has. The core's
+  // come first.
   int column(int block) const { return columns_[static_cast<std::size_t>(block)]; }
+  std::vector<int> Columns(int block) const;  // All of them; empty where column() is -1.
   int core_size() const { return core_size_; }
 
-  // Covariance, pseudo-inverse on the observed subspace of the core. A camera that is not estimated
-  // is counted by its prior: Sigma_x + S Sigma_camera S^T, S how the others follow it ("consider"
-  // covariance). Also fills null_space(), of the core. False where the other unknowns carry no
-  // information.
+  // The inverse of the information, pseudo-inverse on the observed subspace of the core; then
+  // + X S X^T of what is considered, X how the unknowns follow it, and of priors that a loss counts
+  // for more than they say. Also fills null_space(), of the core. False where the other unknowns
+  // carry no information.
   bool ComputeCovariance();
   const Eigen::MatrixXd& covariance() const { return covariance_; }  // Of the core.
   const Eigen::MatrixXd& null_space() const { return null_space_; }
-  // Of unknowns of the core and of such as share a residual, n x n for n columns.
+  // Of unknowns that share a residual, n x n for n columns.
   Eigen::MatrixXd Covariance(const std::vector<int>& columns) const;
 
   // By feature: d^2 = 2 (C(all) - C(without it) - C(its own free fit)), to second order, and its
@@ -44,14 +60,14 @@ class Linearization {
     double d2 = 0.0;
     int dof = 1;
   };
-  std::vector<Misfit> Misfits() const;
+  std::vector<Misfit> Misfits(const std::vector<Feature>& features) const;
   // Variance of one coordinate of a block that a feature has of its own, all shared unknowns held.
   double OwnVariance(int block, int coordinate) const;
 
  private:
-  // Residuals of one or several features or priors, by the columns that they have.
+  // Residuals of one or several terms, by the columns that they have.
   struct Rows {
-    int feature = -1;
+    int feature = -1, group = -1;
     std::vector<int> columns;
     Eigen::MatrixXd J;
     Eigen::VectorXd f;
@@ -61,32 +77,35 @@ class Linearization {
     std::vector<int> columns;  // Of F.
     Eigen::MatrixXd F, S;
   };
+  // X S X^T, a part of the covariance.
+  struct Part {
+    Eigen::MatrixXd X, S;
+  };
 
-  void LayOut();
+  void LayOut(const std::vector<const Term*>& terms);
   bool AddTerm(const Term& term, const Weighing& weighing);
   void TakeLoss(const Term& term, double twice_cost, Rows* rows);
   const Eigen::MatrixXd& PlusJacobian(int block);  // Of the block's manifold, worked out once.
   Rows Together(const std::vector<std::size_t>& parts) const;
-  Eigen::MatrixXd EliminateOthers();
-  void AddOvercounted(const Eigen::MatrixXd& inverse);
-  Misfit MisfitOf(std::size_t feature, const std::vector<std::size_t>& parts) const;
+  InverseOnPattern::Sparse Information(Eigen::MatrixXd* with_considered) const;
+  bool Invert(InverseOnPattern::Sparse information);
+  void AddConsidered(const Eigen::MatrixXd& with_considered);
+  Misfit MisfitOf(const std::vector<Feature>& features, std::size_t feature,
+                  const std::vector<std::size_t>& parts) const;
 
-  const JointProblem& problem_;
-  const State& state_;
+  const Graph& graph_;
+  const double* x_;
+  const Options options_;
   bool ok_ = true;
-  std::vector<int> columns_;  // By block.
-  std::vector<int> groups_;   // By column: Block::group.
-  int core_size_ = 0,
-      num_estimated_ = 0;  // Columns of the core, and those without a camera's prior.
+  std::vector<int> columns_;              // By block.
+  std::vector<int> groups_;               // By column: Block::group.
+  int core_size_ = 0, num_unknowns_ = 0;  // Columns; those of what is considered come last.
   std::vector<Rows> rows_;
-  std::vector<std::vector<std::size_t>> together_;  // Of rows_: by group, then one prior each.
   std::vector<Overcounted> overcounted_;
   std::vector<Eigen::MatrixXd> plus_;  // By block.
   std::vector<double> ambient_;        // Jacobians of one term, as its cost function writes them.
-  // The others x follow the core y: x = -gain y + n. Covariances of n, and between n and the core.
-  std::optional<InverseOnPattern> others_;
-  Eigen::MatrixXd gain_, with_core_;
-  Eigen::VectorXd diagonal_;  // Of the core's information, if all others were known.
+  std::optional<InverseOnPattern> inverse_;
+  std::vector<Part> parts_;
   Eigen::MatrixXd covariance_, null_space_;
 };
 

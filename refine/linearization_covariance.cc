@@ -1,167 +1,140 @@
-// Covariance from the assembled system: elimination of all but the core, and the way back; and how
-// far each feature contradicts the others.
+// The inverse of the assembled system, and how far each feature contradicts the others.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "circline/refine/linearization.h"
 
 namespace circline {
 namespace {
 
-constexpr double kNoInformation = 1e-12;  // Of an eigenvalue, at unit diagonal.
+using Sparse = InverseOnPattern::Sparse;
 
-// Pseudo-inverse on the observed subspace, which units do not matter to, and the directions without
-// information. `diagonal`: what the information would be if all else were known.
-bool PseudoInverse(const Eigen::MatrixXd& A, const Eigen::VectorXd& diagonal,
-                   Eigen::MatrixXd* inverse, Eigen::MatrixXd* nulls) {
-  const Eigen::VectorXd scale =
-      diagonal.unaryExpr([](double d) { return d > 0.0 ? 1.0 / std::sqrt(d) : 1.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * A *
-                                                             scale.asDiagonal());
-  if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) return false;
-  const Eigen::Index n = A.rows();
-  Eigen::Index k = 0;
-  while (k < n && eigen.eigenvalues()[k] <= kNoInformation) ++k;
-  const Eigen::MatrixXd vectors = scale.asDiagonal() * eigen.eigenvectors();
-  const auto known = eigen.eigenvalues().tail(n - k);
-  *inverse = vectors.rightCols(n - k) * known.cwiseInverse().asDiagonal() *
-             vectors.rightCols(n - k).transpose();
-  *nulls = vectors.leftCols(k).colwise().normalized();
-  return true;
-}
+constexpr double kNoInformation = 1e-12;  // Of an eigenvalue, at unit diagonal.
 
 }  // namespace
 
-// The information of the core, all others unknown; empty where these carry none.
-Eigen::MatrixXd Linearization::EliminateOthers() {
-  const int core = core_size(), others = static_cast<int>(groups_.size()) - core;
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(core, core),
-                  across = Eigen::MatrixXd::Zero(others, core);
+Sparse Linearization::Information(Eigen::MatrixXd* with_considered) const {
+  const int n = num_unknowns_;
+  with_considered->setZero(n, static_cast<Eigen::Index>(groups_.size()) - n);
   std::vector<Eigen::Triplet<double>> entries;
-  for (const std::vector<std::size_t>& parts : together_) {
-    const Rows rows = Together(parts);
+  for (int i = 0; i < core_size_; ++i) {
+    for (int j = 0; j < core_size_; ++j) entries.emplace_back(i, j, 0.0);  // All have a place.
+  }
+  for (const Rows& rows : rows_) {
     const Eigen::MatrixXd H = rows.J.transpose() * rows.J;
     for (Eigen::Index a = 0; a < H.rows(); ++a) {
       const int i = rows.columns[static_cast<std::size_t>(a)];
-      for (Eigen::Index b = 0; b < H.cols(); ++b) {
+      for (Eigen::Index b = 0; i < n && b < H.cols(); ++b) {
         const int j = rows.columns[static_cast<std::size_t>(b)];
-        if (j >= core) {
-          if (i >= core) entries.emplace_back(i - core, j - core, H(a, b));
-        } else if (i >= core) {
-          across(i - core, j) += H(a, b);
+        if (j < n) {
+          entries.emplace_back(i, j, H(a, b));
         } else {
-          information(i, j) += H(a, b);
+          (*with_considered)(i, j - n) += H(a, b);
         }
       }
     }
   }
-  diagonal_ = information.diagonal();
-  if (others == 0) return information;
-  InverseOnPattern::Sparse own(others, others);
-  own.setFromTriplets(entries.begin(), entries.end());
-  others_.emplace(own);
-  if (!others_->ok()) return {};
-  gain_ = others_->Times(across);
-  information -= across.transpose() * gain_;
+  Sparse information(n, n);
+  information.setFromTriplets(entries.begin(), entries.end());
   return information;
 }
 
-// A^-1 F^T S F A^-1, A^-1 of the core `inverse`, and what it comes to in the others that F has.
-// What is left of F where the others follow the core can be little: it is worked out before it is
-// squared.
-void Linearization::AddOvercounted(const Eigen::MatrixXd& inverse) {
-  const int core = core_size(), e = num_estimated_;
-  for (const Overcounted& over : overcounted_) {
-    std::vector<int> own;  // Of the others.
-    std::vector<Eigen::Index> at;
-    Eigen::MatrixXd along = Eigen::MatrixXd::Zero(over.F.rows(), core);
-    for (Eigen::Index k = 0; k < over.F.cols(); ++k) {
-      const int column = over.columns[static_cast<std::size_t>(k)];
-      if (column < core) {
-        along.col(column) += over.F.col(k);
-        continue;
-      }
-      along -= over.F.col(k) * gain_.row(column - core);
-      own.push_back(column - core);
-      at.push_back(k);
-    }
-    const Eigen::MatrixXd G = along.leftCols(e) * inverse;
-    covariance_.topLeftCorner(e, e) += G.transpose() * over.S * G;
-    const auto n = static_cast<Eigen::Index>(own.size());
-    if (n == 0) continue;
-    const Eigen::MatrixXd of_own = over.F(Eigen::all, at) * (*others_)(own);
-    const Eigen::MatrixXd with_core = of_own.transpose() * over.S * G,
-                          more = of_own.transpose() * over.S * of_own;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const int row = own[static_cast<std::size_t>(i)];
-      with_core_.row(row).head(e) += with_core.row(i);
-      for (Eigen::Index j = 0; j <= i; ++j)
-        others_->Add(row, own[static_cast<std::size_t>(j)], more(i, j));
-    }
+// Directions of the core without information, at unit diagonal, are found by the variance that they
+// have where it is given next to none; with some, v v^T is what the inverse has too much.
+bool Linearization::Invert(Sparse information) {
+  const Eigen::Index n = core_size_;
+  const Eigen::VectorXd scale = information.diagonal().head(n).unaryExpr(
+      [](double d) { return d > 0.0 ? 1.0 / std::sqrt(d) : 1.0; });
+  Sparse raised = information;
+  for (Eigen::Index k = 0; k < n; ++k)
+    raised.coeffRef(k, k) += kNoInformation / (scale[k] * scale[k]);
+  inverse_.emplace(raised);
+  null_space_.resize(n, 0);
+  if (!inverse_->ok() || n == 0) return inverse_->ok();
+  std::vector<int> core(static_cast<std::size_t>(n));
+  std::iota(core.begin(), core.end(), 0);
+  const Eigen::VectorXd unscale = scale.cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      unscale.asDiagonal() * (*inverse_)(core)*unscale.asDiagonal());
+  if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) return false;
+  const auto nulls = (eigen.eigenvalues().array() >= 0.5 / kNoInformation).count();
+  if (nulls == 0) return true;
+  const Eigen::MatrixXd directions = eigen.eigenvectors().rightCols(nulls);
+  null_space_ = (scale.asDiagonal() * directions).colwise().normalized();
+  Eigen::MatrixXd known = Eigen::MatrixXd::Zero(num_unknowns_, nulls);
+  known.topRows(n) = unscale.asDiagonal() * directions;
+  const Eigen::MatrixXd more = known.topRows(n) * known.topRows(n).transpose();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) information.coeffRef(i, j) += more(i, j);
   }
+  inverse_.emplace(information);
+  if (!inverse_->ok()) return false;
+  parts_.push_back({inverse_->Times(known), -Eigen::MatrixXd::Identity(nulls, nulls)});
+  return true;
+}
+
+// X follows what is considered; that itself has its prior.
+void Linearization::AddConsidered(const Eigen::MatrixXd& with_considered) {
+  const Eigen::Index c = with_considered.cols();
+  if (c == 0) return;
+  const Eigen::MatrixXd& P = PlusJacobian(options_.considered);
+  Eigen::VectorXd variances = Eigen::VectorXd::Zero(P.rows());
+  for (std::size_t k = 0; k < options_.considered_sigmas.size(); ++k)
+    variances[static_cast<Eigen::Index>(k)] = std::pow(options_.considered_sigmas[k], 2.0);
+  Part part{Eigen::MatrixXd(num_unknowns_ + c, c), P.transpose() * variances.asDiagonal() * P};
+  part.X.topRows(num_unknowns_) = -inverse_->Times(with_considered);
+  part.X.bottomRows(c).setIdentity();
+  parts_.push_back(std::move(part));
 }
 
 bool Linearization::ComputeCovariance() {
-  if (!ok_) return false;
-  const Eigen::MatrixXd information = EliminateOthers();
-  const int n = core_size(), e = num_estimated_, c = n - e;
-  Eigen::MatrixXd inverse;
-  if (information.rows() != n ||
-      !PseudoInverse(information.topLeftCorner(e, e), diagonal_.head(e), &inverse, &null_space_))
-    return false;
-  covariance_.setZero(n, n);
-  covariance_.topLeftCorner(e, e) = inverse;
-  with_core_.setZero(gain_.rows(), n);
-  AddOvercounted(inverse);
-  if (c > 0) {
-    const CameraSigma& sigma = problem_.camera_sigma();
-    Eigen::VectorXd ambient = Eigen::VectorXd::Zero(kCameraSize);
-    ambient << sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
-        sigma.principal_point_px, sigma.k1, Eigen::VectorXd::Zero(kCameraSize - 5);
-    const Eigen::MatrixXd P = PlusJacobian(JointProblem::kCamera);
-    const Eigen::MatrixXd prior =
-        P.transpose() * ambient.cwiseAbs2().asDiagonal() * P;  // P selects.
-    const Eigen::MatrixXd follow = -inverse * information.topRightCorner(e, c);
-    covariance_.topLeftCorner(e, e) += follow * prior * follow.transpose();
-    covariance_.topRightCorner(e, c) = follow * prior;
-    covariance_.bottomLeftCorner(c, e) = covariance_.topRightCorner(e, c).transpose();
-    covariance_.bottomRightCorner(c, c) = prior;
+  if (!ok_ || num_unknowns_ == 0) return false;
+  Eigen::MatrixXd with_considered;
+  Sparse information = Information(&with_considered);
+  for (int k = 0; k < num_unknowns_ && options_.floor > 0.0; ++k)
+    information.coeffRef(k, k) = information.coeff(k, k) * (1.0 + options_.floor) + options_.floor;
+  parts_.clear();
+  if (!Invert(std::move(information))) return false;
+  AddConsidered(with_considered);
+  for (const Overcounted& over : overcounted_) {
+    Eigen::MatrixXd F = Eigen::MatrixXd::Zero(num_unknowns_, over.F.rows());
+    for (Eigen::Index k = 0; k < over.F.cols(); ++k)
+      F.row(over.columns[static_cast<std::size_t>(k)]) += over.F.col(k).transpose();
+    parts_.push_back({inverse_->Times(F), over.S});
   }
+  std::vector<int> core(static_cast<std::size_t>(core_size_));
+  std::iota(core.begin(), core.end(), 0);
+  covariance_ = Covariance(core);
   return covariance_.allFinite();
 }
 
 Eigen::MatrixXd Linearization::Covariance(const std::vector<int>& columns) const {
   const auto n = static_cast<Eigen::Index>(columns.size());
-  const int core = core_size();
-  Eigen::MatrixXd by_core = Eigen::MatrixXd::Zero(n, core), with_core = by_core;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const int column = columns[static_cast<std::size_t>(i)];
-    if (column < core) {
-      by_core(i, column) = 1.0;
-    } else {
-      by_core.row(i) = -gain_.row(column - core);
-      with_core.row(i) = with_core_.row(column - core);
-    }
-  }
-  const Eigen::MatrixXd across = with_core * by_core.transpose();
   Eigen::MatrixXd covariance =
-      by_core * covariance_ * by_core.transpose() + across + across.transpose();
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const int a = columns[static_cast<std::size_t>(i)] - core;
-    for (Eigen::Index j = 0; a >= 0 && j < n; ++j) {
-      const int b = columns[static_cast<std::size_t>(j)] - core;
-      if (b >= 0) covariance(i, j) += (*others_)(a, b);
+      Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index i, Eigen::Index j) {
+        const int a = columns[static_cast<std::size_t>(i)],
+                  b = columns[static_cast<std::size_t>(j)];
+        return std::max(a, b) < num_unknowns_ ? (*inverse_)(a, b) : 0.0;
+      });
+  for (const Part& part : parts_) {
+    Eigen::MatrixXd X = Eigen::MatrixXd::Zero(n, part.X.cols());
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const int a = columns[static_cast<std::size_t>(i)];
+      if (a < part.X.rows()) X.row(i) = part.X.row(a);
     }
+    covariance += X * part.S * X.transpose();
   }
   return covariance;
 }
 
 // With the leverage S = J Sigma J^T of the feature's residuals f, the others would cost 1/2 f^T S
 // (I - S)^-1 f less without it. Where S is 1 the feature alone fixes an unknown: no test there.
-Linearization::Misfit Linearization::MisfitOf(std::size_t feature,
+Linearization::Misfit Linearization::MisfitOf(const std::vector<Feature>& features,
+                                              std::size_t feature,
                                               const std::vector<std::size_t>& parts) const {
-  const std::vector<Feature>& features = problem_.features();
   Misfit misfit{-features[feature].free_twice_cost, features[feature].dof};
   for (const std::size_t part : parts) {
     misfit.d2 += rows_[part].f.squaredNorm();
@@ -184,8 +157,8 @@ Linearization::Misfit Linearization::MisfitOf(std::size_t feature,
 }
 
 // What says nothing without a feature is a part of it.
-std::vector<Linearization::Misfit> Linearization::Misfits() const {
-  const std::vector<Feature>& features = problem_.features();
+std::vector<Linearization::Misfit> Linearization::Misfits(
+    const std::vector<Feature>& features) const {
   std::vector<Misfit> misfits(features.size());
   std::vector<std::vector<std::size_t>> parts(features.size());
   for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -196,7 +169,7 @@ std::vector<Linearization::Misfit> Linearization::Misfits() const {
       parts[static_cast<std::size_t>(features[feature].parent)].push_back(i);
   }
   for (std::size_t i = 0; i < features.size(); ++i) {
-    if (state_.active[i] != 0 && !parts[i].empty()) misfits[i] = MisfitOf(i, parts[i]);
+    if (!parts[i].empty()) misfits[i] = MisfitOf(features, i, parts[i]);
   }
   return misfits;
 }

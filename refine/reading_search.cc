@@ -224,7 +224,7 @@ class ReadingSearch {
     if (TotalMisfit(minimum) > ChiSquareLimit(1, FalseAlarms(minimum))) {
       Linearization at(problem_, minimum, Weighing());
       if (at.ok() && at.ComputeCovariance())
-        AddWithout(minimum, at.Misfits(), FalseAlarms(minimum), &rivals);
+        AddWithout(minimum, at.Misfits(problem_.features()), FalseAlarms(minimum), &rivals);
     }
     return rivals;
   }

@@ -1,0 +1,108 @@
+#include "circline/refine/graph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
+#include "circline/refine/block_chain.h"
+
+namespace circline {
+
+BlockMatrix PlusJacobianOf(const ceres::Manifold& manifold, const double* at) {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kCameraSize, kCameraSize>
+      J(manifold.AmbientSize(), manifold.TangentSize());
+  manifold.PlusJacobian(at, J.data());
+  return J;
+}
+
+int Graph::AddBlock(int size, const std::vector<double>& value,
+                    std::unique_ptr<ceres::Manifold> manifold, bool is_constant, int group) {
+  blocks_.push_back({static_cast<int>(values_.size()), size, nullptr, is_constant, group});
+  values_.insert(values_.end(), value.begin(), value.end());
+  values_.resize(static_cast<std::size_t>(blocks_.back().offset + size), 0.0);
+  const int index = static_cast<int>(blocks_.size()) - 1;
+  SetManifold(index, std::move(manifold));
+  return index;
+}
+
+void Graph::SetManifold(int index, std::unique_ptr<ceres::Manifold> manifold) {
+  block(index).manifold = manifold.get();
+  if (manifold != nullptr) manifolds_.push_back(std::move(manifold));
+}
+
+int Graph::AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature, int group,
+                   std::unique_ptr<ceres::LossFunction> loss) {
+  terms_.push_back({std::unique_ptr<ceres::CostFunction>(owned), std::move(blocks), feature, group,
+                    nullptr, std::move(loss)});
+  return static_cast<int>(terms_.size()) - 1;
+}
+
+int Graph::AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature,
+                          int group) {
+  FeatureCost* weighed = cost.get();
+  const int index = AddTerm(cost.release(), std::move(blocks), feature, group);
+  term(index).weighed = weighed;
+  return index;
+}
+
+void Graph::Parameters(const Term& term, const double* x, const double** out) const {
+  for (std::size_t k = 0; k < term.blocks.size(); ++k) out[k] = x + block(term.blocks[k]).offset;
+}
+
+double Graph::TwiceCost(const Term& term, const double* x, const Weighing& weighing) const {
+  const double* parameters[8];
+  Parameters(term, x, parameters);
+  double rho[3] = {TwiceCostOf(*term.cost, term.weighed, weighing, parameters), 0.0, 0.0};
+  if (term.loss != nullptr && std::isfinite(rho[0])) term.loss->Evaluate(rho[0], rho);
+  return rho[0];
+}
+
+double Graph::LargestMiss(const std::vector<const Term*>& terms, const double* x) const {
+  double most = 0.0;
+  const double* parameters[8];
+  for (const Term* term : terms) {
+    if (term->weighed == nullptr) continue;
+    Parameters(*term, x, parameters);
+    const double square = MeanSquareOf(*term->weighed, parameters);
+    if (std::isfinite(square)) most = std::max(most, square);
+  }
+  return std::sqrt(most);
+}
+
+void Graph::SetWeighing(const Weighing& weighing) const {
+  for (const Term& term : terms_) {
+    if (term.weighed != nullptr) term.weighed->set_weighing(weighing);
+  }
+}
+
+std::vector<int> Graph::BlocksOf(const std::vector<const Term*>& terms) const {
+  std::vector<int> blocks;
+  std::vector<std::uint8_t> is_known(blocks_.size(), 0);
+  for (const Term* term : terms) {
+    for (const int block : term->blocks) {
+      if (std::exchange(is_known[static_cast<std::size_t>(block)], 1) == 0) blocks.push_back(block);
+    }
+  }
+  return blocks;
+}
+
+int Graph::Fill(const std::vector<const Term*>& terms, double* x, ceres::Problem* problem) const {
+  int unknowns = 0;
+  for (const int index : BlocksOf(terms)) {
+    const Block& block = this->block(index);
+    problem->AddParameterBlock(x + block.offset, block.size,
+                               const_cast<ceres::Manifold*>(block.manifold));  // Not owned.
+    if (block.is_constant) problem->SetParameterBlockConstant(x + block.offset);
+    unknowns += block.tangent_size();
+  }
+  std::vector<double*> parameters;
+  for (const Term* term : terms) {
+    parameters.clear();
+    for (const int index : term->blocks) parameters.push_back(x + block(index).offset);
+    problem->AddResidualBlock(term->cost.get(), term->loss.get(), parameters);
+  }
+  return unknowns;
+}
+
+}  // namespace circline
