@@ -113,6 +113,7 @@ void JointProblemBuilder::AddCameraPrior(std::vector<double> sigmas) {
   const auto add = [this](const std::vector<double>& gaussian) {
     std::vector<double> mean(kCameraSize, 0.0);
     mean[0] = StatedLogFocal(obs_);
+    mean[4] = -obs_.found_k1;
     AddTerm(NewGaussianPrior(gaussian, mean), {JointProblem::kCamera});
   };
   const double narrow = sigmas[0], wide = p_.camera_sigma_.doubtful_log_focal;
