@@ -95,6 +95,12 @@ Status Judge(const Observations& observations, const DetectionOptions& options, 
   return Status::Ok();
 }
 
+// By how much of its distance to the middle such a k1 moves a corner of the photo.
+double BendAtCorner(double k1, const Camera& camera) {
+  const Vector2d corner(camera.width / camera.fx, camera.height / camera.fy);
+  return std::abs(k1) * (0.5 * corner).squaredNorm();
+}
+
 // Looks until the photo's lines are straight through the lens that is looked through: one that
 // bends breaks them, so each look finds longer ones. Where they do not clearly say so it is the one
 // that is known beforehand.
@@ -104,6 +110,8 @@ Status LookForLens(const EdgeMap& edges, const DetectionOptions& options, Camera
   // Logarithm of how much likelier it is: 20 to 1. Of 3, 6 and 10, on circles-discocal-tir, where
   // 10 leaves three of seven photos as they are, with dots and ChArUco boards beside it.
   constexpr double kClearly = 3.0;
+  // Less breaks no lines, and the estimate finds it.
+  constexpr double kMatters = 0.05;
   constexpr double kSameK1 = 0.01;
   Status status = CollectEvidence(edges, *camera, options, evidence);
   if (camera->model != CameraModel::kOpenCV || !options.noise_model.camera.IsLensOpen())
@@ -111,7 +119,10 @@ Status LookForLens(const EdgeMap& edges, const DetectionOptions& options, Camera
   const double stated_k1 = camera->distortion[0];
   for (int k = 1; k < kMostLooks && status.ok(); ++k) {
     const LikelyLens likeliest = LikeliestLens(*evidence, *camera, options.noise_model, stated_k1);
-    const double k1 = likeliest.gain > kClearly ? likeliest.k1 : stated_k1;
+    const double k1 =
+        likeliest.gain > kClearly && BendAtCorner(likeliest.k1 - stated_k1, *camera) > kMatters
+            ? likeliest.k1
+            : stated_k1;
     if (std::abs(k1 - camera->distortion[0]) < kSameK1) break;
     camera->distortion[0] = k1;
     *evidence = PhotoEvidence();
