@@ -106,7 +106,7 @@ double BendAtCorner(double k1, const Camera& camera) {
 // that is known beforehand.
 Status LookForLens(const EdgeMap& edges, const DetectionOptions& options, Camera* camera,
                    PhotoEvidence* evidence) {
-  constexpr int kMostLooks = 4;
+  constexpr int kMostLooks = 3;
   // Logarithm of how much likelier it is: 20 to 1. Of 3, 6 and 10, on circles-discocal-tir, where
   // 10 leaves three of seven photos as they are, with dots and ChArUco boards beside it.
   constexpr double kClearly = 3.0;
