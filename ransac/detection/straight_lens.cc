@@ -19,12 +19,12 @@ using Eigen::Vector3d;
 // Shorter lines say nothing of a lens and take time, pixels.
 constexpr double kMinLengthPx = 25.0;
 // A bow takes three points, and two more that say how well it is known.
-constexpr std::size_t kMinPoints = 5;
+constexpr std::size_t kMinPointsOfBow = 5;
 // Of lines that are straight. What is not straight has any bow up to this, pixels: that of
 // DetectLines' bent ones.
 constexpr double kStraightShare = 0.5, kMostBowPx = 1.2;
 // Of k1: over which bows are taken for linear, and in which it is compared.
-constexpr double kSlopeStep = 0.01, kStep = 0.004;
+constexpr double kSlopeStep = 0.01, kK1Step = 0.004;
 // The prior is searched over so many of its standard deviations.
 constexpr double kReachOfPrior = 3.0;
 
@@ -68,7 +68,7 @@ class Bows {
     std::vector<CalibratedPoint> points;
     for (const std::vector<DetectedLine>* lines : {&evidence.lines, &evidence.bent}) {
       for (const DetectedLine& line : *lines) {
-        if (line.length_px < kMinLengthPx || line.points.size() < kMinPoints) continue;
+        if (line.length_px < kMinLengthPx || line.points.size() < kMinPointsOfBow) continue;
         const std::optional<Bow> here = BowThrough(camera, line, &points),
                                  below = BowThrough(less, line, &points),
                                  above = BowThrough(more, line, &points);
@@ -116,9 +116,9 @@ LikelyLens LikeliestLens(const PhotoEvidence& evidence, const Camera& camera,
   };
   const double stated = evidence_at(stated_k1);
   LikelyLens likeliest{stated_k1, 0.0};
-  const int most = static_cast<int>(kReachOfPrior * sigma / kStep);
+  const int most = static_cast<int>(kReachOfPrior * sigma / kK1Step);
   for (int k = -most; k <= most; ++k) {
-    const double k1 = stated_k1 + k * kStep, gain = evidence_at(k1) - stated;
+    const double k1 = stated_k1 + k * kK1Step, gain = evidence_at(k1) - stated;
     if (gain > likeliest.gain) likeliest = {k1, gain};
   }
   return likeliest;
