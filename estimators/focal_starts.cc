@@ -82,7 +82,8 @@ std::vector<FocalStart> FocalLengthStarts(const Observations& observations, doub
   }
   std::vector<FocalStart> starts =
       FocalStartsOfFits(observations, default_sigma_px, noise, problems);
-  if (noise.camera.log_focal > 0.0 && IsDistorted(observations.camera)) {
+  const bool is_bent_by_guess = IsDistorted(observations.camera) && !noise.camera.IsLensOpen();
+  if (noise.camera.log_focal > 0.0 && is_bent_by_guess) {
     AddErrorOfGuess(observations, default_sigma_px, noise, &starts);
   }
   return Distinct(std::move(starts));

@@ -47,6 +47,9 @@ struct CameraSigma {
   bool IsEstimated() const { return LargestLogFocal() >= 0.01; }
   // So badly that right angles may look wrong: the focal length is searched for.
   bool IsWide() const { return LargestLogFocal() >= 0.1; }
+  // Nothing is known of the lens: how much it bends is looked for in the photo, whatever the focal
+  // length, and k1 is that of the photo, over the focal length's square.
+  bool IsLensOpen() const { return k1 >= 0.1; }
   // Ok, or a sentence that names the field that is negative or not finite.
   Status Validate() const;
 };

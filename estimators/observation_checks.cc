@@ -148,6 +148,7 @@ Status Observations::Validate() const {
   Status status = camera.Validate();
   if (status.ok() && !NonNegative(stated_focal_px))
     status = Status::Invalid("stated_focal_px must be 0 or more");
+  if (status.ok() && !std::isfinite(found_k1)) status = Status::Invalid("found_k1 must be finite");
   Ids circle_ids, pencil_ids;
   for (std::size_t i = 0; i < circles.size() && status.ok(); ++i) {
     status = ValidateCircle(circles[i]);

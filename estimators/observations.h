@@ -128,6 +128,9 @@ struct Observations {
   // The focal length that is known beforehand, of fx, pixels, where `camera` has another, at which
   // the photo's structure is likelier (DetectObservations); 0 = that of `camera`.
   double stated_focal_px = 0.0;
+  // What the k1 of `camera` has beyond the one known beforehand, where the photo's lines are
+  // straighter with it (DetectObservations); 0 = that is the one of `camera`.
+  double found_k1 = 0.0;
   std::vector<CircleObservation> circles;  // Images of circles.
   std::vector<PencilObservation> pencils;  // Images of parallel lines.
   FrameObservation frame;                  // Where the world frame is to lie.

@@ -85,6 +85,7 @@ void JointProblemBuilder::Build() {
 void JointProblemBuilder::AddCameraPrior(std::vector<double> sigmas) {
   std::vector<double> mean(kCameraSize, 0.0);
   mean[0] = StatedLogFocal(obs_);
+  mean[4] = -obs_.found_k1;
   const double narrow = sigmas[0], wide = p_.camera_sigma_.doubtful_log_focal;
   if (wide > narrow) {
     std::vector<double> focal(kCameraSize, 0.0);

@@ -257,7 +257,14 @@ Status JointProblem::Start(const CameraPose& given, double log_focal,
   seed.rotation = SenseOfPriors(given);
   state->x = values();
   state->active = reading;
-  if (camera_is_estimated_) state->x[static_cast<std::size_t>(block(kCamera).offset)] = log_focal;
+  if (camera_is_estimated_) {
+    double* shifts = At(kCamera, state);
+    shifts[0] = log_focal;
+    // What is straight stays so.
+    const Camera& camera = observations_.camera;
+    if (camera.model == CameraModel::kOpenCV && camera_sigma_.IsLensOpen())
+      shifts[4] = camera.distortion[0] * std::expm1(2.0 * log_focal);
+  }
   Eigen::Map<Eigen::Quaterniond>(At(kRotation, state)) =
       Eigen::Quaterniond(seed.rotation).normalized();
   Eigen::Map<Eigen::Vector3d>(At(kTranslation, state)) = seed.translation;

@@ -152,9 +152,9 @@ class MapBuilder {
 };
 
 // Pose, velocities and camera of a hypothesis, as a first frame's evidence finds them.
-// `log_focal`: the prior's mean, against the camera that the frame comes with.
+// `log_focal`, `k1`: the prior's mean, against the camera that the frame comes with.
 TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const TrackerOptions& options,
-                      const CameraSigma& sigma, double log_focal) {
+                      const CameraSigma& sigma, double log_focal, double k1) {
   TrackState state;
   const double distance = h.cam_from_world.translation.norm();
   const Eigen::Quaterniond q(h.cam_from_world.rotation);
@@ -178,7 +178,10 @@ TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const Tracke
     covariance = chart * camera.cwiseAbs2().asDiagonal() * chart.transpose();
   }
   Eigen::VectorXd mean = zeros;
-  if (block.tangent_size() > 0) mean[0] = log_focal;
+  if (block.tangent_size() > 0) {
+    mean[0] = log_focal;
+    mean[4] = k1;
+  }
   state.Append(map, TrackMap::kCamera, mean.data(), covariance);
   state.log_weight = std::log(std::max(h.probability, 1e-300));
   return state;
@@ -235,8 +238,9 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
   map->plane = resolved.frame.plane;
   states->Shorten(0);
   const double log_focal = sigma.log_focal > 0.0 ? StatedLogFocal(resolved) : 0.0;
+  const double k1 = sigma.k1 > 0.0 ? -resolved.found_k1 : 0.0;
   for (const PoseHypothesis& h : hypotheses)
-    states->Add().state = FirstState(*map, h, options, sigma, log_focal);
+    states->Add().state = FirstState(*map, h, options, sigma, log_focal, k1);
   MapBuilder builder(resolved, options, map, states);
   if (has_position) {
     const auto is_at_origin = [&](const CircleObservation& c) {

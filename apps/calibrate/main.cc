@@ -70,7 +70,7 @@ std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<Scen
     Camera& camera = runs[index].observations.camera;
     // Not the one that the photo alone makes likeliest: the prior is about the one given.
     camera = (*images)[index].observations.camera;
-    runs[index].observations.stated_focal_px = 0.0;
+    runs[index].observations.stated_focal_px = runs[index].observations.found_k1 = 0.0;
     if (camera.width == 0) camera.width = runs[index].photo.cols;
     if (camera.height == 0) camera.height = runs[index].photo.rows;
     runs[index].photo.release();

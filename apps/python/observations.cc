@@ -204,6 +204,7 @@ Observations ObservationsFromPython(const py::handle& object) {
   Observations observations;
   observations.camera = Get<Camera>(object, "camera");
   observations.stated_focal_px = Get<double>(object, "stated_focal_px");
+  observations.found_k1 = Get<double>(object, "found_k1");
   for (const py::handle circle : object.attr("circles"))
     observations.circles.push_back(CircleFromPython(circle));
   for (const py::handle pencil : object.attr("pencils"))
@@ -243,9 +244,10 @@ py::object ObservationsToPython(Observations&& observations) {
   }
   return Class("Observations")(
       "camera"_a = observations.camera, "stated_focal_px"_a = observations.stated_focal_px,
-      "circles"_a = circles, "pencils"_a = pencils, "frame"_a = FrameToPython(observations.frame),
-      "known_angles"_a = angles, "known_lengths"_a = lengths,
-      "num_dropped_points"_a = observations.num_dropped_points, "message"_a = observations.message);
+      "found_k1"_a = observations.found_k1, "circles"_a = circles, "pencils"_a = pencils,
+      "frame"_a = FrameToPython(observations.frame), "known_angles"_a = angles,
+      "known_lengths"_a = lengths, "num_dropped_points"_a = observations.num_dropped_points,
+      "message"_a = observations.message);
 }
 
 }  // namespace circline::python

@@ -16,6 +16,7 @@ bool Agreement(const CircleObservation& circle, const BoxFit& fit, const Observa
   Observations alone;
   alone.camera = observations.camera;
   alone.stated_focal_px = observations.stated_focal_px;
+  alone.found_k1 = observations.found_k1;
   alone.circles = {circle};
   const PoseEstimate estimate = EstimatePose(alone, options);
   double nearest = -1.0;

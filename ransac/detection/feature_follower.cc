@@ -90,9 +90,11 @@ Status FeatureFollower::Cold(const cv::Mat& image, Observations* found, Observat
   if (!is_settled_ && CountFeatures(*found) > 0) {
     camera_ = found->camera;
     stated_focal_px_ = found->stated_focal_px;
+    found_k1_ = found->found_k1;
     is_settled_ = true;
   }
   found->stated_focal_px = stated_focal_px_;
+  found->found_k1 = found_k1_;
   const NextNames before = next_;
   const int kept = KeepNames(held_, SearchPx(), &next_, found);
   was_cold_ = true;

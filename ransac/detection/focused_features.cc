@@ -6,6 +6,7 @@
 
 #include "circline/estimators/conic.h"
 #include "circline/ransac/detection/detect_pencils.h"
+#include "circline/ransac/detection/straight_lens.h"
 
 namespace circline {
 namespace {
@@ -95,8 +96,8 @@ FeaturesByFocal::Points FeaturesByFocal::Some(const std::vector<Vector2d>& all, 
 
 FeaturesByFocal::FeaturesByFocal(const PhotoEvidence& evidence,
                                  const std::vector<DetectedPencil>& pencils, const Camera& camera,
-                                 double diagonal_px)
-    : camera_(camera) {
+                                 const CameraSigma& sigma, double diagonal_px)
+    : camera_(camera), sigma_(sigma) {
   AddCircles(evidence);
   AddPencils(pencils);
   if (IsEmpty() && !pencils.empty()) AddEdges(evidence, pencils[0], diagonal_px);
@@ -154,8 +155,7 @@ bool FeaturesByFocal::FitEdge(const Camera& camera, const Points& points, LineFi
 
 FocusedFeatures FeaturesByFocal::Fit(double log_focal) {
   Camera camera = camera_;
-  camera.fx *= std::exp(log_focal);
-  camera.fy *= std::exp(log_focal);
+  SetFocal(log_focal, sigma_, &camera);
   FocusedFeatures features;
   for (const Points& circle : circles_) {
     ConicFit fit;

@@ -32,7 +32,7 @@ class FeaturesByFocal {
   // The best circles, and the directions of the longest pencils. Where there is one pencil and
   // nothing else: the edges around it. `pencils` are those of DetectPencilsApart.
   FeaturesByFocal(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
-                  const Camera& camera, double diagonal_px);
+                  const Camera& camera, const CameraSigma& sigma, double diagonal_px);
 
   // Whether all focal lengths are alike to them.
   bool IsEmpty() const { return circles_.size() < 2 && pencils_.size() < 2 && edges_.size() < 2; }
@@ -58,6 +58,7 @@ class FeaturesByFocal {
   const FocusedFeatures& Node(int node);
 
   const Camera& camera_;
+  const CameraSigma& sigma_;
   std::vector<Points> circles_, edges_;
   std::vector<std::vector<Points>> pencils_;  // Of each its lines.
   std::map<int, FocusedFeatures> nodes_;      // Fitted so far.

@@ -185,6 +185,7 @@ Status FollowObservations(const cv::Mat& image, const Observations& predicted, d
   *found = Observations();
   found->camera = predicted.camera;
   found->stated_focal_px = predicted.stated_focal_px;
+  found->found_k1 = predicted.found_k1;
   cv::Mat gray;
   Status status = CheckDetectionInput(image, predicted.camera, options);
   if (status.ok()) status = ToGray(image, &gray);

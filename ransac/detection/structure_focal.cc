@@ -8,6 +8,7 @@
 
 #include "circline/ransac/detection/focused_features.h"
 #include "circline/ransac/detection/orthogonal_evidence.h"
+#include "circline/ransac/detection/straight_lens.h"
 #include "circline/ransac/detection/uncertain_direction.h"
 
 namespace circline {
@@ -32,8 +33,8 @@ constexpr double kSeedSigmaDeg = 5.0;
 class StructureEvidence {
  public:
   StructureEvidence(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
-                    const Camera& camera, double diagonal_px)
-      : features_(evidence, pencils, camera, diagonal_px) {
+                    const Camera& camera, const CameraSigma& sigma, double diagonal_px)
+      : features_(evidence, pencils, camera, sigma, diagonal_px) {
     for (const CircleEvidence& circle : evidence.circles) {
       const UncertainDirection& normal = circle.normals[0];
       // The plane is known as well as the circle's own normal.
@@ -130,12 +131,21 @@ double LogPrior(double off, const CameraSigma& sigma) {
                   kDoubtfulShare * gaussian(sigma.doubtful_log_focal));
 }
 
+double LogPriorOfLens(double log_focal, Camera camera, const CameraSigma& sigma, double found_k1) {
+  if (!sigma.IsLensOpen()) return 0.0;
+  const double stated = camera.distortion[0] - found_k1;
+  SetFocal(log_focal, sigma, &camera);
+  const double off = (camera.distortion[0] - stated) / sigma.k1;
+  return -0.5 * off * off;
+}
+
 }  // namespace
 
 LikelyFocal LikeliestFocal(const PhotoEvidence& evidence,
                            const std::vector<DetectedPencil>& pencils, const Camera& camera,
-                           const CameraSigma& sigma, double prior_log_focal, double diagonal_px) {
-  StructureEvidence structure(evidence, pencils, camera, diagonal_px);
+                           const CameraSigma& sigma, double prior_log_focal, double diagonal_px,
+                           double found_k1) {
+  StructureEvidence structure(evidence, pencils, camera, sigma, diagonal_px);
   if (structure.IsEmpty()) {
     const bool is_there = std::abs(prior_log_focal) <= 0.5 * kFocalStep;
     return {prior_log_focal, is_there ? 0.0 : std::numeric_limits<double>::infinity()};
@@ -149,7 +159,8 @@ LikelyFocal LikeliestFocal(const PhotoEvidence& evidence,
     high = std::min(high, std::log(half / kNarrowest));
   }
   const auto evidence_at = [&](double log_focal) {
-    return structure.At(log_focal) + LogPrior(log_focal - prior_log_focal, sigma);
+    return structure.At(log_focal) + LogPrior(log_focal - prior_log_focal, sigma) +
+           LogPriorOfLens(log_focal, camera, sigma, found_k1);
   };
   const double here = evidence_at(0.0);
   LikelyFocal likeliest;

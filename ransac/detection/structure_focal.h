@@ -29,12 +29,13 @@ struct LikelyFocal {
 };
 
 // The likeliest focal length. `evidence` was calibrated with that of `camera`; the prior is about
-// one that is `prior_log_focal` off. `pencils` are those of DetectPencilsApart. Where the photo has
-// no structure it is the prior's, without a limit to the gain. 10 ms for 12 circles.
+// one that is `prior_log_focal` off, and a k1 that the camera's is `found_k1` beyond. `pencils` are
+// those of DetectPencilsApart. Where the photo has no structure it is the prior's, without a limit
+// to the gain. 10 ms for 12 circles.
 LikelyFocal LikeliestFocal(const PhotoEvidence& evidence,
                            const std::vector<DetectedPencil>& pencils, const Camera& camera,
                            const CameraSigma& sigma, double prior_log_focal,
-                           double diagonal_px = kUsualDiagonalPx);
+                           double diagonal_px = kUsualDiagonalPx, double found_k1 = 0.0);
 
 }  // namespace circline
 

@@ -136,6 +136,8 @@ class Observations:
     camera: Camera = field(default_factory=Camera)
     stated_focal_px: float = 0.0
     """The focal length known beforehand, where `camera` has a likelier one; 0: that of `camera`."""
+    found_k1: float = 0.0
+    """What the k1 of `camera` has beyond the one known beforehand."""
     circles: List[CircleObservation] = field(default_factory=list)
     pencils: List[PencilObservation] = field(default_factory=list)
     frame: FrameObservation = field(default_factory=FrameObservation)
