@@ -11,8 +11,8 @@
 #include "circline/ransac/detection/edge_shift.h"
 #include "circline/ransac/detection/edges.h"
 #include "circline/ransac/detection/ellipse_evidence.h"
+#include "circline/ransac/detection/look_for_focal.h"
 #include "circline/ransac/detection/observe_evidence.h"
-#include "circline/ransac/detection/structure_focal.h"
 
 namespace circline {
 namespace {
@@ -58,78 +58,6 @@ Status CollectEvidence(const EdgeMap& edges, const Camera& camera, const Detecti
   return Status::Ok();
 }
 
-// What is seen of a photo through a camera whose focal length is a guess.
-struct Look {
-  double log_focal;  // Of fx.
-  PhotoEvidence evidence;
-  LikelyFocal likeliest;
-};
-
-// The same focal lengths whatever the guess.
-double OnSteps(double log_focal) { return kFocalStep * std::round(log_focal / kFocalStep); }
-
-// Of a usual lens, or as near to it as what is known of the focal length lets it be: what the photo
-// shows does not depend on who guesses.
-double FirstLogFocal(const Camera& camera, const CameraSigma& sigma) {
-  constexpr double kUsual = 0.8660254;  // Over the longer side of the photo: 60 degrees.
-  const double stated = std::log(camera.fx);
-  const int longer = std::max(camera.width, camera.height);
-  if (longer == 0) return stated;
-  return std::clamp(std::log(kUsual * longer), stated - sigma.log_focal, stated + sigma.log_focal);
-}
-
-void SetLogFocal(double log_focal, Camera* camera) {
-  const double factor = std::exp(log_focal) / camera->fx;
-  camera->fx *= factor;
-  camera->fy *= factor;
-}
-
-Status LookAt(const EdgeMap& edges, const Camera& camera, double stated,
-              const DetectionOptions& options, double diagonal_px, Look* look) {
-  Status status = CollectEvidence(edges, camera, options, &look->evidence);
-  std::vector<DetectedPencil> pencils;
-  if (status.ok() && options.max_pencils > 0) {
-    status = DetectPencilsApart(look->evidence.lines, options.max_pencils, options.seed, &pencils,
-                                diagonal_px);
-  }
-  if (!status.ok()) return status;
-  look->likeliest = LikeliestFocal(look->evidence, pencils, camera, options.noise_model.camera,
-                                   stated - look->log_focal, diagonal_px);
-  return Status::Ok();
-}
-
-// The camera at the focal length at which the photo's structure is likeliest, and the evidence seen
-// through that: what is found is straight and round at one focal length, so another one is looked
-// through where it is clearly likelier. Where looks lead back to an earlier one, the one that is
-// contradicted least.
-Status LookForFocal(const EdgeMap& edges, const DetectionOptions& options, double diagonal_px,
-                    PhotoEvidence* evidence, Observations* observations) {
-  constexpr std::size_t kMostLooks = 4;
-  constexpr double kClearly = 0.5;  // Logarithm of how much likelier it is.
-  Camera& camera = observations->camera;
-  observations->stated_focal_px = camera.fx;
-  const double stated = std::log(camera.fx);
-  double next = OnSteps(FirstLogFocal(camera, options.noise_model.camera));
-  std::vector<Look> looks;
-  const auto is_next = [&next](const Look& look) {
-    return std::abs(look.log_focal - next) < 0.5 * kFocalStep;
-  };
-  while (looks.size() < kMostLooks && std::none_of(looks.begin(), looks.end(), is_next)) {
-    looks.push_back({next, {}, {}});
-    SetLogFocal(next, &camera);
-    const Status status = LookAt(edges, camera, stated, options, diagonal_px, &looks.back());
-    if (!status.ok()) return status;
-    const LikelyFocal& likeliest = looks.back().likeliest;
-    if (likeliest.gain > kClearly) next = OnSteps(next + likeliest.log_focal);
-  }
-  const auto best = std::min_element(looks.begin(), looks.end(), [](const Look& a, const Look& b) {
-    return a.likeliest.gain < b.likeliest.gain;
-  });
-  SetLogFocal(best->log_focal, &camera);
-  *evidence = std::move(best->evidence);
-  return Status::Ok();
-}
-
 }  // namespace
 
 Status DetectionOptions::Validate() const {
@@ -165,9 +93,12 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   if (!status.ok()) return status;
   PhotoEvidence evidence;
   const double diagonal_px = DiagonalPx(image.cols, image.rows);
+  const auto collect = [&](const Camera& through, PhotoEvidence* seen) {
+    return CollectEvidence(edges, through, options, seen);
+  };
   status = options.noise_model.camera.IsWide()
-               ? LookForFocal(edges, options, diagonal_px, &evidence, observations)
-               : CollectEvidence(edges, camera, options, &evidence);
+               ? LookForFocal(collect, options, diagonal_px, &evidence, observations)
+               : collect(camera, &evidence);
   return status.ok() ? ObserveEvidence(options, diagonal_px, &evidence, observations) : status;
 }
 
