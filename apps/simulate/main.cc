@@ -33,8 +33,8 @@ int Refuse(const Status& status, int exit_code) {
 }
 
 Status SimulateStreet(const circline::apps::SimulationOptions& options, const std::string& output) {
-  const std::vector<circline::apps::StreetTrial> trials =
-      circline::apps::SimulateStreets(options.trials, options.seed, options.threads);
+  const std::vector<circline::apps::StreetTrial> trials = circline::apps::SimulateStreets(
+      options.trials, options.focal_sigma, options.seed, options.threads);
   std::cout << circline::apps::StreetSummary(trials);
   return circline::apps::WriteFile(output + "/street.csv", circline::apps::StreetCsv(trials));
 }

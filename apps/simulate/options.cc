@@ -6,7 +6,7 @@
 
 DEFINE_string(scene, "paper",
               "paper: a circle and two pairs of parallel lines; street: segments of houses, for "
-              "which trials, seed and threads count.");
+              "which trials, seed, threads and focal_sigma count.");
 DEFINE_int32(trials, 200, "Images for each noise level and outlier ratio; 1 or more.");
 DEFINE_string(noise_px, "0,0.5,1,1.5,2,2.5,3",
               "Standard deviations of the Gaussian noise on both coordinates of every point, "
@@ -18,6 +18,9 @@ DEFINE_string(outlier_kind, "band",
               "band: uniform within 40 px of the feature; cluster: all in one disc of 15 px radius "
               "whose centre lies 40 px off the feature.");
 DEFINE_double(focal, 1800.0, "Focal length, pixels.");
+DEFINE_double(focal_sigma, 0.0,
+              "Of streets: standard deviation of the logarithm of the focal length where that is "
+              "a guess of 60 degrees and the principal point one of the middle; 0: calibrated.");
 DEFINE_string(translation, "2,2,100", "Of the camera: the world's origin in its frame.");
 DEFINE_uint64(seed, 1, "Same flags and seed: same bytes out, whatever the threads.");
 DEFINE_int32(threads, 0, "Images worked on at a time; 0 = one for each core.");
@@ -86,6 +89,7 @@ Status ReadLoss(SimulationOptions* options) {
 Status SimulationFromFlags(SimulationOptions* options, std::string* output) {
   options->trials = FLAGS_trials;
   options->focal_px = FLAGS_focal;
+  options->focal_sigma = FLAGS_focal_sigma;
   options->seed = FLAGS_seed;
   options->threads = FLAGS_threads;
   options->inlier_sigmas = FLAGS_inlier_sigmas;

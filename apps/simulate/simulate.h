@@ -18,7 +18,7 @@ namespace circline::apps {
 enum class SimulatedScene { kPaper, kStreet };
 
 struct SimulationOptions {
-  // Of the street trials, seed and threads count.
+  // Of the street trials, seed, threads and focal_sigma count.
   SimulatedScene scene = SimulatedScene::kPaper;
   int trials = 200;                                                    // 1 or more.
   std::vector<double> noise_px = {0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0};  // 0 or more.
@@ -27,7 +27,8 @@ struct SimulationOptions {
   double focal_px = 1800.0;  // > 0.
   Eigen::Vector3d translation = Eigen::Vector3d(2.0, 2.0, 100.0);
   std::uint64_t seed = 1;
-  int threads = 0;  // 0 = one for each core.
+  int threads = 0;           // 0 = one for each core.
+  double focal_sigma = 0.0;  // Of streets: that of DrawStreet, 0 to 1.
   // With outliers: a point farther than this from its curve is one, in standard deviations of the
   // noise; > 0. FitObservations takes 3.03 at most.
   double inlier_sigmas = 3.03;

@@ -20,6 +20,9 @@ constexpr int kWidth = 640, kHeight = 480;  // Pixels.
 constexpr double kLeastView = 48.0 * kDegree, kMostView = 78.0 * kDegree;
 constexpr double kTilt = 6.0 * kDegree, kMeanTilt = 5.0 * kDegree, kRoll = 2.0 * kDegree;
 constexpr double kK1Sigma = 0.002;
+// Where nobody has calibrated it: of the principal point, about the middle, pixels.
+constexpr double kGuessedMiddle = 12.0;
+constexpr double kGuessedView = 60.0 * kDegree;
 // Each pair of directions of a house is at right angles to so much (standard deviation); a house
 // whose fronts meet at another angle does so by this much more or less.
 constexpr double kLean = 0.7 * kDegree;
@@ -149,7 +152,7 @@ class Painter {
   Random& random_;
 };
 
-Camera DrawCamera(Random* random, Camera* truth) {
+Camera DrawCamera(const CameraSigma& sigma, Random* random, Camera* truth) {
   Camera camera;
   camera.model = CameraModel::kOpenCV;
   camera.width = kWidth;
@@ -157,14 +160,15 @@ Camera DrawCamera(Random* random, Camera* truth) {
   camera.fx = camera.fy = 0.5 * kWidth / std::tan(0.5 * random->Uniform(kLeastView, kMostView));
   camera.cx = 0.5 * (kWidth - 1);
   camera.cy = 0.5 * (kHeight - 1);
-  camera.distortion[0] = random->Uniform(-0.2, 0.05);
-  const CameraSigma sigma;
+  const double k1 = random->Uniform(-0.2, 0.05);
+  camera.distortion[0] = sigma.IsWide() ? 0.0 : k1;
   *truth = camera;
-  truth->fx *= std::exp(sigma.log_focal * random->Normal());
+  truth->fx *= std::exp(CameraSigma().log_focal * random->Normal());
   truth->fy = truth->fx * std::exp(sigma.log_aspect * random->Normal());
   truth->cx += sigma.principal_point_px * random->Normal();
   truth->cy += sigma.principal_point_px * random->Normal();
   truth->distortion[0] += kK1Sigma * random->Normal();
+  if (sigma.IsWide()) camera.fx = camera.fy = 0.5 * kWidth / std::tan(kGuessedView / 2.0);
   return camera;
 }
 
@@ -224,11 +228,16 @@ void AddOthers(Painter* painter, Random* random, std::vector<House>* houses,
 
 }  // namespace
 
-StreetPhoto DrawStreet(Random* random) {
+StreetPhoto DrawStreet(double focal_sigma, Random* random) {
   for (;;) {
     StreetPhoto photo;
+    if (focal_sigma > 0.0) {
+      photo.sigma.log_focal = focal_sigma;
+      photo.sigma.principal_point_px = kGuessedMiddle;
+    }
     Camera truth;
-    photo.camera = DrawCamera(random, &truth);
+    photo.camera = DrawCamera(photo.sigma, random, &truth);
+    photo.focal_px = truth.fx;
     photo.sigma_px = LogUniform(kLeastNoise, kMostNoise, random);
     photo.is_orthogonal = random->Uniform() >= kShareSkew;
     const Eigen::Matrix3d cam_from_world =

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "circline/estimators/camera.h"
+#include "circline/estimators/noise_model.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/random.h"
 
@@ -22,7 +23,9 @@ struct StreetSegment {
 };
 
 struct StreetPhoto {
-  Camera camera;                        // As calibrated.
+  Camera camera;                        // As calibrated, or guessed.
+  CameraSigma sigma;                    // How well it is known.
+  double focal_px = 0.0;                // The true one.
   double sigma_px = 0.0;                // Standard deviation of end points across their segment.
   std::vector<HouseDirections> houses;  // The one that the photo is of comes first.
   std::vector<StreetSegment> segments;
@@ -30,7 +33,9 @@ struct StreetPhoto {
 };
 
 // A photo of 640 x 480 pixels of a corner of a house. All is drawn at random: see the constants.
-StreetPhoto DrawStreet(Random* random);
+// `focal_sigma`: of the logarithm of the focal length, where that is a guess of 60 degrees and the
+// principal point one of the middle; 0: the camera is calibrated.
+StreetPhoto DrawStreet(double focal_sigma, Random* random);
 
 }  // namespace circline::apps
 

@@ -13,7 +13,7 @@
 #include "apps/common/text.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
-#include "circline/ransac/detection/observe_evidence.h"
+#include "circline/ransac/detection/look_for_focal.h"
 #include "circline/refine/estimate_pose.h"
 
 namespace circline::apps {
@@ -64,14 +64,30 @@ Vector3d NearestError(const HouseDirections& house, const Matrix3d& rotation) {
   return nearest;
 }
 
+void JudgeFocal(const StreetPhoto& photo, const Camera& camera, const PoseEstimate& estimate,
+                StreetAnswer* answer) {
+  const double best = std::log(CameraOf(estimate.hypotheses.front(), camera).fx);
+  double variance = 0.0;
+  for (const PoseHypothesis& h : estimate.hypotheses) {
+    const double sigma = h.focal_sigma / h.focal_scale;
+    const double off = std::log(CameraOf(h, camera).fx) - best;
+    variance += h.probability * (sigma * sigma + off * off);
+  }
+  answer->focal_error = best - std::log(photo.focal_px);
+  answer->focal_sigma = std::sqrt(variance);
+}
+
 StreetAnswer Judge(const StreetPhoto& photo, const Observations& observations) {
   StreetAnswer answer;
-  const PoseEstimate estimate = EstimatePose(observations);
+  EstimationOptions options;
+  if (photo.sigma.IsWide()) options.camera_sigma = photo.sigma;
+  const PoseEstimate estimate = EstimatePose(observations, options);
   if (!estimate.status.ok() || estimate.hypotheses.front().RotationIsFree()) return answer;
   const PoseHypothesis& best = estimate.hypotheses.front();
   answer.failed = false;
   answer.probability = best.probability;
   answer.sigma = best.SigmaRotation();
+  if (photo.sigma.IsWide()) JudgeFocal(photo, observations.camera, estimate, &answer);
   for (const HouseDirections& house : photo.houses) {
     const Vector3d error = NearestError(house, best.cam_from_world.rotation);
     const double angle_deg = error.norm() / kDegree;
@@ -84,20 +100,27 @@ StreetAnswer Judge(const StreetPhoto& photo, const Observations& observations) {
 }
 
 Observations Detect(const StreetPhoto& photo, std::uint64_t seed) {
-  PhotoEvidence evidence;
-  for (const StreetSegment& segment : photo.segments) {
-    DetectedLine line;
-    if (LineFromSegment(photo.camera, segment.ends, photo.sigma_px, &line).ok())
-      evidence.lines.push_back(std::move(line));
-  }
-  std::stable_sort(evidence.lines.begin(), evidence.lines.end(),
-                   [](const auto& a, const auto& b) { return a.length_px > b.length_px; });
+  const auto collect = [&photo](const Camera& camera, PhotoEvidence* evidence) {
+    for (const StreetSegment& segment : photo.segments) {
+      DetectedLine line;
+      if (LineFromSegment(camera, segment.ends, photo.sigma_px, &line).ok())
+        evidence->lines.push_back(std::move(line));
+    }
+    std::stable_sort(evidence->lines.begin(), evidence->lines.end(),
+                     [](const auto& a, const auto& b) { return a.length_px > b.length_px; });
+    return Status::Ok();
+  };
   DetectionOptions options;
   options.seed = seed;
+  options.noise_model.camera = photo.sigma;
+  const double diagonal_px = DiagonalPx(photo.camera.width, photo.camera.height);
+  PhotoEvidence evidence;
   Observations observations;
   observations.camera = photo.camera;
-  const Status status = ObserveEvidence(
-      options, DiagonalPx(photo.camera.width, photo.camera.height), &evidence, &observations);
+  Status status = photo.sigma.IsWide()
+                      ? LookForFocal(collect, options, diagonal_px, &evidence, &observations)
+                      : collect(photo.camera, &evidence);
+  if (status.ok()) status = ObserveEvidence(options, diagonal_px, &evidence, &observations);
   return status.ok() ? observations : Observations();
 }
 
@@ -129,6 +152,12 @@ Observations Know(const StreetPhoto& photo) {
   return observations;
 }
 
+// Of its pose, and of that to what counts as wrong.
+bool IsSure(const StreetAnswer& answer) {
+  return !answer.failed && answer.probability >= kSure &&
+         answer.sigma.norm() <= kWrongDeg * kDegree;
+}
+
 std::vector<double> Errors(const std::vector<StreetTrial>& trials,
                            StreetAnswer StreetTrial::*answer) {
   std::vector<double> errors;
@@ -149,20 +178,44 @@ double CoveragePercent(const std::vector<StreetTrial>& trials, StreetAnswer Stre
   return 100.0 * within / std::max(1.0, all);
 }
 
+// What the focal length is off by, per cent: median and ninetieth percentile, and the share of
+// photos that it is within ten of. Of houses that are square: others look as square ones do at
+// another focal length.
+std::string FocalSummary(const std::vector<StreetTrial>& trials, StreetAnswer StreetTrial::*which) {
+  std::vector<double> off;
+  for (const StreetTrial& trial : trials) {
+    const StreetAnswer& answer = trial.*which;
+    if (!trial.photo.is_orthogonal) continue;
+    off.push_back(answer.failed ? std::numeric_limits<double>::infinity()
+                                : 100.0 * std::abs(std::expm1(answer.focal_error)));
+  }
+  if (off.empty()) return "none";
+  std::sort(off.begin(), off.end());
+  const auto near = std::upper_bound(off.begin(), off.end(), 10.0) - off.begin();
+  const double share = 100.0 * static_cast<double>(near) / static_cast<double>(off.size());
+  return FormatFixed(off[off.size() / 2], 1) + " % (nine of ten " +
+         FormatFixed(off[9 * off.size() / 10], 1) + " %), within 10 % in " + FormatFixed(share, 0) +
+         " %";
+}
+
 std::vector<std::string> Cells(const StreetAnswer& answer) {
-  if (answer.failed) return {"1", "", "", "", "", "", "", "", "", ""};
+  if (answer.failed) return {"1", "", "", "", "", "", "", "", "", "", "", ""};
   std::vector<std::string> cells = {"0", FormatFixed(answer.error_deg, 5),
                                     FormatFixed(answer.error_any_deg, 5)};
   for (const Vector3d& v : {answer.error, answer.sigma}) {
     for (const double value : v) cells.push_back(FormatFixed(value / kDegree, 5));
   }
   cells.push_back(FormatFixed(answer.probability, 4));
+  const bool is_guessed = answer.focal_sigma > 0.0;
+  for (const double value : {answer.focal_error, answer.focal_sigma})
+    cells.push_back(is_guessed ? FormatFixed(value, 5) : "");
   return cells;
 }
 
 }  // namespace
 
-std::vector<StreetTrial> SimulateStreets(int num_trials, std::uint64_t seed, int threads) {
+std::vector<StreetTrial> SimulateStreets(int num_trials, double focal_sigma, std::uint64_t seed,
+                                         int threads) {
   if (threads > 0) cv::setNumThreads(threads);
   Progress progress("photos", num_trials);
   std::mutex mutex;
@@ -171,7 +224,7 @@ std::vector<StreetTrial> SimulateStreets(int num_trials, std::uint64_t seed, int
     Random random(Random(seed).Next() + static_cast<std::uint64_t>(k));
     random = Random(random.Next());
     StreetTrial& trial = trials[static_cast<std::size_t>(k)];
-    trial.photo = DrawStreet(&random);
+    trial.photo = DrawStreet(focal_sigma, &random);
     trial.detected = Judge(trial.photo, Detect(trial.photo, random.Next()));
     trial.known = Judge(trial.photo, Know(trial.photo));
     const std::lock_guard<std::mutex> lock(mutex);
@@ -189,9 +242,9 @@ double AreaUnderRecall(const std::vector<double>& errors_deg, double most_deg) {
 std::string StreetCsv(const std::vector<StreetTrial>& trials) {
   std::string csv = "trial,orthogonal,houses,segments,sigma_px";
   for (const std::string who : {"detected", "known"}) {
-    for (const char* what :
-         {"failed", "error_deg", "error_any_deg", "error_x_deg", "error_y_deg", "error_z_deg",
-          "sigma_x_deg", "sigma_y_deg", "sigma_z_deg", "probability"}) {
+    for (const char* what : {"failed", "error_deg", "error_any_deg", "error_x_deg", "error_y_deg",
+                             "error_z_deg", "sigma_x_deg", "sigma_y_deg", "sigma_z_deg",
+                             "probability", "focal_error", "focal_sigma"}) {
       csv += "," + who + "_" + what;
     }
   }
@@ -220,17 +273,23 @@ std::string StreetSummary(const std::vector<StreetTrial>& trials) {
   double sure = 0.0, wrong = 0.0, failed = 0.0;
   for (const StreetTrial& trial : trials) {
     failed += trial.detected.failed ? 1.0 : 0.0;
-    if (trial.detected.failed || trial.detected.probability < kSure) continue;
+    if (!IsSure(trial.detected)) continue;
     sure += 1.0;
     wrong += trial.detected.error_any_deg > kWrongDeg ? 1.0 : 0.0;
   }
   const double n = static_cast<double>(trials.size());
+  const bool is_guessed = !trials.empty() && trials.front().photo.sigma.IsWide();
+  const std::string focal = is_guessed
+                                ? "focal length, of square houses, off by " +
+                                      FocalSummary(trials, &StreetTrial::detected) +
+                                      "; known: " + FocalSummary(trials, &StreetTrial::known) + "\n"
+                                : "";
   return text + JoinList(areas, ", ") + " (" + JoinList(ratios, ", ") + "); within 2 sigma " +
          FormatFixed(CoveragePercent(trials, &StreetTrial::detected), 1) + " % (known " +
          FormatFixed(CoveragePercent(trials, &StreetTrial::known), 1) + " %); no answer " +
          FormatFixed(100.0 * failed / n, 1) + " %; sure " + FormatFixed(100.0 * sure / n, 1) +
          " %, of these wrong " +
-         FormatFixed(100.0 * wrong / std::max(1.0, static_cast<double>(sure)), 1) + " %\n";
+         FormatFixed(100.0 * wrong / std::max(1.0, static_cast<double>(sure)), 1) + " %\n" + focal;
 }
 
 }  // namespace circline::apps

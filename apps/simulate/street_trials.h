@@ -20,6 +20,9 @@ struct StreetAnswer {
   // Of the error that counts for error_any_deg, camera frame, and its standard deviations.
   Eigen::Vector3d error = Eigen::Vector3d::Zero(), sigma = Eigen::Vector3d::Zero();
   double probability = 0.0;
+  // Of the logarithm of the focal length, where that is a guess; the deviation is about the best
+  // hypothesis, over all at their probabilities.
+  double focal_error = 0.0, focal_sigma = 0.0;
 };
 
 struct StreetTrial {
@@ -28,14 +31,16 @@ struct StreetTrial {
 };
 
 // The same options give the same bits, whatever the number of threads (0 = one for each core).
-std::vector<StreetTrial> SimulateStreets(int trials, std::uint64_t seed, int threads);
+// `focal_sigma`: that of DrawStreet.
+std::vector<StreetTrial> SimulateStreets(int trials, double focal_sigma, std::uint64_t seed,
+                                         int threads);
 
 // Area under the share of errors below a threshold, from 0 to that of the argument, of its
 // greatest.
 double AreaUnderRecall(const std::vector<double>& errors_deg, double most_deg);
 
 std::string StreetCsv(const std::vector<StreetTrial>& trials);
-std::string StreetSummary(const std::vector<StreetTrial>& trials);  // One line, for people.
+std::string StreetSummary(const std::vector<StreetTrial>& trials);  // A line or two, for people.
 
 }  // namespace circline::apps
 

@@ -14,6 +14,7 @@
 #include "circline/ransac/detection/find_box.h"
 #include "circline/ransac/detection/pencil_fitter.h"
 #include "circline/ransac/detection/segment_meetings.h"
+#include "circline/ransac/detection/third_direction.h"
 
 namespace circline {
 namespace {
@@ -29,6 +30,12 @@ constexpr double kCirclesGrowth = 2.0;
 // Evidence of a pencil (LogOddsOfDirection) that no box outweighs: six edges along two of its axes,
 // at four each.
 constexpr double kMostOddsOfABox = 24.0;
+
+// Lines along the normal are those of a third direction if they are so much likelier as such: so
+// many focal lengths can be told apart, at one of which they meet it by accident.
+constexpr double kLeastRatio = 20.0;
+// By which a line misses its direction, radians, as the search for pencils has it.
+constexpr double kNormalSpreadRad = 3e-3;
 
 class Assembler {
  public:
@@ -206,11 +213,13 @@ class Assembler {
         PlacedPencil& x = pencils_[static_cast<std::size_t>(order[a])];
         PlacedPencil& y = pencils_[static_cast<std::size_t>(order[b])];
         const bool grid = x.of_grid && y.of_grid && Rectangular(x.direction, y.direction);
-        if (!grid && !(LogOddsOfRightAngle(x.direction, y.direction) > 0.0)) continue;
+        if (!grid && !(RightAngle(x.direction, y.direction, options_.camera).LogOdds() > 0.0))
+          continue;
         x.observation.direction = PencilDirection::kX;
         y.observation.direction = PencilDirection::kY;
-        SetNormalRole(x.direction, y.direction);
         if (plane.circles.empty()) ReadAgain(&x, &y);
+        const bool has_normal = SetNormalRole(x.direction, y.direction);
+        if (!has_normal && options_.camera.log_focal > 0.0) AddNormal(order[a], order[b]);
         return;
       }
     }
@@ -224,8 +233,7 @@ class Assembler {
     const LineSet set(lines_, options_.diagonal_px);
     std::vector<LineFit> others;
     for (int i = 0; i < static_cast<int>(lines_.size()); ++i) {
-      if (!set.IsTwin(i) && !std::binary_search(x->members.begin(), x->members.end(), i))
-        others.push_back(set.fits[static_cast<std::size_t>(i)]);
+      if (!set.IsTwin(i) && !x->Has(i)) others.push_back(set.fits[static_cast<std::size_t>(i)]);
     }
     y->observation.readings =
         ReadDirection(others, x->direction.vector, y->direction.vector, set.Count(y->members));
@@ -247,16 +255,45 @@ class Assembler {
     return order;
   }
 
-  void SetNormalRole(const UncertainDirection& x, const UncertainDirection& y) {
+  // The lines along the normal, where they are too few to have been found by themselves.
+  void AddNormal(int x, int y) {
+    const PlacedPencil &a = pencils_[static_cast<std::size_t>(x)],
+                       &b = pencils_[static_cast<std::size_t>(y)];
+    const auto normal = ThirdDirection(a.direction, b.direction, options_.camera);
+    if (!normal) return;
+    const LineSet set(lines_, options_.diagonal_px);
+    std::vector<int> others;
+    std::vector<LineOdds> odds;
+    for (int i = 0; i < static_cast<int>(lines_.size()); ++i) {
+      if (a.Has(i) || b.Has(i)) continue;
+      others.push_back(i);
+      const LineFit& fit = set.fits[static_cast<std::size_t>(i)];
+      if (!set.IsTwin(i)) odds.emplace_back(WithDirectionError(fit, kNormalSpreadRad));
+    }
+    const SharedDirection shared = LinesAlong(odds, *normal);
+    if (!(shared.ratio > kLeastRatio)) return;
+    FoundPencil found;
+    found.fit.direction = shared.direction;
+    double spread;
+    if (!PencilFitter(set, kNormalSpreadRad).Fit(others, &found, &spread) ||
+        set.Count(found.lines) < PencilOptions().min_lines)
+      return;
+    pencils_.emplace_back(MakePencil(found, set, spread));
+    pencils_.back().observation.direction = PencilDirection::kZ;
+  }
+
+  // False where no pencil can be along the normal.
+  bool SetNormalRole(const UncertainDirection& x, const UncertainDirection& y) {
     for (PlacedPencil& pencil : pencils_) {
       if (!pencil.observation.plane.empty()) continue;
-      if (!(LogOddsOfRightAngle(pencil.direction, x) > 0.0) ||
-          !(LogOddsOfRightAngle(pencil.direction, y) > 0.0)) {
+      if (!(RightAngle(pencil.direction, x, options_.camera).LogOdds() > 0.0) ||
+          !(RightAngle(pencil.direction, y, options_.camera).LogOdds() > 0.0)) {
         continue;
       }
       pencil.observation.direction = PencilDirection::kZ;
-      return;
+      return true;
     }
+    return false;
   }
 
   // Everything in its final order, with ids; repetitions and pencils beyond max_pencils are left

@@ -22,6 +22,7 @@ struct AssemblyOptions {
   int max_pencils = 3;                    // That are kept, those with a role first.
   double max_shared_plane_deg = 5.0;      // As in DetectionOptions.
   double diagonal_px = kUsualDiagonalPx;  // Of the photo (segment_meetings.h).
+  CameraError camera;  // Of one whose focal length was looked for; else none counts.
 };
 
 // Chooses the plane with most support, "p0": that of two pencils and the circles that agree with

@@ -47,7 +47,8 @@ double JointSupport(const PlacedPencil& a, const PlacedPencil& b, double diagona
   const double larger_share = std::max(of_a / a.support_px, of_b / b.support_px);
   const bool is_rectangle =
       (share >= kMinRectangularShare && Rectangular(a.direction, b.direction)) ||
-      (larger_share >= kMinRectangularShare && LogOddsOfRightAngle(a.direction, b.direction) > 0.0);
+      (larger_share >= kMinRectangularShare &&
+       RightAngle(a.direction, b.direction).LogOdds() > 0.0);
   const bool is_plane = share >= kMinSpanningShare || is_rectangle;
   return is_plane ? 2.0 * std::min(of_a, of_b) * std::sqrt(share) : 0.0;
 }

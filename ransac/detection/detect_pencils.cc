@@ -105,6 +105,15 @@ std::vector<int> OneOfEachEdge(const LineSet& set, const std::vector<int>& subse
   return edges;
 }
 
+std::vector<DetectedLine> EdgesOf(const LineSet& set, const std::vector<int>& subset) {
+  std::vector<DetectedLine> edges;
+  for (const int i : OneOfEachEdge(set, subset)) {
+    edges.push_back(set.lines[static_cast<std::size_t>(i)]);
+    edges.back().fit = set.fits[static_cast<std::size_t>(i)];
+  }
+  return edges;
+}
+
 std::vector<LineFit> FitsOf(const LineSet& set, const std::vector<int>& subset) {
   std::vector<LineFit> fits;
   for (const int i : subset) fits.push_back(set.fits[static_cast<std::size_t>(i)]);
@@ -195,12 +204,20 @@ Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, st
 std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
                                       const DetectedPencil& pencil, double diagonal_px) {
   const LineSet set(lines, diagonal_px);
-  std::vector<DetectedLine> edges;
-  for (const int i : OneOfEachEdge(set, LinesAround(set, pencil))) {
-    edges.push_back(lines[static_cast<std::size_t>(i)]);
-    edges.back().fit = set.fits[static_cast<std::size_t>(i)];
+  return EdgesOf(set, LinesAround(set, pencil));
+}
+
+std::vector<DetectedLine> LinesOutside(const std::vector<DetectedLine>& lines,
+                                       const std::vector<DetectedPencil>& pencils,
+                                       double diagonal_px) {
+  std::vector<int> outside;
+  for (int i = 0; i < static_cast<int>(lines.size()); ++i) {
+    if (std::none_of(pencils.begin(), pencils.end(), [i](const DetectedPencil& pencil) {
+          return std::binary_search(pencil.members.begin(), pencil.members.end(), i);
+        }))
+      outside.push_back(i);
   }
-  return edges;
+  return EdgesOf(LineSet(lines, diagonal_px), outside);
 }
 
 LineFit WithSharedError(const DetectedLine& line, double shared_px) {

@@ -47,6 +47,11 @@ std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
                                       const DetectedPencil& pencil,
                                       double diagonal_px = kUsualDiagonalPx);
 
+// The same of the lines that are of none of some pencils.
+std::vector<DetectedLine> LinesOutside(const std::vector<DetectedLine>& lines,
+                                       const std::vector<DetectedPencil>& pencils,
+                                       double diagonal_px = kUsualDiagonalPx);
+
 // The pencil of lines[members] along `direction`, each as good as its `fits` says (one a member):
 // the line's own with a covariance that counts whatever else the line may miss the direction by.
 // No fit.

@@ -100,7 +100,11 @@ FeaturesByFocal::FeaturesByFocal(const PhotoEvidence& evidence,
     : camera_(camera), sigma_(sigma) {
   AddCircles(evidence);
   AddPencils(pencils);
-  if (IsEmpty() && !pencils.empty()) AddEdges(evidence, pencils[0], diagonal_px);
+  if (pencils_.size() > 1) {
+    if (circles_.size() < 2) AddEdges(LinesOutside(evidence.lines, pencils, diagonal_px));
+  } else if (IsEmpty() && !pencils.empty()) {
+    AddEdges(EdgesAround(evidence.lines, pencils[0], diagonal_px));
+  }
 }
 
 void FeaturesByFocal::AddCircles(const PhotoEvidence& evidence) {
@@ -130,9 +134,8 @@ void FeaturesByFocal::AddPencils(const std::vector<DetectedPencil>& pencils) {
   }
 }
 
-void FeaturesByFocal::AddEdges(const PhotoEvidence& evidence, const DetectedPencil& pencil,
-                               double diagonal_px) {
-  for (const DetectedLine& edge : EdgesAround(evidence.lines, pencil, diagonal_px)) {
+void FeaturesByFocal::AddEdges(const std::vector<DetectedLine>& edges) {
+  for (const DetectedLine& edge : edges) {
     if (edges_.size() == kMaxEdges) break;
     edges_.push_back(Some(edge.points, kMostOfLine, 1.0));
     LineFit unit;

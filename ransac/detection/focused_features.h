@@ -50,7 +50,7 @@ class FeaturesByFocal {
 
   void AddCircles(const PhotoEvidence& evidence);
   void AddPencils(const std::vector<DetectedPencil>& pencils);
-  void AddEdges(const PhotoEvidence& evidence, const DetectedPencil& pencil, double diagonal_px);
+  void AddEdges(const std::vector<DetectedLine>& edges);
 
   bool FitCircle(const Camera& camera, const Points& points, ConicFit* fit);
   bool FitEdge(const Camera& camera, const Points& points, LineFit* fit);

@@ -13,6 +13,10 @@ namespace {
 // lines and by the circles rather than by the number of lines.
 constexpr int kExtraPencils = 3;
 
+// What structure tells of a focal length that is a guess; of its logarithm. Right angles that it is
+// told by are not judged again more strictly.
+constexpr double kFoundFocalSigma = 0.1;
+
 std::string Describe(const Observations& observations) {
   const std::size_t circles = observations.circles.size(), pencils = observations.pencils.size();
   if (circles == 0 && pencils == 0) {
@@ -48,6 +52,11 @@ Status ObserveEvidence(const DetectionOptions& options, double diagonal_px, Phot
   assembly.max_pencils = options.max_pencils;
   assembly.max_shared_plane_deg = options.max_shared_plane_deg;
   assembly.diagonal_px = diagonal_px;
+  if (options.noise_model.camera.IsWide()) {
+    assembly.camera.middle_rad =
+        options.noise_model.camera.principal_point_px / observations->camera.fx;
+    assembly.camera.log_focal = kFoundFocalSigma;
+  }
   AssembleObservations(assembly, evidence->lines, evidence->bent, &evidence->circles, &pencils,
                        observations);
   observations->message = Describe(*observations);

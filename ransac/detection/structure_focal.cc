@@ -6,9 +6,12 @@
 #include <limits>
 #include <optional>
 
+#include "circline/estimators/basics.h"
 #include "circline/ransac/detection/focused_features.h"
+#include "circline/ransac/detection/line_odds.h"
 #include "circline/ransac/detection/orthogonal_evidence.h"
 #include "circline/ransac/detection/straight_lens.h"
+#include "circline/ransac/detection/third_direction.h"
 #include "circline/ransac/detection/uncertain_direction.h"
 
 namespace circline {
@@ -27,6 +30,14 @@ constexpr std::size_t kMaxSeeds = 6;
 constexpr double kSpreadRad = 3e-3;
 // Of circles that are of the plane that most are of.
 constexpr double kPlaneShare = 0.5;
+// Odds that two directions are at right angles below which a third to both is not looked for.
+constexpr double kNegligible = 0.05;
+// Beyond these the odds are the same.
+constexpr double kMostLogOdds = 300.0;
+// The principal point is summed over so many steps to either side, of so many standard deviations:
+// by a step of 25 pixels of 600 a right angle changes by 1.4 degrees, twice what walls lean.
+constexpr int kMiddleSteps = 5;
+constexpr double kMiddleStep = 0.5;
 // The circles of a plane have its normal within this of that of one of them, degrees.
 constexpr double kSeedSigmaDeg = 5.0;
 
@@ -34,7 +45,8 @@ class StructureEvidence {
  public:
   StructureEvidence(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
                     const Camera& camera, const CameraSigma& sigma, double diagonal_px)
-      : features_(evidence, pencils, camera, sigma, diagonal_px) {
+      : features_(evidence, pencils, camera, sigma, diagonal_px),
+        middle_rad_(sigma.principal_point_px / camera.fx) {
     for (const CircleEvidence& circle : evidence.circles) {
       const UncertainDirection& normal = circle.normals[0];
       // The plane is known as well as the circle's own normal.
@@ -47,36 +59,79 @@ class StructureEvidence {
 
   bool IsEmpty() const { return features_.IsEmpty(); }
 
-  // Logarithm of the evidence at a focal length, against that of no structure.
-  double At(double log_focal) {
+  struct Odds {
+    double log_common = 0.0;  // Right angles and a common plane to neither, logarithm.
+    double others = 0.0;      // Other lines at right angles to the pencils to any way.
+  };
+  Odds At(double log_focal) {
     const FocusedFeatures features = features_.At(log_focal);
-    return RightAngles(features.pencils) + EdgesAtRightAngles(features) +
-           OnePlane(features.circles);
+    const double middle_rad = middle_rad_ * std::exp(-log_focal);
+    return {RightAngles(features.pencils, middle_rad) + OnePlane(features.circles),
+            features.edges.size() < 2      ? 0.0
+            : features.pencils.size() == 1 ? EdgesAtRightAngles(features)
+                                           : EdgesAlongThird(features, middle_rad)};
   }
 
  private:
-  static double RightAngles(const Directions& directions) {
-    double sum = 0.0;
+  // The principal point is the same for all pairs: at each place that it may have their odds are
+  // multiplied, and the products are summed.
+  static double RightAngles(const Directions& directions, double middle_rad) {
+    std::vector<RightAngle> pairs;
     for (std::size_t i = 0; i < directions.size(); ++i) {
       for (std::size_t j = i + 1; j < directions.size(); ++j) {
-        const bool is_seen = directions[i] && directions[j];
-        const double odds =
-            is_seen ? std::exp(LogOddsOfRightAngle(*directions[i], *directions[j])) : 0.0;
-        sum += std::log(0.5 + 0.5 * odds);
+        if (directions[i] && directions[j]) pairs.emplace_back(*directions[i], *directions[j]);
       }
     }
-    return sum;
+    if (pairs.empty()) return 0.0;
+    double sum = 0.0, all = 0.0;
+    for (int x = -kMiddleSteps; x <= kMiddleSteps; ++x) {
+      for (int y = -kMiddleSteps; y <= kMiddleSteps; ++y) {
+        const Eigen::Vector2d off = kMiddleStep * Eigen::Vector2d(x, y);
+        const double weight = std::exp(-0.5 * off.squaredNorm());
+        double product = weight;
+        for (const RightAngle& pair : pairs)
+          product *= 0.5 + 0.5 * std::exp(pair.LogOdds(middle_rad * off));
+        sum += product;
+        all += weight;
+      }
+    }
+    return std::log(sum / all);
   }
 
-  // Of the edges around the only pencil as those of one thing with it.
-  static double EdgesAtRightAngles(const FocusedFeatures& features) {
-    if (features.edges.empty() || !features.pencils[0]) return 0.0;
+  static std::vector<LineFit> EdgesOf(const FocusedFeatures& features) {
     std::vector<LineFit> edges;
     for (const std::optional<UncertainDirection>& edge : features.edges) {
       if (edge) edges.push_back({edge->vector, edge->covariance, 0.0});
     }
-    const OrthogonalEvidence evidence(edges, features.pencils[0]->vector, kSpreadRad);
-    return std::log1p(std::exp(evidence.HighestLogOdds()));
+    return edges;
+  }
+
+  // Of the edges around the only pencil as those of one thing with it.
+  static double EdgesAtRightAngles(const FocusedFeatures& features) {
+    if (!features.pencils[0]) return 0.0;
+    const OrthogonalEvidence evidence(EdgesOf(features), features.pencils[0]->vector, kSpreadRad);
+    return std::exp(std::min(evidence.HighestLogOdds(), kMostLogOdds));
+  }
+
+  // Of the lines outside the pencils as those of the third direction of one thing with two of them.
+  static double EdgesAlongThird(const FocusedFeatures& features, double middle_rad) {
+    std::vector<LineOdds> lines;
+    for (const LineFit& edge : EdgesOf(features))
+      lines.emplace_back(WithDirectionError(edge, kSpreadRad));
+    const CameraError camera{middle_rad, 0.0};
+    double sum = 0.0, pairs = 0.0;
+    for (std::size_t i = 0; i < features.pencils.size(); ++i) {
+      for (std::size_t j = i + 1; j < features.pencils.size(); ++j) {
+        pairs += 1.0;
+        if (!features.pencils[i] || !features.pencils[j]) continue;
+        const UncertainDirection &a = *features.pencils[i], &b = *features.pencils[j];
+        const double odds = std::exp(RightAngle(a, b, camera).LogOdds());
+        if (odds < kNegligible) continue;
+        if (const auto third = ThirdDirection(a, b, camera))
+          sum += odds / (1.0 + odds) * LinesAlong(lines, *third).ratio;
+      }
+    }
+    return sum / pairs;
   }
 
   // Of the plane that explains most of them.
@@ -119,6 +174,7 @@ class StructureEvidence {
   }
 
   FeaturesByFocal features_;
+  double middle_rad_;          // Standard deviation of the principal point, over the focal length.
   std::vector<double> peaks_;  // Of each circle's likelihood, against that of any plane.
 };
 
@@ -137,6 +193,26 @@ double LogPriorOfLens(double log_focal, Camera camera, const CameraSigma& sigma,
   SetFocal(log_focal, sigma, &camera);
   const double off = (camera.distortion[0] - stated) / sigma.k1;
   return -0.5 * off * off;
+}
+
+// A focal length that is compared.
+struct Step {
+  double log_focal, log_prior;
+  StructureEvidence::Odds odds;
+
+  // `any`: what `others` is where lines are at right angles at another focal length. That they meet
+  // is seen at all of them, that they do so at right angles tells: as likely they do not (half of
+  // the corners are square), or are of nothing at all.
+  double LogEvidence(double any) const {
+    return log_prior + odds.log_common + std::log(1.0 + any + odds.others);
+  }
+};
+
+// Over all focal lengths alike: directions that are not at right angles do not depend on it.
+double MeanOfOthers(const std::vector<Step>& steps) {
+  double sum = 0.0;
+  for (const Step& step : steps) sum += step.odds.others;
+  return sum / static_cast<double>(steps.size());
 }
 
 }  // namespace
@@ -158,15 +234,19 @@ LikelyFocal LikeliestFocal(const PhotoEvidence& evidence,
     low = std::max(low, std::log(half / kWidest));
     high = std::min(high, std::log(half / kNarrowest));
   }
-  const auto evidence_at = [&](double log_focal) {
-    return structure.At(log_focal) + LogPrior(log_focal - prior_log_focal, sigma) +
-           LogPriorOfLens(log_focal, camera, sigma, found_k1);
+  const auto step_at = [&](double log_focal) {
+    const double log_prior = LogPrior(log_focal - prior_log_focal, sigma) +
+                             LogPriorOfLens(log_focal, camera, sigma, found_k1);
+    return Step{log_focal, log_prior, structure.At(log_focal)};
   };
-  const double here = evidence_at(0.0);
+  std::vector<Step> steps = {step_at(0.0)};  // Where the camera is.
+  for (double k = std::ceil(low / kFocalStep); k * kFocalStep <= high; ++k)
+    steps.push_back(step_at(k * kFocalStep));
+  const double any = MeanOfOthers(steps), here = steps.front().LogEvidence(any);
   LikelyFocal likeliest;
-  for (double k = std::ceil(low / kFocalStep); k * kFocalStep <= high; ++k) {
-    const double log_focal = k * kFocalStep, gain = evidence_at(log_focal) - here;
-    if (gain > likeliest.gain) likeliest = {log_focal, gain};
+  for (const Step& step : steps) {
+    const double gain = step.LogEvidence(any) - here;
+    if (gain > likeliest.gain) likeliest = {step.log_focal, gain};
   }
   return likeliest;
 }

@@ -54,15 +54,27 @@ bool InPlane(const UncertainDirection& direction, const UncertainDirection& norm
          std::min(max_deg, kMaxSigmas * std::hypot(test.sigma_deg, kModelSigmaDeg));
 }
 
-// The angle between two directions without relation, from 90 degrees, has the density cos (per
-// radian, Archimedes).
-double LogOddsOfRightAngle(const UncertainDirection& a, const UncertainDirection& b) {
-  const AngleTest test = CompareToRightAngle(a, b);
-  const double sigma = std::hypot(test.sigma_deg, kRightAngleSigmaDeg), r = test.angle_deg / sigma;
+// A shift of the principal point by m, and a focal length larger by a share s, move a direction d
+// by -d_z m and by -s d_z e_z, both across it.
+RightAngle::RightAngle(const UncertainDirection& a, const UncertainDirection& b,
+                       const CameraError& camera) {
+  const Vector3d &p = a.vector, &q = b.vector;
+  angle_ = std::asin(std::clamp(p.dot(q), -1.0, 1.0));
+  by_middle_ = -(q.z() * p.head<2>() + p.z() * q.head<2>());
+  const double by_focal = -2.0 * p.z() * q.z(), lean = kRightAngleSigmaDeg * kDegree;
+  variance_ = std::max(0.0, p.dot(b.covariance * p) + q.dot(a.covariance * q)) + lean * lean +
+              camera.middle_rad * camera.middle_rad * by_middle_.squaredNorm() +
+              camera.log_focal * camera.log_focal * by_focal * by_focal;
+  // The angle between two directions without relation, from 90 degrees, has the density cos (per
+  // radian, Archimedes).
   constexpr double kTwiceGaussian = 0.7978845608028654;  // 2 / sqrt(2 pi): no sense of sign.
-  return std::log(kRightAngleShare / (1.0 - kRightAngleShare) * kTwiceGaussian /
-                  (sigma * kDegree * std::cos(test.angle_deg * kDegree))) -
-         0.5 * r * r;
+  log_peak_ = std::log(kRightAngleShare / (1.0 - kRightAngleShare) * kTwiceGaussian /
+                       (std::sqrt(variance_) * std::cos(angle_)));
+}
+
+double RightAngle::LogOdds(const Eigen::Vector2d& middle) const {
+  const double angle = angle_ + by_middle_.dot(middle);
+  return log_peak_ - 0.5 * angle * angle / variance_;
 }
 
 bool Rectangular(const UncertainDirection& a, const UncertainDirection& b) {

@@ -25,8 +25,27 @@ struct UncertainDirection {
 // Whether a direction can lie in the plane with a normal; never beyond `max_deg`.
 bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal, double max_deg);
 
-// Logarithm of the odds that two directions are at right angles, as houses are made, to any angle.
-double LogOddsOfRightAngle(const UncertainDirection& a, const UncertainDirection& b);
+// What all directions of a photo have in common: the camera that they are seen through. Standard
+// deviations.
+struct CameraError {
+  double middle_rad = 0.0;  // Each coordinate of the principal point over the focal length.
+  double log_focal = 0.0;
+};
+
+// Two directions that may be at right angles, as houses are made, or at any angle.
+class RightAngle {
+ public:
+  RightAngle(const UncertainDirection& a, const UncertainDirection& b,
+             const CameraError& camera = CameraError());
+  // Logarithm of the odds that they are, where the principal point is off by so much (over the
+  // focal length, x and y).
+  double LogOdds(const Eigen::Vector2d& middle = Eigen::Vector2d::Zero()) const;
+
+ private:
+  double angle_, variance_;    // From 90 degrees; radians.
+  Eigen::Vector2d by_middle_;  // What the principal point's error changes it by.
+  double log_peak_;
+};
 
 // Whether two directions of a lattice are those of rows and columns, within 4 degrees.
 bool Rectangular(const UncertainDirection& a, const UncertainDirection& b);

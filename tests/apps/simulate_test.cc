@@ -154,8 +154,10 @@ constexpr char kStreetHeader[] =
     "trial,orthogonal,houses,segments,sigma_px,detected_failed,detected_error_deg,"
     "detected_error_any_deg,detected_error_x_deg,detected_error_y_deg,detected_error_z_deg,"
     "detected_sigma_x_deg,detected_sigma_y_deg,detected_sigma_z_deg,detected_probability,"
+    "detected_focal_error,detected_focal_sigma,"
     "known_failed,known_error_deg,known_error_any_deg,known_error_x_deg,known_error_y_deg,"
-    "known_error_z_deg,known_sigma_x_deg,known_sigma_y_deg,known_sigma_z_deg,known_probability";
+    "known_error_z_deg,known_sigma_x_deg,known_sigma_y_deg,known_sigma_z_deg,known_probability,"
+    "known_focal_error,known_focal_sigma";
 
 // Area under the share of errors below a threshold, per cent of its greatest.
 double Area(const std::vector<Row>& rows, const std::string& who, double most_deg) {
@@ -212,6 +214,31 @@ TEST(Simulate, StreetsAreFoundAboutAsWellAsIfMembershipWereKnown) {
   EXPECT_LE(within, 0.98 * all);
 }
 
+// Nothing is known of the camera but that its lens is straight. Houses whose fronts meet at another
+// angle look as square ones do at another focal length.
+TEST(Simulate, SquareHousesTellTheFocalLength) {
+  const TestFolder folder;
+  constexpr int kStreets = kSanitized ? 20 : 300;
+  ASSERT_EQ(RunSimulate("--scene=street --trials=" + std::to_string(kStreets) +
+                        " --focal_sigma=0.5 --output='" + folder / "out" + "'"),
+            0);
+  const std::vector<Row> rows = ReadCsv(folder / "out/street.csv", kStreetHeader);
+  ASSERT_EQ(rows.size(), static_cast<std::size_t>(kStreets));
+  int square = 0, near = 0, within = 0, answers = 0;
+  for (Row row : rows) {
+    const bool is_square = row["orthogonal"] == "1";
+    square += is_square ? 1 : 0;
+    if (row["detected_failed"] == "1") continue;
+    const double error = std::stod(row["detected_focal_error"]);
+    near += is_square && std::abs(error) < 0.1 ? 1 : 0;
+    within += std::abs(error) <= 2.0 * std::stod(row["detected_focal_sigma"]) ? 1 : 0;
+    ++answers;
+  }
+  if (kSanitized) return;
+  EXPECT_GE(near, 0.6 * square);
+  EXPECT_GE(within, 0.9 * answers);
+}
+
 TEST(Simulate, StreetsAreTheSameWhateverTheThreads) {
   const TestFolder folder;
   const std::string arguments = "--scene=street --trials=20 --seed=5 ";
@@ -235,6 +262,7 @@ TEST(Simulate, BadFlagsAreNamedAndNothingIsWritten) {
       {"--outlier_ratio=1", "--outlier_ratio"},
       {"--outlier_kind=clusters", "did you mean 'cluster'?"},
       {"--focal=0", "--focal"},
+      {"--focal_sigma=-0.1", "--focal_sigma"},
       {"--translation=1,2", "--translation"},
       {"--translation=0,0,-100", "--translation"},
       {"--scene=streets", "did you mean 'street'?"},

@@ -53,6 +53,36 @@ TEST(ObserveEvidence, SegmentsAloneHaveAPlaneAndItsAxes) {
   }
 }
 
+// Where the focal length was looked for, three edges along the third direction are its pencil.
+TEST(ObserveEvidence, AFewEdgesAlongTheNormalAreZ) {
+  const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.2, 0.6, 0.1));
+  DetectionOptions options;
+  options.noise_model.camera.log_focal = 0.5;
+  options.noise_model.camera.principal_point_px = 5.0;
+  int found = 0;
+  constexpr int kTrials = 20;
+  for (std::uint64_t seed = 1; seed <= kTrials; ++seed) {
+    Random random(seed);
+    PhotoEvidence evidence;
+    for (int k = 0; k < 44; ++k) {
+      const double u = random.Uniform(120.0, 360.0), v = random.Uniform(80.0, 260.0);
+      const DetectedLine line = detection_test::MakeLine(
+          TestCamera(), u, v, axes.col(k < 40 ? k % 2 : 2), 60.0, 0.0, 0.1, &random);
+      evidence.lines.emplace_back();
+      ASSERT_TRUE(LineFromSegment(TestCamera(), line.ends, 0.1, &evidence.lines.back()).ok());
+    }
+    Observations observations;
+    observations.camera = TestCamera();
+    ASSERT_TRUE(ObserveEvidence(options, 600.0, &evidence, &observations).ok());
+    for (const PencilObservation& pencil : observations.pencils) {
+      if (pencil.direction != PencilDirection::kZ) continue;
+      EXPECT_LT(AxisDeg(pencil.fit->direction, axes.col(2)), 2.0);
+      ++found;
+    }
+  }
+  EXPECT_GE(found, 0.8 * kTrials);
+}
+
 TEST(ObserveEvidence, SaysWhatIsMissing) {
   PhotoEvidence evidence;
   Observations observations;

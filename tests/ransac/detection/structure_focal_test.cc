@@ -79,6 +79,42 @@ TEST(LikeliestFocal, EdgesAroundTheOnlyPencilTell) {
   }
 }
 
+// A level camera sees the upright edges of a house and those of one front at right angles at any
+// focal length; a few of its other front, too few for a pencil, tell which.
+TEST(LikeliestFocal, AFewEdgesOfTheThirdDirectionTell) {
+  const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.0, 0.7, 0.0));
+  for (const double factor : {0.7, 1.0, 1.4}) {
+    Random random(5);
+    PhotoEvidence evidence;
+    for (int k = 0; k < 40; ++k) AddEdge(axes.col(k % 2), factor, &random, &evidence);
+    EXPECT_NEAR(FromEdges(evidence, factor, Wide(0.5)), 0.0, 0.1) << factor;
+    for (int k = 0; k < 5; ++k) AddEdge(axes.col(2), factor, &random, &evidence);
+    EXPECT_NEAR(FromEdges(evidence, factor, Wide(0.5)), -std::log(factor), 0.06) << factor;
+  }
+}
+
+// A principal point that is off turns all uprights against all that is level, at any focal length
+// but a wrong one: three directions tell the right one nevertheless.
+TEST(LikeliestFocal, ThePrincipalPointMayBeOff) {
+  const Eigen::Matrix3d axes =
+      ExpRotation(Eigen::Vector3d(0.08, 0.0, 0.0)) * ExpRotation(Eigen::Vector3d(0.0, 0.7, 0.0));
+  const PhotoEvidence evidence = Edges(axes, 3, 1.0);
+  std::vector<DetectedPencil> pencils;
+  for (const double off : {-15.0, 15.0}) {
+    Camera camera = TestCamera();
+    camera.cy += off;
+    PhotoEvidence seen;
+    for (const DetectedLine& line : evidence.lines) {
+      seen.lines.emplace_back();
+      ASSERT_TRUE(LineFromSegment(camera, line.ends, 0.1, &seen.lines.back()).ok());
+    }
+    ASSERT_TRUE(DetectPencilsApart(seen.lines, 3, 1, &pencils, 600.0).ok());
+    CameraSigma sigma = Wide(0.5);
+    sigma.principal_point_px = 15.0;
+    EXPECT_NEAR(LikeliestFocal(seen, pencils, camera, sigma, 0.0).log_focal, 0.0, 0.06) << off;
+  }
+}
+
 // What faces the camera says nothing, and the prior stays.
 TEST(LikeliestFocal, FrontalEdgesLeaveThePrior) {
   const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.0, 0.0, 0.2));

@@ -51,9 +51,9 @@ TEST(UncertainDirection, TheOddsOfARightAngleAreThoseOfItsPrior) {
     const bool is_right = random.Uniform() < 0.5;
     const double sine = 2.0 * random.Uniform() - 1.0, sigma_deg = random.Uniform(0.1, 1.5);
     const double angle = (is_right ? turn(0.7) : std::asin(sine)) + turn(sigma_deg);
-    const double odds =
-        LogOddsOfRightAngle(Make(Vector3d::UnitX(), 0.0),
-                            Make(Vector3d(std::sin(angle), std::cos(angle), 0.0), sigma_deg));
+    const double odds = RightAngle(Make(Vector3d::UnitX(), 0.0),
+                                   Make(Vector3d(std::sin(angle), std::cos(angle), 0.0), sigma_deg))
+                            .LogOdds();
     if (odds < -1.5 || odds > 1.5) continue;
     const int bin = odds < -0.5 ? 0 : odds < 0.5 ? 1 : 2;
     ++counts[bin];

@@ -1,0 +1,25 @@
+// A photo looked at through a camera whose focal length is a guess. Internal: not installed, but
+// exported, for circline_simulate.
+#ifndef CIRCLINE_RANSAC_DETECTION_LOOK_FOR_FOCAL_H_
+#define CIRCLINE_RANSAC_DETECTION_LOOK_FOR_FOCAL_H_
+
+#include <functional>
+
+#include "circline/estimators/export.h"
+#include "circline/ransac/detection/observe_evidence.h"
+
+namespace CIRCLINE_EXPORT circline {
+
+// What is found in the photo through a camera.
+using CollectEvidenceFn = std::function<Status(const Camera&, PhotoEvidence*)>;
+
+// The camera at the focal length at which the photo's structure is likeliest, and the evidence seen
+// through that: what is found is straight and round at one focal length, so another one is looked
+// through where it is clearly likelier. Where looks lead back to an earlier one, the one that is
+// contradicted least. `observations` has the camera as it is guessed.
+Status LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& options,
+                    double diagonal_px, PhotoEvidence* evidence, Observations* observations);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_DETECTION_LOOK_FOR_FOCAL_H_

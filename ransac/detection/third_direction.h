@@ -1,0 +1,33 @@
+// The direction at right angles to two others, and what lines say of it. Internal: not installed.
+//
+// Of a house's three directions the third often has few lines: too few to be told from accidents by
+// themselves, enough where two others say where it is to be.
+#ifndef CIRCLINE_RANSAC_DETECTION_THIRD_DIRECTION_H_
+#define CIRCLINE_RANSAC_DETECTION_THIRD_DIRECTION_H_
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "circline/ransac/detection/line_odds.h"
+#include "circline/ransac/detection/uncertain_direction.h"
+
+namespace circline {
+
+// Where the third one is, as houses are made. None where the two are nearly parallel.
+std::optional<UncertainDirection> ThirdDirection(const UncertainDirection& a,
+                                                 const UncertainDirection& b,
+                                                 const CameraError& camera);
+
+struct SharedDirection {
+  double ratio = 0.0;         // Of the likelihoods that some lines share it, and that none do.
+  Eigen::Vector3d direction;  // The likeliest.
+};
+
+// Whether some of the lines, any share of them, share a direction that is known to its covariance:
+// the likelihood is summed over both.
+SharedDirection LinesAlong(const std::vector<LineOdds>& lines, const UncertainDirection& expected);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_DETECTION_THIRD_DIRECTION_H_
