@@ -10,7 +10,8 @@ starts at 60 degrees along the longer side, times 1, 0.7 and 1.4, with a deviati
 
 The answer of a photo is the best hypothesis of `joint`; its deviation is about that one, over all hypotheses at their
 probabilities. `sure` are answers with a deviation of 5 % or less; `same`: with both other guesses an answer within one deviation
-of the first's (two where that is above 5 %), of the photos that answer each time.
+of the first's (two where that is above 5 %), of the photos that answer each time. `box, three directions`: the photos of both sets
+of the box in which three of them were found.
 """
 import argparse
 import json
@@ -25,6 +26,7 @@ from photograph_answers import TO_SCENE
 
 SIGMA = 0.5  # Of log f, of the guess.
 GUESSES = (1.0, 0.7, 1.4)
+GIVEN = {True: 'lens given', False: 'nothing given'}
 # set, whether the lens is given
 ROWS = [
     ('circles-discocal-rgb', True), ('circles-discocal-rgb', False), ('circles-discocal-tir', True), ('circles-discocal-tir', False),
@@ -59,7 +61,7 @@ def guessed(scene, factor, lens_given):
 
 
 def answers(args, scene, scratch):
-    """Of each photo all hypotheses of joint, best first."""
+    """Of each photo all hypotheses of joint, best first; and in which three directions were found."""
     path, out = os.path.join(scratch, 'scene.yaml'), os.path.join(scratch, 'out')
     with open(path, 'w') as file:
         file.write(scene)
@@ -70,7 +72,9 @@ def answers(args, scene, scratch):
         for line in map(json.loads, file):
             if line['status'] == 'ok':
                 found.setdefault(line['image'], []).append(line)
-    return found
+    with open(os.path.join(out, 'observations.jsonl')) as file:
+        three = {line['image'] for line in map(json.loads, file) if len(line['pencils']) >= 3}
+    return found, three
 
 
 def answer(hypotheses):
@@ -100,6 +104,10 @@ def judge(rows):
             percent(sum(compared), len(compared))]
 
 
+def show(name, num_photos, rows):
+    print(f'{name:42}{num_photos:9}' + ''.join(f'{c:>9}' for c in judge(rows)), flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('data')
@@ -110,6 +118,7 @@ def main():
     heads = ['photos', 'answer', 'median %', '<= 5 %', '<= 10 %', 'in 2 s', 'sure', '<= 10 %', '> 20 %', 'same']
     print(f'{"set":42}' + ''.join(f'{h:>9}' for h in heads))
     pooled, num_photos = [], 0
+    boxes = {True: [], False: []}
     with tempfile.TemporaryDirectory() as scratch:
         for data_set, lens_given in ROWS:
             if args.sets and data_set not in args.sets.split(','):
@@ -121,7 +130,7 @@ def main():
                 scene = file.read()
             truth = {m[0]: float(m[4].split(',')[0]) for m in CAMERA.findall(scene)}
             photos = dict(IMAGE.findall(scene))
-            runs = [answers(args, guessed(scene, factor, lens_given), scratch) for factor in GUESSES]
+            runs, threes = zip(*(answers(args, guessed(scene, factor, lens_given), scratch) for factor in GUESSES))
             rows = []
             for photo, camera in photos.items():
                 found = [answer(run[photo]) if photo in run else None for run in runs]
@@ -135,11 +144,15 @@ def main():
                 within = (1 if sigma <= 0.05 else 2) * sigma
                 same = all(abs(a[0] - log_f) <= within for a in found[1:]) if all(found) else None
                 rows.append((log_f - math.log(truth[camera]), sigma, same))
+                if data_set.startswith('box') and photo in threes[0]:
+                    boxes[lens_given].append(rows[-1])
             pooled += rows
             num_photos += len(photos)
-            name = f'{data_set}, {"lens" if lens_given else "nothing"} given'
-            print(f'{name:42}{len(photos):9}' + ''.join(f'{c:>9}' for c in judge(rows)), flush=True)
-    print(f'{"pooled":42}{num_photos:9}' + ''.join(f'{c:>9}' for c in judge(pooled)))
+            show(f'{data_set}, {GIVEN[lens_given]}', len(photos), rows)
+    show('pooled', num_photos, pooled)
+    for lens_given, rows in boxes.items():
+        if rows:
+            show(f'box, three directions, {GIVEN[lens_given]}', len(rows), rows)
 
 
 if __name__ == '__main__':
