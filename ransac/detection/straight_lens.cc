@@ -25,8 +25,8 @@ constexpr std::size_t kMinPointsOfBow = 5;
 constexpr double kStraightShare = 0.5, kMostBowPx = 1.2;
 // Of k1: over which bows are taken for linear, and in which it is compared.
 constexpr double kSlopeStep = 0.01, kK1Step = 0.004;
-// The prior is searched over so many of its standard deviations.
-constexpr double kReachOfPrior = 3.0;
+// The prior is searched over so many of its standard deviations, and no further than lenses go.
+constexpr double kReachOfPrior = 3.0, kMostK1 = 1.5;
 
 // The bow of a line, pixels: what a parabola over it rises from its ends to its middle.
 struct Bow {
@@ -116,7 +116,7 @@ LikelyLens LikeliestLens(const PhotoEvidence& evidence, const Camera& camera,
   };
   const double stated = evidence_at(stated_k1);
   LikelyLens likeliest{stated_k1, 0.0};
-  const int most = static_cast<int>(kReachOfPrior * sigma / kK1Step);
+  const int most = static_cast<int>(std::min(kReachOfPrior * sigma, kMostK1) / kK1Step);
   for (int k = -most; k <= most; ++k) {
     const double k1 = stated_k1 + k * kK1Step, gain = evidence_at(k1) - stated;
     if (gain > likeliest.gain) likeliest = {k1, gain};
