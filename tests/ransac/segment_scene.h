@@ -53,6 +53,15 @@ inline void AddSegment(const Eigen::Vector3d* direction, Random* random,
   if (FitLine(points, 0.5, &fit).ok()) lines->push_back(fit);
 }
 
+// So many lines along `direction`, and others any way.
+inline std::vector<LineFit> Lines(const Eigen::Vector3d& direction, int along, int stray,
+                                  Random* random) {
+  std::vector<LineFit> lines;
+  for (int i = 0; i < along + stray; ++i)
+    AddSegment(i < along ? &direction : nullptr, random, &lines);
+  return lines;
+}
+
 inline double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::asin(std::min(1.0, a.cross(b).norm()));
 }

@@ -10,17 +10,9 @@ namespace circline {
 namespace {
 
 using Eigen::Vector3d;
+using segment_scene::Lines;
 
 constexpr double kSpread = 3e-3;
-
-// So many lines along `direction`, and others any way.
-std::vector<LineFit> Lines(const Vector3d& direction, int along, int stray, Random* random) {
-  std::vector<LineFit> lines;
-  for (int i = 0; i < along + stray; ++i) {
-    segment_scene::AddSegment(i < along ? &direction : nullptr, random, &lines);
-  }
-  return lines;
-}
 
 TEST(OrthogonalEvidence, FindsWhatAFewLinesShareAmongOthers) {
   int found = 0, right = 0;

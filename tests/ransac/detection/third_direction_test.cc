@@ -12,20 +12,15 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kSpread = 3e-3;
-
 UncertainDirection Known(const Vector3d& vector, double sigma_rad) {
   return {vector, sigma_rad * sigma_rad * (Matrix3d::Identity() - vector * vector.transpose())};
 }
 
-// So many lines along `direction`, and others any way.
-std::vector<LineOdds> Lines(const Vector3d& direction, int along, int stray, Random* random) {
-  std::vector<LineFit> fits;
-  for (int i = 0; i < along + stray; ++i)
-    segment_scene::AddSegment(i < along ? &direction : nullptr, random, &fits);
-  std::vector<LineOdds> lines;
-  for (const LineFit& fit : fits) lines.emplace_back(WithDirectionError(fit, kSpread));
-  return lines;
+std::vector<LineOdds> OddsOf(const std::vector<LineFit>& fits) {
+  constexpr double kSpreadRad = 3e-3;
+  std::vector<LineOdds> odds;
+  for (const LineFit& fit : fits) odds.emplace_back(WithDirectionError(fit, kSpreadRad));
+  return odds;
 }
 
 TEST(ThirdDirection, IsAtRightAnglesToBoth) {
@@ -53,14 +48,14 @@ TEST(LinesAlong, AFewLinesAreEnoughWhereTheyAreExpected) {
     const double about_x = kSigma * random.Normal(), about_y = kSigma * random.Normal();
     const Vector3d expected = (R.col(2) + about_x * R.col(0) + about_y * R.col(1)).normalized();
     const SharedDirection shared =
-        LinesAlong(Lines(R.col(2), 5, 25, &random), Known(expected, kSigma));
+        LinesAlong(OddsOf(segment_scene::Lines(R.col(2), 5, 25, &random)), Known(expected, kSigma));
     found += shared.ratio > kOdds ? 1 : 0;
     right += shared.ratio > kOdds &&
                      segment_scene::AngleBetween(shared.direction, R.col(2)) < 3.0 * kSigma
                  ? 1
                  : 0;
     const SharedDirection none =
-        LinesAlong(Lines(R.col(2), 0, 30, &random), Known(expected, kSigma));
+        LinesAlong(OddsOf(segment_scene::Lines(R.col(2), 0, 30, &random)), Known(expected, kSigma));
     accidents += none.ratio > kOdds ? 1 : 0;
   }
   EXPECT_GE(found, 0.7 * kTrials);
