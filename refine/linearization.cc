@@ -121,24 +121,26 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
   return true;
 }
 
-// The loss counts its residuals W times as much as their covariance C asks for, 1 or that of
-// leaning walls: the estimate has the covariance A^-1 (A + J^T (W^2 C - W) J) A^-1, A with W J^T J.
+// The loss counts its residuals W times as much as the covariance does that they are to be counted
+// with, 1 or that of leaning walls.
 void Linearization::TakeLoss(const Term& term, double twice_cost, Rows* rows) {
   double rho[3];
   term.loss->Evaluate(twice_cost, rho);
   const double W = std::max(1.0, rho[1]);
   if (term.is_mostly_exact) {
-    Overcounted over{rows->columns, rows->J, {}};
+    Overcounted over{rows->columns, rows->J, {}, rows->f};
     double information = 1.0;
-    Eigen::MatrixXd C = Eigen::MatrixXd::Identity(over.F.rows(), over.F.rows());
+    Eigen::MatrixXd asked = Eigen::MatrixXd::Identity(over.F.rows(), over.F.rows());
     if (term.lean_shape) {
       // J^T J is the plus Jacobian's P^T P over the variance of a direction's two components.
       const Eigen::MatrixXd& P = PlusJacobian(term.blocks.front());
       over.F = RotationFromBlock(x_ + graph_.block(options_.core.front()).offset) * P;
       information = rows->J.squaredNorm() / P.squaredNorm();
-      C = *term.lean_shape;
+      asked = term.lean_shape->completeOrthogonalDecomposition().pseudoInverse();
+      over.off = over.F * rows->J.completeOrthogonalDecomposition().solve(rows->f);
     }
-    over.S = W * information * (W * C - Eigen::MatrixXd::Identity(C.rows(), C.rows()));
+    over.too_much =
+        information * (W * Eigen::MatrixXd::Identity(asked.rows(), asked.rows()) - asked);
     overcounted_.push_back(std::move(over));
   }
   rows->J *= std::sqrt(W);

@@ -72,10 +72,11 @@ class Linearization {
     Eigen::MatrixXd J;
     Eigen::VectorXd f;
   };
-  // F^T S F: what the information holds too much of, by a loss.
+  // F^T too_much F: what the information holds too much of, by a loss; `off`: what F misses by.
   struct Overcounted {
     std::vector<int> columns;  // Of F.
-    Eigen::MatrixXd F, S;
+    Eigen::MatrixXd F, too_much;
+    Eigen::VectorXd off;
   };
   // X S X^T, a part of the covariance.
   struct Part {
@@ -90,6 +91,7 @@ class Linearization {
   InverseOnPattern::Sparse Information(Eigen::MatrixXd* with_considered) const;
   bool Invert(InverseOnPattern::Sparse information);
   void AddConsidered(const Eigen::MatrixXd& with_considered);
+  void AddOvercounted();
   Misfit MisfitOf(const std::vector<Feature>& features, std::size_t feature,
                   const std::vector<std::size_t>& parts) const;
 

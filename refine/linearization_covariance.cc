@@ -90,6 +90,40 @@ void Linearization::AddConsidered(const Eigen::MatrixXd& with_considered) {
   parts_.push_back(std::move(part));
 }
 
+// With A the information and F^T D F what it holds too much of, the covariance is that without,
+// (A - F^T D F)^-1 = A^-1 + X S X^T with X = A^-1 F^T, S = D (I - F X D)^-1 (Woodbury), about an
+// estimate that lies X S r from here, r being what F misses by.
+void Linearization::AddOvercounted() {
+  Eigen::Index size = 0;
+  for (const Overcounted& over : overcounted_) size += over.F.rows();
+  if (size == 0) return;
+  Eigen::MatrixXd F = Eigen::MatrixXd::Zero(size, num_unknowns_),
+                  D = Eigen::MatrixXd::Zero(size, size), DFX(size, size);
+  Eigen::VectorXd r(size);
+  Eigen::Index first = 0;
+  for (const Overcounted& over : overcounted_) {
+    const Eigen::Index m = over.F.rows();
+    for (Eigen::Index k = 0; k < over.F.cols(); ++k)
+      F.col(over.columns[static_cast<std::size_t>(k)]).segment(first, m) += over.F.col(k);
+    D.block(first, first, m, m) = over.too_much;
+    r.segment(first, m) = over.off;
+    first += m;
+  }
+  Part part{inverse_->Times(F.transpose()), {}};
+  first = 0;
+  for (const Overcounted& over : overcounted_) {
+    Eigen::MatrixXd FX = Eigen::MatrixXd::Zero(over.F.rows(), size);
+    for (Eigen::Index k = 0; k < over.F.cols(); ++k)
+      FX += over.F.col(k) * part.X.row(over.columns[static_cast<std::size_t>(k)]);
+    DFX.middleRows(first, over.F.rows()) = over.too_much * FX;
+    first += over.F.rows();
+  }
+  part.S = (Eigen::MatrixXd::Identity(size, size) - DFX).partialPivLu().solve(D);
+  const Eigen::VectorXd away = part.S * r;
+  part.S = 0.5 * (part.S + part.S.transpose()).eval() + away * away.transpose();
+  parts_.push_back(std::move(part));
+}
+
 bool Linearization::ComputeCovariance() {
   if (!ok_ || num_unknowns_ == 0) return false;
   Eigen::MatrixXd with_considered;
@@ -99,12 +133,7 @@ bool Linearization::ComputeCovariance() {
   parts_.clear();
   if (!Invert(std::move(information))) return false;
   AddConsidered(with_considered);
-  for (const Overcounted& over : overcounted_) {
-    Eigen::MatrixXd F = Eigen::MatrixXd::Zero(num_unknowns_, over.F.rows());
-    for (Eigen::Index k = 0; k < over.F.cols(); ++k)
-      F.row(over.columns[static_cast<std::size_t>(k)]) += over.F.col(k).transpose();
-    parts_.push_back({inverse_->Times(F), over.S});
-  }
+  AddOvercounted();
   std::vector<int> core(static_cast<std::size_t>(core_size_));
   std::iota(core.begin(), core.end(), 0);
   covariance_ = Covariance(core);
