@@ -31,12 +31,6 @@ constexpr double kCirclesGrowth = 2.0;
 // at four each.
 constexpr double kMostOddsOfABox = 24.0;
 
-// Lines along the normal are those of a third direction if they are so much likelier as such: so
-// many focal lengths can be told apart, at one of which they meet it by accident.
-constexpr double kLeastRatio = 20.0;
-// By which a line misses its direction, radians, as the search for pencils has it.
-constexpr double kNormalSpreadRad = 3e-3;
-
 class Assembler {
  public:
   Assembler(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
@@ -219,7 +213,7 @@ class Assembler {
         y.observation.direction = PencilDirection::kY;
         if (plane.circles.empty()) ReadAgain(&x, &y);
         const bool has_normal = SetNormalRole(x.direction, y.direction);
-        if (!has_normal && options_.camera.log_focal > 0.0) AddNormal(order[a], order[b]);
+        if (!has_normal && options_.camera.log_focal > 0.0) AddNormal(x, y);
         return;
       }
     }
@@ -255,31 +249,12 @@ class Assembler {
     return order;
   }
 
-  // The lines along the normal, where they are too few to have been found by themselves.
-  void AddNormal(int x, int y) {
-    const PlacedPencil &a = pencils_[static_cast<std::size_t>(x)],
-                       &b = pencils_[static_cast<std::size_t>(y)];
-    const auto normal = ThirdDirection(a.direction, b.direction, options_.camera);
+  // Lines along the normal that are too few to have been found by themselves. `x` and `y` may move.
+  void AddNormal(const PlacedPencil& x, const PlacedPencil& y) {
+    auto normal = FindThirdPencil(LineSet(lines_, options_.diagonal_px), x, y, options_.camera);
     if (!normal) return;
-    const LineSet set(lines_, options_.diagonal_px);
-    std::vector<int> others;
-    std::vector<LineOdds> odds;
-    for (int i = 0; i < static_cast<int>(lines_.size()); ++i) {
-      if (a.Has(i) || b.Has(i)) continue;
-      others.push_back(i);
-      const LineFit& fit = set.fits[static_cast<std::size_t>(i)];
-      if (!set.IsTwin(i)) odds.emplace_back(WithDirectionError(fit, kNormalSpreadRad));
-    }
-    const SharedDirection shared = LinesAlong(odds, *normal);
-    if (!(shared.ratio > kLeastRatio)) return;
-    FoundPencil found;
-    found.fit.direction = shared.direction;
-    double spread;
-    if (!PencilFitter(set, kNormalSpreadRad).Fit(others, &found, &spread) ||
-        set.Count(found.lines) < PencilOptions().min_lines)
-      return;
-    pencils_.emplace_back(MakePencil(found, set, spread));
-    pencils_.back().observation.direction = PencilDirection::kZ;
+    normal->observation.direction = PencilDirection::kZ;
+    pencils_.emplace_back(std::move(*normal));
   }
 
   // False where no pencil can be along the normal.

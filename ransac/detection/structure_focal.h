@@ -7,7 +7,8 @@
 // directions of the longest pencils are at right angles in pairs, and whether the circles have one
 // plane; each part as the odds of a mixture, so that what has no part in a structure costs its
 // share and no more. Where there is one pencil and nothing else, the edges around it tell at which
-// focal length they are at right angles to it: a box has too few of them for a second pencil.
+// focal length they are at right angles to it: a box has too few of them for a second pencil. Where
+// there are more, other lines tell at which they have the third direction of a thing.
 #ifndef CIRCLINE_RANSAC_DETECTION_STRUCTURE_FOCAL_H_
 #define CIRCLINE_RANSAC_DETECTION_STRUCTURE_FOCAL_H_
 

@@ -26,6 +26,12 @@ constexpr double kMostLogRatio = 10.0;
 constexpr std::array<double, 3> kShares = {0.1127016654, 0.5, 0.8872983346};
 constexpr std::array<double, 3> kWeights = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
 
+// A pencil's lines are along the third direction if they are so much likelier so than any way: so
+// many focal lengths can be told apart, at one of which they meet it by accident.
+constexpr double kLeastRatio = 20.0;
+// By which a line misses its direction, radians, as the search for pencils has it.
+constexpr double kAlongSpreadRad = 3e-3;
+
 double Ratio(const LineOdds& line, const Vector3d& direction) {
   const double miss = line.Miss(direction), variance = line.Variance(direction);
   if (miss * miss > kFar * kFar * variance) return 0.0;
@@ -79,6 +85,29 @@ SharedDirection LinesAlong(const std::vector<LineOdds>& lines, const UncertainDi
   }
   shared.ratio /= all;
   return shared;
+}
+
+std::optional<DetectedPencil> FindThirdPencil(const LineSet& set, const PlacedPencil& a,
+                                              const PlacedPencil& b, const CameraError& camera) {
+  const auto third = ThirdDirection(a.direction, b.direction, camera);
+  if (!third) return std::nullopt;
+  std::vector<int> others;
+  std::vector<LineOdds> odds;
+  for (int i = 0; i < static_cast<int>(set.lines.size()); ++i) {
+    if (a.Has(i) || b.Has(i)) continue;
+    others.push_back(i);
+    const LineFit& fit = set.fits[static_cast<std::size_t>(i)];
+    if (!set.IsTwin(i)) odds.emplace_back(WithDirectionError(fit, kAlongSpreadRad));
+  }
+  const SharedDirection shared = LinesAlong(odds, *third);
+  if (!(shared.ratio > kLeastRatio)) return std::nullopt;
+  FoundPencil found;
+  found.fit.direction = shared.direction;
+  double spread;
+  if (!PencilFitter(set, kAlongSpreadRad).Fit(others, &found, &spread) ||
+      set.Count(found.lines) < PencilOptions().min_lines)
+    return std::nullopt;
+  return MakePencil(found, set, spread);
 }
 
 }  // namespace circline

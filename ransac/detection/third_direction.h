@@ -9,7 +9,9 @@
 #include <optional>
 #include <vector>
 
+#include "circline/ransac/detection/choose_plane.h"
 #include "circline/ransac/detection/line_odds.h"
+#include "circline/ransac/detection/pencil_fitter.h"
 #include "circline/ransac/detection/uncertain_direction.h"
 
 namespace circline {
@@ -27,6 +29,11 @@ struct SharedDirection {
 // Whether some of the lines, any share of them, share a direction that is known to its covariance:
 // the likelihood is summed over both.
 SharedDirection LinesAlong(const std::vector<LineOdds>& lines, const UncertainDirection& expected);
+
+// The pencil of those of the lines that are of neither of two others and along the third direction;
+// none where they are too few, or may be along it by accident.
+std::optional<DetectedPencil> FindThirdPencil(const LineSet& set, const PlacedPencil& a,
+                                              const PlacedPencil& b, const CameraError& camera);
 
 }  // namespace circline
 
