@@ -62,6 +62,12 @@ Eigen::Vector3d PoseHypothesis::SigmaRotation() const {
 void SetCovariance(Matrix6d covariance, PoseHypothesis* hypothesis) {
   constexpr double kRounding = 1e-12;
   const double nothing = kRounding * covariance.cwiseAbs().maxCoeff();
+  // Where next to nothing is known of a direction, rounding may leave less than that.
+  if (covariance.allFinite() && covariance.diagonal().minCoeff() < -nothing) {
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(covariance);
+    covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                 eigen.eigenvectors().transpose();
+  }
   Vector6d scale = Vector6d::Zero();
   for (int i = 0; i < 6; ++i) {
     if (covariance(i, i) > 0.0) {

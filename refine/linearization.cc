@@ -128,7 +128,7 @@ void Linearization::TakeLoss(const Term& term, double twice_cost, Rows* rows) {
   term.loss->Evaluate(twice_cost, rho);
   const double W = std::max(1.0, rho[1]);
   if (term.is_mostly_exact) {
-    Overcounted over{rows->columns, rows->J, {}, rows->f};
+    Overcounted over{rows->columns, rows->J, rows->f};
     double information = 1.0;
     Eigen::MatrixXd asked = Eigen::MatrixXd::Identity(over.F.rows(), over.F.rows());
     if (term.lean_shape) {
@@ -137,10 +137,14 @@ void Linearization::TakeLoss(const Term& term, double twice_cost, Rows* rows) {
       over.F = RotationFromBlock(x_ + graph_.block(options_.core.front()).offset) * P;
       information = rows->J.squaredNorm() / P.squaredNorm();
       asked = term.lean_shape->completeOrthogonalDecomposition().pseudoInverse();
-      over.off = over.F * rows->J.completeOrthogonalDecomposition().solve(rows->f);
+      over.r = over.F * rows->J.completeOrthogonalDecomposition().solve(rows->f);
     }
-    over.too_much =
-        information * (W * Eigen::MatrixXd::Identity(asked.rows(), asked.rows()) - asked);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> too_much(
+        information * (W * Eigen::MatrixXd::Identity(asked.rows(), asked.rows()) - asked));
+    const Eigen::MatrixXd root = too_much.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
+                                 too_much.eigenvectors().transpose();
+    over.F = root * over.F;
+    over.r = root * over.r;
     overcounted_.push_back(std::move(over));
   }
   rows->J *= std::sqrt(W);

@@ -72,11 +72,11 @@ class Linearization {
     Eigen::MatrixXd J;
     Eigen::VectorXd f;
   };
-  // F^T too_much F: what the information holds too much of, by a loss; `off`: what F misses by.
+  // F^T F: what the information holds too much of, by a loss; r: what F misses by.
   struct Overcounted {
     std::vector<int> columns;  // Of F.
-    Eigen::MatrixXd F, too_much;
-    Eigen::VectorXd off;
+    Eigen::MatrixXd F;
+    Eigen::VectorXd r;
   };
   // X S X^T, a part of the covariance.
   struct Part {

@@ -14,6 +14,17 @@ using Sparse = InverseOnPattern::Sparse;
 
 constexpr double kNoInformation = 1e-12;  // Of an eigenvalue, at unit diagonal.
 
+// Of a matrix that has no eigenvalue below 1e-6 but for rounding.
+Eigen::MatrixXd InverseOfPositive(const Eigen::MatrixXd& matrix) {
+  const Eigen::Index n = matrix.rows();
+  const Eigen::LLT<Eigen::MatrixXd> llt(matrix);
+  if (llt.info() == Eigen::Success) return llt.solve(Eigen::MatrixXd::Identity(n, n));
+  constexpr double kLeast = 1e-6;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(matrix);
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(kLeast).cwiseInverse().asDiagonal() *
+         eigen.eigenvectors().transpose();
+}
+
 }  // namespace
 
 Sparse Linearization::Information(Eigen::MatrixXd* with_considered) const {
@@ -90,37 +101,35 @@ void Linearization::AddConsidered(const Eigen::MatrixXd& with_considered) {
   parts_.push_back(std::move(part));
 }
 
-// With A the information and F^T D F what it holds too much of, the covariance is that without,
-// (A - F^T D F)^-1 = A^-1 + X S X^T with X = A^-1 F^T, S = D (I - F X D)^-1 (Woodbury), about an
-// estimate that lies X S r from here, r being what F misses by.
+// With A the information and F^T F what it holds too much of, the covariance is that without,
+// (A - F^T F)^-1 = A^-1 + X S X^T with X = A^-1 F^T, S = (I - F X)^-1 (Woodbury), about an estimate
+// that lies X S r from here, r being what F misses by.
 void Linearization::AddOvercounted() {
   Eigen::Index size = 0;
   for (const Overcounted& over : overcounted_) size += over.F.rows();
   if (size == 0) return;
-  Eigen::MatrixXd F = Eigen::MatrixXd::Zero(size, num_unknowns_),
-                  D = Eigen::MatrixXd::Zero(size, size), DFX(size, size);
+  Eigen::MatrixXd F = Eigen::MatrixXd::Zero(size, num_unknowns_);
   Eigen::VectorXd r(size);
   Eigen::Index first = 0;
   for (const Overcounted& over : overcounted_) {
-    const Eigen::Index m = over.F.rows();
     for (Eigen::Index k = 0; k < over.F.cols(); ++k)
-      F.col(over.columns[static_cast<std::size_t>(k)]).segment(first, m) += over.F.col(k);
-    D.block(first, first, m, m) = over.too_much;
-    r.segment(first, m) = over.off;
-    first += m;
-  }
-  Part part{inverse_->Times(F.transpose()), {}};
-  first = 0;
-  for (const Overcounted& over : overcounted_) {
-    Eigen::MatrixXd FX = Eigen::MatrixXd::Zero(over.F.rows(), size);
-    for (Eigen::Index k = 0; k < over.F.cols(); ++k)
-      FX += over.F.col(k) * part.X.row(over.columns[static_cast<std::size_t>(k)]);
-    DFX.middleRows(first, over.F.rows()) = over.too_much * FX;
+      F.col(over.columns[static_cast<std::size_t>(k)]).segment(first, over.F.rows()) +=
+          over.F.col(k);
+    r.segment(first, over.r.size()) = over.r;
     first += over.F.rows();
   }
-  part.S = (Eigen::MatrixXd::Identity(size, size) - DFX).partialPivLu().solve(D);
+  Part part{inverse_->Times(F.transpose()), {}};
+  Eigen::MatrixXd left = Eigen::MatrixXd::Identity(size, size);
+  first = 0;
+  for (const Overcounted& over : overcounted_) {
+    for (Eigen::Index k = 0; k < over.F.cols(); ++k)
+      left.middleRows(first, over.F.rows()) -=
+          over.F.col(k) * part.X.row(over.columns[static_cast<std::size_t>(k)]);
+    first += over.F.rows();
+  }
+  part.S = InverseOfPositive(left);
   const Eigen::VectorXd away = part.S * r;
-  part.S = 0.5 * (part.S + part.S.transpose()).eval() + away * away.transpose();
+  part.S += away * away.transpose();
   parts_.push_back(std::move(part));
 }
 

@@ -21,6 +21,7 @@ std::optional<UncertainDirection> ThirdDirection(const UncertainDirection& a,
                                                  const UncertainDirection& b,
                                                  const CameraError& camera);
 
+// What LinesAlong finds.
 struct SharedDirection {
   double ratio = 0.0;         // Of the likelihoods that some lines share it, and that none do.
   Eigen::Vector3d direction;  // The likeliest.
