@@ -140,7 +140,7 @@ bool Linearization::ComputeCovariance() {
   for (int k = 0; k < num_unknowns_ && options_.floor > 0.0; ++k)
     information.coeffRef(k, k) = information.coeff(k, k) * (1.0 + options_.floor) + options_.floor;
   parts_.clear();
-  if (!Invert(std::move(information))) return false;
+  if (!Invert(information)) return false;
   AddConsidered(with_considered);
   AddOvercounted();
   std::vector<int> core(static_cast<std::size_t>(core_size_));
