@@ -39,7 +39,9 @@ AdjustProblem::Covariances AdjustProblem::Covariance(int end) const {
   Weighing inliers;
   inliers.inliers_only = true;
   constexpr double kTiny = 1e-10;  // What nothing ties (one circle's spin) says nothing.
-  Linearization at(*this, ActiveTerms(end), values().data(), inliers, {{}, -1, {}, kTiny});
+  Linearization::Options options;
+  options.floor = kTiny;
+  Linearization at(*this, ActiveTerms(end), values().data(), inliers, options);
   Covariances out = OfPriors();
   if (!at.ComputeCovariance()) return out;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {

@@ -57,7 +57,7 @@ Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
 }
 
 void AdjustProblem::Judge() {
-  const double* parameters[8];
+  const double* parameters[kMostBlocks];
   for (Feature& feature : features_) {
     const Term& term = this->term(feature.term);
     const auto rows = static_cast<std::size_t>(term.cost->num_residuals());
@@ -96,7 +96,7 @@ double AdjustProblem::Misfit() const {
       rows += features_[static_cast<std::size_t>(term->feature)].rows;
       continue;
     }
-    const double* parameters[8];
+    const double* parameters[kMostBlocks];
     Parameters(*term, values().data(), parameters);
     const double own = TwiceCostOf(*term->cost, nullptr, Weighing(), parameters);
     if (!std::isfinite(own)) continue;
@@ -145,7 +145,7 @@ std::vector<Eigen::Vector2d> Across(const std::vector<Eigen::Vector2d>& pixels, 
 std::vector<std::vector<AdjustedResidual>> AdjustProblem::Residuals() const {
   std::vector<std::vector<AdjustedResidual>> out(photos_.size());
   std::vector<double> distances;
-  const double* parameters[8];
+  const double* parameters[kMostBlocks];
   for (const Feature& feature : features_) {
     const Term& term = this->term(feature.term);
     const ImagePoints* points = term.weighed->points();

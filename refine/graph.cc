@@ -22,13 +22,14 @@ int Graph::AddBlock(int size, const std::vector<double>& value,
   values_.insert(values_.end(), value.begin(), value.end());
   values_.resize(static_cast<std::size_t>(blocks_.back().offset + size), 0.0);
   const int index = static_cast<int>(blocks_.size()) - 1;
+  manifolds_.emplace_back();
   SetManifold(index, std::move(manifold));
   return index;
 }
 
 void Graph::SetManifold(int index, std::unique_ptr<ceres::Manifold> manifold) {
   block(index).manifold = manifold.get();
-  if (manifold != nullptr) manifolds_.push_back(std::move(manifold));
+  manifolds_[static_cast<std::size_t>(index)] = std::move(manifold);
 }
 
 int Graph::AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature, int group,
@@ -51,7 +52,7 @@ void Graph::Parameters(const Term& term, const double* x, const double** out) co
 }
 
 double Graph::TwiceCost(const Term& term, const double* x, const Weighing& weighing) const {
-  const double* parameters[8];
+  const double* parameters[kMostBlocks];
   Parameters(term, x, parameters);
   double rho[3] = {TwiceCostOf(*term.cost, term.weighed, weighing, parameters), 0.0, 0.0};
   if (term.loss != nullptr && std::isfinite(rho[0])) term.loss->Evaluate(rho[0], rho);
@@ -60,7 +61,7 @@ double Graph::TwiceCost(const Term& term, const double* x, const Weighing& weigh
 
 double Graph::LargestMiss(const std::vector<const Term*>& terms, const double* x) const {
   double most = 0.0;
-  const double* parameters[8];
+  const double* parameters[kMostBlocks];
   for (const Term* term : terms) {
     if (term->weighed == nullptr) continue;
     Parameters(*term, x, parameters);

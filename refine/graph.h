@@ -8,6 +8,7 @@
 #include <ceres/problem.h>
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -20,6 +21,9 @@ namespace circline {
 using BlockMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCameraSize, kCameraSize>;
 using BlockVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCameraSize, 1>;
+
+// A term has no more blocks.
+constexpr std::size_t kMostBlocks = 8;
 
 BlockMatrix PlusJacobianOf(const ceres::Manifold& manifold, const double* at);
 
@@ -97,7 +101,7 @@ class Graph {
   std::vector<Block> blocks_;
   std::vector<Term> terms_;
   std::vector<double> values_;
-  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
+  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;  // By block.
 };
 
 }  // namespace circline

@@ -12,7 +12,7 @@ namespace {
 template <typename Visit>
 void ForEachCurve(const JointProblem& problem, const State& state, const Visit& visit) {
   std::vector<double> distances;
-  const double* parameters[8];
+  const double* parameters[kMostBlocks];
   for (const Term* term : problem.ActiveTerms(state)) {
     const ImagePoints* points = term->weighed != nullptr ? term->weighed->points() : nullptr;
     if (points == nullptr) continue;
@@ -25,7 +25,7 @@ void ForEachCurve(const JointProblem& problem, const State& state, const Visit& 
 // Calls visit(feature, cost, miss) for each single point that takes part.
 template <typename Visit>
 void ForEachPoint(const JointProblem& problem, const State& state, const Visit& visit) {
-  const double* parameters[8];
+  const double* parameters[kMostBlocks];
   for (const JointProblem::PointBlocks& p : problem.points()) {
     const Term& term = problem.term(p.term);
     if (!problem.IsActive(term, state)) continue;

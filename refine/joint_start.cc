@@ -155,7 +155,7 @@ void JointProblem::PlaceScale(Placed placed, const double* camera, State* state)
 
 bool JointProblem::PlaceLine(const LineBlocks& l, State* state) const {
   const Term& term = this->term(l.term);
-  const double* parameters[8];
+  const double* parameters[kMostBlocks];
   Parameters(term, state->x.data(), parameters);
   double* line = At(l.line, state);
   return static_cast<const DirectionLineCost&>(*term.cost).Start(parameters, line);

@@ -80,9 +80,8 @@ const Eigen::MatrixXd& Linearization::PlusJacobian(int index) {
 }
 
 bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
-  constexpr std::size_t kMaxBlocks = 8;
-  const double* parameters[kMaxBlocks];
-  double* jacobians[kMaxBlocks];
+  const double* parameters[kMostBlocks];
+  double* jacobians[kMostBlocks];
   graph_.Parameters(term, x_, parameters);
   const int num_rows = term.cost->num_residuals();
   Rows rows{term.feature, term.group, {}, {}, Eigen::VectorXd(num_rows)};

@@ -221,7 +221,7 @@ int TrackFrame::CircleStarts(const TrackState& prior, CameraPose* starts) const 
 bool TrackFrame::Place(std::size_t index, TrackFit* fit) const {
   const Term& term = terms_[index];
   if (term.own == 0) return true;
-  const double* parameters[8];
+  const double* parameters[kMostBlocks];
   Parameters(term, fit->state.x.data(), fit->own.data(), parameters);
   return static_cast<const DirectionLineCost&>(*term.cost)
       .Start(parameters, fit->own.data() + 2 * index);
@@ -245,7 +245,7 @@ bool TrackFrame::Begin(const TrackState& prior, const CameraPose& start, TrackFi
 
 // Twice a term's cost; infinite where it has none.
 double TrackFrame::TwiceCost(std::size_t index, const TrackFit& fit) const {
-  const double* parameters[8];
+  const double* parameters[kMostBlocks];
   Parameters(terms_[index], fit.state.x.data(), fit.own.data(), parameters);
   return TwiceCostOf(*terms_[index].cost, nullptr, Weighing(), parameters);
 }

@@ -145,7 +145,7 @@ void FillFrame(const TrackFrame& frame, const TrackFit& fit, PoseHypothesis* h,
                std::vector<std::string>* notes, std::vector<double>* distances) {
   h->cost = fit.cost;
   double squares = 0.0;
-  const double* parameters[8];
+  const double* parameters[kMostBlocks];
   for (std::size_t i = 0; i < frame.terms().size(); ++i) {
     const TrackFrame::Term& term = frame.terms()[i];
     if (fit.active[i] == 0) {

@@ -54,7 +54,7 @@ class TrackFrame::Information {
   bool Add(std::size_t index, const Weighing& weighing) {
     const Scratch::Scope scope(&frame_.scratch_);
     const Term& term = frame_.terms_[index];
-    const double* parameters[8];
+    const double* parameters[kMostBlocks];
     double* jacobians[8];
     CurveJacobian ambient[8];
     frame_.Parameters(term, fit_.state.x.data(), fit_.own.data(), parameters);

@@ -18,9 +18,10 @@ DEFINE_string(outlier_kind, "band",
               "band: uniform within 40 px of the feature; cluster: all in one disc of 15 px radius "
               "whose centre lies 40 px off the feature.");
 DEFINE_double(focal, 1800.0, "Focal length, pixels.");
-DEFINE_double(focal_sigma, 0.0,
-              "Of streets: standard deviation of the logarithm of the focal length where that is "
-              "a guess of 60 degrees and the principal point one of the middle; 0: calibrated.");
+DEFINE_double(
+    focal_sigma, 0.0,
+    "Of streets: standard deviation of the logarithm of the focal length where that is "
+    "a guess of 60 degrees and the principal point one of the middle, 0.1 to 1; 0: calibrated.");
 DEFINE_string(translation, "2,2,100", "Of the camera: the world's origin in its frame.");
 DEFINE_uint64(seed, 1, "Same flags and seed: same bytes out, whatever the threads.");
 DEFINE_int32(threads, 0, "Images worked on at a time; 0 = one for each core.");

@@ -222,8 +222,8 @@ Status SimulationOptions::Validate() const {
     return Status::Invalid("focal must be positive");
   if (!(inlier_sigmas > 0.0) || !std::isfinite(inlier_sigmas))
     return Status::Invalid("inlier_sigmas must be positive");
-  if (!(focal_sigma >= 0.0 && focal_sigma <= 1.0))
-    return Status::Invalid("focal_sigma must be between 0 and 1");
+  if (focal_sigma != 0.0 && !(focal_sigma >= 0.1 && focal_sigma <= 1.0))
+    return Status::Invalid("focal_sigma must be 0, or between 0.1 and 1");
   if (threads < 0 || threads > 1024) return Status::Invalid("threads must be between 0 and 1024");
   const Status status = PaperScene(focal_px, translation).Validate();
   return status.ok() ? status : Status::Invalid("translation: " + status.message);

@@ -28,7 +28,7 @@ struct SimulationOptions {
   Eigen::Vector3d translation = Eigen::Vector3d(2.0, 2.0, 100.0);
   std::uint64_t seed = 1;
   int threads = 0;           // 0 = one for each core.
-  double focal_sigma = 0.0;  // Of streets: that of DrawStreet, 0 to 1.
+  double focal_sigma = 0.0;  // Of streets: that of DrawStreet, 0 or 0.1 to 1.
   // With outliers: a point farther than this from its curve is one, in standard deviations of the
   // noise; > 0. FitObservations takes 3.03 at most.
   double inlier_sigmas = 3.03;

@@ -3,7 +3,6 @@
 #define CIRCLINE_RANSAC_DETECTION_CHOOSE_PLANE_H_
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <array>
 #include <utility>
 #include <vector>
@@ -19,8 +18,6 @@ struct PlacedPencil : DetectedPencil {
         direction{observation.fit->direction, observation.fit->covariance} {}
   PlacedPencil(DetectedPencil pencil, const Eigen::Vector3d& along)
       : DetectedPencil(std::move(pencil)), direction{along, Eigen::Matrix3d::Zero()} {}
-  bool Has(int line) const { return std::binary_search(members.begin(), members.end(), line); }
-
   UncertainDirection direction;
   bool of_grid = false;  // A row or column of circles.
   bool spans = false;    // One of the two that the plane was chosen by.

@@ -11,6 +11,7 @@
 #include "circline/ransac/detection/orthogonal_evidence.h"
 #include "circline/ransac/detection/pencil_fitter.h"
 #include "circline/ransac/detection/segment_meetings.h"
+#include "circline/ransac/detection/uncertain_direction.h"
 #include "circline/ransac/robust_pencils.h"
 
 namespace circline {
@@ -18,10 +19,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Lines that are parallel in space miss their common direction by more than edges explain: in old
-// streets and on hand-made things by a third of a degree, on paper that bends by more. The search
-// allows for this much. Radians.
-constexpr double kSearchSigmaRad = 3e-3;
 // For so many of the longest pencils, so many are searched among the lines that meet theirs.
 constexpr std::size_t kMaxSearchedAround = 3;
 constexpr int kFoundAround = 2;
@@ -31,7 +28,7 @@ constexpr double kTwinShareOfPhoto = 4.0 / kUsualDiagonalPx;
 PencilOptions SearchOptions(int max_pencils, std::uint64_t seed) {
   PencilOptions options;
   options.ransac.seed = seed;
-  options.model_sigma_rad = kSearchSigmaRad;
+  options.model_sigma_rad = kParallelSigmaRad;
   options.max_pencils = max_pencils;
   return options;
 }
@@ -60,7 +57,7 @@ std::vector<DetectedPencil> Search(const LineSet& set, const PencilOptions& opti
   std::vector<FoundPencil> found;
   std::vector<DetectedPencil> pencils;
   if (!FindPencils(chosen, options, &found).ok()) return pencils;
-  const PencilFitter fitter(set, kSearchSigmaRad);
+  const PencilFitter fitter(set, kParallelSigmaRad);
   for (FoundPencil& f : found) {
     for (int& i : f.lines) i = subset[static_cast<std::size_t>(i)];
     fitter.StartAtDensest(options.ransac.seed, &f);
@@ -78,7 +75,7 @@ std::vector<int> LinesAround(const LineSet& set, const DetectedPencil& pencil) {
   std::vector<int> around;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const int k = static_cast<int>(i);
-    if (std::binary_search(pencil.members.begin(), pencil.members.end(), k)) continue;
+    if (pencil.Has(k)) continue;
     const bool meets = std::any_of(pencil.ends.begin(), pencil.ends.end(), [&](const Segment& s) {
       return AreNear(s, lines[i].ends, set.diagonal_px);
     });
@@ -125,12 +122,12 @@ std::vector<LineFit> FitsOf(const LineSet& set, const std::vector<int>& subset) 
 std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::vector<int>& subset,
                                                const Vector3d& axis) {
   const std::vector<LineFit> pool = FitsOf(set, OneOfEachEdge(set, subset));
-  const std::optional<Vector3d> best = OrthogonalEvidence(pool, axis, kSearchSigmaRad).Best();
+  const std::optional<Vector3d> best = OrthogonalEvidence(pool, axis, kParallelSigmaRad).Best();
   if (!best) return std::nullopt;
   FoundPencil found;
   found.fit.direction = *best;
   double spread;
-  if (!PencilFitter(set, kSearchSigmaRad).Fit(subset, &found, &spread)) return std::nullopt;
+  if (!PencilFitter(set, kParallelSigmaRad).Fit(subset, &found, &spread)) return std::nullopt;
   if (set.Count(found.lines) < PencilOptions().min_lines) return std::nullopt;
   return MakePencil(found, set, spread);
 }
@@ -212,9 +209,7 @@ std::vector<DetectedLine> LinesOutside(const std::vector<DetectedLine>& lines,
                                        double diagonal_px) {
   std::vector<int> outside;
   for (int i = 0; i < static_cast<int>(lines.size()); ++i) {
-    if (std::none_of(pencils.begin(), pencils.end(), [i](const DetectedPencil& pencil) {
-          return std::binary_search(pencil.members.begin(), pencil.members.end(), i);
-        }))
+    if (std::none_of(pencils.begin(), pencils.end(), [i](const auto& p) { return p.Has(i); }))
       outside.push_back(i);
   }
   return EdgesOf(LineSet(lines, diagonal_px), outside);

@@ -3,6 +3,7 @@
 #define CIRCLINE_RANSAC_DETECTION_DETECT_PENCILS_H_
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct DetectedPencil {
   std::vector<int> members;       // Its lines, indices into those searched, ascending.
   std::vector<Segment> ends;      // Of its lines, pixels.
   double support_px = 0.0;        // Length of its lines.
+
+  bool Has(int line) const { return std::binary_search(members.begin(), members.end(), line); }
 };
 
 // Robust and sequential, first among all lines (`max_pencils`), then, for the longest pencils,

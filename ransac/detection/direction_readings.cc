@@ -17,8 +17,6 @@ using Eigen::Vector3d;
 constexpr int kMostTurnDeg = 12;
 // Leans, standard deviations, that stand for all.
 constexpr double kLeans[] = {-2.0, -1.0, 0.0, 1.0, 2.0};
-// By which a line misses its pencil's direction, radians, as the search for pencils has it.
-constexpr double kLineSpreadRad = 3e-3;
 // Less likely a line is along a direction no more.
 constexpr double kNegligible = -20.0;
 
@@ -28,11 +26,11 @@ std::vector<DirectionReading> ReadDirection(const std::vector<LineFit>& lines, c
                                             const Vector3d& direction, int num_own) {
   const double share = num_own / (static_cast<double>(lines.size()) + 1.0);
   const double reach = std::sin((kMostTurnDeg + 2.0 * kRightAngleSigmaDeg) * kDegree) +
-                       kInlierSigmas * kLineSpreadRad;
+                       kInlierSigmas * kParallelSigmaRad;
   std::vector<LineOdds> near;
   for (const LineFit& line : lines) {
     if (std::abs(line.line.dot(direction)) < reach)
-      near.emplace_back(WithDirectionError(line, kLineSpreadRad));
+      near.emplace_back(WithDirectionError(line, kParallelSigmaRad));
   }
   const auto log_likelihood = [&](const Vector3d& v) {
     double sum = 0.0;

@@ -26,8 +26,6 @@ constexpr double kReach = 2.5;
 constexpr double kNarrowest = 0.0874887, kWidest = 1.7320508;
 // Circles whose normals are tried as that of the plane.
 constexpr std::size_t kMaxSeeds = 6;
-// Edges of one thing may miss their direction by this, radians.
-constexpr double kSpreadRad = 3e-3;
 // Of circles that are of the plane that most are of.
 constexpr double kPlaneShare = 0.5;
 // Odds that two directions are at right angles below which a third to both is not looked for.
@@ -35,7 +33,8 @@ constexpr double kNegligible = 0.05;
 // Beyond these the odds are the same.
 constexpr double kMostLogOdds = 300.0;
 // The principal point is summed over so many steps to either side, of so many standard deviations:
-// by a step of 25 pixels of 600 a right angle changes by 1.4 degrees, twice what walls lean.
+// a step of 12 pixels of 600, of the principal point of a camera that is a guess, changes a right
+// angle by up to 1.1 degrees, about what walls lean.
 constexpr int kMiddleSteps = 5;
 constexpr double kMiddleStep = 0.5;
 // The circles of a plane have its normal within this of that of one of them, degrees.
@@ -109,7 +108,8 @@ class StructureEvidence {
   // Of the edges around the only pencil as those of one thing with it.
   static double EdgesAtRightAngles(const FocusedFeatures& features) {
     if (!features.pencils[0]) return 0.0;
-    const OrthogonalEvidence evidence(EdgesOf(features), features.pencils[0]->vector, kSpreadRad);
+    const OrthogonalEvidence evidence(EdgesOf(features), features.pencils[0]->vector,
+                                      kParallelSigmaRad);
     return std::exp(std::min(evidence.HighestLogOdds(), kMostLogOdds));
   }
 
@@ -117,7 +117,7 @@ class StructureEvidence {
   static double EdgesAlongThird(const FocusedFeatures& features, double middle_rad) {
     std::vector<LineOdds> lines;
     for (const LineFit& edge : EdgesOf(features))
-      lines.emplace_back(WithDirectionError(edge, kSpreadRad));
+      lines.emplace_back(WithDirectionError(edge, kParallelSigmaRad));
     const CameraError camera{middle_rad, 0.0};
     double sum = 0.0, pairs = 0.0;
     for (std::size_t i = 0; i < features.pencils.size(); ++i) {

@@ -29,8 +29,6 @@ constexpr std::array<double, 3> kWeights = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
 // A pencil's lines are along the third direction if they are so much likelier so than any way: so
 // many focal lengths can be told apart, at one of which they meet it by accident.
 constexpr double kLeastRatio = 20.0;
-// By which a line misses its direction, radians, as the search for pencils has it.
-constexpr double kAlongSpreadRad = 3e-3;
 
 double Ratio(const LineOdds& line, const Vector3d& direction) {
   const double miss = line.Miss(direction), variance = line.Variance(direction);
@@ -97,14 +95,14 @@ std::optional<DetectedPencil> FindThirdPencil(const LineSet& set, const PlacedPe
     if (a.Has(i) || b.Has(i)) continue;
     others.push_back(i);
     const LineFit& fit = set.fits[static_cast<std::size_t>(i)];
-    if (!set.IsTwin(i)) odds.emplace_back(WithDirectionError(fit, kAlongSpreadRad));
+    if (!set.IsTwin(i)) odds.emplace_back(WithDirectionError(fit, kParallelSigmaRad));
   }
   const SharedDirection shared = LinesAlong(odds, *third);
   if (!(shared.ratio > kLeastRatio)) return std::nullopt;
   FoundPencil found;
   found.fit.direction = shared.direction;
   double spread;
-  if (!PencilFitter(set, kAlongSpreadRad).Fit(others, &found, &spread) ||
+  if (!PencilFitter(set, kParallelSigmaRad).Fit(others, &found, &spread) ||
       set.Count(found.lines) < PencilOptions().min_lines)
     return std::nullopt;
   return MakePencil(found, set, spread);

@@ -23,8 +23,8 @@ std::optional<UncertainDirection> ThirdDirection(const UncertainDirection& a,
 
 // What LinesAlong finds.
 struct SharedDirection {
-  double ratio = 0.0;         // Of the likelihoods that some lines share it, and that none do.
-  Eigen::Vector3d direction;  // The likeliest.
+  double ratio = 0.0;  // Of the likelihoods that some lines share it, and that none do.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // The likeliest.
 };
 
 // Whether some of the lines, any share of them, share a direction that is known to its covariance:

@@ -15,6 +15,11 @@ namespace circline {
 // The walls of most houses are at right angles, to about so much (each pair, standard deviation).
 constexpr double kRightAngleSigmaDeg = 0.7;
 
+// Lines that are parallel in space miss their common direction by more than edges explain: in old
+// streets and on hand-made things by a third of a degree, on paper that bends by more. Searches
+// allow for this much, as NoiseModel::line_direction_rad does. Radians.
+constexpr double kParallelSigmaRad = 3e-3;
+
 // A unit vector (a normal, or a pencil's direction), its sense without meaning, and its covariance,
 // rank 2, rad^2.
 struct UncertainDirection {

@@ -263,6 +263,7 @@ TEST(Simulate, BadFlagsAreNamedAndNothingIsWritten) {
       {"--outlier_kind=clusters", "did you mean 'cluster'?"},
       {"--focal=0", "--focal"},
       {"--focal_sigma=-0.1", "--focal_sigma"},
+      {"--focal_sigma=0.05", "--focal_sigma"},
       {"--translation=1,2", "--translation"},
       {"--translation=0,0,-100", "--translation"},
       {"--scene=streets", "did you mean 'street'?"},

@@ -93,25 +93,32 @@ TEST(LikeliestFocal, AFewEdgesOfTheThirdDirectionTell) {
   }
 }
 
-// A principal point that is off turns all uprights against all that is level, at any focal length
-// but a wrong one: three directions tell the right one nevertheless.
+// A principal point that is off turns all uprights against all that is level, which right angles
+// make up for by another focal length, if it is taken for exact.
 TEST(LikeliestFocal, ThePrincipalPointMayBeOff) {
   const Eigen::Matrix3d axes =
       ExpRotation(Eigen::Vector3d(0.08, 0.0, 0.0)) * ExpRotation(Eigen::Vector3d(0.0, 0.7, 0.0));
   const PhotoEvidence evidence = Edges(axes, 3, 1.0);
-  std::vector<DetectedPencil> pencils;
-  for (const double off : {-15.0, 15.0}) {
-    Camera camera = TestCamera();
-    camera.cy += off;
-    PhotoEvidence seen;
-    for (const DetectedLine& line : evidence.lines) {
-      seen.lines.emplace_back();
-      ASSERT_TRUE(LineFromSegment(camera, line.ends, 0.1, &seen.lines.back()).ok());
+  for (const double factor : {0.7, 1.4}) {
+    for (const double off : {-30.0, 30.0}) {
+      Camera camera = Guess(factor);
+      camera.cy += off;
+      PhotoEvidence seen;
+      for (const DetectedLine& line : evidence.lines) {
+        seen.lines.emplace_back();
+        ASSERT_TRUE(LineFromSegment(camera, line.ends, 0.1, &seen.lines.back()).ok());
+      }
+      std::vector<DetectedPencil> pencils;
+      ASSERT_TRUE(DetectPencilsApart(seen.lines, 3, 1, &pencils, 600.0).ok());
+      CameraSigma sigma = Wide(0.5);
+      const auto error = [&](double middle_px) {
+        sigma.principal_point_px = middle_px;
+        const LikelyFocal likeliest = LikeliestFocal(seen, pencils, camera, sigma, 0.0);
+        return likeliest.log_focal + std::log(factor);
+      };
+      EXPECT_NEAR(error(20.0), 0.0, 0.02) << factor << " " << off;
+      EXPECT_GT(std::abs(error(0.0)), 0.2) << factor << " " << off;
     }
-    ASSERT_TRUE(DetectPencilsApart(seen.lines, 3, 1, &pencils, 600.0).ok());
-    CameraSigma sigma = Wide(0.5);
-    sigma.principal_point_px = 15.0;
-    EXPECT_NEAR(LikeliestFocal(seen, pencils, camera, sigma, 0.0).log_focal, 0.0, 0.06) << off;
   }
 }
 
