@@ -41,6 +41,7 @@ AdjustProblem::Covariances AdjustProblem::Covariance(int end) const {
   constexpr double kTiny = 1e-10;  // What nothing ties (one circle's spin) says nothing.
   Linearization::Options options;
   options.floor = kTiny;
+  options.at_minimum = end >= static_cast<int>(photos_.size());
   Linearization at(*this, ActiveTerms(end), values().data(), inliers, options);
   Covariances out = OfPriors();
   if (!at.ComputeCovariance()) return out;

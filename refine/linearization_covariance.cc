@@ -128,8 +128,10 @@ void Linearization::AddOvercounted() {
     first += over.F.rows();
   }
   part.S = InverseOfPositive(left);
-  const Eigen::VectorXd away = part.S * r;
-  part.S += away * away.transpose();
+  if (options_.at_minimum) {
+    const Eigen::VectorXd away = part.S * r;
+    part.S += away * away.transpose();
+  }
   parts_.push_back(std::move(part));
 }
 
