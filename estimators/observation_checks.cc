@@ -58,6 +58,8 @@ Status ValidatePencil(const PencilObservation& pencil) {
     return Status::Invalid("pencil '" + pencil.id + "': " + what);
   };
   if (!NonNegative(pencil.sigma_px)) return wrong("sigma_px must be 0 or more");
+  if (!NonNegative(pencil.axis_probability) || pencil.axis_probability > 1.0)
+    return wrong("axis_probability must be from 0 to 1");
   for (const LineObservation& line : pencil.lines) {
     if (!Finite(line.points)) return wrong("a segment is not finite");
     if (!NonNegative(line.sigma_px)) {

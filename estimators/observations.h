@@ -95,6 +95,9 @@ struct PencilObservation {
   // refinement gives those far from its pose to hypotheses of their own: the same turned, with its
   // covariance and inliers. Empty: as `fit` says.
   std::vector<DirectionReading> readings;
+  // Of a detected pencil along an axis, where the focal length is unknown: how probably it runs so.
+  // Poses are those where it does; their covariances count that it may run any way.
+  double axis_probability = 1.0;
 };
 
 // Where the user wants the world frame. All optional; where nothing is said, the plane is the first

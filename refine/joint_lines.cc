@@ -16,18 +16,23 @@ namespace {
 
 constexpr double kHalfPi = 1.57079632679489661923;
 
-// By how much the lines of a pencil miss its direction, radians: root mean square, together with
-// one line that misses it by what the noise model says.
+// By how much the lines of a pencil miss its direction, beyond their own noise, radians: root mean
+// square, each as it tells of that, together with one line that misses it by what the noise model
+// says.
 double LineMiss(const PencilObservation& pencil, double usual) {
   constexpr double kUnknowns = 2.0;  // Of a direction.
   double squares = usual * usual, count = 1.0 - kUnknowns;
   for (const LineObservation& line : pencil.lines) {
     if (!line.fit || !line.is_parallel || !pencil.fit) continue;
-    const double miss = line.fit->line.normalized().dot(pencil.fit->direction);
-    squares += miss * miss;
-    count += 1.0;
+    const Eigen::Vector3d& v = pencil.fit->direction;
+    const double miss = line.fit->line.normalized().dot(v);
+    const double noise = std::max(
+        0.0, v.dot(line.fit->covariance * v) / line.fit->line.squaredNorm() - usual * usual);
+    const double tells = std::pow(usual * usual / (usual * usual + noise), 2.0);
+    squares += tells * (miss * miss - noise);
+    count += tells;
   }
-  return std::sqrt(squares / std::max(1.0, count));
+  return std::sqrt(std::max(0.0, squares) / std::max(1.0, count));
 }
 
 // Standard deviation of a pencil's direction against its axis. A photo tells the focal length or
@@ -42,6 +47,19 @@ double AxisSigma(const PencilObservation& pencil, const NoiseModel& model,
   const bool is_free = pencil.direction == PencilDirection::kFree;
   if (is_free || !(model.pencil_axis_rad > 0.0) || !camera.IsWide()) return model.pencil_axis_rad;
   return std::max(model.pencil_axis_rad, kOfMiss * LineMiss(pencil, model.line_direction_rad));
+}
+
+// What a direction may miss its axis by, as the covariance is to count it, in units of `sigma`, the
+// axis' own: LeanShape, walls apart by what the noise model says, whatever the corner; and any way,
+// where it may run along none.
+Eigen::Matrix3d LeanAgainst(double sigma, const PencilObservation& pencil,
+                            const NoiseModel& model) {
+  constexpr double kAnyWay = 0.6;  // Radians: of each component of a direction without sense.
+  const double walls = std::pow(model.pencil_axis_rad / sigma, 2.0);
+  const double any = std::pow(kAnyWay / sigma, 2.0) * (1.0 - pencil.axis_probability);
+  Eigen::Matrix3d one_wall = Eigen::Matrix3d::Identity();
+  if (pencil.fit) one_wall -= pencil.fit->direction * pencil.fit->direction.transpose();
+  return walls * LeanShape(pencil) + ((1.0 - walls) * kLeaning * kLeaning + any) * one_wall;
 }
 
 }  // namespace
@@ -78,7 +96,7 @@ int JointProblemBuilder::DirectionBlock(std::size_t index) {
   const int term = p_.AddTerm(
       is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma) : NewDirectionPrior(axis, sigma),
       {block}, feature, -1, std::make_unique<MostlyExact>());
-  if (!is_free) p_.term(term).lean_shape = LeanShape(pencil);
+  if (!is_free) p_.term(term).lean_shape = LeanAgainst(sigma, pencil, model_);
   return block;
 }
 

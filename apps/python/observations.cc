@@ -110,16 +110,17 @@ PencilObservation PencilFromPython(const py::handle& object) {
   pencil.sigma_px = Get<double>(object, "sigma_px");
   pencil.fit = Get<std::optional<VanishingPointFit>>(object, "fit");
   pencil.readings = Get<std::vector<DirectionReading>>(object, "readings");
+  pencil.axis_probability = Get<double>(object, "axis_probability");
   return pencil;
 }
 
 py::object PencilToPython(PencilObservation&& pencil) {
   py::list lines;
   for (LineObservation& line : pencil.lines) lines.append(LineToPython(std::move(line)));
-  return Class("PencilObservation")("id"_a = pencil.id, "lines"_a = lines,
-                                    "direction"_a = PencilDirectionName(pencil.direction),
-                                    "plane"_a = pencil.plane, "sigma_px"_a = pencil.sigma_px,
-                                    "fit"_a = pencil.fit, "readings"_a = pencil.readings);
+  return Class("PencilObservation")(
+      "id"_a = pencil.id, "lines"_a = lines, "direction"_a = PencilDirectionName(pencil.direction),
+      "plane"_a = pencil.plane, "sigma_px"_a = pencil.sigma_px, "fit"_a = pencil.fit,
+      "readings"_a = pencil.readings, "axis_probability"_a = pencil.axis_probability);
 }
 
 FrameObservation FrameFromPython(const py::handle& object) {

@@ -12,6 +12,7 @@
 #include "circline/ransac/detection/circle_grid.h"
 #include "circline/ransac/detection/direction_readings.h"
 #include "circline/ransac/detection/find_box.h"
+#include "circline/ransac/detection/judge_axes.h"
 #include "circline/ransac/detection/pencil_fitter.h"
 #include "circline/ransac/detection/segment_meetings.h"
 #include "circline/ransac/detection/third_direction.h"
@@ -212,8 +213,10 @@ class Assembler {
         x.observation.direction = PencilDirection::kX;
         y.observation.direction = PencilDirection::kY;
         if (plane.circles.empty()) ReadAgain(&x, &y);
-        const bool has_normal = SetNormalRole(x.direction, y.direction);
-        if (!has_normal && options_.camera.log_focal > 0.0) AddNormal(x, y);
+        PlacedPencil* z = SetNormalRole(x.direction, y.direction);
+        if (!(options_.camera.log_focal > 0.0)) return;
+        JudgeAxes(options_, x, &y, z);
+        if (z == nullptr) AddNormal(x, y);
         return;
       }
     }
@@ -257,8 +260,8 @@ class Assembler {
     pencils_.emplace_back(std::move(*normal));
   }
 
-  // False where no pencil can be along the normal.
-  bool SetNormalRole(const UncertainDirection& x, const UncertainDirection& y) {
+  // Null where no pencil can be along the normal.
+  PlacedPencil* SetNormalRole(const UncertainDirection& x, const UncertainDirection& y) {
     for (PlacedPencil& pencil : pencils_) {
       if (!pencil.observation.plane.empty()) continue;
       if (!(RightAngle(pencil.direction, x, options_.camera).LogOdds() > 0.0) ||
@@ -266,9 +269,9 @@ class Assembler {
         continue;
       }
       pencil.observation.direction = PencilDirection::kZ;
-      return true;
+      return &pencil;
     }
-    return false;
+    return nullptr;
   }
 
   // Everything in its final order, with ids; repetitions and pencils beyond max_pencils are left

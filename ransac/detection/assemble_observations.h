@@ -23,6 +23,9 @@ struct AssemblyOptions {
   double max_shared_plane_deg = 5.0;      // As in DetectionOptions.
   double diagonal_px = kUsualDiagonalPx;  // Of the photo (segment_meetings.h).
   CameraError camera;  // Of one whose focal length was looked for; else none counts.
+  // Of such a one: what is known beforehand of the logarithm of the focal length, over the
+  // camera's.
+  double prior_log_focal = 0.0, focal_sigma = 0.0;
 };
 
 // Chooses the plane with most support, "p0": that of two pencils and the circles that agree with

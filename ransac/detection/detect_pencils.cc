@@ -69,6 +69,12 @@ std::vector<DetectedPencil> Search(const LineSet& set, const PencilOptions& opti
   return pencils;
 }
 
+// Whether a line comes near one of the pencil's.
+bool Meets(const DetectedPencil& pencil, const Segment& ends, double diagonal_px) {
+  return std::any_of(pencil.ends.begin(), pencil.ends.end(),
+                     [&](const Segment& s) { return AreNear(s, ends, diagonal_px); });
+}
+
 // The lines that are near one of the pencil's, and not of it.
 std::vector<int> LinesAround(const LineSet& set, const DetectedPencil& pencil) {
   const std::vector<DetectedLine>& lines = set.lines;
@@ -76,10 +82,7 @@ std::vector<int> LinesAround(const LineSet& set, const DetectedPencil& pencil) {
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const int k = static_cast<int>(i);
     if (pencil.Has(k)) continue;
-    const bool meets = std::any_of(pencil.ends.begin(), pencil.ends.end(), [&](const Segment& s) {
-      return AreNear(s, lines[i].ends, set.diagonal_px);
-    });
-    if (meets) around.push_back(k);
+    if (Meets(pencil, lines[i].ends, set.diagonal_px)) around.push_back(k);
   }
   return around;
 }
@@ -204,15 +207,22 @@ std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
   return EdgesOf(set, LinesAround(set, pencil));
 }
 
-std::vector<DetectedLine> LinesOutside(const std::vector<DetectedLine>& lines,
-                                       const std::vector<DetectedPencil>& pencils,
-                                       double diagonal_px) {
-  std::vector<int> outside;
+std::vector<DetectedLine> EdgesAroundAll(const std::vector<DetectedLine>& lines,
+                                         const std::vector<DetectedPencil>& pencils,
+                                         double diagonal_px) {
+  const LineSet set(lines, diagonal_px);
+  std::vector<int> around;
   for (int i = 0; i < static_cast<int>(lines.size()); ++i) {
-    if (std::none_of(pencils.begin(), pencils.end(), [i](const auto& p) { return p.Has(i); }))
-      outside.push_back(i);
+    const Segment& ends = lines[static_cast<std::size_t>(i)].ends;
+    const auto has = [i](const DetectedPencil& pencil) { return pencil.Has(i); };
+    const auto meets = [&](const DetectedPencil& pencil) {
+      return Meets(pencil, ends, diagonal_px);
+    };
+    if (std::none_of(pencils.begin(), pencils.end(), has) &&
+        std::any_of(pencils.begin(), pencils.end(), meets))
+      around.push_back(i);
   }
-  return EdgesOf(LineSet(lines, diagonal_px), outside);
+  return EdgesOf(set, around);
 }
 
 LineFit WithSharedError(const DetectedLine& line, double shared_px) {

@@ -50,10 +50,10 @@ std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
                                       const DetectedPencil& pencil,
                                       double diagonal_px = kUsualDiagonalPx);
 
-// The same of the lines that are of none of some pencils.
-std::vector<DetectedLine> LinesOutside(const std::vector<DetectedLine>& lines,
-                                       const std::vector<DetectedPencil>& pencils,
-                                       double diagonal_px = kUsualDiagonalPx);
+// The same of lines that are of none of some pencils, and come near one of these.
+std::vector<DetectedLine> EdgesAroundAll(const std::vector<DetectedLine>& lines,
+                                         const std::vector<DetectedPencil>& pencils,
+                                         double diagonal_px = kUsualDiagonalPx);
 
 // The pencil of lines[members] along `direction`, each as good as its `fits` says (one a member):
 // the line's own with a covariance that counts whatever else the line may miss the direction by.

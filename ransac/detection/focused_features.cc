@@ -28,18 +28,9 @@ constexpr double kSeenShare = 0.8;
 constexpr double kDistinctSine = 0.0523;
 
 // Calibrated coordinates at another focal length: x' = A x.
-UncertainDirection Refocus(const UncertainDirection& direction, const Vector3d& scale) {
-  UncertainDirection out;
-  const Vector3d moved = scale.cwiseProduct(direction.vector);
-  out.vector = moved.normalized();
-  const Matrix3d J = (Matrix3d::Identity() - out.vector * out.vector.transpose()) *
-                     scale.asDiagonal() / moved.norm();
-  out.covariance = J * direction.covariance * J.transpose();
-  return out;
-}
-
-ConicFit Refocus(const ConicFit& fit, const Vector3d& scale) {
-  const Matrix3d inverse = scale.cwiseInverse().asDiagonal();
+ConicFit Refocus(const ConicFit& fit, double log_focal) {
+  const double s = std::exp(log_focal);
+  const Matrix3d inverse = Vector3d(s, s, 1.0).asDiagonal();
   ConicFit out = fit;
   out.conic = inverse * fit.conic * inverse;
   Matrix6d J;
@@ -67,19 +58,13 @@ ConicFit Between(const ConicFit& a, const ConicFit& b, double share) {
 template <typename Feature>
 std::vector<std::optional<Feature>> Between(const std::vector<std::optional<Feature>>& low,
                                             const std::vector<std::optional<Feature>>& high,
-                                            double share, const Vector3d& from_low,
-                                            const Vector3d& from_high) {
+                                            double share, double from_low, double from_high) {
   std::vector<std::optional<Feature>> out(low.size());
   for (std::size_t i = 0; i < low.size(); ++i) {
     if (low[i] && high[i])
       out[i] = Between(Refocus(*low[i], from_low), Refocus(*high[i], from_high), share);
   }
   return out;
-}
-
-Vector3d ScaleOf(double log_focal) {
-  const double s = std::exp(-log_focal);
-  return {s, s, 1.0};
 }
 
 }  // namespace
@@ -101,7 +86,7 @@ FeaturesByFocal::FeaturesByFocal(const PhotoEvidence& evidence,
   AddCircles(evidence);
   AddPencils(pencils);
   if (pencils_.size() > 1) {
-    if (circles_.size() < 2) AddEdges(LinesOutside(evidence.lines, pencils, diagonal_px));
+    if (circles_.size() < 2) AddEdges(EdgesAroundAll(evidence.lines, pencils, diagonal_px));
   } else if (IsEmpty() && !pencils.empty()) {
     AddEdges(EdgesAround(evidence.lines, pencils[0], diagonal_px));
   }
@@ -194,11 +179,10 @@ FocusedFeatures FeaturesByFocal::At(double log_focal) {
   const int node = static_cast<int>(std::floor(log_focal / kNodeStep));
   const double share = log_focal / kNodeStep - node;
   const FocusedFeatures &low = Node(node), &high = Node(node + 1);
-  const Vector3d from_low = ScaleOf(share * kNodeStep),
-                 from_high = ScaleOf((share - 1.0) * kNodeStep);
+  const double from_low = share * kNodeStep, from_high = (share - 1.0) * kNodeStep;
   return {Between(low.circles, high.circles, share, from_low, from_high),
           Between(low.pencils, high.pencils, share, from_low, from_high),
-          Between(low.edges, high.edges, share, from_low.cwiseInverse(), from_high.cwiseInverse())};
+          Between(low.edges, high.edges, share, -from_low, -from_high)};
 }
 
 }  // namespace circline

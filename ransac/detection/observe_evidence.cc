@@ -56,6 +56,8 @@ Status ObserveEvidence(const DetectionOptions& options, double diagonal_px, Phot
     assembly.camera.middle_rad =
         options.noise_model.camera.principal_point_px / observations->camera.fx;
     assembly.camera.log_focal = kFoundFocalSigma;
+    assembly.prior_log_focal = StatedLogFocal(*observations);
+    assembly.focal_sigma = options.noise_model.camera.LargestLogFocal();
   }
   AssembleObservations(assembly, evidence->lines, evidence->bent, &evidence->circles, &pencils,
                        observations);

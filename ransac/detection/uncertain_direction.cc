@@ -47,6 +47,18 @@ AngleTest CompareToRightAngle(const UncertainDirection& a, const UncertainDirect
 
 }  // namespace
 
+UncertainDirection Refocus(const UncertainDirection& direction, double log_focal) {
+  const double s = std::exp(-log_focal);
+  const Matrix3d scale = Vector3d(s, s, 1.0).asDiagonal();
+  const Vector3d moved = scale * direction.vector;
+  UncertainDirection out;
+  out.vector = moved.normalized();
+  const Matrix3d J =
+      (Matrix3d::Identity() - out.vector * out.vector.transpose()) * scale / moved.norm();
+  out.covariance = J * direction.covariance * J.transpose();
+  return out;
+}
+
 bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal,
              double max_deg) {
   const AngleTest test = CompareToRightAngle(direction, normal);

@@ -27,6 +27,9 @@ struct UncertainDirection {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
+// The same seen through a camera of another focal length, its logarithm over that of the first.
+UncertainDirection Refocus(const UncertainDirection& direction, double log_focal);
+
 // Whether a direction can lie in the plane with a normal; never beyond `max_deg`.
 bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal, double max_deg);
 

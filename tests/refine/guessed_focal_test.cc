@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
 
 #include "circline/refine/estimate_pose.h"
 #include "tests/plane_scene.h"
@@ -26,6 +28,74 @@ TEST(GuessedFocalLength, IsKnownToItsPriorWhereRightAnglesSayNothing) {
     EXPECT_LT(sigma, std::hypot(0.5, std::log(best.focal_scale))) << tilt;
     EXPECT_GT(sigma, 0.01) << tilt;
   }
+}
+
+// The short edges of a front among the many that a photo has: each misses the direction by degrees,
+// as its ends are noisy, and not because the walls lean.
+Observations Front(PlaneScene* scene) {
+  constexpr double kHalf = 0.25;  // 30 pixels long.
+  Observations observations = scene->Empty();
+  for (const auto direction : {PencilDirection::kX, PencilDirection::kY}) {
+    const bool is_x = direction == PencilDirection::kX;
+    PencilObservation pencil = scene->Pencil(is_x ? "x" : "y", direction, Eigen::Vector3d::Zero());
+    pencil.plane = "p0";
+    pencil.lines.clear();
+    const Eigen::Vector3d along =
+        kHalf * (is_x ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY());
+    for (int k = 0; k < 40; ++k) {
+      const double u = scene->random.Uniform(-3.0, 3.0), v = scene->random.Uniform(-3.0, 3.0);
+      pencil.lines.push_back(
+          scene->Line(Eigen::Vector3d(u, v, 0.0) - along, Eigen::Vector3d(u, v, 0.0) + along));
+    }
+    observations.pencils.push_back(pencil);
+  }
+  return observations;
+}
+
+EstimationOptions Guessed() {
+  EstimationOptions options;
+  options.camera_sigma = CameraSigma();
+  options.camera_sigma->log_focal = 0.5;
+  return options;
+}
+
+TEST(GuessedFocalLength, IsKnownAsWellAsShortEdgesTellIt) {
+  constexpr int kScenes = 60;
+  int within = 0;
+  double squares = 0.0;
+  for (std::uint64_t seed = 1; seed <= kScenes; ++seed) {
+    PlaneScene scene(0.7, 1.0, seed);
+    scene.camera.distortion = {};
+    const PoseEstimate estimate = EstimatePose(Front(&scene), Guessed());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& best = estimate.hypotheses.front();
+    const double off = std::log(best.focal_scale) / (best.focal_sigma / best.focal_scale);
+    within += std::abs(off) < 2.0 ? 1 : 0;
+    squares += off * off;
+  }
+  const double rms = std::sqrt(squares / kScenes);
+  std::printf("focal length of short edges: error over deviation %.2f, within two in %d of %d\n",
+              rms, within, kScenes);
+  EXPECT_GE(within, 54);
+  EXPECT_GT(rms, 0.5);
+}
+
+// Nothing but the prior is left where the axes may be none.
+TEST(GuessedFocalLength, IsDoubtedWithTheAxes) {
+  PlaneScene scene(0.7, 0.1);
+  scene.camera.distortion = {};  // A known lens would tell its focal length.
+  Observations observations = Front(&scene);
+  const PoseHypothesis sure = EstimatePose(observations, Guessed()).hypotheses.front();
+  observations.pencils[1].axis_probability = 0.5;
+  const PoseHypothesis doubted = EstimatePose(observations, Guessed()).hypotheses.front();
+  EXPECT_NEAR(doubted.focal_scale, sure.focal_scale, 1e-9);
+  EXPECT_LT(sure.focal_sigma, 0.2);
+  EXPECT_GT(doubted.focal_sigma, 0.3);
+  EXPECT_LT(doubted.focal_sigma / doubted.focal_scale,
+            std::hypot(0.5, std::log(doubted.focal_scale)));
+  observations.pencils[1].axis_probability = 1.5;
+  const Status status = EstimatePose(observations, Guessed()).status;
+  EXPECT_EQ(status.code, StatusCode::kInvalidArgument) << status.message;
 }
 
 }  // namespace

@@ -87,6 +87,8 @@ class PencilObservation:
     fit: Optional[VanishingPointFit] = None
     readings: List[DirectionReading] = field(default_factory=list)
     """Directions that a detected pencil may have; empty: as `fit` says."""
+    axis_probability: float = 1.0
+    """Of a detected pencil, where the focal length is unknown: how probably it runs along its axis."""
 
 
 @dataclass(eq=False)

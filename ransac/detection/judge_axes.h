@@ -1,0 +1,22 @@
+// How probably pencils that were taken for axes are at right angles, seen through a camera whose
+// focal length is unknown. Internal: not installed.
+//
+// At a known focal length two directions look square by accident once in fifty times. At an unknown
+// one they do so at some focal length in one case of two, and the estimate takes that one: what
+// tells is whether their lines meet, as those of one thing do, and whether a third direction is
+// square to both at the same focal length.
+#ifndef CIRCLINE_RANSAC_DETECTION_JUDGE_AXES_H_
+#define CIRCLINE_RANSAC_DETECTION_JUDGE_AXES_H_
+
+#include "circline/ransac/detection/assemble_observations.h"
+#include "circline/ransac/detection/choose_plane.h"
+
+namespace circline {
+
+// Fills PencilObservation::axis_probability of y, and of z where there is one: null = none.
+void JudgeAxes(const AssemblyOptions& options, const PlacedPencil& x, PlacedPencil* y,
+               PlacedPencil* z);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_RANSAC_DETECTION_JUDGE_AXES_H_

@@ -1,0 +1,78 @@
+#include "circline/ransac/detection/judge_axes.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "circline/estimators/basics.h"
+#include "circline/estimators/pose.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// A pencil known to 0.1 degrees, of eight segments on the photo side by side.
+PlacedPencil Pencil(const Vector3d& direction, const Vector2d& from, const Vector2d& along,
+                    const Vector2d& across) {
+  DetectedPencil pencil;
+  VanishingPointFit fit;
+  fit.direction = direction;
+  fit.covariance =
+      std::pow(0.1 * kDegree, 2.0) * (Matrix3d::Identity() - direction * direction.transpose());
+  pencil.observation.fit = fit;
+  for (int k = 0; k < 8; ++k)
+    pencil.ends.push_back({Vector2d(from + k * across), Vector2d(from + k * across + along)});
+  pencil.support_px = 8.0 * along.norm();
+  return PlacedPencil(std::move(pencil));
+}
+
+// Rows from (100, 100), and columns that cross them, or do so elsewhere on the photo.
+struct Axes {
+  PlacedPencil x, y, z;
+
+  explicit Axes(const Matrix3d& R, const Vector2d& columns = {100.0, 100.0})
+      : x(Pencil(R.col(0), {100.0, 100.0}, {140.0, 0.0}, {0.0, 20.0})),
+        y(Pencil(R.col(1), columns, {0.0, 140.0}, {20.0, 0.0})),
+        z(Pencil(R.col(2), {400.0, 100.0}, {50.0, 50.0}, {20.0, 0.0})) {}
+};
+
+AssemblyOptions Guessed() {
+  AssemblyOptions options;
+  options.camera.log_focal = 0.1;
+  options.focal_sigma = 0.5;
+  return options;
+}
+
+const Matrix3d kTurned = ExpRotation(Vector3d(0.5, -0.6, 0.4));
+
+TEST(JudgeAxes, RowsAndColumnsAreOfOneThing) {
+  Axes axes(kTurned);
+  JudgeAxes(Guessed(), axes.x, &axes.y, nullptr);
+  EXPECT_EQ(axes.y.observation.axis_probability, 1.0);
+}
+
+TEST(JudgeAxes, LinesThatDoNotMeetAreDoubted) {
+  Axes axes(kTurned, {400.0, 300.0});
+  JudgeAxes(Guessed(), axes.x, &axes.y, nullptr);
+  EXPECT_LT(axes.y.observation.axis_probability, 0.1);
+}
+
+// Whichever way a level camera sees the corner of a house, some focal length makes it square: one
+// that looks down as well has only one that makes it square to the uprights, too.
+TEST(JudgeAxes, AThirdDirectionIsConfirmedByTheSecond) {
+  const Matrix3d level = ExpRotation(Vector3d(0.0, 0.7, 0.0));
+  Axes seen_level(level), seen_from_above(kTurned);
+  JudgeAxes(Guessed(), seen_level.x, &seen_level.y, &seen_level.z);
+  JudgeAxes(Guessed(), seen_from_above.x, &seen_from_above.y, &seen_from_above.z);
+  EXPECT_LT(seen_level.z.observation.axis_probability, 0.9);
+  EXPECT_GT(seen_level.z.observation.axis_probability, 0.5);
+  EXPECT_EQ(seen_from_above.z.observation.axis_probability, 1.0);
+  EXPECT_EQ(seen_from_above.y.observation.axis_probability, 1.0);
+}
+
+}  // namespace
+}  // namespace circline
