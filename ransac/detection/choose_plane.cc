@@ -40,15 +40,14 @@ bool HasLongerNeighbour(const std::vector<PlacedPencil>& pencils, std::size_t i)
 // Length of the lines of two pencils that meet; 0 where these are too few to tell a plane. No
 // better than by the weaker of the two: one long pencil makes no plane. What is one thing meets
 // all over; of a room's long pencils the half that meets may do so by accident.
-double JointSupport(const PlacedPencil& a, const PlacedPencil& b, const AssemblyOptions& options) {
-  const double of_a = MeetingLength(a.ends, b.ends, options.diagonal_px),
-               of_b = MeetingLength(b.ends, a.ends, options.diagonal_px);
-  const bool is_calibrated = !(options.camera.log_focal > 0.0);
+double JointSupport(const PlacedPencil& a, const PlacedPencil& b, double diagonal_px) {
+  const double of_a = MeetingLength(a.ends, b.ends, diagonal_px),
+               of_b = MeetingLength(b.ends, a.ends, diagonal_px);
   const double share = std::min(of_a / a.support_px, of_b / b.support_px);
   const double larger_share = std::max(of_a / a.support_px, of_b / b.support_px);
   const bool is_rectangle =
       (share >= kMinRectangularShare && Rectangular(a.direction, b.direction)) ||
-      (is_calibrated && larger_share >= kMinRectangularShare &&
+      (larger_share >= kMinRectangularShare &&
        RightAngle(a.direction, b.direction).LogOdds() > 0.0);
   const bool is_plane = share >= kMinSpanningShare || is_rectangle;
   return is_plane ? 2.0 * std::min(of_a, of_b) * std::sqrt(share) : 0.0;
@@ -158,7 +157,7 @@ Plane PlaneChooser::Best(const Plane& of_circles, const std::vector<PlacedPencil
       Plane plane;
       if (!SpannedNormal(pencils[i].direction, pencils[j].direction, &plane.normal)) continue;
       plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
-      plane.support_px = JointSupport(pencils[i], pencils[j], options_);
+      plane.support_px = JointSupport(pencils[i], pencils[j], options_.diagonal_px);
       if (!(plane.support_px > 0.0)) continue;
       plane.support_px *= PrecisionShare(plane.normal);
       AddCircles(&plane);

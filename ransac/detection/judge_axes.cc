@@ -23,9 +23,15 @@ double Odds(const UncertainDirection& a, const UncertainDirection& b, const Came
   return std::exp(RightAngle(a, b, camera).LogOdds());
 }
 
+// Of the first one's length that meets the second, as if one more of its lines did by accident.
+double MeetingShare(const PlacedPencil& a, const PlacedPencil& b, double diagonal_px) {
+  const double n = static_cast<double>(a.ends.size()),
+               share = MeetingLength(a.ends, b.ends, diagonal_px) / a.support_px;
+  return (n * share + kAccidentalShare) / (n + 1.0);
+}
+
 double ProbabilityOfOneThing(const PlacedPencil& a, const PlacedPencil& b, double diagonal_px) {
-  const double share = std::max(MeetingLength(a.ends, b.ends, diagonal_px) / a.support_px,
-                                MeetingLength(b.ends, a.ends, diagonal_px) / b.support_px);
+  const double share = std::max(MeetingShare(a, b, diagonal_px), MeetingShare(b, a, diagonal_px));
   const double odds = std::pow(share / kAccidentalShare, kPower);
   return odds / (1.0 + odds);
 }

@@ -282,29 +282,5 @@ TEST(AssembleObservations, KeepsNoMorePencilsThanAsked) {
   EXPECT_TRUE(Assemble({}, {}).frame.plane.empty());
 }
 
-// A board, and uprights of the room behind it of which one crosses three of its twelve rows. At a
-// known focal length right angles tell that the two are of one thing, at a guess they do not.
-TEST(AssembleObservations, WhatMeetsByAccidentSpansNoPlaneOfAGuessedCamera) {
-  DetectedPencil rows = Pencil(kFrame.col(0), 480.0), uprights = Pencil(kFrame.col(1), 800.0);
-  rows.ends.clear();
-  uprights.ends.clear();
-  for (int k = 0; k < 12; ++k)
-    rows.ends.push_back({Eigen::Vector2d(100.0, 40.0 * k), Eigen::Vector2d(140.0, 40.0 * k)});
-  for (int k = 0; k < 8; ++k) {
-    const double u = k == 0 ? 120.0 : 400.0 + 20.0 * k;
-    uprights.ends.push_back({Eigen::Vector2d(u, 70.0), Eigen::Vector2d(u, 170.0)});
-  }
-  for (const bool is_guessed : {false, true}) {
-    AssemblyOptions options;
-    options.camera.log_focal = is_guessed ? 0.1 : 0.0;
-    options.focal_sigma = is_guessed ? 0.5 : 0.0;
-    std::vector<CircleEvidence> circles;
-    std::vector<DetectedPencil> pencils = {rows, uprights};
-    Observations observations;
-    AssembleObservations(options, {}, {}, &circles, &pencils, &observations);
-    EXPECT_EQ(observations.frame.plane, is_guessed ? "" : "p0");
-  }
-}
-
 }  // namespace
 }  // namespace circline
