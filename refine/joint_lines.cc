@@ -95,7 +95,9 @@ int JointProblemBuilder::DirectionBlock(std::size_t index) {
   const int feature = AddFeature(tie);
   const int term = p_.AddTerm(
       is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma) : NewDirectionPrior(axis, sigma),
-      {block}, feature, -1, std::make_unique<MostlyExact>());
+      {block}, feature, -1,
+      p_.camera_sigma_.IsWide() ? std::make_unique<MostlyExact>(MostlyExact::kNarrowerOfGuess)
+                                : std::make_unique<MostlyExact>());
   if (!is_free) p_.term(term).lean_shape = LeanAgainst(sigma, pencil, model_);
   return block;
 }

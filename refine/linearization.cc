@@ -131,12 +131,20 @@ void Linearization::TakeLoss(const Term& term, double twice_cost, Rows* rows) {
     double information = 1.0;
     Eigen::MatrixXd asked = Eigen::MatrixXd::Identity(over.F.rows(), over.F.rows());
     if (term.lean_shape) {
-      // J^T J is the plus Jacobian's P^T P over the variance of a direction's two components.
-      const Eigen::MatrixXd& P = PlusJacobian(term.blocks.front());
-      over.F = RotationFromBlock(x_ + graph_.block(options_.core.front()).offset) * P;
-      information = rows->J.squaredNorm() / P.squaredNorm();
-      asked = term.lean_shape->completeOrthogonalDecomposition().pseudoInverse();
-      over.r = over.F * rows->J.completeOrthogonalDecomposition().solve(rows->f);
+      // In the direction's tangent plane. J^T J is P^T P, the plus Jacobian's, a multiple of 1,
+      // over the variance of a direction's two components.
+      const Eigen::MatrixXd turned =
+          RotationFromBlock(x_ + graph_.block(options_.core.front()).offset) *
+          PlusJacobian(term.blocks.front());
+      const Eigen::Index n = turned.cols();
+      over.F = Eigen::MatrixXd::Identity(n, n);
+      information = rows->J.squaredNorm() / static_cast<double>(n);
+      asked = turned.squaredNorm() / static_cast<double>(n) *
+              (turned.transpose() * *term.lean_shape * turned).inverse();
+      over.r = rows->J.completeOrthogonalDecomposition().solve(rows->f);
+      // Where a direction may run any way no other one is likelier, and nothing is linear.
+      constexpr double kAnyWay = 0.1;  // Radians.
+      if (information * asked.trace() * kAnyWay * kAnyWay < turned.squaredNorm()) over.r.setZero();
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> too_much(
         information * (W * Eigen::MatrixXd::Identity(asked.rows(), asked.rows()) - asked));
