@@ -50,11 +50,12 @@ double AxisSigma(const PencilObservation& pencil, const NoiseModel& model,
 }
 
 // What a direction may miss its axis by, as the covariance is to count it, in units of `sigma`, the
-// axis' own: LeanShape, walls apart by what the noise model says, whatever the corner; and any way,
-// where it may run along none.
-Eigen::Matrix3d LeanAgainst(double sigma, const PencilObservation& pencil,
-                            const NoiseModel& model) {
+// axis' own: LeanShape. Where the focal length is an unknown, walls lean apart by what the noise
+// model says, whatever the corner, and the direction may run any way where it may be no axis.
+Eigen::Matrix3d LeanAgainst(double sigma, const PencilObservation& pencil, const NoiseModel& model,
+                            const CameraSigma& camera) {
   constexpr double kAnyWay = 0.6;  // Radians: of each component of a direction without sense.
+  if (!camera.IsWide()) return LeanShape(pencil);
   const double walls = std::pow(model.pencil_axis_rad / sigma, 2.0);
   const double any = std::pow(kAnyWay / sigma, 2.0) * (1.0 - pencil.axis_probability);
   Eigen::Matrix3d one_wall = Eigen::Matrix3d::Identity();
@@ -98,7 +99,7 @@ int JointProblemBuilder::DirectionBlock(std::size_t index) {
       {block}, feature, -1,
       p_.camera_sigma_.IsWide() ? std::make_unique<MostlyExact>(MostlyExact::kNarrowerOfGuess)
                                 : std::make_unique<MostlyExact>());
-  if (!is_free) p_.term(term).lean_shape = LeanAgainst(sigma, pencil, model_);
+  if (!is_free) p_.term(term).lean_shape = LeanAgainst(sigma, pencil, model_, p_.camera_sigma_);
   return block;
 }
 

@@ -143,8 +143,8 @@ void Linearization::TakeLoss(const Term& term, double twice_cost, Rows* rows) {
               (turned.transpose() * *term.lean_shape * turned).inverse();
       over.r = rows->J.completeOrthogonalDecomposition().solve(rows->f);
       // Where a direction may run any way no other one is likelier, and nothing is linear.
-      constexpr double kAnyWay = 0.1;  // Radians.
-      if (information * asked.trace() * kAnyWay * kAnyWay < turned.squaredNorm()) over.r.setZero();
+      constexpr double kNear = 0.1;  // Radians.
+      if (information * asked.trace() * kNear * kNear < turned.squaredNorm()) over.r.setZero();
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> too_much(
         information * (W * Eigen::MatrixXd::Identity(asked.rows(), asked.rows()) - asked));

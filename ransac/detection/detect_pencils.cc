@@ -69,20 +69,19 @@ std::vector<DetectedPencil> Search(const LineSet& set, const PencilOptions& opti
   return pencils;
 }
 
-// Whether a line comes near one of the pencil's.
-bool Meets(const DetectedPencil& pencil, const Segment& ends, double diagonal_px) {
-  return std::any_of(pencil.ends.begin(), pencil.ends.end(),
-                     [&](const Segment& s) { return AreNear(s, ends, diagonal_px); });
-}
-
-// The lines that are near one of the pencil's, and not of it.
-std::vector<int> LinesAround(const LineSet& set, const DetectedPencil& pencil) {
-  const std::vector<DetectedLine>& lines = set.lines;
+// The lines that are near one of the pencils', and of none of them.
+std::vector<int> LinesAround(const LineSet& set, const std::vector<DetectedPencil>& pencils) {
   std::vector<int> around;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    const int k = static_cast<int>(i);
-    if (pencil.Has(k)) continue;
-    if (Meets(pencil, lines[i].ends, set.diagonal_px)) around.push_back(k);
+  for (int i = 0; i < static_cast<int>(set.lines.size()); ++i) {
+    const Segment& ends = set.lines[static_cast<std::size_t>(i)].ends;
+    const auto has = [i](const DetectedPencil& pencil) { return pencil.Has(i); };
+    const auto meets = [&](const DetectedPencil& pencil) {
+      return std::any_of(pencil.ends.begin(), pencil.ends.end(),
+                         [&](const Segment& s) { return AreNear(s, ends, set.diagonal_px); });
+    };
+    if (std::none_of(pencils.begin(), pencils.end(), has) &&
+        std::any_of(pencils.begin(), pencils.end(), meets))
+      around.push_back(i);
   }
   return around;
 }
@@ -137,7 +136,7 @@ std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::ve
 
 // The pencils orthogonal to one, among the lines that meet its own.
 std::vector<DetectedPencil> SearchAround(const LineSet& set, const DetectedPencil& pencil) {
-  std::vector<int> left = LinesAround(set, pencil);
+  std::vector<int> left = LinesAround(set, {pencil});
   std::vector<DetectedPencil> found;
   for (int k = 0; k < kFoundAround; ++k) {
     std::optional<DetectedPencil> next =
@@ -202,27 +201,10 @@ Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, st
 }
 
 std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
-                                      const DetectedPencil& pencil, double diagonal_px) {
+                                      const std::vector<DetectedPencil>& pencils,
+                                      double diagonal_px) {
   const LineSet set(lines, diagonal_px);
-  return EdgesOf(set, LinesAround(set, pencil));
-}
-
-std::vector<DetectedLine> EdgesAroundAll(const std::vector<DetectedLine>& lines,
-                                         const std::vector<DetectedPencil>& pencils,
-                                         double diagonal_px) {
-  const LineSet set(lines, diagonal_px);
-  std::vector<int> around;
-  for (int i = 0; i < static_cast<int>(lines.size()); ++i) {
-    const Segment& ends = lines[static_cast<std::size_t>(i)].ends;
-    const auto has = [i](const DetectedPencil& pencil) { return pencil.Has(i); };
-    const auto meets = [&](const DetectedPencil& pencil) {
-      return Meets(pencil, ends, diagonal_px);
-    };
-    if (std::none_of(pencils.begin(), pencils.end(), has) &&
-        std::any_of(pencils.begin(), pencils.end(), meets))
-      around.push_back(i);
-  }
-  return EdgesOf(set, around);
+  return EdgesOf(set, LinesAround(set, pencils));
 }
 
 LineFit WithSharedError(const DetectedLine& line, double shared_px) {

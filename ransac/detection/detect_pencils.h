@@ -44,16 +44,11 @@ Status DetectPencilsApart(const std::vector<DetectedLine>& lines, int max_pencil
 bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
                  DetectedPencil* pencil, double diagonal_px = kUsualDiagonalPx);
 
-// Fits of the lines that come near those of a pencil and are not of it, one of each edge, longest
-// first.
+// Fits of the lines that come near those of some pencils and are of none of them, one of each edge,
+// longest first.
 std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
-                                      const DetectedPencil& pencil,
+                                      const std::vector<DetectedPencil>& pencils,
                                       double diagonal_px = kUsualDiagonalPx);
-
-// The same of lines that are of none of some pencils, and come near one of these.
-std::vector<DetectedLine> EdgesAroundAll(const std::vector<DetectedLine>& lines,
-                                         const std::vector<DetectedPencil>& pencils,
-                                         double diagonal_px = kUsualDiagonalPx);
 
 // The pencil of lines[members] along `direction`, each as good as its `fits` says (one a member):
 // the line's own with a covariance that counts whatever else the line may miss the direction by.

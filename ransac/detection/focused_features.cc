@@ -85,11 +85,8 @@ FeaturesByFocal::FeaturesByFocal(const PhotoEvidence& evidence,
     : camera_(camera), sigma_(sigma) {
   AddCircles(evidence);
   AddPencils(pencils);
-  if (pencils_.size() > 1) {
-    if (circles_.size() < 2) AddEdges(EdgesAroundAll(evidence.lines, pencils, diagonal_px));
-  } else if (IsEmpty() && !pencils.empty()) {
-    AddEdges(EdgesAround(evidence.lines, pencils[0], diagonal_px));
-  }
+  const bool tell_a_third = pencils_.size() > 1 && circles_.size() < 2;
+  if (tell_a_third || IsEmpty()) AddEdges(EdgesAround(evidence.lines, pencils, diagonal_px));
 }
 
 void FeaturesByFocal::AddCircles(const PhotoEvidence& evidence) {

@@ -13,7 +13,8 @@
 
 namespace circline {
 
-// Fills PencilObservation::axis_probability of y, and of z where there is one: null = none.
+// Fills PencilObservation::axis_probability of y, and of z where there is one: null = none. 1 where
+// it is 0.95 or more. `options` are those of a camera whose focal length was looked for.
 void JudgeAxes(const AssemblyOptions& options, const PlacedPencil& x, PlacedPencil* y,
                PlacedPencil* z);
 
