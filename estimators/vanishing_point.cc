@@ -86,7 +86,7 @@ double DirectionSeparation(const VanishingPointFit& a, const VanishingPointFit& 
 }
 
 Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* fit,
-                         const std::vector<double>* weights) {
+                         const std::vector<double>* weights, VanishingPointFit* second) {
   if (lines.size() < 2) return Status::Refused("a pencil needs two lines");
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -107,8 +107,11 @@ Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* f
   Descent other;
   const Eigen::Vector3d across = eigen.eigenvectors().col(1);
   if (Cost(lines, weights, across) < best.cost + kOpen &&
-      Descend(lines, weights, across, kMaxIterations, &other) && other.cost < best.cost)
-    best = other;
+      Descend(lines, weights, across, kMaxIterations, &other)) {
+    if (other.cost < best.cost) std::swap(best, other);
+    const Eigen::Vector3d far = best.fit.direction.cross(eigen.eigenvectors().col(2)).normalized();
+    if (second != nullptr && Descend(lines, weights, far, 0, &other)) *second = other.fit;
+  }
   *fit = best.fit;
   return Status::Ok();
 }

@@ -22,9 +22,11 @@ struct VanishingPointFit {
 // sum_i (l_i . v)^2 / (v^T Cov(l_i) v) over unit v, so that long segments count for more than short
 // ones, by damped Gauss-Newton steps from the eigenvector of the weighted scatter. Refuses fewer
 // than two lines, and lines that all coincide. `weights` (optional, one per line) multiply the
-// terms.
+// terms. `second` (optional): where the lines lie so near one line of the photo that a direction
+// across, along that line, may compete, it receives that direction; else it is left as it is.
 Status FitVanishingPoint(const std::vector<LineFit>& lines, VanishingPointFit* fit,
-                         const std::vector<double>* weights = nullptr);
+                         const std::vector<double>* weights = nullptr,
+                         VanishingPointFit* second = nullptr);
 
 // How far a line misses a direction, in standard deviations of the line: l.v / sqrt(v^T Cov v).
 double VanishingPointResidual(const LineFit& line, const Eigen::Vector3d& direction);

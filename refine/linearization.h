@@ -29,8 +29,8 @@ class Linearization {
     std::vector<double> considered_sigmas;
     // Information that is added to every unknown, of what it has and in itself.
     double floor = 0.0;
-    // Whether x is where the terms cost least; else how far what a loss counts for more than it says
-    // has moved it is not known.
+    // Whether x is where the terms cost least; else how far what a loss counts for more than it
+    // says has moved it is not known.
     bool at_minimum = true;
   };
   // Terms of a graph at x. Not ok() where some cannot be evaluated.
