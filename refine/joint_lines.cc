@@ -41,8 +41,8 @@ double LineMiss(const PencilObservation& pencil, double usual) {
 // of an old street, of which each misses its direction by a third of a degree, to one or two.
 double AxisSigma(const PencilObservation& pencil, const NoiseModel& model,
                  const CameraSigma& camera) {
-  // On the street of scene-lund, whose directions are 88.4 degrees apart (scene-lund-more and the
-  // boxes had no part in it).
+  // Of 4 and 8, on the street of scene-lund, whose directions are 88.4 degrees apart, and
+  // chessboard-opencv (scene-lund-more and the boxes had no part in it).
   constexpr double kOfMiss = 4.0;
   const bool is_free = pencil.direction == PencilDirection::kFree;
   if (is_free || !(model.pencil_axis_rad > 0.0) || !camera.IsWide()) return model.pencil_axis_rad;

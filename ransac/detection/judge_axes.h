@@ -1,10 +1,9 @@
 // How probably pencils that were taken for axes are at right angles, seen through a camera whose
 // focal length is unknown. Internal: not installed.
 //
-// At a known focal length two directions look square by accident once in fifty times. At an unknown
-// one they do so at some focal length in one case of two, and the estimate takes that one: what
-// tells is whether their lines meet, as those of one thing do, and whether a third direction is
-// square to both at the same focal length.
+// At a known focal length two directions are hardly ever square by accident. At an unknown one many
+// are so at some focal length, and the estimate takes that one: what tells is whether their lines
+// meet, as those of one thing do, and whether a third direction is square to both at the same one.
 #ifndef CIRCLINE_RANSAC_DETECTION_JUDGE_AXES_H_
 #define CIRCLINE_RANSAC_DETECTION_JUDGE_AXES_H_
 
