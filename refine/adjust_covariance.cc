@@ -35,13 +35,13 @@ Matrix6d AdjustProblem::PoseCovariance(std::size_t photo, const Linearization& a
   return by * at.Covariance(columns) * by.transpose();
 }
 
-AdjustProblem::Covariances AdjustProblem::Covariance(int end) const {
+AdjustProblem::Covariances AdjustProblem::Covariance(int end, bool at_minimum) const {
   Weighing inliers;
   inliers.inliers_only = true;
   constexpr double kTiny = 1e-10;  // What nothing ties (one circle's spin) says nothing.
   Linearization::Options options;
   options.floor = kTiny;
-  options.at_minimum = end >= static_cast<int>(photos_.size());
+  options.at_minimum = at_minimum;
   Linearization at(*this, ActiveTerms(end), values().data(), inliers, options);
   Covariances out = OfPriors();
   if (!at.ComputeCovariance()) return out;

@@ -91,8 +91,9 @@ struct AdjustedCamera {
   std::vector<std::string> at_prior;
   int num_photos = 0;   // That it took, and that take part.
   double rms_px = 0.0;  // Of the inlier residuals, pixels.
-  // The standard deviation of log f (Sigma(0)) that the first photos alone would give, at the same
-  // estimate: how many, and that; 1, 2, 4, ... 64 of those that take part, and all.
+  // The standard deviation of log f that the first photos alone would give, about the same estimate
+  // (Sigma(0) counts how far that may lie off, too): how many, and that; 1, 2, 4, ... 64 of those
+  // that take part, and all.
   std::vector<std::pair<int, double>> sigma_by_photos;
 
   // Standard deviation of a shift, 0 to kCameraSize - 1.

@@ -87,7 +87,8 @@ class AdjustProblem : private Graph {
     std::vector<Matrix6d> poses;  // Of [delta, delta_t], as PoseHypothesis has them.
     double log_scale = 0.0;       // Variance, of GivenFrame::scale.
   };
-  Covariances Covariance(int end) const;
+  // `at_minimum`: counts how far losses may have moved the estimate (Linearization::Options).
+  Covariances Covariance(int end, bool at_minimum = true) const;
 
   bool IsUsed(int camera) const;  // By a photo that takes part; else there is nothing to ask of it.
   Camera CameraAt(int camera) const;

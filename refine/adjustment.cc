@@ -128,29 +128,28 @@ void Adjustment::SolveWithoutGross() {
   }
 }
 
-// What the focal lengths' deviations were after 1, 2, 4, ... photos, and are after all. From some
-// dozens on they fall as one over the root of their number.
+// What the focal lengths' deviations were after 1, 2, 4, ... photos, and are after all, about the
+// same estimate. From some dozens on they fall as one over the root of their number.
 void Adjustment::ReportSigmas(double scale) {
   std::vector<int> counts(cameras_.size(), 0);
   constexpr int kMost = 64;
   int seen = 0, next = 1;
-  for (std::size_t i = 0; i < given_.size(); ++i) {
-    if (!inputs_[i].takes_part) continue;
-    ++counts[CameraOf(i)];
-    if (++seen < next || seen > kMost) continue;
-    next *= 2;
-    const auto covariances = problem_->Covariance(static_cast<int>(i) + 1);
+  const auto add = [&](std::size_t end) {
+    const auto covariances = problem_->Covariance(static_cast<int>(end), false);
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       auto& sigmas = out_.cameras[c].sigma_by_photos;
       if (counts[c] > 0 && (sigmas.empty() || sigmas.back().first < counts[c]))
         sigmas.emplace_back(counts[c], std::sqrt(scale * covariances.cameras[c](0, 0)));
     }
+  };
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    if (!inputs_[i].takes_part) continue;
+    ++counts[CameraOf(i)];
+    if (++seen < next || seen > kMost) continue;
+    next *= 2;
+    add(i + 1);
   }
-  for (AdjustedCamera& made : out_.cameras) {
-    if (made.num_photos > 0 &&
-        (made.sigma_by_photos.empty() || made.sigma_by_photos.back().first < made.num_photos))
-      made.sigma_by_photos.emplace_back(made.num_photos, made.Sigma(0));
-  }
+  add(given_.size());
 }
 
 void Adjustment::Report() {
