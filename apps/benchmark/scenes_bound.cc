@@ -11,52 +11,45 @@ namespace {
 class Layout {
  public:
   Layout(const World& world, const BoundRequest& request) {
-    rotation = Take(world.SpinIsFree() || !request.pencils ? 2 : 3);
-    if (request.log_focal_sigma > 0.0) focal = Take(1);
+    rotation = Reserve(world.SpinIsFree() ? 2 : 3);
+    if (request.log_focal_sigma > 0.0) focal = Reserve(1);
     int shared_radius = -1;
     std::map<int, int> rings;
     for (std::size_t i = 0; i < world.circles.size(); ++i) {
       const WorldCircle& circle = world.circles[i];
       const bool used = request.circles.empty() || request.circles[i] != 0;
-      const int index = static_cast<int>(i);
       center.push_back(-1);
       radius.push_back(-1);
-      tilt.push_back(-1);
       if (!used) continue;
       const auto ring = rings.find(circle.ring);
-      center.back() = circle.ring >= 0 && ring != rings.end() ? ring->second : Take(2);
+      center.back() = circle.ring >= 0 && ring != rings.end() ? ring->second : Reserve(2);
       rings[circle.ring] = center.back();
-      if (circle.stated_radius > 0.0 && index != request.resized) {
-        if (distance < 0) distance = Take(1);
+      if (circle.stated_radius > 0.0) {
+        if (distance < 0) distance = Reserve(1);
       } else if (world.equal_radii) {
-        if (shared_radius < 0) shared_radius = Take(1);
+        if (shared_radius < 0) shared_radius = Reserve(1);
         radius.back() = shared_radius;
       } else {
-        radius.back() = Take(1);
+        radius.back() = Reserve(1);
       }
-      if (index == request.tilted) tilt.back() = Take(2);
     }
-    if (!request.pencils) return;
-    bool has_role = false;
-    for (const WorldPencil& pencil : world.pencils) {
-      has_role = has_role || pencil.direction != PencilDirection::kFree;
-    }
+    const bool has_role = HasRole(world.pencils);
     for (std::size_t i = 0; i < world.pencils.size(); ++i) {
       // Where no pencil has a role the first is the X axis.
       const bool free = world.pencils[i].direction == PencilDirection::kFree;
-      angle.push_back(free && (has_role || i > 0) ? Take(1) : -1);
-      offset.push_back(Take(static_cast<int>(world.pencils[i].lines.size())));
+      angle.push_back(free && (has_role || i > 0) ? Reserve(1) : -1);
+      offset.push_back(Reserve(static_cast<int>(world.pencils[i].lines.size())));
     }
   }
 
-  int Take(int count) {
+  int Reserve(int count) {
     size += count;
     return size - count;
   }
 
   int size = 0;
   int rotation = -1, focal = -1, distance = -1;
-  std::vector<int> center, radius, tilt, angle, offset;
+  std::vector<int> center, radius, angle, offset;
 };
 
 class Information {
@@ -68,24 +61,18 @@ class Information {
     basis_ << R.col(0), R.col(1), R.col(2);
   }
 
-  void AddCircles(const BoundRequest& request) {
+  void AddCircles() {
     std::vector<Sample> samples;
     for (std::size_t i = 0; i < world_.circles.size(); ++i) {
       if (layout_.center[i] < 0) continue;
       const WorldCircle& circle = world_.circles[i];
       SampleCircle(world_, circle, &samples);
-      for (std::size_t k = 0; k < samples.size(); ++k) {
-        if (request.masks != nullptr && request.masks->circles[i][k] == 0) continue;
-        Eigen::VectorXd g = PoseGradient(samples[k]);
-        const Eigen::RowVector3d by_world = samples[k].by_point * world_.pose.rotation;
-        const Eigen::Vector2d arm = samples[k].on_plane - circle.center;
+      for (const Sample& sample : samples) {
+        Eigen::VectorXd g = PoseGradient(sample);
+        const Eigen::RowVector3d by_world = sample.by_point * world_.pose.rotation;
+        const Eigen::Vector2d arm = sample.on_plane - circle.center;
         g.segment<2>(layout_.center[i]) += by_world.head<2>().transpose();
         if (layout_.radius[i] >= 0) g[layout_.radius[i]] += by_world.head<2>() * arm.normalized();
-        if (layout_.tilt[i] >= 0) {
-          // A turn about x or y moves a point of the plane along z alone.
-          g[layout_.tilt[i]] += by_world[2] * arm.y();
-          g[layout_.tilt[i] + 1] -= by_world[2] * arm.x();
-        }
         matrix_ += g * g.transpose();
       }
     }
@@ -164,7 +151,7 @@ bool Invert(const Eigen::MatrixXd& information, Eigen::MatrixXd* covariance) {
 Bound ComputeBound(const World& world, const BoundRequest& request) {
   const Layout layout(world, request);
   Information information(world, layout);
-  information.AddCircles(request);
+  information.AddCircles();
   information.AddPencils();
   information.matrix() /= request.noise_px * request.noise_px;
   if (layout.focal >= 0) {
@@ -184,14 +171,6 @@ Bound ComputeBound(const World& world, const BoundRequest& request) {
   const auto deviation = [&](int at) { return at < 0 ? 0.0 : std::sqrt(covariance(at, at)); };
   bound.log_focal = deviation(layout.focal);
   bound.log_distance = deviation(layout.distance);
-  if (request.tilted >= 0) {
-    const int at = layout.tilt[static_cast<std::size_t>(request.tilted)];
-    bound.tilt = covariance.block<2, 2>(at, at);
-  }
-  if (request.resized >= 0) {
-    const auto at = static_cast<std::size_t>(request.resized);
-    bound.log_radius = deviation(layout.radius[at]) / world.circles[at].radius;
-  }
   return bound;
 }
 

@@ -13,12 +13,8 @@ namespace circline::apps {
 // Which evidence counts, and what besides pose and structure is unknown.
 struct BoundRequest {
   double noise_px = 1.0;
-  std::vector<std::uint8_t> circles;  // 1: used; empty: all.
-  bool pencils = true;                // Their odd lines never count.
-  const Masks* masks = nullptr;       // Points that count.
+  std::vector<std::uint8_t> circles;  // 1: used; empty: all. Odd lines never count.
   double log_focal_sigma = 0.0;       // Prior of log f; 0: known.
-  int tilted = -1;                    // This circle's plane may have a tilt of its own.
-  int resized = -1;                   // This circle's stated radius does not count.
 };
 
 // Structure (centres, radii, lines, free directions) is unknown, and eliminated.
@@ -28,11 +24,9 @@ struct Bound {
   // Of delta, camera frame, rotation = exp([delta]x) truth, radians^2; where the spin is free, of
   // its components across the normal alone.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  double rotation_rad = 0.0;                       // Root of its trace.
-  double log_focal = 0.0;                          // Standard deviations.
-  double log_distance = 0.0;                       // Of the plane; of a scene with a stated radius.
-  Eigen::Matrix2d tilt = Eigen::Matrix2d::Zero();  // Covariance of the tilted circle's own.
-  double log_radius = 0.0;                         // Standard deviation of the resized circle's.
+  double rotation_rad = 0.0;  // Root of its trace.
+  double log_focal = 0.0;     // Standard deviations.
+  double log_distance = 0.0;  // Of the plane; of a scene with a stated radius.
 };
 
 Bound ComputeBound(const World& world, const BoundRequest& request);

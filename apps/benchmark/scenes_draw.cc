@@ -140,10 +140,7 @@ void DrawPencils(const Recipe& recipe, int count, World* world, Random* random) 
     world->pencils.push_back(pencil);
   }
   // The first one is free, but another has a role: any direction will do.
-  const bool role =
-      std::any_of(world->pencils.begin(), world->pencils.end(),
-                  [](const WorldPencil& p) { return p.direction != PencilDirection::kFree; });
-  if (count > 0 && role && world->pencils[0].direction == PencilDirection::kFree) {
+  if (HasRole(world->pencils) && world->pencils[0].direction == PencilDirection::kFree) {
     world->pencils[0].angle = random->Uniform(-70.0, 70.0) * kDegree;
   }
 }

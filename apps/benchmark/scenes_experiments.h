@@ -3,8 +3,12 @@
 #define CIRCLINE_APPS_BENCHMARK_SCENES_EXPERIMENTS_H_
 
 #include <cstdint>
+#include <functional>
+#include <string>
 #include <vector>
 
+#include "apps/benchmark/scenes_bound.h"
+#include "apps/benchmark/scenes_world.h"
 #include "circline/estimators/random.h"
 #include "circline/estimators/robust_loss.h"
 
@@ -30,22 +34,35 @@ struct ExperimentOptions {
   }
 };
 
-// Scenes of every kind, by noise: errors against the bound, coverage, probabilities.
-void RunRandomScenes(const ExperimentOptions& options);
-// Three full circles and one short arc, all coplanar.
-void RunShortArcs(const ExperimentOptions& options);
-// One of the circles has a plane of its own, or a wrong radius.
-void RunOddCircles(const ExperimentOptions& options);
-// Twelve equal discs whose print bleeds.
-void RunBleed(const ExperimentOptions& options);
-// A focal length that is not known well.
-void RunFocalLength(const ExperimentOptions& options);
-// Two circles among outliers.
-void RunOutliers(const ExperimentOptions& options);
-// Circle and pencil without outliers: do probabilities come true?
-void RunCircleAndPencil(const ExperimentOptions& options);
-// Circle and pencils, some of whose lines have another direction.
-void RunOddLines(const ExperimentOptions& options);
+// A scene to estimate, and what is true of it.
+struct Scene {
+  std::string kind;  // Which line of its row it counts in, where there are several.
+  World world;
+  Disturbance disturbance;
+  double focal_factor = 1.0;     // The focal length that is given over the true one.
+  BoundRequest request;          // Of what agrees.
+  Bound bound;                   // By this request.
+  std::vector<std::string> odd;  // Features that contradict the rest: "c1", "L0[2]".
+};
+
+struct SceneRow {
+  std::string name;
+  std::function<Scene(double noise_px, Random* random)> draw;
+};
+
+struct SceneExperiment {
+  std::string name, title;
+  int number = 0;  // Of its seeds.
+  int trials = 0;
+  std::vector<double> noise_px;
+  std::vector<LossType> losses;
+  std::vector<SceneRow> rows;
+  bool as_photographed = false;  // The noise model of photographs; else of points alone.
+};
+
+std::vector<SceneExperiment> SceneExperiments();
+void RunScenes(const SceneExperiment& experiment, const ExperimentOptions& options);
+
 // Sequences of frames of a moving camera.
 void RunTracking(const ExperimentOptions& options);
 

@@ -4,176 +4,117 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
+#include <vector>
 
 #include "apps/common/text.h"
 #include "circline/estimators/basics.h"
+#include "circline/estimators/line_pose.h"
 
 namespace circline::apps {
 namespace {
 
-Eigen::VectorXd Whiten(const Eigen::MatrixXd& covariance, const Eigen::VectorXd& error) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
-  if (!covariance.allFinite() || factor.info() != Eigen::Success) {
-    return Eigen::VectorXd::Constant(error.size(), std::numeric_limits<double>::quiet_NaN());
-  }
-  return factor.matrixL().solve(error);
-}
+constexpr double kSure = 0.99;
 
-// True rotation = exp([delta]x) estimate; of the half turns of the world the one that fits best.
-Eigen::Vector3d RotationError(const Eigen::Matrix3d& truth, const Eigen::Matrix3d& estimate) {
-  Eigen::Vector3d smallest = Eigen::Vector3d::Constant(10.0);
-  for (int turn = 0; turn < 4; ++turn) {
-    Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-    if (turn > 0) {
-      signs = -signs;
-      signs[turn - 1] = 1.0;
-    }
-    const Eigen::Matrix3d turned = truth * signs.asDiagonal();
-    const Eigen::Vector3d delta = LogRotation(turned * estimate.transpose());
-    if (delta.norm() < smallest.norm()) smallest = delta;
-  }
-  return smallest;
-}
+struct PoseError {
+  Eigen::VectorXd error;  // Radians: 3 components of the rotation, 2 of the normal.
+  Eigen::VectorXd sigma;  // Their standard deviations, as stated.
+  double nees = 0.0;      // A component; not finite where the covariance is singular.
 
-std::string Percent(double part, double whole, int decimals = 1) {
-  return FormatFixed(100.0 * part / whole, decimals);
-}
+  double Angle() const { return error.norm(); }
+};
 
-}  // namespace
-
-PoseError ComparePose(const Eigen::Matrix3d& truth, bool spin_is_free,
-                      const PoseHypothesis& hypothesis) {
+// Directions have no sense: up to half turns about the axes of the world.
+PoseError ErrorOf(const Scene& scene, const PoseHypothesis& hypothesis) {
+  const Eigen::Matrix3d& truth = scene.world.pose.rotation;
   const Eigen::Matrix3d& estimate = hypothesis.cam_from_world.rotation;
-  const Eigen::Matrix3d stated = hypothesis.Covariance().topLeftCorner<3, 3>();
+  Eigen::MatrixXd components = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d delta = Eigen::Vector3d::Constant(10.0);
+  if (scene.bound.spin_is_free || hypothesis.RotationIsFree()) {
+    const Eigen::Vector3d from = estimate.col(2), to = truth.col(2);
+    delta = LogRotation(
+        Eigen::Quaterniond::FromTwoVectors(from, from.dot(to) < 0.0 ? Eigen::Vector3d(-to) : to)
+            .toRotationMatrix());
+    components.resize(2, 3);
+    components << from.unitOrthogonal().transpose(), from.cross(from.unitOrthogonal()).transpose();
+  } else {
+    for (const Eigen::Matrix3d& R : SignChoices(truth)) {
+      const Eigen::Vector3d candidate = LogRotation(R * estimate.transpose());
+      if (candidate.norm() < delta.norm()) delta = candidate;
+    }
+  }
   PoseError result;
-  if (spin_is_free || hypothesis.RotationIsFree()) {
-    const Eigen::Vector3d from = estimate.col(2);
-    const Eigen::Vector3d to = (truth.col(2).dot(from) < 0.0 ? -1.0 : 1.0) * truth.col(2);
-    const Eigen::Vector3d turn = from.cross(to);
-    result.angle = std::atan2(turn.norm(), from.dot(to));
-    const Eigen::Vector3d delta = turn.norm() > 0.0
-                                      ? Eigen::Vector3d(turn.normalized() * result.angle)
-                                      : Eigen::Vector3d(Eigen::Vector3d::Zero());
-    Eigen::Matrix<double, 2, 3> across;
-    across.row(0) = from.unitOrthogonal().transpose();
-    across.row(1) = from.cross(across.row(0).transpose()).transpose();
-    result.error = across * delta;
-    const Eigen::Matrix2d covariance = across * stated * across.transpose();
-    result.sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-    result.whitened = Whiten(covariance, result.error);
-    return result;
-  }
-  result.error = RotationError(truth, estimate);
-  result.angle = result.error.norm();
-  result.sigma = stated.diagonal().cwiseMax(0.0).cwiseSqrt();
-  result.whitened = Whiten(stated, result.error);
+  result.error = components * delta;
+  const Eigen::MatrixXd covariance =
+      components * hypothesis.Covariance().topLeftCorner<3, 3>() * components.transpose();
+  result.sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  result.nees = result.error.dot(covariance.inverse() * result.error) /
+                static_cast<double>(result.error.size());
   return result;
-}
-
-const PoseHypothesis* Nearest(const Eigen::Matrix3d& truth, bool spin_is_free,
-                              const PoseEstimate& estimate, PoseError* error) {
-  const PoseHypothesis* nearest = nullptr;
-  for (const PoseHypothesis& hypothesis : estimate.hypotheses) {
-    const PoseError candidate = ComparePose(truth, spin_is_free, hypothesis);
-    if (nearest != nullptr && candidate.angle >= error->angle) continue;
-    nearest = &hypothesis;
-    *error = candidate;
-  }
-  return nearest;
 }
 
 bool IsWrong(const PoseError& error, const Bound& bound) {
   constexpr double kSigmas = 5.0, kLeast = 2.0 * kDegree;
-  return error.angle > std::max(kLeast, kSigmas * bound.rotation_rad);
+  return error.Angle() > std::max(kLeast, kSigmas * bound.rotation_rad);
 }
 
-void Tally::Add(const PoseError& error, const Bound& bound) {
+std::string Percent(int part, int whole) {
+  return FormatFixed(100.0 * part / std::max(1, whole), 1);
+}
+
+}  // namespace
+
+void Tally::Add(const Scene& scene, const PoseEstimate& estimate) {
   ++trials_;
-  const double ratio = error.angle / bound.rotation_rad;
-  const double nees = error.whitened.squaredNorm() / static_cast<double>(error.whitened.size());
-  const bool wrong = IsWrong(error, bound);
-  if (wrong) ++wrong_;
-  for (Sums* sums : {&all_, &right_}) {
-    if (sums == &right_ && wrong) continue;
-    ++sums->count;
-    sums->squared_error += ratio * ratio;
-    if (std::isfinite(nees)) sums->nees += nees;  // Else a covariance that does not cover anything.
+  if (!estimate.status.ok()) {
+    ++refused_;
+    return;
   }
-  for (Eigen::Index i = 0; i < error.error.size(); ++i) {
-    ++components_;
-    if (std::abs(error.whitened[i]) <= 2.0) ++whitened_covered_;
-    if (std::abs(error.error[i]) <= 2.0 * error.sigma[i]) ++raw_covered_;
+  std::vector<PoseError> errors;
+  for (const PoseHypothesis& h : estimate.hypotheses) errors.push_back(ErrorOf(scene, h));
+  const PoseError& nearest = *std::min_element(
+      errors.begin(), errors.end(),
+      [](const PoseError& a, const PoseError& b) { return a.Angle() < b.Angle(); });
+  if (IsWrong(nearest, scene.bound)) {
+    ++missing_;
+  } else {
+    ++right_;
+    squared_error_ += std::pow(nearest.Angle() / scene.bound.rotation_rad, 2);
+    if (std::isfinite(nearest.nees)) nees_ += nearest.nees;
+    components_ += static_cast<int>(nearest.error.size());
+    covered_ +=
+        static_cast<int>((nearest.error.array().abs() <= 2.0 * nearest.sigma.array()).count());
   }
+
+  const PoseHypothesis& first = estimate.hypotheses.front();
+  const bool is_wrong = IsWrong(errors.front(), scene.bound), is_sure = first.probability >= kSure;
+  wrong_ += is_wrong ? 1 : 0;
+  sure_ += is_sure ? 1 : 0;
+  sure_wrong_ += is_sure && is_wrong ? 1 : 0;
+  expected_wrong_ += 1.0 - first.probability;
+  const auto odd = std::count_if(scene.odd.begin(), scene.odd.end(), [&](const std::string& id) {
+    return std::count(first.left_out.begin(), first.left_out.end(), id) > 0;
+  });
+  odd_left_out_ += odd == static_cast<std::ptrdiff_t>(scene.odd.size()) ? 1 : 0;
+  others_left_out_ += odd < static_cast<std::ptrdiff_t>(first.left_out.size()) ? 1 : 0;
 }
 
 std::string Tally::Header() {
-  return "   n   refused%  wrong%  rms/bound (right)  NEES/dim (right)  cover%  raw%";
+  return "    n refused%  missing% rms/bound NEES/dim  cover%   wrong% expected%  sure wrong  "
+         "left out: odd% others%";
 }
 
 std::string Tally::Row() const {
-  const auto rms = [](const Sums& sums) {
-    return FormatFixed(std::sqrt(sums.squared_error / sums.count), 2);
-  };
-  const auto nees = [](const Sums& sums) {
-    const double mean = sums.nees / sums.count;
-    return mean < 1e4 ? FormatFixed(mean, 2) : FormatPlain(mean);
-  };
+  const int answered = trials_ - refused_;
   char line[160];
-  std::snprintf(line, sizeof(line), "%5d  %7s  %6s  %9s (%5s)  %8s (%5s)  %6s %6s", trials_,
-                Percent(refused_, trials_).c_str(), Percent(wrong_, trials_).c_str(),
-                rms(all_).c_str(), rms(right_).c_str(), nees(all_).c_str(), nees(right_).c_str(),
-                Percent(whitened_covered_, components_).c_str(),
-                Percent(raw_covered_, components_).c_str());
+  std::snprintf(line, sizeof(line), "%5d %8s  %8s %9s %8s  %6s   %6s %9s %5d %5d  %14s %7s",
+                trials_, Percent(refused_, trials_).c_str(), Percent(missing_, answered).c_str(),
+                FormatFixed(std::sqrt(squared_error_ / right_), 2).c_str(),
+                FormatFixed(nees_ / right_, 2).c_str(), Percent(covered_, components_).c_str(),
+                Percent(wrong_, answered).c_str(),
+                FormatFixed(100.0 * expected_wrong_ / answered, 1).c_str(), sure_, sure_wrong_,
+                Percent(odd_left_out_, answered).c_str(),
+                Percent(others_left_out_, answered).c_str());
   return line;
-}
-
-void Calibration::Add(double probability, bool right) { said_.push_back({probability, right}); }
-
-void Calibration::Print() const {
-  const double edges[] = {0.0, 0.5, 0.9, 0.99, 0.9999, 2.0};
-  std::printf("  %-16s %6s %8s %10s\n", "probability", "n", "right%", "expected%");
-  for (int bin = 4; bin >= 0; --bin) {
-    int count = 0, right = 0;
-    double expected = 0.0;
-    for (const Said& said : said_) {
-      if (said.probability < edges[bin] || said.probability >= edges[bin + 1]) continue;
-      ++count;
-      right += said.right ? 1 : 0;
-      expected += said.probability;
-    }
-    if (count == 0) continue;
-    const std::string name =
-        FormatPlain(edges[bin]) + " - " + FormatPlain(std::min(1.0, edges[bin + 1]));
-    std::printf("  %-16s %6d %8s %10s\n", name.c_str(), count, Percent(right, count, 2).c_str(),
-                Percent(expected, count, 2).c_str());
-  }
-}
-
-double Calibration::NumWrong() const { return NumWrongAbove(0.0); }
-
-double Calibration::NumExpected() const {
-  double expected = 0.0;
-  for (const Said& said : said_) expected += 1.0 - said.probability;
-  return expected;
-}
-
-double Calibration::NumAllowed() const {
-  double variance = 0.0;
-  for (const Said& said : said_) variance += said.probability * (1.0 - said.probability);
-  return NumExpected() + 3.0 * std::sqrt(std::max(0.0, variance));
-}
-
-int Calibration::NumWrongAbove(double probability) const {
-  return static_cast<int>(std::count_if(said_.begin(), said_.end(), [&](const Said& said) {
-    return !said.right && said.probability >= probability;
-  }));
-}
-
-int Calibration::NumAbove(double probability) const {
-  return static_cast<int>(std::count_if(said_.begin(), said_.end(), [&](const Said& said) {
-    return said.probability >= probability;
-  }));
 }
 
 }  // namespace circline::apps

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "apps/benchmark/scenes_experiments.h"
-#include "apps/benchmark/scenes_score.h"
 #include "apps/benchmark/tracking_bound.h"
 #include "apps/benchmark/trajectory.h"
 #include "apps/common/progress.h"
@@ -95,12 +94,12 @@ bool IsNearest(const CameraPose& truth, const std::vector<PoseHypothesis>& hypot
 }
 
 struct Score {
-  int frames = 0, right = 0, told = 0, told_right = 0, sure_wrong = 0, predicted = 0, restarts = 0,
-      began_wrong_and_told = 0, ended_right = 0;
+  int frames = 0, right = 0, can_tell = 0, right_where_told = 0, sure_wrong = 0, predicted = 0,
+      restarts = 0;
+  double expected_wrong = 0.0;  // By the probabilities of the first hypotheses.
   // Of the first hypothesis where it is right, none is nearer, and in the map of the first frame.
   double squared = 0.0, bound = 0.0, nees = 0.0;
   int measured = 0;
-  Calibration calibration;
 };
 
 // Natural logarithm of the odds that a frame without noise gives the right hypothesis: half the
@@ -108,13 +107,35 @@ struct Score {
 // more probable once in 1 / Phi(-d / 2) sequences: here less than once in 100.
 constexpr double kCanTell = 11.0;
 
+bool CanTell(const CameraPose& truth, const std::vector<PoseHypothesis>& without_noise,
+             double sigma) {
+  double right = 0.0, others = 0.0;
+  for (const PoseHypothesis& h : without_noise)
+    (IsRight(truth, h, sigma) ? right : others) += h.probability;
+  return right > 0.0 && std::log(right) > std::log(others) + kCanTell;
+}
+
+// The error of the normal against the bound and the stated covariance.
+void Measure(const CameraPose& truth, const PoseHypothesis& first, double sigma, Score* score) {
+  const Eigen::Vector3d normal = first.cam_from_world.rotation.col(2);
+  const Eigen::Matrix<double, 2, 3> across = truth.rotation.leftCols<2>().transpose();
+  const Eigen::Vector2d error = across * normal;
+  // d n = delta x n: components along the world's X and Y.
+  const Eigen::Matrix<double, 2, 3> J = -across * CrossMatrix(normal);
+  const Eigen::Matrix2d covariance = J * first.Covariance().topLeftCorner<3, 3>() * J.transpose();
+  score->squared += error.squaredNorm();
+  score->bound += sigma * sigma;
+  score->nees += error.dot(covariance.inverse() * error);
+  ++score->measured;
+}
+
 void RunSequence(const Setting& setting, LossType loss, std::uint64_t seed, Score* score) {
   const Trajectory sequence(setting.trajectory, seed);
   const TrackerOptions options = OptionsFor(setting, loss);
   Random noise(seed + 1000003), motion_noise(seed + 2000003);
   PoseTracker tracker(options), ideal(options);
   TrackingBound bound(sequence, options);
-  bool began_wrong = false, world_is_first = true;
+  bool world_is_first = true;
   for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
     const Trajectory::Frame& frame = sequence.frames[k];
     const double time = static_cast<double>(k) / setting.trajectory.fps;
@@ -124,55 +145,38 @@ void RunSequence(const Setting& setting, LossType loss, std::uint64_t seed, Scor
     const TrackedPose tracked = tracker.Update(sequence.Observe(frame, &noise), time, motion);
     const TrackedPose without_noise = ideal.Update(sequence.Observe(frame, nullptr), time, motion);
     const double sigma = bound.Advance(k);
-    if (!tracked.estimate.status.ok() || tracked.estimate.hypotheses.empty()) continue;
-    const PoseHypothesis& first = tracked.estimate.hypotheses.front();
-    const bool right = IsRight(frame.pose, first, sigma);
-    if (k == 0) began_wrong = !right;
-    world_is_first = world_is_first && (k == 0 || !tracked.reinitialized);
-    score->restarts += k > 0 && tracked.reinitialized ? 1 : 0;
+    if (!tracked.estimate.status.ok()) continue;
+    const std::vector<PoseHypothesis>& hypotheses = tracked.estimate.hypotheses;
+    const PoseHypothesis& first = hypotheses.front();
+    const bool is_right = IsRight(frame.pose, first, sigma);
+    const bool is_restart = k > 0 && tracked.reinitialized;
+    world_is_first = world_is_first && !is_restart;
+    score->restarts += is_restart ? 1 : 0;
     score->predicted += tracked.predicted_only && !frame.is_occluded ? 1 : 0;
-    score->calibration.Add(first.probability, right);
-    score->sure_wrong += !right && first.probability >= kSure ? 1 : 0;
+    score->expected_wrong += 1.0 - first.probability;
+    score->sure_wrong += !is_right && first.probability >= kSure ? 1 : 0;
     ++score->frames;
-    score->right += right ? 1 : 0;
-    double true_odds = 0.0, others = 0.0;
-    for (const PoseHypothesis& h : without_noise.estimate.hypotheses)
-      (IsRight(frame.pose, h, sigma) ? true_odds : others) += h.probability;
-    const bool can_tell = true_odds > 0.0 && std::log(true_odds) > std::log(others) + kCanTell;
-    if (k >= kFramesOfMotion && can_tell) {
-      ++score->told;
-      score->told_right += right ? 1 : 0;
+    score->right += is_right ? 1 : 0;
+    if (k < kFramesOfMotion) continue;
+    if (CanTell(frame.pose, without_noise.estimate.hypotheses, sigma)) {
+      ++score->can_tell;
+      score->right_where_told += is_right ? 1 : 0;
     }
-    if (right && IsNearest(frame.pose, tracked.estimate.hypotheses) && !setting.odometry &&
-        world_is_first && k >= kFramesOfMotion) {
-      const Eigen::Matrix3d R = frame.pose.rotation;
-      const Eigen::Vector3d tilt = R.transpose() * first.cam_from_world.rotation.col(2);
-      const Eigen::Matrix<double, 2, 3> across = R.leftCols<2>().transpose();
-      // d n = delta x n: components along the world's X and Y.
-      const Eigen::Matrix<double, 2, 3> J =
-          -across * CrossMatrix(first.cam_from_world.rotation.col(2));
-      const Eigen::Matrix2d covariance =
-          J * first.Covariance().topLeftCorner<3, 3>() * J.transpose();
-      score->squared += tilt.head<2>().squaredNorm();
-      score->bound += sigma * sigma;
-      score->nees += tilt.head<2>().dot(covariance.inverse() * tilt.head<2>());
-      ++score->measured;
-    }
-    if (k + 1 < sequence.frames.size() || !began_wrong) continue;
-    score->began_wrong_and_told += can_tell ? 1 : 0;
-    score->ended_right += can_tell && right ? 1 : 0;
+    if (is_right && IsNearest(frame.pose, hypotheses) && !setting.odometry && world_is_first)
+      Measure(frame.pose, first, sigma, score);
   }
 }
 
 void Print(const std::string& name, const Score& s) {
-  const auto percent = [](int part, int all) {
+  const auto percent = [](double part, int all) {
     return all > 0 ? FormatFixed(100.0 * part / all, 2) : std::string("-");
   };
   const bool measured = s.measured > 0;
-  std::printf("  %-24s %7d %7s %8d %8s %9s %9d %8d %6d/%-6d %9s %6s\n", name.c_str(), s.frames,
-              percent(s.right, s.frames).c_str(), s.told, percent(s.told_right, s.told).c_str(),
-              percent(s.sure_wrong, s.frames).c_str(), s.predicted, s.restarts, s.ended_right,
-              s.began_wrong_and_told,
+  std::printf("  %-24s %7d %7s %8d %8s %9s %9s %9d %8d %9s %6s\n", name.c_str(), s.frames,
+              percent(s.right, s.frames).c_str(), s.can_tell,
+              percent(s.right_where_told, s.can_tell).c_str(),
+              percent(s.sure_wrong, s.frames).c_str(), percent(s.expected_wrong, s.frames).c_str(),
+              s.predicted, s.restarts,
               measured ? FormatFixed(std::sqrt(s.squared / s.bound), 3).c_str() : "-",
               measured ? FormatFixed(s.nees / s.measured, 2).c_str() : "-");
 }
@@ -185,8 +189,8 @@ void RunTracking(const ExperimentOptions& options) {
     for (const double noise : options.Noises({2.0})) {
       std::printf("Tracking, noise %s px, loss %s, 20 %% of frames occluded\n",
                   FormatPlain(noise).c_str(), LossName(loss));
-      std::printf("  %-24s %7s %7s %8s %8s %9s %9s %8s %13s %9s %6s\n", "scene", "frames", "right%",
-                  "can tell", "right%", "sure+wr.%", "contrad.", "restarts", "began wrong",
+      std::printf("  %-24s %7s %7s %8s %8s %9s %9s %9s %8s %9s %6s\n", "scene", "frames", "right%",
+                  "can tell", "right%", "sure+wr.%", "exp.wr.%", "contrad.", "restarts",
                   "rms/bound", "NEES 2");
       for (const Setting& given : Settings()) {
         Setting setting = given;
@@ -200,7 +204,6 @@ void RunTracking(const ExperimentOptions& options) {
         }
         progress.Clear();
         Print(setting.name, score);
-        score.calibration.Print();
       }
       std::printf("\n");
     }

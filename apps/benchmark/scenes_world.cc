@@ -42,10 +42,8 @@ bool SamplePoint(const World& world, const Eigen::Vector3d& X, const Eigen::Vect
 Eigen::Vector3d OnPlane(const Eigen::Vector2d& x) { return {x.x(), x.y(), 0.0}; }
 
 std::vector<Eigen::Vector2d> Disturb(const std::vector<Sample>& samples, const Disturbance& d,
-                                     double offset_px, Random* random,
-                                     std::vector<std::uint8_t>* mask) {
+                                     double offset_px, Random* random) {
   std::vector<Eigen::Vector2d> pixels;
-  mask->assign(samples.size(), 1);
   for (const Sample& sample : samples) {
     const double dx = random->Normal(), dy = random->Normal();
     pixels.push_back(sample.pixel + d.noise_px * Eigen::Vector2d(dx, dy) +
@@ -61,7 +59,6 @@ std::vector<Eigen::Vector2d> Disturb(const std::vector<Sample>& samples, const D
     std::swap(order[at], order[at + static_cast<std::size_t>(random->UniformInt(n - i))]);
     const Sample& foot = samples[static_cast<std::size_t>(random->UniformInt(n))];
     pixels[order[at]] = foot.pixel + random->Uniform(-kBandPx, kBandPx) * foot.normal;
-    (*mask)[order[at]] = 0;
   }
   return pixels;
 }
@@ -105,6 +102,12 @@ bool SampleLine(const World& world, const WorldPencil& pencil, const WorldLine& 
     if (!SamplePoint(world, OnPlane(X), OnPlane(Along(angle)), &sample)) return false;
   }
   return true;
+}
+
+bool HasRole(const std::vector<WorldPencil>& pencils) {
+  return std::any_of(pencils.begin(), pencils.end(), [](const WorldPencil& pencil) {
+    return pencil.direction != PencilDirection::kFree;
+  });
 }
 
 bool IsVisible(const World& world) {
@@ -158,29 +161,27 @@ double Tilt(const World& world) {
   return std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
-double OddLineMiss(const World& world, const WorldPencil& pencil, const WorldLine& line) {
+double OddLineDeviation(const World& world, const WorldPencil& pencil, const WorldLine& line) {
   WorldLine straight = line;
   straight.turn = 0.0;
   std::vector<Sample> odd, even;
   if (!SampleLine(world, pencil, line, &odd) || !SampleLine(world, pencil, straight, &even)) {
     return 0.0;
   }
-  Eigen::VectorXd miss(line.num_points);
+  Eigen::VectorXd distance(line.num_points);
   for (int i = 0; i < line.num_points; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    miss[i] = even[at].normal.dot(odd[at].pixel - even[at].pixel);
+    distance[i] = even[at].normal.dot(odd[at].pixel - even[at].pixel);
   }
-  return (miss.array() - miss.mean()).matrix().norm();
+  return (distance.array() - distance.mean()).matrix().norm();
 }
 
-Observations Observe(const World& world, const Disturbance& disturbance, Random* random,
-                     Masks* masks) {
+Observations Observe(const World& world, const Disturbance& disturbance, Random* random) {
   Observations observations;
   observations.camera = world.camera;
   observations.frame.plane = "p0";
   const double sigma_px = disturbance.stated ? disturbance.noise_px : 0.0;
   std::vector<Sample> samples;
-  std::vector<std::uint8_t> mask;
   for (const WorldCircle& circle : world.circles) {
     CircleObservation& c = observations.circles.emplace_back();
     c.id = "c" + std::to_string(observations.circles.size() - 1);
@@ -191,8 +192,7 @@ Observations Observe(const World& world, const Disturbance& disturbance, Random*
     if (world.equal_radii) c.radius_group = "r";
     if (disturbance.bleed_px != 0.0) c.contrast = -1;  // Dark print that bleeds.
     SampleCircle(world, circle, &samples);
-    c.points = Disturb(samples, disturbance, disturbance.bleed_px, random, &mask);
-    if (masks != nullptr) masks->circles.push_back(mask);
+    c.points = Disturb(samples, disturbance, disturbance.bleed_px, random);
   }
   for (const WorldPencil& pencil : world.pencils) {
     PencilObservation& p = observations.pencils.emplace_back();
@@ -202,7 +202,7 @@ Observations Observe(const World& world, const Disturbance& disturbance, Random*
     p.sigma_px = sigma_px;
     for (const WorldLine& line : pencil.lines) {
       SampleLine(world, pencil, line, &samples);
-      p.lines.emplace_back().points = Disturb(samples, disturbance, 0.0, random, &mask);
+      p.lines.emplace_back().points = Disturb(samples, disturbance, 0.0, random);
     }
   }
   return observations;

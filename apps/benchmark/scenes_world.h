@@ -43,6 +43,9 @@ struct WorldPencil {
   std::vector<WorldLine> lines;
 };
 
+// Whether any is along X or Y; else the first is taken for the X axis.
+bool HasRole(const std::vector<WorldPencil>& pencils);
+
 struct World {
   Camera camera;
   CameraPose pose;
@@ -101,7 +104,7 @@ double Tilt(const World& world);
 
 // By how many standard deviations an odd line's points are off the best line of its pencil's
 // direction, for a noise of 1 px.
-double OddLineMiss(const World& world, const WorldPencil& pencil, const WorldLine& line);
+double OddLineDeviation(const World& world, const WorldPencil& pencil, const WorldLine& line);
 
 // What is added to the true image.
 struct Disturbance {
@@ -111,13 +114,8 @@ struct Disturbance {
   double outlier_ratio = 0.0;  // Share of each feature's points that lies anywhere near it.
 };
 
-struct Masks {  // Which points are no outliers, by feature; empty: all.
-  std::vector<std::vector<std::uint8_t>> circles;
-};
-
 // Circles are named c0, c1, ...; pencils L0, L1, ...
-Observations Observe(const World& world, const Disturbance& disturbance, Random* random,
-                     Masks* masks = nullptr);
+Observations Observe(const World& world, const Disturbance& disturbance, Random* random);
 
 }  // namespace circline::apps
 
