@@ -13,7 +13,7 @@ circline_find(Eigen3 libeigen3-dev 3.4 NO_MODULE)
 circline_find(Ceres libceres-dev 2.1 CONFIG)
 circline_find(OpenCV libopencv-dev 4.6 CONFIG COMPONENTS core imgproc)
 
-if(CIRCLINE_BUILD_APPS OR CIRCLINE_BUILD_BENCHMARKS)
+if(CIRCLINE_BUILD_APPS)
   circline_find(OpenCV libopencv-dev 4.6 CONFIG COMPONENTS core imgproc imgcodecs videoio)
 endif()
 if(CIRCLINE_BUILD_APPS OR CIRCLINE_BUILD_TESTS)

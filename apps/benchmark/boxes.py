@@ -2,16 +2,14 @@
 """How well one photo tells a box's size, and do circle and lines agree? Prints a table and a line for each claim; the last line is
 `N passed, N failed`.
 
-  boxes.py DATA [--reconstruct=build/release/bin/circline_reconstruct] [--output=FOLDER] [--verbose]
+  boxes.py DATA [--reconstruct=build/release/bin/circline_reconstruct] [--output=FOLDER] [--verbose] [--only=SET/EVIDENCE]
 
 DATA holds box-camprodon, box-camprodon-more and turntable-teabox with their groundtruth.yml. One edge of the box is given, each of the
 three in turn; the other two are compared with the box's size. `annotated`: the edges measured in the photo, as the set has them;
 `detected`: nothing but the photo and the camera. The agreement of circle and lines is of the normal of the disc's plane, by its rim
 alone, and the box's axes, by its edges alone. Needs python3-opencv.
 """
-import argparse
 import csv
-import math
 import os
 import statistics
 import subprocess
@@ -19,6 +17,9 @@ import sys
 import tempfile
 
 import cv2
+
+from scripts import Claims, parser_of, write
+from to_scene import camera, row, seq, text
 
 # Lengths along x, y, z as the program names a box that it finds: z upright, x the longer of the others; mm.
 SETS = {
@@ -29,33 +30,10 @@ SETS = {
 AXES = 'xyz'
 
 
-def number(value):
-    """With a point or an exponent: the scene file's readers take `9` for an integer."""
-    text = f'{float(value):.9g}'
-    return text if '.' in text or 'e' in text else text + '.'
-
-
-def numbers(values):
-    return '[' + ', '.join(map(number, values)) + ']'
-
-
-def nodes(node, key):
-    found = node.getNode(key)
-    return [] if found.empty() else [found.at(i) for i in range(found.size())]
-
-
-def camera_line(node, ident, size):
-    d = node.getNode('distortion_coefficients')
-    d = [0.0] * 5 if d.empty() else list(d.mat().ravel())
-    k = list(node.getNode('camera_matrix').mat().ravel())
-    return (f'  - {{ id: "{ident}", model: "opencv", width: {size[0]}, height: {size[1]}, camera_matrix: {numbers(k)}, '
-            f'distortion: {numbers(d)} }}')
-
-
 def edges_of(image):
     """Of the biscuit box, whose names (`top_back_long`, `front_left_vertical`, ...) say where each edge lies."""
     edges = []
-    for line in nodes(image, 'lines'):
+    for line in seq(image, 'lines'):
         words = line.getNode('name').string().split('_')
         # The set's x is depth (back is far), y the long side (right is far), z up; the program's x is the long side.
         far = ''.join(axis for axis, word in (('x', 'right'), ('y', 'back'), ('z', 'top')) if word in words)
@@ -63,23 +41,21 @@ def edges_of(image):
         if words[-1] == 'vertical' and 'back' not in words and 'front' not in words:
             continue
         points = line.getNode('edge_points').mat().ravel()
-        edges.append(f'{{ along: "{along}", far: "{far.replace(along, "")}", points: {numbers(points)} }}')
+        edges.append(f'{{ along: "{along}", far: "{far.replace(along, "")}", points: {row(points)} }}')
     return edges
 
 
 def write_scene(path, folder, root, image, edges, given):
     size = (int(root.getNode('image_width').real()), int(root.getNode('image_height').real()))
-    cameras = nodes(root, 'cameras')
+    cameras = seq(root, 'cameras')
     lines = ['%YAML:1.0', '---', 'cameras:']
-    lines += [camera_line(c, c.getNode('name').string(), size) for c in cameras] or [camera_line(root, 'cam0', size)]
-    camera = image.getNode('camera').string() if cameras else 'cam0'
+    lines += [camera(c, text(c, 'name'), *size) for c in cameras] or [camera(root, 'cam0', *size)]
     lines += ['images:', f'  - file: "{os.path.abspath(os.path.join(folder, image.getNode("file").string()))}"',
-              f'    camera: "{camera}"', '    solids:', f'      - {{ id: "box", kind: "box", length: {numbers(given)}']
+              f'    camera: "{text(image, "camera", "cam0")}"', '    solids:', f'      - {{ id: "box", kind: "box", length: {row(given)}']
     if edges:
         lines.append('          , edges: [ ' + ',\n            '.join(edges) + ' ]')
     lines.append('        }')
-    with open(path, 'w') as file:
-        file.write('\n'.join(lines) + '\n')
+    write(path, '\n'.join(lines) + '\n')
 
 
 def reconstruct(program, scene, out):
@@ -111,7 +87,7 @@ def measure(args, data_set, evidence, scratch):
     storage = cv2.FileStorage(os.path.join(folder, 'groundtruth.yml'), cv2.FILE_STORAGE_READ)
     root = storage.root()
     table = Table()
-    for image in nodes(root, 'images'):
+    for image in seq(root, 'images'):
         edges = edges_of(image) if evidence == 'annotated' else []
         table.photos += 1
         name = os.path.splitext(image.getNode('file').string())[0]
@@ -126,10 +102,10 @@ def measure(args, data_set, evidence, scratch):
                     print(f'  {name} given {AXES[axis]}: {reason}')
                 continue
             found = True
-            for row in rows:
-                k = AXES.index(row['id'][-1]) if row['what'] == 'length' else axis
+            for line in rows:
+                k = AXES.index(line['id'][-1]) if line['what'] == 'length' else axis
                 if k != axis:
-                    value, sigma = float(row['value']), float(row['sigma'])
+                    value, sigma = float(line['value']), float(line['sigma'])
                     table.relative.append(abs(value / truth[k] - 1.0))
                     table.sigmas.append(abs(value - truth[k]) / sigma)
                     if args.verbose:
@@ -147,22 +123,10 @@ def measure(args, data_set, evidence, scratch):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('data')
-    parser.add_argument('--reconstruct', default='build/release/bin/circline_reconstruct')
-    parser.add_argument('--output', help='keeps scenes and models there')
-    parser.add_argument('--verbose', action='store_true')
-    parser.add_argument('--only', default='', help='a set, and the evidence: box-camprodon/annotated')
-    args = parser.parse_args()
+    args = parser_of(__doc__, 'reconstruct', data='1', output=None, verbose=False, only='').parse_args()
     if args.output:
         os.makedirs(args.output, exist_ok=True)
-    passed = failed = 0
-
-    def claim(text, holds):
-        nonlocal passed, failed
-        passed, failed = passed + holds, failed + (not holds)
-        print(f'{"ok    " if holds else "FAILED"} {text}')
-
+    claims = Claims()
     print('set and evidence: lengths, photos with a box, median and largest error (%), within 3 sigma (number, %), within 2 (%)')
     with tempfile.TemporaryDirectory() as scratch:
         for data_set, evidence in (('box-camprodon', 'annotated'), ('box-camprodon', 'detected'), ('box-camprodon-more', 'annotated'),
@@ -172,22 +136,21 @@ def main():
             table = measure(args, data_set, evidence, scratch)
             name = f'{data_set} {evidence}'
             if not table.relative:
-                claim(f'{name}: no box in {table.photos} photos', False)
+                claims.check(f'{name}: no box in {table.photos} photos', False)
                 continue
             print(f'{name:30s} {table.row()}')
             if data_set != 'box-camprodon-more':  # Photos that are hard on purpose: shown, not judged.
                 median = statistics.median(table.relative)
                 inside = sum(s <= 3.0 for s in table.sigmas) / len(table.sigmas)
-                claim(f'{name}: median error of the lengths that are not given {100 * median:.2f} % <= 2 %', median <= 0.02)
-                claim(f'{name}: within 3 sigma {100 * inside:.1f} % >= 95 %', inside >= 0.95)
+                claims.check(f'{name}: median error of the lengths that are not given {100 * median:.2f} % <= 2 %', median <= 0.02)
+                claims.check(f'{name}: within 3 sigma {100 * inside:.1f} % >= 95 %', inside >= 0.95)
             if data_set == 'turntable-teabox':
                 near = sum(v <= 2.0 * s for s, v, _ in table.agreement)
                 angles = [v for _, v, _ in table.agreement]
-                claim(f'{name}: circle and lines agree within 2 combined sigma in {near} of {len(angles)} photos with both, '
+                claims.check(f'{name}: circle and lines agree within 2 combined sigma in {near} of {len(angles)} photos with both, '
                       f'median {statistics.median(angles):.2f} degrees' if angles else f'{name}: no circle',
                       bool(angles) and near >= 0.85 * len(angles))
-    print(f'{passed} passed, {failed} failed')
-    return failed > 0
+    return claims.end()
 
 
 if __name__ == '__main__':

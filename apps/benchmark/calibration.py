@@ -4,11 +4,11 @@ of the stated deviations they are. `pooled` counts focal lengths and principal p
 Rows that end in OpenCV: cv2.calibrateCamera on the same photographs with the layout KNOWN, from the centres of the contours'
 ellipses or the corners of cv2.findChessboardCorners. Needs python3-opencv.
 
-  calibration.py DATA [--calibrate=build/release/bin/circline_calibrate] [--draws=10]
+  calibration.py DATA [--calibrate=build/release/bin/circline_calibrate] [--draws=10] [--guess=1.0]
 
-DATA holds one folder a set, each with a groundtruth.yml (docs/photographs.md).
+DATA holds one folder a set, each with a groundtruth.yml (docs/photographs.md). --guess: of the focal length, in those of 60
+degrees.
 """
-import argparse
 import json
 import math
 import os
@@ -21,7 +21,7 @@ import tempfile
 import cv2
 import numpy as np
 
-from photograph_answers import TO_SCENE
+from scripts import CAMERA, make_scene, parser_of, read, write
 
 # set, to_scene.py's arguments, flags, how many photos are drawn (0: all)
 SETS = [
@@ -34,13 +34,10 @@ SETS = [
     ('chessboard-opencv', ['--lines=all'], [], (0,)),
     ('chessboard-opencv', ['--evidence=auto'], [], (0,)),
 ]
-CAMERA = re.compile(r'id: "(\w+)", model: "\w+", width: (\d+), height: (\d+), '
-                    r'camera_matrix: \[([^\]]*)\], distortion: \[[^\]]*\]')
-
 
 def read_truths(scene):
     truths = {}
-    for name, _, _, matrix in CAMERA.findall(scene):
+    for name, _, _, _, matrix, _ in CAMERA.findall(scene):
         m = [float(v) for v in matrix.split(',')]
         truths[name] = {'fx': m[0], 'fy': m[4], 'cx': m[2], 'cy': m[5]}
     return truths
@@ -49,7 +46,7 @@ def read_truths(scene):
 def without_camera(scene, scale):
     """The cameras replaced by a guess: 60 degrees (times `scale`), no distortion."""
     def guess(match):
-        name, width, height, _ = match.groups()
+        name, _, width, height, _, _ = match.groups()
         f = scale * int(width) / 2 / math.tan(math.radians(30))
         middle = (int(width) - 1) / 2, (int(height) - 1) / 2
         return (f'id: "{name}", model: "opencv", width: {width}, height: {height}, '
@@ -63,14 +60,9 @@ def photos_of(scene):
 
 
 def calibrate(args, scene, flags, scratch):
-    path, out = os.path.join(scratch, 'scene.yaml'), os.path.join(scratch, 'out')
-    with open(path, 'w') as file:
-        file.write(scene)
+    path, out = write(os.path.join(scratch, 'scene.yaml'), scene), os.path.join(scratch, 'out')
     run = subprocess.run([args.calibrate, f'--scene={path}', f'--output={out}', '--overlays=false', *flags], capture_output=True, text=True)
-    if run.returncode != 0:
-        return None
-    with open(os.path.join(out, 'calibration.json')) as file:
-        return json.load(file)
+    return None if run.returncode != 0 else json.loads(read(os.path.join(out, 'calibration.json')))
 
 
 class KnownLayout:
@@ -140,21 +132,12 @@ def judge(camera, truth, held):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('data')
-    parser.add_argument('--calibrate', default='build/release/bin/circline_calibrate')
-    parser.add_argument('--draws', type=int, default=10)
-    parser.add_argument('--guess', type=float, default=1.0, help='times the focal length of 60 degrees')
-    args = parser.parse_args()
+    args = parser_of(__doc__, 'calibrate', data='1', draws=10, guess=1.0).parse_args()
     pooled, seen = [], set()
     print(f'{"set":44} {"photos":>6} {"camera":>7} {"f %":>7} {"sigma %":>8} {"point px":>9} {"sigmas of f, cx, cy":>22}')
     with tempfile.TemporaryDirectory() as scratch:
         for data_set, given, flags, counts in SETS:
-            source = os.path.join(scratch, 'source.yaml')
-            subprocess.run([TO_SCENE, os.path.join(args.data, data_set), source, *given],
-                           check=True, stdout=subprocess.DEVNULL)
-            with open(source) as file:
-                scene = file.read()
+            scene = make_scene(args, data_set, os.path.join(scratch, 'source.yaml'), *given)
             truths = read_truths(scene)
             head, photos = photos_of(without_camera(scene, args.guess))
             layout = KnownLayout(os.path.join(args.data, data_set))

@@ -31,20 +31,20 @@ axes lie along one, along the other, or between, and its normal along their prod
 88 to 99 % are to lie within two. The truth of chessboard-opencv comes from the same corners: it has a pool of its own, with
 a lower bound only.
 """
-import argparse
 import collections
 import itertools
 import json
 import math
 import os
-import subprocess
 import sys
 import tempfile
 
 import cv2
 import numpy
 
-from photograph_answers import EQUAL, TO_SCENE, folder, group_circles, json_lines
+from photograph_answers import EQUAL, SURE, folder, run_set
+from scripts import json_lines, parser_of, read, write
+from to_scene import seq
 
 # What is given: to_scene.py's arguments, and the solvers that are judged by it (none: all). The images of a board's centres
 # and axes come from the truth; where they decide more than the choice of a hypothesis or the turn, there is no row.
@@ -75,7 +75,7 @@ SETS = {
 SAME_CORNERS = 'chessboard-opencv'
 BOXES = ('box-camprodon', 'box-camprodon-more', 'circle-mire2', 'turntable-teabox')
 
-FAR_DEG, FAR_SIGMAS, SURE = 5.0, 5.0, 0.9
+FAR_DEG, FAR_SIGMAS = 5.0, 5.0
 POOLED_PERCENT = (88.0, 99.0)
 KINDS = {'refined': 'other refined solvers', 'closed_form': 'closed forms'}
 
@@ -90,12 +90,8 @@ Truth = collections.namedtuple('Truth', 'rotations normal directions')  # All ro
 Part = collections.namedtuple('Part', 'error sigma angle normal turn')  # Degrees; normal and turn: (error, sigma) or None.
 
 
-def sequence(node, key):
-    return [node.getNode(key).at(i) for i in range(node.getNode(key).size())]
-
-
 def numbers(node, key):
-    return numpy.array([value.real() for value in sequence(node, key)])
+    return numpy.array([value.real() for value in seq(node, key)])
 
 
 def street_rotations(directions):
@@ -115,13 +111,13 @@ def read_truths(args, data_set, scene, detected):
     """Of each image by its name."""
     storage = cv2.FileStorage(scene, cv2.FILE_STORAGE_READ)  # Storages must outlive their nodes.
     original = cv2.FileStorage(os.path.join(args.data, data_set, 'groundtruth.yml'), cv2.FILE_STORAGE_READ)
-    images, originals = sequence(storage, 'images'), sequence(original, 'images')
-    own = {d.getNode('name').string(): d.getNode('bootstrap_sd_deg').real() for d in sequence(original, 'scene_directions')}
+    images, originals = seq(storage, 'images'), seq(original, 'images')
+    own = {d.getNode('name').string(): d.getNode('bootstrap_sd_deg').real() for d in seq(original, 'scene_directions')}
     result = {}
     for image, given in zip(images, originals):
         truth, axes = image.getNode('truth'), given.getNode('box_axes_cam')
         rotation, symmetry = numbers(truth, 'rotation'), truth.getNode('symmetry').string()
-        directions = {d.getNode('pencil').string(): numbers(d, 'value') for d in sequence(truth, 'directions')}
+        directions = {d.getNode('pencil').string(): numbers(d, 'value') for d in seq(truth, 'directions')}
         sigmas = {name: own[name] / math.sqrt(2.0) for name in directions}
         rotations, normal = [], None
         if len(rotation):
@@ -253,17 +249,10 @@ def pencil_row(data_set, given, lines, truths):
 
 
 def rows_of(args, data_set, given, options, only, scratch):
-    out = folder(data_set, options, scratch)
-    scene = out + '.yaml'
-    subprocess.run([TO_SCENE, os.path.join(args.data, data_set), scene,
-                    *(o for o in options if o != EQUAL)], check=True)
-    if EQUAL in options:
-        group_circles(scene)
-    subprocess.run([args.compare, f'--scene={scene}', f'--output={out}', '--overlays=false', *args.flags.split()],
-                   check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    lines, scene = run_set(args, data_set, options, scratch, *args.flags.split())
     truths = read_truths(args, data_set, scene, given == DETECTED[0])
-    rows = solver_rows(data_set, given, only, json_lines(os.path.join(out, 'results.jsonl')), truths)
-    rows += pencil_row(data_set, given, json_lines(os.path.join(out, 'observations.jsonl')), truths)
+    rows = solver_rows(data_set, given, only, lines, truths)
+    rows += pencil_row(data_set, given, json_lines(os.path.join(folder(data_set, options, scratch), 'observations.jsonl')), truths)
     return [row.numbers() for row in rows if row.photos or row.far]
 
 
@@ -315,12 +304,7 @@ def print_changes(results, earlier):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('data')
-    for flag, default in (('compare', 'build/release/bin/circline_compare'), ('sets', ''), ('flags', ''),
-                          ('json', None), ('against', None), ('keep', None)):
-        parser.add_argument('--' + flag, default=default)
-    args = parser.parse_args()
+    args = parser_of(__doc__, 'compare', data='1', sets='', flags='', json=None, against=None, keep=None).parse_args()
     results = []
     print(FORMAT.format(*HEAD))
     with tempfile.TemporaryDirectory() as temporary:
@@ -336,11 +320,9 @@ def main():
     print(f'{len(results)} rows, {short} short; {outside} pools outside; of joint with a probability of {SURE} or more: '
           f'{sure["far"]} far answers, {sure["not_first"]} first hypotheses that are not the right one')
     if args.json:
-        with open(args.json, 'w') as file:
-            json.dump(results, file)
+        write(args.json, json.dumps(results))
     if args.against:
-        with open(args.against) as file:
-            print_changes(results, json.load(file))
+        print_changes(results, json.loads(read(args.against)))
     return short + outside > 0
 
 

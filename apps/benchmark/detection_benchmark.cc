@@ -3,31 +3,35 @@
 //     circline_detection_benchmark --data=DIR [--set=NAME]
 //     circline_detection_benchmark --data=DIR [--set=NAME] --speed
 //     circline_detection_benchmark --render_seed=1 [--render_seeds=5] [--render_count=60]
-//         [--render_textures=DIR] [--render_output=DIR]
 //
-// DIR holds folders with a groundtruth.yml (camera, and per photo what is true of it) or, for
-// renderings, a truth.csv; each is measured by what its truth offers. --speed prints times only.
-// The third form renders sets of 60 images of its own, one a seed, and prints a row for each and
-// their mean; or writes the first of them as such a folder. Its textures are the photographs of the
-// package opencv-doc.
+// DIR holds folders with a groundtruth.yml (camera, and per photo what is true of it); each is
+// measured by what its truth offers. The third form renders sets of 60 images of its own, one a
+// seed, and prints a row for each and their mean.
+#include <gflags/gflags.h>
+
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <fstream>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
 #include "apps/benchmark/detection_tables.h"
+#include "apps/common/flags_util.h"
 
-namespace circline::benchmark {
+DEFINE_string(data, "", "A folder with a folder for each set of photographs.");
+DEFINE_string(set, "", "Only this set.");
+DEFINE_bool(speed, false, "Times only.");
+DEFINE_int32(render_seed, -1, "Measure renderings of this and the following seeds instead.");
+DEFINE_int32(render_seeds, 1, "How many seeds.");
+DEFINE_int32(render_count, 60, "Images of each seed.");
+DEFINE_string(render_textures, "/usr/share/doc/opencv-doc/examples/data",
+              "The sample photographs of OpenCV, for the ground.");
+
+namespace circline::apps {
 namespace {
 
-void MeasureFolder(const std::string& folder, bool speed) {
-  if (std::ifstream(folder + "/truth.csv").good()) {
-    if (!speed) MeasureRenderings(folder);
-    return;
-  }
+void MeasureFolder(const std::string& folder) {
   cv::FileStorage file;
   if (!std::ifstream(folder + "/groundtruth.yml").good() ||
       !file.open(folder + "/groundtruth.yml", cv::FileStorage::READ)) {
@@ -35,7 +39,7 @@ void MeasureFolder(const std::string& folder, bool speed) {
   }
   const cv::FileNode root = file.root();
   const bool calibrated = !root["camera_matrix"].empty() || !root["cameras"].empty();
-  if (speed) {
+  if (FLAGS_speed) {
     if (calibrated) MeasureSpeed(folder, root);
   } else if (calibrated) {
     MeasurePhotographs(folder, root);
@@ -55,55 +59,37 @@ std::vector<std::string> FoldersBelow(const std::string& data) {
   return folders;
 }
 
-std::string Flag(int argc, char** argv, const std::string& name) {
-  const std::string prefix = "--" + name + "=";
-  for (int i = 1; i < argc; ++i) {
-    const std::string argument = argv[i];
-    if (argument.rfind(prefix, 0) == 0) return argument.substr(prefix.size());
-  }
-  return std::string();
-}
-
-int NumberFlag(int argc, char** argv, const std::string& name, int preset) {
-  const std::string value = Flag(argc, argv, name);
-  return value.empty() ? preset : std::atoi(value.c_str());
-}
-
-int Render(int argc, char** argv) {
-  std::string textures = Flag(argc, argv, "render_textures");
-  if (textures.empty()) textures = "/usr/share/doc/opencv-doc/examples/data";
-  const std::string output = Flag(argc, argv, "render_output");
-  const int seed = NumberFlag(argc, argv, "render_seed", 1);
-  const int count = NumberFlag(argc, argv, "render_count", 60);
-  const bool done =
-      output.empty()
-          ? MeasureFreshRenderings(textures, seed, NumberFlag(argc, argv, "render_seeds", 1), count)
-          : WriteRenderings(textures, seed, count, output);
-  if (!done) std::fprintf(stderr, "no photographs in %s, or no output\n", textures.c_str());
-  return done ? 0 : 1;
-}
-
-int Main(int argc, char** argv) {
-  const std::string data = Flag(argc, argv, "data"), set = Flag(argc, argv, "set");
+int Run() {
   cv::setNumThreads(1);
-  if (!Flag(argc, argv, "render_seed").empty()) return Render(argc, argv);
-  if (data.empty()) {
-    std::fprintf(stderr, "usage: %s --data=DIR [--set=NAME] [--speed] | --render_seed=N\n",
-                 argv[0]);
-    return 2;
+  if (FLAGS_render_seed >= 0) {
+    if (MeasureRenderings(FLAGS_render_textures, FLAGS_render_seed, FLAGS_render_seeds,
+                          FLAGS_render_count)) {
+      return kExitOk;
+    }
+    SayOnStderr("circline_detection_benchmark: no photographs in " + FLAGS_render_textures);
+    return kExitUnreadable;
   }
-  const bool speed = std::find(argv + 1, argv + argc, std::string("--speed")) != argv + argc;
-  const std::vector<std::string> folders =
-      set.empty() ? FoldersBelow(data) : std::vector<std::string>{data + "/" + set};
-  if (speed) {
+  if (FLAGS_data.empty()) {
+    SayOnStderr("circline_detection_benchmark: --data or --render_seed is missing");
+    return kExitUsage;
+  }
+  if (FLAGS_speed) {
     MeasureRingSpeed();
     std::printf("photographs              640 x 480 ms     worst     12 MP  12 MP tiled\n");
   }
-  for (const std::string& folder : folders) MeasureFolder(folder, speed);
-  return 0;
+  const std::vector<std::string> folders =
+      FLAGS_set.empty() ? FoldersBelow(FLAGS_data)
+                        : std::vector<std::string>{FLAGS_data + "/" + FLAGS_set};
+  for (const std::string& folder : folders) MeasureFolder(folder);
+  return kExitOk;
 }
 
 }  // namespace
-}  // namespace circline::benchmark
+}  // namespace circline::apps
 
-int main(int argc, char** argv) { return circline::benchmark::Main(argc, argv); }
+int main(int argc, char** argv) {
+  return circline::apps::RunApp(
+      argc, argv, "circline_detection_benchmark",
+      "circline_detection_benchmark: what detection finds on photographs with truth.",
+      circline::apps::Run);
+}

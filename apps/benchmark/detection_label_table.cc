@@ -1,16 +1,14 @@
 // Table of labelled photographs.
-#include <algorithm>
 #include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
-#include "apps/benchmark/detection_ellipses_run.h"
-#include "apps/benchmark/detection_statistics.h"
+#include "apps/benchmark/detection_ellipses.h"
 #include "apps/benchmark/detection_tables.h"
 #include "apps/benchmark/detection_truth.h"
-#include "apps/benchmark/ellipse_overlap.h"
+#include "apps/benchmark/timing.h"
 
-namespace circline::benchmark {
+namespace circline::apps {
 
 void MeasureLabels(const std::string& folder, const cv::FileNode& root) {
   Score all;
@@ -29,7 +27,7 @@ void MeasureLabels(const std::string& folder, const cv::FileNode& root) {
     camera.fx = camera.fy = image.cols;
     camera.cx = 0.5 * (image.cols - 1);
     camera.cy = 0.5 * (image.rows - 1);
-    const Timed t = RunEllipses(image, camera);
+    const FoundEllipses t = FindEllipses(image, camera);
     ms.push_back(t.edges_ms + t.ellipses_ms);
     std::vector<PolygonPoints> truth;
     for (const cv::FileNode& label : node["ellipses"]) {
@@ -42,13 +40,11 @@ void MeasureLabels(const std::string& folder, const cv::FileNode& root) {
     s.Add(overlap, t.polygons.size());
     all.Add(overlap, t.polygons.size());
     std::printf("  %-16s %5d %5d   %8.3f  %8.3f  %9.1f %.1f\n", file.c_str(), s.truth, s.found,
-                static_cast<double>(s.hit80) / std::max(1, s.truth),
-                static_cast<double>(s.hit95) / std::max(1, s.truth), t.edges_ms, t.ellipses_ms);
+                s.Recall(s.hit80), s.Recall(s.hit95), t.edges_ms, t.ellipses_ms);
   }
   std::printf("  all %18d %5d   %8.3f  %8.3f   ms with edges: median %.1f worst %.1f\n", all.truth,
-              all.found, static_cast<double>(all.hit80) / std::max(1, all.truth),
-              static_cast<double>(all.hit95) / std::max(1, all.truth), Quantile(ms, 0.5),
+              all.found, all.Recall(all.hit80), all.Recall(all.hit95), Quantile(ms, 0.5),
               Quantile(ms, 1.0));
 }
 
-}  // namespace circline::benchmark
+}  // namespace circline::apps

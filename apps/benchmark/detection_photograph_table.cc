@@ -1,30 +1,65 @@
 // The table of whole photographs: circles, pencils, and the contours of circles. Times are of
 // DetectObservations, everything in it.
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
-#include "apps/benchmark/detection_contours.h"
-#include "apps/benchmark/detection_statistics.h"
+#include "apps/benchmark/detection_ellipses.h"
 #include "apps/benchmark/detection_tables.h"
 #include "apps/benchmark/detection_truth.h"
-#include "apps/benchmark/ellipse_overlap.h"
-#include "circline/estimators/basics.h"
+#include "apps/benchmark/timing.h"
+#include "apps/common/pose_error.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/line_pose.h"
-#include "circline/estimators/pose.h"
 #include "circline/ransac/detection/detect_observations.h"
 
-namespace circline::benchmark {
+namespace circline::apps {
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+// The circle found whose contour is that of the conic, or null.
+const CircleObservation* CircleOf(const Matrix3d& conic, const Camera& camera,
+                                  const Observations& found) {
+  const PolygonPoints truth = ContourPolygon(camera, conic);
+  for (const CircleObservation& circle : found.circles) {
+    if (circle.fit &&
+        IntersectionOverUnion(truth, ContourPolygon(camera, circle.fit->conic)) >= 0.8) {
+      return &circle;
+    }
+  }
+  return nullptr;
+}
+
+// Of the edge points of circles, root mean squares of the distances to the true conic, pixels; and
+// what the set records of edge points of its own.
+struct ContourResiduals {
+  void Add(const cv::FileNode& circle, const Camera& camera, const Observations& observations) {
+    const cv::Mat center = ReadMatrix(circle, "centre_cam"),
+                  normal = ReadMatrix(circle, "normal_cam");
+    const cv::FileNode recorded_rms = circle["contour_rms_to_ground_truth_px"];
+    if (center.empty() || normal.empty() || recorded_rms.empty() || circle["radius"].empty())
+      return;
+    const CirclePose pose = {ToVector(normal),
+                             ToVector(center) / static_cast<double>(circle["radius"])};
+    const Matrix3d conic = ProjectCircle(pose);
+    const CircleObservation* own = CircleOf(conic, camera, observations);
+    if (own == nullptr) return;
+    std::vector<CalibratedPoint> points;
+    PixelsToCalibrated(camera, own->points, &points);
+    double squares = 0.0;
+    for (const CalibratedPoint& point : points)
+      squares += std::pow(ConicDistancePx(point, conic), 2);
+    found.push_back(std::sqrt(squares / static_cast<double>(points.size())));
+    recorded.push_back(static_cast<double>(recorded_rms));
+  }
+
+  std::vector<double> found, recorded;
+};
 
 // What is true of one photo, and how far the observations are from it; NaN = not to be had.
 struct PhotoErrors {
@@ -33,28 +68,6 @@ struct PhotoErrors {
   double rotation_deg = std::nan("");  // From the two in-plane pencils, up to the board's symmetry.
   std::vector<double> directions_deg;
 };
-
-double DirectionDeg(const Vector3d& a, const Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) / kDegree;
-}
-
-// Angle between rotations up to the symmetry of a square board.
-double BoardRotationDeg(const Matrix3d& a, const Matrix3d& b) {
-  double best = 1e9;
-  for (int axis = 0; axis < 2; ++axis) {
-    for (int quarter = 0; quarter < 4; ++quarter) {
-      Matrix3d s = Matrix3d::Identity();
-      const double half_turn = axis == 0 ? 1.0 : -1.0;
-      s << 1, 0, 0, 0, half_turn, 0, 0, 0, half_turn;
-      const double c = std::cos(quarter * 1.5707963267948966);
-      const double d = std::sin(quarter * 1.5707963267948966);
-      Matrix3d z;
-      z << c, -d, 0, d, c, 0, 0, 0, 1;
-      best = std::min(best, RotationAngle(a * z * s, b) / kDegree);
-    }
-  }
-  return best;
-}
 
 PhotoErrors MeasurePhoto(const cv::FileNode& node, const Camera& camera,
                          const Observations& found) {
@@ -92,13 +105,13 @@ PhotoErrors MeasurePhoto(const cv::FileNode& node, const Camera& camera,
   Matrix3d estimate;
   if (!rotation.empty() && in_plane.size() >= 2 &&
       RotationFromOrthogonalDirections(in_plane[0], 1.0, in_plane[1], 1.0, &estimate)) {
-    errors.rotation_deg = BoardRotationDeg(estimate, ToEigen(rotation));
+    errors.rotation_deg = RotationErrorDeg(ToEigen(rotation), estimate, Symmetry::kD4);
   }
   for (const cv::FileNode& direction : node["directions"]) {
     const Vector3d d = ToVector(ReadMatrix(direction, "direction_cam"));
     double best = 90.0;
     for (const PencilObservation& pencil : found.pencils) {
-      if (pencil.fit) best = std::min(best, DirectionDeg(pencil.fit->direction, d));
+      if (pencil.fit) best = std::min(best, AngleWithoutSenseDeg(pencil.fit->direction, d));
     }
     errors.directions_deg.push_back(best);
   }
@@ -121,15 +134,15 @@ void MeasurePhotographs(const std::string& folder, const cv::FileNode& root) {
     Camera camera;
     if (image.empty() || !CameraOf(root, node, image.size(), &camera)) continue;
     Observations found;
-    const std::clock_t start = std::clock();
-    const Status status = DetectObservations(image, camera, DetectionOptions(), &found);
-    ms.push_back(Milliseconds(start));
+    Status status;
+    ms.push_back(Milliseconds(
+        [&] { status = DetectObservations(image, camera, DetectionOptions(), &found); }));
     if (!status.ok()) {
       std::printf("  %s: %s\n", file.c_str(), status.message.c_str());
       continue;
     }
     const PhotoErrors e = MeasurePhoto(node, camera, found);
-    contours.Add(node, camera, found);
+    for (const cv::FileNode& circle : node["circles"]) contours.Add(circle, camera, found);
     circles += e.circles;
     circles_found += e.circles_found;
     if (!std::isnan(e.normal_deg)) normals.push_back(e.normal_deg);
@@ -150,7 +163,10 @@ void MeasurePhotographs(const std::string& folder, const cv::FileNode& root) {
       circles_found, circles, Quantile(normals, 0.5), Quantile(normals, 0.9),
       Quantile(rotations, 0.5), Quantile(rotations, 0.9), static_cast<int>(rotations.size()),
       Quantile(ms, 0.5), Quantile(ms, 1.0));
-  contours.Print();
+  if (contours.found.empty()) return;
+  std::printf("  contour rms to the truth: median %.3f px of %d, the set's own edges %.3f px\n",
+              Quantile(contours.found, 0.5), static_cast<int>(contours.found.size()),
+              Quantile(contours.recorded, 0.5));
 }
 
-}  // namespace circline::benchmark
+}  // namespace circline::apps

@@ -7,10 +7,11 @@
 #include <opencv2/imgproc.hpp>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/random.h"
 
-namespace circline::benchmark {
+namespace circline::apps {
 namespace {
 
 using Eigen::Matrix3d;
@@ -30,16 +31,12 @@ struct Disc {
   bool is_ring = false;
 
   Ellipse Rim(const Camera& camera, double share) const {
-    // Of a ray x the point in the plane is x (n.c) / (n.x); its squared
-    // distance from c is r^2: |x (n.c) - c (n.x)|^2 = r^2 (n.x)^2.
-    const Matrix3d m = normal.dot(center) * Matrix3d::Identity() - center * normal.transpose();
-    const double r = share * radius;
-    const Matrix3d conic = m.transpose() * m - r * r * normal * normal.transpose();
     Matrix3d ray_from_pixel;
     ray_from_pixel << 1.0 / camera.fx, 0.0, -camera.cx / camera.fx, 0.0, 1.0 / camera.fy,
         -camera.cy / camera.fy, 0.0, 0.0, 1.0;
     Ellipse rim;
-    ConicToEllipse(ray_from_pixel.transpose() * conic * ray_from_pixel, &rim);
+    ConicToEllipse(
+        TransformConic(ProjectCircle({normal, center / (share * radius)}), ray_from_pixel), &rim);
     return rim;
   }
 };
@@ -222,4 +219,4 @@ cv::Mat Renderer::Render(std::uint64_t seed, int number, RenderedImage* truth) c
   return image;
 }
 
-}  // namespace circline::benchmark
+}  // namespace circline::apps

@@ -1,5 +1,4 @@
-// Renderings of circles and rings in perspective with exact truth: as many fresh sets as there are
-// seeds, of the kind that a folder of renderings with a truth.csv holds.
+// Renderings of circles and rings in perspective with exact truth: a set for each seed.
 #ifndef CIRCLINE_APPS_BENCHMARK_DETECTION_RENDER_H_
 #define CIRCLINE_APPS_BENCHMARK_DETECTION_RENDER_H_
 
@@ -8,10 +7,17 @@
 #include <string>
 #include <vector>
 
-#include "apps/benchmark/detection_truth.h"
 #include "circline/estimators/camera.h"
+#include "circline/estimators/conic.h"
 
-namespace circline::benchmark {
+namespace circline::apps {
+
+struct RenderedImage {
+  int group = 0;
+  std::vector<Ellipse> ellipses;
+  std::vector<Eigen::Vector3d> normals;
+  std::vector<Eigen::Vector2d> centers;  // Of the circle; the two rims of a ring share theirs.
+};
 
 // 640x480, f = 800 px, no distortion: that of all renderings.
 Camera RenderingCamera();
@@ -39,6 +45,6 @@ class Renderer {
   std::vector<cv::Mat> textures_;  // Grey, as large as the supersampled rendering.
 };
 
-}  // namespace circline::benchmark
+}  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_BENCHMARK_DETECTION_RENDER_H_

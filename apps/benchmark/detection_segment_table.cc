@@ -3,23 +3,68 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
 #include <vector>
+#ifdef CIRCLINE_HAVE_XIMGPROC
+#include <opencv2/ximgproc/edge_drawing.hpp>
+#endif
 
-#include "apps/benchmark/baseline_detectors.h"
-#include "apps/benchmark/detection_statistics.h"
 #include "apps/benchmark/detection_tables.h"
 #include "apps/benchmark/detection_truth.h"
+#include "apps/benchmark/timing.h"
 #include "circline/estimators/line.h"
 #include "circline/ransac/detection/detect_lines.h"
 #include "circline/ransac/detection/edges.h"
 
-namespace circline::benchmark {
+namespace circline::apps {
 namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+
+// OpenCV's own detectors, in the same run as ours.
+std::vector<Segment> FromOpenCv(const std::vector<cv::Vec4f>& lines) {
+  std::vector<Segment> segments;
+  for (const cv::Vec4f& v : lines) {
+    const Eigen::Vector4d ends = Eigen::Vector4f(v.val).cast<double>();
+    segments.push_back({ends.head<2>(), ends.tail<2>()});
+  }
+  return segments;
+}
+
+std::vector<Segment> LsdSegments(const cv::Mat& gray) {
+  std::vector<cv::Vec4f> lines;
+  cv::createLineSegmentDetector()->detect(gray, lines);
+  return FromOpenCv(lines);
+}
+
+#ifdef CIRCLINE_HAVE_XIMGPROC
+std::vector<Segment> EdgeDrawingSegments(const cv::Mat& gray) {
+  const auto drawing = cv::ximgproc::createEdgeDrawing();
+  drawing->detectEdges(gray);
+  std::vector<cv::Vec4f> lines;
+  drawing->detectLines(lines);
+  return FromOpenCv(lines);
+}
+#endif
+
+struct Detector {
+  const char* name;
+  std::vector<Segment> (*detect)(const cv::Mat& gray);
+};
+constexpr Detector kOpenCvDetectors[] = {
+#ifdef CIRCLINE_HAVE_XIMGPROC
+    {"EdgeDrawing", EdgeDrawingSegments},
+#endif
+    {"LineSegmentDetector", LsdSegments}};
+
+// What one detector has found.
+struct Ends {
+  std::string name;
+  std::vector<double> squares, ms;  // Squared distances of ends to the board's lines.
+};
 
 // A row or column of a chessboard's corners: its line, and how far it reaches.
 struct BoardLine {
@@ -92,50 +137,44 @@ Segment FittedEnds(const DetectedLine& line, const Camera& camera) {
   return ends;
 }
 
-void PrintResiduals(const std::string& name, const std::vector<double>& squares,
-                    const std::vector<double>& ms) {
+void Print(const Ends& ends) {
   double sum = 0.0;
-  for (const double s : squares) sum += s;
+  for (const double s : ends.squares) sum += s;
   std::printf(
       "  segments, %-22s %6d ends, rms to the board's lines %.3f px, median %.3f; ms with edges "
       "%.1f\n",
-      name.c_str(), static_cast<int>(squares.size()),
-      std::sqrt(sum / static_cast<double>(squares.size())), std::sqrt(Quantile(squares, 0.5)),
-      Quantile(ms, 0.5));
+      ends.name.c_str(), static_cast<int>(ends.squares.size()),
+      std::sqrt(sum / static_cast<double>(ends.squares.size())),
+      std::sqrt(Quantile(ends.squares, 0.5)), Quantile(ends.ms, 0.5));
 }
 
 }  // namespace
 
 void MeasureSegments(const std::string& folder, const cv::FileNode& root) {
-  std::vector<SegmentBaseline> baselines = SegmentBaselines();
-  std::vector<std::vector<double>> squares(baselines.size() + 1), ms(baselines.size() + 1);
+  std::vector<Ends> all = {{"circline", {}, {}}};
+  for (const Detector& detector : kOpenCvDetectors) all.push_back({detector.name, {}, {}});
   for (const cv::FileNode& node : root["images"]) {
     const cv::Mat gray = cv::imread(folder + "/" + ReadText(node, "file"), cv::IMREAD_GRAYSCALE);
     Camera camera;
     if (gray.empty() || !CameraOf(root, node, gray.size(), &camera)) continue;
     const std::vector<BoardLine> lines = BoardLines(node, camera);
     if (lines.empty()) continue;
-    std::clock_t start = std::clock();
-    EdgeMap edges;
     std::vector<DetectedLine> found;
-    DetectEdges(gray, EdgeOptions(), &edges);
-    DetectLines(edges, camera, LineOptions(), &found);
-    ms[0].push_back(Milliseconds(start));
+    all[0].ms.push_back(Milliseconds([&] {
+      EdgeMap edges;
+      DetectEdges(gray, EdgeOptions(), &edges);
+      DetectLines(edges, camera, LineOptions(), &found);
+    }));
     std::vector<Segment> segments;
     for (const DetectedLine& line : found) segments.push_back(FittedEnds(line, camera));
-    AddEndResiduals(lines, camera, segments, &squares[0]);
-    for (std::size_t k = 0; k < baselines.size(); ++k) {
-      start = std::clock();
-      segments = baselines[k].detect(gray);
-      ms[k + 1].push_back(Milliseconds(start));
-      AddEndResiduals(lines, camera, segments, &squares[k + 1]);
+    AddEndResiduals(lines, camera, segments, &all[0].squares);
+    for (std::size_t k = 1; k < all.size(); ++k) {
+      all[k].ms.push_back(Milliseconds([&] { segments = kOpenCvDetectors[k - 1].detect(gray); }));
+      AddEndResiduals(lines, camera, segments, &all[k].squares);
     }
   }
-  if (squares[0].empty()) return;
-  PrintResiduals("circline", squares[0], ms[0]);
-  for (std::size_t k = 0; k < baselines.size(); ++k) {
-    PrintResiduals(baselines[k].name, squares[k + 1], ms[k + 1]);
-  }
+  if (all[0].squares.empty()) return;
+  for (const Ends& ends : all) Print(ends);
 }
 
-}  // namespace circline::benchmark
+}  // namespace circline::apps

@@ -4,19 +4,18 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <vector>
 
-#include "apps/benchmark/detection_statistics.h"
 #include "apps/benchmark/detection_tables.h"
 #include "apps/benchmark/detection_truth.h"
+#include "apps/benchmark/timing.h"
 #include "circline/estimators/basics.h"
 #include "circline/ransac/detection/detect_observations.h"
 
-namespace circline::benchmark {
+namespace circline::apps {
 namespace {
 
 constexpr double kSmallPixels = 640.0 * 480.0, kLargePixels = 12e6;
@@ -27,9 +26,9 @@ double TimeDetection(const cv::Mat& image, const Camera& camera, Observations* f
   constexpr int kRuns = 3;
   double least = std::nan("");
   for (int run = 0; run < kRuns; ++run) {
-    const std::clock_t start = std::clock();
-    const Status status = DetectObservations(image, camera, DetectionOptions(), found);
-    const double ms = Milliseconds(start);
+    Status status;
+    const double ms = Milliseconds(
+        [&] { status = DetectObservations(image, camera, DetectionOptions(), found); });
     if (status.ok() && !(least <= ms)) least = ms;
   }
   return least;
@@ -166,4 +165,4 @@ void MeasureSpeed(const std::string& folder, const cv::FileNode& root) {
               Quantile(small, 1.0), enlarged, tiled);
 }
 
-}  // namespace circline::benchmark
+}  // namespace circline::apps

@@ -7,18 +7,11 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-namespace circline::benchmark {
+namespace circline::apps {
 
-// Renderings with a truth.csv: ellipses and normals, ours and OpenCV's.
-void MeasureRenderings(const std::string& folder);
-
-// Fresh renderings, `count` of each of the seeds first, first + 1, ...: what the table of a folder
-// ends with, a line a seed and their average. `textures`: a folder with OpenCV's sample
-// photographs. False where it has none.
-bool MeasureFreshRenderings(const std::string& textures, int first_seed, int num_seeds, int count);
-
-// The renderings of one seed as a folder with a truth.csv. False where it cannot be written.
-bool WriteRenderings(const std::string& textures, int seed, int count, const std::string& folder);
+// Renderings, `count` of each of the seeds first, first + 1, ...: a line a seed and their average.
+// `textures`: a folder with OpenCV's sample photographs. False where it has none.
+bool MeasureRenderings(const std::string& textures, int first_seed, int num_seeds, int count);
 
 // Photographs with labelled ellipses, not calibrated.
 void MeasureLabels(const std::string& folder, const cv::FileNode& root);
@@ -40,6 +33,6 @@ void MeasureRingSpeed();
 // The angle between a normal and the better of the two that an ellipse allows.
 double BetterNormalDeg(const Eigen::Matrix3d& conic, const Eigen::Vector3d& normal);
 
-}  // namespace circline::benchmark
+}  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_BENCHMARK_DETECTION_TABLES_H_

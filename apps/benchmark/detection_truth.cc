@@ -1,14 +1,10 @@
 #include "apps/benchmark/detection_truth.h"
 
 #include <algorithm>
-#include <cstdlib>
-#include <fstream>
-#include <sstream>
 
-#include "apps/benchmark/detection_statistics.h"
 #include "circline/estimators/basics.h"
 
-namespace circline::benchmark {
+namespace circline::apps {
 namespace {
 
 using Eigen::Matrix3d;
@@ -34,32 +30,6 @@ bool ReadCamera(const cv::FileNode& node, const cv::Size& size, Camera* camera) 
 }
 
 }  // namespace
-
-std::map<std::string, RenderedImage> ReadRenderings(const std::string& path) {
-  std::map<std::string, RenderedImage> images;
-  std::ifstream file(path);
-  std::string line;
-  std::getline(file, line);
-  while (std::getline(file, line)) {
-    std::stringstream row(line);
-    std::string name, cell;
-    std::getline(row, name, ',');
-    std::vector<double> v;
-    while (std::getline(row, cell, ',')) v.push_back(std::atof(cell.c_str()));
-    if (v.size() < 11) continue;
-    RenderedImage& image = images[name];
-    image.group = static_cast<int>(v[0]);
-    Ellipse e;
-    e.center = {v[1], v[2]};
-    e.a = v[3];
-    e.b = v[4];
-    e.angle = v[5];
-    image.ellipses.push_back(e);
-    image.normals.emplace_back(v[6], v[7], v[8]);
-    image.centers.emplace_back(v[9], v[10]);
-  }
-  return images;
-}
 
 cv::Mat ReadMatrix(const cv::FileNode& node, const char* key) {
   cv::Mat m;
@@ -97,4 +67,4 @@ Ellipse ReadEllipse(const cv::Mat& m) {
   return ellipse;
 }
 
-}  // namespace circline::benchmark
+}  // namespace circline::apps

@@ -17,6 +17,13 @@
 namespace circline {
 namespace {
 
+// Powers of ten to `most`, with a fit of n log n.
+template <std::int64_t most>
+void UpTo(benchmark::internal::Benchmark* benchmark) {
+  benchmark->RangeMultiplier(10)->Range(most / 1000, most)->Unit(benchmark::kMillisecond);
+  benchmark->Complexity(benchmark::oNLogN);
+}
+
 // An ellipse, three tenths of its points beside it.
 Observations LongContour(std::int64_t count) {
   Random random(1);
@@ -42,11 +49,7 @@ void BM_GrowthContourPoints(benchmark::State& state) {
   }
   state.SetComplexityN(state.range(0));
 }
-BENCHMARK(BM_GrowthContourPoints)
-    ->RangeMultiplier(10)
-    ->Range(100, 100000)
-    ->Unit(benchmark::kMillisecond)
-    ->Complexity(benchmark::oNLogN);
+BENCHMARK(BM_GrowthContourPoints)->Apply(UpTo<100000>);
 
 void ParseImages(const std::string& images, benchmark::State* state) {
   const std::string text =
@@ -67,11 +70,7 @@ void BM_GrowthScenePencils(benchmark::State& state) {
     image += "      - {id: \"p" + std::to_string(i) + "\", segments: [10, 20, 30, 40]}\n";
   ParseImages(image, &state);
 }
-BENCHMARK(BM_GrowthScenePencils)
-    ->RangeMultiplier(10)
-    ->Range(100, 100000)
-    ->Unit(benchmark::kMillisecond)
-    ->Complexity(benchmark::oNLogN);
+BENCHMARK(BM_GrowthScenePencils)->Apply(UpTo<100000>);
 
 void BM_GrowthSceneEntries(benchmark::State& state) {
   std::string images;
@@ -79,11 +78,7 @@ void BM_GrowthSceneEntries(benchmark::State& state) {
     images += "  - {file: \"a.jpg\", camera: \"k\"}\n";
   ParseImages(images, &state);
 }
-BENCHMARK(BM_GrowthSceneEntries)
-    ->RangeMultiplier(10)
-    ->Range(100, 100000)
-    ->Unit(benchmark::kMillisecond)
-    ->Complexity(benchmark::oNLogN);
+BENCHMARK(BM_GrowthSceneEntries)->Apply(UpTo<100000>);
 
 constexpr double kSegmentNoisePx = 0.2;
 
@@ -145,26 +140,32 @@ BENCHMARK(BM_GrowthSegments)
 // A sheet four units wide, six away, seen 40 degrees off its normal.
 class Sheet {
  public:
-  Sheet() {
+  explicit Sheet(double noise_px = kSegmentNoisePx) : noise_px_(noise_px) {
     Camera& camera = observations_.camera;
     camera.fx = camera.fy = 600.0;
     camera.cx = 320.0;
     camera.cy = 240.0;
   }
 
-  // With its centre and a diameter.
-  void AddCircle() {
+  // Turned out of the sheet by `lean` about its own vertical; perhaps with its centre and a
+  // diameter.
+  void AddCircle(bool is_marked, double lean = 0.0) {
     const Eigen::Vector2d center = Anywhere();
     const double radius = random_.Uniform(0.05, 0.2);
     CircleObservation circle;
     circle.id = "c" + std::to_string(observations_.circles.size());
     circle.plane = "p";
     constexpr int kPoints = 24;
-    for (int k = 0; k < kPoints; ++k)
-      circle.points.push_back(Pixel(center + radius * Along(2.0 * kPi * k / kPoints)));
-    circle.center = Pixel(center);
-    const Eigen::Vector2d across = radius * Along(random_.Uniform(0.0, kPi));
-    circle.diameters.push_back({Pixel(center - across), Pixel(center + across)});
+    for (int k = 0; k < kPoints; ++k) {
+      const Eigen::Vector2d arm = radius * Along(2.0 * kPi * k / kPoints);
+      const Eigen::Vector2d turned(std::cos(lean) * arm.x(), arm.y());
+      circle.points.push_back(Pixel(center + turned, -std::sin(lean) * arm.x()));
+    }
+    if (is_marked) {
+      circle.center = Pixel(center);
+      const Eigen::Vector2d across = radius * Along(random_.Uniform(0.0, kPi));
+      circle.diameters.push_back({Pixel(center - across), Pixel(center + across)});
+    }
     observations_.circles.push_back(circle);
   }
 
@@ -217,16 +218,17 @@ class Sheet {
     const double x = random_.Uniform(-2.0, 2.0), y = random_.Uniform(-2.0, 2.0);
     return {x, y};
   }
-  Eigen::Vector2d Pixel(const Eigen::Vector2d& at) {
+  Eigen::Vector2d Pixel(const Eigen::Vector2d& at, double height = 0.0) {
     const Eigen::Vector3d ray =
-        ExpRotation({0.7, 0.0, 0.0}) * Eigen::Vector3d(at.x(), at.y(), 0.0) +
+        ExpRotation({0.7, 0.0, 0.0}) * Eigen::Vector3d(at.x(), at.y(), height) +
         Eigen::Vector3d(0.0, 0.0, 6.0);
     Eigen::Vector2d pixel;
     CameraToPixel(observations_.camera, ray, &pixel);
     const double dx = random_.Normal(), dy = random_.Normal();
-    return pixel + kSegmentNoisePx * Eigen::Vector2d(dx, dy);
+    return pixel + noise_px_ * Eigen::Vector2d(dx, dy);
   }
 
+  double noise_px_;
   Random random_{1};
   Observations observations_;
 };
@@ -237,11 +239,7 @@ void BM_GrowthFreePencils(benchmark::State& state) {
   for (std::int64_t i = 0; i < state.range(0); ++i) sheet.AddFreePencil();
   FitAndEstimate(sheet.observations(), &state);
 }
-BENCHMARK(BM_GrowthFreePencils)
-    ->RangeMultiplier(10)
-    ->Range(10, 10000)
-    ->Unit(benchmark::kMillisecond)
-    ->Complexity(benchmark::oNLogN);
+BENCHMARK(BM_GrowthFreePencils)->Apply(UpTo<10000>);
 
 // The same in pairs at known angles, or in chains of so many.
 void BM_GrowthKnownAngles(benchmark::State& state) {
@@ -262,18 +260,33 @@ BENCHMARK(BM_GrowthKnownAngles)
 void BM_GrowthOfAll(benchmark::State& state) {
   const auto count = static_cast<int>(state.range(0));
   Sheet sheet;
-  for (int i = 0; i < count; ++i) sheet.AddCircle();
+  for (int i = 0; i < count; ++i) sheet.AddCircle(true);
   for (int i = 0; i < count; ++i) sheet.AddFreePencil();
   for (int i = 0; i < count; ++i) sheet.AddLength();
   sheet.AddPencil(0.0, count, PencilDirection::kX);
   sheet.AddPencil(0.5 * kPi, count, PencilDirection::kY);
   FitAndEstimate(sheet.observations(), &state);
 }
-BENCHMARK(BM_GrowthOfAll)
-    ->RangeMultiplier(10)
-    ->Range(10, 10000)
-    ->Unit(benchmark::kMillisecond)
-    ->Complexity(benchmark::oNLogN);
+BENCHMARK(BM_GrowthOfAll)->Apply(UpTo<10000>);
+
+// Circles of one plane; where the second argument is above 0, each so-many-th one leans out of it.
+void BM_EstimatePoseCirclesOfAPlane(benchmark::State& state) {
+  constexpr double kNoisePx = 0.3;
+  Random random(2);
+  Sheet sheet(kNoisePx);
+  for (std::int64_t i = 0; i < state.range(0); ++i) {
+    const bool leans = state.range(1) > 0 && i % state.range(1) == 0;
+    sheet.AddCircle(false, leans ? random.Uniform(0.2, 0.6) : 0.0);
+  }
+  Observations observations = sheet.observations();
+  FitDirect(kNoisePx, &observations);
+  for (auto _ : state) benchmark::DoNotOptimize(EstimatePose(observations));
+}
+BENCHMARK(BM_EstimatePoseCirclesOfAPlane)
+    ->ArgNames({"circles", "leaning_every"})
+    ->ArgsProduct({{10, 30, 100, 300, 1000}, {0, 5}})
+    ->Args({10000, 0})
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace circline

@@ -5,7 +5,6 @@
 
 Noise 0.15 px, 40 points a circle; --anonymous: a circle has another id in each photo.
 """
-import argparse
 import math
 import os
 import resource
@@ -15,20 +14,16 @@ import time
 
 import numpy as np
 
+from peers import rotation
+from scripts import parser_of
+
 FOCAL, POINT, K1, WIDTH, HEIGHT = 900.0, (650.0, 470.0), -0.1, 1280, 960  # The truth, pixels.
 GUESS = WIDTH / 2 / math.tan(math.radians(30))
 
 
-def turn(vector):
-    angle = np.linalg.norm(vector)
-    x, y, z = vector / angle
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-
-
 def photo(rng, index, circles, anonymous):
     around, tilt, spin = rng.uniform(0, 2 * math.pi), rng.uniform(0.3, 0.8), rng.uniform(-1, 1)
-    rotation = turn(np.array([tilt * math.cos(around), tilt * math.sin(around), 0])) @ turn(np.array([0, 0, spin])) @ np.diag([1, -1, -1])
+    world = rotation(np.array([math.cos(around), math.sin(around), 0]), tilt) @ rotation(np.array([0, 0, 1]), spin) @ np.diag([1, -1, -1])
     translation = np.array([rng.uniform(-1, 1), rng.uniform(-1, 1), 16])
     angles = np.linspace(0, 2 * math.pi, 40, endpoint=False)
     side = math.isqrt(circles - 1) + 1
@@ -36,7 +31,7 @@ def photo(rng, index, circles, anonymous):
     lines = [f'  - file: "p{index:04d}.jpg"', '    camera: "c"', '    circles:']
     for k in range(circles):
         x, y = k % side - (side - 1) / 2, k // side - (side - 1) / 2
-        p = rotation @ np.stack([x + 0.35 * np.cos(angles), y + 0.35 * np.sin(angles), 0 * angles]) + translation[:, None]
+        p = world @ np.stack([x + 0.35 * np.cos(angles), y + 0.35 * np.sin(angles), 0 * angles]) + translation[:, None]
         ray = p[:2] / p[2]
         pixels = FOCAL * ray * (1 + K1 * (ray**2).sum(0)) + np.array(POINT)[:, None] + rng.normal(0, 0.15, (2, 40))
         contour = ', '.join(f'{v:.3f}' for v in pixels.T.ravel())
@@ -45,12 +40,7 @@ def photo(rng, index, circles, anonymous):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--photos', type=int, default=300)
-    parser.add_argument('--circles', type=int, default=100)
-    parser.add_argument('--calibrate', default='build/release/bin/circline_calibrate')
-    parser.add_argument('--anonymous', action='store_true')
-    args = parser.parse_args()
+    args = parser_of(__doc__, 'calibrate', photos=300, circles=100, anonymous=False).parse_args()
     rng = np.random.default_rng(1)
     with tempfile.TemporaryDirectory() as folder:
         for i in range(args.photos):  # Not looked at: all circles are given.

@@ -10,9 +10,7 @@ centre and on the corners of the rectangle: known points for the peers, for ours
 Errors are medians over all images, in degrees; of several poses that of the first counts. Times are lower quartiles,
 of the wall, as other programs run, too.
 """
-import argparse
 import collections
-import json
 import os
 import re
 import statistics
@@ -20,7 +18,8 @@ import subprocess
 
 import numpy as np
 
-TOP = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..')
+from scripts import TOP, json_lines, parser_of, read, write
+
 PAGE = os.path.join(TOP, 'docs/scene_files.md')
 F, WIDTH, HEIGHT, NOISE_PX = 800.0, 640, 480, 0.5
 HALF = np.array([0.7, 0.6])
@@ -82,11 +81,6 @@ def simulated_scene(num_images):
     return '\n'.join(lines) + '\n'
 
 
-def json_lines(file):
-    with open(file) as lines:
-        return [json.loads(line) for line in lines]
-
-
 def measure(build, scene, *flags):
     """By solver and stage: medians of the normal's and the rotation's error, infinite where there is none, and the time."""
     out = os.path.join(build, 'peers')
@@ -120,11 +114,7 @@ def table(photographs, simulated):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--build')
-    parser.add_argument('--images', type=int, default=300)
-    parser.add_argument('--write', action='store_true')
-    args = parser.parse_args()
+    args = parser_of(__doc__, build='', images=300, write=False).parse_args()
     if not args.build:
         args.build = os.path.join(TOP, 'build/peers')
         shell('''options=(-DCIRCLINE_BUILD_{TESTS,BENCHMARKS}=OFF -DCIRCLINE_WERROR="${CIRCLINE_WERROR:-OFF}")
@@ -135,17 +125,12 @@ def main():
             quietly build/peers-configure.log cmake --preset release -B build/peers "${options[@]}"
             cmake --build build/peers --target circline_compare -j "$(nproc)" -- --quiet''')
     shell('lay_out disc')
-    scene = os.path.join(args.build, 'peers.yaml')
-    with open(scene, 'w') as file:
-        file.write(simulated_scene(args.images))
+    scene = write(os.path.join(args.build, 'peers.yaml'), simulated_scene(args.images))
     made = table(measure(args.build, os.path.join(TOP, 'build/demo/disc/scene.yaml')),
                  measure(args.build, scene, '--noise=exact'))
     print(made, end='')
     if args.write:
-        with open(PAGE) as file:
-            page = file.read()
-        with open(PAGE, 'w') as file:
-            file.write(re.sub(r'\| solver \| from \| photographs.*?\n(?!\|)', lambda _: made, page, flags=re.DOTALL))
+        write(PAGE, re.sub(r'\| solver \| from \| photographs.*?\n(?!\|)', lambda _: made, read(PAGE), flags=re.DOTALL))
 
 
 if __name__ == '__main__':

@@ -1,46 +1,35 @@
 """Answers of circline_compare about photographs with truth, and their errors: for photographs.py."""
 import itertools
-import json
 import math
 import os
 import re
 import subprocess
 
-TOP = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..')
-TO_SCENE = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'to_scene.py')
+from scripts import TOP, compare, make_scene, read, write
+
 EQUAL = 'equal circles'  # Not for to_scene.py: all circles of a photo are one radius_group.
 SURE = 0.9  # The probability of an answer that counts as sure.
-
-
-def group_circles(scene):
-    with open(scene) as file:
-        text = file.read()
-    with open(scene, 'w') as file:
-        file.write(re.sub(r'(\{ id: "\w+", )(contour:)', r'\1radius_group: "dots", \2', text))
 
 
 def folder(data_set, options, scratch):
     return os.path.join(scratch, '_'.join((data_set, *options)).replace('=', '').replace(' ', '_'))
 
 
-def json_lines(file):
-    with open(file) as lines:
-        return [json.loads(line) for line in lines]
+def run_set(args, data_set, options, scratch, *flags):
+    """Result lines, and the scene file."""
+    out = folder(data_set, options, scratch)
+    scene = out + '.yaml'
+    text = make_scene(args, data_set, scene, *(o for o in options if o != EQUAL))
+    if EQUAL in options:
+        write(scene, re.sub(r'(\{ id: "\w+", )(contour:)', r'\1radius_group: "dots", \2', text))
+    return compare(args, scene, out, *flags), scene
 
 
 def run(args, data_set, options, scratch, cache={}):
     """Result lines by image, solver and stage; one run for each set and evidence."""
     key = (data_set, *options)
     if key not in cache:
-        out = folder(data_set, options, scratch)
-        scene = out + '.yaml'
-        subprocess.run([TO_SCENE, os.path.join(args.data, data_set), scene,
-                        *(o for o in options if o != EQUAL)], check=True)
-        if EQUAL in options:
-            group_circles(scene)
-        subprocess.run([args.compare, f'--scene={scene}', f'--output={out}', '--overlays=false'], check=True,
-                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        cache[key] = json_lines(os.path.join(out, 'results.jsonl'))
+        cache[key], scene = run_set(args, data_set, options, scratch)
         if data_set == 'box-camprodon':
             cache[key] = set_box_errors(scene_rotations(scene), cache[key])
     return cache[key]
@@ -54,10 +43,7 @@ def run_demo(args, scene, scratch, cache={}):
     """Result lines of a scene of apps/demo, on photographs of Debian packages."""
     if scene not in cache:
         bash('lay_out "$1"', scene)
-        out = os.path.join(scratch, scene)
-        subprocess.run([args.compare, f'--scene={TOP}/build/demo/{scene}/scene.yaml', f'--output={out}', '--overlays=false'],
-                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        cache[scene] = json_lines(os.path.join(out, 'results.jsonl'))
+        cache[scene] = compare(args, f'{TOP}/build/demo/{scene}/scene.yaml', os.path.join(scratch, scene))
     return cache[scene]
 
 
@@ -105,8 +91,7 @@ def is_right_first(hypotheses):
 
 def matrices(file, before):
     """The numbers in the brackets that follow each `before`."""
-    with open(file) as text:
-        return [list(map(float, numbers.split(','))) for numbers in re.findall(before + r'\[([^\]]*)\]', text.read())]
+    return [list(map(float, numbers.split(','))) for numbers in re.findall(before + r'\[([^\]]*)\]', read(file))]
 
 
 def scene_rotations(scene):

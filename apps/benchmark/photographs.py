@@ -9,7 +9,6 @@ Without DATA: on photographs of Debian packages, fetched by apt, with the truth 
 circline_compare it is built. With DATA also on the sets of docs/photographs.md that are there, one folder a set, each with a
 groundtruth.yml, of which to_scene.py makes scene files; that needs python3-opencv.
 """
-import argparse
 import copy
 import os
 import re
@@ -17,8 +16,9 @@ import statistics
 import sys
 import tempfile
 
-from photograph_answers import (EQUAL, SURE, TOP, answers, any_error, bash, box_axes, error, folder, is_right_first,
-                                json_lines, run, run_demo, set_box_errors, shares_plane, sure_errors)
+from photograph_answers import (EQUAL, SURE, answers, any_error, bash, box_axes, error, folder, is_right_first, run, run_demo,
+                                set_box_errors, shares_plane, sure_errors)
+from scripts import TOP, Claims, json_lines, parser_of, read, write
 
 AUTO = ['--evidence=auto']  # Nothing annotated.
 # Fields of TABLE: the rotation's error, of the photos with an answer to it; of those with a sure one.
@@ -30,7 +30,7 @@ CLAIMS = [
     ('chessboard-opencv', [], 'line_pairs', 'closed_form', 'rotation_error_deg', 'best', 1.0),
     ('chessboard-opencv', [], 'joint', 'refined', 'rotation_error_deg', 'best', 0.25),
     ('chessboard-opencv', ['--lines=all'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.15),
-    ('chessboard-opencv', ['--evidence=auto'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.2),
+    ('chessboard-opencv', AUTO, 'joint', 'refined', 'rotation_error_deg', 'best', 0.2),
     ('circles-discocal-rgb', ['--centre'], 'circle_center', 'refined', 'normal_error_deg', 'best', 0.5),
     ('circles-discocal-rgb', ['--circles=all'], 'joint', 'refined', 'normal_error_deg', 'best', 0.2),
     ('circles-discocal-tir', ['--centre'], 'circle_center', 'refined', 'normal_error_deg', 'best', 0.7),
@@ -38,15 +38,15 @@ CLAIMS = [
     ('circles-discocal-rgb', ['--circles=all', EQUAL], 'joint', 'refined', 'normal_error_deg', 'best', 0.1),
     ('circles-discocal-tir', ['--circles=all', EQUAL], 'joint', 'refined', 'normal_error_deg', 'best', 0.15),
     ('circles-visp36', ['--circles=all', EQUAL], 'joint', 'refined', 'normal_error_deg', 'best', 0.2),
-    ('chessboard-charuco-robot', ['--evidence=auto'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.5),
-    ('circles-visp36', ['--evidence=auto'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.3),
-    ('circles-discocal-rgb', ['--evidence=auto'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.3),
-    ('circles-discocal-tir', ['--evidence=auto'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.3),
-    ('circles-robot10x10', ['--evidence=auto'], 'joint', 'refined', 'rotation_error_deg', 'best', 0.6),
-    ('scene-lund', ['--evidence=auto'], 'joint', 'refined', 'direction_error_deg', 'best', 1.0),
+    ('chessboard-charuco-robot', AUTO, 'joint', 'refined', 'rotation_error_deg', 'best', 0.5),
+    ('circles-visp36', AUTO, 'joint', 'refined', 'rotation_error_deg', 'best', 0.3),
+    ('circles-discocal-rgb', AUTO, 'joint', 'refined', 'rotation_error_deg', 'best', 0.3),
+    ('circles-discocal-tir', AUTO, 'joint', 'refined', 'rotation_error_deg', 'best', 0.3),
+    ('circles-robot10x10', AUTO, 'joint', 'refined', 'rotation_error_deg', 'best', 0.6),
+    ('scene-lund', AUTO, 'joint', 'refined', 'direction_error_deg', 'best', 1.0),
     ('circle-mire2', [], 'single_circle', 'refined', 'normal_error_deg', 'better', 0.2),
-    ('turntable-teabox', ['--evidence=auto'], 'single_circle', 'refined', 'normal_error_deg', 'better', 1.3),
-    ('turntable-teabox', ['--evidence=auto'], 'joint', 'refined', 'normal_error_deg', 'best', 1.3),
+    ('turntable-teabox', AUTO, 'single_circle', 'refined', 'normal_error_deg', 'better', 1.3),
+    ('turntable-teabox', AUTO, 'joint', 'refined', 'normal_error_deg', 'best', 1.3),
     ('scene-lund', [], 'joint', 'refined', 'direction_error_deg', 'best', 0.5),
     ('box-camprodon', [], 'joint', 'refined', 'rotation_error_deg', 'best', 1.0),
 ]
@@ -105,8 +105,7 @@ def table_row(text, begins):
 
 
 def check_table(args, scratch, claim):
-    with open(README) as file:
-        readme = file.read()
+    readme = read(README)
     for begins, source, solver, field in TABLE:
         if isinstance(source, str):
             lines = run_demo(args, source, scratch)
@@ -123,8 +122,7 @@ def check_table(args, scratch, claim):
         else:
             claim(f'{row.group(1)}{figure}{row.group(3)} README.md: {row.group(2)}', same_figure(figure, row.group(2)))
     if args.write:
-        with open(README, 'w') as file:
-            file.write(readme)
+        write(README, readme)
 
 
 def check_bars(args, scratch, claim):
@@ -135,7 +133,7 @@ def check_bars(args, scratch, claim):
         median = statistics.median(errors)
         claim(f'{data_set} {" ".join(options)}: {solver} ({stage}), {field} of the {which} hypothesis, median of '
               f'{len(images)} photos: {median:.3f} <= {bar}', median <= bar)
-    automatic = {s: run(args, s, ['--evidence=auto'], scratch) for s in AUTOMATIC}
+    automatic = {s: run(args, s, AUTO, scratch) for s in AUTOMATIC}
     pooled = [error(h[0], 'rotation_error_deg') if h else float('inf')
               for s in BOARDS for h in answers(automatic[s], 'joint', 'refined')]
     median = statistics.median(pooled)
@@ -156,7 +154,7 @@ def check_bars(args, scratch, claim):
     median = statistics.median(box) if box else float('inf')
     claim(f'turntable-teabox --evidence=auto: joint (refined), axes of the box, median of the {len(box)} of 9 photos with a '
           f'sure answer: {median:.3f} <= 1.3', median <= 1.3 and len(box) >= 8)
-    observations = json_lines(os.path.join(folder('turntable-teabox', ['--evidence=auto'], scratch), 'observations.jsonl'))
+    observations = json_lines(os.path.join(folder('turntable-teabox', AUTO, scratch), 'observations.jsonl'))
     shared = sum(map(shares_plane, observations))
     claim(f'turntable-teabox --evidence=auto: the disc and the box share a plane in {shared} of 9', shared >= 8)
     for data_set in ('circles-discocal-rgb', 'circles-discocal-tir'):
@@ -171,30 +169,17 @@ def check_bars(args, scratch, claim):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('data', nargs='?')
-    parser.add_argument('--write', action='store_true')
-    parser.add_argument('--compare', default=os.path.join(TOP, 'build/release/bin/circline_compare'))
-    args = parser.parse_args()
+    args = parser_of(__doc__, 'compare', data='?', write=False).parse_args()
     if not os.path.exists(args.compare):
         bash('install_packages "${BUILD_PACKAGES[@]}"; build release circline_compare')
-    passed = failed = 0
-
-    def claim(text, holds):
-        nonlocal passed, failed
-        passed, failed = passed + holds, failed + (not holds)
-        print(f'{"ok    " if holds else "FAILED"} {text}', flush=True)
-
+    claims = Claims()
     with tempfile.TemporaryDirectory() as scratch:
-        check_table(args, scratch, claim)
+        check_table(args, scratch, claims.check)
         if args.data:
-            check_bars(args, scratch, claim)
+            check_bars(args, scratch, claims.check)
         else:
             print('other sets, and where they are: docs/photographs.md')
-    print(f'{passed} passed, {failed} failed')
-    return failed > 0
-    print(f'{passed} passed, {failed} failed')
-    return failed > 0
+    return claims.end()
 
 
 if __name__ == '__main__':

@@ -2,100 +2,73 @@
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Dense>
-#include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
-#include "circline/estimators/basics.h"
-#include "circline/estimators/random.h"
+#include "apps/benchmark/closed_form_rows.h"
 #include "circline/refine/estimate_pose.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
+#include "tests/plane_scene.h"
 
 namespace circline {
 namespace {
 
 constexpr double kNoisePx = 0.3;
-constexpr std::size_t kScenes = 16;  // Taken in turn, so that no branch is learnt by heart.
 
 // A tilted plane seen by a wide-angle camera with distortion.
-class Scene {
- public:
-  explicit Scene(std::uint64_t seed) : random_(seed) {
-    Camera& camera = observations.camera;
-    camera.model = CameraModel::kOpenCV;
+struct Scene {
+  explicit Scene(std::uint64_t seed)
+      : plane(0.5 + 0.4 * static_cast<double>(seed) / kScenes, kNoisePx, seed) {
+    Camera& camera = plane.camera;
     camera.width = 1280;
     camera.height = 960;
     camera.fx = camera.fy = 1000.0;
     camera.cx = 640.0;
     camera.cy = 480.0;
-    camera.distortion = {-0.2, 0.05, 1e-3, -5e-4, 0.0};
-    const double tilt = random_.Uniform(0.5, 0.9), turn = random_.Uniform(-0.5, 0.5);
-    pose.rotation = ExpRotation({tilt, 0.1, 0.0}) * ExpRotation({0.0, 0.0, turn}) *
-                    Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
-    pose.translation = Eigen::Vector3d(0.3, -0.2, 14.0);
+    plane.pose.translation.z() = 14.0;
     observations.frame.plane = "p0";
   }
 
   void AddCircle(double x, double y, double radius, int points) {
-    CircleObservation circle;
-    circle.id = "c" + std::to_string(observations.circles.size());
-    circle.plane = "p0";
-    circle.sigma_px = kNoisePx;
-    for (int i = 0; i < points; ++i) {
-      const double a = 2.0 * kPi * i / points;
-      circle.points.push_back(Pixel(x + radius * std::cos(a), y + radius * std::sin(a)));
-    }
-    observations.circles.push_back(circle);
+    const std::string id = "c" + std::to_string(observations.circles.size());
+    observations.circles.push_back(plane.Circle(id, x, y, radius, points));
   }
 
-  // `lines` lines along X or Y, side by side, `points` on each.
-  void AddPencil(PencilDirection direction, int lines, int points) {
-    PencilObservation pencil;
-    pencil.id = PencilDirectionName(direction);
-    pencil.direction = direction;
-    pencil.plane = "p0";
-    pencil.sigma_px = kNoisePx;
-    for (int i = 0; i < lines; ++i) {
-      LineObservation line;
-      const double across = -3.0 + 6.0 * i / (lines - 1);
-      for (int k = 0; k < points; ++k) {
-        const double along = -3.0 + 6.0 * k / (points - 1);
-        line.points.push_back(direction == PencilDirection::kX ? Pixel(along, across)
-                                                               : Pixel(across, along));
+  // `lines` lines along X and as many along Y, side by side, `points` on each.
+  void AddGrid(int lines, int points) {
+    PencilObservation along[2];
+    for (std::size_t k = 0; k < 2; ++k) {
+      along[k].direction = k == 0 ? PencilDirection::kX : PencilDirection::kY;
+      along[k].id = PencilDirectionName(along[k].direction);
+      along[k].plane = "p0";
+      along[k].sigma_px = kNoisePx;
+      for (int i = 0; i < lines; ++i) {
+        const double at = -3.0 + 6.0 * i / (lines - 1);
+        along[k].lines.push_back(k == 0 ? plane.Line({-3.0, at, 0.0}, {3.0, at, 0.0}, points)
+                                        : plane.Line({at, -3.0, 0.0}, {at, 3.0, 0.0}, points));
       }
-      pencil.lines.push_back(line);
+      observations.pencils.push_back(along[k]);
     }
-    observations.pencils.push_back(pencil);
   }
 
+  PlaneScene plane;
   Observations observations;
-  CameraPose pose;
-
- private:
-  Eigen::Vector2d Pixel(double x, double y) {
-    Eigen::Vector2d pixel;
-    CameraToPixel(observations.camera,
-                  pose.rotation * Eigen::Vector3d(x, y, 0.0) + pose.translation, &pixel);
-    const double dx = random_.Normal(), dy = random_.Normal();
-    return pixel + kNoisePx * Eigen::Vector2d(dx, dy);
-  }
-
-  Random random_;
 };
 
 // 100 contour points and 4 lines of 50.
 void AddPaperLike(Scene* scene) {
   scene->AddCircle(0.0, 0.0, 2.0, 100);
-  scene->AddPencil(PencilDirection::kX, 2, 50);
-  scene->AddPencil(PencilDirection::kY, 2, 50);
+  scene->AddGrid(2, 50);
 }
 
 // The same through a camera without distortion: undistorting 300 points takes a third of the time.
 void AddPaperLikeUndistorted(Scene* scene) {
-  scene->observations.camera.model = CameraModel::kPinhole;
-  scene->observations.camera.distortion = {};
+  scene->plane.camera.model = CameraModel::kPinhole;
+  scene->plane.camera.distortion = {};
   AddPaperLike(scene);
 }
 
@@ -108,30 +81,22 @@ void AddManyFeatures(Scene* scene) {
     for (int column = 0; column < 5; ++column)
       scene->AddCircle(-2.4 + 1.2 * column, -1.8 + 1.2 * row, 0.5, 60);
   }
-  scene->AddPencil(PencilDirection::kX, 100, 2);
-  scene->AddPencil(PencilDirection::kY, 100, 2);
+  scene->AddGrid(100, 2);
 }
 
-std::vector<Scene> Scenes(void (*add)(Scene*)) {
+std::vector<Scene> Scenes(void (*add)(Scene*), bool fitted = true) {
   std::vector<Scene> scenes;
-  for (std::uint64_t seed = 1; seed <= kScenes; ++seed) {
-    scenes.emplace_back(seed);
-    add(&scenes.back());
+  for (std::uint64_t seed = 0; seed < kScenes; ++seed) {
+    Scene& scene = scenes.emplace_back(seed);
+    add(&scene);
+    scene.observations.camera = scene.plane.camera;
+    if (fitted) FitDirect(kNoisePx, &scene.observations);
   }
   return scenes;
 }
 
-// Calls `run` on every scene in turn.
-template <typename Run>
-void RunInTurn(benchmark::State& state, const std::vector<Scene>& scenes, const Run& run) {
-  std::size_t i = 0;
-  for (auto _ : state) {
-    if (!run(i)) {
-      state.SkipWithError("refused");
-      break;
-    }
-    i = i + 1 < scenes.size() ? i + 1 : 0;
-  }
+void Require(bool is_ok) {
+  if (!is_ok) std::abort();
 }
 
 EstimationOptions WithLoss(LossType loss) {
@@ -144,20 +109,18 @@ EstimationOptions WithLoss(LossType loss) {
 void RefineOneSeed(benchmark::State& state, void (*add)(Scene*), const EstimationOptions& options,
                    double error) {
   std::vector<Scene> scenes = Scenes(add);
-  for (Scene& scene : scenes) {
-    FitDirect(kNoisePx, &scene.observations);
-    scene.observations = ResolveWorld(scene.observations);
-  }
-  RunInTurn(state, scenes, [&](std::size_t i) {
-    const JointProblem problem(scenes[i].observations, options);
-    CameraPose seed = scenes[i].pose;
+  for (Scene& scene : scenes) scene.observations = ResolveWorld(scene.observations);
+  RunInTurn(state, scenes, [&](const Scene& scene) {
+    const JointProblem problem(scene.observations, options);
+    CameraPose seed = scene.plane.pose;
     seed.rotation = ExpRotation({error, -error, error}) * seed.rotation;
     seed.translation.x() += 10.0 * error;
     State at;
     Refined refined;
-    return problem.Start(seed, 0.0, problem.FirstReading(), &at).ok() &&
-           problem.SolveGraduated(options.max_iterations, &at).ok() &&
-           FillRefined(problem, at, &refined).ok();
+    Require(problem.Start(seed, 0.0, problem.FirstReading(), &at).ok() &&
+            problem.SolveGraduated(options.max_iterations, &at).ok() &&
+            FillRefined(problem, at, &refined).ok());
+    return refined;
   });
 }
 
@@ -206,12 +169,11 @@ BENCHMARK_CAPTURE(BM_RefineManyFeatures, cold_cauchy, LossType::kCauchy, kCold);
 
 // From points alone to all poses, ranked.
 void Estimate(benchmark::State& state, void (*add)(Scene*), bool fitted) {
-  std::vector<Scene> scenes = Scenes(add);
-  if (fitted) {
-    for (Scene& scene : scenes) FitDirect(kNoisePx, &scene.observations);
-  }
-  RunInTurn(state, scenes,
-            [&](std::size_t i) { return EstimatePose(scenes[i].observations).status.ok(); });
+  RunInTurn(state, Scenes(add, fitted), [&](const Scene& scene) {
+    PoseEstimate estimate = EstimatePose(scene.observations);
+    Require(estimate.status.ok());
+    return estimate;
+  });
 }
 
 void BM_EstimatePoseCircleAndLines(benchmark::State& state) { Estimate(state, AddPaperLike, true); }
@@ -224,13 +186,13 @@ BENCHMARK(BM_EstimatePoseCircleAndLinesUnfitted);
 
 // As a front end calls it: with the pose of the frame before.
 void BM_EstimatePoseFromPrior(benchmark::State& state) {
-  std::vector<Scene> scenes = Scenes(AddPaperLike);
-  for (Scene& scene : scenes) FitDirect(kNoisePx, &scene.observations);
-  RunInTurn(state, scenes, [&](std::size_t i) {
+  RunInTurn(state, Scenes(AddPaperLike), [&](const Scene& scene) {
     EstimationOptions options;
-    options.prior = scenes[i].pose;
-    options.prior->rotation = ExpRotation({kWarm, -kWarm, kWarm}) * scenes[i].pose.rotation;
-    return EstimatePose(scenes[i].observations, options).status.ok();
+    options.prior = scene.plane.pose;
+    options.prior->rotation = ExpRotation({kWarm, -kWarm, kWarm}) * scene.plane.pose.rotation;
+    PoseEstimate estimate = EstimatePose(scene.observations, options);
+    Require(estimate.status.ok());
+    return estimate;
   });
 }
 BENCHMARK(BM_EstimatePoseFromPrior);

@@ -287,9 +287,10 @@ std::vector<SceneExperiment> SceneExperiments() {
        {0.5},
        {LossType::kTrivial, LossType::kHuber, LossType::kCauchy, LossType::kTukey,
         LossType::kGemanMcClure},
-       {OddLinesRow("rim, 5 kerbs", 1, 5, 0), OddLinesRow("1 odd", 1, 5, 1),
-        OddLinesRow("2 odd", 1, 5, 2), OddLinesRow("circle, 2 x 10 lines, 1 odd", 2, 10, 1),
-        OddLinesRow("3 odd", 2, 10, 3)}}};
+       {OddLinesRow("rim, 5 kerbs, none odd", 1, 5, 0), OddLinesRow("rim, 5 kerbs, 1 odd", 1, 5, 1),
+        OddLinesRow("rim, 5 kerbs, 2 odd", 1, 5, 2),
+        OddLinesRow("circle, 2 x 10 lines, 1 odd", 2, 10, 1),
+        OddLinesRow("circle, 2 x 10 lines, 3 odd", 2, 10, 3)}}};
 }
 
 }  // namespace circline::apps

@@ -13,31 +13,21 @@ probabilities. `sure` are answers with a deviation of 5 % or less; `same`: with 
 of the first's (two where that is above 5 %), of the photos that answer each time. `box, three directions`: the photos of both sets
 of the box in which three of them were found.
 """
-import argparse
-import json
+import itertools
 import math
 import os
 import re
 import statistics
-import subprocess
 import tempfile
 
-from photograph_answers import TO_SCENE
+from scripts import CAMERA, compare, json_lines, make_scene, parser_of, write
 
 SIGMA = 0.5  # Of log f, of the guess.
 GUESSES = (1.0, 0.7, 1.4)
 GIVEN = {True: 'lens given', False: 'nothing given'}
-# set, whether the lens is given
-ROWS = [
-    ('circles-discocal-rgb', True), ('circles-discocal-rgb', False), ('circles-discocal-tir', True), ('circles-discocal-tir', False),
-    ('circles-visp36', True), ('circles-visp36', False), ('circles-robot10x10', True), ('circles-robot10x10', False),
-    ('chessboard-opencv', True), ('chessboard-opencv', False), ('chessboard-charuco-robot', True), ('chessboard-charuco-robot', False),
-    ('scene-lund', True), ('scene-lund', False), ('scene-lund-more', True), ('scene-lund-more', False),
-    ('box-camprodon', True), ('box-camprodon', False), ('box-camprodon-more', True), ('box-camprodon-more', False),
-    ('turntable-teabox', True), ('turntable-teabox', False), ('circle-mire2', True), ('circle-mire2', False),
-]
-CAMERA = re.compile(r'\{ ?id: "(\w+)", model: "(\w+)", width: (\d+), height: (\d+), '
-                    r'camera_matrix: \[([^\]]*)\](?:, distortion: \[([^\]]*)\])?')
+SETS = ['circles-discocal-rgb', 'circles-discocal-tir', 'circles-visp36', 'circles-robot10x10', 'chessboard-opencv',
+        'chessboard-charuco-robot', 'scene-lund', 'scene-lund-more', 'box-camprodon', 'box-camprodon-more', 'turntable-teabox',
+        'circle-mire2']
 IMAGE = re.compile(r'file: "([^"]*)"\s+camera: "(\w+)"')
 
 
@@ -55,25 +45,19 @@ def guessed(scene, factor, lens_given):
             model, distortion, aspect = 'opencv', '0., 0., 0., 0., 0.', 1.0
             cx, cy = (width - 1) / 2, (height - 1) / 2
             lens = f', principal_point_sigma_px: {0.03 * math.hypot(width, height)}, k1_sigma: 0.3'
-        return (f'{{ id: "{name}", model: "{model}", width: {width}, height: {height}, camera_matrix: '
+        return (f'id: "{name}", model: "{model}", width: {width}, height: {height}, camera_matrix: '
                 f'[{f}, 0., {cx}, 0., {f * aspect}, {cy}, 0., 0., 1.], distortion: [{distortion}], focal_sigma: {SIGMA}{lens}')
     return CAMERA.sub(guess, scene)
 
 
 def answers(args, scene, scratch):
     """Of each photo all hypotheses of joint, best first; and in which three directions were found."""
-    path, out = os.path.join(scratch, 'scene.yaml'), os.path.join(scratch, 'out')
-    with open(path, 'w') as file:
-        file.write(scene)
-    subprocess.run([args.compare, f'--scene={path}', f'--output={out}', '--overlays=false', '--solvers=joint'],
-                   check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    out = os.path.join(scratch, 'out')
     found = {}
-    with open(os.path.join(out, 'results.jsonl')) as file:
-        for line in map(json.loads, file):
-            if line['status'] == 'ok':
-                found.setdefault(line['image'], []).append(line)
-    with open(os.path.join(out, 'observations.jsonl')) as file:
-        three = {line['image'] for line in map(json.loads, file) if len(line['pencils']) >= 3}
+    for line in compare(args, write(os.path.join(scratch, 'scene.yaml'), scene), out, '--solvers=joint'):
+        if line['status'] == 'ok':
+            found.setdefault(line['image'], []).append(line)
+    three = {line['image'] for line in json_lines(os.path.join(out, 'observations.jsonl')) if len(line['pencils']) >= 3}
     return found, three
 
 
@@ -109,25 +93,16 @@ def show(name, num_photos, rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('data')
-    parser.add_argument('--compare', default='build/release/bin/circline_compare')
-    parser.add_argument('--sets', default='', help='only these, separated by commas')
-    parser.add_argument('--photos', action='store_true', help='a line for each photo')
-    args = parser.parse_args()
+    args = parser_of(__doc__, 'compare', data='1', sets='', photos=False).parse_args()
     heads = ['photos', 'answer', 'median %', '<= 5 %', '<= 10 %', 'in 2 s', 'sure', '<= 10 %', '> 20 %', 'same']
     print(f'{"set":42}' + ''.join(f'{h:>9}' for h in heads))
     pooled, num_photos = [], 0
     boxes = {True: [], False: []}
     with tempfile.TemporaryDirectory() as scratch:
-        for data_set, lens_given in ROWS:
+        for data_set, lens_given in itertools.product(SETS, (True, False)):
             if args.sets and data_set not in args.sets.split(','):
                 continue
-            source = os.path.join(scratch, 'source.yaml')
-            subprocess.run([TO_SCENE, os.path.join(args.data, data_set), source, '--evidence=auto'],
-                           check=True, stdout=subprocess.DEVNULL)
-            with open(source) as file:
-                scene = file.read()
+            scene = make_scene(args, data_set, os.path.join(scratch, 'source.yaml'), '--evidence=auto')
             truth = {m[0]: float(m[4].split(',')[0]) for m in CAMERA.findall(scene)}
             photos = dict(IMAGE.findall(scene))
             runs, threes = zip(*(answers(args, guessed(scene, factor, lens_given), scratch) for factor in GUESSES))

@@ -13,29 +13,27 @@ the same photo at its own size with the first seed, if they are of the same plan
   agree    those whose normals are within three of the larger standard deviation
   other    pairs of sure answers about different planes
 """
-import argparse
 import collections
-import json
 import math
 import os
 import re
-import subprocess
+import shutil
 import sys
 import tempfile
 
 import cv2
 import numpy
 
-from photograph_answers import TO_SCENE
+from photograph_answers import SURE
 from photographs import AUTOMATIC
+from scripts import compare, make_scene, parser_of, write
 
-SURE = 0.9
 SAME_PLANE_DEG = 20.0
 SIGMAS = 3.0
 LEAST_SHARE = 0.97  # Of pairs that agree.
 
 
-def scaled_scene(text, size, folder, scratch):
+def scaled_scene(text, size, scratch):
     """The scene with its photos, cameras at this size; pixel centres are at integers."""
     def camera(match):
         width, height = (round(size * int(match[k])) for k in (1, 2))
@@ -44,7 +42,7 @@ def scaled_scene(text, size, folder, scratch):
                 f'{fy * size}, {(cy + 0.5) * size - 0.5}, 0., 0., 1.]')
 
     def photo(match):
-        image = cv2.imread(os.path.join(folder, match[1]), cv2.IMREAD_COLOR)
+        image = cv2.imread(os.path.join(scratch, match[1]), cv2.IMREAD_COLOR)
         height, width = image.shape[:2]
         file = os.path.join(scratch, os.path.splitext(os.path.basename(match[1]))[0] + '.png')
         cv2.imwrite(file, cv2.resize(image, (round(size * width), round(size * height)),
@@ -60,22 +58,18 @@ def scaled_scene(text, size, folder, scratch):
 def sure_answers(args, scene, flags, scratch):
     """Normals and their standard deviations, degrees, by photo."""
     out = os.path.join(scratch, 'out')
-    subprocess.run(['rm', '-rf', out], check=True)
-    subprocess.run([args.compare, f'--scene={scene}', f'--output={out}', '--overlays=false', '--solvers=joint', *flags,
-                    *args.flags.split()], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    shutil.rmtree(out, ignore_errors=True)
     answers, photos = {}, set()
-    with open(os.path.join(out, 'results.jsonl')) as lines:
-        for line in map(json.loads, lines):
-            name = os.path.splitext(os.path.basename(line['image']))[0]
-            photos.add(name)
-            # A normal that is not told is of no plane.
-            if line['hypothesis'] == 0 and line['probability'] >= SURE and line['sigma_normal_deg'] is not None:
-                rotation = numpy.array(line['rotation']).reshape(3, 3)
-                answers[name] = (rotation[:, 2], line['sigma_normal_deg'])
+    for line in compare(args, scene, out, '--solvers=joint', *flags, *args.flags.split()):
+        name = os.path.splitext(os.path.basename(line['image']))[0]
+        photos.add(name)
+        # A normal that is not told is of no plane.
+        if line['hypothesis'] == 0 and line['probability'] >= SURE and line['sigma_normal_deg'] is not None:
+            answers[name] = (numpy.array(line['rotation'][2::3]), line['sigma_normal_deg'])
     return answers, photos
 
 
-def compare(base, other, counts):
+def count_pairs(base, other, counts):
     for name in base.keys() & other.keys():
         (a, sigma_a), (b, sigma_b) = base[name], other[name]
         angle = math.degrees(math.acos(min(1.0, abs(float(a @ b)))))
@@ -87,12 +81,7 @@ def compare(base, other, counts):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('data')
-    for flag, default in (('compare', 'build/release/bin/circline_compare'), ('sets', ''),
-                          ('sizes', '0.5,1,2'), ('seeds', '1,2,3'), ('flags', '')):
-        parser.add_argument('--' + flag, default=default)
-    args = parser.parse_args()
+    args = parser_of(__doc__, 'compare', data='1', sets='', sizes='0.5,1,2', seeds='1,2,3', flags='').parse_args()
     sizes, seeds = [float(s) for s in args.sizes.split(',')], args.seeds.split(',')
     total = collections.Counter()
     print(f'{"set":26} answers   pairs  agree  other')
@@ -101,21 +90,16 @@ def main():
             continue
         with tempfile.TemporaryDirectory() as scratch:
             scene = os.path.join(scratch, 'scene.yaml')
-            subprocess.run([TO_SCENE, os.path.join(args.data, data_set), scene,
-                            '--evidence=auto'], check=True, stdout=subprocess.DEVNULL)
+            text = make_scene(args, data_set, scene, '--evidence=auto')
             base, photos = sure_answers(args, scene, [f'--seed={seeds[0]}'], scratch)
             counts = collections.Counter(answers=len(base), photos=len(photos))
             for seed in seeds[1:]:
-                compare(base, sure_answers(args, scene, [f'--seed={seed}'], scratch)[0], counts)
-            with open(scene) as file:
-                text = file.read()
+                count_pairs(base, sure_answers(args, scene, [f'--seed={seed}'], scratch)[0], counts)
             for size in sizes:
                 if size == 1.0:
                     continue
-                scaled = os.path.join(scratch, 'scaled.yaml')
-                with open(scaled, 'w') as file:
-                    file.write(scaled_scene(text, size, scratch, scratch))
-                compare(base, sure_answers(args, scaled, [f'--seed={seeds[0]}'], scratch)[0], counts)
+                scaled = write(os.path.join(scratch, 'scaled.yaml'), scaled_scene(text, size, scratch))
+                count_pairs(base, sure_answers(args, scaled, [f'--seed={seeds[0]}'], scratch)[0], counts)
         total += counts
         print(f'{data_set:26} {counts["answers"]:3}/{counts["photos"]:3} {counts["pairs"]:7} {counts["agree"]:6} '
               f'{counts["other"]:6}', flush=True)

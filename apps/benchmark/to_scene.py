@@ -34,6 +34,7 @@ def text(node, key, default=''):
 
 
 def number(value):
+    """With a point or an exponent: the scene file's readers take `9` for an integer."""
     shown = f'{float(value):.9g}'
     return shown if any(c in shown for c in '.en') else shown + '.'
 
@@ -158,4 +159,5 @@ def main():
         out.write('\n'.join(lines) + '\n')
 
 
-main()
+if __name__ == '__main__':
+    main()

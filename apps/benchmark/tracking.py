@@ -21,13 +21,13 @@ places, two seconds apart: the track begins anew with each, and each is to be re
 frame of 640 x 480: processor time of the program on one core, the least of three runs, for a photograph of a board seen by a
 camera that turns; what it takes to start and to look at the first frame is taken off.
 """
-import argparse
 import glob
-import json
+import gzip
 import math
 import os
 import re
 import resource
+import shutil
 import statistics
 import subprocess
 import sys
@@ -36,23 +36,10 @@ import tempfile
 import cv2
 import numpy
 
-from ties import write_scene
-
-from photograph_answers import TO_SCENE
+from photographs import BOARDS
+from scripts import TOP, Claims, json_lines, make_scene, parser_of, read, write
 
 FAR_DEG, SURE, OPEN = 5.0, 0.95, 0.6
-BOARDS = ['chessboard-opencv', 'chessboard-charuco-robot', 'circles-visp36', 'circles-discocal-rgb', 'circles-discocal-tir']
-HERE = os.path.dirname(os.path.abspath(__file__))
-
-
-class Claims:
-    def __init__(self):
-        self.passed = self.failed = 0
-
-    def check(self, holds, text):
-        self.passed += holds
-        self.failed += not holds
-        print(('pass  ' if holds else 'FAIL  ') + text, flush=True)
 
 
 def angle(a, b):
@@ -70,8 +57,7 @@ def track(args, name, inputs, extra=()):
                          stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     if run.returncode != 0:
         sys.exit(f'{name}: {run.stderr}')
-    with open(os.path.join(out, 'results.jsonl')) as lines:
-        return [json.loads(line) for line in lines]
+    return json_lines(os.path.join(out, 'results.jsonl'))
 
 
 def count_flips(frames):
@@ -86,10 +72,14 @@ def count_flips(frames):
     return flips, settled
 
 
-def disc_truth():
-    with open(os.path.join(HERE, '..', 'demo', 'disc.yaml')) as file:
-        found = re.findall(r'file: "(image\.\d+)\.pgm".*?truth: \{ rotation: \[([^\]]*)\]', file.read(), re.S)
-    return {name: normal([float(v) for v in values.split(',')]) for name, values in found}
+def unpacked(frame, folder):
+    """The frame's absolute path; that of a copy where it is compressed."""
+    if not frame.endswith('.gz'):
+        return os.path.abspath(frame)
+    name = os.path.join(folder, os.path.basename(frame).removesuffix('.gz'))
+    with gzip.open(frame) as packed, open(name, 'wb') as file:
+        shutil.copyfileobj(packed, file)
+    return name
 
 
 def judge(frames, errors):
@@ -112,29 +102,25 @@ def mire(args, claims):
     if not frames:
         print(f'skipped: no frames image.NNNN.pgm in {args.frames}; apt-get install visp-images-data')
         return
-    scene = write_scene(frames, args.keep)
-    truth = disc_truth()
-    with open(scene) as file:
-        text = file.read()
-    camera = re.search(r'camera_matrix: (\[.*?\]),\s*distortion: (\[.*?\])', text, re.S)
-    calibration = os.path.join(args.keep, 'mire.yml')
-    with open(calibration, 'w') as file:
-        file.write(f'%YAML:1.0\n---\nimage_width: 384\nimage_height: 288\ncamera_matrix: {camera[1]}\n'
-                   f'distortion_coefficients: {camera[2]}\n')
-    photos = [f'--images={",".join(re.findall(r"file: .([^,]*)., camera", text))}', f'--camera={calibration}']
+    demo = read(os.path.join(TOP, 'apps/demo/disc.yaml'))
+    truth = {name: normal([float(v) for v in values.split(',')]) for name, values in
+             re.findall(r'file: "(image\.\d+)\.pgm".*?truth: \{ rotation: \[([^\]]*)\]', demo, re.S)}
+    camera = re.search(r'camera_matrix: (\[.*?\]),\s*distortion: (\[.*?\])', demo, re.S)
+    calibration = write(os.path.join(args.keep, 'mire.yml'),
+                        f'%YAML:1.0\n---\nimage_width: 384\nimage_height: 288\ncamera_matrix: {camera[1]}\n'
+                        f'distortion_coefficients: {camera[2]}\n')
+    photos = [f'--images={",".join(unpacked(frame, args.keep) for frame in frames)}', f'--camera={calibration}']
     for name, extra in (('disc alone', ['--roi=127,157,79,61']), ('all detected', [])):
         lines = track(args, 'mire-2 ' + name, photos, extra)
         stem = lambda f: os.path.splitext(os.path.basename(f['image']))[0]
         errors = [(f, angle(normal(f['rotation']), truth[stem(f)])) for f in lines if f['rotation'] and stem(f) in truth]
         said, right, wrong, flips = judge(lines, errors)
-        claims.check(right == len(truth) and wrong == 0 and not flips, f'mire-2, {name}: {said}')
+        claims.check(f'mire-2, {name}: {said}', right == len(truth) and wrong == 0 and not flips)
 
 
 def scene_of(args, data_set, *options):
     scene = os.path.join(args.keep, data_set + '.yaml')
-    subprocess.run([TO_SCENE, os.path.join(args.data, data_set), scene, *options], check=True)
-    with open(scene) as file:
-        return scene, file.read()
+    return scene, make_scene(args, data_set, scene, *options)
 
 
 def teabox(args, claims):
@@ -143,16 +129,15 @@ def teabox(args, claims):
     head, images = text.split('images:\n')
     images = [i for i in re.split(r'(?=^  - file:)', images, flags=re.M) if '/left_' in i]
     images = [re.sub(r'^    (pencils|frame|known):.*?(?=^    \w|\Z)', '', i, flags=re.M | re.S) for i in images]
-    with open(scene, 'w') as file:
-        file.write(head + 'images:\n' + ''.join(images))
+    write(scene, head + 'images:\n' + ''.join(images))
     lines = track(args, 'turntable-teabox', [f'--scene={scene}'], ['--fps=1.25'])
     flips, settled = count_flips(lines)
     flips += settled
     shares = [f['probability'] for f in lines if f['status'] == 'ok']
     begins = sum(f['reinitialized'] for f in lines)
-    claims.check(len(shares) == len(images) and not flips and all(0.3 <= p <= 0.7 for p in shares) and begins == 1,
-                 f'turntable-teabox, disc alone: {len(shares)} of {len(images)} frames, probability of the first '
-                 f'{min(shares):.2f} to {max(shares):.2f}, {len(flips)} flips, begins {begins}')
+    claims.check(f'turntable-teabox, disc alone: {len(shares)} of {len(images)} frames, probability of the first '
+                 f'{min(shares):.2f} to {max(shares):.2f}, {len(flips)} flips, begins {begins}',
+                 len(shares) == len(images) and not flips and all(0.3 <= p <= 0.7 for p in shares) and begins == 1)
 
 
 def boards(args, claims):
@@ -161,14 +146,13 @@ def boards(args, claims):
         head, images = text.split('images:\n')
         images = re.split(r'(?=^  - file:)', images, flags=re.M)[1:]
         for camera in sorted(set(re.findall(r'camera: "(.*?)"', ''.join(images)))):
-            with open(scene, 'w') as file:
-                file.write(head + 'images:\n' + ''.join(i for i in images if f'camera: "{camera}"' in i))
+            write(scene, head + 'images:\n' + ''.join(i for i in images if f'camera: "{camera}"' in i))
             lines = track(args, f'{data_set} {camera}', [f'--scene={scene}'], ['--fps=0.5'])
             errors = [(f, f['normal_error_deg']) for f in lines if f.get('normal_error_deg') is not None]
             if not errors:
                 errors = [(f, f['rotation_error_deg']) for f in lines if f.get('rotation_error_deg') is not None]
             said, right, wrong, flips = judge(lines, errors)
-            claims.check(right == len(lines) and wrong == 0 and not flips, f'{data_set}, {camera}, all detected: {said}')
+            claims.check(f'{data_set}, {camera}, all detected: {said}', right == len(lines) and wrong == 0 and not flips)
 
 
 def turning(photo, camera, distortion, rotation):
@@ -191,11 +175,10 @@ def speed(args, claims, num_frames=60):
     for k in range(num_frames):
         turn = numpy.radians([3.0 * math.sin(0.15 * k), 4.0 * math.sin(0.1 * k), 2.0 * math.sin(0.2 * k)])
         cv2.imwrite(f'{folder}/{k:03d}.pgm', turning(photo, camera, distortion, cv2.Rodrigues(turn)[0]))
-    calibration = os.path.join(args.keep, 'left.yml')
-    with open(calibration, 'w') as file:
-        file.write('%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n' + ''.join(
-            f'{key}: [{", ".join(repr(float(v)) for v in values.ravel())}]\n'
-            for key, values in (('camera_matrix', camera), ('distortion_coefficients', distortion))))
+    calibration = write(os.path.join(args.keep, 'left.yml'), '%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n' + ''.join(
+        f'{key}: [{", ".join(repr(float(v)) for v in values.ravel())}]\n'
+        for key, values in (('camera_matrix', camera), ('distortion_coefficients', distortion))))
+
     def run(pattern, cold_every):
         """Lines, and processor time in all, ms."""
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -211,18 +194,13 @@ def speed(args, claims, num_frames=60):
             lines, total = run('*.pgm', cold_every)
             list_of.append((total - begin) / (len(lines) - 1))
     followed, cold = min(costs[0]), min(costs[1])
-    claims.check(followed <= 0.5 * cold, f'640 x 480, a chessboard: {followed:.1f} ms of a core for a frame, reading and writing included; '
-                                         f'{cold:.1f} ms where each is looked at as a whole (means of {len(lines) - 1})')
+    claims.check(f'640 x 480, a chessboard: {followed:.1f} ms of a core for a frame, reading and writing included; '
+                 f'{cold:.1f} ms where each is looked at as a whole (means of {len(lines) - 1})', followed <= 0.5 * cold)
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('data', nargs='?')
-    parser.add_argument('--frames', default='/usr/share/visp-images-data/ViSP-images/mire-2')
-    parser.add_argument('--track', default='build/release/bin/circline_track')
-    parser.add_argument('--flags', default='', help='for circline_track')
-    parser.add_argument('--keep', help='a folder for scenes and results')
-    args = parser.parse_args()
+    args = parser_of(__doc__, 'track', data='?', frames='/usr/share/visp-images-data/ViSP-images/mire-2', flags='',
+                     keep=None).parse_args()
     claims = Claims()
     with tempfile.TemporaryDirectory() as scratch:
         args.keep = os.path.abspath(args.keep or scratch)
@@ -232,8 +210,7 @@ def main():
             args.data = os.path.abspath(args.data)
             for part in (teabox, boards, speed):
                 part(args, claims)
-    print(f'{claims.passed} passed, {claims.failed} failed')
-    return claims.failed > 0
+    return claims.end()
 
 
 if __name__ == '__main__':

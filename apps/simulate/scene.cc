@@ -23,7 +23,9 @@ enum Feature : std::size_t { kCircle, kL11, kL12, kL21, kL22 };
 // Positions in PaperScene's parameters.
 constexpr int kTranslation = 3, kCenter = 5, kCircleRadius = 7, kOffsetL12 = 8, kOffsetL22 = 9;
 
-int UniformIndex(std::size_t n, Random* random) { return random->UniformInt(static_cast<int>(n)); }
+std::size_t UniformIndex(std::size_t n, Random* random) {
+  return static_cast<std::size_t>(random->UniformInt(static_cast<int>(n)));
+}
 
 Eigen::Vector2d UniformInDisc(double radius, Random* random) {
   const double r = radius * std::sqrt(random->Uniform());
@@ -37,18 +39,6 @@ Segment DrawAxis(const LineObservation& line, const std::vector<std::uint8_t>& m
   const auto last = std::find(mask.rbegin(), mask.rend(), 1);
   return {line.points[static_cast<std::size_t>(first - mask.begin())],
           line.points[static_cast<std::size_t>(mask.rend() - last - 1)]};
-}
-
-std::vector<int> ParametersOf(Evidence evidence) {
-  switch (evidence) {
-    case Evidence::kCircleFrame:
-      return {0, 1, 2, 3, 4, kCenter, kCenter + 1, kCircleRadius};
-    case Evidence::kLinePairs:
-      return {0, 1, 2, 3, 4, kOffsetL12, kOffsetL22};
-    case Evidence::kJoint:
-      break;
-  }
-  return {0, 1, 2, 3, 4, kCenter, kCenter + 1, kCircleRadius, kOffsetL12, kOffsetL22};
 }
 
 std::vector<std::size_t> FeaturesOf(Evidence evidence) {
@@ -136,12 +126,6 @@ Status PaperScene::Validate() const {
   return Status::Ok();
 }
 
-InlierMasks PaperScene::AllPoints() const {
-  InlierMasks masks;
-  for (std::size_t f = 0; f < kNumFeatures; ++f) masks[f].assign(features_[f].size(), 1);
-  return masks;
-}
-
 std::vector<Eigen::Vector2d> PaperScene::Disturb(const std::vector<Sample>& samples,
                                                  const Disturbance& disturbance, Random* random,
                                                  std::vector<std::uint8_t>* mask) const {
@@ -155,22 +139,20 @@ std::vector<Eigen::Vector2d> PaperScene::Disturb(const std::vector<Sample>& samp
       std::lround(disturbance.outlier_ratio * static_cast<double>(samples.size())));
   if (num_outliers == 0) return pixels;
 
-  const Sample& near_cluster =
-      samples[static_cast<std::size_t>(UniformIndex(samples.size(), random))];
+  const Sample& near_cluster = samples[UniformIndex(samples.size(), random)];
   const double side = random->Uniform() < 0.5 ? -1.0 : 1.0;
   const Eigen::Vector2d cluster =
       near_cluster.pixel + side * kClusterOffsetPx * near_cluster.normal;
   std::vector<std::size_t> order(samples.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   for (std::size_t i = 0; i < num_outliers; ++i) {
-    std::swap(order[i],
-              order[i + static_cast<std::size_t>(UniformIndex(order.size() - i, random))]);
+    std::swap(order[i], order[i + UniformIndex(order.size() - i, random)]);
     (*mask)[order[i]] = 0;
     Eigen::Vector2d& pixel = pixels[order[i]];
     if (disturbance.outlier_kind == OutlierKind::kCluster) {
       pixel = cluster + UniformInDisc(kClusterRadiusPx, random);
     } else {
-      const Sample& foot = samples[static_cast<std::size_t>(UniformIndex(samples.size(), random))];
+      const Sample& foot = samples[UniformIndex(samples.size(), random)];
       pixel = foot.pixel + random->Uniform(-kBandPx, kBandPx) * foot.normal;
     }
   }
@@ -217,7 +199,10 @@ Eigen::Matrix3d PaperScene::BoundCovariance(Evidence evidence, const InlierMasks
       if (masks[f][i] != 0) information += g * g.transpose();
     }
   }
-  const std::vector<int> used = ParametersOf(evidence);
+  std::vector<int> used;  // Those that the evidence depends on.
+  for (int k = 0; k < kNumParameters; ++k) {
+    if (information(k, k) > 0.0) used.push_back(k);
+  }
   const Eigen::MatrixXd own = information(used, used);
   return own.inverse().topLeftCorner<3, 3>();
 }

@@ -53,7 +53,6 @@ class PaperScene {
   // Cramer-Rao bound on the covariance of the rotation (of delta, camera frame) from the points
   // that the masks keep, for a noise of 1 px; it grows with the square of the noise.
   Eigen::Matrix3d BoundCovariance(Evidence evidence, const InlierMasks& masks) const;
-  InlierMasks AllPoints() const;
 
   const CameraPose& pose() const { return pose_; }
 

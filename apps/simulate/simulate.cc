@@ -5,9 +5,11 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <iomanip>
 #include <limits>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
+#include <sstream>
 
 #include "apps/common/in_parallel.h"
 #include "apps/common/progress.h"
@@ -114,10 +116,10 @@ Trial RunTrial(const PaperScene& scene, const Disturbance& disturbance, const So
   return trial;
 }
 
-// Mean and standard deviation of a sample.
+// Mean and standard deviation of a sample, NaN of nothing.
 struct Spread {
   explicit Spread(const std::vector<double>& values) {
-    if (values.empty()) return;
+    if (values.empty()) mean = std = std::numeric_limits<double>::quiet_NaN();
     const double n = static_cast<double>(values.size());
     for (const double v : values) mean += v / n;
     for (const double v : values) std += (v - mean) * (v - mean) / n;
@@ -179,13 +181,12 @@ SimulationRow Summarize(const std::vector<Trial>& trials, std::size_t method_ind
     nees.push_back(outcome.nees);
   }
   bound /= static_cast<double>(trials.size());
-  const double nothing = std::numeric_limits<double>::quiet_NaN();
-  row.axis_mean_rad = axis.empty() ? nothing : Spread(axis).mean;
-  row.axis_std_rad = axis.empty() ? nothing : Spread(axis).std;
-  row.angle_mean_rad = angle.empty() ? nothing : Spread(angle).mean;
-  row.angle_std_rad = angle.empty() ? nothing : Spread(angle).std;
-  row.rotation_rms_rad = squares.empty() ? nothing : std::sqrt(Spread(squares).mean);
-  row.nees_mean = nees.empty() || row.noise_px == 0.0 ? nothing : Spread(nees).mean;
+  row.axis_mean_rad = Spread(axis).mean;
+  row.axis_std_rad = Spread(axis).std;
+  row.angle_mean_rad = Spread(angle).mean;
+  row.angle_std_rad = Spread(angle).std;
+  row.rotation_rms_rad = std::sqrt(Spread(squares).mean);
+  row.nees_mean = row.noise_px > 0.0 ? Spread(nees).mean : std::numeric_limits<double>::quiet_NaN();
   row.bound_rms_rad = std::sqrt(bound.trace());
   FillBoundSpread(bound, truth, &row);
   return row;
@@ -197,10 +198,6 @@ std::string Number(double value) {
   char text[40];
   std::snprintf(text, sizeof(text), "%.9g", value);
   return text;
-}
-
-std::string Padded(const std::string& text, std::size_t width) {
-  return std::string(width - std::min(width, text.size()), ' ') + text;
 }
 
 }  // namespace
@@ -284,23 +281,23 @@ std::string SimulationCsv(const std::vector<SimulationRow>& rows) {
 }
 
 std::string SimulationTable(const std::vector<SimulationRow>& rows) {
-  const auto line = [](const std::vector<std::string>& cells) {
-    static constexpr std::array<std::size_t, 8> kWidths = {8, 9, 22, 9, 12, 12, 12, 7};
-    std::string text;
-    for (std::size_t i = 0; i < cells.size(); ++i) text += Padded(cells[i], kWidths[i]);
-    return text + "\n";
+  std::ostringstream table;
+  const auto line = [&table](const std::array<std::string, 8>& cells) {
+    constexpr std::array<int, 8> kWidths = {8, 9, 22, 9, 12, 12, 12, 7};
+    for (std::size_t i = 0; i < cells.size(); ++i) table << std::setw(kWidths[i]) << cells[i];
+    table << "\n";
   };
-  std::string table = line(
+  line(
       {"noise px", "outliers", "method", "failures", "rms rad", "bound rad", "efficiency", "NEES"});
   for (const SimulationRow& row : rows) {
     const bool noisy = row.noise_px > 0.0;
-    table += line({FormatShort(row.noise_px), FormatShort(row.outlier_ratio), row.method->name,
-                   std::to_string(row.failures), FormatFixed(row.rotation_rms_rad, 6),
-                   FormatFixed(row.bound_rms_rad, 6),
-                   noisy ? FormatFixed(row.bound_rms_rad / row.rotation_rms_rad, 3) : "-",
-                   FormatFixed(row.nees_mean, 2)});
+    line({FormatShort(row.noise_px), FormatShort(row.outlier_ratio), row.method->name,
+          std::to_string(row.failures), FormatFixed(row.rotation_rms_rad, 6),
+          FormatFixed(row.bound_rms_rad, 6),
+          noisy ? FormatFixed(row.bound_rms_rad / row.rotation_rms_rad, 3) : "-",
+          FormatFixed(row.nees_mean, 2)});
   }
-  return table;
+  return table.str();
 }
 
 }  // namespace circline::apps

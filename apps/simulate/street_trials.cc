@@ -158,11 +158,14 @@ bool IsSure(const StreetAnswer& answer) {
          answer.sigma.norm() <= kWrongDeg * kDegree;
 }
 
-std::vector<double> Errors(const std::vector<StreetTrial>& trials,
-                           StreetAnswer StreetTrial::*answer) {
-  std::vector<double> errors;
-  for (const StreetTrial& trial : trials) errors.push_back((trial.*answer).error_deg);
-  return errors;
+// Area under the share of errors below a threshold, from 0 to that of the argument, of its
+// greatest, per cent.
+double AreaUnderRecall(const std::vector<StreetTrial>& trials, StreetAnswer StreetTrial::*answer,
+                       double most_deg) {
+  double area = 0.0;
+  for (const StreetTrial& trial : trials)
+    area += std::max(0.0, 1.0 - (trial.*answer).error_deg / most_deg);
+  return 100.0 * area / static_cast<double>(trials.size());
 }
 
 // Components of the answers that are not wrong within two standard deviations, per cent.
@@ -233,12 +236,6 @@ std::vector<StreetTrial> SimulateStreets(int num_trials, double focal_sigma, std
   return trials;
 }
 
-double AreaUnderRecall(const std::vector<double>& errors_deg, double most_deg) {
-  double area = 0.0;
-  for (const double error : errors_deg) area += std::max(0.0, 1.0 - error / most_deg);
-  return area / static_cast<double>(errors_deg.size());
-}
-
 std::string StreetCsv(const std::vector<StreetTrial>& trials) {
   std::string csv = "trial,orthogonal,houses,segments,sigma_px";
   for (const std::string who : {"detected", "known"}) {
@@ -262,12 +259,11 @@ std::string StreetCsv(const std::vector<StreetTrial>& trials) {
 }
 
 std::string StreetSummary(const std::vector<StreetTrial>& trials) {
-  std::string text = "rotation AUC@3/5/10 deg, detected against known: ";
   std::vector<std::string> areas, ratios;
   for (const double most : kThresholdsDeg) {
-    const double detected = AreaUnderRecall(Errors(trials, &StreetTrial::detected), most);
-    const double known = AreaUnderRecall(Errors(trials, &StreetTrial::known), most);
-    areas.push_back(FormatFixed(100.0 * detected, 1) + " of " + FormatFixed(100.0 * known, 1));
+    const double detected = AreaUnderRecall(trials, &StreetTrial::detected, most);
+    const double known = AreaUnderRecall(trials, &StreetTrial::known, most);
+    areas.push_back(FormatFixed(detected, 1) + " of " + FormatFixed(known, 1));
     ratios.push_back(FormatFixed(detected / known, 3));
   }
   double sure = 0.0, wrong = 0.0, failed = 0.0;
@@ -278,18 +274,19 @@ std::string StreetSummary(const std::vector<StreetTrial>& trials) {
     wrong += trial.detected.error_any_deg > kWrongDeg ? 1.0 : 0.0;
   }
   const double n = static_cast<double>(trials.size());
-  const bool is_guessed = !trials.empty() && trials.front().photo.sigma.IsWide();
-  const std::string focal = is_guessed
-                                ? "focal length, of square houses, off by " +
-                                      FocalSummary(trials, &StreetTrial::detected) +
-                                      "; known: " + FocalSummary(trials, &StreetTrial::known) + "\n"
-                                : "";
-  return text + JoinList(areas, ", ") + " (" + JoinList(ratios, ", ") + "); within 2 sigma " +
-         FormatFixed(CoveragePercent(trials, &StreetTrial::detected), 1) + " % (known " +
-         FormatFixed(CoveragePercent(trials, &StreetTrial::known), 1) + " %); no answer " +
-         FormatFixed(100.0 * failed / n, 1) + " %; sure " + FormatFixed(100.0 * sure / n, 1) +
-         " %, of these wrong " +
-         FormatFixed(100.0 * wrong / std::max(1.0, static_cast<double>(sure)), 1) + " %\n" + focal;
+  std::string text = "rotation AUC@3/5/10 deg, detected against known: " + JoinList(areas, ", ") +
+                     " (" + JoinList(ratios, ", ") + "); within 2 sigma " +
+                     FormatFixed(CoveragePercent(trials, &StreetTrial::detected), 1) +
+                     " % (known " + FormatFixed(CoveragePercent(trials, &StreetTrial::known), 1) +
+                     " %); no answer " + FormatFixed(100.0 * failed / n, 1) + " %; sure " +
+                     FormatFixed(100.0 * sure / n, 1) + " %, of these wrong " +
+                     FormatFixed(100.0 * wrong / std::max(1.0, sure), 1) + " %\n";
+  if (trials.front().photo.sigma.IsWide()) {
+    text += "focal length, of square houses, off by " +
+            FocalSummary(trials, &StreetTrial::detected) +
+            "; known: " + FocalSummary(trials, &StreetTrial::known) + "\n";
+  }
+  return text;
 }
 
 }  // namespace circline::apps

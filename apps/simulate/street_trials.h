@@ -35,10 +35,6 @@ struct StreetTrial {
 std::vector<StreetTrial> SimulateStreets(int trials, double focal_sigma, std::uint64_t seed,
                                          int threads);
 
-// Area under the share of errors below a threshold, from 0 to that of the argument, of its
-// greatest.
-double AreaUnderRecall(const std::vector<double>& errors_deg, double most_deg);
-
 std::string StreetCsv(const std::vector<StreetTrial>& trials);
 std::string StreetSummary(const std::vector<StreetTrial>& trials);  // A line or two, for people.
 

@@ -1,15 +1,30 @@
-#include "apps/benchmark/ellipse_overlap.h"
+#include "apps/benchmark/detection_ellipses.h"
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "apps/benchmark/timing.h"
 #include "circline/estimators/basics.h"
+#include "circline/ransac/detection/edges.h"
 
-namespace circline::benchmark {
+namespace circline::apps {
 
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+
+FoundEllipses FindEllipses(const cv::Mat& image, const Camera& camera) {
+  FoundEllipses found;
+  cv::Mat gray;
+  if (!ToGray(image, &gray).ok()) return found;
+  EdgeMap edges;
+  found.edges_ms = Milliseconds([&] { DetectEdges(gray, EdgeOptions(), &edges); });
+  found.ellipses_ms =
+      Milliseconds([&] { DetectEllipses(edges, camera, EllipseOptions(), &found.ellipses); });
+  for (const DetectedEllipse& e : found.ellipses)
+    found.polygons.push_back(ContourPolygon(camera, e.fit.conic));
+  return found;
+}
 
 PolygonPoints EllipsePolygon(const Ellipse& e) {
   PolygonPoints polygon;
@@ -73,4 +88,4 @@ double SemiMinorPx(const PolygonPoints& polygon) {
   return 0.5 * static_cast<double>(std::min(box.size.width, box.size.height));
 }
 
-}  // namespace circline::benchmark
+}  // namespace circline::apps

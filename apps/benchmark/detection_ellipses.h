@@ -1,17 +1,29 @@
-// Which ellipses found are which of the truth: by the overlap of their areas.
-#ifndef CIRCLINE_APPS_BENCHMARK_ELLIPSE_OVERLAP_H_
-#define CIRCLINE_APPS_BENCHMARK_ELLIPSE_OVERLAP_H_
+// The ellipses of a photo as the tables measure them, and which of them are which of the truth: by
+// the overlap of their areas.
+#ifndef CIRCLINE_APPS_BENCHMARK_DETECTION_ELLIPSES_H_
+#define CIRCLINE_APPS_BENCHMARK_DETECTION_ELLIPSES_H_
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <opencv2/core.hpp>
 #include <vector>
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
+#include "circline/ransac/detection/detect_ellipses.h"
 
-namespace circline::benchmark {
+namespace circline::apps {
 
 using PolygonPoints = std::vector<cv::Point2f>;
+
+struct FoundEllipses {
+  std::vector<DetectedEllipse> ellipses;
+  std::vector<PolygonPoints> polygons;  // Their contours.
+  double edges_ms = 0.0, ellipses_ms = 0.0;
+};
+
+// All ellipses of a photo.
+FoundEllipses FindEllipses(const cv::Mat& image, const Camera& camera);
 
 PolygonPoints EllipsePolygon(const Ellipse& e);
 
@@ -39,9 +51,10 @@ struct Score {
       hit95 += o >= 0.95 ? 1 : 0;
     }
   }
+  double Recall(int hits) const { return static_cast<double>(hits) / std::max(1, truth); }
   double F(int hits) const { return truth + found > 0 ? 2.0 * hits / (truth + found) : 0.0; }
 };
 
-}  // namespace circline::benchmark
+}  // namespace circline::apps
 
-#endif  // CIRCLINE_APPS_BENCHMARK_ELLIPSE_OVERLAP_H_
+#endif  // CIRCLINE_APPS_BENCHMARK_DETECTION_ELLIPSES_H_
