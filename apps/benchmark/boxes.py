@@ -49,7 +49,7 @@ def write_scene(path, folder, root, image, edges, given):
     size = (int(root.getNode('image_width').real()), int(root.getNode('image_height').real()))
     cameras = seq(root, 'cameras')
     lines = ['%YAML:1.0', '---', 'cameras:']
-    lines += [camera(c, text(c, 'name'), *size) for c in cameras] or [camera(root, 'cam0', *size)]
+    lines += [camera(c, text(c, 'name'), *size, lens=True) for c in cameras] or [camera(root, 'cam0', *size, lens=True)]
     lines += ['images:', f'  - file: "{os.path.abspath(os.path.join(folder, image.getNode("file").string()))}"',
               f'    camera: "{text(image, "camera", "cam0")}"', '    solids:', f'      - {{ id: "box", kind: "box", length: {row(given)}']
     if edges:

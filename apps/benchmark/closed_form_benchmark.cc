@@ -11,7 +11,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "apps/benchmark/closed_form_rows.h"
+#include "apps/benchmark/rows.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/circular_points.h"

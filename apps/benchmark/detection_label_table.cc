@@ -7,6 +7,7 @@
 #include "apps/benchmark/detection_tables.h"
 #include "apps/benchmark/detection_truth.h"
 #include "apps/benchmark/timing.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::apps {
 
@@ -21,12 +22,8 @@ void MeasureLabels(const std::string& folder, const cv::FileNode& root) {
     const std::string file = ReadText(node, "file");
     const cv::Mat image = cv::imread(folder + "/" + file, cv::IMREAD_COLOR);
     if (image.empty()) continue;
-    Camera camera;  // Not calibrated: any pinhole does for finding ellipses.
-    camera.width = image.cols;
-    camera.height = image.rows;
-    camera.fx = camera.fy = image.cols;
-    camera.cx = 0.5 * (image.cols - 1);
-    camera.cy = 0.5 * (image.rows - 1);
+    // Not calibrated: any pinhole does for finding ellipses.
+    const Camera camera = CenteredCamera(image.cols, image.cols, image.rows);
     const FoundEllipses t = FindEllipses(image, camera);
     ms.push_back(t.edges_ms + t.ellipses_ms);
     std::vector<PolygonPoints> truth;

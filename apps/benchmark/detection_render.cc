@@ -10,6 +10,7 @@
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/random.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::apps {
 namespace {
@@ -119,7 +120,7 @@ bool Touch(const std::vector<Ellipse>& rims, const Ellipse& rim) {
 
 void List(const Disc& disc, const Ellipse& rim, RenderedImage* truth) {
   if (rim.b < kSmallestListedPx) return;
-  const Camera camera = RenderingCamera();
+  const Camera camera = PinholeCamera();
   truth->ellipses.push_back(rim);
   truth->normals.push_back(disc.normal);
   truth->centers.emplace_back(camera.fx * disc.center.x() / disc.center.z() + camera.cx,
@@ -129,7 +130,7 @@ void List(const Disc& disc, const Ellipse& rim, RenderedImage* truth) {
 // One rim, what fills it, and perhaps what hides a part of it.
 double DrawRim(const Disc& disc, double share, double around, int group, Random* random,
                cv::Mat* image, RenderedImage* truth) {
-  const Ellipse rim = disc.Rim(RenderingCamera(), share);
+  const Ellipse rim = disc.Rim(PinholeCamera(), share);
   const double grey = DrawGrey(around, random);
   FillRim(rim, grey, image);
   if (group >= 2 && random->Uniform() < 0.7) Occlude(rim, DrawGrey(grey, random), random, image);
@@ -139,7 +140,7 @@ double DrawRim(const Disc& disc, double share, double around, int group, Random*
 
 void DrawCircles(int group, Random* random, cv::Mat* image, RenderedImage* truth) {
   constexpr int kMostTries = 100;
-  const Camera camera = RenderingCamera();
+  const Camera camera = PinholeCamera();
   const double ground = cv::mean(*image)[0];
   std::vector<Ellipse> rims;
   const int wanted = 1 + random->UniformInt(5);
@@ -176,22 +177,12 @@ void AddNoise(double sigma, Random* random, cv::Mat* image) {
 
 }  // namespace
 
-Camera RenderingCamera() {
-  Camera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 800.0;
-  camera.cx = 320.0;
-  camera.cy = 240.0;
-  return camera;
-}
-
 Renderer::Renderer(const std::string& textures) {
   // Those of the sample photographs that show no ellipses.
   constexpr std::array<const char*, 6> kFiles = {"building.jpg", "home.jpg",  "leuvenA.jpg",
                                                  "leuvenB.jpg",  "aloeL.jpg", "box_in_scene.png"};
   constexpr double kBlurPx = 1.5;
-  const Camera camera = RenderingCamera();
+  const Camera camera = PinholeCamera();
   for (const char* file : kFiles) {
     cv::Mat texture = cv::imread(textures + "/" + file, cv::IMREAD_GRAYSCALE);
     if (texture.empty()) continue;
@@ -203,7 +194,7 @@ Renderer::Renderer(const std::string& textures) {
 }
 
 cv::Mat Renderer::Render(std::uint64_t seed, int number, RenderedImage* truth) const {
-  const Camera camera = RenderingCamera();
+  const Camera camera = PinholeCamera();
   Random random(Random(seed * 1000003ULL + static_cast<std::uint64_t>(number)).Next());
   *truth = RenderedImage();
   truth->group = number % 4;

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
 
 namespace circline::apps {
@@ -19,17 +18,14 @@ struct RenderedImage {
   std::vector<Eigen::Vector2d> centers;  // Of the circle; the two rims of a ring share theirs.
 };
 
-// 640x480, f = 800 px, no distortion: that of all renderings.
-Camera RenderingCamera();
-
 // The smallest rim that the truth of a rendering lists, semi-minor axis, pixels. Smaller ones are
 // drawn, and photographs of textures hold blobs of that size.
 constexpr double kSmallestListedPx = 8.0;
 
-// Discs and rings (the inner radius is 0.6 of the outer one) at tilts of 0 to 75 degrees, which do
-// not touch. Groups, image number modulo 4: a plain ground; a photograph; a photograph, and
-// occluders that hide 10 to 40 % of most contours; the same with noise of sigma 10 grey levels (2
-// otherwise). Supersampled 4x, blurred by 0.5 to 1.2 px.
+// Seen by PinholeCamera(): discs and rings (the inner radius is 0.6 of the outer one) at tilts of 0
+// to 75 degrees, which do not touch. Groups, image number modulo 4: a plain ground; a photograph; a
+// photograph, and occluders that hide 10 to 40 % of most contours; the same with noise of sigma 10
+// grey levels (2 otherwise). Supersampled 4x, blurred by 0.5 to 1.2 px.
 class Renderer {
  public:
   // `textures`: a folder with the sample photographs of OpenCV.

@@ -12,6 +12,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::apps {
 namespace {
@@ -27,7 +28,7 @@ class RenderingScores {
   void Add(const cv::Mat& image, const RenderedImage& truth) {
     std::vector<PolygonPoints> polygons, large;
     for (const Ellipse& e : truth.ellipses) polygons.push_back(EllipsePolygon(e));
-    const FoundEllipses found = FindEllipses(image, RenderingCamera());
+    const FoundEllipses found = FindEllipses(image, PinholeCamera());
     ms.push_back(found.edges_ms + found.ellipses_ms);
     for (const PolygonPoints& polygon : found.polygons) {
       if (SemiMinorPx(polygon) >= kSmallestListedPx) large.push_back(polygon);

@@ -14,6 +14,7 @@
 #include "apps/benchmark/timing.h"
 #include "circline/estimators/basics.h"
 #include "circline/ransac/detection/detect_observations.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::apps {
 namespace {
@@ -58,25 +59,14 @@ void TileTo(double pixels, cv::Mat* image, Camera* camera) {
   const cv::Size size(static_cast<int>(scale * image->cols), static_cast<int>(scale * image->rows));
   const int times = static_cast<int>(std::ceil(scale / 2.0));
   *image = cv::repeat(block, times, times)(cv::Rect({}, size)).clone();
-  *camera = Camera();
-  camera->width = size.width;
-  camera->height = size.height;
-  camera->fx = camera->fy = size.width;
-  camera->cx = 0.5 * (size.width - 1);
-  camera->cy = 0.5 * (size.height - 1);
+  *camera = CenteredCamera(size.width, size.width, size.height);
 }
 
 // A plane 4 units ahead that leans by 35 degrees, seen by a camera of 65 degrees, 1600 x 1200:
 // black rings on white paper, drawn four times as large, blurred like a lens and with noise.
 class RingSheet {
  public:
-  RingSheet() : large_(4800, 6400, CV_8U, cv::Scalar(235)) {
-    camera_.width = 1600;
-    camera_.height = 1200;
-    camera_.fx = camera_.fy = 1250.0;
-    camera_.cx = 799.5;
-    camera_.cy = 599.5;
-  }
+  RingSheet() : large_(4800, 6400, CV_8U, cv::Scalar(235)) {}
 
   void Disc(const cv::Point2d& center, double radius, int gray) {
     std::vector<cv::Point> contour;
@@ -111,7 +101,7 @@ class RingSheet {
             static_cast<int>(std::lround((v + 0.5) * unit))};
   }
 
-  Camera camera_;
+  Camera camera_ = CenteredCamera(1250.0, 1600, 1200);
   cv::Mat large_;
 };
 

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "apps/benchmark/closed_form_rows.h"
+#include "apps/benchmark/rows.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/circle_focal.h"
 #include "circline/estimators/circle_pose.h"

@@ -147,11 +147,11 @@ class Sheet {
     camera.cy = 240.0;
   }
 
-  // Turned out of the sheet by `lean` about its own vertical; perhaps with its centre and a
-  // diameter.
-  void AddCircle(bool is_marked, double lean = 0.0) {
+  // Perhaps with its centre and a diameter; perhaps turned out of the sheet by 11 to 34 degrees.
+  void AddCircle(bool is_marked, bool leans = false) {
     const Eigen::Vector2d center = Anywhere();
     const double radius = random_.Uniform(0.05, 0.2);
+    const double lean = leans ? random_.Uniform(0.2, 0.6) : 0.0;
     CircleObservation circle;
     circle.id = "c" + std::to_string(observations_.circles.size());
     circle.plane = "p";
@@ -272,11 +272,9 @@ BENCHMARK(BM_GrowthOfAll)->Apply(UpTo<10000>);
 // Circles of one plane; where the second argument is above 0, each so-many-th one leans out of it.
 void BM_EstimatePoseCirclesOfAPlane(benchmark::State& state) {
   constexpr double kNoisePx = 0.3;
-  Random random(2);
   Sheet sheet(kNoisePx);
   for (std::int64_t i = 0; i < state.range(0); ++i) {
-    const bool leans = state.range(1) > 0 && i % state.range(1) == 0;
-    sheet.AddCircle(false, leans ? random.Uniform(0.2, 0.6) : 0.0);
+    sheet.AddCircle(false, state.range(1) > 0 && i % state.range(1) == 0);
   }
   Observations observations = sheet.observations();
   FitDirect(kNoisePx, &observations);

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/benchmark/closed_form_rows.h"
+#include "apps/benchmark/rows.h"
 #include "circline/refine/estimate_pose.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"

@@ -155,7 +155,7 @@ const Row kRows[] = {
 };
 
 void RunRow(const Row& row, const Method& method) {
-  constexpr double kOk = 3.0, kMissed = 1e9;
+  constexpr double kOk = 3.0, kNotFound = 1e9;
   std::vector<double> errors, ms;
   for (int trial = 0; trial < FLAGS_trials; ++trial) {
     const Scene scene =
@@ -164,8 +164,8 @@ void RunRow(const Row& row, const Method& method) {
     Matrix3d conic;
     bool is_found = false;
     ms.push_back(Milliseconds([&] { is_found = method.fit(scene, &conic); }));
-    const double error = is_found ? scene.Error(conic) : kMissed;
-    errors.push_back(std::isfinite(error) ? error : kMissed);
+    const double error = is_found ? scene.Error(conic) : kNotFound;
+    errors.push_back(std::isfinite(error) ? error : kNotFound);
   }
   const auto num_ok =
       std::count_if(errors.begin(), errors.end(), [&](double error) { return error <= kOk; });

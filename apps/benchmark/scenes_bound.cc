@@ -11,7 +11,7 @@ namespace {
 class Layout {
  public:
   Layout(const World& world, const BoundRequest& request) {
-    rotation = Reserve(world.SpinIsFree() ? 2 : 3);
+    rotation = Reserve(world.RotationIsFree() ? 2 : 3);
     if (request.log_focal_sigma > 0.0) focal = Reserve(1);
     int shared_radius = -1;
     std::map<int, int> rings;
@@ -160,11 +160,11 @@ Bound ComputeBound(const World& world, const BoundRequest& request) {
   }
 
   Bound bound;
-  bound.spin_is_free = layout.offset.empty();
+  bound.rotation_is_free = layout.offset.empty();
   Eigen::MatrixXd covariance;
   bound.finite = Invert(information.matrix(), &covariance);
   if (!bound.finite) return bound;
-  const int unknown = bound.spin_is_free ? 2 : 3;
+  const int unknown = bound.rotation_is_free ? 2 : 3;
   const Eigen::MatrixXd basis = information.basis().leftCols(unknown);
   bound.covariance = basis * covariance.topLeftCorner(unknown, unknown) * basis.transpose();
   bound.rotation_rad = std::sqrt(bound.covariance.trace());

@@ -20,9 +20,9 @@ struct BoundRequest {
 // Structure (centres, radii, lines, free directions) is unknown, and eliminated.
 struct Bound {
   bool finite = false;
-  bool spin_is_free = false;
-  // Of delta, camera frame, rotation = exp([delta]x) truth, radians^2; where the spin is free, of
-  // its components across the normal alone.
+  bool rotation_is_free = false;
+  // Of delta, camera frame, rotation = exp([delta]x) truth, radians^2; where the rotation about the
+  // normal is free, of its components across the normal alone.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   double rotation_rad = 0.0;  // Root of its trace.
   double log_focal = 0.0;     // Standard deviations.

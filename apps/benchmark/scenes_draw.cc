@@ -61,12 +61,12 @@ CameraPose DrawPose(const Recipe& recipe, const Camera& camera, Random* random) 
   PixelToCalibrated(camera, {u * camera.width, v * camera.height}, &middle);
   const Eigen::Vector3d ray = middle.Homogeneous().normalized();
   const double tilt = random->Uniform(recipe.min_tilt_deg, recipe.max_tilt_deg) * kDegree;
-  const double azimuth = random->Uniform(0.0, 2.0 * kPi), spin = random->Uniform(0.0, 2.0 * kPi);
+  const double azimuth = random->Uniform(0.0, 2.0 * kPi), turn = random->Uniform(0.0, 2.0 * kPi);
   const Eigen::Vector3d a = ray.unitOrthogonal(), b = ray.cross(a);
   const Eigen::Vector3d sideways = std::cos(azimuth) * a + std::sin(azimuth) * b;
   const Eigen::Vector3d normal = std::sin(tilt) * sideways - std::cos(tilt) * ray;
   const Eigen::Vector3d e = normal.unitOrthogonal(), f = normal.cross(e);
-  const Eigen::Vector3d x = std::cos(spin) * e + std::sin(spin) * f;
+  const Eigen::Vector3d x = std::cos(turn) * e + std::sin(turn) * f;
   CameraPose pose;
   pose.rotation << x, normal.cross(x), normal;
   pose.translation = kDistance * ray;

@@ -29,7 +29,7 @@ PoseError ErrorOf(const Scene& scene, const PoseHypothesis& hypothesis) {
   const Eigen::Matrix3d& estimate = hypothesis.cam_from_world.rotation;
   Eigen::MatrixXd components = Eigen::Matrix3d::Identity();
   Eigen::Vector3d delta = Eigen::Vector3d::Constant(10.0);
-  if (scene.bound.spin_is_free || hypothesis.RotationIsFree()) {
+  if (scene.bound.rotation_is_free || hypothesis.RotationIsFree()) {
     const Eigen::Vector3d from = estimate.col(2), to = truth.col(2);
     delta = LogRotation(
         Eigen::Quaterniond::FromTwoVectors(from, from.dot(to) < 0.0 ? Eigen::Vector3d(-to) : to)

@@ -54,7 +54,7 @@ struct World {
   bool equal_radii = false;  // Stated as one radius group.
 
   // Whether no pencil fixes the rotation about the normal.
-  bool SpinIsFree() const { return pencils.empty(); }
+  bool RotationIsFree() const { return pencils.empty(); }
 };
 
 // What to draw. The defaults are the scenes "of every kind".

@@ -43,9 +43,12 @@ def row(values):
     return '[' + ', '.join(map(number, np.asarray(values, float).ravel())) + ']'
 
 
-def camera(node, ident, width, height):
+def camera(node, ident, width, height, lens=False):
+    """`lens`: it counts as one with distortion, be that zero."""
     distortion = mat(node, 'distortion_coefficients')
-    lens = distortion is not None and np.any(distortion)
+    if distortion is None:
+        distortion = np.zeros(5)
+    lens = lens or np.any(distortion)
     return (f'  - {{ id: "{ident}", model: "{"opencv" if lens else "pinhole"}", width: {width}, height: {height}, '
             f'camera_matrix: {row(mat(node, "camera_matrix"))}' + (f', distortion: {row(distortion)}' if lens else '') + ' }')
 

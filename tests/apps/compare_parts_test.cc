@@ -22,6 +22,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
 #include "tests/apps/test_files.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::apps {
 namespace {
@@ -154,10 +155,7 @@ TEST(Overlay, DrawsWithTheRefinedFocalLength) {
     ImageRun run;
     run.image = &image;
     run.photo = cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(90));
-    Camera& camera = run.observations.camera;
-    camera.fx = camera.fy = given;
-    camera.cx = 319.5;
-    camera.cy = 239.5;
+    run.observations.camera = CenteredCamera(given, 640, 480);
     CircleObservation circle;  // Without a fit: its points alone say where the grid is.
     circle.id = "c";
     circle.plane = "p";

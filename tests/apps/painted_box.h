@@ -12,6 +12,7 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/pose.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::apps {
 
@@ -34,13 +35,8 @@ struct PaintedBox {
   }
 
   Camera camera() const {
-    Camera camera;
+    Camera camera = CenteredCamera(kFocal, kWidth, kHeight);
     camera.id = "k";
-    camera.width = kWidth;
-    camera.height = kHeight;
-    camera.fx = camera.fy = kFocal;
-    camera.cx = 0.5 * (kWidth - 1);
-    camera.cy = 0.5 * (kHeight - 1);
     return camera;
   }
   std::string CameraText() const {

@@ -12,6 +12,7 @@
 #include "apps/studio/studio.h"
 #include "tests/apps/studio_disc.h"
 #include "tests/apps/test_files.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::apps {
 namespace {
@@ -23,13 +24,8 @@ constexpr char kCameraText[] =
     "camera_matrix: [317.5, 0., 160., 0., 317.5, 120., 0., 0., 1.] }";
 
 Camera CameraOf(double focal_px) {
-  Camera camera;
+  Camera camera = PinholeCamera(focal_px, 320, 240);
   camera.id = "camera";
-  camera.width = 320;
-  camera.height = 240;
-  camera.fx = camera.fy = focal_px;
-  camera.cx = 160.0;
-  camera.cy = 120.0;
   return camera;
 }
 

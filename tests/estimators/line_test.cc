@@ -10,17 +10,15 @@
 
 #include "circline/estimators/random.h"
 #include "circline/estimators/vanishing_point.h"
+#include "tests/pinhole_camera.h"
 #include "tests/trials.h"
 
 namespace circline {
 namespace {
 
 Camera BarrelCamera() {
-  Camera camera;
+  Camera camera = PinholeCamera(500.0);
   camera.model = CameraModel::kOpenCV;
-  camera.fx = camera.fy = 500.0;
-  camera.cx = 320.0;
-  camera.cy = 240.0;
   camera.distortion = {-0.28, 0.08, 0.0, 0.0, 0.0};
   return camera;
 }

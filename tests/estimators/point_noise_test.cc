@@ -6,16 +6,14 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline {
 namespace {
 
 Observations MakePhoto() {
   Observations photo;
-  photo.camera.id = "cam";
-  photo.camera.fx = photo.camera.fy = 800.0;
-  photo.camera.cx = 320.0;
-  photo.camera.cy = 240.0;
+  photo.camera = PinholeCamera();
   return photo;
 }
 

@@ -12,19 +12,11 @@
 #include "circline/estimators/conic.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/conic_model.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::conic_scene {
 
-inline Camera TestCamera() {
-  Camera camera;
-  camera.id = "cam";
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 800.0;
-  camera.cx = 320.0;
-  camera.cy = 240.0;
-  return camera;
-}
+inline Camera TestCamera() { return PinholeCamera(); }
 
 enum class Clutter { kUniform, kEllipse, kEdge, kCluster };
 

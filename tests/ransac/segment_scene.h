@@ -11,18 +11,9 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/random.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::segment_scene {
-
-constexpr double kFocal = 800.0;
-
-inline Camera TestCamera() {
-  Camera camera;
-  camera.fx = camera.fy = kFocal;
-  camera.cx = 320.0;
-  camera.cy = 240.0;
-  return camera;
-}
 
 inline Eigen::Matrix3d RandomRotation(Random* random) {
   const double w = random->Normal(), x = random->Normal(), y = random->Normal(),
@@ -34,11 +25,12 @@ inline Eigen::Matrix3d RandomRotation(Random* random) {
 // along the image of `direction` or, where that is null, any way.
 inline void AddSegment(const Eigen::Vector3d* direction, Random* random,
                        std::vector<LineFit>* lines) {
-  const double u = random->Uniform(0.0, 640.0), v = random->Uniform(0.0, 480.0);
+  const Camera camera = PinholeCamera();
+  const double u = random->Uniform(0.0, camera.width), v = random->Uniform(0.0, camera.height);
   const double angle = random->Uniform(0.0, kPi);
   Eigen::Vector2d along(std::cos(angle), std::sin(angle));
   if (direction != nullptr) {
-    const Eigen::Vector3d x((u - 320.0) / kFocal, (v - 240.0) / kFocal, 1.0);
+    const Eigen::Vector3d x((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
     along = (*direction - direction->z() * x).head<2>().normalized();
   }
   const double half = random->Uniform(10.0, 60.0);
@@ -48,7 +40,7 @@ inline void AddSegment(const Eigen::Vector3d* direction, Random* random,
     ends[i] += (i == 0 ? half : -half) * along + 0.5 * Eigen::Vector2d(nx, ny);
   }
   std::vector<CalibratedPoint> points;
-  PixelsToCalibrated(TestCamera(), ends, &points);
+  PixelsToCalibrated(camera, ends, &points);
   LineFit fit;
   if (FitLine(points, 0.5, &fit).ok()) lines->push_back(fit);
 }

@@ -10,18 +10,13 @@
 
 #include "circline/estimators/observations.h"
 #include "circline/estimators/random.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::stray_points_scene {
 
 inline Camera TestCamera() {
-  Camera camera;
-  camera.id = "cam";
+  Camera camera = PinholeCamera();
   camera.model = CameraModel::kOpenCV;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 800.0;
-  camera.cx = 320.0;
-  camera.cy = 240.0;
   camera.distortion = {-0.2, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   return camera;
 }

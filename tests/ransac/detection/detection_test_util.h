@@ -17,17 +17,12 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::detection_test {
 
 inline Camera TestCamera(int width = 480, int height = 360, double focal = 500.0) {
-  Camera camera;
-  camera.width = width;
-  camera.height = height;
-  camera.fx = camera.fy = focal;
-  camera.cx = 0.5 * (width - 1);
-  camera.cy = 0.5 * (height - 1);
-  return camera;
+  return CenteredCamera(focal, width, height);
 }
 
 inline Camera DistortedCamera() {

@@ -1,6 +1,6 @@
-// Rows of the tables of closed forms.
-#ifndef CIRCLINE_APPS_BENCHMARK_CLOSED_FORM_ROWS_H_
-#define CIRCLINE_APPS_BENCHMARK_CLOSED_FORM_ROWS_H_
+// Rows of circline_benchmark.
+#ifndef CIRCLINE_APPS_BENCHMARK_ROWS_H_
+#define CIRCLINE_APPS_BENCHMARK_ROWS_H_
 
 #include <benchmark/benchmark.h>
 
@@ -27,9 +27,8 @@ void RunInTurn(benchmark::State& state, const std::vector<Inputs>& inputs, const
 
 // Columns of the table of solvers, over `scenes`: hypotheses a call; how many of them are proper
 // (finite rotations, unit normals facing the camera) and how often the truth is among them to
-// 1e-6, in per cent. `errors` writes, for each hypothesis, its error in radians, or of
-// log focal length (NaN if it is
-// improper) and returns how many there are.
+// 1e-6, in per cent. `errors` writes, for each hypothesis, its error in radians or of the logarithm
+// of the focal length (NaN if it is improper), and returns how many there are.
 template <typename Scene, typename Errors>
 void CountHypotheses(benchmark::State& state, const std::vector<Scene>& scenes,
                      const Errors& errors) {
@@ -54,4 +53,4 @@ void CountHypotheses(benchmark::State& state, const std::vector<Scene>& scenes,
 
 }  // namespace circline
 
-#endif  // CIRCLINE_APPS_BENCHMARK_CLOSED_FORM_ROWS_H_
+#endif  // CIRCLINE_APPS_BENCHMARK_ROWS_H_
