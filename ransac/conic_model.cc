@@ -3,19 +3,27 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <utility>
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
-#include "circline/ransac/conic_normal_equations.h"
-#include "circline/ransac/conic_sectors.h"
+#include "circline/ransac/conic_weights.h"
 
 namespace circline {
 namespace {
 
 // Keeps 0 / 0 out of the centre of a conic; far below any squared gradient per pixel that matters.
 constexpr float kTiny = 1e-30f;
+
+Eigen::Matrix3d ToMatrix(const ConicModel::Value& value) {
+  const auto [a, b, c, d, e, f] = value;
+  Eigen::Matrix3d conic;
+  conic << a, b, d, b, c, e, d, e, f;
+  return conic;
+}
+
+ConicModel::Value ToValue(const Eigen::Matrix3d& conic) {
+  return {conic(0, 0), conic(0, 1), conic(1, 1), conic(0, 2), conic(1, 2), conic(2, 2)};
+}
 
 // Whether `width` neighbouring sectors hold four fifths of the counts: the rest may be clutter.
 bool HoldMost(const std::array<int, kConicSectors>& counts, int width) {
@@ -104,26 +112,25 @@ ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLi
   scale_ = std::max(0.5 * (high - low).norm(), 1e-12);
   box_area_ = (high - low).prod() / (scale_ * scale_);
   data_.resize((directions != nullptr ? 8 : 6) * n);
-  x_.resize(n);
-  x_from_pixel_.resize(n);
   double area = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
-    const CalibratedPoint& p = points[static_cast<std::size_t>(index_[i])];
-    x_[i] = (p.x - center_) / scale_;
-    data_[i] = static_cast<float>(x_[i].x());
-    data_[n + i] = static_cast<float>(x_[i].y());
+    CalibratedPoint p = points[static_cast<std::size_t>(index_[i])];
+    p.x = (p.x - center_) / scale_;
+    data_[i] = static_cast<float>(p.x.x());
+    data_[n + i] = static_cast<float>(p.x.y());
+    std::array<double, 4>& j = p.x_from_pixel;
     for (std::size_t k = 0; k < 4; ++k) {
-      x_from_pixel_[i][k] = p.x_from_pixel[k] / scale_;
-      data_[(2 + k) * n + i] = static_cast<float>(x_from_pixel_[i][k]);
+      j[k] /= scale_;
+      data_[(2 + k) * n + i] = static_cast<float>(j[k]);
     }
-    const std::array<double, 4>& j = x_from_pixel_[i];
     area += std::abs(j[0] * j[3] - j[1] * j[2]);
+    points_.push_back(p);
   }
   pixel_ = std::sqrt(area / static_cast<double>(n));
-  if (directions != nullptr) TakeDirections(*directions);
+  if (directions != nullptr) ReadDirections(*directions);
 }
 
-void ConicModel::TakeDirections(const EdgeDirections& directions) {
+void ConicModel::ReadDirections(const EdgeDirections& directions) {
   const std::size_t n = index_.size();
   sigma_rad_ = directions.sigma_rad;
   normals_.resize(n);
@@ -137,12 +144,17 @@ void ConicModel::TakeDirections(const EdgeDirections& directions) {
 }
 
 Eigen::Matrix3d ConicModel::ToConic(const Value& value) const {
-  const auto [a, b, c, d, e, f] = value;
-  Eigen::Matrix3d C, T;
-  C << a, b, d, b, c, e, d, e, f;
+  Eigen::Matrix3d T;
   T << 1.0 / scale_, 0.0, -center_.x() / scale_, 0.0, 1.0 / scale_, -center_.y() / scale_, 0.0, 0.0,
       1.0;
-  return T.transpose() * C * T;
+  return TransformConic(ToMatrix(value), T);
+}
+
+bool ConicModel::FromConic(const Eigen::Matrix3d& conic, Value* value) const {
+  Eigen::Matrix3d T;
+  T << scale_, 0.0, center_.x(), 0.0, scale_, center_.y(), 0.0, 0.0, 1.0;
+  *value = ToValue(TransformConic(conic, T));
+  return Normalize(value);
 }
 
 bool ConicModel::Normalize(Value* value) const {
@@ -167,10 +179,10 @@ bool ConicModel::Normalize(Value* value) const {
 
 bool ConicModel::Fit(const int* sample, Value* value) const {
   std::array<Eigen::Vector2d, 5> x;
-  for (std::size_t i = 0; i < 5; ++i) x[i] = x_[static_cast<std::size_t>(sample[i])];
+  for (std::size_t i = 0; i < 5; ++i) x[i] = Position(sample[i]);
   Eigen::Matrix3d conic;
   if (!ConicFromFivePoints(x, &conic)) return false;
-  *value = {conic(0, 0), conic(0, 1), conic(1, 1), conic(0, 2), conic(1, 2), conic(2, 2)};
+  *value = ToValue(conic);
   return Normalize(value);
 }
 
@@ -202,26 +214,6 @@ void ConicModel::Residuals(const Value& value, int begin, int end, float* r2) co
   }
 }
 
-bool ConicModel::Refine(const float* weights, Value* value) const {
-  ConicNormalEquations equations(*value);
-  for (std::size_t i = 0; i < x_.size(); ++i) {
-    if (!(weights[i] > 0.0f)) continue;
-    equations.Add(x_[i], x_from_pixel_[i], static_cast<double>(weights[i]));
-  }
-  Vector6d step;
-  if (equations.count() < kMinSamples || !equations.Step(&step)) return false;
-  const Eigen::Map<const Vector6d> q(value->data());
-  constexpr int kMaxHalvings = 4;
-  for (int i = 0; i <= kMaxHalvings; ++i, step *= 0.5) {
-    Value moved;
-    Eigen::Map<Vector6d>(moved.data()) = q + step;
-    if (!Normalize(&moved)) continue;
-    *value = moved;
-    return true;
-  }
-  return false;
-}
-
 bool ConicModel::Accept(const Value& value, double threshold) const {
   const ConicSectors sector_of(value);
   const float t2 = static_cast<float>(threshold * threshold);
@@ -235,7 +227,7 @@ bool ConicModel::Accept(const Value& value, double threshold) const {
     for (int i = begin; i < end; ++i) {
       const float square = r2[static_cast<std::size_t>(i - begin)];
       if (!(square < t2)) continue;
-      const Eigen::Vector2d& x = x_[static_cast<std::size_t>(i)];
+      const Eigen::Vector2d& x = Position(i);
       ++counts[sector_of(x)];
       if (some.size == SomePoints::kMost) continue;
       some.Add(x);
@@ -264,39 +256,21 @@ double ConicModel::BandShare(const Value& value, double threshold) const {
 }
 
 double ConicModel::Distance(const Value& value, int i) const {
-  const auto [a, b, c, d, e, f] = value;
-  const Eigen::Vector2d& x = x_[static_cast<std::size_t>(i)];
-  const std::array<double, 4>& j = x_from_pixel_[static_cast<std::size_t>(i)];
-  const double gx = a * x.x() + b * x.y() + d, gy = b * x.x() + c * x.y() + e;
-  const double gu = j[0] * gx + j[2] * gy, gv = j[1] * gx + j[3] * gy;
-  const double norm = std::sqrt(gu * gu + gv * gv);
-  const double algebraic = x.x() * gx + x.y() * gy + d * x.x() + e * x.y() + f;
-  return norm > 0.0 ? 0.5 * algebraic / norm : std::numeric_limits<double>::infinity();
+  return ConicDistancePx(Point(i), ToMatrix(value));
 }
 
 double ConicModel::DirectionMiss(const Value& value, int i) const {
   if (normals_.empty()) return 0.0;
-  const auto [a, b, c, d, e, f] = value;
-  const Eigen::Vector2d& x = x_[static_cast<std::size_t>(i)];
-  const std::array<double, 4>& j = x_from_pixel_[static_cast<std::size_t>(i)];
-  const Eigen::Vector2d& normal = normals_[static_cast<std::size_t>(i)];
-  const double gx = a * x.x() + b * x.y() + d, gy = b * x.x() + c * x.y() + e;
-  const double gu = j[0] * gx + j[2] * gy, gv = j[1] * gx + j[3] * gy;
-  const double sine = gu * normal.y() - gv * normal.x();
-  const double scale = sigma_rad_ * sigma_rad_ * (gu * gu + gv * gv);
+  const CalibratedPoint& p = Point(i);
+  const Eigen::Vector3d polar = ToMatrix(value) * p.Homogeneous();
+  const Eigen::Vector2d gradient = p.GradientPerPixel(polar.head<2>());
+  const double sine = Cross(gradient, normals_[static_cast<std::size_t>(i)]);
+  const double scale = sigma_rad_ * sigma_rad_ * gradient.squaredNorm();
   return scale > 0.0 ? sine * sine / scale : 0.0;
 }
 
 bool ConicModel::DirectionFits(const Value& value, int i) const {
   return DirectionMiss(value, i) < kInlierSigmas * kInlierSigmas;
-}
-
-bool ConicModel::FromConic(const Eigen::Matrix3d& conic, Value* value) const {
-  Eigen::Matrix3d T;
-  T << scale_, 0.0, center_.x(), 0.0, scale_, center_.y(), 0.0, 0.0, 1.0;
-  const Eigen::Matrix3d C = T.transpose() * conic * T;
-  *value = {C(0, 0), C(0, 1), C(1, 1), C(0, 2), C(1, 2), C(2, 2)};
-  return Normalize(value);
 }
 
 }  // namespace circline

@@ -83,7 +83,7 @@ class ConicModel {
   // Signed distance of datum i, pixels, in double precision.
   double Distance(const Value& value, int i) const;
   // Position of datum i in the model's coordinates.
-  const Eigen::Vector2d& Position(int i) const { return x_[static_cast<std::size_t>(i)]; }
+  const Eigen::Vector2d& Position(int i) const { return Point(i).x; }
   // Standard deviation of the directions, radians; 0 where none are given.
   double sigma_rad() const { return sigma_rad_; }
   // Whether the direction at datum i is known.
@@ -91,9 +91,7 @@ class ConicModel {
     return !normals_.empty() && !normals_[static_cast<std::size_t>(i)].isZero(0.0);
   }
   // Distance of two data, pixels, roughly (a pixel of average size).
-  double PixelsBetween(int i, int j) const {
-    return (x_[static_cast<std::size_t>(i)] - x_[static_cast<std::size_t>(j)]).norm() / pixel_;
-  }
+  double PixelsBetween(int i, int j) const { return (Position(i) - Position(j)).norm() / pixel_; }
   // Squared sine residual of datum i, in standard deviations; 0 where its direction is not known.
   double DirectionMiss(const Value& value, int i) const;
   // Whether it is within kInlierSigmas of them.
@@ -102,9 +100,10 @@ class ConicModel {
  private:
   friend class OrientedConicModel;
 
+  const CalibratedPoint& Point(int i) const { return points_[static_cast<std::size_t>(i)]; }
   template <bool kOriented>
   void Residuals(const Value& value, int begin, int end, float* r2) const;
-  void TakeDirections(const EdgeDirections& directions);
+  void ReadDirections(const EdgeDirections& directions);
   // True if the value is a real ellipse within the limits; makes it negative inside, of unit norm.
   bool Normalize(Value* value) const;
 
@@ -113,8 +112,7 @@ class ConicModel {
   // x, y, the four entries of x_from_pixel and, with directions, the normal scaled to pixels per
   // unit sine: six or eight flat arrays.
   std::vector<float> data_;
-  std::vector<Eigen::Vector2d> x_;
-  std::vector<std::array<double, 4>> x_from_pixel_;
+  std::vector<CalibratedPoint> points_;   // In the model's coordinates and order.
   std::vector<Eigen::Vector2d> normals_;  // On the photo; empty without directions.
   double sigma_rad_ = 0.0;
   double sigma_px_ = 1.0;  // threshold / kInlierSigmas.

@@ -6,25 +6,23 @@
 #include <numeric>
 
 #include "circline/estimators/basics.h"
-#include "circline/ransac/conic_sectors.h"
 
 namespace circline {
 namespace {
 
-constexpr int kSectors = kConicSectors;
-
 // Points per pixel of distance, by sector.
 struct SectorDensities {
-  std::array<double, kSectors> curve, background;
+  std::array<double, kConicSectors> curve, background;
 };
 
 // For each sector the sum over it and `reach` neighbours on either side.
-std::array<double, kSectors> SumsOfWindows(const std::array<double, kSectors>& counts, int reach) {
-  std::array<double, kSectors> sums{};
-  for (int k = 0; k < kSectors; ++k) {
+std::array<double, kConicSectors> SumsOfWindows(const std::array<double, kConicSectors>& counts,
+                                                int reach) {
+  std::array<double, kConicSectors> sums{};
+  for (int k = 0; k < kConicSectors; ++k) {
     for (int j = k - reach; j <= k + reach; ++j) {
       sums[static_cast<std::size_t>(k)] +=
-          counts[static_cast<std::size_t>((j + kSectors) % kSectors)];
+          counts[static_cast<std::size_t>((j + kConicSectors) % kConicSectors)];
     }
   }
   return sums;
@@ -33,7 +31,7 @@ std::array<double, kSectors> SumsOfWindows(const std::array<double, kSectors>& c
 // Points within the threshold of the ellipse whose directions fit, and points beside it (up to
 // three times as far), by sector; fills what `result` keeps of each point.
 struct SectorCounts {
-  std::array<double, kSectors> inside{}, beside{};
+  std::array<double, kConicSectors> inside{}, beside{};
 };
 
 SectorCounts CountSectors(const ConicModel& model, const ConicModel::Value& value, double threshold,
@@ -42,7 +40,7 @@ SectorCounts CountSectors(const ConicModel& model, const ConicModel::Value& valu
   const ConicSectors sector_of(value);
   SectorCounts counts;
   result->residuals.resize(n);
-  result->misses.resize(n);
+  result->direction_residuals.resize(n);
   result->sectors.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     const int datum = static_cast<int>(i);
@@ -55,8 +53,8 @@ SectorCounts CountSectors(const ConicModel& model, const ConicModel::Value& valu
       counts.beside[k] += 1.0;
       continue;
     }
-    result->misses[i] = model.DirectionMiss(value, datum);
-    if (result->misses[i] < kInlierSigmas * kInlierSigmas) counts.inside[k] += 1.0;
+    result->direction_residuals[i] = model.DirectionMiss(value, datum);
+    if (result->direction_residuals[i] < kInlierSigmas * kInlierSigmas) counts.inside[k] += 1.0;
   }
   return counts;
 }
@@ -67,17 +65,17 @@ SectorCounts CountSectors(const ConicModel& model, const ConicModel::Value& valu
 SectorDensities Densities(const SectorCounts& counts, double threshold, double chance,
                           double sigma) {
   constexpr int kReach = 2;  // Neighbours on each side that vouch for a sector.
-  const std::array<double, kSectors> in = SumsOfWindows(counts.inside, kReach);
-  const std::array<double, kSectors> near = SumsOfWindows(counts.beside, kReach);
+  const std::array<double, kConicSectors> in = SumsOfWindows(counts.inside, kReach);
+  const std::array<double, kConicSectors> near = SumsOfWindows(counts.beside, kReach);
   // What clutter all around leaves in a window; a blob at one place is not all around. The half
   // keeps a trace of doubt where none was seen.
   const double all_beside = std::accumulate(counts.beside.begin(), counts.beside.end(), 0.5);
-  std::array<double, kSectors> sorted = near;
-  std::nth_element(sorted.begin(), sorted.begin() + kSectors / 2, sorted.end());
-  const double all_around =
-      std::min(all_beside * (2.0 * kReach + 1.0) / kSectors, 2.0 * sorted[kSectors / 2] + 1.0);
+  std::array<double, kConicSectors> sorted = near;
+  std::nth_element(sorted.begin(), sorted.begin() + kConicSectors / 2, sorted.end());
+  const double all_around = std::min(all_beside * (2.0 * kReach + 1.0) / kConicSectors,
+                                     2.0 * sorted[kConicSectors / 2] + 1.0);
   SectorDensities densities;
-  for (std::size_t k = 0; k < kSectors; ++k) {
+  for (std::size_t k = 0; k < kConicSectors; ++k) {
     // Half local, half global; the sides are twice as wide as the inside.
     const double expected = 0.5 * (0.5 * near[k] + 0.5 * all_around);
     const double stray = chance * expected;
@@ -90,18 +88,19 @@ SectorDensities Densities(const SectorCounts& counts, double threshold, double c
 
 }  // namespace
 
+double DirectionChance(const ConicModel& model) {
+  if (!(model.sigma_rad() > 0.0)) return 1.0;
+  return std::min(1.0, 2.0 * kInlierSigmas * model.sigma_rad() / kPi);
+}
+
 void WeighConic(const ConicModel& model, const ConicModel::Value& value, double threshold,
                 ConicWeights* result) {
   const std::size_t n = static_cast<std::size_t>(model.NumData());
   const double s = result->sigma > 0.0 ? result->sigma : threshold / kInlierSigmas;
-  const bool oriented = model.sigma_rad() > 0.0;
-  // A stray point's direction is anything: how many of them look right, and the density of their
-  // sine where it is small, over that of the curve's own points.
-  const double chance =
-      oriented ? std::min(1.0, 2.0 * kInlierSigmas * model.sigma_rad() / kPi) : 1.0;
-  const double sharpness = oriented ? std::sqrt(0.5 * kPi) / model.sigma_rad() : 1.0;
-  const SectorDensities densities =
-      Densities(CountSectors(model, value, threshold, result), threshold, chance, s);
+  // Density of the sine of the curve's own points where it is small over that of stray ones.
+  const double sharpness = model.sigma_rad() > 0.0 ? std::sqrt(0.5 * kPi) / model.sigma_rad() : 1.0;
+  const SectorDensities densities = Densities(CountSectors(model, value, threshold, result),
+                                              threshold, DirectionChance(model), s);
   result->weights.assign(n, 0.0f);
   double sum = 0.0, sum_squares = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -110,7 +109,7 @@ void WeighConic(const ConicModel& model, const ConicModel::Value& value, double 
     const std::size_t k = result->sectors[i];
     double density = densities.curve[k] * std::exp(-0.5 * r * r / (s * s));
     if (model.HasDirection(static_cast<int>(i))) {
-      density *= sharpness * std::exp(-0.5 * result->misses[i]);
+      density *= sharpness * std::exp(-0.5 * result->direction_residuals[i]);
     }
     const double w = density / (density + densities.background[k]);
     result->weights[i] = static_cast<float>(w);

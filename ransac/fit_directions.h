@@ -27,7 +27,7 @@ struct FittedFeature {
   // A line through two points misses neither: how it misses its pencil's direction tells its noise.
   bool HasNoiseFromPencil() const { return !is_stated && points.size() == 2; }
   // Takes the noise that was measured, unless one is stated; true if it is not what it was.
-  bool TakeNoise(double measured_px);
+  bool FollowNoise(double measured_px);
 };
 
 // What the fits of one set of observations share.

@@ -182,7 +182,7 @@ class PointFitter {
     for (std::size_t i = 0; i < circles_.size(); ++i) {
       CircleObservation& circle = run_.observations.circles[i];
       const double before = circles_[i].sigma_px;
-      if (!circles_[i].TakeNoise(noise.circles[i])) continue;
+      if (!circles_[i].FollowNoise(noise.circles[i])) continue;
       const bool is_wider = circles_[i].sigma_px > before;
       const std::optional<ConicFit> initial = circle.fit;
       if (is_wider && (!initial || HasManyOutliers(circle.inliers))) {
@@ -194,7 +194,7 @@ class PointFitter {
     for (std::size_t k = 0; k < lines_.size(); ++k) {
       for (std::size_t i = 0; i < lines_[k].size(); ++i) {
         LineObservation& line = run_.observations.pencils[k].lines[i];
-        if (!lines_[k][i].TakeNoise(noise.lines[k][i]) || !line.fit) continue;
+        if (!lines_[k][i].FollowNoise(noise.lines[k][i]) || !line.fit) continue;
         moved |= FitLine(lines_[k][i], &line).ok();
       }
     }

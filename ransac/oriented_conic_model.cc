@@ -37,7 +37,7 @@ OrientedConicModel::OrientedConicModel(const ConicModel& model) : model_(model) 
   for (std::size_t i = 0; i < tangents_.size(); ++i) {
     const Eigen::Vector2d& normal = model.normals_[i];
     if (normal.isZero(0.0)) continue;
-    const std::array<double, 4>& j = model.x_from_pixel_[i];
+    const std::array<double, 4>& j = model.points_[i].x_from_pixel;
     tangents_[i] = Eigen::Vector2d(-j[0] * normal.y() + j[1] * normal.x(),
                                    -j[2] * normal.y() + j[3] * normal.x())
                        .normalized();
@@ -46,7 +46,7 @@ OrientedConicModel::OrientedConicModel(const ConicModel& model) : model_(model) 
 
 bool OrientedConicModel::Fit(const int* sample, Value* value) const {
   std::array<const Eigen::Vector2d*, 3> x;
-  for (std::size_t i = 0; i < 3; ++i) x[i] = &model_.x_[static_cast<std::size_t>(sample[i])];
+  for (std::size_t i = 0; i < 3; ++i) x[i] = &model_.Position(sample[i]);
   const double sigma = model_.sigma_px_ * model_.pixel_;
   std::array<Side, 3> sides;
   std::array<double, 3> inverse_length2;

@@ -1,6 +1,7 @@
 #include "circline/ransac/ransac.h"
 
 #include <climits>
+#include <cmath>
 
 namespace circline {
 

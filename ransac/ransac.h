@@ -42,14 +42,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <string>
 #include <type_traits>
 #include <vector>
 
 #include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
-#include "circline/estimators/random.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/sampler.h"
 
@@ -164,7 +162,6 @@ class Ransac {
         needed = Needed();
       }
     }
-    if (!optimized) Optimize(model, best_.value, report);
     if (needed < options_.max_iterations) report->stop_reason = StopReason::kConfident;
     Finish(model, report);
   }
@@ -315,16 +312,11 @@ class Ransac {
     report->success = best_.num_inliers > 0;
     if (!report->success) return;
     report->model = best_.value;
-    std::array<float, kRansacBlock> r2;
-    report->score = 0.0;
-    for (int begin = 0; begin < num_data_; begin += kRansacBlock) {
-      const int size = std::min(kRansacBlock, num_data_ - begin);
-      model.SquaredResiduals(best_.value, begin, begin + size, r2.data());
-      report->score += ScoreBlock(r2.data(), size, &report->num_inliers);
-      for (int i = 0; i < size; ++i) {
-        const bool inlier = r2[static_cast<std::size_t>(i)] * inverse_t2_ < 1.0f;
-        report->inlier_mask[static_cast<std::size_t>(begin + i)] = inlier ? 1 : 0;
-      }
+    report->score = best_.score;
+    report->num_inliers = Weigh(model, best_.value, 1.0);
+    for (int k = 0; k < report->num_inliers; ++k) {
+      const int datum = inliers_[static_cast<std::size_t>(k)];
+      report->inlier_mask[static_cast<std::size_t>(datum)] = 1;
     }
   }
 

@@ -18,9 +18,9 @@ FoundEllipses FindEllipses(const cv::Mat& image, const Camera& camera) {
   cv::Mat gray;
   if (!ToGray(image, &gray).ok()) return found;
   EdgeMap edges;
-  found.edges_ms = Milliseconds([&] { DetectEdges(gray, EdgeOptions(), &edges); });
+  found.edges_ms = Milliseconds([&] { edges = DetectEdges(gray); });
   found.ellipses_ms =
-      Milliseconds([&] { DetectEllipses(edges, camera, EllipseOptions(), &found.ellipses); });
+      Milliseconds([&] { found.ellipses = DetectEllipses(edges, camera, EllipseOptions()); });
   for (const DetectedEllipse& e : found.ellipses)
     found.polygons.push_back(ContourPolygon(camera, e.fit.conic));
   return found;

@@ -161,8 +161,7 @@ void MeasureSegments(const std::string& folder, const cv::FileNode& root) {
     if (lines.empty()) continue;
     std::vector<DetectedLine> found;
     all[0].ms.push_back(Milliseconds([&] {
-      EdgeMap edges;
-      DetectEdges(gray, EdgeOptions(), &edges);
+      const EdgeMap edges = DetectEdges(gray);
       DetectLines(edges, camera, LineOptions(), &found);
     }));
     std::vector<Segment> segments;

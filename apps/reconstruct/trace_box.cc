@@ -162,11 +162,10 @@ void DropCopies(std::vector<DetectedLine>* lines) {
 Status DetectPhotoLines(const std::vector<cv::Mat>& channels, const Camera& camera,
                         PhotoEdges* edges, std::vector<DetectedLine>* lines) {
   for (const cv::Mat& channel : channels) {
-    edges->emplace_back();
-    Status status = DetectEdges(channel, EdgeOptions(), &edges->back());
+    edges->push_back(DetectEdges(channel));
     std::vector<DetectedLine> straight, bent;  // Worn edges are bent.
-    if (status.ok())
-      status = DetectLines(edges->back(), camera, LineOptions(), &straight, nullptr, &bent);
+    const Status status =
+        DetectLines(edges->back(), camera, LineOptions(), &straight, nullptr, &bent);
     if (!status.ok()) return status;
     UndoEdgeShift(edges->back(), camera, &straight);
     lines->insert(lines->end(), straight.begin(), straight.end());

@@ -28,66 +28,54 @@ constexpr int kMinArcPoints = 6;
 constexpr double kMinArcTurn = 12.0 * kDegree;
 // What the smoothing rounds on either side of a corner, points.
 constexpr int kCornerReach = 2;
-// How far the ends of two arcs may lie from the conic through their middles, pixels: tangents are
-// good to a few degrees.
+// How far the ends of two arcs may lie from the conic through their middles, or beyond each other's
+// tangents, pixels: tangents are good to a few degrees.
 constexpr double kEndSlackPx = 2.0;
 constexpr double kEndSlackShare = 0.03;
 // ... and how far their tangents there may be from its own, a sine (20 degrees).
 constexpr double kEndTangentSine = 0.34;
 
-// Vertices (indices of points) of the Douglas-Peucker polygon of points[begin, end).
-class Polygon {
- public:
-  const std::vector<int>& Approximate(const std::vector<EdgePoint>& points, int begin, int end) {
-    vertices_.clear();
-    stack_.clear();
-    vertices_.push_back(begin);
-    stack_.push_back({begin, end - 1});
-    // Depth first, left before right, so that vertices come out in order.
-    while (!stack_.empty()) {
-      const auto [a, b] = stack_.back();
-      stack_.pop_back();
-      const int farthest = Farthest(points, a, b);
-      if (farthest < 0) {
-        vertices_.push_back(b);
-      } else {
-        stack_.push_back({farthest, b});
-        stack_.push_back({a, farthest});
-      }
-    }
-    return vertices_;
+// Point farther than the tolerance from the chord a-b (or from a, where both coincide), or -1.
+int Farthest(const std::vector<EdgePoint>& points, int a, int b) {
+  const EdgePoint& p = points[static_cast<std::size_t>(a)];
+  const EdgePoint& q = points[static_cast<std::size_t>(b)];
+  float dx = q.x - p.x, dy = q.y - p.y;
+  const float length = std::sqrt(dx * dx + dy * dy);
+  // The ends of a closed chain coincide nearly: then the distance to the point itself counts.
+  const bool degenerate = length < 2.0f * kPolygonTolerancePx && b - a > 4;
+  if (length > 0.0f) {
+    dx /= length;
+    dy /= length;
   }
-
- private:
-  // Point farther than the tolerance from the chord a-b (or from a, where both coincide), or -1.
-  static int Farthest(const std::vector<EdgePoint>& points, int a, int b) {
-    const EdgePoint& p = points[static_cast<std::size_t>(a)];
-    const EdgePoint& q = points[static_cast<std::size_t>(b)];
-    float dx = q.x - p.x, dy = q.y - p.y;
-    const float length = std::sqrt(dx * dx + dy * dy);
-    // The ends of a closed chain coincide nearly: then the distance to the point itself counts.
-    const bool degenerate = length < 2.0f * kPolygonTolerancePx && b - a > 4;
-    if (length > 0.0f) {
-      dx /= length;
-      dy /= length;
+  int best = -1;
+  float best_distance = kPolygonTolerancePx;
+  for (int i = a + 1; i < b; ++i) {
+    const EdgePoint& r = points[static_cast<std::size_t>(i)];
+    const float ex = r.x - p.x, ey = r.y - p.y;
+    const float d = degenerate ? std::sqrt(ex * ex + ey * ey) : std::abs(ex * dy - ey * dx);
+    if (d > best_distance) {
+      best_distance = d;
+      best = i;
     }
-    int best = -1;
-    float best_distance = kPolygonTolerancePx;
-    for (int i = a + 1; i < b; ++i) {
-      const EdgePoint& r = points[static_cast<std::size_t>(i)];
-      const float ex = r.x - p.x, ey = r.y - p.y;
-      const float d = degenerate ? std::sqrt(ex * ex + ey * ey) : std::abs(ex * dy - ey * dx);
-      if (d > best_distance) {
-        best_distance = d;
-        best = i;
-      }
-    }
-    return best;
   }
+  return best;
+}
 
-  std::vector<int> vertices_;
-  std::vector<std::pair<int, int>> stack_;
-};
+// Vertices (indices of points) of the Douglas-Peucker polygon of a chain.
+std::vector<int> ApproximatePolygon(const std::vector<EdgePoint>& points, const EdgeChain& chain) {
+  // Those found, and those that end what is left, the nearest last.
+  std::vector<int> vertices = {chain.begin}, ends = {chain.end - 1};
+  while (!ends.empty()) {
+    const int farthest = Farthest(points, vertices.back(), ends.back());
+    if (farthest >= 0) {
+      ends.push_back(farthest);
+    } else {
+      vertices.push_back(ends.back());
+      ends.pop_back();
+    }
+  }
+  return vertices;
+}
 
 Arc MakeArc(const std::vector<EdgePoint>& points, int begin, int end, bool bright_inside,
             double turn) {
@@ -132,8 +120,7 @@ class ArcFinder {
 
   std::vector<Arc> Find() {
     for (const EdgeChain& chain : map_.chains) {
-      if (chain.size() >= kMinArcPoints)
-        Cut(polygon_.Approximate(map_.points, chain.begin, chain.end));
+      if (chain.size() >= kMinArcPoints) Cut(ApproximatePolygon(map_.points, chain));
     }
     return std::move(arcs_);
   }
@@ -190,26 +177,22 @@ class ArcFinder {
   }
 
   const EdgeMap& map_;
-  Polygon polygon_;
   std::vector<Arc> arcs_;
 };
 
 // Whether `p` lies on the inner side of the arc's end tangents and chord, as every other point of a
-// convex curve through the arc must; `slack` pixels are forgiven.
-bool InnerSide(const Arc& arc, const Vector2d& p, double slack) {
+// convex curve through the arc must.
+bool InnerSide(const Arc& arc, const Vector2d& p) {
   const double inward = arc.bright_inside ? -1.0 : 1.0;
-  if (inward * Cross(arc.first_tangent, p - arc.first) < -slack) return false;
-  if (inward * Cross(arc.last_tangent, p - arc.last) < -slack) return false;
+  if (inward * Cross(arc.first_tangent, p - arc.first) < -kEndSlackPx) return false;
+  if (inward * Cross(arc.last_tangent, p - arc.last) < -kEndSlackPx) return false;
   // Beyond the chord, seen from the arc: the walk from the first to the last point turns inward.
   const Vector2d chord = arc.last - arc.first;
-  return arc.turn > kPi || inward * Cross(chord, p - arc.first) > -slack * chord.norm();
+  return arc.turn > kPi || inward * Cross(chord, p - arc.first) > -kEndSlackPx * chord.norm();
 }
 
-bool OnInnerSides(const Arc& a, const Arc& b) {
-  constexpr double kSlackPx = 2.0;
-  return InnerSide(a, b.first, kSlackPx) && InnerSide(a, b.middle, kSlackPx) &&
-         InnerSide(a, b.last, kSlackPx) && InnerSide(b, a.first, kSlackPx) &&
-         InnerSide(b, a.middle, kSlackPx) && InnerSide(b, a.last, kSlackPx);
+bool OnInnerSide(const Arc& arc, const Arc& other) {
+  return InnerSide(arc, other.first) && InnerSide(arc, other.middle) && InnerSide(arc, other.last);
 }
 
 // The conics through two points with given tangents are T1 T2 + m L^2 = 0, with the two tangents
@@ -275,6 +258,8 @@ std::vector<Arc> SplitArc(const EdgeMap& map, const Arc& arc) {
   return parts;
 }
 
-bool CanShareEllipse(const Arc& a, const Arc& b) { return OnInnerSides(a, b) && EndsAgree(a, b); }
+bool CanShareEllipse(const Arc& a, const Arc& b) {
+  return OnInnerSide(a, b) && OnInnerSide(b, a) && EndsAgree(a, b);
+}
 
 }  // namespace circline

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -57,20 +58,17 @@ class LatticeFinder {
  private:
   using Place = std::array<int, 2>;  // In steps.
 
-  int NearestTo(const Vector2d& target, double within) const {
+  // The point that is nearest to where the step leads from point i; -1 if there is none.
+  int After(std::size_t i, const Vector2d& step) const {
     int nearest = -1;
-    double smallest = within * within;
-    for (std::size_t i = 0; i < points_.size(); ++i) {
-      const double d = (points_[i] - target).squaredNorm();
+    double smallest = kStepTolerance * kStepTolerance * step.squaredNorm();
+    for (std::size_t j = 0; j < points_.size(); ++j) {
+      const double d = (points_[j] - points_[i] - step).squaredNorm();
       if (d >= smallest) continue;
       smallest = d;
-      nearest = static_cast<int>(i);
+      nearest = static_cast<int>(j);
     }
     return nearest;
-  }
-
-  int After(std::size_t i, const Vector2d& step) const {
-    return NearestTo(points_[i] + step, kStepTolerance * step.norm());
   }
 
   // Points in the order of their distance to the middle one.
@@ -80,9 +78,9 @@ class LatticeFinder {
       x.push_back(p.x());
       y.push_back(p.y());
     }
-    const Vector2d middle(Median(&x), Median(&y));
+    const Vector2d middle(UpperMedian(std::move(x)), UpperMedian(std::move(y)));
     std::vector<std::size_t> order(points_.size());
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
       return (points_[a] - middle).squaredNorm() < (points_[b] - middle).squaredNorm();
     });
@@ -98,7 +96,7 @@ class LatticeFinder {
       }
       nearest.push_back(std::sqrt(smallest));
     }
-    return Median(&nearest);
+    return UpperMedian(std::move(nearest));
   }
 
   // The two steps that most points can take; of equally good ones the shorter.
@@ -106,8 +104,10 @@ class LatticeFinder {
     struct Step {
       Vector2d step;
       int support;
+      double merit;
     };
     std::vector<Step> steps;
+    const double n = static_cast<double>(points_.size());
     const double reach = kNeighbourFactor * UsualDistance();
     const std::vector<std::size_t> order = FromTheMiddle();
     for (std::size_t k = 0; k < std::min(kSeedPoints, order.size()); ++k) {
@@ -116,20 +116,18 @@ class LatticeFinder {
         if (j == order[k] || step.norm() > reach) continue;
         int support = 0;
         for (std::size_t i = 0; i < points_.size(); ++i) support += After(i, step) >= 0 ? 1 : 0;
-        steps.push_back({step, support});
+        // A diagonal step is nearly as common: the whole reach costs three tenths of the points.
+        steps.push_back({step, support, support - n * 0.3 * step.norm() / reach});
       }
     }
-    const double n = static_cast<double>(points_.size());
-    // A diagonal step is nearly as common: the whole reach costs three tenths of the points.
-    const auto merit = [&](const Step& s) { return s.support - n * 0.3 * s.step.norm() / reach; };
     std::stable_sort(steps.begin(), steps.end(),
-                     [&](const Step& a, const Step& b) { return merit(a) > merit(b); });
+                     [](const Step& a, const Step& b) { return a.merit > b.merit; });
     for (const Step& s : steps) {
-      const double sine =
-          std::abs(Cross(steps[0].step, s.step)) / (steps[0].step.norm() * s.step.norm());
+      const Step& first = steps.front();
+      const double sine = std::abs(Cross(first.step, s.step)) / (first.step.norm() * s.step.norm());
       if (sine < kMinStepSine) continue;
-      steps_ = {steps[0].step, s.step};
-      return steps[0].support >= kMinPointsOfLine && s.support >= kMinPointsOfLine;
+      steps_ = {first.step, s.step};
+      return first.support >= kMinPointsOfLine && s.support >= kMinPointsOfLine;
     }
     return false;
   }

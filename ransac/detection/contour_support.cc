@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <utility>
 
 #include "circline/estimators/basics.h"
 
@@ -24,6 +24,33 @@ constexpr double kFarPx = 1e6;
 
 // To the nearest integer, for values within 2 kFarPx of 0; a tenth of the time of std::lround.
 int Round(double x) { return static_cast<int>(x + (2e6 + 0.5)) - 2000000; }
+
+// Inverts those runs of `value` around the contour that are no longer than `longest` pixels.
+void FlipShortRuns(const std::vector<ContourSample>& samples, std::uint8_t value, double longest,
+                   std::vector<std::uint8_t>* flags) {
+  const std::size_t n = flags->size();
+  const auto flag = [&](std::size_t k) -> std::uint8_t& { return (*flags)[k % n]; };
+  std::size_t start = 0;  // Of a run, so that none is cut.
+  while (start < n && !(flag(start) == value && flag(start + n - 1) != value)) ++start;
+  if (start == n) return;  // One run all around, or none.
+  for (std::size_t begin = start; begin < start + n;) {
+    double length = 0.0;
+    std::size_t end = begin;
+    for (; flag(end) == value; ++end) length += samples[end % n].length;
+    for (std::size_t k = begin; k < end && length <= longest; ++k) flag(k) = value == 0 ? 1 : 0;
+    for (begin = end; begin < start + n && flag(begin) != value;) ++begin;
+  }
+}
+
+// Angle between the gradient at an edge point and the contour's normal beside it, which has turned
+// since the sample by curvature times distance.
+double NormalDeviation(const ContourSample& s, const EdgePoint& p) {
+  const Vector2d tangent(-s.normal.y(), s.normal.x());
+  const double curvature = s.turn / std::max(s.length, 1e-9);
+  const double side = s.normal.dot(p.Normal()) < 0.0 ? -1.0 : 1.0;
+  const double turned = curvature * tangent.dot(p.Position() - s.pixel);
+  return std::abs(side * Cross(s.normal, p.Normal()) - turned);
+}
 
 }  // namespace
 
@@ -67,26 +94,21 @@ bool Contour::SampleCount(int n, std::vector<ContourSample>* samples) const {
     anomaly = Vector2d(step_c * anomaly.x() - step_s * anomaly.y(),
                        step_s * anomaly.x() + step_c * anomaly.y());
   }
-  ContourSample* before = &samples->back();
-  for (std::size_t k = 0; k < samples->size(); ++k) {
-    ContourSample* s = &(*samples)[k];
-    const ContourSample& after = k + 1 < samples->size() ? s[1] : samples->front();
-    const Vector2d along = after.pixel - before->pixel;
+  const auto neighbour = [samples, n](int k) -> ContourSample& {
+    return (*samples)[static_cast<std::size_t>(k < 0 ? k + n : k < n ? k : k - n)];
+  };
+  for (int k = 0; k < n; ++k) {
+    const Vector2d along = neighbour(k + 1).pixel - neighbour(k - 1).pixel;
     const double length = along.norm();
-    const double inverse = length > 0.0 ? 1.0 / length : 0.0;
-    s->length = 0.5 * length;
+    ContourSample& s = neighbour(k);
+    s.length = 0.5 * length;
     // The anomaly runs from +x towards +y, so that outward is on its right (y down).
-    s->normal =
-        length > 0.0 ? Vector2d(along.y() * inverse, -along.x() * inverse) : Vector2d(1.0, 0.0);
-    before = s;
+    s.normal =
+        length > 0.0 ? Vector2d(along.y() / length, -along.x() / length) : Vector2d(1.0, 0.0);
   }
-  before = &samples->back();
-  for (std::size_t k = 0; k < samples->size(); ++k) {
-    ContourSample* s = &(*samples)[k];
-    const ContourSample& after = k + 1 < samples->size() ? s[1] : samples->front();
+  for (int k = 0; k < n; ++k) {
     // Twice the sine is close enough to the angle for steps of a few degrees.
-    s->turn = 0.5 * std::abs(Cross(before->normal, after.normal));
-    before = s;
+    neighbour(k).turn = 0.5 * std::abs(Cross(neighbour(k - 1).normal, neighbour(k + 1).normal));
   }
   return true;
 }
@@ -151,35 +173,32 @@ void EdgeCollector::Collect(const std::vector<ContourSample>& samples, BrightSid
                             double reach, Support* support) {
   const std::size_t n = samples.size();
   nearest_.resize(n);
-  for (std::size_t k = 0; k < n; ++k) nearest_[k] = Strongest(samples[k], bright, reach);
-  FindRuns(samples);
-  support->points.clear();
+  in_run_.resize(n);
   support->perimeter_px = support->length_px = support->turn = 0.0;
-  int last = -1;
-  sines_.clear();
   for (std::size_t k = 0; k < n; ++k) {
+    nearest_[k] = Strongest(samples[k], bright, reach);
+    in_run_[k] = nearest_[k] >= 0 ? 1 : 0;
     support->perimeter_px += samples[k].length;
+  }
+  FlipShortRuns(samples, 0, kMaxHolePx, &in_run_);
+  FlipShortRuns(samples, 1, std::min(kMinRunPx, 0.1 * support->perimeter_px), &in_run_);
+  support->points.clear();
+  std::vector<double> deviations;
+  int last = -1;
+  for (std::size_t k = 0; k < n; ++k) {
     if (!in_run_[k]) continue;
     support->length_px += samples[k].length;
     support->turn += samples[k].turn;
     const int i = nearest_[k];
     if (i < 0 || i == last) continue;
-    sines_.push_back(NormalMiss(samples[k], map_.points[static_cast<std::size_t>(i)]));
-    support->points.push_back(i);
     last = i;
+    deviations.push_back(NormalDeviation(samples[k], map_.points[static_cast<std::size_t>(i)]));
+    std::uint8_t& is_in = in_support_[static_cast<std::size_t>(i)];
+    if (is_in == 0) support->points.push_back(i);
+    is_in = 1;
   }
-  support->normal_median = Median(&sines_);
-  Unique(&support->points);
-}
-
-// Angle between the gradient at an edge point and the contour's normal beside it, which has turned
-// since the sample by curvature times distance.
-double EdgeCollector::NormalMiss(const ContourSample& s, const EdgePoint& p) {
-  const Vector2d tangent(-s.normal.y(), s.normal.x());
-  const double curvature = s.turn / std::max(s.length, 1e-9);
-  const double side = s.normal.dot(p.Normal()) < 0.0 ? -1.0 : 1.0;
-  const double turned = curvature * tangent.dot(p.Position() - s.pixel);
-  return std::abs(side * Cross(s.normal, p.Normal()) - turned);
+  for (const int i : support->points) in_support_[static_cast<std::size_t>(i)] = 0;
+  support->normal_median = UpperMedian(std::move(deviations));
 }
 
 // The free edge point near the contour at a sample with the right direction: of several the
@@ -208,85 +227,22 @@ int EdgeCollector::Strongest(const ContourSample& s, BrightSide bright, double r
   return best;
 }
 
-void EdgeCollector::AverageStrength(Support* support) {
+void EdgeCollector::AverageStrength(Support* support) const {
   support->gradient = 0.0;
-  sigmas_.clear();
+  std::vector<double> sigmas;
   for (const int i : support->points) {
     const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
     support->gradient += static_cast<double>(p.gradient);
-    sigmas_.push_back(static_cast<double>(p.sigma_px));
+    sigmas.push_back(static_cast<double>(p.sigma_px));
   }
   support->gradient /= std::max(1.0, static_cast<double>(support->points.size()));
-  support->sigma_px = Median(&sigmas_);
+  support->sigma_px = UpperMedian(std::move(sigmas));
 }
 
-// in_run_[k]: sample k lies in a supported run that is long enough, small holes closed.
-void EdgeCollector::FindRuns(const std::vector<ContourSample>& samples) {
-  const std::size_t n = samples.size();
-  in_run_.assign(n, 0);
-  double perimeter = 0.0;
-  for (const ContourSample& s : samples) perimeter += s.length;
-  const double min_run = std::min(kMinRunPx, 0.1 * perimeter);
-  const std::size_t start = BehindHole(samples);
-  if (start == n) {
-    in_run_.assign(n, 1);
-    return;
-  }
-  std::size_t run_begin = 0, run_end = 0;  // Offsets from start; the run found so far.
-  double run = 0.0;
-  double hole = std::numeric_limits<double>::infinity();
-  const auto close = [&] {
-    for (std::size_t j = run_begin; run >= min_run && j < run_end; ++j)
-      in_run_[(start + j) % n] = 1;
-  };
-  for (std::size_t j = 0; j < n; ++j) {
-    const ContourSample& s = samples[(start + j) % n];
-    if (nearest_[(start + j) % n] < 0) {
-      hole += s.length;
-      continue;
-    }
-    if (hole > kMaxHolePx) {
-      close();
-      run_begin = j;
-      run = 0.0;
-    } else {
-      run += hole;
-    }
-    run += s.length;
-    run_end = j + 1;
-    hole = 0.0;
-  }
-  close();
-}
-
-// Where to start, so that no run is cut by the start of the contour; n if there is no hole.
-std::size_t EdgeCollector::BehindHole(const std::vector<ContourSample>& samples) const {
-  const std::size_t n = samples.size();
-  double hole = 0.0;
-  for (std::size_t k = 0; k < 2 * n; ++k) {
-    hole = nearest_[k % n] >= 0 ? 0.0 : hole + samples[k % n].length;
-    if (hole > kMaxHolePx) return k % n;
-  }
-  return n;
-}
-
-// Removes repetitions, keeps the order.
-void EdgeCollector::Unique(std::vector<int>* points) {
-  stamp_.resize(map_.points.size(), 0);
-  ++now_;
-  const auto seen = [this](int i) {
-    std::uint32_t& stamp = stamp_[static_cast<std::size_t>(i)];
-    if (stamp == now_) return true;
-    stamp = now_;
-    return false;
-  };
-  points->erase(std::remove_if(points->begin(), points->end(), seen), points->end());
-}
-
-double Median(std::vector<double>* values) {
-  if (values->empty()) return 0.0;
-  const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
-  std::nth_element(values->begin(), middle, values->end());
+double UpperMedian(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 

@@ -70,7 +70,8 @@ struct QuickSupport {
 class EdgeCollector {
  public:
   // `map` must outlive the collector.
-  explicit EdgeCollector(const EdgeMap& map) : map_(map), taken_(map.points.size(), 0) {}
+  explicit EdgeCollector(const EdgeMap& map)
+      : map_(map), taken_(map.points.size(), 0), in_support_(map.points.size(), 0) {}
 
   // Marks points as belonging to an accepted ellipse: they support no other.
   void Take(const std::vector<int>& points);
@@ -82,30 +83,24 @@ class EdgeCollector {
   // The strongest points along the contour with the right bright side, as far as they come in runs.
   void Collect(const std::vector<ContourSample>& samples, BrightSide bright, double reach,
                Support* support);
-  void AverageStrength(Support* support);
+  void AverageStrength(Support* support) const;
 
  private:
   static constexpr int kMaxSteps = 7;
 
-  static double NormalMiss(const ContourSample& s, const EdgePoint& p);
   int PointsAcross(const ContourSample& s, int steps, std::array<int, 16>* points) const;
   int Strongest(const ContourSample& s, BrightSide bright, double reach) const;
-  void FindRuns(const std::vector<ContourSample>& samples);
-  std::size_t BehindHole(const std::vector<ContourSample>& samples) const;
-  void Unique(std::vector<int>* points);
 
   const EdgeMap& map_;
   std::vector<std::uint8_t> taken_;
-  // Scratch: for each sample its point or -1, and whether it lies in a run.
+  // Scratch: for each sample its point or -1, and whether it lies in a run; for each point of the
+  // map whether it is in the support.
   std::vector<int> nearest_;
-  std::vector<std::uint8_t> in_run_;
-  std::vector<double> sines_, sigmas_;
-  std::vector<std::uint32_t> stamp_;
-  std::uint32_t now_ = 0;
+  std::vector<std::uint8_t> in_run_, in_support_;
 };
 
-// Reorders; 0 for none.
-double Median(std::vector<double>* values);
+// The larger one in the middle of an even number; 0 of none.
+double UpperMedian(std::vector<double> values);
 
 }  // namespace circline
 

@@ -254,23 +254,11 @@ void GroupConcentric(const Camera& camera, std::vector<DetectedEllipse>* ellipse
 
 }  // namespace
 
-Status EllipseOptions::Validate() const {
-  if (!(min_axis_px > 0.0)) return Status::Invalid("min_axis_px must be positive");
-  if (!(min_arc_deg > 0.0 && min_arc_deg <= 360.0)) {
-    return Status::Invalid("min_arc_deg must be in (0, 360]");
-  }
-  return Status::Ok();
-}
-
-Status DetectEllipses(const EdgeMap& edges, const Camera& camera, const EllipseOptions& options,
-                      std::vector<DetectedEllipse>* ellipses) {
-  ellipses->clear();
-  Status status = options.Validate();
-  if (status.ok()) status = camera.Validate();
-  if (!status.ok()) return status;
-  *ellipses = EllipseDetector(edges, camera, options).Detect();
-  GroupConcentric(camera, ellipses);
-  return Status::Ok();
+std::vector<DetectedEllipse> DetectEllipses(const EdgeMap& edges, const Camera& camera,
+                                            const EllipseOptions& options) {
+  std::vector<DetectedEllipse> ellipses = EllipseDetector(edges, camera, options).Detect();
+  GroupConcentric(camera, &ellipses);
+  return ellipses;
 }
 
 }  // namespace circline

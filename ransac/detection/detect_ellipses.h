@@ -17,7 +17,6 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic_fit.h"
-#include "circline/estimators/status.h"
 #include "circline/ransac/detection/edges.h"
 
 namespace circline {
@@ -26,8 +25,6 @@ struct EllipseOptions {
   double min_axis_px = 4.0;  // Smallest semi-minor axis; > 0.
   // Smallest share of the contour that edges support, of 360; in (0, 360].
   double min_arc_deg = 100.0;
-
-  Status Validate() const;
 };
 
 struct DetectedEllipse {
@@ -38,10 +35,7 @@ struct DetectedEllipse {
   std::vector<Eigen::Vector2d> contour;
   double sigma_px = 0.0;      // Standard deviation of a point about the ellipse.
   double coverage_deg = 0.0;  // Share of the contour that has edge points, times 360.
-  double turn_deg = 0.0;      // Angle through which the contour turns over that share.
   double length_px = 0.0;     // Length of that share.
-  double normal_deg = 0.0;    // Median angle between gradients and the contour's normal.
-  double contrast = 0.0;      // Mean gradient there, grey levels per pixel.
   BrightSide bright = BrightSide::kOutside;
   // Ellipses with the same number can be circles about one centre, and differ by more in size than
   // the two edges of one thick rim do; -1 = alone.
@@ -49,8 +43,8 @@ struct DetectedEllipse {
 };
 
 // Best supported first. `camera` must be valid.
-Status DetectEllipses(const EdgeMap& edges, const Camera& camera, const EllipseOptions& options,
-                      std::vector<DetectedEllipse>* ellipses);
+std::vector<DetectedEllipse> DetectEllipses(const EdgeMap& edges, const Camera& camera,
+                                            const EllipseOptions& options);
 
 }  // namespace circline
 

@@ -41,9 +41,8 @@ std::vector<CircleEvidence> MakeCircles(const EdgeMap& edges,
 
 Status CollectEvidence(const EdgeMap& edges, const Camera& camera, const DetectionOptions& options,
                        PhotoEvidence* evidence) {
-  std::vector<DetectedEllipse> ellipses;
-  Status status = DetectEllipses(edges, camera, ToEllipseOptions(options), &ellipses);
-  if (!status.ok()) return status;
+  std::vector<DetectedEllipse> ellipses =
+      DetectEllipses(edges, camera, {options.min_ellipse_axis_px, options.min_arc_deg});
   const std::vector<std::uint8_t> on_ellipses = EllipsePoints(edges, ellipses);
   evidence->num_ellipses = ellipses.size();
   ellipses.resize(std::min(ellipses.size(), static_cast<std::size_t>(options.max_circles)));
@@ -51,7 +50,7 @@ Status CollectEvidence(const EdgeMap& edges, const Camera& camera, const Detecti
   if (options.max_pencils == 0) return Status::Ok();
   LineOptions line_options;
   line_options.min_length_px = options.min_segment_length_px;
-  status =
+  const Status status =
       DetectLines(edges, camera, line_options, &evidence->lines, &on_ellipses, &evidence->bent);
   if (!status.ok()) return status;
   UndoEdgeShift(edges, camera, &evidence->lines);
@@ -88,9 +87,7 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   cv::Mat gray;
   status = ToGray(image, &gray);
   if (!status.ok()) return status;
-  EdgeMap edges;
-  status = DetectEdges(gray, EdgeOptions(), &edges);
-  if (!status.ok()) return status;
+  const EdgeMap edges = DetectEdges(gray);
   PhotoEvidence evidence;
   const double diagonal_px = DiagonalPx(image.cols, image.rows);
   const auto collect = [&](const Camera& through, PhotoEvidence* seen) {
@@ -119,12 +116,9 @@ Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::R
   shifted.height = inside.height;
   shifted.cx -= inside.x;
   shifted.cy -= inside.y;
-  EdgeMap edges;
-  status = DetectEdges(gray, EdgeOptions(), &edges);
-  if (!status.ok()) return status;
-  std::vector<DetectedEllipse> ellipses;
-  status = DetectEllipses(edges, shifted, ToEllipseOptions(options), &ellipses);
-  if (!status.ok()) return status;
+  const EdgeMap edges = DetectEdges(gray);
+  const std::vector<DetectedEllipse> ellipses =
+      DetectEllipses(edges, shifted, {options.min_ellipse_axis_px, options.min_arc_deg});
   if (ellipses.empty()) return Status::Refused("no ellipse found inside the rectangle");
   FillCircle(edges, ellipses.front(), options.noise_model, circle);
   for (Vector2d& p : circle->points) p += Vector2d(inside.x, inside.y);

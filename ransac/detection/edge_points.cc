@@ -1,11 +1,12 @@
-#include "circline/ransac/detection/edge_points.h"
+// Where the gradient of the smoothed photo is largest across itself, to a fraction of a pixel.
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <opencv2/core/hal/hal.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "circline/ransac/detection/edges.h"
 
 namespace circline {
 namespace {
@@ -32,91 +33,53 @@ void GaussianKernels(double sigma, cv::Mat* smooth, cv::Mat* derivative) {
   }
 }
 
-// Marks (1 or 0) where the squared gradient `s` of a row of n pixels is a maximum along the axis
-// nearer to the gradient and at least `low`; the ends have no neighbours. Written without branches
-// so that the compiler works on several pixels at a time.
-void MarkMaxima(const float* gx, const float* gy, const float* above, const float* s,
-                const float* below, float low, int n, std::uint8_t* marks) {
-  marks[0] = marks[n - 1] = 0;
-  for (int x = 1; x + 1 < n; ++x) {
-    const float left = s[x - 1], right = s[x + 1], up = above[x], down = below[x];
-    const bool horizontal = std::abs(gx[x]) >= std::abs(gy[x]);
-    const float before = horizontal ? left : up, after = horizontal ? right : down;
-    const int strong = s[x] >= low, rises = s[x] > before, falls = s[x] >= after;
-    marks[x] = static_cast<std::uint8_t>(strong & rises & falls);
-  }
-}
-
-// The positions of the marks, ascending; there must be room for n.
-int ListMarks(const std::uint8_t* marks, int n, int* list) {
-  int count = 0, x = 0;
-  for (; x + 8 <= n; x += 8) {
-    std::uint64_t eight;
-    std::memcpy(&eight, marks + x, sizeof(eight));
-    if (eight == 0) continue;
-    for (int k = x; k < x + 8; ++k) {
-      list[count] = k;
-      count += marks[k];
-    }
-  }
-  for (; x < n; ++x) {
-    list[count] = x;
-    count += marks[x];
-  }
-  return count;
-}
-
 // The maxima of the gradient across itself, one a pixel at most, row by row.
 class PointFinder {
  public:
-  PointFinder(const cv::Mat& gray, double smoothing, double low, double noise)
-      : gray_(gray),
+  PointFinder(double smoothing, double low, EdgeMap* map)
+      : map_(*map),
         low_squared_(static_cast<float>(low * low)),
         // Noise of the gradient's slope at its peak, from that of the gradient, for white noise
         // seen through a Gaussian: sqrt(3/2) / sigma.
-        slope_noise_(static_cast<float>(noise * std::sqrt(1.5) / smoothing)) {
+        slope_noise_(static_cast<float>(map->gradient_noise * std::sqrt(1.5) / smoothing)) {
     GaussianKernels(smoothing, &smooth_, &derivative_);
-    const auto n = static_cast<std::size_t>(gray.cols);
-    for (std::vector<float>& row : squared_) row.resize(n);
-    marks_.resize(n);
-    list_.resize(n);
-    before_.resize(n);
-    after_.resize(n);
+    for (std::vector<float>& row : squared_) row.resize(static_cast<std::size_t>(map_.width));
   }
 
   // The gradient is worked off in bands of rows, which stay in the processor's cache.
-  void Find(const std::vector<cv::Rect>& within, EdgeMap* map, std::vector<std::int32_t>* pixels) {
+  std::vector<std::int32_t> Find(const std::vector<cv::Rect>& within) {
     constexpr int kBandRows = 48;
-    map->index.assign(gray_.total(), -1);
+    map_.index.assign(map_.gray.total(), -1);
     int area = 0;
     for (const cv::Rect& box : within) area += box.area();
     const auto room = static_cast<std::size_t>(area / 4);  // More than a busy photo's.
-    map->points.reserve(room);
-    pixels->reserve(room);
+    map_.points.reserve(room);
+    pixels_.reserve(room);
     for (const cv::Rect& box : within) {
-      const cv::Rect inside = box & cv::Rect(1, 1, gray_.cols - 2, gray_.rows - 2);
+      const cv::Rect inside = box & cv::Rect(1, 1, map_.width - 2, map_.height - 2);
       if (inside.empty()) continue;
       left_ = inside.x - 1;
       cols_ = inside.width + 2;
       const int bottom = inside.y + inside.height;
       for (int y = inside.y; y < bottom; y += kBandRows) {
-        FindInBand(y, std::min(y + kBandRows, bottom), map, pixels);
+        FindInBand(y, std::min(y + kBandRows, bottom));
       }
     }
+    return std::move(pixels_);
   }
 
  private:
   // Rows [begin, end) of the columns at hand. (Filters see the pixels beyond.)
-  void FindInBand(int begin, int end, EdgeMap* map, std::vector<std::int32_t>* pixels) {
+  void FindInBand(int begin, int end) {
     top_ = begin - 1;
-    const cv::Mat band = gray_(cv::Rect(left_, top_, cols_, end + 1 - top_));
+    const cv::Mat band = map_.gray(cv::Rect(left_, top_, cols_, end + 1 - top_));
     cv::sepFilter2D(band, x_, CV_32F, derivative_, smooth_, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
     cv::sepFilter2D(band, y_, CV_32F, smooth_, derivative_, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
     Square(begin - 1);
     Square(begin);
     for (int y = begin; y < end; ++y) {
       Square(y + 1);
-      FindInRow(y, map, pixels);
+      FindInRow(y);
     }
   }
 
@@ -135,39 +98,37 @@ class PointFinder {
 
   bool IsHorizontal(int x, int y) const { return std::abs(X(y)[x]) >= std::abs(Y(y)[x]); }
 
-  void FindInRow(int y, EdgeMap* map, std::vector<std::int32_t>* pixels) {
-    const float* s = Squared(y);
-    MarkMaxima(X(y), Y(y), Squared(y - 1), s, Squared(y + 1), low_squared_, cols_, marks_.data());
-    const int count = ListMarks(marks_.data(), cols_, list_.data());
-    TakeLogarithms(y, count);
-    const std::int32_t row = y * gray_.cols + left_;
-    for (int k = 0; k < count; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      float offset, variance;
-      if (!LocatePeak(before_[i], after_[i], &offset, &variance)) continue;
-      const int x = list_[i];
-      map->index[static_cast<std::size_t>(row + x)] = static_cast<std::int32_t>(map->points.size());
-      pixels->push_back(row + x);
-      map->points.push_back(MakePoint(x, y, offset, variance, std::sqrt(s[x])));
-    }
-  }
-
-  // Of the squared gradients before and after each listed pixel of a row, relative to its own.
-  void TakeLogarithms(int y, int count) {
+  void FindInRow(int y) {
     constexpr float kTiny = 1e-6f;  // The logarithm of zero, for a step between two pixels exactly.
     const float* s = Squared(y);
     const float* above = Squared(y - 1);
     const float* below = Squared(y + 1);
-    for (int k = 0; k < count; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      const int x = list_[i];
+    columns_.clear();
+    before_.clear();
+    after_.clear();
+    for (int x = 1; x + 1 < cols_; ++x) {
+      if (s[x] < low_squared_) continue;
       const bool horizontal = IsHorizontal(x, y);
+      const float before = horizontal ? s[x - 1] : above[x];
+      const float after = horizontal ? s[x + 1] : below[x];
+      if (s[x] <= before || s[x] < after) continue;
       const float inverse = 1.0f / s[x];
-      before_[i] = inverse * std::max(horizontal ? s[x - 1] : above[x], kTiny);
-      after_[i] = inverse * std::max(horizontal ? s[x + 1] : below[x], kTiny);
+      columns_.push_back(x);
+      before_.push_back(inverse * std::max(before, kTiny));
+      after_.push_back(inverse * std::max(after, kTiny));
     }
+    const int count = static_cast<int>(columns_.size());
     cv::hal::log32f(before_.data(), before_.data(), count);
     cv::hal::log32f(after_.data(), after_.data(), count);
+    const std::int32_t row = y * map_.width + left_;
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      float offset, variance;
+      if (!LocatePeak(before_[i], after_[i], &offset, &variance)) continue;
+      const int x = columns_[i];
+      map_.index[static_cast<std::size_t>(row + x)] = static_cast<std::int32_t>(map_.points.size());
+      pixels_.push_back(row + x);
+      map_.points.push_back(MakePoint(x, y, offset, variance, std::sqrt(s[x])));
+    }
   }
 
   // The vertex of the parabola through the logarithms of three samples of a squared gradient, those
@@ -207,7 +168,7 @@ class PointFinder {
     return point;
   }
 
-  const cv::Mat& gray_;
+  EdgeMap& map_;
   const float low_squared_;
   const float slope_noise_;
   cv::Mat smooth_, derivative_;
@@ -215,19 +176,19 @@ class PointFinder {
   int top_ = 0;              // The photo's row that is the band's first.
   int left_ = 0, cols_ = 0;  // The photo's column that is the band's first, and its columns.
   std::array<std::vector<float>, 3> squared_;
-  // Of a row: marks of maxima, their columns, and the neighbours' logarithms.
-  std::vector<std::uint8_t> marks_;
-  std::vector<int> list_;
+  // Of a row: columns of maxima, and the squared gradients (then their logarithms) before and after
+  // each, relative to its own.
+  std::vector<int> columns_;
   std::vector<float> before_, after_;
+  std::vector<std::int32_t> pixels_;
 };
 
 }  // namespace
 
-void FindEdgePoints(const cv::Mat& gray, double smoothing_px, double low, double noise,
-                    EdgeMap* map, std::vector<std::int32_t>* pixels,
-                    const std::vector<cv::Rect>* within) {
-  const std::vector<cv::Rect> all = {cv::Rect(0, 0, gray.cols, gray.rows)};
-  PointFinder(gray, smoothing_px, low, noise).Find(within != nullptr ? *within : all, map, pixels);
+std::vector<std::int32_t> FindEdgePoints(double smoothing_px, double low,
+                                         const std::vector<cv::Rect>* within, EdgeMap* map) {
+  const std::vector<cv::Rect> all = {cv::Rect({}, map->gray.size())};
+  return PointFinder(smoothing_px, low, map).Find(within != nullptr ? *within : all);
 }
 
 }  // namespace circline

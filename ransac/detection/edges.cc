@@ -3,16 +3,22 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <string>
+#include <utility>
 
 #include "circline/estimators/basics.h"
-#include "circline/ransac/detection/edge_chains.h"
-#include "circline/ransac/detection/edge_points.h"
 
 namespace circline {
 namespace {
 
+// Weakest gradient of an edge point, and the one that at least one point of a chain must reach,
+// grey levels (of 255) per pixel; a step of 100 levels in a sharp photo has about 35. Both are
+// raised to multiples of the gradient's noise where the photo is noisy.
+constexpr double kLowGradient = 2.5, kHighGradient = 5.0;
+constexpr double kLowNoiseFactor = 3.0, kHighNoiseFactor = 5.0;
+constexpr int kMinChainPoints = 6;  // Shorter chains are dropped.
 // Rounding to grey levels is noise too: 1 / sqrt(12) of a level.
 constexpr double kRoundingNoise = 0.29;
 // Noise raises the thresholds by no more than this factor, lest a photo full of texture count as
@@ -50,25 +56,155 @@ double GradientNoise(double pixel_noise, double smoothing) {
   return pixel_noise / (std::sqrt(8.0 * kPi) * smoothing * smoothing);
 }
 
-double Threshold(double value, double factor, double noise) {
+double RaiseToNoise(double value, double factor, double noise) {
   return std::min(std::max(value, factor * noise), kMaxThresholdRaise * value);
 }
 
-}  // namespace
+// Two points are neighbours on one edge only if their gradients agree within 50 degrees; a sharper
+// turn over one or two pixels is a corner.
+constexpr float kMinNeighbourCosine = 0.64f;
+// A neighbour lies along the edge rather than beside it: its offset across the edge, pixels.
+constexpr float kMaxNeighbourOffset = 1.0f;
 
-Status EdgeOptions::Validate() const {
-  if (!(smoothing_px >= 0.5 && smoothing_px <= 5.0)) {
-    return Status::Invalid("smoothing_px must be in [0.5, 5]");
+// For each point the next and the previous one along its edge, or -1.
+struct Links {
+  std::vector<std::int32_t> next, previous;
+};
+
+// The pixels of the square frame at `radius` around a pixel, as steps through the index.
+std::vector<std::int32_t> FrameSteps(int radius, int width) {
+  std::vector<std::int32_t> steps;
+  for (int dy = -radius; dy <= radius; ++dy) {
+    for (int dx = -radius; dx <= radius; ++dx) {
+      if (std::max(std::abs(dx), std::abs(dy)) == radius) steps.push_back(dy * width + dx);
+    }
   }
-  if (!(low_gradient > 0.0)) return Status::Invalid("low_gradient must be positive");
-  if (!(high_gradient >= low_gradient)) {
-    return Status::Invalid("high_gradient must be low_gradient or more");
-  }
-  if (!(low_noise_factor >= 0.0)) return Status::Invalid("low_noise_factor must not be negative");
-  if (!(high_noise_factor >= 0.0)) return Status::Invalid("high_noise_factor must not be negative");
-  if (min_chain_points < 2) return Status::Invalid("min_chain_points must be 2 or more");
-  return Status::Ok();
+  return steps;
 }
+
+float SquaredDistance(const EdgePoint& p, const EdgePoint& q) {
+  const float dx = q.x - p.x, dy = q.y - p.y;
+  return dx * dx + dy * dy;
+}
+
+// Whether q follows p along one edge.
+bool IsAhead(const EdgePoint& p, const EdgePoint& q) {
+  const float dx = q.x - p.x, dy = q.y - p.y;
+  const float ahead = dy * p.nx - dx * p.ny;
+  const float ahead_of_q = dy * q.nx - dx * q.ny;  // Seen from there p must lie behind.
+  const float offset = std::abs(dx * p.nx + dy * p.ny);
+  const float cosine = p.nx * q.nx + p.ny * q.ny;
+  return ahead > 0.0f && ahead_of_q > 0.0f && cosine >= kMinNeighbourCosine &&
+         offset <= kMaxNeighbourOffset + 0.5f * ahead;
+}
+
+// The nearest point ahead of p in the pixels `steps` from its own; -1 if there is none.
+std::int32_t NearestAhead(const EdgeMap& map, const EdgePoint& p, std::int32_t pixel,
+                          const std::vector<std::int32_t>& steps) {
+  std::int32_t nearest = -1;
+  float smallest = std::numeric_limits<float>::infinity();
+  for (const std::int32_t step : steps) {
+    const std::int32_t j = map.index[static_cast<std::size_t>(pixel + step)];
+    if (j < 0) continue;
+    const EdgePoint& q = map.points[static_cast<std::size_t>(j)];
+    const float distance = SquaredDistance(p, q);
+    if (distance >= smallest || !IsAhead(p, q)) continue;
+    nearest = j;
+    smallest = distance;
+  }
+  return nearest;
+}
+
+// Every point points to the nearest ahead, walking with the brighter side on the left; of several
+// that point to the same, the nearest keeps it.
+Links LinkPoints(const EdgeMap& map, const std::vector<std::int32_t>& pixels) {
+  const std::vector<std::int32_t> adjacent = FrameSteps(1, map.width);
+  const std::vector<std::int32_t> around = FrameSteps(2, map.width);
+  const std::size_t n = map.points.size();
+  Links links{std::vector<std::int32_t>(n, -1), std::vector<std::int32_t>(n, -1)};
+  for (std::size_t i = 0; i < n; ++i) {
+    const EdgePoint& p = map.points[i];
+    const std::int32_t pixel = pixels[i];
+    std::int32_t ahead = NearestAhead(map, p, pixel, adjacent);
+    // The pixels around the adjacent ones bridge one missing pixel. (To the left and right, a step
+    // beyond the end of a row leads to another's outermost pixel, which holds no point.)
+    const bool has_rows = pixel >= 3 * map.width && pixel < (map.height - 3) * map.width;
+    if (ahead < 0 && has_rows) ahead = NearestAhead(map, p, pixel, around);
+    if (ahead < 0) continue;
+    const EdgePoint& q = map.points[static_cast<std::size_t>(ahead)];
+    std::int32_t& previous = links.previous[static_cast<std::size_t>(ahead)];
+    if (previous >= 0) {
+      const auto rival = static_cast<std::size_t>(previous);
+      if (SquaredDistance(p, q) >= SquaredDistance(map.points[rival], q)) continue;
+      links.next[rival] = -1;
+    }
+    previous = static_cast<std::int32_t>(i);
+    links.next[i] = ahead;
+  }
+  return links;
+}
+
+constexpr std::int32_t kNone = -1;
+
+// Walks the links and appends the chains of at least kMinChainPoints with at least one gradient of
+// `high`. Returns the new place of each of their points; kNone for the others.
+std::vector<std::int32_t> ListChains(const Links& links, float high, EdgeMap* map) {
+  constexpr std::int32_t kNotSeen = -2;
+  const auto n = static_cast<std::int32_t>(map->points.size());
+  std::vector<std::int32_t> places(map->points.size(), kNotSeen);
+  const auto place = [&](std::int32_t i) -> std::int32_t& {
+    return places[static_cast<std::size_t>(i)];
+  };
+  const auto next = [&](std::int32_t i) { return links.next[static_cast<std::size_t>(i)]; };
+  std::int32_t kept = 0;
+  const auto walk = [&](std::int32_t start) {
+    int length = 0;
+    float strongest = 0.0f;
+    for (std::int32_t i = start; i >= 0 && place(i) == kNotSeen; i = next(i), ++length) {
+      place(i) = kNone;
+      strongest = std::max(strongest, map->points[static_cast<std::size_t>(i)].gradient);
+    }
+    if (length < kMinChainPoints || strongest < high) return;
+    map->chains.push_back({kept, kept + length});
+    for (std::int32_t i = start; length > 0; i = next(i), --length) place(i) = kept++;
+  };
+  for (std::int32_t i = 0; i < n; ++i) {
+    if (links.previous[static_cast<std::size_t>(i)] < 0) walk(i);
+  }
+  for (std::int32_t i = 0; i < n; ++i) walk(i);  // Loops remain.
+  return places;
+}
+
+// Moves every point to its place and drops those without one, in place: fresh memory would cost
+// more than the moving.
+void Rearrange(std::vector<std::int32_t> place, std::vector<EdgePoint>* points) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    // Until a point comes here that belongs here or nowhere.
+    while (place[i] >= 0) {
+      const auto to = static_cast<std::size_t>(place[i]);
+      std::swap((*points)[i], (*points)[to]);
+      std::swap(place[i], place[to]);
+      ++kept;
+      place[to] = kNone;  // Done.
+    }
+  }
+  points->resize(kept);
+}
+
+// Links the points of `map`, which are in any order, point i in pixel `pixels[i]` of its index and
+// none in the outermost pixels, into chains; then points are in order chain by chain, and those of
+// none are gone.
+void ChainEdgePoints(const std::vector<std::int32_t>& pixels, double high, EdgeMap* map) {
+  std::vector<std::int32_t> place =
+      ListChains(LinkPoints(*map, pixels), static_cast<float>(high), map);
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    map->index[static_cast<std::size_t>(pixels[i])] = place[i];
+  }
+  Rearrange(std::move(place), &map->points);
+}
+
+}  // namespace
 
 Status ToGray(const cv::Mat& image, cv::Mat* gray) {
   if (image.empty()) return Status::Invalid("the image is empty");
@@ -102,25 +238,17 @@ double CurvatureBias(const EdgePoint& point, double blur_px, double curvature) {
   return 0.5 * curvature * (variance + (1.0 - cosine * cosine) * (1.0 - 3.0 * offset * offset));
 }
 
-Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edges,
-                   const std::vector<cv::Rect>* within) {
-  *edges = EdgeMap();
-  const Status status = options.Validate();
-  if (!status.ok()) return status;
-  if (gray.empty()) return Status::Invalid("the image is empty");
-  if (gray.type() != CV_8UC1) return Status::Invalid("edges need an 8-bit grey image");
-  edges->width = gray.cols;
-  edges->height = gray.rows;
-  edges->gray = gray;
-  const double noise = GradientNoise(EstimateNoise(gray), options.smoothing_px);
-  edges->gradient_noise = noise;
-  const double low = Threshold(options.low_gradient, options.low_noise_factor, noise);
-  const double high =
-      std::max(low, Threshold(options.high_gradient, options.high_noise_factor, noise));
-  std::vector<std::int32_t> pixels;
-  FindEdgePoints(gray, options.smoothing_px, low, noise, edges, &pixels, within);
-  ChainEdgePoints(pixels, high, options.min_chain_points, edges);
-  return Status::Ok();
+EdgeMap DetectEdges(const cv::Mat& gray, double smoothing_px, const std::vector<cv::Rect>* within) {
+  EdgeMap edges;
+  edges.width = gray.cols;
+  edges.height = gray.rows;
+  edges.gray = gray;
+  edges.gradient_noise = GradientNoise(EstimateNoise(gray), smoothing_px);
+  const double low = RaiseToNoise(kLowGradient, kLowNoiseFactor, edges.gradient_noise);
+  const double high = RaiseToNoise(kHighGradient, kHighNoiseFactor, edges.gradient_noise);
+  const std::vector<std::int32_t> pixels = FindEdgePoints(smoothing_px, low, within, &edges);
+  ChainEdgePoints(pixels, high, &edges);
+  return edges;
 }
 
 }  // namespace circline

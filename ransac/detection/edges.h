@@ -19,30 +19,15 @@
 
 namespace circline {
 
-struct EdgeOptions {
-  // Standard deviation of the smoothing, pixels; in [0.5, 5]. More finds fainter edges in noise,
-  // less resolves finer structure and rounds corners less.
-  double smoothing_px = 1.0;
-  // Weakest gradient of an edge point, and the one that at least one point of a chain must reach,
-  // grey levels (of 255) per pixel; a step of 100 levels in a sharp photo has about 35. Both are
-  // raised to multiples of the gradient's noise where the photo is noisy. 0 < low <= high.
-  double low_gradient = 2.5;
-  double high_gradient = 5.0;
-  // Both thresholds in units of the gradient's estimated noise; >= 0.
-  double low_noise_factor = 3.0;
-  double high_noise_factor = 5.0;
-  int min_chain_points = 6;  // Shorter chains are dropped; 2 or more.
-
-  Status Validate() const;
-};
+// Standard deviation of the smoothing, pixels.
+constexpr double kEdgeSmoothingPx = 1.0;
 
 struct EdgePoint {
   float x = 0.0f, y = 0.0f;    // Pixels of the photo.
   float nx = 0.0f, ny = 0.0f;  // Unit gradient: across the edge, towards the brighter side.
   float gradient = 0.0f;       // Its length, grey levels per pixel.
-  float sigma_px =
-      0.0f;  // Standard deviation of the location across the edge, from the noise alone.
-  float blur_px = 0.0f;  // Width (standard deviation) of the gradient's profile across the edge.
+  float sigma_px = 0.0f;       // Standard deviation across the edge, from the noise alone.
+  float blur_px = 0.0f;        // That of the gradient's profile across the edge.
 
   Eigen::Vector2d Position() const { return {x, y}; }
   Eigen::Vector2d Normal() const { return {nx, ny}; }
@@ -52,7 +37,6 @@ struct EdgePoint {
 // The brighter side is on the left of the walk as one sees it on the photo (y down).
 struct EdgeChain {
   int begin = 0, end = 0;
-  bool closed = false;  // The last point is a neighbour of the first.
 
   int size() const { return end - begin; }
 };
@@ -96,10 +80,19 @@ double CurvatureBias(const EdgePoint& point, double blur_px, double curvature);
 // channels (BGR, BGRA).
 Status ToGray(const cv::Mat& image, cv::Mat* gray);
 
-// `gray` is 8-bit with one channel. About 2 ms for a 640x480 photo. `within` (optional): only in
-// these rectangles, as in FindEdgePoints; chains end at their borders.
-Status DetectEdges(const cv::Mat& gray, const EdgeOptions& options, EdgeMap* edges,
-                   const std::vector<cv::Rect>* within = nullptr);
+// `gray` is 8-bit with one channel, not empty. `smoothing_px` is the standard deviation of the
+// smoothing, in [0.5, 5]: more finds fainter edges in noise, less resolves finer structure and
+// rounds corners less. `within` (optional): only in these rectangles, as in FindEdgePoints; chains
+// end at their borders. About 2 ms for a 640x480 photo.
+EdgeMap DetectEdges(const cv::Mat& gray, double smoothing_px = kEdgeSmoothingPx,
+                    const std::vector<cv::Rect>* within = nullptr);
+
+// Fills the points of `map`, row by row, and its index from its grey photo; no chains. Returns
+// where each point stands in the index. The outermost pixels hold no points. `low` is the weakest
+// gradient that counts, grey levels per pixel. `within` (optional): only in these rectangles, which
+// lie in the photo and do not overlap, and there the same points.
+std::vector<std::int32_t> FindEdgePoints(double smoothing_px, double low,
+                                         const std::vector<cv::Rect>* within, EdgeMap* map);
 
 }  // namespace circline
 

@@ -16,6 +16,7 @@ constexpr std::size_t kThinFrom = 60;  // Points from which every second one is 
 constexpr double kCorrelationDense = 1.9;
 // No contour lies farther than this from the edges it was fitted to, pixels.
 constexpr double kMaxBiasPx = 1.0;
+
 }  // namespace
 
 void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const NoiseModel& noise,
@@ -50,13 +51,6 @@ std::vector<std::uint8_t> EllipsePoints(const EdgeMap& edges,
     for (const int i : ellipse.points) mask[static_cast<std::size_t>(i)] = 1;
   }
   return mask;
-}
-
-EllipseOptions ToEllipseOptions(const DetectionOptions& options) {
-  EllipseOptions result;
-  result.min_axis_px = options.min_ellipse_axis_px;
-  result.min_arc_deg = options.min_arc_deg;
-  return result;
 }
 
 Status CheckDetectionInput(const cv::Mat& image, const Camera& camera,

@@ -22,8 +22,6 @@ void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const Nois
 std::vector<std::uint8_t> EllipsePoints(const EdgeMap& edges,
                                         const std::vector<DetectedEllipse>& ellipses);
 
-EllipseOptions ToEllipseOptions(const DetectionOptions& options);
-
 // Bad options or camera, an empty image, or one of another size than the camera's.
 Status CheckDetectionInput(const cv::Mat& image, const Camera& camera,
                            const DetectionOptions& options);

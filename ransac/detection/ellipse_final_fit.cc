@@ -32,8 +32,8 @@ constexpr double kStretchShare = 0.6;
 constexpr int kStretchTrims = 1;
 // As many points as this, at least half as many, tell which fit is the best.
 constexpr std::size_t kStretchPoints = 120;
-// However much of it there is, a contour that misses by more is a blob's.
-constexpr double kMostMiss = 1.4;
+// However much of it there is, a contour whose shape deviates by more is a blob's.
+constexpr double kMostDeviation = 1.4;
 // No contour is known better than this, whatever its scatter says.
 constexpr double kMinEllipseSigmaPx = 0.05;
 
@@ -77,10 +77,7 @@ bool EllipseFitter::SecondLook(EllipseCandidate* candidate, DetectedEllipse* e) 
   }
   const cv::Rect box = Surroundings();
   if (box.empty() || box.width > kMaxSecondLookPx || box.height > kMaxSecondLookPx) return false;
-  EdgeOptions edge_options;
-  edge_options.smoothing_px = kSecondSmoothingPx;
-  EdgeMap map;
-  if (!DetectEdges(map_.gray(box), edge_options, &map).ok()) return false;
+  const EdgeMap map = DetectEdges(map_.gray(box), kSecondSmoothingPx);
   Camera camera = camera_;  // Seen from the corner of the box; fits stay valid.
   camera.cx -= box.x;
   camera.cy -= box.y;
@@ -124,12 +121,9 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
   }
   e->coverage_deg = 360.0 * support_.Coverage();
   e->length_px = support_.length_px;
-  e->turn_deg = ToDegrees(support_.turn);
-  e->normal_deg = ToDegrees(support_.normal_median);
-  const double miss = ShapeMiss(e->fit.rms_px, candidate->conic, e->points);
-  e->contrast = support_.gradient;
-  if (miss > kMostMiss) return kNone;
-  return RimLogOdds(Log10FalseAlarms(support_, candidate->bright), miss);
+  const double deviation = MeasureShape(e->fit.rms_px, candidate->conic, e->points);
+  if (deviation > kMostDeviation) return kNone;
+  return RimLogOdds(Log10FalseAlarms(support_, candidate->bright), deviation);
 }
 
 // Direct fits to the points at hand and, where these scatter, to stretches of them, each with what
@@ -177,7 +171,11 @@ void EllipseFitter::UndoCurvatureBias(const Matrix3d& conic, DetectedEllipse* e)
   e->points.clear();
   e->contour.clear();
   fit_points_.clear();
-  const double blur = MedianBlur();
+  std::vector<double> blurs;
+  for (const int i : support_.points) {
+    blurs.push_back(static_cast<double>(map_.points[static_cast<std::size_t>(i)].blur_px));
+  }
+  const double blur = UpperMedian(std::move(blurs));
   for (const int i : support_.points) {
     CalibratedPoint moved;
     if (!calibrated_.Get(i, &moved)) continue;
@@ -190,14 +188,6 @@ void EllipseFitter::UndoCurvatureBias(const Matrix3d& conic, DetectedEllipse* e)
     e->contour.push_back(edge.Position() + shift);
     fit_points_.push_back(moved);
   }
-}
-
-double EllipseFitter::MedianBlur() {
-  sorted_.clear();
-  for (const int i : support_.points) {
-    sorted_.push_back(static_cast<double>(map_.points[static_cast<std::size_t>(i)].blur_px));
-  }
-  return Median(&sorted_);
 }
 
 bool EllipseFitter::FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
@@ -218,9 +208,7 @@ bool EllipseFitter::FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
 
 // False if there are none.
 bool EllipseFitter::DropOutliers(DetectedEllipse* e) {
-  // 1.4826: median absolute deviation to standard deviation of a Gaussian.
-  const double limit =
-      kOutlierSigmas * std::max(kMinEllipseSigmaPx, 1.4826 * MedianDistance(e->fit.conic));
+  const double limit = kOutlierSigmas * std::max(kMinEllipseSigmaPx, RobustSigma(e->fit.conic));
   std::size_t kept = 0;
   for (std::size_t k = 0; k < distances_.size(); ++k) {
     if (std::abs(distances_[k]) > limit) continue;

@@ -151,7 +151,7 @@ void EllipseFitter::Concentrate(int max_trims, Matrix3d* conic) {
 }
 
 void EllipseFitter::Trim(const Matrix3d& conic) {
-  const double limit = kTrimSigmas * std::max(kTrimMinSigmaPx, 1.4826 * MedianDistance(conic));
+  const double limit = kTrimSigmas * std::max(kTrimMinSigmaPx, RobustSigma(conic));
   trimmed_.clear();
   for (std::size_t k = 0; k < fit_points_.size(); ++k) {
     if (std::abs(distances_[k]) <= limit) trimmed_.push_back(fit_points_[k]);
@@ -164,12 +164,13 @@ void EllipseFitter::MeasureDistances(const Matrix3d& conic) {
   for (const CalibratedPoint& p : fit_points_) distances_.push_back(ConicDistancePx(p, conic));
 }
 
-// Of their lengths. Measures the distances.
-double EllipseFitter::MedianDistance(const Matrix3d& conic) {
+// Of the distances, the median of which it measures.
+double EllipseFitter::RobustSigma(const Matrix3d& conic) {
   MeasureDistances(conic);
-  sorted_.clear();
-  for (const double d : distances_) sorted_.push_back(std::abs(d));
-  return Median(&sorted_);
+  std::vector<double> sizes;
+  for (const double d : distances_) sizes.push_back(std::abs(d));
+  // Median absolute deviation to standard deviation of a Gaussian.
+  return 1.4826 * UpperMedian(std::move(sizes));
 }
 
 // Whether the points of the arcs are near the contour that was fitted to them, and the gradients
@@ -223,20 +224,17 @@ bool EllipseFitter::Refit(EllipseCandidate* candidate) {
   CalibrateSupport(kRoughSamples);
   Trim(candidate->conic);
   const double rms_px = Rms(trimmed_, candidate->conic);
-  const double miss = ShapeMiss(rms_px, candidate->conic, fit_indices_);
-  candidate->score = RimLogOdds(Log10FalseAlarms(support_, candidate->bright), miss);
-  return rms_px <= kShapeSlack * kMaxRmsPx && miss <= kShapeSlack;
+  const double deviation = MeasureShape(rms_px, candidate->conic, fit_indices_);
+  candidate->score = RimLogOdds(Log10FalseAlarms(support_, candidate->bright), deviation);
+  return rms_px <= kShapeSlack * kMaxRmsPx && deviation <= kShapeSlack;
 }
 
-double EllipseFitter::ShapeMiss(double rms_px, const Matrix3d& conic,
-                                const std::vector<int>& points) {
+// The ShapeDeviation of a contour; `points` are edge points near it.
+double EllipseFitter::MeasureShape(double rms_px, const Matrix3d& conic,
+                                   const std::vector<int>& points) {
   collector_.AverageStrength(&support_);
-  EllipseShape shape;
-  shape.rms_px = rms_px;
-  shape.slope_deg = SlopeDeg(map_, conic, points, &calibrated_);
-  shape.size_px = std::sqrt(contour_.major_px() * contour_.minor_px());
-  shape.noise = map_.gradient_noise;
-  return shape.Miss(support_);
+  return ShapeDeviation(support_, rms_px, SlopeDeg(map_, conic, points, &calibrated_),
+                        std::sqrt(contour_.major_px() * contour_.minor_px()), map_.gradient_noise);
 }
 
 bool EllipseFitter::Gather(const EllipseCandidate& candidate, double spacing, double reach,

@@ -70,11 +70,11 @@ class EllipseFitter {
   void Concentrate(int max_trims, Eigen::Matrix3d* conic);
   void Trim(const Eigen::Matrix3d& conic);
   void MeasureDistances(const Eigen::Matrix3d& conic);
-  double MedianDistance(const Eigen::Matrix3d& conic);
+  double RobustSigma(const Eigen::Matrix3d& conic);
   bool ArcsAgree(const EllipseCandidate& candidate) const;
   static double Rms(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic);
   bool Refit(EllipseCandidate* candidate);
-  double ShapeMiss(double rms_px, const Eigen::Matrix3d& conic, const std::vector<int>& points);
+  double MeasureShape(double rms_px, const Eigen::Matrix3d& conic, const std::vector<int>& points);
   bool Gather(const EllipseCandidate& candidate, double spacing, double reach,
               int max_samples = 20000);
   void CalibrateSupport(std::size_t limit);
@@ -83,7 +83,6 @@ class EllipseFitter {
   cv::Rect Surroundings() const;
   double FinalFit(EllipseCandidate* candidate, DetectedEllipse* e);
   void UndoCurvatureBias(const Eigen::Matrix3d& conic, DetectedEllipse* e);
-  double MedianBlur();
   bool FitSupport(const Eigen::Matrix3d& initial, DetectedEllipse* e);
   bool DropOutliers(DetectedEllipse* e);
 
@@ -99,7 +98,7 @@ class EllipseFitter {
   std::vector<int> fit_indices_;
   std::vector<ContourSample> samples_;
   Support support_;
-  std::vector<double> distances_, sorted_;
+  std::vector<double> distances_;
 };
 
 }  // namespace circline

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 
 namespace circline {
@@ -29,7 +29,6 @@ constexpr double kLog10Tests = 6.0;
 // less to keep to than a full contour.
 constexpr double kShapeRmsPx = 0.17;
 constexpr double kShapeRmsPerSize = 0.022;
-constexpr double kShapeMaxSigmaPx = 0.5;
 constexpr double kShapeRmsPerPx = 5e-4;
 constexpr double kShapeRmsPerCoverage = 0.8;
 constexpr double kShapeUsualCoverage = 0.7;
@@ -50,7 +49,7 @@ constexpr double kShapeLimit = 2.5;
 // what it would among unrelated points: edges come in chains.
 constexpr double kLogOdds = 3.47;
 constexpr double kLogOddsPerFalseAlarm = -0.24;
-constexpr double kLogOddsPerMiss = -5.55;
+constexpr double kLogOddsPerDeviation = -5.55;
 
 // Logarithm (base 10) of the upper tail of the binomial distribution by Hoeffding's bound in its
 // Chernoff form: k of n successes or more at probability p.
@@ -62,8 +61,6 @@ double Log10BinomialTail(double n, double k, double p) {
 }
 
 }  // namespace
-
-double ToDegrees(double radians) { return radians / kDegree; }
 
 double Log10FalseAlarms(const Support& support, BrightSide bright) {
   const double n = support.perimeter_px / kIndependentPx;
@@ -86,14 +83,15 @@ double SlopeDeg(const EdgeMap& map, const Matrix3d& conic, const std::vector<int
     if (chord > kMaxChordPx || !(chord > 0.0)) continue;
     slopes.push_back(std::abs(ConicDistancePx(b, conic) - ConicDistancePx(a, conic)) / chord);
   }
-  return ToDegrees(Median(&slopes));
+  return ToDegrees(UpperMedian(std::move(slopes)));
 }
 
-double EllipseShape::Miss(const Support& support) const {
+double ShapeDeviation(const Support& support, double rms_px, double slope_deg, double size_px,
+                      double noise) {
   const double coverage = std::min(support.Coverage(), support.turn / (2.0 * kPi));
   const double rms_unit = std::hypot(std::min(kShapeRmsPx, kShapeRmsPerSize * size_px) +
                                          kShapeRmsPerPx * support.length_px,
-                                     std::min(support.sigma_px, kShapeMaxSigmaPx)) *
+                                     support.sigma_px) *
                           (1.0 + kShapeRmsPerCoverage * (coverage - kShapeUsualCoverage));
   const double noise_deg = ToDegrees(noise / std::max(support.gradient, 1e-9));
   const double slope_unit = std::hypot(kShapeSlopeDeg + kShapeSlopePerPx * support.length_px,
@@ -104,8 +102,8 @@ double EllipseShape::Miss(const Support& support) const {
   return sum / kShapeLimit;
 }
 
-double RimLogOdds(double log10_false_alarms, double miss) {
-  return kLogOdds + kLogOddsPerFalseAlarm * log10_false_alarms + kLogOddsPerMiss * miss;
+double RimLogOdds(double log10_false_alarms, double deviation) {
+  return kLogOdds + kLogOddsPerFalseAlarm * log10_false_alarms + kLogOddsPerDeviation * deviation;
 }
 
 }  // namespace circline

@@ -6,13 +6,14 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/ransac/detection/calibrated_edges.h"
 #include "circline/ransac/detection/contour_support.h"
 #include "circline/ransac/detection/edges.h"
 
 namespace circline {
 
-double ToDegrees(double radians);
+inline double ToDegrees(double radians) { return radians / kDegree; }
 
 // Logarithm (base 10) of the number of ellipses as well supported that are expected among unrelated
 // edges.
@@ -24,20 +25,15 @@ double SlopeDeg(const EdgeMap& map, const Eigen::Matrix3d& conic, const std::vec
                 CalibratedEdges* calibrated);
 
 // How far edges are from following a contour as those of an ellipse do: 1 is the most that a true
-// rim shows.
-struct EllipseShape {
-  double rms_px = 0.0;     // Of the edge points to the contour.
-  double slope_deg = 0.0;  // SlopeDeg.
-  double size_px = 0.0;    // Geometric mean of the semi-axes.
-  double noise = 0.0;      // Of one component of the gradient, grey levels per pixel.
-
-  // `support` with its average strength.
-  double Miss(const Support& support) const;
-};
+// rim shows. `support` with its average strength; `rms_px` of the edge points to the contour;
+// `slope_deg` by SlopeDeg; `size_px` the geometric mean of the semi-axes; `noise` of one component
+// of the gradient, grey levels per pixel.
+double ShapeDeviation(const Support& support, double rms_px, double slope_deg, double size_px,
+                      double noise);
 
 // Logarithm of the odds that a contour is the rim of a circle to that it is anything else, clutter
-// or a blob; `miss` is its shape's.
-double RimLogOdds(double log10_false_alarms, double miss);
+// or a blob; `deviation` is its shape's.
+double RimLogOdds(double log10_false_alarms, double deviation);
 
 }  // namespace circline
 

@@ -194,11 +194,10 @@ Status FollowObservations(const cv::Mat& image, const Observations& predicted, d
   for (const PencilObservation& pencil : predicted.pencils)
     of_centres.push_back(LinesOfCentres(predicted, pencil));
   const std::vector<cv::Rect> bands = BandsOf(predicted, of_centres, gray.size(), search_px);
-  EdgeMap edges;
-  status = DetectEdges(gray, EdgeOptions(), &edges, &bands);
-  if (!status.ok()) return status;
-  std::vector<DetectedEllipse> ellipses = FollowCircles(edges, predicted.camera, predicted.circles,
-                                                        ToEllipseOptions(options), search_px);
+  const EdgeMap edges = DetectEdges(gray, kEdgeSmoothingPx, &bands);
+  const std::vector<DetectedEllipse> ellipses =
+      FollowCircles(edges, predicted.camera, predicted.circles,
+                    {options.min_ellipse_axis_px, options.min_arc_deg}, search_px);
   for (std::size_t k = 0; k < ellipses.size(); ++k) {
     if (ellipses[k].points.empty()) continue;
     found->circles.push_back(

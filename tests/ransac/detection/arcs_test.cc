@@ -18,8 +18,7 @@ using detection_test::PixelPattern;
 using detection_test::Render;
 
 EdgeMap Edges(const PixelPattern& pattern) {
-  EdgeMap map;
-  EXPECT_TRUE(DetectEdges(Develop(Render(200, 200, pattern)), EdgeOptions(), &map).ok());
+  const EdgeMap map = DetectEdges(Develop(Render(200, 200, pattern)));
   return map;
 }
 

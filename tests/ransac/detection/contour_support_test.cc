@@ -81,8 +81,7 @@ TEST(EdgeCollector, MeasuresCoverageAndRemembersWhatIsTaken) {
     const double angle = std::atan2(v - 100.0, u - 100.0);
     return std::abs(angle) < kPi / 3.0 || std::hypot(u - 100.0, v - 100.0) > 50.0 ? 150.0 : 40.0;
   }));
-  EdgeMap map;
-  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+  const EdgeMap map = DetectEdges(image);
   Contour contour(camera);
   ASSERT_TRUE(contour.Project(PixelCircle(camera, 100.0, 100.0, 50.0), 4.0, 1000.0));
   std::vector<ContourSample> samples;
@@ -113,8 +112,7 @@ TEST(EdgeCollector, MeasuresNormalsAtThePointsThemselves) {
   const cv::Mat image = Develop(Render(60, 60, [](double u, double v) {
     return std::hypot(u - 30.2, v - 29.7) < 5.0 ? 40.0 : 200.0;
   }));
-  EdgeMap map;
-  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+  const EdgeMap map = DetectEdges(image);
   Contour contour(camera);
   ASSERT_TRUE(contour.Project(PixelCircle(camera, 30.2, 29.7, 5.0), 4.0, 1000.0));
   std::vector<ContourSample> samples;
@@ -132,8 +130,7 @@ TEST(EdgeCollector, TakesEitherBrightSideIfAsked) {
   const cv::Mat image = Develop(Render(120, 120, [](double u, double v) {
     return std::hypot(u - 60.0, v - 60.0) < 30.0 ? 120.0 : u < 60.0 ? 20.0 : 220.0;
   }));
-  EdgeMap map;
-  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+  const EdgeMap map = DetectEdges(image);
   Contour contour(camera);
   ASSERT_TRUE(contour.Project(PixelCircle(camera, 60.0, 60.0, 30.0), 4.0, 1000.0));
   std::vector<ContourSample> samples;
@@ -148,13 +145,10 @@ TEST(EdgeCollector, TakesEitherBrightSideIfAsked) {
   EXPECT_GT(support.Coverage(), 0.9);
 }
 
-TEST(Median, OfOddEvenAndNone) {
-  std::vector<double> values = {3.0, 1.0, 2.0};
-  EXPECT_EQ(Median(&values), 2.0);
-  values = {4.0, 1.0, 3.0, 2.0};
-  EXPECT_EQ(Median(&values), 3.0);
-  values.clear();
-  EXPECT_EQ(Median(&values), 0.0);
+TEST(UpperMedian, OfOddEvenAndNone) {
+  EXPECT_EQ(UpperMedian({3.0, 1.0, 2.0}), 2.0);
+  EXPECT_EQ(UpperMedian({4.0, 1.0, 3.0, 2.0}), 3.0);
+  EXPECT_EQ(UpperMedian({}), 0.0);
 }
 
 }  // namespace

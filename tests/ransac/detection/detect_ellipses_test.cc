@@ -33,10 +33,8 @@ using Eigen::Vector3d;
 
 std::vector<DetectedEllipse> EllipsesOf(const cv::Mat& image, const Camera& camera,
                                         const EllipseOptions& options = {}) {
-  EdgeMap edges;
-  EXPECT_TRUE(DetectEdges(image, EdgeOptions(), &edges).ok());
-  std::vector<DetectedEllipse> ellipses;
-  EXPECT_TRUE(DetectEllipses(edges, camera, options, &ellipses).ok());
+  const EdgeMap edges = DetectEdges(image);
+  std::vector<DetectedEllipse> ellipses = DetectEllipses(edges, camera, options);
   for (const DetectedEllipse& e : ellipses) {
     EXPECT_TRUE(e.fit.conic.allFinite());
     EXPECT_GE(e.points.size(), 6U);
@@ -308,21 +306,6 @@ TEST(DetectEllipses, IsRepeatable) {
     EXPECT_EQ(a[k].points, b[k].points);
     EXPECT_TRUE(a[k].fit.conic == b[k].fit.conic);
   }
-}
-
-TEST(DetectEllipses, NamesTheOptionThatIsWrong) {
-  const EdgeMap edges;
-  std::vector<DetectedEllipse> found;
-  const auto message = [&](const EllipseOptions& options) {
-    return DetectEllipses(edges, TestCamera(), options, &found).message;
-  };
-  EllipseOptions options;
-  options.min_axis_px = 0.0;
-  EXPECT_NE(message(options).find("min_axis_px"), std::string::npos);
-  options = EllipseOptions();
-  options.min_arc_deg = 400.0;
-  EXPECT_NE(message(options).find("min_arc_deg"), std::string::npos);
-  EXPECT_FALSE(DetectEllipses(edges, Camera(), EllipseOptions(), &found).ok());
 }
 
 }  // namespace

@@ -25,8 +25,7 @@ using Eigen::Vector3d;
 
 std::vector<DetectedLine> LinesOf(const cv::Mat& image, const Camera& camera,
                                   const LineOptions& options = {}) {
-  EdgeMap edges;
-  EXPECT_TRUE(DetectEdges(image, EdgeOptions(), &edges).ok());
+  const EdgeMap edges = DetectEdges(image);
   std::vector<DetectedLine> lines;
   EXPECT_TRUE(DetectLines(edges, camera, options, &lines).ok());
   for (std::size_t k = 0; k < lines.size(); ++k) {
@@ -161,8 +160,7 @@ TEST(DetectLines, KeepsBentEdgesApart) {
     if (worn && std::abs(v - 60.0) < 40.0) return 40.0;
     return round && std::abs(v - 60.0) < 25.0 ? 40.0 : 160.0;
   }));
-  EdgeMap edges;
-  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &edges).ok());
+  const EdgeMap edges = DetectEdges(image);
   std::vector<DetectedLine> lines, bent;
   LineOptions options;
   options.min_length_px = 45.0;
@@ -190,8 +188,7 @@ TEST(DetectLines, DropsShortOnesAndSkippedPoints) {
   EXPECT_EQ(LinesOf(image, camera, options).size(), 2U);
   options.max_lines = 1;
   EXPECT_EQ(LinesOf(image, camera, options).size(), 1U);
-  EdgeMap edges;
-  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &edges).ok());
+  const EdgeMap edges = DetectEdges(image);
   const std::vector<std::uint8_t> skip(edges.points.size(), 1);
   std::vector<DetectedLine> lines;
   ASSERT_TRUE(DetectLines(edges, camera, LineOptions(), &lines, &skip).ok());

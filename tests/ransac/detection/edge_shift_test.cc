@@ -43,7 +43,7 @@ struct Found {
 
 Found DetectIn(const cv::Mat& photo) {
   Found result;
-  EXPECT_TRUE(DetectEdges(photo, EdgeOptions(), &result.edges).ok());
+  result.edges = DetectEdges(photo);
   EXPECT_TRUE(
       DetectLines(result.edges, detection_test::TestCamera(), LineOptions(), &result.lines).ok());
   return result;

@@ -49,8 +49,7 @@ double Rms(const std::vector<double>& values) {
 TEST(DetectEdges, LocatesAStraightStepInAnyDirection) {
   for (int k = 0; k < 24; ++k) {
     const double angle = 2.0 * kPi * k / 24 + 0.03;
-    EdgeMap map;
-    ASSERT_TRUE(DetectEdges(StepEdge(angle), EdgeOptions(), &map).ok());
+    const EdgeMap map = DetectEdges(StepEdge(angle));
     ASSERT_EQ(map.chains.size(), 1U) << k;
     const std::vector<double> errors = StepErrors(map, angle);
     ASSERT_GT(errors.size(), 45U);
@@ -66,11 +65,9 @@ TEST(DetectEdges, LocatesAStraightStepInAnyDirection) {
 }
 
 TEST(DetectEdges, WalksWithTheBrighterSideOnTheLeft) {
-  EdgeMap map;
-  ASSERT_TRUE(DetectEdges(StepEdge(0.0), EdgeOptions(), &map).ok());  // Brighter on the right:
-  ASSERT_EQ(map.chains.size(), 1U);                                   // the walk goes down.
+  const EdgeMap map = DetectEdges(StepEdge(0.0));  // Brighter on the right:
+  ASSERT_EQ(map.chains.size(), 1U);                // the walk goes down.
   const EdgeChain& chain = map.chains[0];
-  EXPECT_FALSE(chain.closed);
   for (int i = chain.begin + 1; i < chain.end; ++i) {
     const float step =
         map.points[static_cast<std::size_t>(i)].y - map.points[static_cast<std::size_t>(i - 1)].y;
@@ -83,10 +80,8 @@ TEST(DetectEdges, ClosesTheContourOfADiscAndIndexesIt) {
   const cv::Mat image = Develop(Render(80, 80, [](double u, double v) {
     return std::hypot(u - 39.6, v - 40.2) < 25.0 ? 200.0 : 50.0;
   }));
-  EdgeMap map;
-  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+  const EdgeMap map = DetectEdges(image);
   ASSERT_EQ(map.chains.size(), 1U);
-  EXPECT_TRUE(map.chains[0].closed);
   EXPECT_NEAR(map.chains[0].size(), 2.0 * kPi * 25.0, 30.0);
   double mean = 0.0;
   for (std::size_t i = 0; i < map.points.size(); ++i) {
@@ -121,8 +116,7 @@ RimErrors MeasureRim(double radius, double blur) {
             70, 70,
             [=](double u, double v) { return std::hypot(u - u0, v - v0) < radius ? 40.0 : 200.0; }),
         blur);
-    EdgeMap map;
-    EXPECT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+    const EdgeMap map = DetectEdges(image);
     for (const EdgePoint& p : map.points) {
       const double dx = static_cast<double>(p.x) - u0, dy = static_cast<double>(p.y) - v0;
       const double off = std::hypot(dx, dy) - radius;
@@ -158,7 +152,6 @@ TEST(DetectEdges, StatesTheNoiseAndWhatItDoesToLocations) {
   double predicted = 0.0, actual = 0.0, count = 0.0;
   for (int k = 0; k < 12; ++k) {
     const double angle = 0.26 + 2.0 * kPi * k / 12;
-    EdgeMap map;
     const cv::Mat image = Develop(
         Render(81, 65,
                [=](double u, double v) {
@@ -166,7 +159,7 @@ TEST(DetectEdges, StatesTheNoiseAndWhatItDoesToLocations) {
                                                                                           : 60.0;
                }),
         0.7, kNoise, static_cast<std::uint64_t>(k + 1));
-    ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &map).ok());
+    const EdgeMap map = DetectEdges(image);
     // White noise through the derivative of a Gaussian of 1 px.
     EXPECT_NEAR(map.gradient_noise, kNoise / std::sqrt(8.0 * kPi), 0.15 * kNoise / 5.0);
     for (const EdgePoint& p : map.points) {
@@ -184,18 +177,16 @@ TEST(DetectEdges, StatesTheNoiseAndWhatItDoesToLocations) {
 }
 
 TEST(DetectEdges, FindsNothingOnABlankImageAndLittleInNoise) {
-  EdgeMap map;
-  ASSERT_TRUE(DetectEdges(cv::Mat(50, 60, CV_8UC1, cv::Scalar(90)), EdgeOptions(), &map).ok());
+  EdgeMap map = DetectEdges(cv::Mat(50, 60, CV_8UC1, cv::Scalar(90)));
   EXPECT_TRUE(map.points.empty());
   EXPECT_TRUE(map.chains.empty());
-  ASSERT_TRUE(DetectEdges(Noise(200, 200, 8.0), EdgeOptions(), &map).ok());
+  map = DetectEdges(Noise(200, 200, 8.0));
   EXPECT_LT(map.points.size(), 200U);
 }
 
 TEST(DetectEdges, TakesTheSmallestImages) {
   for (const cv::Size size : {cv::Size(1, 1), cv::Size(2, 5), cv::Size(3, 3), cv::Size(200, 1)}) {
-    EdgeMap map;
-    EXPECT_TRUE(DetectEdges(cv::Mat(size, CV_8UC1, cv::Scalar(0)), EdgeOptions(), &map).ok());
+    const EdgeMap map = DetectEdges(cv::Mat(size, CV_8UC1, cv::Scalar(0)));
     EXPECT_TRUE(map.points.empty());
   }
 }
@@ -231,46 +222,29 @@ void ExpectWholeMap(const EdgeMap& map) {
 }
 
 TEST(DetectEdges, MapsAreWholeUpToTheBorder) {
-  EdgeOptions options;
-  options.min_chain_points = 2;
-  options.smoothing_px = 0.5;
-  options.low_gradient = options.high_gradient = 0.5;
-  options.low_noise_factor = options.high_noise_factor = 0.0;
   std::size_t points = 0;
   for (int size = 3; size < 40; ++size) {
-    EdgeMap map;
-    const cv::Mat image = Noise(size, 43 - size, 60.0);
-    ASSERT_TRUE(DetectEdges(image, options, &map).ok());
+    const EdgeMap map = DetectEdges(Noise(size, 43 - size, 60.0), 0.5);
     ExpectWholeMap(map);
     points += map.points.size();
   }
   EXPECT_GT(points, 1000U);
 }
 
-TEST(DetectEdges, RefusesWhatIsNotAGreyImage) {
-  EdgeMap map;
-  EXPECT_EQ(DetectEdges(cv::Mat(), EdgeOptions(), &map).code, StatusCode::kInvalidArgument);
-  EXPECT_EQ(DetectEdges(cv::Mat(9, 9, CV_8UC3), EdgeOptions(), &map).code,
-            StatusCode::kInvalidArgument);
-  EXPECT_EQ(DetectEdges(cv::Mat(9, 9, CV_32F), EdgeOptions(), &map).code,
-            StatusCode::kInvalidArgument);
-}
-
 // Rectangles that tile the photo give what the whole photo gives, point by point.
 TEST(DetectEdges, WithinRectanglesPointsAreTheSame) {
   const cv::Mat image = StepEdge(0.4, 3.0);
-  EdgeMap whole, tiled, part;
-  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &whole).ok());
+  const EdgeMap whole = DetectEdges(image);
   std::vector<cv::Rect> tiles;
   for (int y = 0; y < image.rows; y += 20) {
     for (int x = 0; x < image.cols; x += 27)
       tiles.push_back(cv::Rect(x, y, 27, 20) & cv::Rect({}, image.size()));
   }
-  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &tiled, &tiles).ok());
+  const EdgeMap tiled = DetectEdges(image, kEdgeSmoothingPx, &tiles);
   ASSERT_GT(whole.points.size(), 60U);
   EXPECT_EQ(tiled.points.size(), whole.points.size());
   const std::vector<cv::Rect> one = {cv::Rect(30, 0, 25, 65)};
-  ASSERT_TRUE(DetectEdges(image, EdgeOptions(), &part, &one).ok());
+  const EdgeMap part = DetectEdges(image, kEdgeSmoothingPx, &one);
   EXPECT_GT(part.points.size(), 0U);
   for (const EdgeMap* map : {&tiled, &part}) {
     for (const EdgePoint& p : map->points) {
@@ -284,23 +258,6 @@ TEST(DetectEdges, WithinRectanglesPointsAreTheSame) {
     }
   }
   for (const EdgePoint& p : part.points) EXPECT_TRUE(p.x > 28.5f && p.x < 55.5f);
-}
-
-TEST(DetectEdges, NamesTheOptionThatIsWrong) {
-  EdgeMap map;
-  const cv::Mat image(9, 9, CV_8UC1, cv::Scalar(0));
-  EdgeOptions options;
-  options.smoothing_px = 0.0;
-  EXPECT_NE(DetectEdges(image, options, &map).message.find("smoothing_px"), std::string::npos);
-  options = EdgeOptions();
-  options.low_gradient = std::nan("");
-  EXPECT_NE(DetectEdges(image, options, &map).message.find("low_gradient"), std::string::npos);
-  options = EdgeOptions();
-  options.high_gradient = 1.0;
-  EXPECT_NE(DetectEdges(image, options, &map).message.find("high_gradient"), std::string::npos);
-  options = EdgeOptions();
-  options.min_chain_points = 1;
-  EXPECT_NE(DetectEdges(image, options, &map).message.find("min_chain_points"), std::string::npos);
 }
 
 TEST(ToGray, TakesOneThreeAndFourChannels) {

@@ -139,9 +139,9 @@ TEST(RealPhotographs, BoxesAreRareOnNormalsOfNothing) {
     VisitSet(set, 2, [&](const cv::Mat& image, const Camera& camera, const cv::FileNode& node) {
       const Matrix3d axes = ReadRotation(node, set == "turntable-teabox" ? "box_axes_cam" : "R");
       cv::Mat gray;
-      EdgeMap edges;
       std::vector<DetectedLine> lines, bent;
-      ASSERT_TRUE(ToGray(image, &gray).ok() && DetectEdges(gray, EdgeOptions(), &edges).ok());
+      ASSERT_TRUE(ToGray(image, &gray).ok());
+      const EdgeMap edges = DetectEdges(gray);
       ASSERT_TRUE(DetectLines(edges, camera, LineOptions(), &lines, nullptr, &bent).ok());
       lines.insert(lines.end(), bent.begin(), bent.end());
       for (int trial = 0; trial < 40; ++trial) {
