@@ -143,30 +143,27 @@ int EdgeCollector::PointsAcross(const ContourSample& s, int steps,
   return static_cast<int>(count);
 }
 
-QuickSupport EdgeCollector::QuickLook(const std::vector<ContourSample>& samples,
-                                      double reach) const {
+std::array<double, 3> EdgeCollector::QuickLook(const std::vector<ContourSample>& samples,
+                                               double reach) const {
   const int steps = std::min(static_cast<int>(reach + 0.5), kMaxSteps);
-  std::array<int, 3> across{};
-  int any = 0;
+  std::array<double, 3> shares{};
   std::array<int, 16> points;
   for (const ContourSample& s : samples) {
-    bool outside = false, inside = false, found = false;
+    bool outside = false, inside = false;
     const int count = PointsAcross(s, steps, &points);
     for (int k = 0; k < count; ++k) {
       const auto i = static_cast<std::size_t>(points[static_cast<std::size_t>(k)]);
       if (taken_[i]) continue;
       const double cosine = s.normal.dot(map_.points[i].Normal());
-      found = true;
       outside = outside || cosine > kMinNormalCosine;
       inside = inside || cosine < -kMinNormalCosine;
     }
-    across[0] += outside ? 1 : 0;
-    across[1] += inside ? 1 : 0;
-    across[2] += outside || inside ? 1 : 0;
-    any += found ? 1 : 0;
+    shares[0] += outside ? 1.0 : 0.0;
+    shares[1] += inside ? 1.0 : 0.0;
+    shares[2] += outside || inside ? 1.0 : 0.0;
   }
-  const double n = static_cast<double>(samples.size());
-  return {{across[0] / n, across[1] / n, across[2] / n}, any / n};
+  for (double& share : shares) share /= static_cast<double>(samples.size());
+  return shares;
 }
 
 void EdgeCollector::Collect(const std::vector<ContourSample>& samples, BrightSide bright,

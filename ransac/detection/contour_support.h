@@ -60,12 +60,6 @@ struct Support {
   double Coverage() const { return perimeter_px > 0.0 ? length_px / perimeter_px : 0.0; }
 };
 
-// Shares of a contour's samples near which there are edge points.
-struct QuickSupport {
-  std::array<double, 3> across{};  // With the gradient across the contour, by BrightSide.
-  double any = 0.0;                // Whatever their gradient.
-};
-
 // Finds the edge points along a sampled contour, and keeps book of which are already taken.
 class EdgeCollector {
  public:
@@ -77,8 +71,10 @@ class EdgeCollector {
   void Take(const std::vector<int>& points);
   bool IsTaken(int i) const { return taken_[static_cast<std::size_t>(i)] != 0; }
 
-  // A first look with few samples. (Here and below a reach over kMaxSteps pixels is cut to that.)
-  QuickSupport QuickLook(const std::vector<ContourSample>& samples, double reach) const;
+  // A first look with few samples: the shares of them near which there are edge points with the
+  // gradient across the contour, by BrightSide. (Here and below a reach over kMaxSteps pixels is
+  // cut to that.)
+  std::array<double, 3> QuickLook(const std::vector<ContourSample>& samples, double reach) const;
 
   // The strongest points along the contour with the right bright side, as far as they come in runs.
   void Collect(const std::vector<ContourSample>& samples, BrightSide bright, double reach,

@@ -28,9 +28,6 @@ constexpr double kTrimMinSigmaPx = 0.1;
 constexpr int kQuickSamples = 24;
 constexpr double kQuickPx = 2.0;
 constexpr double kQuickShare = 0.25;
-// ... or where so few of the samples near edges have them across the contour: on clutter 50 to 100
-// of 360 degrees pass for across.
-constexpr double kQuickAcross = 0.4;
 // Samples of a contour, at most, while a candidate is being improved.
 constexpr int kRoughSamples = 120;
 // While a candidate is still being refined, it may miss the limits by this factor.
@@ -76,7 +73,7 @@ bool EllipseFitter::FitArcs(std::initializer_list<const Arc*> arcs, EllipseCandi
 bool EllipseFitter::FindAlong(const Matrix3d& conic, EllipseCandidate* candidate) {
   if (!contour_.Project(conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
   if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
-  const std::array<double, 3> across = collector_.QuickLook(samples_, kQuickPx).across;
+  const std::array<double, 3> across = collector_.QuickLook(samples_, kQuickPx);
   if (across[static_cast<std::size_t>(BrightSide::kEither)] < kQuickShare) return false;
   constexpr auto kIn = static_cast<std::size_t>(BrightSide::kInside),
                  kOut = static_cast<std::size_t>(BrightSide::kOutside);
@@ -88,9 +85,8 @@ bool EllipseFitter::FindAlong(const Matrix3d& conic, EllipseCandidate* candidate
 bool EllipseFitter::Improve(EllipseCandidate* candidate) {
   if (!contour_.Project(candidate->conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
   if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
-  const QuickSupport look = collector_.QuickLook(samples_, kQuickPx);
-  const double own = look.across[static_cast<std::size_t>(candidate->bright)];
-  return own >= std::max(kQuickShare, kQuickAcross * look.any) && Refit(candidate);
+  const std::array<double, 3> across = collector_.QuickLook(samples_, kQuickPx);
+  return across[static_cast<std::size_t>(candidate->bright)] >= kQuickShare && Refit(candidate);
 }
 
 double EllipseFitter::Coverage(const EllipseCandidate& candidate) {

@@ -26,7 +26,7 @@ EdgeMap Lines(const Camera& camera) {
       point.y = static_cast<float>(y) + 0.3f * static_cast<float>(x % 3);
       map.points.push_back(point);
     }
-    map.chains.push_back({begin, static_cast<int>(map.points.size()), false});
+    map.chains.push_back({begin, static_cast<int>(map.points.size())});
   }
   return map;
 }
