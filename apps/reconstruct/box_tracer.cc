@@ -224,11 +224,8 @@ std::vector<TracedBox> TraceLines(const std::vector<DetectedLine>& lines,
   for (const Eigen::Matrix3d& candidate : axes) {
     for (int k = 0; k < 3; ++k) vote.Try(candidate.col(k));
   }
-  std::vector<DetectedPencil> pencils;
-  if (DetectPencils(lines, kMaxPencils, kSeed, &pencils).ok()) {
-    for (const DetectedPencil& pencil : pencils) {
-      if (pencil.observation.fit) vote.Try(pencil.observation.fit->direction.normalized());
-    }
+  for (const DetectedPencil& pencil : DetectPencils(lines, kMaxPencils, kSeed)) {
+    if (pencil.observation.fit) vote.Try(pencil.observation.fit->direction.normalized());
   }
   vote.TryTriples();
   std::vector<Eigen::Matrix3d> all = vote.Best();

@@ -117,10 +117,10 @@ Observations Detect(const StreetPhoto& photo, std::uint64_t seed) {
   PhotoEvidence evidence;
   Observations observations;
   observations.camera = photo.camera;
-  Status status = photo.sigma.IsWide()
-                      ? LookForFocal(collect, options, diagonal_px, &evidence, &observations)
-                      : collect(photo.camera, &evidence);
-  if (status.ok()) status = ObserveEvidence(options, diagonal_px, &evidence, &observations);
+  const Status status = photo.sigma.IsWide()
+                            ? LookForFocal(collect, options, diagonal_px, &evidence, &observations)
+                            : collect(photo.camera, &evidence);
+  if (status.ok()) ObserveEvidence(options, diagonal_px, &evidence, &observations);
   return status.ok() ? observations : Observations();
 }
 

@@ -7,12 +7,11 @@
 #include <string>
 #include <utility>
 
-#include "circline/ransac/detection/box_search.h"
 #include "circline/ransac/detection/choose_plane.h"
 #include "circline/ransac/detection/circle_grid.h"
-#include "circline/ransac/detection/direction_readings.h"
 #include "circline/ransac/detection/find_box.h"
 #include "circline/ransac/detection/judge_axes.h"
+#include "circline/ransac/detection/orthogonal_evidence.h"
 #include "circline/ransac/detection/pencil_fitter.h"
 #include "circline/ransac/detection/segment_meetings.h"
 #include "circline/ransac/detection/third_direction.h"
@@ -37,19 +36,17 @@ class Assembler {
   Assembler(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
             const std::vector<DetectedLine>& bent, std::vector<CircleEvidence>* circles,
             std::vector<DetectedPencil>* pencils)
-      : options_(options),
-        lines_(lines),
-        bent_(bent),
-        circles_(*circles),
-        chooser_(options, lines, circles_) {
+      : options_(options), lines_(lines), bent_(bent), circles_(*circles) {
     Place(pencils);
   }
 
   void Assemble(Observations* observations) {
-    const Plane of_circles = chooser_.OfCircles();
+    const Plane of_circles = PlaneOfCircles(options_, circles_);
     AddGrid(observations->camera, of_circles);
-    Plane plane = chooser_.Choose(of_circles, &pencils_);
-    const bool has_box = AddBox(&plane);
+    Plane plane = ChoosePlane(options_, lines_, circles_, of_circles, &pencils_);
+    // A box that stands on the plane where circles are all that this has, or one that has better
+    // evidence than two pencils: its edges become the axes.
+    const bool has_box = AddBoxOnCircles(&plane) || AddFreeBox(&plane);
     SetPlane(plane);
     if (!has_box) SetRoles(plane);
     Emit(plane, observations);
@@ -72,10 +69,6 @@ class Assembler {
     for (std::size_t i = before; i < pencils_.size(); ++i) pencils_[i].of_grid = true;
   }
 
-  // A box that stands on the plane where circles are all that this has, or one that has better
-  // evidence than two pencils: its edges become the axes.
-  bool AddBox(Plane* plane) { return AddBoxOnCircles(plane) || AddFreeBox(plane); }
-
   std::vector<DetectedLine> AllLines() const {
     std::vector<DetectedLine> lines = lines_;
     lines.insert(lines.end(), bent_.begin(), bent_.end());
@@ -93,7 +86,7 @@ class Assembler {
     for (const UncertainDirection& normal : normals) vectors.push_back(normal.vector);
     std::optional<FoundBox> box = FindBox(AllLines(), vectors, options_.diagonal_px);
     if (!box) return false;
-    plane->normal = normals[box->normal];
+    plane->normal = normals[box->given];
     PlaceBox(&*box);
     return true;
   }
@@ -102,8 +95,8 @@ class Assembler {
   bool AddFreeBox(Plane* plane) {
     const bool is_of_pencils = plane->pencils[0] >= 0;
     if (plane->circles.size() > (is_of_pencils ? 0 : 1)) return false;
-    if (is_of_pencils &&
-        std::min(LogOddsOf(plane->pencils[0]), LogOddsOf(plane->pencils[1])) >= kMostOddsOfABox)
+    if (is_of_pencils && std::min(LogOddsOf(At(plane->pencils[0])),
+                                  LogOddsOf(At(plane->pencils[1]))) >= kMostOddsOfABox)
       return false;
     std::vector<Vector3d> axes;
     for (const PlacedPencil& pencil : pencils_) {
@@ -129,30 +122,32 @@ class Assembler {
     }
   }
 
-  double LogOddsOf(int pencil) const {
-    const PlacedPencil& p = pencils_[static_cast<std::size_t>(pencil)];
-    return LogOddsOfDirection(lines_, p.members, p.direction.vector);
+  PlacedPencil& At(int i) { return pencils_[static_cast<std::size_t>(i)]; }
+
+  double LogOddsOf(const PlacedPencil& pencil) const {
+    return LogOddsOfDirection(lines_, pencil.members, pencil.direction.vector);
   }
 
   // Whether the box has another direction than the two pencils, and better evidence for it: what
   // they have in common speaks for both.
-  bool Contradicts(const FoundBox& box, const Plane& plane) const {
-    std::array<bool, 3> in_common{};
+  bool Contradicts(const FoundBox& box, const Plane& plane) {
+    std::array<double, 3> of_box = box.log_odds_along;
+    double of_pencils = 0.0;
     bool is_other = false;
-    double log_odds = 0.0;
     for (const int i : plane.pencils) {
-      const PlacedPencil& pencil = pencils_[static_cast<std::size_t>(i)];
+      const PlacedPencil& pencil = At(i);
       bool is_axis = false;
       for (std::size_t k = 0; k < 3; ++k) {
-        if (!IsNear(pencil, box.axes.col(static_cast<Eigen::Index>(k)))) continue;
-        is_axis = in_common[k] = true;
+        const Vector3d axis = box.axes.col(static_cast<Eigen::Index>(k));
+        if (!AreAlike(pencil.direction.vector, axis)) continue;
+        is_axis = true;
+        of_box[k] = 0.0;
       }
       if (is_axis) continue;
       is_other = true;
-      log_odds -= LogOddsOf(i);
+      of_pencils += LogOddsOf(pencil);
     }
-    for (std::size_t k = 0; k < 3; ++k) log_odds += in_common[k] ? 0.0 : box.log_odds_along[k];
-    return is_other && log_odds > 0.0;
+    return is_other && of_box[0] + of_box[1] + of_box[2] > of_pencils;
   }
 
   void SetPlane(const Plane& plane) {
@@ -165,8 +160,8 @@ class Assembler {
     }
     for (const int i : plane.pencils) {
       if (i < 0) continue;
-      pencils_[static_cast<std::size_t>(i)].observation.plane = "p0";
-      pencils_[static_cast<std::size_t>(i)].spans = true;
+      At(i).observation.plane = "p0";
+      At(i).spans = true;
     }
   }
 
@@ -174,13 +169,11 @@ class Assembler {
   // lines must also meet those that span the plane; or, where circles are all there is, be among
   // them, and two of them at least must have settled the normal (one leaves two, which doubles the
   // accidents).
-  bool BelongsTo(const Plane& plane, const PlacedPencil& pencil) const {
+  bool BelongsTo(const Plane& plane, const PlacedPencil& pencil) {
     if (plane.pencils[0] < 0) return plane.circles.size() >= 2 && IsAmongCircles(plane, pencil);
     double meeting = 0.0;
-    for (const int i : plane.pencils) {
-      meeting += MeetingLength(pencil.ends, pencils_[static_cast<std::size_t>(i)].ends,
-                               options_.diagonal_px);
-    }
+    for (const int i : plane.pencils)
+      meeting += MeetingLength(pencil.ends, At(i).ends, options_.diagonal_px);
     return meeting >= kMinMeetingShare * pencil.support_px;
   }
 
@@ -205,8 +198,7 @@ class Assembler {
     const std::vector<int> order = InPlaneOrder(plane);
     for (std::size_t a = 0; a < order.size(); ++a) {
       for (std::size_t b = a + 1; b < order.size(); ++b) {
-        PlacedPencil& x = pencils_[static_cast<std::size_t>(order[a])];
-        PlacedPencil& y = pencils_[static_cast<std::size_t>(order[b])];
+        PlacedPencil &x = At(order[a]), &y = At(order[b]);
         const bool grid = x.of_grid && y.of_grid && Rectangular(x.direction, y.direction);
         if (!grid && !(RightAngle(x.direction, y.direction, options_.camera).LogOdds() > 0.0))
           continue;
@@ -237,17 +229,16 @@ class Assembler {
   }
 
   // Pencils of the plane: those that span it, then the others by support, but for repetitions.
-  std::vector<int> InPlaneOrder(const Plane& plane) const {
+  std::vector<int> InPlaneOrder(const Plane& plane) {
     std::vector<int> order;
     for (const int i : plane.pencils) {
       if (i >= 0) order.push_back(i);
     }
     for (std::size_t i = 0; i < pencils_.size(); ++i) {
-      const int k = static_cast<int>(i);
       const bool is_new = std::none_of(order.begin(), order.end(), [&](int other) {
-        return IsNear(pencils_[i], pencils_[static_cast<std::size_t>(other)].direction.vector);
+        return AreAlike(pencils_[i].direction.vector, At(other).direction.vector);
       });
-      if (pencils_[i].observation.plane == "p0" && is_new) order.push_back(k);
+      if (pencils_[i].observation.plane == "p0" && is_new) order.push_back(static_cast<int>(i));
     }
     return order;
   }
@@ -295,8 +286,13 @@ class Assembler {
     std::vector<Vector3d> directions;
     for (PlacedPencil& pencil : pencils_) {
       if (static_cast<int>(observations->pencils.size()) >= options_.max_pencils) break;
-      if (IsRepetition(pencil, directions)) continue;
-      directions.push_back(pencil.direction.vector);
+      // Old houses have verticals a degree apart: what is nearly parallel to a better supported
+      // pencil says nothing new, and no plane is spanned by both.
+      const Vector3d& v = pencil.direction.vector;
+      if (std::any_of(directions.begin(), directions.end(),
+                      [&](const Vector3d& direction) { return AreAlike(v, direction); }))
+        continue;
+      directions.push_back(v);
       const std::string number = std::to_string(observations->pencils.size());
       pencil.observation.id = "L" + number;
       // Directions of different things: without a plane each they would be taken to span one.
@@ -306,18 +302,10 @@ class Assembler {
     if (plane.support_px > 0.0) observations->frame.plane = "p0";
   }
 
-  // Old houses have verticals a degree apart: what is nearly parallel to a better supported pencil
-  // says nothing new, and no plane is spanned by both.
-  static bool IsRepetition(const PlacedPencil& pencil, const std::vector<Vector3d>& emitted) {
-    return std::any_of(emitted.begin(), emitted.end(),
-                       [&](const Vector3d& direction) { return IsNear(pencil, direction); });
-  }
-
   const AssemblyOptions& options_;
   const std::vector<DetectedLine>&lines_, &bent_;
   std::vector<CircleEvidence>& circles_;
   std::vector<PlacedPencil> pencils_;
-  PlaneChooser chooser_;
 };
 
 }  // namespace

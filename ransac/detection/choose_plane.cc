@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "circline/estimators/conic.h"
-#include "circline/ransac/detection/local_pencils.h"
 #include "circline/ransac/detection/segment_meetings.h"
 
 namespace circline {
@@ -14,8 +13,6 @@ namespace {
 
 // Planes of circles alone start from this many of the best supported ones.
 constexpr std::size_t kMaxSeeds = 16;
-// Directions nearer than this (a sine; 3 degrees) are one.
-constexpr double kDistinctSine = 0.0523;
 // Two pencils of one plane cross or form corners, while the edges of a box and the stripes of a
 // cushion behind it do not: this share of either's length meets the other. At right angles, as
 // those of houses are, a lower one of one of them is enough (few of a front's many uprights may
@@ -26,6 +23,12 @@ constexpr double kMinRectangularShare = 0.1;
 // The rim of a circle that agrees with two pencils counts as much as this many times its length in
 // lines: it is rarer than a line, and fixes both directions.
 constexpr double kCircleWeight = 3.0;
+// The region in which lines meet is widened by this factor: the outermost lines meet none.
+constexpr double kRegionGrowth = 1.1;
+// Lines that miss a direction by up to this are alike, radians.
+constexpr double kAlikeRad = 0.05;
+// It is one thing if its lines are this share of either pencil's length.
+constexpr double kMinLocalShare = 0.5;
 
 // Old houses have verticals a degree apart: the longest pencil stands for all that are nearly
 // parallel to it.
@@ -33,7 +36,7 @@ bool HasLongerNeighbour(const std::vector<PlacedPencil>& pencils, std::size_t i)
   return !pencils[i].of_grid &&
          std::any_of(pencils.begin(), pencils.end(), [&](const PlacedPencil& other) {
            return other.support_px > pencils[i].support_px &&
-                  IsNear(pencils[i], other.direction.vector);
+                  AreAlike(pencils[i].direction.vector, other.direction.vector);
          });
 }
 
@@ -66,134 +69,200 @@ bool AreOfOneSolid(const CircleObservation& a, const CircleObservation& b) {
          (first.center - second.center).norm() < kSameMiddle * std::max(first.b, second.b);
 }
 
+// The lines of the region in which lines of about the directions of two pencils form corners.
+std::vector<int> LinesWhereTheyMeet(const std::vector<DetectedLine>& lines,
+                                    const std::array<DetectedPencil, 2>& pair, double diagonal_px) {
+  std::array<std::vector<Segment>, 2> alike;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Eigen::Vector3d& direction = pair[k].observation.fit->direction;
+    for (const DetectedLine& line : lines) {
+      if (std::abs(line.fit.line.dot(direction)) < kAlikeRad) alike[k].push_back(line.ends);
+    }
+  }
+  const std::array<std::vector<int>, 2> core = ConnectedCore(alike[0], alike[1], diagonal_px);
+  std::vector<Eigen::Vector2d> points;
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (const int i : core[k]) {
+      const Segment& s = alike[k][static_cast<std::size_t>(i)];
+      points.insert(points.end(), s.begin(), s.end());
+    }
+  }
+  const ConvexRegion region(std::move(points), kRegionGrowth);
+  std::vector<int> inside;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (region.Contains(lines[i].ends)) inside.push_back(static_cast<int>(i));
+  }
+  return inside;
+}
+
+class PlaneChooser {
+ public:
+  // All must outlive it.
+  PlaneChooser(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
+               const std::vector<CircleEvidence>& circles)
+      : options_(options), lines_(lines), circles_(circles) {}
+
+  Plane OfCircles() const {
+    Plane best;
+    for (std::size_t i = 0; i < std::min(circles_.size(), kMaxSeeds); ++i) {
+      const CircleEvidence& circle = circles_[i];
+      for (int k = 0; k < circle.num_normals; ++k) {
+        Plane plane = GrowFrom(circle.normals[static_cast<std::size_t>(k)]);
+        if (plane.support_px > best.support_px) best = std::move(plane);
+      }
+    }
+    if (best.circles.size() < 2 || LogOdds(best.normal) > 0.0) return best;
+    Plane lone;
+    lone.normal = circles_[0].normals[0];
+    lone.circles = {0};
+    lone.support_px = kCircleWeight * circles_[0].support_px;
+    return lone;
+  }
+
+  Plane Choose(const Plane& of_circles, std::vector<PlacedPencil>* pencils) const {
+    Plane plane = Best(of_circles, *pencils);
+    while (!Refit(&plane, pencils)) plane = Best(of_circles, *pencils);
+    return plane;
+  }
+
+ private:
+  // The best supported rim of a solid speaks for all.
+  bool IsOfSolidIn(const Plane& plane, std::size_t i) const {
+    return std::any_of(plane.circles.begin(), plane.circles.end(), [&](int other) {
+      return AreOfOneSolid(circles_[i].observation,
+                           circles_[static_cast<std::size_t>(other)].observation);
+    });
+  }
+
+  void AddCircles(Plane* plane) const {
+    for (std::size_t i = 0; i < circles_.size(); ++i) {
+      if (IsOfSolidIn(*plane, i) || !CanLieIn(*circles_[i].observation.fit, plane->normal))
+        continue;
+      plane->circles.push_back(static_cast<int>(i));
+      plane->support_px += kCircleWeight * circles_[i].support_px;
+    }
+  }
+
+  // The plane of circles alone that starts from one circle's normal: that of all that agree, until
+  // no more join. What agrees with the start alone says little, as the normal of a small circle is
+  // vague.
+  Plane GrowFrom(const UncertainDirection& seed) const {
+    Plane plane;
+    plane.normal = seed;
+    AddCircles(&plane);
+    constexpr int kPasses = 3;
+    for (int pass = 0; pass < kPasses && plane.circles.size() > 1; ++pass) {
+      Plane next;
+      next.normal = MeanNormal(plane);
+      AddCircles(&next);
+      if (pass > 0 && next.support_px < plane.support_px) break;
+      plane = next;
+    }
+    return plane;
+  }
+
+  UncertainDirection MeanNormal(const Plane& plane) const {
+    std::vector<const ConicFit*> circles;
+    for (const int i : plane.circles)
+      circles.push_back(&*circles_[static_cast<std::size_t>(i)].observation.fit);
+    return NormalOfCircles(plane.normal, options_.max_shared_plane_deg, circles);
+  }
+
+  // Logarithm of the odds that circles share a plane with this normal to that all lie any way: a
+  // mixture over all circles, each with two normals of which either may be its own, integrated over
+  // the plane's normal (Laplace), which is uniform before.
+  double LogOdds(const UncertainDirection& normal) const {
+    std::vector<double> ratios;
+    for (const CircleEvidence& circle : circles_) {
+      double ratio = 0.0;
+      for (int k = 0; k < circle.num_normals; ++k)
+        ratio += LikelihoodRatio(circle.normals[static_cast<std::size_t>(k)], normal.vector);
+      ratios.push_back(ratio / circle.num_normals);
+    }
+    return LogOddsOfMixture(ratios) + std::log(ShareOfHemisphere(normal));
+  }
+
+  // The plane with most support: of two pencils and the circles that agree, or of circles alone.
+  Plane Best(const Plane& of_circles, const std::vector<PlacedPencil>& pencils) const {
+    Plane best;
+    const auto consider = [&best](const Plane& plane) {
+      if (plane.support_px > best.support_px) best = plane;
+    };
+    for (std::size_t i = 0; i < pencils.size(); ++i) {
+      if (HasLongerNeighbour(pencils, i)) continue;
+      for (std::size_t j = i + 1; j < pencils.size(); ++j) {
+        if (HasLongerNeighbour(pencils, j)) continue;
+        Plane plane;
+        if (!SpannedNormal(pencils[i].direction, pencils[j].direction, &plane.normal)) continue;
+        plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
+        plane.support_px = JointSupport(pencils[i], pencils[j], options_.diagonal_px);
+        if (!(plane.support_px > 0.0)) continue;
+        plane.support_px *= PrecisionShare(plane.normal);
+        AddCircles(&plane);
+        consider(plane);
+      }
+    }
+    consider(of_circles);
+    return best;
+  }
+
+  // The two pencils that span the plane may be of one thing, whose lines tell more than those of
+  // the whole photo. False where these lines tell that the two are one pencil: there is no such
+  // plane, and the one with less support is no more.
+  bool Refit(Plane* plane, std::vector<PlacedPencil>* pencils) const {
+    if (plane->pencils[0] < 0) return true;
+    PlacedPencil& first = (*pencils)[static_cast<std::size_t>(plane->pencils[0])];
+    PlacedPencil& second = (*pencils)[static_cast<std::size_t>(plane->pencils[1])];
+    if (first.of_grid || second.of_grid) return true;
+    std::array<DetectedPencil, 2> pair = {first, second};
+    if (!RefitWhereTheyMeet(lines_, &pair, options_.diagonal_px)) return true;
+    const PlacedPencil a(std::move(pair[0])), b(std::move(pair[1]));
+    if (!SpannedNormal(a.direction, b.direction, &plane->normal)) {
+      pencils->erase(pencils->begin() + plane->pencils[1]);
+      return false;
+    }
+    first = a;
+    second = b;
+    plane->circles.clear();
+    AddCircles(plane);
+    return true;
+  }
+
+  const AssemblyOptions& options_;
+  const std::vector<DetectedLine>& lines_;
+  const std::vector<CircleEvidence>& circles_;
+};
+
 }  // namespace
 
-bool IsNear(const PlacedPencil& pencil, const Eigen::Vector3d& direction) {
-  return pencil.direction.vector.cross(direction).norm() < kDistinctSine;
-}
-
-// The best supported rim of a solid speaks for all.
-bool PlaneChooser::IsOfSolidIn(const Plane& plane, std::size_t i) const {
-  return std::any_of(plane.circles.begin(), plane.circles.end(), [&](int other) {
-    return AreOfOneSolid(circles_[i].observation,
-                         circles_[static_cast<std::size_t>(other)].observation);
-  });
-}
-
-void PlaneChooser::AddCircles(Plane* plane) const {
-  for (std::size_t i = 0; i < circles_.size(); ++i) {
-    if (IsOfSolidIn(*plane, i) || !CanLieIn(*circles_[i].observation.fit, plane->normal)) continue;
-    plane->circles.push_back(static_cast<int>(i));
-    plane->support_px += kCircleWeight * circles_[i].support_px;
-  }
-}
-
-// The plane of circles alone that starts from one circle's normal: that of all that agree, until no
-// more join. What agrees with the start alone says little, as the normal of a small circle is
-// vague.
-Plane PlaneChooser::GrowFrom(const UncertainDirection& seed) const {
-  Plane plane;
-  plane.normal = seed;
-  AddCircles(&plane);
-  constexpr int kPasses = 3;
-  for (int pass = 0; pass < kPasses && plane.circles.size() > 1; ++pass) {
-    Plane next;
-    next.normal = MeanNormal(plane);
-    AddCircles(&next);
-    if (pass > 0 && next.support_px < plane.support_px) break;
-    plane = next;
-  }
-  return plane;
-}
-
-UncertainDirection PlaneChooser::MeanNormal(const Plane& plane) const {
-  std::vector<const ConicFit*> circles;
-  for (const int i : plane.circles)
-    circles.push_back(&*circles_[static_cast<std::size_t>(i)].observation.fit);
-  return NormalOfCircles(plane.normal, options_.max_shared_plane_deg, circles);
-}
-
-Plane PlaneChooser::OfCircles() const {
-  Plane best;
-  for (std::size_t i = 0; i < std::min(circles_.size(), kMaxSeeds); ++i) {
-    const CircleEvidence& circle = circles_[i];
-    for (int k = 0; k < circle.num_normals; ++k) {
-      Plane plane = GrowFrom(circle.normals[static_cast<std::size_t>(k)]);
-      if (plane.support_px > best.support_px) best = std::move(plane);
+bool RefitWhereTheyMeet(const std::vector<DetectedLine>& lines, std::array<DetectedPencil, 2>* pair,
+                        double diagonal_px) {
+  std::array<DetectedPencil, 2> local = *pair;
+  std::vector<int> before;
+  constexpr int kPasses = 4;  // Each time with the directions that the last one gave.
+  for (int pass = 0; pass < kPasses; ++pass) {
+    std::vector<int> inside = LinesWhereTheyMeet(lines, local, diagonal_px);
+    if (pass > 0 && inside == before) break;
+    for (DetectedPencil& pencil : local) {
+      if (!RefitPencil(lines, inside, &pencil, diagonal_px)) return false;
     }
+    before = std::move(inside);
   }
-  if (best.circles.size() < 2 || LogOdds(best.normal) > 0.0) return best;
-  Plane lone;
-  lone.normal = circles_[0].normals[0];
-  lone.circles = {0};
-  lone.support_px = kCircleWeight * circles_[0].support_px;
-  return lone;
-}
-
-// Logarithm of the odds that circles share a plane with this normal to that all lie any way: a
-// mixture over all circles, each with two normals of which either may be its own, integrated over
-// the plane's normal (Laplace), which is uniform before.
-double PlaneChooser::LogOdds(const UncertainDirection& normal) const {
-  std::vector<double> ratios;
-  for (const CircleEvidence& circle : circles_) {
-    double ratio = 0.0;
-    for (int k = 0; k < circle.num_normals; ++k)
-      ratio += LikelihoodRatio(circle.normals[static_cast<std::size_t>(k)], normal.vector);
-    ratios.push_back(ratio / circle.num_normals);
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (local[k].support_px < kMinLocalShare * (*pair)[k].support_px) return false;
   }
-  return LogOddsOfMixture(ratios) + std::log(ShareOfHemisphere(normal));
-}
-
-// The plane with most support: of two pencils and the circles that agree, or of circles alone.
-Plane PlaneChooser::Best(const Plane& of_circles, const std::vector<PlacedPencil>& pencils) const {
-  Plane best;
-  const auto consider = [&best](const Plane& plane) {
-    if (plane.support_px > best.support_px) best = plane;
-  };
-  for (std::size_t i = 0; i < pencils.size(); ++i) {
-    if (HasLongerNeighbour(pencils, i)) continue;
-    for (std::size_t j = i + 1; j < pencils.size(); ++j) {
-      if (HasLongerNeighbour(pencils, j)) continue;
-      Plane plane;
-      if (!SpannedNormal(pencils[i].direction, pencils[j].direction, &plane.normal)) continue;
-      plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
-      plane.support_px = JointSupport(pencils[i], pencils[j], options_.diagonal_px);
-      if (!(plane.support_px > 0.0)) continue;
-      plane.support_px *= PrecisionShare(plane.normal);
-      AddCircles(&plane);
-      consider(plane);
-    }
-  }
-  consider(of_circles);
-  return best;
-}
-
-// The two pencils that span the plane may be of one thing, whose lines tell more than those of
-// the whole photo. False where these lines tell that the two are one pencil: there is no such
-// plane, and the one with less support is no more.
-bool PlaneChooser::Refit(Plane* plane, std::vector<PlacedPencil>* pencils) const {
-  if (plane->pencils[0] < 0) return true;
-  PlacedPencil& first = (*pencils)[static_cast<std::size_t>(plane->pencils[0])];
-  PlacedPencil& second = (*pencils)[static_cast<std::size_t>(plane->pencils[1])];
-  if (first.of_grid || second.of_grid) return true;
-  std::array<DetectedPencil, 2> pair = {first, second};
-  if (!RefitWhereTheyMeet(lines_, &pair, options_.diagonal_px)) return true;
-  const PlacedPencil a(std::move(pair[0])), b(std::move(pair[1]));
-  if (!SpannedNormal(a.direction, b.direction, &plane->normal)) {
-    pencils->erase(pencils->begin() + plane->pencils[1]);
-    return false;
-  }
-  first = a;
-  second = b;
-  plane->circles.clear();
-  AddCircles(plane);
+  *pair = std::move(local);
   return true;
 }
 
-Plane PlaneChooser::Choose(const Plane& of_circles, std::vector<PlacedPencil>* pencils) const {
-  Plane plane = Best(of_circles, *pencils);
-  while (!Refit(&plane, pencils)) plane = Best(of_circles, *pencils);
-  return plane;
+Plane PlaneOfCircles(const AssemblyOptions& options, const std::vector<CircleEvidence>& circles) {
+  return PlaneChooser(options, {}, circles).OfCircles();
+}
+
+Plane ChoosePlane(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
+                  const std::vector<CircleEvidence>& circles, const Plane& of_circles,
+                  std::vector<PlacedPencil>* pencils) {
+  return PlaneChooser(options, lines, circles).Choose(of_circles, pencils);
 }
 
 }  // namespace circline

@@ -31,38 +31,23 @@ struct Plane {
   double support_px = 0.0;
 };
 
-// Whether a pencil's direction is that one, within 3 degrees.
-bool IsNear(const PlacedPencil& pencil, const Eigen::Vector3d& direction);
+// The lines of pencils come from the whole photo, and are those that are exactly parallel. The
+// region in which two pencils form corners may be one thing: then all its lines count, bent or not,
+// and no others. Fits both pencils to the lines of that region. False, and nothing changed, where
+// less than half of either pencil is left: two directions of a street, say.
+bool RefitWhereTheyMeet(const std::vector<DetectedLine>& lines, std::array<DetectedPencil, 2>* pair,
+                        double diagonal_px = kUsualDiagonalPx);
 
-class PlaneChooser {
- public:
-  // All must outlive it.
-  PlaneChooser(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
-               const std::vector<CircleEvidence>& circles)
-      : options_(options), lines_(lines), circles_(circles) {}
+// The plane with most support of circles alone; where it is likelier that they agree by accident,
+// that of the best supported circle.
+Plane PlaneOfCircles(const AssemblyOptions& options, const std::vector<CircleEvidence>& circles);
 
-  // The plane with most support of circles alone; where it is likelier that they agree by accident,
-  // that of the best supported circle.
-  Plane OfCircles() const;
-
-  // The plane with most support: of two pencils and the circles that agree, or that of circles
-  // alone. Fits the two pencils again, to where they meet; drops those that prove to be another
-  // one.
-  Plane Choose(const Plane& of_circles, std::vector<PlacedPencil>* pencils) const;
-
- private:
-  bool IsOfSolidIn(const Plane& plane, std::size_t i) const;
-  void AddCircles(Plane* plane) const;
-  Plane GrowFrom(const UncertainDirection& seed) const;
-  UncertainDirection MeanNormal(const Plane& plane) const;
-  double LogOdds(const UncertainDirection& normal) const;
-  Plane Best(const Plane& of_circles, const std::vector<PlacedPencil>& pencils) const;
-  bool Refit(Plane* plane, std::vector<PlacedPencil>* pencils) const;
-
-  const AssemblyOptions& options_;
-  const std::vector<DetectedLine>& lines_;
-  const std::vector<CircleEvidence>& circles_;
-};
+// The plane with most support: of two pencils and the circles that agree, or that of circles alone.
+// Fits the two pencils again, to where they meet; drops those that prove to be another one. `lines`
+// are those that the pencils' members index.
+Plane ChoosePlane(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
+                  const std::vector<CircleEvidence>& circles, const Plane& of_circles,
+                  std::vector<PlacedPencil>* pencils);
 
 }  // namespace circline
 

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "circline/ransac/detection/line_pieces.h"
-#include "circline/ransac/detection/piece_beginnings.h"
 
 namespace circline {
 namespace {
@@ -79,8 +78,8 @@ class LineJoiner {
   }
 
   void JoinPieces() {
-    PieceBeginnings free(kMaxAlternatingPx);
-    for (const LinePiece& piece : pieces_) free.Add(edges_.X(piece.begin));
+    PieceBeginnings free;
+    for (const LinePiece& piece : pieces_) free.Add(edges_.X(piece.begin), kMaxAlternatingPx);
     for (std::size_t k = 0; k < pieces_.size(); ++k) {
       if (!free.Has(k)) continue;
       free.Remove(k);
@@ -169,30 +168,35 @@ class LineJoiner {
            std::abs(LineDistancePx(edges_.X(p.end - 1), joined.line)) <= limit;
   }
 
+  // Means of points over point_spacing_px.
+  struct Average {
+    double position;  // Along the line.
+    Vector2d pixel;
+    CalibratedPoint point;
+  };
+
   void Finish(const Joined& joined) {
     DetectedLine line;
-    averages_.clear();
+    std::vector<Average> averages;
     for (const int k : joined.pieces) {
       const LinePiece& p = pieces_[static_cast<std::size_t>(k)];
       line.length_px += p.length_px;
-      AppendAverages(p, joined.line, &line.points);
+      AppendAverages(p, joined, &averages);
     }
-    if (line.length_px < options_.min_length_px || line.points.size() < 2) return;
-    SortAlong(joined, &line);
-    calibrated_.clear();
-    for (const auto& [position, i] : order_)
-      calibrated_.push_back(averages_[static_cast<std::size_t>(i)]);
-    if (!FitLine(calibrated_, 1.0, &line.fit).ok()) return;
-    const double n = static_cast<double>(calibrated_.size());
-    const double spread = n > 2.0 ? line.fit.rms_px * std::sqrt(n / (n - 2.0)) : 0.0;
-    line.sigma_px = std::max(kMinLineSigmaPx, spread);
-    line.fit.covariance *= line.sigma_px * line.sigma_px;
+    if (line.length_px < options_.min_length_px || averages.size() < 2) return;
+    std::stable_sort(averages.begin(), averages.end(),
+                     [](const Average& a, const Average& b) { return a.position < b.position; });
+    std::vector<CalibratedPoint> points;
+    for (const Average& average : averages) {
+      line.points.push_back(average.pixel);
+      points.push_back(average.point);
+    }
+    if (!FitAverages(points, &line)) return;
     SetEnds(joined, &line);
     lines_.push_back(std::move(line));
   }
 
-  // Means of the points of a piece over point_spacing_px, in pixels and calibrated (averages_).
-  void AppendAverages(const LinePiece& p, const Vector3d& line, std::vector<Vector2d>* points) {
+  void AppendAverages(const LinePiece& p, const Joined& joined, std::vector<Average>* averages) {
     const int n = p.end - p.begin;  // More than two.
     const int bins =
         static_cast<int>(std::clamp(p.length_px / options_.point_spacing_px, 2.0, 1.0 * n));
@@ -201,29 +205,16 @@ class LineJoiner {
       int count = 0;
       const int begin = p.begin + k * n / bins, end = p.begin + (k + 1) * n / bins;
       for (int i = begin; i < end; ++i) {
-        if (edges_.Distance(i, line) > kMaxJoinPx) continue;
+        if (edges_.Distance(i, joined.line) > kMaxJoinPx) continue;
         pixel += edges_.Pixel(i);
         x += edges_.X(i).x;
         ++count;
       }
       if (count == 0) continue;
-      points->push_back(pixel / count);
-      CalibratedPoint average = edges_.X((begin + end) / 2);
-      average.x = x / count;
-      averages_.push_back(average);
+      CalibratedPoint point = edges_.X((begin + end) / 2);
+      point.x = x / count;
+      averages->push_back({joined.along.dot(point.x), pixel / count, point});
     }
-  }
-
-  void SortAlong(const Joined& joined, DetectedLine* line) {
-    order_.clear();
-    for (std::size_t i = 0; i < averages_.size(); ++i) {
-      order_.push_back({joined.along.dot(averages_[i].x), static_cast<int>(i)});
-    }
-    std::sort(order_.begin(), order_.end());
-    std::vector<Vector2d> sorted;
-    for (const auto& [position, i] : order_)
-      sorted.push_back(line->points[static_cast<std::size_t>(i)]);
-    line->points = std::move(sorted);
   }
 
   void SetEnds(const Joined& joined, DetectedLine* line) const {
@@ -248,9 +239,6 @@ class LineJoiner {
   const LineOptions& options_;
   std::vector<LinePiece> pieces_, bent_;
   std::vector<DetectedLine> lines_;
-  // Scratch.
-  std::vector<CalibratedPoint> averages_, calibrated_;
-  std::vector<std::pair<double, int>> order_;
 };
 
 }  // namespace
@@ -262,6 +250,17 @@ Status LineOptions::Validate() const {
   if (!(max_sagitta_px > 0.0)) return Status::Invalid("max_sagitta_px must be positive");
   if (!(point_spacing_px > 0.0)) return Status::Invalid("point_spacing_px must be positive");
   return Status::Ok();
+}
+
+bool FitAverages(const std::vector<CalibratedPoint>& points, DetectedLine* line) {
+  LineFit fit;
+  if (!FitLine(points, 1.0, &fit).ok()) return false;
+  const double n = static_cast<double>(points.size());
+  const double spread = n > 2.0 ? fit.rms_px * std::sqrt(n / (n - 2.0)) : 0.0;
+  line->sigma_px = std::max(kMinLineSigmaPx, spread);
+  fit.covariance *= line->sigma_px * line->sigma_px;
+  line->fit = fit;
+  return true;
 }
 
 Status DetectLines(const EdgeMap& edges, const Camera& camera, const LineOptions& options,

@@ -41,6 +41,10 @@ struct DetectedLine {
   LineFit fit;                          // Calibrated.
 };
 
+// Sets the fit and sigma_px of a line from its points, calibrated; false, and nothing changed,
+// where there is none.
+bool FitAverages(const std::vector<CalibratedPoint>& points, DetectedLine* line);
+
 // Longest first. `skip` (optional, one per edge point, 1 = belongs to something else) marks points
 // that are not used. `camera` must be valid. `bent` (optional) receives what is all but straight,
 // up to a sagitta of 1.2 px and of 1.8 % of its length: edges of worn and of soft things, and arcs;

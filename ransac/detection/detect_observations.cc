@@ -96,7 +96,8 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   status = options.noise_model.camera.IsWide()
                ? LookForFocal(collect, options, diagonal_px, &evidence, observations)
                : collect(camera, &evidence);
-  return status.ok() ? ObserveEvidence(options, diagonal_px, &evidence, observations) : status;
+  if (status.ok()) ObserveEvidence(options, diagonal_px, &evidence, observations);
+  return status;
 }
 
 Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::Rect& roi,

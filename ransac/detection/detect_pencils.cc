@@ -25,14 +25,6 @@ constexpr int kFoundAround = 2;
 // The two sides of a thin line are so near to each other, a share of the photo's diagonal.
 constexpr double kTwinShareOfPhoto = 4.0 / kUsualDiagonalPx;
 
-PencilOptions SearchOptions(int max_pencils, std::uint64_t seed) {
-  PencilOptions options;
-  options.ransac.seed = seed;
-  options.model_sigma_rad = kParallelSigmaRad;
-  options.max_pencils = max_pencils;
-  return options;
-}
-
 // Lines and their twins, ascending.
 std::vector<int> WithTwins(const LineSet& set, std::vector<int> members) {
   const std::size_t own = members.size();
@@ -45,8 +37,18 @@ std::vector<int> WithTwins(const LineSet& set, std::vector<int> members) {
   return members;
 }
 
-// Pencils among all lines, each fitted to its own ones.
-std::vector<DetectedPencil> Search(const LineSet& set, const PencilOptions& options) {
+void LongestFirst(std::vector<DetectedPencil>* pencils) {
+  std::stable_sort(
+      pencils->begin(), pencils->end(),
+      [](const DetectedPencil& a, const DetectedPencil& b) { return a.support_px > b.support_px; });
+}
+
+// Pencils among all lines, each fitted to its own ones, longest first.
+std::vector<DetectedPencil> Search(const LineSet& set, int max_pencils, std::uint64_t seed) {
+  PencilOptions options;
+  options.ransac.seed = seed;
+  options.model_sigma_rad = kParallelSigmaRad;
+  options.max_pencils = max_pencils;
   std::vector<int> subset;
   std::vector<LineFit> chosen;
   for (int i = 0; i < static_cast<int>(set.lines.size()); ++i) {
@@ -57,15 +59,14 @@ std::vector<DetectedPencil> Search(const LineSet& set, const PencilOptions& opti
   std::vector<FoundPencil> found;
   std::vector<DetectedPencil> pencils;
   if (!FindPencils(chosen, options, &found).ok()) return pencils;
-  const PencilFitter fitter(set, kParallelSigmaRad);
   for (FoundPencil& f : found) {
     for (int& i : f.lines) i = subset[static_cast<std::size_t>(i)];
-    fitter.StartAtDensest(options.ransac.seed, &f);
-    double spread;
-    if (!fitter.Fit(WithTwins(set, f.lines), &f, &spread)) continue;
-    if (set.Count(f.lines) < options.min_lines) continue;
-    pencils.push_back(MakePencil(f, set, spread));
+    std::optional<DetectedPencil> pencil = FitPencil(
+        set, WithTwins(set, f.lines), DensestDirection(set, f.lines, f.fit.direction, seed),
+        kParallelSigmaRad, options.min_lines);
+    if (pencil) pencils.push_back(std::move(*pencil));
   }
+  LongestFirst(&pencils);
   return pencils;
 }
 
@@ -104,34 +105,16 @@ std::vector<int> OneOfEachEdge(const LineSet& set, const std::vector<int>& subse
   return edges;
 }
 
-std::vector<DetectedLine> EdgesOf(const LineSet& set, const std::vector<int>& subset) {
-  std::vector<DetectedLine> edges;
-  for (const int i : OneOfEachEdge(set, subset)) {
-    edges.push_back(set.lines[static_cast<std::size_t>(i)]);
-    edges.back().fit = set.fits[static_cast<std::size_t>(i)];
-  }
-  return edges;
-}
-
-std::vector<LineFit> FitsOf(const LineSet& set, const std::vector<int>& subset) {
-  std::vector<LineFit> fits;
-  for (const int i : subset) fits.push_back(set.fits[static_cast<std::size_t>(i)]);
-  return fits;
-}
-
 // Boxes, boards and rooms have right angles: the direction orthogonal to `axis` that lines[subset]
 // have the best evidence of, if any.
 std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::vector<int>& subset,
                                                const Vector3d& axis) {
-  const std::vector<LineFit> pool = FitsOf(set, OneOfEachEdge(set, subset));
-  const std::optional<Vector3d> best = OrthogonalEvidence(pool, axis, kParallelSigmaRad).Best();
+  std::vector<LineFit> edges;
+  for (const int i : OneOfEachEdge(set, subset))
+    edges.push_back(set.fits[static_cast<std::size_t>(i)]);
+  const std::optional<Vector3d> best = OrthogonalEvidence(edges, axis).Best();
   if (!best) return std::nullopt;
-  FoundPencil found;
-  found.fit.direction = *best;
-  double spread;
-  if (!PencilFitter(set, kParallelSigmaRad).Fit(subset, &found, &spread)) return std::nullopt;
-  if (set.Count(found.lines) < PencilOptions().min_lines) return std::nullopt;
-  return MakePencil(found, set, spread);
+  return FitPencil(set, subset, *best, kParallelSigmaRad, PencilOptions().min_lines);
 }
 
 // The pencils orthogonal to one, among the lines that meet its own.
@@ -161,50 +144,38 @@ bool IsKnown(const DetectedPencil& pencil, const std::vector<DetectedPencil>& ot
   });
 }
 
-void LongestFirst(std::vector<DetectedPencil>* pencils) {
-  std::stable_sort(
-      pencils->begin(), pencils->end(),
-      [](const DetectedPencil& a, const DetectedPencil& b) { return a.support_px > b.support_px; });
-}
-
 }  // namespace
 
-Status DetectPencilsApart(const std::vector<DetectedLine>& lines, int max_pencils,
-                          std::uint64_t seed, std::vector<DetectedPencil>* pencils,
-                          double diagonal_px) {
-  pencils->clear();
-  const PencilOptions options = SearchOptions(max_pencils, seed);
-  const Status status = options.Validate();
-  if (!status.ok()) return status;
-  *pencils = Search(LineSet(lines, diagonal_px), options);
-  LongestFirst(pencils);
-  return Status::Ok();
+std::vector<DetectedPencil> DetectPencilsApart(const std::vector<DetectedLine>& lines,
+                                               int max_pencils, std::uint64_t seed,
+                                               double diagonal_px) {
+  return Search(LineSet(lines, diagonal_px), max_pencils, seed);
 }
 
-Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, std::uint64_t seed,
-                     std::vector<DetectedPencil>* pencils, double diagonal_px) {
-  pencils->clear();
-  const PencilOptions options = SearchOptions(max_pencils, seed);
-  const Status status = options.Validate();
-  if (!status.ok()) return status;
+std::vector<DetectedPencil> DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils,
+                                          std::uint64_t seed, double diagonal_px) {
   const LineSet set(lines, diagonal_px);
-  *pencils = Search(set, options);
-  LongestFirst(pencils);
-  const std::size_t num_around = std::min(kMaxSearchedAround, pencils->size());
+  std::vector<DetectedPencil> pencils = Search(set, max_pencils, seed);
+  const std::size_t num_around = std::min(kMaxSearchedAround, pencils.size());
   for (std::size_t k = 0; k < num_around; ++k) {
-    for (DetectedPencil& found : SearchAround(set, (*pencils)[k])) {
-      if (!IsKnown(found, *pencils)) pencils->push_back(std::move(found));
+    for (DetectedPencil& found : SearchAround(set, pencils[k])) {
+      if (!IsKnown(found, pencils)) pencils.push_back(std::move(found));
     }
   }
-  LongestFirst(pencils);
-  return Status::Ok();
+  LongestFirst(&pencils);
+  return pencils;
 }
 
 std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
                                       const std::vector<DetectedPencil>& pencils,
                                       double diagonal_px) {
   const LineSet set(lines, diagonal_px);
-  return EdgesOf(set, LinesAround(set, pencils));
+  std::vector<DetectedLine> edges;
+  for (const int i : OneOfEachEdge(set, LinesAround(set, pencils))) {
+    edges.push_back(lines[static_cast<std::size_t>(i)]);
+    edges.back().fit = set.fits[static_cast<std::size_t>(i)];
+  }
+  return edges;
 }
 
 LineFit WithSharedError(const DetectedLine& line, double shared_px) {

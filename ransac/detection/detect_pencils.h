@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "circline/estimators/observations.h"
-#include "circline/estimators/status.h"
 #include "circline/ransac/detection/detect_lines.h"
 #include "circline/ransac/detection/segment_meetings.h"
 
@@ -23,20 +22,21 @@ struct DetectedPencil {
   bool Has(int line) const { return std::binary_search(members.begin(), members.end(), line); }
 };
 
-// Robust and sequential, first among all lines (`max_pencils`), then, for the longest pencils,
-// among the lines that meet theirs: the short edges of a box are few among those of a room. Lines
-// may be in several of the latter. `diagonal_px`: of the photo, as in segment_meetings.h. For each
-// pencil the scatter of its lines about their common direction is estimated and the direction is
-// fitted by maximum likelihood with it: the lines of a printed board all count for what they were
-// measured, those of an old street, each a third of a degree from parallel, count alike. The
-// longest pencil (sum of its lines) comes first. 0.5 ms for 150 lines.
-Status DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils, std::uint64_t seed,
-                     std::vector<DetectedPencil>* pencils, double diagonal_px = kUsualDiagonalPx);
+// Robust and sequential, first among all lines (`max_pencils`, 0 or more), then, for the longest
+// pencils, among the lines that meet theirs: the short edges of a box are few among those of a
+// room. Lines may be in several of the latter. `diagonal_px`: of the photo, as in
+// segment_meetings.h. For each pencil the scatter of its lines about their common direction is
+// estimated and the direction is fitted by maximum likelihood with it: the lines of a printed board
+// all count for what they were measured, those of an old street, each a third of a degree from
+// parallel, count alike. The longest pencil (sum of its lines) comes first. 0.5 ms for 150 lines.
+std::vector<DetectedPencil> DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils,
+                                          std::uint64_t seed,
+                                          double diagonal_px = kUsualDiagonalPx);
 
 // The first half of that: without those around the longest, which are looked for at right angles.
-Status DetectPencilsApart(const std::vector<DetectedLine>& lines, int max_pencils,
-                          std::uint64_t seed, std::vector<DetectedPencil>* pencils,
-                          double diagonal_px = kUsualDiagonalPx);
+std::vector<DetectedPencil> DetectPencilsApart(const std::vector<DetectedLine>& lines,
+                                               int max_pencils, std::uint64_t seed,
+                                               double diagonal_px = kUsualDiagonalPx);
 
 // Fits the pencil again, to all of lines[candidates] that share its direction within up to half a
 // degree (standard deviation, estimated): for lines that are known to be of one thing, whose sides

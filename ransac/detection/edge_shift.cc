@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "circline/ransac/detection/contour_support.h"
+
 namespace circline {
 namespace {
 
@@ -24,15 +26,6 @@ constexpr double kMinCosine = 0.9;
 constexpr double kMinSigmas = 2.0;
 // More than this is no displacement of edges but another structure, pixels.
 constexpr double kMaxShiftPx = 0.6;
-
-// Averaged points are not trusted beyond this, as in detect_lines.cc.
-constexpr double kMinShiftedSigmaPx = 0.1;
-
-double MedianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Unit gradient of the edge at a point of a line, or else of one beside it, across the line; zero
 // where there is none. Points of lines are means over a few pixels.
@@ -92,18 +85,7 @@ double ShiftOfLine(const Camera& camera, const DetectedLine& line,
   return std::abs(shift) <= kMaxShiftPx ? shift : undefined;
 }
 
-double CommonShift(const std::vector<double>& shifts) {
-  if (shifts.size() < kMinLines) return 0.0;
-  const double median = MedianOf(shifts);
-  std::vector<double> deviations;
-  for (const double shift : shifts) deviations.push_back(std::abs(shift - median));
-  // 1.4826 makes a median of deviations a standard deviation, 1.2533 one of a mean that of a
-  // median.
-  const double sigma = 1.2533 * 1.4826 * MedianOf(std::move(deviations)) /
-                       std::sqrt(static_cast<double>(shifts.size()));
-  return std::abs(median) > kMinSigmas * sigma ? median : 0.0;
-}
-
+// The median over the lines that tell it, or 0.
 double CommonShift(const Camera& camera, const std::vector<DetectedLine>& lines,
                    const std::vector<std::vector<Vector2d>>& gradients) {
   std::vector<double> shifts;
@@ -112,7 +94,15 @@ double CommonShift(const Camera& camera, const std::vector<DetectedLine>& lines,
     const double shift = ShiftOfLine(camera, lines[k], gradients[k]);
     if (std::isfinite(shift)) shifts.push_back(shift);
   }
-  return CommonShift(shifts);
+  if (shifts.size() < kMinLines) return 0.0;
+  const double median = UpperMedian(shifts);
+  std::vector<double> deviations;
+  for (const double shift : shifts) deviations.push_back(std::abs(shift - median));
+  // 1.4826 makes a median of deviations a standard deviation, 1.2533 one of a mean that of a
+  // median.
+  const double sigma =
+      1.2533 * 1.4826 * UpperMedian(deviations) / std::sqrt(static_cast<double>(shifts.size()));
+  return std::abs(median) > kMinSigmas * sigma ? median : 0.0;
 }
 
 void MoveBack(const Camera& camera, const std::vector<Vector2d>& gradients, double shift,
@@ -124,35 +114,20 @@ void MoveBack(const Camera& camera, const std::vector<Vector2d>& gradients, doub
     CalibratedPoint point;
     if (PixelToCalibrated(camera, moved.points[i], &point)) calibrated.push_back(point);
   }
-  if (!FitLine(calibrated, 1.0, &moved.fit).ok()) return;
   // The scatter was part staircase.
-  const double n = static_cast<double>(calibrated.size());
-  moved.sigma_px = std::max(kMinShiftedSigmaPx, moved.fit.rms_px * std::sqrt(n / (n - 2.0)));
-  moved.fit.covariance *= moved.sigma_px * moved.sigma_px;
-  *line = std::move(moved);
-}
-
-std::vector<std::vector<Vector2d>> AllGradients(const EdgeMap& edges,
-                                                const std::vector<DetectedLine>& lines) {
-  std::vector<std::vector<Vector2d>> gradients;
-  for (const DetectedLine& line : lines) gradients.push_back(GradientsOfBothKinds(edges, line));
-  return gradients;
+  if (FitAverages(calibrated, &moved)) *line = std::move(moved);
 }
 
 }  // namespace
 
-double EstimateEdgeShift(const EdgeMap& edges, const Camera& camera,
-                         const std::vector<DetectedLine>& lines) {
-  return CommonShift(camera, lines, AllGradients(edges, lines));
-}
-
-void UndoEdgeShift(const EdgeMap& edges, const Camera& camera, std::vector<DetectedLine>* lines) {
-  const std::vector<std::vector<Vector2d>> gradients = AllGradients(edges, *lines);
+double UndoEdgeShift(const EdgeMap& edges, const Camera& camera, std::vector<DetectedLine>* lines) {
+  std::vector<std::vector<Vector2d>> gradients;
+  for (const DetectedLine& line : *lines) gradients.push_back(GradientsOfBothKinds(edges, line));
   const double shift = CommonShift(camera, *lines, gradients);
-  if (shift == 0.0) return;
-  for (std::size_t k = 0; k < lines->size(); ++k) {
+  for (std::size_t k = 0; k < lines->size() && shift != 0.0; ++k) {
     if (!gradients[k].empty()) MoveBack(camera, gradients[k], shift, &(*lines)[k]);
   }
+  return shift;
 }
 
 }  // namespace circline

@@ -15,13 +15,10 @@
 namespace circline {
 
 // By how much the edges of the photo are displaced towards their brighter side, pixels: the median
-// over the lines with both kinds of edges; 0 where fewer than five agree on anything but 0.
-double EstimateEdgeShift(const EdgeMap& edges, const Camera& camera,
-                         const std::vector<DetectedLine>& lines);
-
-// Estimates the shift, moves the points of those lines back by it and fits the lines again. The
-// others keep their direction whatever the shift, and stay as they are. 0.2 ms for 150 lines.
-void UndoEdgeShift(const EdgeMap& edges, const Camera& camera, std::vector<DetectedLine>* lines);
+// over the lines with both kinds of edges; 0 where fewer than five agree on anything but 0. The
+// points of those lines are moved back by it and the lines fitted again; the others keep their
+// direction whatever the shift, and stay as they are. 0.2 ms for 150 lines.
+double UndoEdgeShift(const EdgeMap& edges, const Camera& camera, std::vector<DetectedLine>* lines);
 
 }  // namespace circline
 

@@ -7,8 +7,6 @@
 #include <vector>
 
 #include "circline/ransac/detection/follow_observations.h"
-#include "circline/ransac/detection/keep_names.h"
-#include "circline/ransac/detection/move_observations.h"
 
 namespace circline {
 namespace {
@@ -16,20 +14,17 @@ namespace {
 // After so many frames in a row that show little, and that of another scene, it is another scene.
 constexpr int kFramesOfCut = 3;
 
+template <typename Feature, typename Find>
+void KeepKnown(const Observations& known, Find find, std::vector<Feature>* features) {
+  features->erase(std::remove_if(features->begin(), features->end(),
+                                 [&](const Feature& f) { return find(known, f.id) < 0; }),
+                  features->end());
+}
+
 // Of what was found cold, only what goes on from the features that were given.
 void KeepGiven(const Observations& given, Observations* found) {
-  const auto is_new = [&](const auto& feature,
-                          int (*find)(const Observations&, const std::string&)) {
-    return find(given, feature.id) < 0;
-  };
-  found->circles.erase(
-      std::remove_if(found->circles.begin(), found->circles.end(),
-                     [&](const CircleObservation& c) { return is_new(c, FindCircle); }),
-      found->circles.end());
-  found->pencils.erase(
-      std::remove_if(found->pencils.begin(), found->pencils.end(),
-                     [&](const PencilObservation& p) { return is_new(p, FindPencil); }),
-      found->pencils.end());
+  KeepKnown(given, FindCircle, &found->circles);
+  KeepKnown(given, FindPencil, &found->pencils);
   found->frame.origin_is_center = given.frame.origin_is_center;
   if (FindCircle(*found, found->frame.origin_is_center) < 0) found->frame.origin_is_center.clear();
 }

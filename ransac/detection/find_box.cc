@@ -1,17 +1,31 @@
 #include "circline/ransac/detection/find_box.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "circline/ransac/detection/box_search.h"
+#include "circline/estimators/basics.h"
+#include "circline/estimators/pose.h"
+#include "circline/ransac/detection/line_odds.h"
+#include "circline/ransac/detection/segment_meetings.h"
 
 namespace circline {
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+// No box, or no axis.
+constexpr double kImpossible = -std::numeric_limits<double>::infinity();
+// What all points of an edge share, pixels: cartons are worn and bulge.
+constexpr double kWornPx = 0.35;
+// What lens and calibration leave beyond that, radians.
+constexpr double kModelSigmaRad = 1.7e-3;
+// The logarithm of the odds, before its direction is looked at, that a line that forms corners is
+// an edge of the box (the choice between three directions not counted).
+constexpr double kLogOddsOfAnEdge = -1.5;
 
 // Least odds of a box, kLogCorners times the logarithm of the number of corners in the photo beyond
 // kLogOddsOfNone: by accident one normal in a hundred has as much, on photos of few lines and of
@@ -29,9 +43,213 @@ constexpr double kPencilSigmaRad = 0.01;
 // Axes nearer than this, each to each, are those of one box: a cosine, 3 degrees.
 constexpr double kSameBox = 0.9986;
 
-double LeastLogOdds(const BoxSearch& search, double of_none) {
-  return kLogCorners * std::log(std::max(1, search.num_corners())) + of_none;
+LineOdds WornLine(const DetectedLine& line) {
+  return LineOdds(WithDirectionError(WithSharedError(line, kWornPx), kModelSigmaRad));
 }
+
+// Of an edge along an axis that is off by a Gaussian error of that variance.
+double LogOddsAlong(const LineOdds& line, const Vector3d& axis, double off_variance) {
+  const double variance = line.Variance(axis) + off_variance;
+  return line.LogRatio(axis, variance) - std::log(3.0) + kLogOddsOfAnEdge;
+}
+
+// Columns x, normal x x, normal.
+Matrix3d AxesOf(const Vector3d& x, const Vector3d& normal) {
+  Matrix3d axes;
+  axes << x, normal.cross(x), normal;
+  return axes;
+}
+
+Matrix3d Rotated(const Matrix3d& axes, double angle) {
+  return AxesOf(std::cos(angle) * axes.col(0) + std::sin(angle) * axes.col(1), axes.col(2));
+}
+
+struct BoxHypothesis {
+  std::size_t given = 0;  // Index of the axis that it was looked for about.
+  Matrix3d axes;
+  std::array<std::vector<int>, 3> edges;  // Along each axis, indices of lines.
+  double log_odds = kImpossible;
+};
+
+// Only lines that end where others do can be edges of a box.
+class BoxSearch {
+ public:
+  // `lines` must outlive it.
+  BoxSearch(const std::vector<DetectedLine>& lines, double diagonal_px) : lines_(lines) {
+    FindCorners(diagonal_px);
+    axis_.resize(edges_.size());
+    gain_.resize(edges_.size());
+    seen_.resize(edges_.size());
+  }
+
+  // The box with the highest odds about one of the axes, known to `sigma_rad`; none where the odds
+  // are too low, or do not tell it from another box or, of axes that are known, from one about
+  // another.
+  std::optional<FoundBox> Best(const std::vector<Vector3d>& axes, double sigma_rad,
+                               double log_odds_of_none) {
+    variance_ = sigma_rad * sigma_rad;
+    std::vector<BoxHypothesis> boxes;
+    for (std::size_t k = 0; k < axes.size(); ++k) {
+      normal_ = axes[k];
+      boxes.push_back(FindOnNormal());
+      boxes.back().given = k;
+    }
+    std::stable_sort(boxes.begin(), boxes.end(),
+                     [](const auto& a, const auto& b) { return a.log_odds > b.log_odds; });
+    const double least = kLogCorners * std::log(std::max(1, num_corners_)) + log_odds_of_none;
+    if (boxes.empty() || !(boxes[0].log_odds >= least)) return std::nullopt;
+    for (std::size_t k = 1; k < boxes.size(); ++k) {
+      if (boxes[0].log_odds - boxes[k].log_odds >= kMinLogMargin) break;
+      const Matrix3d cosines = (boxes[0].axes.transpose() * boxes[k].axes).cwiseAbs();
+      const bool is_same = variance_ > 0.0 && cosines.rowwise().maxCoeff().minCoeff() >= kSameBox;
+      if (!is_same) return std::nullopt;
+    }
+    return Finish(boxes[0]);
+  }
+
+ private:
+  struct Edge {
+    LineOdds odds;                     // With all that it may miss its direction by.
+    std::vector<std::size_t> corners;  // Those it forms a corner with, indices into edges_.
+  };
+
+  FoundBox Finish(const BoxHypothesis& box) const {
+    FoundBox found;
+    found.given = box.given;
+    found.log_odds = box.log_odds;
+    found.axes = box.axes;
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::vector<LineFit> fits;
+      for (const int i : box.edges[k])
+        fits.push_back(edges_[static_cast<std::size_t>(i)].odds.fit());
+      const Vector3d axis = box.axes.col(static_cast<Eigen::Index>(k));
+      found.log_odds_along[k] = LogOddsOfDirection(lines_, box.edges[k], axis);
+      found.pencils[k] = MakePencil(lines_, box.edges[k], fits, axis);
+    }
+    return found;
+  }
+
+  void FindCorners(double diagonal_px) {
+    const std::vector<int> twin_of = FindTwins(lines_, diagonal_px);
+    for (const DetectedLine& line : lines_) edges_.push_back({WornLine(line), {}});
+    for (std::size_t i = 0; i < lines_.size(); ++i) {
+      for (std::size_t j = i + 1; j < lines_.size() && twin_of[i] < 0; ++j) {
+        if (twin_of[j] >= 0 || !FormCorner(lines_[i].ends, lines_[j].ends, diagonal_px)) continue;
+        edges_[i].corners.push_back(j);
+        edges_[j].corners.push_back(i);
+        ++num_corners_;
+      }
+    }
+  }
+
+  // At any angle about normal_, of which edges may be off by its variance; and from there to where
+  // its edges agree best. No odds where there is none.
+  BoxHypothesis FindOnNormal() {
+    constexpr int kAngles = 180, kPasses = 4;  // Of a quarter turn: one in half a degree.
+    BoxHypothesis start, best;
+    const Matrix3d axes = AxesOf(normal_.unitOrthogonal(), normal_);
+    for (int k = 0; k < kAngles; ++k)
+      Consider(Rotated(axes, 0.5 * kPi * k / kAngles), variance_, &start);
+    if (!std::isfinite(start.log_odds)) return best;
+    Consider(start.axes, 0.0, &best);
+    if (!std::isfinite(best.log_odds)) Consider(Turned(start), 0.0, &best);
+    for (int pass = 0; pass < kPasses && std::isfinite(best.log_odds); ++pass) {
+      const double before = best.log_odds;
+      Consider(Turned(best), 0.0, &best);
+      if (!(best.log_odds > before)) break;
+    }
+    return best;
+  }
+
+  // Which axis each edge is most likely along, and the logarithm of its odds.
+  void Assign(const Matrix3d& axes, double off_variance) {
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      gain_[i] = kImpossible;
+      for (int k = 0; k < 3 && !edges_[i].corners.empty(); ++k) {
+        const Vector3d axis = axes.col(k);
+        const LineOdds& line = edges_[i].odds;
+        // Four standard deviations off no edge has odds above one, as kModelSigmaRad bounds them;
+        // most lines are farther off, and logarithms take time.
+        const double residual = line.Residual(axis);
+        if (residual * residual > 16.0 * (line.Variance(axis) + off_variance)) continue;
+        const double gain = LogOddsAlong(line, axis, off_variance);
+        if (gain <= gain_[i]) continue;
+        gain_[i] = gain;
+        axis_[i] = k;
+      }
+    }
+  }
+
+  // The likeliest set of edges that corners between different axes connect. Each two of the axes
+  // have a corner in common: only lines that differ in the photo can be told from one another.
+  void Consider(const Matrix3d& axes, double off_variance, BoxHypothesis* best) {
+    Assign(axes, off_variance);
+    const double off = (axes.col(2) - normal_).squaredNorm();
+    const double log_prior = variance_ > 0.0 ? -0.5 * off / variance_ : 0.0;
+    std::fill(seen_.begin(), seen_.end(), char{0});
+    for (std::size_t start = 0; start < edges_.size(); ++start) {
+      if (seen_[start] || gain_[start] <= 0.0) continue;
+      BoxHypothesis box;
+      box.axes = axes;
+      box.log_odds = log_prior;
+      std::array<bool, 3> have_corner{};  // Of the axes other than the index.
+      queue_.assign(1, start);
+      seen_[start] = 1;
+      while (!queue_.empty()) {
+        const std::size_t i = queue_.back();
+        queue_.pop_back();
+        box.log_odds += gain_[i];
+        box.edges[static_cast<std::size_t>(axis_[i])].push_back(static_cast<int>(i));
+        for (const std::size_t j : edges_[i].corners) {
+          if (gain_[j] <= 0.0 || axis_[j] == axis_[i]) continue;
+          have_corner[static_cast<std::size_t>(3 - axis_[i] - axis_[j])] = true;
+          if (seen_[j]) continue;
+          seen_[j] = 1;
+          queue_.push_back(j);
+        }
+      }
+      const bool is_box = have_corner[0] && have_corner[1] && have_corner[2];
+      if (is_box && box.log_odds > best->log_odds) *best = std::move(box);
+    }
+  }
+
+  // Turned to where its edges agree best, one Gauss-Newton step: by a rotation d the residual l . v
+  // of an edge along v changes by d . (v x l).
+  Matrix3d Turned(const BoxHypothesis& box) const {
+    Matrix3d information = Matrix3d::Zero();
+    Vector3d gradient = Vector3d::Zero();
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d v = box.axes.col(k);
+      for (const int e : box.edges[static_cast<std::size_t>(k)]) {
+        const LineOdds& line = edges_[static_cast<std::size_t>(e)].odds;
+        const double weight = 1.0 / line.Variance(v);
+        const Vector3d slope = v.cross(line.fit().line);
+        information += weight * slope * slope.transpose();
+        gradient += weight * line.Residual(v) * slope;
+      }
+    }
+    const Vector3d n = box.axes.col(2);
+    if (!(variance_ > 0.0)) {
+      const double angle = -n.dot(gradient) / n.dot(information * n);
+      return std::isfinite(angle) ? Rotated(box.axes, angle) : box.axes;
+    }
+    information += (Matrix3d::Identity() - n * n.transpose()) / variance_;
+    gradient += n.cross(n - normal_) / variance_;
+    return ExpRotation(-information.ldlt().solve(gradient)) * box.axes;
+  }
+
+  const std::vector<DetectedLine>& lines_;
+  std::vector<Edge> edges_;  // One a line.
+  int num_corners_ = 0;
+  // Of the box that is looked for; how well it is known, squared radians.
+  Vector3d normal_ = Vector3d::UnitZ();
+  double variance_ = 0.0;
+  // Of each edge, for the axes considered.
+  std::vector<int> axis_;
+  std::vector<double> gain_;
+  std::vector<char> seen_;
+  std::vector<std::size_t> queue_;
+};
 
 // The first `count` axes in the order of their lines' length.
 void PutLongestFirst(int count, FoundBox* box) {
@@ -51,46 +269,27 @@ void PutLongestFirst(int count, FoundBox* box) {
 
 }  // namespace
 
+double LogOddsOfDirection(const std::vector<DetectedLine>& lines, const std::vector<int>& members,
+                          const Vector3d& direction) {
+  double sum = 0.0;
+  for (const int i : members)
+    sum += LogOddsAlong(WornLine(lines[static_cast<std::size_t>(i)]), direction, 0.0);
+  return sum;
+}
+
 std::optional<FoundBox> FindBox(const std::vector<DetectedLine>& lines,
                                 const std::vector<Vector3d>& normals, double diagonal_px) {
-  BoxSearch search(lines, diagonal_px);
-  BoxSearch::Box best;
-  std::size_t best_normal = 0;
-  double second = -std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < normals.size(); ++k) {
-    BoxSearch::Box box = search.Find(normals[k], 0.0);
-    second = std::max(second, std::min(box.log_odds, best.log_odds));
-    if (!(box.log_odds > best.log_odds)) continue;
-    best = std::move(box);
-    best_normal = k;
-  }
-  if (!(best.log_odds >= LeastLogOdds(search, kLogOddsOfNone) &&
-        best.log_odds - second >= kMinLogMargin)) {
-    return std::nullopt;
-  }
-  FoundBox found = search.Finish(best);
-  found.normal = best_normal;
-  PutLongestFirst(2, &found);
-  return found;
+  std::optional<FoundBox> box = BoxSearch(lines, diagonal_px).Best(normals, 0.0, kLogOddsOfNone);
+  if (box) PutLongestFirst(2, &*box);
+  return box;
 }
 
 std::optional<FoundBox> FindFreeBox(const std::vector<DetectedLine>& lines,
                                     const std::vector<Vector3d>& axes, double diagonal_px) {
-  BoxSearch search(lines, diagonal_px);
-  std::vector<BoxSearch::Box> boxes;
-  for (const Vector3d& axis : axes) boxes.push_back(search.Find(axis, kPencilSigmaRad));
-  std::stable_sort(boxes.begin(), boxes.end(),
-                   [](const auto& a, const auto& b) { return a.log_odds > b.log_odds; });
-  if (boxes.empty() || !(boxes[0].log_odds >= LeastLogOdds(search, kLogOddsOfNoneFree)))
-    return std::nullopt;
-  for (std::size_t k = 1; k < boxes.size(); ++k) {
-    if (boxes[0].log_odds - boxes[k].log_odds >= kMinLogMargin) break;
-    const Matrix3d cosines = (boxes[0].axes.transpose() * boxes[k].axes).cwiseAbs();
-    if (cosines.rowwise().maxCoeff().minCoeff() < kSameBox) return std::nullopt;
-  }
-  FoundBox found = search.Finish(boxes[0]);
-  PutLongestFirst(3, &found);
-  return found;
+  std::optional<FoundBox> box =
+      BoxSearch(lines, diagonal_px).Best(axes, kPencilSigmaRad, kLogOddsOfNoneFree);
+  if (box) PutLongestFirst(3, &*box);
+  return box;
 }
 
 }  // namespace circline

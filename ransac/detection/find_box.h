@@ -19,7 +19,7 @@
 namespace circline {
 
 struct FoundBox {
-  std::size_t normal = 0;                 // Which of those given; of FindBox.
+  std::size_t given = 0;                  // Which of the normals, or axes, it has.
   Eigen::Matrix3d axes;                   // A rotation: directions in the plane, the normal.
   std::array<DetectedPencil, 3> pencils;  // Along them; one line or more each, no fit.
   // Logarithm of how much likelier the lines are as edges of the box than as lines of any
@@ -42,6 +42,11 @@ std::optional<FoundBox> FindBox(const std::vector<DetectedLine>& lines,
 std::optional<FoundBox> FindFreeBox(const std::vector<DetectedLine>& lines,
                                     const std::vector<Eigen::Vector3d>& axes,
                                     double diagonal_px = kUsualDiagonalPx);
+
+// Logarithm of how much likelier lines[members] are along the direction than along any, with the
+// errors and the prior odds of a box's edges.
+double LogOddsOfDirection(const std::vector<DetectedLine>& lines, const std::vector<int>& members,
+                          const Eigen::Vector3d& direction);
 
 }  // namespace circline
 

@@ -156,4 +156,13 @@ std::vector<DetectedEllipse> FollowCircles(const EdgeMap& edges, const Camera& c
   return found;
 }
 
+void Continue(const CircleObservation& predicted, CircleObservation* circle) {
+  circle->id = predicted.id;
+  if (!predicted.plane.empty()) circle->plane = predicted.plane;
+  circle->contrast = predicted.contrast;
+  circle->radius = predicted.radius;
+  circle->radius_sigma = predicted.radius_sigma;
+  circle->radius_group = predicted.radius_group;
+}
+
 }  // namespace circline

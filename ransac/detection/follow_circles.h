@@ -19,6 +19,9 @@ std::vector<DetectedEllipse> FollowCircles(const EdgeMap& edges, const Camera& c
                                            const std::vector<CircleObservation>& predicted,
                                            const EllipseOptions& options, double search_px);
 
+// Gives a circle what is known of the predicted one that it continues, whatever the photo.
+void Continue(const CircleObservation& predicted, CircleObservation* circle);
+
 }  // namespace circline
 
 #endif  // CIRCLINE_RANSAC_DETECTION_FOLLOW_CIRCLES_H_

@@ -24,12 +24,6 @@ constexpr double kMinOverlap = 0.5;
 // The centre of a circle lies within this share of the semi-minor axis from that of its ellipse.
 constexpr double kMaxCentreShare = 0.35;
 
-struct Match {
-  double cost;
-  std::size_t pencil, line;
-  int detected;
-};
-
 // How unlike a detected line is to the predicted one; infinite where it cannot be the same.
 double Unlikeness(const Segment& predicted, const Segment& detected, double search_px) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -63,29 +57,40 @@ Segment Ends(const LineObservation& line) { return {line.points.front(), line.po
 
 }  // namespace
 
+std::vector<int> CheapestPairs(std::vector<FeaturePair> pairs, std::size_t num_first,
+                               std::size_t num_second) {
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const FeaturePair& a, const FeaturePair& b) { return a.cost < b.cost; });
+  std::vector<int> matches(num_first, -1);
+  std::vector<bool> is_taken(num_second, false);
+  for (const FeaturePair& pair : pairs) {
+    if (matches[pair.first] >= 0 || is_taken[pair.second]) continue;
+    matches[pair.first] = static_cast<int>(pair.second);
+    is_taken[pair.second] = true;
+  }
+  return matches;
+}
+
 std::vector<std::vector<int>> MatchLines(const std::vector<PencilObservation>& predicted,
                                          const std::vector<DetectedLine>& lines, double search_px) {
-  std::vector<Match> candidates;
-  std::vector<std::vector<int>> matches;
-  for (std::size_t p = 0; p < predicted.size(); ++p) {
-    matches.emplace_back(predicted[p].lines.size(), -1);
-    for (std::size_t k = 0; k < predicted[p].lines.size(); ++k) {
-      const Segment ends = Ends(predicted[p].lines[k]);
+  std::vector<FeaturePair> pairs;
+  std::size_t num_predicted = 0;
+  for (const PencilObservation& pencil : predicted) {
+    for (const LineObservation& line : pencil.lines) {
       for (std::size_t i = 0; i < lines.size(); ++i) {
-        const double cost = Unlikeness(ends, lines[i].ends, search_px);
-        if (std::isfinite(cost)) candidates.push_back({cost, p, k, static_cast<int>(i)});
+        const double cost = Unlikeness(Ends(line), lines[i].ends, search_px);
+        if (std::isfinite(cost)) pairs.push_back({cost, num_predicted, i});
       }
+      ++num_predicted;
     }
   }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Match& a, const Match& b) { return a.cost < b.cost; });
-  std::vector<bool> is_taken(lines.size(), false);
-  for (const Match& match : candidates) {
-    int& detected = matches[match.pencil][match.line];
-    const auto index = static_cast<std::size_t>(match.detected);
-    if (detected >= 0 || is_taken[index]) continue;
-    detected = match.detected;
-    is_taken[index] = true;
+  const std::vector<int> all = CheapestPairs(std::move(pairs), num_predicted, lines.size());
+  std::vector<std::vector<int>> matches;
+  auto next = all.begin();
+  for (const PencilObservation& pencil : predicted) {
+    const auto end = next + static_cast<std::ptrdiff_t>(pencil.lines.size());
+    matches.emplace_back(next, end);
+    next = end;
   }
   return matches;
 }

@@ -2,12 +2,24 @@
 #ifndef CIRCLINE_RANSAC_DETECTION_FOLLOW_LINES_H_
 #define CIRCLINE_RANSAC_DETECTION_FOLLOW_LINES_H_
 
+#include <cstddef>
 #include <vector>
 
 #include "circline/estimators/observations.h"
 #include "circline/ransac/detection/detect_lines.h"
 
 namespace circline {
+
+// What may be one feature in two photos.
+struct FeaturePair {
+  double cost;
+  std::size_t first, second;
+};
+
+// For each of the first features the second one that it is, or -1: the cheapest pairs first, each
+// feature once.
+std::vector<int> CheapestPairs(std::vector<FeaturePair> pairs, std::size_t num_first,
+                               std::size_t num_second);
 
 // For each predicted pencil the detected lines that continue its own, none in two pencils: within
 // `search_px` at both ends, over half of the shorter one. -1 for a line that none continues.

@@ -1,5 +1,3 @@
-#include "circline/ransac/detection/keep_names.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -12,6 +10,7 @@
 #include "circline/estimators/conic.h"
 #include "circline/ransac/detection/follow_circles.h"
 #include "circline/ransac/detection/follow_lines.h"
+#include "circline/ransac/detection/follow_observations.h"
 
 namespace circline {
 namespace {
@@ -21,35 +20,15 @@ constexpr double kMaxTurnSine = 0.17;  // 10 degrees.
 // features is no continuation.
 constexpr double kMinKept = 0.5;
 
-struct Pair {
-  double cost;
-  std::size_t predicted, detected;
-};
-
-// For each detected feature the index of the predicted one that it continues, or -1: the cheapest
-// pairs first, each feature once.
-std::vector<int> Assign(std::vector<Pair> pairs, std::size_t num_predicted,
-                        std::size_t num_detected) {
-  std::stable_sort(pairs.begin(), pairs.end(),
-                   [](const Pair& a, const Pair& b) { return a.cost < b.cost; });
-  std::vector<int> continued(num_detected, -1);
-  std::vector<bool> is_taken(num_predicted, false);
-  for (const Pair& pair : pairs) {
-    if (continued[pair.detected] >= 0 || is_taken[pair.predicted]) continue;
-    continued[pair.detected] = static_cast<int>(pair.predicted);
-    is_taken[pair.predicted] = true;
-  }
-  return continued;
-}
-
 bool FittedEllipse(const CircleObservation& circle, Ellipse* ellipse) {
   return circle.fit && ConicToEllipse(circle.fit->conic, ellipse);
 }
 
+// For each detected circle the predicted one that it continues, or -1.
 std::vector<int> AssignCircles(const Observations& predicted, const Observations& detected,
                                double search_px) {
   const double focal = 0.5 * (detected.camera.fx + detected.camera.fy);
-  std::vector<Pair> pairs;
+  std::vector<FeaturePair> pairs;
   for (std::size_t i = 0; i < predicted.circles.size(); ++i) {
     Ellipse before;
     if (!FittedEllipse(predicted.circles[i], &before)) continue;
@@ -60,10 +39,10 @@ std::vector<int> AssignCircles(const Observations& predicted, const Observations
       const double growth = now.a / before.a;
       if (offset > std::max(search_px / focal, 0.5 * before.b)) continue;
       if (!(growth < kMaxGrowth && growth > 1.0 / kMaxGrowth)) continue;
-      pairs.push_back({offset + std::abs(now.a - before.a) + std::abs(now.b - before.b), i, k});
+      pairs.push_back({offset + std::abs(now.a - before.a) + std::abs(now.b - before.b), k, i});
     }
   }
-  return Assign(std::move(pairs), predicted.circles.size(), detected.circles.size());
+  return CheapestPairs(std::move(pairs), detected.circles.size(), predicted.circles.size());
 }
 
 // How many lines of each detected pencil continue those of each predicted one,
@@ -88,11 +67,11 @@ std::vector<std::vector<int>> CountSharedLines(const Observations& predicted,
   return shared;
 }
 
-// By the lines that they share: at least half of those of the smaller one.
+// The same of pencils, by the lines that they share: at least half of those of the smaller one.
 std::vector<int> AssignPencils(const Observations& predicted, const Observations& detected,
                                double search_px) {
   const std::vector<std::vector<int>> shared = CountSharedLines(predicted, detected, search_px);
-  std::vector<Pair> pairs;
+  std::vector<FeaturePair> pairs;
   for (std::size_t i = 0; i < predicted.pencils.size(); ++i) {
     for (std::size_t k = 0; k < detected.pencils.size(); ++k) {
       const auto &before = predicted.pencils[i].fit, &now = detected.pencils[k].fit;
@@ -100,10 +79,10 @@ std::vector<int> AssignPencils(const Observations& predicted, const Observations
       const std::size_t fewer =
           std::min(predicted.pencils[i].lines.size(), detected.pencils[k].lines.size());
       if (shared[i][k] > 0 && 2 * static_cast<std::size_t>(shared[i][k]) >= fewer)
-        pairs.push_back({-1.0 * shared[i][k], i, k});
+        pairs.push_back({-1.0 * shared[i][k], k, i});
     }
   }
-  return Assign(std::move(pairs), predicted.pencils.size(), detected.pencils.size());
+  return CheapestPairs(std::move(pairs), detected.pencils.size(), predicted.pencils.size());
 }
 
 // What the planes of the detection are called in the prediction: as most features say that are in
@@ -134,15 +113,6 @@ class PlaneNames {
   std::map<std::string, std::map<std::string, int>> votes_;
   std::map<std::string, std::string> names_;
 };
-
-void Continue(const CircleObservation& predicted, CircleObservation* circle) {
-  circle->id = predicted.id;
-  if (!predicted.plane.empty()) circle->plane = predicted.plane;
-  circle->contrast = predicted.contrast;
-  circle->radius = predicted.radius;
-  circle->radius_sigma = predicted.radius_sigma;
-  circle->radius_group = predicted.radius_group;
-}
 
 void Continue(const PencilObservation& predicted, PencilObservation* pencil) {
   pencil->id = predicted.id;

@@ -28,8 +28,8 @@ double LineOdds::Sine(const Eigen::Vector3d& direction) const {
 // A line of any orientation, an angle phi uniform, misses by sine * cos(phi): with a density of
 // 1 / (pi sine) at no miss, and hardly more near it.
 double LineOdds::LogRatio(const Eigen::Vector3d& direction, double variance) const {
-  const double sine = Sine(direction), miss = Miss(direction);
-  return 0.5 * std::log(0.5 * kPi * sine * sine / variance) - 0.5 * miss * miss / variance;
+  const double sine = Sine(direction), residual = Residual(direction);
+  return 0.5 * std::log(0.5 * kPi * sine * sine / variance) - 0.5 * residual * residual / variance;
 }
 
 }  // namespace circline

@@ -16,7 +16,7 @@ class LineOdds {
   explicit LineOdds(const LineFit& fit);
 
   const LineFit& fit() const { return fit_; }
-  double Miss(const Eigen::Vector3d& direction) const { return fit_.line.dot(direction); }
+  double Residual(const Eigen::Vector3d& direction) const { return fit_.line.dot(direction); }
   // Of the miss.
   double Variance(const Eigen::Vector3d& direction) const {
     return direction.dot(fit_.covariance * direction);

@@ -34,22 +34,6 @@ double FirstLogFocal(const Camera& camera, const CameraSigma& sigma) {
   return std::clamp(std::log(kUsual * longer), stated - sigma.log_focal, stated + sigma.log_focal);
 }
 
-// The focal length at which its structure is likeliest.
-Status Judge(const Observations& observations, const DetectionOptions& options, double diagonal_px,
-             Look* look) {
-  std::vector<DetectedPencil> pencils;
-  if (options.max_pencils > 0) {
-    const Status status = DetectPencilsApart(look->evidence.lines, options.max_pencils,
-                                             options.seed, &pencils, diagonal_px);
-    if (!status.ok()) return status;
-  }
-  const double prior = StatedLogFocal(observations);
-  look->likeliest =
-      LikeliestFocal(look->evidence, pencils, observations.camera, options.noise_model.camera,
-                     prior, diagonal_px, observations.found_k1);
-  return Status::Ok();
-}
-
 // By how much of its distance to the middle such a k1 moves a corner of the photo.
 double BendAtCorner(double k1, const Camera& camera) {
   const Vector2d corner(camera.width / camera.fx, camera.height / camera.fy);
@@ -113,8 +97,11 @@ Status LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& op
     Status status = is_first ? LookForLens(collect, options, &camera, &look.evidence)
                              : collect(camera, &look.evidence);
     observations->found_k1 = camera.distortion[0] - stated_k1;
-    if (status.ok()) status = Judge(*observations, options, diagonal_px, &look);
     if (!status.ok()) return status;
+    look.likeliest = LikeliestFocal(
+        look.evidence,
+        DetectPencilsApart(look.evidence.lines, options.max_pencils, options.seed, diagonal_px),
+        camera, sigma, StatedLogFocal(*observations), diagonal_px, observations->found_k1);
     if (look.likeliest.gain > kClearly) next = OnSteps(next + look.likeliest.log_focal);
   }
   const auto best = std::min_element(looks.begin(), looks.end(), [](const Look& a, const Look& b) {

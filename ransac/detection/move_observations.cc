@@ -1,5 +1,3 @@
-#include "circline/ransac/detection/move_observations.h"
-
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -12,6 +10,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
+#include "circline/ransac/detection/follow_observations.h"
 
 namespace circline {
 namespace {

@@ -40,13 +40,12 @@ double DiagonalPx(int width, int height) {
   return std::max(kUsualDiagonalPx, std::hypot(width, height));
 }
 
-Status ObserveEvidence(const DetectionOptions& options, double diagonal_px, PhotoEvidence* evidence,
-                       Observations* observations) {
+void ObserveEvidence(const DetectionOptions& options, double diagonal_px, PhotoEvidence* evidence,
+                     Observations* observations) {
   std::vector<DetectedPencil> pencils;
   if (options.max_pencils > 0) {
-    const Status status = DetectPencils(evidence->lines, options.max_pencils + kExtraPencils,
-                                        options.seed, &pencils, diagonal_px);
-    if (!status.ok()) return status;
+    pencils = DetectPencils(evidence->lines, options.max_pencils + kExtraPencils, options.seed,
+                            diagonal_px);
   }
   AssemblyOptions assembly;
   assembly.max_pencils = options.max_pencils;
@@ -68,7 +67,6 @@ Status ObserveEvidence(const DetectionOptions& options, double diagonal_px, Phot
     observations->message += std::to_string(evidence->num_ellipses) + " ellipses found, the best " +
                              std::to_string(most) + " kept (max_circles)";
   }
-  return Status::Ok();
 }
 
 Status LineFromSegment(const Camera& camera, const Segment& segment, double sigma_px,

@@ -27,8 +27,8 @@ double DiagonalPx(int width, int height);
 
 // Pencils, the plane, the roles: fills all of `observations` but its camera, which is there.
 // `evidence` is moved from.
-Status ObserveEvidence(const DetectionOptions& options, double diagonal_px, PhotoEvidence* evidence,
-                       Observations* observations);
+void ObserveEvidence(const DetectionOptions& options, double diagonal_px, PhotoEvidence* evidence,
+                     Observations* observations);
 
 // A line from a segment's end points, each with the standard deviation `sigma_px` across it. Not ok
 // where the camera cannot undistort them or they coincide.

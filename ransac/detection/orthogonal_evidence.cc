@@ -21,15 +21,18 @@ using Eigen::Vector3d;
 constexpr double kMinLogOdds = 2.0;
 // A line so nearly orthogonal to the axis (a sine) has no direction orthogonal to it.
 constexpr double kMinCross = 0.05;
+// Turns about the axis that are compared, degrees: those of other houses' fronts are further off.
+constexpr int kMostTurnDeg = 12;
+// Leans, standard deviations, that stand for all.
+constexpr int kMostLean = 2;
 
 }  // namespace
 
-OrthogonalEvidence::OrthogonalEvidence(const std::vector<LineFit>& lines, const Vector3d& axis,
-                                       double spread_rad)
+OrthogonalEvidence::OrthogonalEvidence(const std::vector<LineFit>& lines, const Vector3d& axis)
     : axis_(axis) {
   for (const LineFit& line : lines) {
     const double lean = kRightAngleSigmaDeg * kDegree * line.line.dot(axis);
-    lines_.emplace_back(WithDirectionError(line, std::hypot(spread_rad, lean)));
+    lines_.emplace_back(WithDirectionError(line, std::hypot(kParallelSigmaRad, lean)));
   }
 }
 
@@ -41,8 +44,8 @@ double OrthogonalEvidence::LogOdds(const Vector3d& direction) const {
     const double variance = line.Variance(direction), sigma = std::sqrt(variance);
     // Lines as near by chance.
     expected += 2.0 / kPi * std::asin(std::min(1.0, kInlierSigmas * sigma / line.Sine(direction)));
-    const double slope = line.Miss(turn) / sigma;
-    if (std::abs(line.Miss(direction)) > kInlierSigmas * sigma) continue;
+    const double slope = line.Residual(turn) / sigma;
+    if (std::abs(line.Residual(direction)) > kInlierSigmas * sigma) continue;
     ratios.push_back(std::exp(line.LogRatio(direction, variance)));
     information += slope * slope;
   }
@@ -82,6 +85,39 @@ double OrthogonalEvidence::HighestLogOdds() const {
     highest = std::max(highest, LogOdds(direction) + std::log(0.5 + 0.5 * std::exp(third)));
   }
   return highest - kMinLogOdds;
+}
+
+std::vector<DirectionReading> ReadDirection(const std::vector<LineFit>& lines, const Vector3d& axis,
+                                            const Vector3d& direction, int num_own) {
+  const double odds = num_own / (static_cast<double>(lines.size()) + 1.0 - num_own);
+  const double lean_rad = kRightAngleSigmaDeg * kDegree;
+  const double reach =
+      std::sin(kMostTurnDeg * kDegree + kMostLean * lean_rad) + kInlierSigmas * kParallelSigmaRad;
+  std::vector<LineOdds> near;
+  for (const LineFit& line : lines) {
+    if (std::abs(line.line.dot(direction)) < reach)
+      near.emplace_back(WithDirectionError(line, kParallelSigmaRad));
+  }
+  const Vector3d level = axis.cross(direction).cross(axis).normalized(), aside = axis.cross(level);
+  std::vector<DirectionReading> readings;
+  Eigen::ArrayXXd logs(2 * kMostLean + 1, 2 * kMostTurnDeg + 1);  // Of the likelihoods.
+  for (int turn = -kMostTurnDeg; turn <= kMostTurnDeg; ++turn) {
+    const Vector3d turned = std::cos(turn * kDegree) * level + std::sin(turn * kDegree) * aside;
+    readings.push_back({turned, 0.0});
+    for (int lean = -kMostLean; lean <= kMostLean; ++lean) {
+      const Vector3d v = std::cos(lean * lean_rad) * turned + std::sin(lean * lean_rad) * axis;
+      double& sum = logs(lean + kMostLean, turn + kMostTurnDeg);
+      sum = -0.5 * lean * lean;
+      for (const LineOdds& line : near)
+        sum += std::log1p(odds * std::exp(line.LogRatio(v, line.Variance(v))));
+    }
+  }
+  const Eigen::ArrayXXd likelihoods = (logs - logs.maxCoeff()).exp();
+  for (std::size_t k = 0; k < readings.size(); ++k) {
+    readings[k].probability =
+        likelihoods.col(static_cast<Eigen::Index>(k)).sum() / likelihoods.sum();
+  }
+  return readings;
 }
 
 }  // namespace circline

@@ -1,4 +1,4 @@
-// Evidence of a direction at right angles to one that is known. Internal: not installed.
+// Evidence of directions at right angles to one that is known. Internal: not installed.
 #ifndef CIRCLINE_RANSAC_DETECTION_ORTHOGONAL_EVIDENCE_H_
 #define CIRCLINE_RANSAC_DETECTION_ORTHOGONAL_EVIDENCE_H_
 
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "circline/estimators/line.h"
+#include "circline/estimators/observations.h"
 #include "circline/ransac/detection/line_odds.h"
 
 namespace circline {
@@ -16,9 +17,8 @@ namespace circline {
 class OrthogonalEvidence {
  public:
   // Each line is to be one of its own, no piece of another. Lines may miss the direction by
-  // `spread_rad` more than their covariances say.
-  OrthogonalEvidence(const std::vector<LineFit>& lines, const Eigen::Vector3d& axis,
-                     double spread_rad);
+  // kParallelSigmaRad more than their covariances say.
+  OrthogonalEvidence(const std::vector<LineFit>& lines, const Eigen::Vector3d& axis);
 
   // Logarithm of the odds that some share about this direction to that all lie any way. The
   // likelihood of the mixture is integrated over the direction's angle about the axis (Laplace),
@@ -40,6 +40,14 @@ class OrthogonalEvidence {
   Eigen::Vector3d axis_;
   std::vector<LineOdds> lines_;
 };
+
+// Directions about `direction`, turned about `axis`, and how probable each is by all of `lines`: a
+// mixture of `num_own` lines along it, which leans from the right angle to the axis by what walls
+// do (kRightAngleSigmaDeg, integrated over), and others that run any way. A fit that knows which
+// lines are its own misses that others might be.
+std::vector<DirectionReading> ReadDirection(const std::vector<LineFit>& lines,
+                                            const Eigen::Vector3d& axis,
+                                            const Eigen::Vector3d& direction, int num_own);
 
 }  // namespace circline
 

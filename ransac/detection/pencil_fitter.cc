@@ -19,6 +19,48 @@ constexpr double kMaxSpreadRad = 12e-3;
 // by more than long ones; measured on the sides of chessboard squares.
 constexpr double kSharedErrorPx = 0.06;
 
+double Variance(const LineFit& line, const Vector3d& direction, double spread) {
+  return direction.dot(line.covariance * direction) + spread * spread;
+}
+
+std::vector<int> LinesNear(const LineSet& set, const std::vector<int>& candidates,
+                           const Vector3d& direction, double spread) {
+  std::vector<int> near;
+  for (const int i : candidates) {
+    const LineFit& line = set.fits[static_cast<std::size_t>(i)];
+    const double residual = line.line.dot(direction);
+    if (residual * residual <= kInlierSigmas * kInlierSigmas * Variance(line, direction, spread))
+      near.push_back(i);
+  }
+  return near;
+}
+
+// The standard deviation (radians) by which lines miss the direction beyond what their own
+// covariances explain: chosen so that half of the total length has normalised residuals below the
+// median of a Gaussian's. Between kMinSpreadRad and the largest.
+double EstimateSpread(const LineSet& set, const std::vector<int>& members,
+                      const Vector3d& direction, double max_spread) {
+  const auto share_below = [&](double spread) {
+    double below = 0.0, total = 0.0;
+    for (const int i : members) {
+      const LineFit& line = set.fits[static_cast<std::size_t>(i)];
+      const double residual = line.line.dot(direction);
+      const double length = set.lines[static_cast<std::size_t>(i)].length_px;
+      total += length;
+      if (residual * residual < 0.455 * Variance(line, direction, spread)) below += length;
+    }
+    return below / std::max(total, 1.0);
+  };
+  double low = kMinSpreadRad, high = max_spread;
+  if (share_below(low) >= 0.5) return low;
+  if (share_below(high) <= 0.5) return high;
+  for (int step = 0; step < 12; ++step) {  // To a part in 4000 of the interval.
+    const double middle = 0.5 * (low + high);
+    (share_below(middle) < 0.5 ? low : high) = middle;
+  }
+  return high;
+}
+
 }  // namespace
 
 LineSet::LineSet(const std::vector<DetectedLine>& detected, double photo_px)
@@ -31,95 +73,50 @@ int LineSet::Count(const std::vector<int>& members) const {
       std::count_if(members.begin(), members.end(), [this](int i) { return !IsTwin(i); }));
 }
 
-bool PencilFitter::Fit(const std::vector<int>& candidates, FoundPencil* pencil,
-                       double* spread) const {
-  *spread = max_spread_;
+std::optional<DetectedPencil> FitPencil(const LineSet& set, const std::vector<int>& candidates,
+                                        const Vector3d& direction, double max_spread_rad,
+                                        int min_lines) {
   constexpr int kPasses = 6;
+  VanishingPointFit fit;
+  fit.direction = direction;
+  std::vector<int> members;
+  std::vector<LineFit> fits;
   for (int pass = 0; pass < kPasses; ++pass) {
-    const Vector3d direction = pencil->fit.direction;
-    const std::vector<int> near = Near(candidates, direction, max_spread_);
-    *spread = EstimateSpread(near, direction);
-    pencil->lines = Near(near, direction, *spread);
-    std::vector<LineFit> members;
-    for (const int i : pencil->lines) members.push_back(WithDirectionError(Line(i), *spread));
-    VanishingPointFit fit;
-    if (!FitVanishingPoint(members, &fit).ok()) return false;
-    pencil->fit = fit;
+    const std::vector<int> near = LinesNear(set, candidates, fit.direction, max_spread_rad);
+    const double spread = EstimateSpread(set, near, fit.direction, max_spread_rad);
+    members = LinesNear(set, near, fit.direction, spread);
+    fits.clear();
+    for (const int i : members)
+      fits.push_back(WithDirectionError(set.fits[static_cast<std::size_t>(i)], spread));
+    if (!FitVanishingPoint(fits, &fit).ok()) return std::nullopt;
   }
-  return true;
+  if (set.Count(members) < min_lines) return std::nullopt;
+  DetectedPencil pencil = MakePencil(set.lines, members, fits, fit.direction);
+  pencil.observation.fit = fit;
+  return pencil;
 }
 
-void PencilFitter::StartAtDensest(std::uint64_t seed, FoundPencil* pencil) const {
+Vector3d DensestDirection(const LineSet& set, const std::vector<int>& lines,
+                          const Vector3d& direction, std::uint64_t seed) {
   std::vector<LineFit> members;
-  for (const int i : pencil->lines) members.push_back(Line(i));
+  for (const int i : lines) members.push_back(set.fits[static_cast<std::size_t>(i)]);
   PencilOptions exact;
   exact.ransac.seed = seed;
   exact.model_sigma_rad = kExactSigmaRad;
   exact.max_pencils = 1;
   exact.max_false_alarms = 1e300;  // However few they are.
   std::vector<FoundPencil> densest;
-  if (FindPencils(members, exact, &densest).ok() && !densest.empty())
-    pencil->fit = densest.front().fit;
-}
-
-double PencilFitter::Variance(int i, const Vector3d& direction, double spread) const {
-  return direction.dot(Line(i).covariance * direction) + spread * spread;
-}
-
-std::vector<int> PencilFitter::Near(const std::vector<int>& candidates, const Vector3d& direction,
-                                    double spread) const {
-  std::vector<int> near;
-  for (const int i : candidates) {
-    const double miss = Line(i).line.dot(direction);
-    if (miss * miss <= kInlierSigmas * kInlierSigmas * Variance(i, direction, spread))
-      near.push_back(i);
-  }
-  return near;
-}
-
-// The standard deviation (radians) by which lines miss the direction beyond what their own
-// covariances explain: chosen so that half of the total length has normalised residuals below the
-// median of a Gaussian's. Between kMinSpreadRad and the largest.
-double PencilFitter::EstimateSpread(const std::vector<int>& members,
-                                    const Vector3d& direction) const {
-  const auto share_below = [&](double spread) {
-    double below = 0.0, total = 0.0;
-    for (const int i : members) {
-      const double miss = Line(i).line.dot(direction);
-      const double length = set_.lines[static_cast<std::size_t>(i)].length_px;
-      total += length;
-      if (miss * miss < 0.455 * Variance(i, direction, spread)) below += length;
-    }
-    return below / std::max(total, 1.0);
-  };
-  double low = kMinSpreadRad, high = max_spread_;
-  if (share_below(low) >= 0.5) return low;
-  if (share_below(high) <= 0.5) return high;
-  for (int step = 0; step < 12; ++step) {  // To a part in 4000 of the interval.
-    const double middle = 0.5 * (low + high);
-    (share_below(middle) < 0.5 ? low : high) = middle;
-  }
-  return high;
-}
-
-DetectedPencil MakePencil(const FoundPencil& found, const LineSet& set, double spread) {
-  std::vector<LineFit> fits;
-  for (const int i : found.lines) {
-    fits.push_back(WithDirectionError(set.fits[static_cast<std::size_t>(i)], spread));
-  }
-  DetectedPencil pencil = MakePencil(set.lines, found.lines, fits, found.fit.direction);
-  pencil.observation.fit = found.fit;
-  return pencil;
+  const bool is_found = FindPencils(members, exact, &densest).ok() && !densest.empty();
+  return is_found ? densest.front().fit.direction : direction;
 }
 
 bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
                  DetectedPencil* pencil, double diagonal_px) {
-  const LineSet set(lines, diagonal_px);
-  FoundPencil found;
-  found.fit = *pencil->observation.fit;
-  double spread;
-  if (!PencilFitter(set, kMaxSpreadRad).Fit(candidates, &found, &spread)) return false;
-  *pencil = MakePencil(found, set, spread);
+  std::optional<DetectedPencil> found =
+      FitPencil(LineSet(lines, diagonal_px), candidates, pencil->observation.fit->direction,
+                kMaxSpreadRad, 1);
+  if (!found) return false;
+  *pencil = std::move(*found);
   return true;
 }
 

@@ -1,13 +1,13 @@
 #include "circline/ransac/detection/structure_focal.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "circline/estimators/basics.h"
-#include "circline/ransac/detection/focused_features.h"
+#include "circline/estimators/conic.h"
 #include "circline/ransac/detection/line_odds.h"
 #include "circline/ransac/detection/orthogonal_evidence.h"
 #include "circline/ransac/detection/straight_lens.h"
@@ -17,8 +17,8 @@
 namespace circline {
 namespace {
 
-using Circles = std::vector<std::optional<ConicFit>>;
-using Directions = std::vector<std::optional<UncertainDirection>>;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
 
 // The prior is searched over so many of its standard deviations.
 constexpr double kReach = 2.5;
@@ -40,19 +40,72 @@ constexpr double kMiddleStep = 0.5;
 // The circles of a plane have its normal within this of that of one of them, degrees.
 constexpr double kSeedSigmaDeg = 5.0;
 
+// More circles, pencils and edges add little but accidents.
+constexpr std::size_t kMaxCircles = 16, kMaxPencils = 4, kMaxEdges = 40;
+
+// A conic seen through a camera of another focal length, its logarithm over that of the first.
+ConicFit Refocus(const ConicFit& fit, double log_focal) {
+  const double s = std::exp(log_focal);
+  const Matrix3d scale = Vector3d(s, s, 1.0).asDiagonal();
+  ConicFit out = fit;
+  out.conic = scale * fit.conic * scale;
+  Matrix6d J;
+  for (int k = 0; k < 6; ++k)
+    J.col(k) = ConicToVector(scale * VectorToConic(Vector6d::Unit(k)) * scale);
+  Eigen::Map<Matrix6d>(out.covariance.data()) = J * fit.Covariance() * J.transpose();
+  return out;
+}
+
+// The features by which the structure of a photo is judged: the best circles, the directions of the
+// longest pencils, and edges around these where they tell more. What was fitted is seen through
+// another focal length as through a lens that bends the photo alike: a photo is looked at again
+// where that leads.
+struct Features {
+  std::vector<ConicFit> circles;
+  std::vector<UncertainDirection> pencils, edges;  // Edges: the lines.
+
+  Features(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& detected,
+           double diagonal_px) {
+    for (const CircleEvidence& circle : evidence.circles) {
+      if (circles.size() < kMaxCircles) circles.push_back(*circle.observation.fit);
+    }
+    for (const DetectedPencil& pencil : detected) {
+      const VanishingPointFit& fit = *pencil.observation.fit;
+      const bool is_known = std::any_of(pencils.begin(), pencils.end(), [&](const auto& other) {
+        return AreAlike(other.vector, fit.direction);
+      });
+      if (!is_known && pencils.size() < kMaxPencils)
+        pencils.push_back({fit.direction, fit.covariance});
+    }
+    const bool tell_a_third = pencils.size() > 1 && circles.size() < 2;
+    if (!tell_a_third && !IsEmpty()) return;
+    for (const DetectedLine& edge : EdgesAround(evidence.lines, detected, diagonal_px)) {
+      if (edges.size() < kMaxEdges) edges.push_back({edge.fit.line, edge.fit.covariance});
+    }
+  }
+
+  // Whether all focal lengths are alike to them.
+  bool IsEmpty() const { return circles.size() < 2 && pencils.size() < 2 && edges.size() < 2; }
+
+  // At a focal length, its logarithm over that of the camera.
+  Features At(double log_focal) const {
+    Features at = *this;
+    for (ConicFit& circle : at.circles) circle = Refocus(circle, log_focal);
+    for (UncertainDirection& pencil : at.pencils) pencil = Refocus(pencil, log_focal);
+    for (UncertainDirection& edge : at.edges) edge = Refocus(edge, -log_focal);
+    return at;
+  }
+};
+
 class StructureEvidence {
  public:
   StructureEvidence(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& pencils,
-                    const Camera& camera, const CameraSigma& sigma, double diagonal_px)
-      : features_(evidence, pencils, camera, sigma, diagonal_px),
-        middle_rad_(sigma.principal_point_px / camera.fx) {
+                    double middle_rad, double diagonal_px)
+      : features_(evidence, pencils, diagonal_px), middle_rad_(middle_rad) {
     for (const CircleEvidence& circle : evidence.circles) {
       const UncertainDirection& normal = circle.normals[0];
       // The plane is known as well as the circle's own normal.
-      peaks_.push_back(
-          circle.num_normals > 0
-              ? LikelihoodRatio({normal.vector, 2.0 * normal.covariance}, normal.vector)
-              : 0.0);
+      peaks_.push_back(LikelihoodRatio({normal.vector, 2.0 * normal.covariance}, normal.vector));
     }
   }
 
@@ -62,8 +115,8 @@ class StructureEvidence {
     double log_common = 0.0;  // Right angles and a common plane to neither, logarithm.
     double others = 0.0;      // Other lines at right angles to the pencils to any way.
   };
-  Odds At(double log_focal) {
-    const FocusedFeatures features = features_.At(log_focal);
+  Odds At(double log_focal) const {
+    const Features features = features_.At(log_focal);
     const double middle_rad = middle_rad_ * std::exp(-log_focal);
     return {RightAngles(features.pencils, middle_rad) + OnePlane(features.circles),
             features.edges.size() < 2      ? 0.0
@@ -74,12 +127,10 @@ class StructureEvidence {
  private:
   // The principal point is the same for all pairs: at each place that it may have their odds are
   // multiplied, and the products are summed.
-  static double RightAngles(const Directions& directions, double middle_rad) {
+  static double RightAngles(const std::vector<UncertainDirection>& directions, double middle_rad) {
     std::vector<RightAngle> pairs;
-    for (std::size_t i = 0; i < directions.size(); ++i) {
-      for (std::size_t j = i + 1; j < directions.size(); ++j) {
-        if (directions[i] && directions[j]) pairs.emplace_back(*directions[i], *directions[j]);
-      }
+    for (std::size_t j = 0; j < directions.size(); ++j) {
+      for (std::size_t i = 0; i < j; ++i) pairs.emplace_back(directions[i], directions[j]);
     }
     if (pairs.empty()) return 0.0;
     double sum = 0.0, all = 0.0;
@@ -97,24 +148,21 @@ class StructureEvidence {
     return std::log(sum / all);
   }
 
-  static std::vector<LineFit> EdgesOf(const FocusedFeatures& features) {
+  static std::vector<LineFit> EdgesOf(const Features& features) {
     std::vector<LineFit> edges;
-    for (const std::optional<UncertainDirection>& edge : features.edges) {
-      if (edge) edges.push_back({edge->vector, edge->covariance, 0.0});
-    }
+    for (const UncertainDirection& edge : features.edges)
+      edges.push_back({edge.vector, edge.covariance, 0.0});
     return edges;
   }
 
   // Of the edges around the only pencil as those of one thing with it.
-  static double EdgesAtRightAngles(const FocusedFeatures& features) {
-    if (!features.pencils[0]) return 0.0;
-    const OrthogonalEvidence evidence(EdgesOf(features), features.pencils[0]->vector,
-                                      kParallelSigmaRad);
+  static double EdgesAtRightAngles(const Features& features) {
+    const OrthogonalEvidence evidence(EdgesOf(features), features.pencils[0].vector);
     return std::exp(std::min(evidence.HighestLogOdds(), kMostLogOdds));
   }
 
   // Of the lines outside the pencils as those of the third direction of one thing with two of them.
-  static double EdgesAlongThird(const FocusedFeatures& features, double middle_rad) {
+  static double EdgesAlongThird(const Features& features, double middle_rad) {
     std::vector<LineOdds> lines;
     for (const LineFit& edge : EdgesOf(features))
       lines.emplace_back(WithDirectionError(edge, kParallelSigmaRad));
@@ -123,8 +171,7 @@ class StructureEvidence {
     for (std::size_t i = 0; i < features.pencils.size(); ++i) {
       for (std::size_t j = i + 1; j < features.pencils.size(); ++j) {
         pairs += 1.0;
-        if (!features.pencils[i] || !features.pencils[j]) continue;
-        const UncertainDirection &a = *features.pencils[i], &b = *features.pencils[j];
+        const UncertainDirection &a = features.pencils[i], &b = features.pencils[j];
         const double odds = std::exp(RightAngle(a, b, camera).LogOdds());
         if (odds < kNegligible) continue;
         if (const auto third = ThirdDirection(a, b, camera))
@@ -135,13 +182,12 @@ class StructureEvidence {
   }
 
   // Of the plane that explains most of them.
-  double OnePlane(const Circles& circles) const {
+  double OnePlane(const std::vector<ConicFit>& circles) const {
     if (circles.size() < 2) return 0.0;
     double best = 0.0;
     for (std::size_t seed = 0; seed < std::min(circles.size(), kMaxSeeds); ++seed) {
-      if (!circles[seed]) continue;
       std::array<UncertainDirection, 2> normals;
-      const int count = CircleNormals(*circles[seed], &normals);
+      const int count = CircleNormals(circles[seed], &normals);
       for (int k = 0; k < count; ++k) {
         const UncertainDirection mean = MeanOfPlane(circles, normals[static_cast<std::size_t>(k)]);
         best = std::max(best, PlaneEvidence(circles, mean));
@@ -150,10 +196,11 @@ class StructureEvidence {
     return best;
   }
 
-  static UncertainDirection MeanOfPlane(const Circles& circles, const UncertainDirection& seed) {
+  static UncertainDirection MeanOfPlane(const std::vector<ConicFit>& circles,
+                                        const UncertainDirection& seed) {
     std::vector<const ConicFit*> members;
-    for (const std::optional<ConicFit>& circle : circles) {
-      if (circle && CanLieIn(*circle, seed)) members.push_back(&*circle);
+    for (const ConicFit& circle : circles) {
+      if (CanLieIn(circle, seed)) members.push_back(&circle);
     }
     return NormalOfCircles(seed, kSeedSigmaDeg, members);
   }
@@ -161,28 +208,26 @@ class StructureEvidence {
   // How much likelier circles are as those of one plane than as any. What a circle's normal is
   // known to changes with the focal length, what its contour is known to does not: that alone
   // counts, so that all focal lengths are compared by the same data.
-  double PlaneEvidence(const Circles& circles, const UncertainDirection& plane) const {
+  double PlaneEvidence(const std::vector<ConicFit>& circles,
+                       const UncertainDirection& plane) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < circles.size(); ++i) {
-      const double ratio =
-          circles[i]
-              ? peaks_[i] * std::exp(-0.5 * CircleEquations(*circles[i], plane.vector).Chi2(plane))
-              : 0.0;
+      const double chi2 = CircleEquations(circles[i], plane.vector).Chi2(plane);
+      const double ratio = peaks_[i] * std::exp(-0.5 * chi2);
       sum += std::log(1.0 - kPlaneShare + kPlaneShare * ratio);
     }
     return sum;
   }
 
-  FeaturesByFocal features_;
+  Features features_;
   double middle_rad_;          // Standard deviation of the principal point, over the focal length.
   std::vector<double> peaks_;  // Of each circle's likelihood, against that of any plane.
 };
 
 double LogPrior(double off, const CameraSigma& sigma) {
   const auto gaussian = [off](double s) { return std::exp(-0.5 * off * off / (s * s)) / s; };
-  if (!(sigma.doubtful_log_focal > sigma.log_focal)) {
+  if (!(sigma.doubtful_log_focal > sigma.log_focal))
     return -0.5 * off * off / (sigma.log_focal * sigma.log_focal);
-  }
   return std::log((1.0 - kDoubtfulShare) * gaussian(sigma.log_focal) +
                   kDoubtfulShare * gaussian(sigma.doubtful_log_focal));
 }
@@ -221,7 +266,8 @@ LikelyFocal LikeliestFocal(const PhotoEvidence& evidence,
                            const std::vector<DetectedPencil>& pencils, const Camera& camera,
                            const CameraSigma& sigma, double prior_log_focal, double diagonal_px,
                            double found_k1) {
-  StructureEvidence structure(evidence, pencils, camera, sigma, diagonal_px);
+  const StructureEvidence structure(evidence, pencils, sigma.principal_point_px / camera.fx,
+                                    diagonal_px);
   if (structure.IsEmpty()) {
     const bool is_there = std::abs(prior_log_focal) <= 0.5 * kFocalStep;
     return {prior_log_focal, is_there ? 0.0 : std::numeric_limits<double>::infinity()};

@@ -31,8 +31,8 @@ constexpr std::array<double, 3> kWeights = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
 constexpr double kLeastRatio = 20.0;
 
 double Ratio(const LineOdds& line, const Vector3d& direction) {
-  const double miss = line.Miss(direction), variance = line.Variance(direction);
-  if (miss * miss > kFar * kFar * variance) return 0.0;
+  const double residual = line.Residual(direction), variance = line.Variance(direction);
+  if (residual * residual > kFar * kFar * variance) return 0.0;
   return std::exp(std::min(line.LogRatio(direction, variance), kMostLogRatio));
 }
 
@@ -61,9 +61,7 @@ std::optional<UncertainDirection> ThirdDirection(const UncertainDirection& a,
 }
 
 SharedDirection LinesAlong(const std::vector<LineOdds>& lines, const UncertainDirection& expected) {
-  Eigen::Matrix<double, 3, 2> basis;
-  basis.col(0) = expected.vector.unitOrthogonal();
-  basis.col(1) = expected.vector.cross(basis.col(0));
+  const Eigen::Matrix<double, 3, 2> basis = BasisAcross(expected.vector);
   const Eigen::Matrix2d root =
       (basis.transpose() * expected.covariance * basis).eval().llt().matrixL();
   SharedDirection shared;
@@ -99,13 +97,7 @@ std::optional<DetectedPencil> FindThirdPencil(const LineSet& set, const PlacedPe
   }
   const SharedDirection shared = LinesAlong(odds, *third);
   if (!(shared.ratio > kLeastRatio)) return std::nullopt;
-  FoundPencil found;
-  found.fit.direction = shared.direction;
-  double spread;
-  if (!PencilFitter(set, kParallelSigmaRad).Fit(others, &found, &spread) ||
-      set.Count(found.lines) < PencilOptions().min_lines)
-    return std::nullopt;
-  return MakePencil(found, set, spread);
+  return FitPencil(set, others, shared.direction, kParallelSigmaRad, PencilOptions().min_lines);
 }
 
 }  // namespace circline

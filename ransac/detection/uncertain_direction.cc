@@ -30,22 +30,29 @@ constexpr double kRectangularDeg = 4.0;
 // Two pencils span a plane if they are this far from parallel.
 constexpr double kMinSpanDeg = 15.0;
 
-// An angle and its standard deviation.
-struct AngleTest {
-  double angle_deg = 0.0, sigma_deg = 0.0;
-};
+double DegreesFromRightAngle(const UncertainDirection& a, const UncertainDirection& b) {
+  return std::asin(std::min(1.0, std::abs(a.vector.dot(b.vector)))) / kDegree;
+}
 
-// How far from 90 degrees.
-AngleTest CompareToRightAngle(const UncertainDirection& a, const UncertainDirection& b) {
-  AngleTest test;
-  test.angle_deg = std::asin(std::min(1.0, std::abs(a.vector.dot(b.vector)))) / kDegree;
-  const double variance =
-      a.vector.dot(b.covariance * a.vector) + b.vector.dot(a.covariance * b.vector);
-  test.sigma_deg = std::sqrt(std::max(0.0, variance)) / kDegree;
-  return test;
+// Of the angle between two directions at about right angles, squared radians.
+double VarianceOfAngle(const UncertainDirection& a, const UncertainDirection& b) {
+  return std::max(0.0,
+                  a.vector.dot(b.covariance * a.vector) + b.vector.dot(a.covariance * b.vector));
 }
 
 }  // namespace
+
+bool AreAlike(const Vector3d& a, const Vector3d& b) {
+  constexpr double kDistinctSine = 0.0523;
+  return a.cross(b).norm() < kDistinctSine;
+}
+
+Eigen::Matrix<double, 3, 2> BasisAcross(const Vector3d& vector) {
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = vector.unitOrthogonal();
+  basis.col(1) = vector.cross(basis.col(0));
+  return basis;
+}
 
 UncertainDirection Refocus(const UncertainDirection& direction, double log_focal) {
   const double s = std::exp(-log_focal);
@@ -61,9 +68,9 @@ UncertainDirection Refocus(const UncertainDirection& direction, double log_focal
 
 bool InPlane(const UncertainDirection& direction, const UncertainDirection& normal,
              double max_deg) {
-  const AngleTest test = CompareToRightAngle(direction, normal);
-  return test.angle_deg <=
-         std::min(max_deg, kMaxSigmas * std::hypot(test.sigma_deg, kModelSigmaDeg));
+  const double sigma_deg = std::sqrt(VarianceOfAngle(direction, normal)) / kDegree;
+  return DegreesFromRightAngle(direction, normal) <=
+         std::min(max_deg, kMaxSigmas * std::hypot(sigma_deg, kModelSigmaDeg));
 }
 
 // A shift of the principal point by m, and a focal length larger by a share s, move a direction d
@@ -74,7 +81,7 @@ RightAngle::RightAngle(const UncertainDirection& a, const UncertainDirection& b,
   angle_ = std::asin(std::clamp(p.dot(q), -1.0, 1.0));
   by_middle_ = -(q.z() * p.head<2>() + p.z() * q.head<2>());
   const double by_focal = -2.0 * p.z() * q.z(), lean = kRightAngleSigmaDeg * kDegree;
-  variance_ = std::max(0.0, p.dot(b.covariance * p) + q.dot(a.covariance * q)) + lean * lean +
+  variance_ = VarianceOfAngle(a, b) + lean * lean +
               camera.middle_rad * camera.middle_rad * by_middle_.squaredNorm() +
               camera.log_focal * camera.log_focal * by_focal * by_focal;
   // The angle between two directions without relation, from 90 degrees, has the density cos (per
@@ -90,7 +97,7 @@ double RightAngle::LogOdds(const Eigen::Vector2d& middle) const {
 }
 
 bool Rectangular(const UncertainDirection& a, const UncertainDirection& b) {
-  return CompareToRightAngle(a, b).angle_deg <= kRectangularDeg;
+  return DegreesFromRightAngle(a, b) <= kRectangularDeg;
 }
 
 // First-order propagation through the normalised cross product.
@@ -121,15 +128,13 @@ double LikelihoodRatio(const UncertainDirection& normal, const Vector3d& plane) 
   constexpr double kNearby = 0.5;  // Cosine of an angle that no standard deviation spans.
   const double cosine = normal.vector.dot(plane);
   if (std::abs(cosine) < kNearby) return 0.0;
-  Eigen::Matrix<double, 3, 2> across;
-  across.col(0) = plane.unitOrthogonal();
-  across.col(1) = plane.cross(across.col(0));
+  const Eigen::Matrix<double, 3, 2> across = BasisAcross(plane);
   const double model = kModelSigmaDeg * kDegree;
   const Eigen::Matrix2d covariance =
       across.transpose() * normal.covariance * across + model * model * Eigen::Matrix2d::Identity();
-  const Eigen::Vector2d miss = across.transpose() * normal.vector;
+  const Eigen::Vector2d residual = across.transpose() * normal.vector;
   // Of a hemisphere, 2 pi: the Gaussian's own factor.
-  return std::exp(-0.5 * miss.dot(covariance.inverse() * miss)) /
+  return std::exp(-0.5 * residual.dot(covariance.inverse() * residual)) /
          std::sqrt(covariance.determinant());
 }
 
@@ -153,10 +158,10 @@ double LogOddsOfMixture(const std::vector<double>& ratios) {
   return most + std::log(sum / kShares);
 }
 
-CircleEquations::CircleEquations(const ConicFit& fit, const Vector3d& normal) {
-  const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
+CircleEquations::CircleEquations(const ConicFit& fit, const Vector3d& normal)
+    : basis(BasisAcross(normal)) {
+  const Vector3d u = basis.col(0), v = basis.col(1);
   const Vector3d Cu = fit.conic * u, Cv = fit.conic * v;
-  basis << u, v;
   value << u.dot(Cu) - v.dot(Cv), 2.0 * u.dot(Cv);
   // A step (a, b) of the normal takes u to u - a n and v to v - b n.
   const double a = 2.0 * normal.dot(Cu), b = 2.0 * normal.dot(Cv);
@@ -186,9 +191,7 @@ UncertainDirection NormalOfCircles(const UncertainDirection& about, double sigma
   for (int step = 0; step < kSteps; ++step) {
     const double weight = std::pow(sigma_deg * kDegree, -2.0);
     Eigen::Matrix2d information = weight * Eigen::Matrix2d::Identity();
-    Eigen::Matrix<double, 3, 2> basis;
-    basis.col(0) = normal.vector.unitOrthogonal();
-    basis.col(1) = normal.vector.cross(basis.col(0));
+    const Eigen::Matrix<double, 3, 2> basis = BasisAcross(normal.vector);
     Eigen::Vector2d gradient = weight * basis.transpose() * (normal.vector - about.vector);
     for (const ConicFit* circle : circles) {
       const CircleEquations equations(*circle, normal.vector);

@@ -36,13 +36,13 @@ cv::Mat ShiftedBoard(double shift) {
   return detection_test::Develop(image, 0.8, 1.0);
 }
 
-struct Found {
+struct FoundLines {
   EdgeMap edges;
   std::vector<DetectedLine> lines;
 };
 
-Found DetectIn(const cv::Mat& photo) {
-  Found result;
+FoundLines DetectIn(const cv::Mat& photo) {
+  FoundLines result;
   result.edges = DetectEdges(photo);
   EXPECT_TRUE(
       DetectLines(result.edges, detection_test::TestCamera(), LineOptions(), &result.lines).ok());
@@ -63,14 +63,14 @@ double WorstTurn(const std::vector<DetectedLine>& lines) {
 TEST(EdgeShift, IsMeasuredOnLinesOfBothKindsOfEdges) {
   const Camera camera = detection_test::TestCamera();
   for (const double shift : {-0.3, -0.15, 0.15, 0.3}) {
-    const Found found = DetectIn(ShiftedBoard(shift));
-    EXPECT_NEAR(EstimateEdgeShift(found.edges, camera, found.lines), -shift, 0.05) << shift;
+    FoundLines found = DetectIn(ShiftedBoard(shift));
+    EXPECT_NEAR(UndoEdgeShift(found.edges, camera, &found.lines), -shift, 0.05) << shift;
   }
 }
 
 TEST(EdgeShift, UndoneItLeavesLinesStraight) {
   const Camera camera = detection_test::TestCamera();
-  Found found = DetectIn(ShiftedBoard(0.3));
+  FoundLines found = DetectIn(ShiftedBoard(0.3));
   const double before = WorstTurn(found.lines);
   UndoEdgeShift(found.edges, camera, &found.lines);
   EXPECT_GT(before, 0.01);
@@ -79,12 +79,12 @@ TEST(EdgeShift, UndoneItLeavesLinesStraight) {
 
 TEST(EdgeShift, NoneWhereThereIsNone) {
   const Camera camera = detection_test::TestCamera();
-  const Found found = DetectIn(ShiftedBoard(0.0));
+  FoundLines found = DetectIn(ShiftedBoard(0.0));
   ASSERT_GE(found.lines.size(), 10u);
-  EXPECT_NEAR(EstimateEdgeShift(found.edges, camera, found.lines), 0.0, 0.03);
-  EXPECT_EQ(EstimateEdgeShift(found.edges, camera, {}), 0.0);
-  std::vector<DetectedLine> few(found.lines.begin(), found.lines.begin() + 2);
-  EXPECT_EQ(EstimateEdgeShift(found.edges, camera, few), 0.0);
+  std::vector<DetectedLine> few(found.lines.begin(), found.lines.begin() + 2), none;
+  EXPECT_NEAR(UndoEdgeShift(found.edges, camera, &found.lines), 0.0, 0.03);
+  EXPECT_EQ(UndoEdgeShift(found.edges, camera, &few), 0.0);
+  EXPECT_EQ(UndoEdgeShift(found.edges, camera, &none), 0.0);
 }
 
 }  // namespace

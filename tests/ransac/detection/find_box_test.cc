@@ -57,7 +57,7 @@ TEST(FindBox, FindsItsAxesOnTheRightOfTwoPlanes) {
     const Vector3d wrong = ExpRotation(Vector3d(0.9, 0.3, 0.0)) * kAxes.col(2);
     const auto box = FindBox(lines, {wrong, kAxes.col(2)});
     ASSERT_TRUE(box.has_value()) << seed;
-    EXPECT_EQ(box->normal, 1u) << seed;
+    EXPECT_EQ(box->given, 1u) << seed;
     // Edges of 100 pixels that may be worn by a third of a pixel: 0.7 degrees each.
     EXPECT_LT(AxisErrorDeg(box->axes.col(0)), 1.0) << seed;
     EXPECT_NEAR(box->axes.determinant(), 1.0, 1e-9);

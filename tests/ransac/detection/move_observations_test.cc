@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/move_observations.h"
+#include "circline/ransac/detection/follow_observations.h"
 
 #include <gtest/gtest.h>
 

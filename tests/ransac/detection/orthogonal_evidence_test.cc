@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 
+#include "circline/estimators/basics.h"
 #include "tests/ransac/segment_scene.h"
 
 namespace circline {
@@ -12,14 +13,12 @@ namespace {
 using Eigen::Vector3d;
 using segment_scene::Lines;
 
-constexpr double kSpread = 3e-3;
-
 TEST(OrthogonalEvidence, FindsWhatAFewLinesShareAmongOthers) {
   int found = 0, right = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Random random(seed);
     const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
-    const OrthogonalEvidence evidence(Lines(R.col(1), 10, 20, &random), R.col(0), kSpread);
+    const OrthogonalEvidence evidence(Lines(R.col(1), 10, 20, &random), R.col(0));
     const auto best = evidence.Best();
     if (!best) continue;
     ++found;
@@ -37,13 +36,47 @@ TEST(OrthogonalEvidence, UnrelatedLinesShareNothing) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Random random(seed);
     const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
-    found += OrthogonalEvidence(Lines(R.col(1), 0, 30, &random), R.col(0), kSpread).Best() ? 1 : 0;
+    found += OrthogonalEvidence(Lines(R.col(1), 0, 30, &random), R.col(0)).Best() ? 1 : 0;
   }
   EXPECT_LE(found, 10);
 }
 
 TEST(OrthogonalEvidence, NothingFromNothing) {
-  EXPECT_FALSE(OrthogonalEvidence({}, Vector3d::UnitX(), kSpread).Best());
+  EXPECT_FALSE(OrthogonalEvidence({}, Vector3d::UnitX()).Best());
+}
+
+// Some lines run along a direction, others any way; the fit is off by up to eight degrees.
+TEST(DirectionReadings, AreProbableWhereLinesAgree) {
+  int near = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    Random random(seed);
+    const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
+    const Vector3d along = R.col(1);
+    std::vector<LineFit> lines;
+    for (int i = 0; i < 30; ++i)
+      segment_scene::AddSegment(i < 15 ? &along : nullptr, &random, &lines);
+    const double off = random.Uniform(-8.0, 8.0) * kDegree;
+    const auto readings =
+        ReadDirection(lines, R.col(0), Eigen::AngleAxisd(off, R.col(0)) * along, 15);
+    double sum = 0.0, about = 0.0;
+    for (const DirectionReading& reading : readings) {
+      EXPECT_NEAR(reading.direction.norm(), 1.0, 1e-12);
+      EXPECT_NEAR(reading.direction.dot(R.col(0)), 0.0, 1e-12);
+      sum += reading.probability;
+      if (segment_scene::AngleBetween(reading.direction, along) < 2.0 * kDegree)
+        about += reading.probability;
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-12);
+    near += about > 0.9 ? 1 : 0;
+  }
+  EXPECT_GE(near, 85);
+}
+
+TEST(DirectionReadings, WithoutLinesAllAreAlike) {
+  const auto readings = ReadDirection({}, Vector3d::UnitX(), Vector3d::UnitY(), 0);
+  ASSERT_FALSE(readings.empty());
+  for (const DirectionReading& reading : readings)
+    EXPECT_NEAR(reading.probability, 1.0 / static_cast<double>(readings.size()), 1e-12);
 }
 
 }  // namespace

@@ -46,8 +46,7 @@ PhotoEvidence Edges(const Eigen::Matrix3d& axes, int num_directions, double fact
 }
 
 double FromEdges(const PhotoEvidence& evidence, double factor, const CameraSigma& sigma) {
-  std::vector<DetectedPencil> pencils;
-  EXPECT_TRUE(DetectPencilsApart(evidence.lines, 3, 1, &pencils, 600.0).ok());
+  const auto pencils = DetectPencilsApart(evidence.lines, 3, 1, 600.0);
   return LikeliestFocal(evidence, pencils, Guess(factor), sigma, 0.0).log_focal;
 }
 
@@ -108,8 +107,7 @@ TEST(LikeliestFocal, ThePrincipalPointMayBeOff) {
         seen.lines.emplace_back();
         ASSERT_TRUE(LineFromSegment(camera, line.ends, 0.1, &seen.lines.back()).ok());
       }
-      std::vector<DetectedPencil> pencils;
-      ASSERT_TRUE(DetectPencilsApart(seen.lines, 3, 1, &pencils, 600.0).ok());
+      const auto pencils = DetectPencilsApart(seen.lines, 3, 1, 600.0);
       CameraSigma sigma = Wide(0.5);
       const auto error = [&](double middle_px) {
         sigma.principal_point_px = middle_px;
@@ -138,44 +136,6 @@ TEST(LikeliestFocal, PriorsCount) {
   doubtful.doubtful_log_focal = 0.5;
   EXPECT_NEAR(FromEdges(axes, 3, 1.6, doubtful), -std::log(1.6), 0.05);
   EXPECT_NEAR(FromEdges(axes, 3, 1.6, Wide(1e20)), -std::log(1.6), 0.05);  // And it ends.
-}
-
-// An edge along the direction, as a lens bends it.
-LineObservation BentEdge(const Camera& lens, const Eigen::Vector3d& direction, Random* random) {
-  const Eigen::Vector2d pixel(random->Uniform(60.0, 420.0), random->Uniform(40.0, 300.0));
-  CalibratedPoint middle;
-  EXPECT_TRUE(PixelToCalibrated(lens, pixel, &middle));
-  LineObservation line;
-  line.sigma_px = 0.2;
-  for (int k = -5; k <= 5; ++k) {
-    Eigen::Vector2d seen;
-    EXPECT_TRUE(CameraToPixel(lens, middle.Homogeneous() + 0.02 * k * direction, &seen));
-    line.points.push_back(seen);
-  }
-  return line;
-}
-
-// A lens bends by the angle at which it sees: through another focal length the same points are
-// other lines, so a look tells the focal length however far off its own is.
-TEST(LikeliestFocal, TheLensIsLookedThroughAtEveryFocalLength) {
-  const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.5, 0.6, 0.1));
-  Camera lens = TestCamera();
-  lens.model = CameraModel::kOpenCV;
-  lens.distortion[0] = -0.3;
-  for (const double factor : {0.8, 1.0, 1.6}) {
-    Camera guess = lens;
-    guess.fx *= factor;
-    guess.fy *= factor;
-    Random random(3);
-    std::vector<DetectedPencil> pencils(3);
-    for (int k = 0; k < 36; ++k) {
-      PencilObservation& pencil = pencils[static_cast<std::size_t>(k % 3)].observation;
-      pencil.lines.push_back(BentEdge(lens, axes.col(k % 3), &random));
-      pencil.fit = VanishingPointFit{axes.col(k % 3), Eigen::Matrix3d::Identity()};
-    }
-    const LikelyFocal likeliest = LikeliestFocal(PhotoEvidence(), pencils, guess, Wide(0.5), 0.0);
-    EXPECT_NEAR(likeliest.log_focal, -std::log(factor), 0.03) << factor;
-  }
 }
 
 // Twelve discs of one sheet, all of a photo: the camera at which they have one plane, and what it

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/local_pencils.h"
+#include "circline/ransac/detection/choose_plane.h"
 
 #include <gtest/gtest.h>
 
