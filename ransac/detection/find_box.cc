@@ -91,7 +91,11 @@ class BoxSearch {
     std::vector<BoxHypothesis> boxes;
     for (std::size_t k = 0; k < axes.size(); ++k) {
       normal_ = axes[k];
-      boxes.push_back(FindOnNormal());
+      boxes.push_back(FindOnNormal(0.0));
+      if (variance_ > 0.0) {
+        BoxHypothesis near = FindOnNormal(variance_);
+        if (near.log_odds > boxes.back().log_odds) boxes.back() = std::move(near);
+      }
       boxes.back().given = k;
     }
     std::stable_sort(boxes.begin(), boxes.end(),
@@ -142,14 +146,14 @@ class BoxSearch {
     }
   }
 
-  // At any angle about normal_, of which edges may be off by its variance; and from there to where
-  // its edges agree best. No odds where there is none.
-  BoxHypothesis FindOnNormal() {
+  // At any angle about normal_, of which edges may be off by so much; and from there to where its
+  // edges agree best. No odds where there is none.
+  BoxHypothesis FindOnNormal(double off_variance) {
     constexpr int kAngles = 180, kPasses = 4;  // Of a quarter turn: one in half a degree.
     BoxHypothesis start, best;
     const Matrix3d axes = AxesOf(normal_.unitOrthogonal(), normal_);
     for (int k = 0; k < kAngles; ++k)
-      Consider(Rotated(axes, 0.5 * kPi * k / kAngles), variance_, &start);
+      Consider(Rotated(axes, 0.5 * kPi * k / kAngles), off_variance, &start);
     if (!std::isfinite(start.log_odds)) return best;
     Consider(start.axes, 0.0, &best);
     if (!std::isfinite(best.log_odds)) Consider(Turned(start), 0.0, &best);
