@@ -4,11 +4,10 @@
 
 #include <algorithm>
 #include <opencv2/core/utility.hpp>
-#include <set>
 #include <vector>
 
 #include "apps/common/camera_file.h"
-#include "apps/common/text.h"
+#include "apps/common/flags_util.h"
 
 DECLARE_string(camera);
 
@@ -38,39 +37,29 @@ Status ModelFromFlag(std::optional<CameraModel>* model) {
              : Status::Invalid("--model: " + NoSuchModel(FLAGS_model));
 }
 
-// The names in a list flag.
-Status NamesFromFlag(const char* flag, const std::string& text,
-                     const std::vector<std::string>& known, std::set<std::string>* names) {
-  if (text.empty()) return Status::Ok();
-  for (const std::string& name : SplitList(text)) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      return Status::Invalid(std::string("--") + flag + ": there is no '" + name + "'" +
-                             DidYouMean(name, known));
-    }
-    names->insert(name);
-  }
-  return Status::Ok();
-}
-
 Status ParametersFromFlags(CalibrateOptions* options) {
-  std::set<std::string> fixed, free;
+  std::vector<std::string> fixed, free;
   Status status = NamesFromFlag(
       "fix", FLAGS_fix, {"principal_point", "aspect", "k1", "k2", "k3", "tangential"}, &fixed);
   if (status.ok()) status = NamesFromFlag("free", FLAGS_free, {"aspect", "tangential"}, &free);
   if (!status.ok()) return status;
+  const auto has = [](const std::vector<std::string>& names, const char* name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
   for (const std::string& name : free) {
-    if (fixed.count(name) > 0) return Status::Invalid("--fix and --free both name '" + name + "'");
+    if (has(fixed, name.c_str()))
+      return Status::Invalid("--fix and --free both name '" + name + "'");
   }
   constexpr double kFreeAspect = 0.02, kFreeTangential = 0.01;
-  options->fix_principal_point = fixed.count("principal_point") > 0;
-  if (fixed.count("aspect") > 0) options->aspect_sigma = 0.0;
-  if (free.count("aspect") > 0) options->aspect_sigma = kFreeAspect;
-  if (fixed.count("tangential") > 0) options->adjust.tangential_sigma = 0.0;
-  if (free.count("tangential") > 0) options->adjust.tangential_sigma = kFreeTangential;
-  options->adjust.num_radial = fixed.count("k1") > 0   ? 0
-                               : fixed.count("k2") > 0 ? 1
-                               : fixed.count("k3") > 0 ? 2
-                                                       : 3;
+  options->fix_principal_point = has(fixed, "principal_point");
+  if (has(fixed, "aspect")) options->aspect_sigma = 0.0;
+  if (has(free, "aspect")) options->aspect_sigma = kFreeAspect;
+  if (has(fixed, "tangential")) options->adjust.tangential_sigma = 0.0;
+  if (has(free, "tangential")) options->adjust.tangential_sigma = kFreeTangential;
+  options->adjust.num_radial = has(fixed, "k1")   ? 0
+                               : has(fixed, "k2") ? 1
+                               : has(fixed, "k3") ? 2
+                                                  : 3;
   return Status::Ok();
 }
 

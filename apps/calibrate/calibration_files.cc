@@ -1,7 +1,6 @@
 #include "apps/calibrate/calibration_files.h"
 
 #include <cmath>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <sstream>
@@ -102,8 +101,8 @@ Json PhotoJson(const AdjustedPhoto& photo, std::size_t index,
 
 Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observations>& photos,
                         const std::vector<std::string>& names,
-                        const std::vector<std::vector<std::uint8_t>>& pictures,
-                        const std::string& folder, std::string* note) {
+                        const std::vector<std::string>& pictures, const std::string& folder,
+                        std::string* note) {
   Json json = {{"rigid", adjusted.rigid}, {"metric", adjusted.metric}, {"cameras", Json::array()}};
   Status status;
   for (std::size_t c = 0; c < adjusted.cameras.size() && status.ok(); ++c) {
@@ -112,21 +111,20 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
         c == 0 ? "calibration.yml" : "calibration_" + adjusted.cameras[c].camera.id + ".yml";
     status = WriteFile(folder + "/" + name, CalibrationYaml(adjusted.cameras[c]));
   }
-  const std::unique_ptr<Exporter> colmap = MakeColmapExporter(folder);
+  std::vector<ExportedPose> poses;
   json["images"] = Json::array();
   for (std::size_t i = 0; i < photos.size(); ++i) {
     const AdjustedPhoto& photo = adjusted.photos[i];
     json["images"].push_back(PhotoJson(photo, i, names));
     if (!photo.status.ok()) continue;
-    colmap->Add({names[i], i, adjusted.cameras[static_cast<std::size_t>(photo.camera)].camera,
-                 photo.cam_from_world.rotation, photo.cam_from_world.translation, std::nullopt});
+    poses.push_back({names[i], i, adjusted.cameras[static_cast<std::size_t>(photo.camera)].camera,
+                     photo.cam_from_world});
   }
   json["notes"] = adjusted.notes;
   if (status.ok())
     status = WriteFile(folder + "/calibration.json",
                        json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
-  if (status.ok()) status = colmap->Finish();
-  *note = colmap->Note();
+  if (status.ok()) status = ExportPoses("colmap", poses, folder, note);
   if (!note->empty()) *note += "\n";
   if (status.ok())
     status = WriteFile(folder + "/report.html", CalibrationReport(adjusted, names, pictures));

@@ -2,7 +2,6 @@
 #ifndef CIRCLINE_APPS_CALIBRATE_CALIBRATION_FILES_H_
 #define CIRCLINE_APPS_CALIBRATE_CALIBRATION_FILES_H_
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -17,8 +16,8 @@ namespace circline::apps {
 // be empty. `note`: what the files could not take, a line; or empty.
 Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observations>& photos,
                         const std::vector<std::string>& names,
-                        const std::vector<std::vector<std::uint8_t>>& pictures,
-                        const std::string& folder, std::string* note);
+                        const std::vector<std::string>& pictures, const std::string& folder,
+                        std::string* note);
 
 // Why a photo is left out, the other one by its name where it shows nearly the same.
 std::string WhyLeftOut(const AdjustedPhoto& photo, const std::vector<std::string>& names);

@@ -24,9 +24,9 @@ std::vector<std::size_t> ChoosePhotos(const AdjustedPhotos& adjusted) {
 
 }  // namespace
 
-std::vector<std::vector<std::uint8_t>> CalibrationPictures(const CompareOptions& options,
-                                                           const AdjustedPhotos& adjusted,
-                                                           const std::vector<SceneImage>& images) {
+std::vector<std::string> CalibrationPictures(const CompareOptions& options,
+                                             const AdjustedPhotos& adjusted,
+                                             const std::vector<SceneImage>& images) {
   constexpr int kWidth = 720;  // Pixels.
   CompareOptions joint = options;
   joint.solvers = {"joint"};
@@ -38,7 +38,7 @@ std::vector<std::vector<std::uint8_t>> CalibrationPictures(const CompareOptions&
     loss.estimation.camera_sigma = loss.estimation.noise_model.camera = CameraSigma();
   const SolverSet solvers(joint);
   const std::vector<std::size_t> chosen = ChoosePhotos(adjusted);
-  std::vector<std::vector<std::uint8_t>> pictures(images.size());
+  std::vector<std::string> pictures(images.size());
   InParallel(static_cast<int>(chosen.size()), [&](int k) {
     const std::size_t i = chosen[static_cast<std::size_t>(k)];
     SceneImage image = images[i];
@@ -47,7 +47,7 @@ std::vector<std::vector<std::uint8_t>> CalibrationPictures(const CompareOptions&
     image.observations.camera = made.camera;
     image.camera_sigma = StatedCameraSigma();
     image.guessed_sigma.reset();
-    const ImageRun run = RunImage(joint, solvers, &image);
+    const ImageRun run = RunImage(joint, &solvers, &image);
     if (!run.photo.empty()) pictures[i] = EncodeJpeg(DrawOverlay(run), kWidth);
   });
   return pictures;

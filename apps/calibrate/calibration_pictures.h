@@ -2,7 +2,7 @@
 #ifndef CIRCLINE_APPS_CALIBRATE_CALIBRATION_PICTURES_H_
 #define CIRCLINE_APPS_CALIBRATE_CALIBRATION_PICTURES_H_
 
-#include <cstdint>
+#include <string>
 #include <vector>
 
 #include "apps/common/scene.h"
@@ -14,9 +14,9 @@ namespace circline::apps {
 // JPEG, by photo: those left out and as many others as a page bears, seen anew through the camera
 // that was estimated; empty for the others, and where there is nothing to look at. `images`: of
 // the photos.
-std::vector<std::vector<std::uint8_t>> CalibrationPictures(const CompareOptions& options,
-                                                           const AdjustedPhotos& adjusted,
-                                                           const std::vector<SceneImage>& images);
+std::vector<std::string> CalibrationPictures(const CompareOptions& options,
+                                             const AdjustedPhotos& adjusted,
+                                             const std::vector<SceneImage>& images);
 
 }  // namespace circline::apps
 

@@ -6,10 +6,10 @@
 #include <sstream>
 
 #include "apps/calibrate/calibration_files.h"
+#include "apps/common/report_page.h"
 #include "apps/common/svg_plot.h"
 #include "apps/common/text.h"
 #include "apps/compare/report_image.h"
-#include "apps/compare/report_style.h"
 #include "circline/estimators/basics.h"
 
 namespace circline::apps {
@@ -148,16 +148,14 @@ std::string SigmaPlot(const AdjustedCamera& made) {
 }
 
 std::string Pictures(const AdjustedPhotos& adjusted, const std::vector<std::string>& names,
-                     const std::vector<std::vector<std::uint8_t>>& pictures) {
+                     const std::vector<std::string>& pictures) {
   std::string html;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     if (pictures[i].empty()) continue;
-    const std::string name = EscapeHtml(names[i]);
-    html += "<div><section class=\"image\"><h3>" + name +
-            (adjusted.photos[i].status.ok() ? "" : "<small>left out</small>") +
-            "</h3><figure><img alt=\"" + name +
-            ", with what was found in it\" src=\"data:image/jpeg;base64," +
-            EncodeBase64(pictures[i]) + "\"></figure></section></div>";
+    html += "<div><section class=\"image\"><h3>" + EscapeHtml(names[i]) +
+            (adjusted.photos[i].status.ok() ? "" : "<small>left out</small>") + "</h3><figure>" +
+            PictureHtml(names[i] + ", with what was found in it", pictures[i]) +
+            "</figure></section></div>";
   }
   if (html.empty()) return "";
   return "<h2>What was found in them</h2><p class=\"lead\">Seen through the estimated camera, each "
@@ -231,11 +229,9 @@ std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera) {
 }
 
 std::string CalibrationReport(const AdjustedPhotos& adjusted, const std::vector<std::string>& names,
-                              const std::vector<std::vector<std::uint8_t>>& pictures) {
+                              const std::vector<std::string>& pictures) {
   std::ostringstream html;
-  html << "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-          "content=\"width=device-width\"><title>circline: calibration</title><style>"
-       << kReportStyle << "</style></head><body><h1>Calibration</h1><p class=\"lead\">"
+  html << PageTop("circline: calibration") << "<h1>Calibration</h1><p class=\"lead\">"
        << names.size() << " photos, "
        << (adjusted.rigid ? "one sheet seen from all of them" : "each with a sheet of its own")
        << (adjusted.metric ? ", metric" : "") << "</p>";
@@ -259,8 +255,7 @@ std::string CalibrationReport(const AdjustedPhotos& adjusted, const std::vector<
     if (!advice.empty()) html << "</ul>";
   }
   html << "<h2>Photos</h2>" << PhotoTable(adjusted, names) << Pictures(adjusted, names, pictures)
-       << "<div id='zoom'><img alt=''><p></p></div><script>" << kReportScript
-       << "</script></body></html>\n";
+       << PageEnd();
   return html.str();
 }
 

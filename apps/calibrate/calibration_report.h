@@ -3,7 +3,6 @@
 #ifndef CIRCLINE_APPS_CALIBRATE_CALIBRATION_REPORT_H_
 #define CIRCLINE_APPS_CALIBRATE_CALIBRATION_REPORT_H_
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -13,7 +12,7 @@ namespace circline::apps {
 
 // `pictures`: of photos, JPEG, by photo; may be empty.
 std::string CalibrationReport(const AdjustedPhotos& adjusted, const std::vector<std::string>& names,
-                              const std::vector<std::vector<std::uint8_t>>& pictures);
+                              const std::vector<std::string>& pictures);
 
 // What one more photo should show, a sentence each; empty where nothing stands out.
 std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <iostream>
 #include <map>
 #include <mutex>
@@ -45,11 +44,6 @@ constexpr char kUsage[] =
     "Exit code 0: done; 1: some photo could not be read, or no camera came out; 2: unusable flags "
     "or scene file.";
 
-int Refuse(const Status& status) {
-  SayOnStderr("circline_calibrate: " + status.message);
-  return status.code == StatusCode::kInvalidArgument ? kExitUsage : kExitUnreadable;
-}
-
 // Of another model a camera has another distortion; one that comes with poses is what it is.
 void SetModel(const CalibrateOptions& options, Camera* camera) {
   if (!options.import.empty()) return;
@@ -66,7 +60,7 @@ std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<Scen
   std::mutex mutex;
   InParallel(static_cast<int>(images->size()), [&](int i) {
     const auto index = static_cast<std::size_t>(i);
-    runs[index] = ObserveImage(options, &(*images)[index]);
+    runs[index] = RunImage(options, nullptr, &(*images)[index]);
     Camera& camera = runs[index].observations.camera;
     // Not the one that the photo alone makes likeliest: the prior is about the one given.
     camera = (*images)[index].observations.camera;
@@ -206,13 +200,13 @@ int Calibrate() {
   ImageSet set;
   Status status = CalibrateOptionsFromFlags(&options);
   if (status.ok()) status = ImagesFromFlags(options.compare.inputs, &set);
-  if (!status.ok()) return Refuse(status);
+  if (!status.ok()) return Refuse("circline_calibrate", status);
   if (!set.rigid().empty()) RigidWorldFromName(set.rigid(), &options.adjust.rigid);
   std::vector<SceneImage> images;
   for (std::size_t i = 0; i < set.size(); ++i) images.push_back(set.At(i));
   GivenPoses poses;
   if (!options.import.empty()) status = Import(&options, &images, &poses);
-  if (!status.ok()) return Refuse(status);
+  if (!status.ok()) return Refuse("circline_calibrate", status);
   if (options.compare.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.compare.inputs.guess));
   const bool with_pictures = options.compare.overlays;
   options.compare.overlays = false;  // Photos are read for detection only.
@@ -220,11 +214,11 @@ int Calibrate() {
   Calibration calibration;
   status = CalibrateInPasses(&options, poses, &images, &calibration);
   for (const std::string& error : calibration.errors) SayOnStderr(error);
-  if (!status.ok()) return Refuse(status);
+  if (!status.ok()) return Refuse("circline_calibrate", status);
   std::string note;
   status = CreateFolder(options.compare.output);
   if (status.ok()) {
-    std::vector<std::vector<std::uint8_t>> pictures;
+    std::vector<std::string> pictures;
     if (with_pictures)
       pictures = CalibrationPictures(options.compare, calibration.adjusted, calibration.images);
     status = WriteCalibration(calibration.adjusted, calibration.photos, calibration.names, pictures,
@@ -235,7 +229,7 @@ int Calibrate() {
                                   options.compare.output + "/scene.yaml");
   }
   if (status.ok() && calibration.adjusted.given) status = FinishImport(options, calibration);
-  if (!status.ok()) return Refuse(status);
+  if (!status.ok()) return Refuse("circline_calibrate", status);
   std::cout << CalibrationTable(calibration.adjusted, calibration.names) << note;
   return calibration.errors.empty() ? kExitOk : kExitUnreadable;
 }

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "apps/common/colmap_camera.h"
+#include "apps/common/colmap_file.h"
 #include "apps/common/text.h"
 
 namespace circline::apps {
@@ -138,7 +138,7 @@ bool ModelFromName(const std::string& name, CameraModel* model) {
 std::string NoSuchModel(const std::string& name) {
   std::vector<std::string> names;
   for (const CameraModel known : kModels) names.emplace_back(ModelName(known));
-  return "'" + name + "' is not one of " + JoinList(names, ", ");
+  return NotOneOf(name, names);
 }
 
 std::vector<double> Distortion(const Camera& camera) {

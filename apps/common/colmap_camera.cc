@@ -1,8 +1,7 @@
-#include "apps/common/colmap_camera.h"
-
 #include <set>
 #include <sstream>
 
+#include "apps/common/colmap_file.h"
 #include "apps/common/text.h"
 
 namespace circline::apps {
@@ -40,7 +39,7 @@ Status CameraModelByName(const std::string& name, const ColmapCameraModel** mode
       return Status::Ok();
     }
   }
-  return Status::Invalid("camera model '" + name + "' is not one of " + JoinList(names, ", "));
+  return Status::Invalid("camera model " + NotOneOf(name, names));
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include <set>
 #include <sstream>
 
-#include "apps/common/colmap_camera.h"
 #include "apps/common/storage_node.h"
 #include "apps/common/text.h"
 

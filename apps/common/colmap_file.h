@@ -13,6 +13,16 @@
 
 namespace circline::apps {
 
+// Of a camera model by its name, SIMPLE_RADIAL say. Not ok: it is none that we have.
+Status NumColmapParameters(const std::string& name, std::size_t* number);
+// Model and numbers of a camera, its id and size apart. Not ok: what is wrong with them.
+Status SetColmapCamera(const std::string& name, const std::vector<double>& parameters,
+                       Camera* camera);
+
+// The content of a cameras.txt. Not ok: one line that names `path` and the line.
+Status ParseColmapCameras(const std::string& path, const std::string& text,
+                          std::vector<Camera>* cameras);
+
 struct ColmapImage {
   std::string name;        // As COLMAP has it: below its folder of images.
   std::size_t camera = 0;  // Index.

@@ -26,7 +26,7 @@ class DocumentError : public std::runtime_error {
 
 constexpr char kTooManyKeys[] = "a map has too many keys", kTooDeep[] = "is nested too deeply";
 
-std::string Twice(const std::string& key) { return "key '" + key + "' stands there twice"; }
+std::string DuplicateKey(const std::string& key) { return "key '" + key + "' stands there twice"; }
 
 // YAML 1.1 writes what is no number as ".inf" and ".nan", which the reader of values then refuses.
 Json PlainScalar(const std::string& text) {
@@ -63,7 +63,7 @@ class YamlReader {
       yaml_event_t event;
       if (yaml_parser_parse(&parser_, &event) == 0) Fail(parser_.problem, parser_.problem_mark);
       try {
-        more = Take(event);
+        more = ReadEvent(event);
       } catch (...) {
         yaml_event_delete(&event);
         throw;
@@ -86,7 +86,7 @@ class YamlReader {
                         (problem == nullptr ? "cannot be read" : problem));
   }
 
-  bool Take(const yaml_event_t& event) {
+  bool ReadEvent(const yaml_event_t& event) {
     const yaml_mark_t& mark = event.start_mark;
     switch (event.type) {
       case YAML_STREAM_END_EVENT:
@@ -97,7 +97,7 @@ class YamlReader {
       case YAML_ALIAS_EVENT:
         Fail("aliases (*name) are not read", mark);
       case YAML_SCALAR_EVENT:
-        TakeScalar(event);
+        ReadScalar(event);
         break;
       case YAML_SEQUENCE_START_EVENT:
         Begin(Json::array(), mark);
@@ -115,20 +115,20 @@ class YamlReader {
     return true;
   }
 
-  void TakeScalar(const yaml_event_t& event) {
+  void ReadScalar(const yaml_event_t& event) {
     const auto& scalar = event.data.scalar;
     std::string text(reinterpret_cast<const char*>(scalar.value), scalar.length);
     if (!open_.empty() && open_.back().node->is_object() && !open_.back().has_key) {
-      TakeKey(std::move(text), event.start_mark);
+      ReadKey(std::move(text), event.start_mark);
     } else {
       const bool is_plain = scalar.style == YAML_PLAIN_SCALAR_STYLE && scalar.plain_implicit != 0;
       Add(is_plain ? PlainScalar(text) : Json(std::move(text)), event.start_mark);
     }
   }
 
-  void TakeKey(std::string key, const yaml_mark_t& mark) {
+  void ReadKey(std::string key, const yaml_mark_t& mark) {
     Open& map = open_.back();
-    if (!map.keys.insert(key).second) Fail(Twice(key).c_str(), mark);
+    if (!map.keys.insert(key).second) Fail(DuplicateKey(key).c_str(), mark);
     if (map.keys.size() > limits_.keys_of_a_map) Fail(kTooManyKeys, mark);
     map.key = std::move(key);
     map.has_key = true;
@@ -166,7 +166,7 @@ Json ParseJson(const std::string& text, const DocumentLimits& limits) {
     if (event == Json::parse_event_t::object_end) keys.pop_back();
     if (event != Json::parse_event_t::key) return true;
     const auto& key = value.get_ref<const std::string&>();
-    if (!keys.back().insert(key).second) throw DocumentError(Twice(key));
+    if (!keys.back().insert(key).second) throw DocumentError(DuplicateKey(key));
     if (keys.back().size() > limits.keys_of_a_map) throw DocumentError(kTooManyKeys);
     return true;
   };
@@ -205,7 +205,7 @@ Json XmlValue(const tinyxml2::XMLElement& element, const DocumentLimits& limits)
     if (key == "_") {
       if (!value.is_object()) value.push_back(XmlValue(*child, limits));
     } else if (!value.is_array()) {
-      if (value.contains(key)) throw DocumentError(Twice(key));
+      if (value.contains(key)) throw DocumentError(DuplicateKey(key));
       if (value.size() >= limits.keys_of_a_map) throw DocumentError(kTooManyKeys);
       value[key] = XmlValue(*child, limits);
     }

@@ -163,6 +163,33 @@ void SayOnStderr(const std::string& line) {
   std::fputs((WithoutControls(line) + "\n").c_str(), stderr);
 }
 
+Status NamesFromFlag(const std::string& flag, const std::string& list,
+                     const std::vector<std::string>& known, std::vector<std::string>* names) {
+  names->clear();
+  if (list.empty()) return Status::Ok();
+  for (const std::string& name : SplitList(list)) {
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      return Status::Invalid("--" + flag + ": " + NotOneOf(name, known));
+    names->push_back(name);
+  }
+  return Status::Ok();
+}
+
+Status CheckNotGiven(const std::string& app, const std::vector<std::string>& flags) {
+  for (const std::string& name : flags) {
+    gflags::CommandLineFlagInfo info;
+    if (gflags::GetCommandLineFlagInfo(name.c_str(), &info) &&
+        info.current_value != info.default_value)
+      return Status::Invalid("--" + name + ": is not a flag of " + app);
+  }
+  return Status::Ok();
+}
+
+int Refuse(const std::string& app, const Status& status) {
+  SayOnStderr(app + ": " + status.message);
+  return status.code == StatusCode::kInvalidArgument ? kExitUsage : kExitUnreadable;
+}
+
 namespace {
 
 // To stderr (--minloglevel=0 shows it; people are told by SayOnStderr); OpenCV's own messages
@@ -180,10 +207,7 @@ int ParseAndRun(int argc, char** argv, const std::string& app, const std::string
                 int (*run)()) {
   CommandLine command_line;
   const Status status = ParseCommandLine(argc, argv, &command_line);
-  if (!status.ok()) {
-    SayOnStderr(app + ": " + status.message);
-    return kExitUsage;
-  }
+  if (!status.ok()) return Refuse(app, status);
   if (command_line.help) {
     std::cout << HelpText(usage);
   } else if (command_line.version) {

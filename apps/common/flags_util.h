@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "circline/estimators/status.h"
 
@@ -37,6 +38,16 @@ int RunGuarded(const char* program, const std::string& app, const std::function<
 
 // All of an app's main but what it does: the above, the command line, --help, --version.
 int RunApp(int argc, char** argv, const std::string& app, const std::string& usage, int (*run)());
+
+// The names in the comma-separated list of a flag, all of `known`. Not ok: one line that names it.
+Status NamesFromFlag(const std::string& flag, const std::string& list,
+                     const std::vector<std::string>& known, std::vector<std::string>* names);
+
+// Not ok where one of another program's flags was given: `app` does not have it.
+Status CheckNotGiven(const std::string& app, const std::vector<std::string>& flags);
+
+// Says why an app does not go on; returns the exit code for that.
+int Refuse(const std::string& app, const Status& status);
 
 // One whole line on stderr.
 void SayOnStderr(const std::string& line);

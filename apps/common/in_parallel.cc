@@ -13,25 +13,15 @@ void Order() {
   const std::lock_guard<std::mutex> lock(mutex);
 }
 
-class Body : public cv::ParallelLoopBody {
- public:
-  explicit Body(const std::function<void(int)>& work) : work_(work) {}
-  void operator()(const cv::Range& range) const override {
-    Order();
-    for (int i = range.start; i < range.end; ++i) work_(i);
-    Order();
-  }
-
- private:
-  const std::function<void(int)>& work_;
-};
-
 }  // namespace
 
 void InParallel(int count, const std::function<void(int)>& work) {
-  const Body body(work);
   Order();
-  cv::parallel_for_(cv::Range(0, count), body);
+  cv::parallel_for_(cv::Range(0, count), [&work](const cv::Range& range) {
+    Order();
+    for (int i = range.start; i < range.end; ++i) work(i);
+    Order();
+  });
   Order();
 }
 

@@ -142,7 +142,7 @@ FolderLock::~FolderLock() {
   if (descriptor_ >= 0) close(descriptor_);
 }
 
-Status FolderLock::Take(const std::string& folder) {
+Status FolderLock::Acquire(const std::string& folder) {
   descriptor_ = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const bool taken = descriptor_ < 0 || flock(descriptor_, LOCK_EX | LOCK_NB) == 0;
   if (taken || errno != EWOULDBLOCK) return Status::Ok();

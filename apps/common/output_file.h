@@ -66,7 +66,7 @@ class FolderLock {
   FolderLock& operator=(const FolderLock&) = delete;
 
   // Not ok: another process has it. Ok also where the file system knows no locks.
-  Status Take(const std::string& folder);
+  Status Acquire(const std::string& folder);
 
  private:
   int descriptor_ = -1;

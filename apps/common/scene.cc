@@ -1,65 +1,17 @@
 #include "apps/common/scene.h"
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <set>
 
 #include "apps/common/camera_file.h"
-#include "apps/common/scene_pixels.h"
-#include "apps/common/scene_solids.h"
+#include "apps/common/scene_values.h"
 #include "apps/common/storage_node.h"
 #include "apps/common/text.h"
 #include "circline/estimators/basics.h"
 
 namespace circline::apps {
 namespace {
-
-std::vector<Segment> ReadSegments(const StorageNode& node) {
-  const std::vector<double> v = node.Numbers(0, 4);
-  std::vector<Segment> segments;
-  for (std::size_t i = 0; i + 3 < v.size(); i += 4) {
-    segments.push_back({Eigen::Vector2d(v[i], v[i + 1]), Eigen::Vector2d(v[i + 2], v[i + 3])});
-    if (segments.back()[0] == segments.back()[1]) {
-      node.Fail("segment " + std::to_string(i / 4) + " has no length");
-    }
-  }
-  return segments;
-}
-
-Segment ReadSegment(const StorageNode& node) {
-  const std::vector<double> v = node.Numbers(4);
-  if (v.empty()) return {Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
-  return ReadSegments(node).front();
-}
-
-// A positive number, or 0 where it is not given.
-double ReadPositive(const StorageNode& node) {
-  if (!node.Exists()) return 0.0;
-  const double value = node.Number();
-  if (!(value > 0.0)) node.Fail("must be positive");
-  return value;
-}
-
-std::string ReadOptionalText(const StorageNode& node) {
-  return node.Exists() ? node.Text() : std::string();
-}
-
-std::array<int, 4> ReadRectangle(const StorageNode& node) {
-  const std::vector<double> v = node.Numbers(4);
-  if (v.empty()) return {};
-  if (std::any_of(v.begin(), v.end(), [](double x) { return std::abs(x) > 1e6; })) {
-    node.Fail("is not a rectangle of a photo");
-    return {};
-  }
-  const int x0 = static_cast<int>(std::floor(v[0])), y0 = static_cast<int>(std::floor(v[1]));
-  const int x1 = static_cast<int>(std::ceil(v[0] + v[2]));
-  const int y1 = static_cast<int>(std::ceil(v[1] + v[3]));
-  if (!(v[2] > 0.0) || !(v[3] > 0.0)) node.Fail("width and height must be positive");
-  return {x0, y0, x1 - x0, y1 - y0};
-}
 
 using Ids = std::set<std::string>;
 
@@ -96,7 +48,7 @@ PencilDirection ReadDirection(const StorageNode& node) {
        {PencilDirection::kX, PencilDirection::kY, PencilDirection::kZ, PencilDirection::kFree}) {
     if (name == PencilDirectionName(direction)) return direction;
   }
-  node.Fail("'" + name + "' is not one of x, y, z, free");
+  node.Fail(NotOneOf(name, {"x", "y", "z", "free"}));
   return PencilDirection::kFree;
 }
 
@@ -186,33 +138,14 @@ void ReadKnown(const StorageNode& node, const Ids& pencil_ids, bool detect_every
   }
 }
 
-// The nearest rotation, so that nine printed digits do not cost accuracy.
-Eigen::Matrix3d ReadRotation(const StorageNode& node) {
-  const std::vector<double> v = node.Numbers(9);
-  if (v.empty()) return Eigen::Matrix3d::Identity();
-  const Eigen::Matrix3d given =
-      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v.data());
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(given, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
-  if ((rotation - given).norm() > 1e-3 || rotation.determinant() < 0.0) {
-    node.Fail("is not a rotation matrix");
-  }
-  return rotation;
-}
-
 Symmetry ReadSymmetry(const StorageNode& node) {
   if (!node.Exists()) return Symmetry::kNone;
   const std::string name = node.Text();
   for (const Symmetry known : {Symmetry::kNone, Symmetry::kD2, Symmetry::kD4, Symmetry::kAxis}) {
     if (name == SymmetryName(known)) return known;
   }
-  node.Fail("'" + name + "' is not one of none, D2, D4, axis");
+  node.Fail(NotOneOf(name, {"none", "D2", "D4", "axis"}));
   return Symmetry::kNone;
-}
-
-Eigen::Vector3d ReadVector3(const StorageNode& node) {
-  const std::vector<double> v = node.Numbers(3);
-  return v.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(v[0], v[1], v[2]);
 }
 
 void ReadTruth(const StorageNode& node, SceneImage* image) {
@@ -332,7 +265,7 @@ Status ParseScene(const std::string& name, const std::string& text, const std::s
   const StorageNode root(document.root(), "", &status);
   root.AllowKeys({"cameras", "images", "rigid"});
   const StorageNode stated = root.Get("rigid");
-  const std::string choice = stated.Exists() ? stated.Text() : "";
+  const std::string choice = ReadOptionalText(stated);
   if (stated.Exists() && choice != "auto" && choice != "yes" && choice != "no")
     stated.Fail("must be auto, yes or no");
   if (rigid != nullptr) *rigid = choice;

@@ -1,10 +1,10 @@
-#include "apps/common/scene_solids.h"
-
+// The keys `faces` and `solids` of a scene file's image.
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "apps/common/scene_pixels.h"
+#include "apps/common/scene_values.h"
+#include "apps/common/text.h"
 
 namespace circline::apps {
 namespace {
@@ -80,9 +80,9 @@ void ReadEdge(const StorageNode& node, double sigma_px, BoxObservation* box) {
   node.AllowKeys({"along", "far", "points"});
   const std::string along = node.Require("along").Text();
   const auto axis = std::find(std::begin(kAxes), std::end(kAxes), along) - std::begin(kAxes);
-  if (axis == 3) return node.Get("along").Fail("'" + along + "' is not one of x, y, z");
+  if (axis == 3) return node.Get("along").Fail(NotOneOf(along, {"x", "y", "z"}));
   std::array<bool, 3> far{};
-  const std::string at = node.Get("far").Exists() ? node.Get("far").Text() : "";
+  const std::string at = ReadOptionalText(node.Get("far"));
   for (const char name : at) {
     if (name < 'x' || name > 'z' || name == along[0]) {
       return node.Get("far").Fail("'" + at + "' must name axes across the edge: x, y, z, or two");
@@ -140,7 +140,7 @@ Solids ReadSolids(const StorageNode& image, const Observations& observations) {
     FaceObservation face;
     face.id = node.Require("id").Text();
     face.corners = ReadPixels(node.Require("corners"), 3);
-    face.plane = node.Get("plane").Exists() ? node.Get("plane").Text() : "";
+    face.plane = ReadOptionalText(node.Get("plane"));
     solids.faces.push_back(std::move(face));
   }
   for (const StorageNode& node : image.Get("solids").Items()) {
@@ -151,7 +151,7 @@ Solids ReadSolids(const StorageNode& image, const Observations& observations) {
     } else if (kind == "cylinder") {
       solids.cylinders.push_back(ReadCylinder(node, observations));
     } else {
-      node.Get("kind").Fail("'" + kind + "' is not one of box, cylinder");
+      node.Get("kind").Fail(NotOneOf(kind, {"box", "cylinder"}));
     }
   }
   const auto is_base = [&](const FaceObservation& face) {

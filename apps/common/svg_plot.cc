@@ -15,6 +15,18 @@ constexpr double kLegendRow = 18.0;
 constexpr double kTickText = 6.5;      // Width of a digit of a label, half of a line's height.
 constexpr std::size_t kLongName = 32;  // Longer ones stand one below the other.
 
+// A place or length in the picture, to a tenth.
+std::string SvgNumber(double value) { return FormatFixed(value, 1); }
+
+std::string TickText(double value) {
+  if (value == 0.0) return "0";
+  if (value < 1e-4) return FormatShort(value, 1);
+  std::string text = FormatFixed(value, 4);
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
 struct Frame {
   const Plot& plot;
 
@@ -151,27 +163,10 @@ void DrawLegend(const Frame& frame, std::ostringstream* svg) {
 
 }  // namespace
 
-std::string SvgNumber(double value) { return FormatFixed(value, 1); }
-
-std::string TickText(double value) {
-  if (value == 0.0) return "0";
-  if (value < 1e-4) return FormatShort(value, 1);
-  std::string text = FormatFixed(value, 4);
-  text.erase(text.find_last_not_of('0') + 1);
-  if (text.back() == '.') text.pop_back();
-  return text;
-}
-
 std::vector<double> PlotTicks(bool log, double low, double high) {
   if (!log) return LinearTicks(low, high);
   const std::vector<double> ticks = LogTicks(low, high);
   return ticks.size() < 3 ? LinearTicks(low, high) : ticks;  // Hardly a decade: round values.
-}
-
-std::vector<double> DecadeTicks(double low, double high) {
-  std::vector<double> ticks;
-  for (double tick = low; tick <= high * 1.0001; tick *= 10.0) ticks.push_back(tick);
-  return ticks;
 }
 
 std::string RenderSvg(const Plot& plot) {

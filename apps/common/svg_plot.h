@@ -29,14 +29,9 @@ std::string RenderSvg(const Plot& plot);
 
 // Round values of an axis; on a logarithmic one 1, 2 and 5 times powers of ten.
 std::vector<double> PlotTicks(bool log, double low, double high);
-std::vector<double> DecadeTicks(double low, double high);  // Powers of ten.
-std::string TickText(double value);
 
 // Colours that stay apart for most eyes, repeated after ten.
 std::string SeriesColor(std::size_t index);
-
-// A place or length in a picture, to a tenth.
-std::string SvgNumber(double value);
 
 }  // namespace circline::apps
 

@@ -1,12 +1,12 @@
 #include "apps/common/text.h"
 
 #include <algorithm>
-#include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <limits>
 #include <new>
+#include <system_error>
 
 namespace circline::apps {
 namespace {
@@ -68,15 +68,11 @@ bool ParseDouble(const std::string& text, double* value) {
 }
 
 bool ParseInt(const std::string& text, int* value) {
-  if (text.empty()) return false;
-  char* end = nullptr;
-  errno = 0;
-  const long parsed = std::strtol(text.c_str(), &end, 10);
-  if (end != text.c_str() + text.size() || errno != 0) return false;
-  if (parsed < std::numeric_limits<int>::min() || parsed > std::numeric_limits<int>::max()) {
-    return false;
-  }
-  *value = static_cast<int>(parsed);
+  int parsed = 0;
+  const char* const all = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), all, parsed);
+  if (end != all || error != std::errc()) return false;
+  *value = parsed;
   return true;
 }
 
@@ -91,6 +87,10 @@ std::string DidYouMean(const std::string& name, const std::vector<std::string>& 
     }
   }
   return best == nullptr ? "" : "; did you mean '" + *best + "'?";
+}
+
+std::string NotOneOf(const std::string& name, const std::vector<std::string>& known) {
+  return "'" + name + "' is not one of " + JoinList(known, ", ") + DidYouMean(name, known);
 }
 
 std::string FormatFixed(double value, int decimals) {
@@ -129,30 +129,17 @@ std::string FormatMicroseconds(double microseconds) {
 std::string EscapeHtml(const std::string& text) {
   std::string escaped;
   for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      default:
-        escaped += c;
-    }
+    escaped += c == '&'    ? "&amp;"
+               : c == '<'  ? "&lt;"
+               : c == '>'  ? "&gt;"
+               : c == '"'  ? "&quot;"
+               : c == '\'' ? "&#39;"
+                           : std::string(1, c);
   }
   return escaped;
 }
 
-std::string EncodeBase64(const std::vector<std::uint8_t>& bytes) {
+std::string EncodeBase64(const std::string& bytes) {
   static constexpr char kLetters[] =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
@@ -160,7 +147,7 @@ std::string EncodeBase64(const std::vector<std::uint8_t>& bytes) {
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
     std::uint32_t group = 0;
     for (std::size_t k = 0; k < 3; ++k)
-      group = group << 8U | (i + k < bytes.size() ? bytes[i + k] : 0U);
+      group = group << 8U | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
     for (std::size_t k = 0; k < 4; ++k) {
       const bool pad = i + k > bytes.size();
       text += pad ? '=' : kLetters[(group >> (18U - 6U * k)) & 63U];

@@ -20,6 +20,9 @@ bool ParseInt(const std::string& text, int* value);
 // "; did you mean 'x'?" where one of the candidates is near enough to `name`, else "".
 std::string DidYouMean(const std::string& name, const std::vector<std::string>& candidates);
 
+// "'fish' is not one of pinhole, opencv, fisheye", and which was meant, as above.
+std::string NotOneOf(const std::string& name, const std::vector<std::string>& known);
+
 // Fixed number of decimals; "-" for what is not finite.
 std::string FormatFixed(double value, int decimals);
 // About `digits` significant digits without an exponent where that is readable (0.012, 3.4, 120).
@@ -30,7 +33,7 @@ std::string FormatPlain(double value);
 std::string FormatMicroseconds(double microseconds);
 
 std::string EscapeHtml(const std::string& text);
-std::string EncodeBase64(const std::vector<std::uint8_t>& bytes);
+std::string EncodeBase64(const std::string& bytes);
 
 // A line for a terminal: control characters, which may move the cursor or end the line, as \xNN.
 std::string WithoutControls(const std::string& text);

@@ -30,7 +30,7 @@ double FocalOfFov(double fov_deg, int width, int height) {
   return 0.5 * std::max(width, height) / std::tan(0.5 * fov_deg * kDegree);
 }
 
-std::string SureTo(double sigma, double doubtful) {
+std::string AccuracyText(double sigma, double doubtful) {
   if (!(sigma > 0.0)) return ", taken as exact";
   std::string words = ", +- " + FormatShort(100.0 * sigma) + " %";
   if (doubtful > 0.0) {
@@ -89,7 +89,7 @@ GuessedCamera CameraGuess::ForPhoto(const std::string& path, int width, int heig
   guess.sigma.log_focal = sigma;
   guess.sigma.doubtful_log_focal = doubtful;
   guess.words = "focal length " + FormatShort(camera.fx) + " px from " + guess.words +
-                SureTo(sigma, doubtful);
+                AccuracyText(sigma, doubtful);
   return guess;
 }
 

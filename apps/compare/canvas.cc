@@ -79,6 +79,10 @@ int Canvas::Thickness(double thickness) const {
   return std::max(1, static_cast<int>(std::lround(thickness * stroke_)));
 }
 
+int Canvas::FixedLength(double length) const {
+  return static_cast<int>(std::lround(length * stroke_ * (1 << kShift)));
+}
+
 double Canvas::LetterSize(double size) const { return std::max(kMinLetters, size * stroke_); }
 
 void Canvas::Run(const std::vector<cv::Point>& points, const cv::Scalar& color, int thickness) {
@@ -144,35 +148,16 @@ void Canvas::Arrow(const std::vector<Eigen::Vector2d>& pixels, const cv::Scalar&
   }
 }
 
-void Canvas::Dot(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color,
-                 double opacity) {
+void Canvas::Dot(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color) {
   if (!IsNear(pixel)) return;
-  radius *= stroke_;
-  const double reach = radius + 0.5;
-  const int left = std::max(0, static_cast<int>(std::ceil(pixel.x() - reach)));
-  const int right = std::min(image_.cols - 1, static_cast<int>(std::floor(pixel.x() + reach)));
-  const int top = std::max(0, static_cast<int>(std::ceil(pixel.y() - reach)));
-  const int bottom = std::min(image_.rows - 1, static_cast<int>(std::floor(pixel.y() + reach)));
-  for (int y = top; y <= bottom; ++y) {
-    cv::Vec3b* row = image_.ptr<cv::Vec3b>(y);
-    for (int x = left; x <= right; ++x) {
-      const double dx = x - pixel.x(), dy = y - pixel.y();
-      // The share of a pixel on the rim that the dot covers.
-      const double share = std::min(1.0, reach - std::sqrt(dx * dx + dy * dy));
-      if (share <= 0.0) continue;
-      const double weight = opacity * share;
-      for (int k = 0; k < 3; ++k) {
-        row[x][k] = cv::saturate_cast<std::uint8_t>(weight * color[k] + (1.0 - weight) * row[x][k]);
-      }
-    }
-  }
+  cv::circle(image_, Fixed(pixel), FixedLength(radius), color, cv::FILLED, cv::LINE_AA, kShift);
 }
 
 void Canvas::Ring(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color) {
   if (!IsNear(pixel)) return;
-  const int fixed_radius = static_cast<int>(std::lround(radius * stroke_ * (1 << kShift)));
-  cv::circle(image_, Fixed(pixel), fixed_radius, kRim, Thickness(3.0), cv::LINE_AA, kShift);
-  cv::circle(image_, Fixed(pixel), fixed_radius, color, Thickness(1.0), cv::LINE_AA, kShift);
+  const int length = FixedLength(radius);
+  cv::circle(image_, Fixed(pixel), length, kRim, Thickness(3.0), cv::LINE_AA, kShift);
+  cv::circle(image_, Fixed(pixel), length, color, Thickness(1.0), cv::LINE_AA, kShift);
 }
 
 void Canvas::Cross(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color) {

@@ -29,8 +29,7 @@ class Canvas {
   void Dashes(const std::vector<Eigen::Vector2d>& pixels, const cv::Scalar& color,
               double thickness);
   void Arrow(const std::vector<Eigen::Vector2d>& pixels, const cv::Scalar& color, double thickness);
-  void Dot(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color,
-           double opacity = 1.0);
+  void Dot(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color);
   void Ring(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color);
   void Cross(const Eigen::Vector2d& pixel, double radius, const cv::Scalar& color);
   // Text with a dark rim, moved inside the picture; begins at the pixel, or is centred there.
@@ -47,6 +46,7 @@ class Canvas {
  private:
   bool IsNear(const Eigen::Vector2d& pixel) const;
   int Thickness(double thickness) const;
+  int FixedLength(double length) const;
   double LetterSize(double size) const;
   void Run(const std::vector<cv::Point>& points, const cv::Scalar& color, int thickness);
 

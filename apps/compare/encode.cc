@@ -4,18 +4,19 @@
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 namespace circline::apps {
 
-std::vector<std::uint8_t> EncodePng(const cv::Mat& picture) {
+std::string EncodePng(const cv::Mat& picture) {
   std::vector<std::uint8_t> bytes;
   // OpenCV's default (zlib's fastest level on differences of neighbours): every other level and
   // strategy takes 1.3 to 2 times as long, for files up to a tenth smaller.
   cv::imencode(".png", picture, bytes);
-  return bytes;
+  return {bytes.begin(), bytes.end()};
 }
 
-std::vector<std::uint8_t> EncodeJpeg(const cv::Mat& picture, int max_width) {
+std::string EncodeJpeg(const cv::Mat& picture, int max_width) {
   constexpr int kMaxRatio = 8;  // Of height to width; a JPEG has 65500 rows at most.
   const double scale = std::min({1.0, static_cast<double>(max_width) / picture.cols,
                                  static_cast<double>(kMaxRatio * max_width) / picture.rows});
@@ -28,7 +29,7 @@ std::vector<std::uint8_t> EncodeJpeg(const cv::Mat& picture, int max_width) {
                cv::INTER_AREA);
   std::vector<std::uint8_t> bytes;
   cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, 82});
-  return bytes;
+  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace circline::apps

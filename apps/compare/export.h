@@ -2,47 +2,45 @@
 #ifndef CIRCLINE_APPS_COMPARE_EXPORT_H_
 #define CIRCLINE_APPS_COMPARE_EXPORT_H_
 
-#include <memory>
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "apps/compare/record.h"
+#include "circline/estimators/camera.h"
+#include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
 
 namespace circline::apps {
 
-// A camera in the world frame of its photo: X_cam = rotation X_world + translation.
+// A camera in the world frame of its photo.
 struct ExportedPose {
   std::string name;  // Of the photo.
   std::size_t index = 0;
   Camera camera;  // Of the refined focal length, where that was refined.
-  Eigen::Matrix3d rotation;
-  Eigen::Vector3d translation;
+  CameraPose cam_from_world;
   std::optional<double> time_s = std::nullopt;  // Where it is known otherwise than by the name.
 };
 
-class Exporter {
- public:
-  virtual ~Exporter() = default;
-  virtual void Add(const ExportedPose& pose) = 0;
-  virtual Status Finish() = 0;  // Writes the files.
-  // What the files could not take, a sentence; or empty.
-  virtual std::string Note() const { return ""; }
+struct ExportFormat {
+  std::string name;
+  std::vector<std::string> files;
 };
 
-// images.txt (without points), cameras.txt and an empty points3D.txt. Photos with a space in their
-// name are left out: this format ends a name there.
-std::unique_ptr<Exporter> MakeColmapExporter(const std::string& folder);
-// cameras.gltf: a glTF 2.0 scene with a camera for each photo, upright in programs whose Z is up.
-// It has no place for lens distortion and the principal point.
-std::unique_ptr<Exporter> MakeGltfExporter(const std::string& folder);
-// trajectory.txt: lines "time tx ty tz qx qy qz qw", world from camera. The time is
-// time_s, else the photo's name where that is a number, else its position in the set.
-std::unique_ptr<Exporter> MakeTumExporter(const std::string& folder);
+// colmap: images.txt (without points), cameras.txt and an empty points3D.txt. Photos with a space
+// in their name are left out: this format ends a name there. gltf: cameras.gltf, a glTF 2.0 scene
+// with a camera for each photo, upright in programs whose Z is up. It has no place for lens
+// distortion and the principal point. tum: trajectory.txt, lines "time tx ty tz qx qy qz qw", world
+// from camera. The time is time_s, else the photo's name where that is a number, else its position
+// in the set.
+const std::vector<ExportFormat>& ExportFormats();
 
-// Writes the answer to show of every photo that has one; `formats` are colmap, gltf, tum. `notes`:
-// sentences, a line each, on what a reader of the files could not know.
+// `format`: one of these. `note`: what the files could not take, a sentence; or empty.
+Status ExportPoses(const std::string& format, const std::vector<ExportedPose>& poses,
+                   const std::string& folder, std::string* note);
+
+// Writes the answer to show of every photo that has one. `notes`: sentences, a line each, on what a
+// reader of the files could not know.
 Status WriteExports(const std::string& folder, const std::vector<std::string>& formats,
                     std::string* notes);
 

@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include "apps/common/output_file.h"
-#include "apps/compare/digest.h"
 #include "apps/compare/export.h"
 #include "apps/compare/report.h"
 #include "apps/compare/sweep.h"

@@ -1,7 +1,6 @@
 #include "apps/compare/image_run.h"
 
 #include <algorithm>
-#include <functional>
 #include <optional>
 
 #include "apps/common/photo_file.h"
@@ -26,7 +25,7 @@ std::string SizeError(const cv::Mat& photo, const Camera& camera) {
 
 // What the scene says of a photo in which everything is detected: the frame and lengths in pixels
 // hold; ids of planes mean nothing unless the detection happens to use them.
-void TakeOverFrame(const Observations& scene, Observations* detected) {
+void CopyFrame(const Observations& scene, Observations* detected) {
   const auto has_plane = [&](const std::string& plane) {
     return std::any_of(detected->circles.begin(), detected->circles.end(),
                        [&](const CircleObservation& c) { return c.plane == plane; }) ||
@@ -54,7 +53,7 @@ void DetectAll(const CompareOptions& options, ImageRun* run) {
                                            &run->observations);
   run->stages.emplace_back("detect", watch.Microseconds());
   if (!status.ok()) run->read_error = status.message;
-  TakeOverFrame(run->image->observations, &run->observations);
+  CopyFrame(run->image->observations, &run->observations);
   SetLargestRadius(options.inputs.circle_radius, &run->observations);
   if (!run->observations.message.empty()) run->problems.push_back(run->observations.message);
 }
@@ -140,21 +139,20 @@ CompareOptions WithCamera(CompareOptions options, const SceneImage& image) {
   return options;
 }
 
-void ObserveRead(const CompareOptions& options, SceneImage* image, ImageRun* run) {
-  if (!run->photo.empty()) {
-    TakeGuess(options, run->photo.size(), image);
-    run->read_error = SizeError(run->photo, image->observations.camera);
-  }
-  if (run->read_error.empty()) Observe(options, run);
-}
-
-void ReadAndObserve(const CompareOptions& options, SceneImage* image, ImageRun* run) {
-  if (options.overlays || image->detect_everything || !image->rois.empty()) {
+void ReadAndObserve(const CompareOptions& options, const cv::Mat* photo, SceneImage* image,
+                    ImageRun* run) {
+  if (photo != nullptr) {
+    run->photo = *photo;
+  } else if (options.overlays || image->detect_everything || !image->rois.empty()) {
     const Stopwatch watch;
     run->read_error = ReadPhoto(image->path, &run->photo, options.max_megapixels);
     run->stages.emplace_back("read", watch.Microseconds());
   }
-  if (run->read_error.empty()) ObserveRead(options, image, run);
+  if (!run->photo.empty()) {
+    SetGuessedCamera(options, run->photo.size(), image);
+    run->read_error = SizeError(run->photo, image->observations.camera);
+  }
+  if (run->read_error.empty()) Observe(options, run);
 }
 
 void RunSolvers(const CompareOptions& options, const SolverSet& solvers, ImageRun* run) {
@@ -172,7 +170,7 @@ void RunSolvers(const CompareOptions& options, const SolverSet& solvers, ImageRu
 
 }  // namespace
 
-void TakeGuess(const CompareOptions& options, cv::Size photo, SceneImage* image) {
+void SetGuessedCamera(const CompareOptions& options, cv::Size photo, SceneImage* image) {
   if (!options.inputs.guess.wanted) return;
   GuessedCamera guess = options.inputs.guess.ForPhoto(
       image->path, photo.width, photo.height, options.losses.front().estimation.noise_model.camera);
@@ -230,48 +228,19 @@ SolverSet::SolverSet(const CompareOptions& options) {
   for (const PeerSolver& peer : peers_) tasks_.push_back({nullptr, &peer, -1});
 }
 
-namespace {
-
-ImageRun Guarded(SceneImage* image, const std::function<void(ImageRun*)>& work) {
+ImageRun RunImage(const CompareOptions& options, const SolverSet* solvers, SceneImage* image,
+                  const cv::Mat* photo) {
   ImageRun run;
   run.image = image;
   try {
-    work(&run);
+    ReadAndObserve(options, photo, image, &run);
+    if (solvers != nullptr) RunSolvers(options, *solvers, &run);
   } catch (const std::exception& error) {  // Such as a photo too large for the memory.
     run.read_error = "cannot be worked on: " + Words(error);
     std::replace(run.read_error.begin(), run.read_error.end(), '\n', ' ');
     run.solvers.clear();
   }
   return run;
-}
-
-}  // namespace
-
-ImageRun ObserveImage(const CompareOptions& options, SceneImage* image) {
-  return Guarded(image, [&](ImageRun* run) { ReadAndObserve(options, image, run); });
-}
-
-ImageRun ObservePhoto(const CompareOptions& options, const cv::Mat& photo, SceneImage* image) {
-  return Guarded(image, [&](ImageRun* run) {
-    run->photo = photo;
-    ObserveRead(options, image, run);
-  });
-}
-
-ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image) {
-  return Guarded(image, [&](ImageRun* run) {
-    ReadAndObserve(options, image, run);
-    RunSolvers(options, solvers, run);
-  });
-}
-
-ImageRun RunPhoto(const CompareOptions& options, const SolverSet& solvers, const cv::Mat& photo,
-                  SceneImage* image) {
-  return Guarded(image, [&](ImageRun* run) {
-    run->photo = photo;
-    ObserveRead(options, image, run);
-    RunSolvers(options, solvers, run);
-  });
 }
 
 std::vector<SolverKey> SolverSet::Keys(const CompareOptions& options) const {

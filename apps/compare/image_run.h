@@ -72,29 +72,21 @@ struct ImageRun {
 };
 
 // The camera of a photo that has no calibration, where the flags want a guess.
-void TakeGuess(const CompareOptions& options, cv::Size photo, SceneImage* image);
+void SetGuessedCamera(const CompareOptions& options, cv::Size photo, SceneImage* image);
 
 // How well an image's camera is known: a guess says so itself; else as --focal_sigma says, else the
 // scene file, else the noise model.
 CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image);
 
-// The photo read and everything in it detected or fitted; no solver. Never throws. Image and
-// options outlive the result. A camera that is only guessed gets its focal length from the size of
-// the photo.
-ImageRun ObserveImage(const CompareOptions& options, SceneImage* image);
-
-// The same of a photo that is at hand; it may be empty where nothing is to be detected in it.
-ImageRun ObservePhoto(const CompareOptions& options, const cv::Mat& photo, SceneImage* image);
+// Everything in the photo detected or fitted, and all solvers run; null: none. `photo`: where it is
+// at hand (empty where nothing is to be detected in it), else it is read if need be. A camera that
+// is only guessed gets its focal length from the size of the photo. Never throws. Image and solvers
+// outlive the result.
+ImageRun RunImage(const CompareOptions& options, const SolverSet* solvers, SceneImage* image,
+                  const cv::Mat* photo = nullptr);
 
 // Gives it to the circle whose image has the longest axis, whose index is returned; -1: to none.
 int SetLargestRadius(double radius, Observations* observations);
-
-// The same, and all solvers, which outlive the result.
-ImageRun RunImage(const CompareOptions& options, const SolverSet& solvers, SceneImage* image);
-
-// The same of a photo that is at hand.
-ImageRun RunPhoto(const CompareOptions& options, const SolverSet& solvers, const cv::Mat& photo,
-                  SceneImage* image);
 
 // The run to show in a picture (see ShowRank). Null if every solver refused.
 const SolverRun* RunToShow(const ImageRun& run);

@@ -96,8 +96,8 @@ Status ReadScenes(const InputOptions& options, const std::vector<Camera>& camera
   std::vector<SceneImage> all;
   std::string rigid;
   const Status status = ReadScene(FLAGS_scene, cameras, &all, &rigid);
-  if (status.ok()) *images = ImageSet(std::move(all), options.shard_index, options.num_shards);
-  images->set_rigid(rigid);
+  if (status.ok())
+    *images = ImageSet(std::move(all), options.shard_index, options.num_shards, rigid);
   return status;
 }
 

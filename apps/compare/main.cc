@@ -8,12 +8,8 @@
 #include "apps/compare/ranks.h"
 #include "apps/compare/run.h"
 
+namespace circline::apps {
 namespace {
-
-using circline::Status;
-using circline::apps::CommandLine;
-using circline::apps::CompareOptions;
-using circline::apps::Ranks;
 
 constexpr char kUsage[] =
     "circline_compare: camera pose from circles and parallel lines, by every solver, compared.\n"
@@ -29,44 +25,41 @@ constexpr char kUsage[] =
     "the rest is done); 2: unusable flags or scene file (nothing is written).";
 
 // Only the first of several ranks speaks.
-int Refuse(const Status& status, const Ranks& ranks) {
-  if (ranks.is_first()) circline::apps::SayOnStderr("circline_compare: " + status.message);
-  return circline::apps::kExitUsage;
+int RefuseOnce(const Status& status, const Ranks& ranks) {
+  if (ranks.is_first()) SayOnStderr("circline_compare: " + status.message);
+  return kExitUsage;
 }
 
 int Compare(const Ranks& ranks) {
   CompareOptions options;
-  Status status = circline::apps::OptionsFromFlags(&options);
-  if (!status.ok()) return Refuse(status, ranks);
-  circline::apps::ComparisonResult result;
+  Status status = OptionsFromFlags(&options);
+  if (!status.ok()) return RefuseOnce(status, ranks);
+  ComparisonResult result;
   if (!options.inputs.merge.empty()) {
-    if (ranks.is_first()) status = circline::apps::MergeComparison(options, &result);
+    if (ranks.is_first()) status = MergeComparison(options, &result);
   } else {
-    circline::apps::ImageSet images;
-    status = circline::apps::ImagesFromFlags(options.inputs, &images);
+    ImageSet images;
+    status = ImagesFromFlags(options.inputs, &images);
     if (status.ok() && options.inputs.guess.wanted && ranks.is_first())
-      circline::apps::SayOnStderr(circline::apps::DescribeGuess(options.inputs.guess));
-    if (status.ok()) status = circline::apps::RunComparison(images, options, ranks, &result);
+      SayOnStderr(DescribeGuess(options.inputs.guess));
+    if (status.ok()) status = RunComparison(images, options, ranks, &result);
   }
-  if (status.code == circline::StatusCode::kInvalidArgument) return Refuse(status, ranks);
-  if (!ranks.is_first()) return circline::apps::kExitOk;
+  if (status.code == StatusCode::kInvalidArgument) return RefuseOnce(status, ranks);
+  if (!ranks.is_first()) return kExitOk;
   std::cout << result.table;
-  if (!status.ok()) {
-    circline::apps::SayOnStderr("circline_compare: " + status.message);
-    return circline::apps::kExitUnreadable;
-  }
+  if (!status.ok()) return Refuse("circline_compare", status);
   std::cout << "report: " << options.output << "/report.html\n";
-  return result.num_unreadable > 0 ? circline::apps::kExitUnreadable : circline::apps::kExitOk;
+  return result.num_unreadable > 0 ? kExitUnreadable : kExitOk;
 }
 
 // What is asked for instead of a comparison; false if nothing is.
 bool Answer(const CommandLine& command_line) {
   if (command_line.help) {
-    std::cout << circline::apps::HelpText(kUsage);
+    std::cout << HelpText(kUsage);
   } else if (command_line.version) {
-    std::cout << circline::apps::VersionText("circline_compare") << Ranks::kBuiltWith << "\n";
-  } else if (circline::apps::ListSolversAsked()) {
-    std::cout << circline::apps::ListSolvers();
+    std::cout << VersionText("circline_compare") << Ranks::kBuiltWith << "\n";
+  } else if (ListSolversAsked()) {
+    std::cout << ListSolvers();
   } else {
     return false;
   }
@@ -75,24 +68,25 @@ bool Answer(const CommandLine& command_line) {
 
 int ParseAndCompare(int argc, char** argv, const Ranks& ranks) {
   CommandLine command_line;
-  Status status = circline::apps::ParseCommandLine(argc, argv, &command_line);
-  if (status.ok()) status = circline::apps::PluginsFromFlags();
-  if (!status.ok()) return Refuse(status, ranks);
-  return Answer(command_line) ? circline::apps::kExitOk : Compare(ranks);
+  Status status = ParseCommandLine(argc, argv, &command_line);
+  if (status.ok()) status = PluginsFromFlags();
+  if (!status.ok()) return RefuseOnce(status, ranks);
+  return Answer(command_line) ? kExitOk : Compare(ranks);
 }
 
 }  // namespace
+}  // namespace circline::apps
 
 int main(int argc, char** argv) {
-  return circline::apps::RunGuarded(argv[0], "circline_compare", [&] {
+  using namespace circline::apps;
+  return RunGuarded(argv[0], "circline_compare", [&] {
     const Ranks ranks(&argc, &argv);
     try {
       return ParseAndCompare(argc, argv, ranks);
     } catch (const std::exception& error) {
       if (ranks.count() == 1) throw;
-      circline::apps::SayOnStderr(std::string("circline_compare: stopped: ") + error.what());
-      ranks.Abort(circline::apps::kExitUnreadable);  // The others wait to be heard.
-      return circline::apps::kExitUnreadable;
+      SayOnStderr(std::string("circline_compare: stopped: ") + error.what());
+      ranks.Abort(kExitUnreadable);  // The others wait to be heard.
     }
   });
 }

@@ -136,7 +136,7 @@ Status MergeFolders(const std::vector<std::string>& folders, const std::string& 
   if (status.ok()) status = CheckImages(folders);
   if (status.ok()) status = CreateFolder(output);
   FolderLock lock;
-  if (status.ok()) status = lock.Take(output);
+  if (status.ok()) status = lock.Acquire(output);
   if (!status.ok()) return status;
   RecordWriter writer(output, {});
   Merger merger(folders);

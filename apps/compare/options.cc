@@ -8,32 +8,16 @@
 #include <optional>
 #include <sstream>
 
+#include "apps/common/flags_util.h"
 #include "apps/common/plugins.h"
 #include "apps/common/text.h"
-#include "apps/compare/noise_flags.h"
+#include "apps/compare/export.h"
 #include "apps/compare/peers.h"
-#include "circline/estimators/robust_loss.h"
 #include "circline/estimators/solver_registry.h"
 #include "circline/refine/refined_solvers.h"
 
 DEFINE_string(output, "", "Folder for the results; created if need be.");
 DEFINE_string(solvers, "all", "Solvers to compare, separated by commas; see --list_solvers.");
-DEFINE_string(
-    robust_loss, circline::LossName(circline::LossOptions().type),
-    "Robust losses of the refinement, a list sweeps: trivial, huber, soft_l_one, cauchy, arctan, "
-    "tukey, geman_mcclure.");
-DEFINE_string(
-    loss_scale_px, "auto",
-    "Standard deviation of a point's noise, pixels, or 'auto' (estimated); a list sweeps. A number "
-    "also replaces what detection measured.");
-DEFINE_string(conic_loss, "", "Loss of contour points, where it differs from --robust_loss.");
-DEFINE_string(conic_loss_scale_px, "", "Scale of contour points, where it differs.");
-DEFINE_string(line_loss, "", "Loss of points of lines, where it differs from --robust_loss.");
-DEFINE_string(line_loss_scale_px, "", "Scale of points of lines, where it differs.");
-DEFINE_string(conic_distance,
-              circline::ConicDistanceName(circline::EstimationOptions().conic_distance),
-              "Distance of contour points in the refinement: sampson (first order), orthogonal, or "
-              "auto: orthogonal where the first order does not suffice.");
 DEFINE_double(
     inlier_threshold_px, circline::FitOptions().inlier_threshold_px,
     "A point farther than this from its curve is an outlier, pixels; 0 = from the noise.");
@@ -84,114 +68,33 @@ Status CheckFlag(const std::string& flag, const Status& status) {
   return Status::Invalid("--" + flag + "=" + value + ": " + status.message);
 }
 
-Status ParseLoss(const std::string& flag, const std::string& name, LossType* type) {
-  if (LossFromName(name, type)) return Status::Ok();
-  return Status::Invalid("--" + flag + ": '" + name + "' is not one of " +
-                         JoinList(LossNames(), ", ") + DidYouMean(name, LossNames()));
-}
-
-Status ParseScale(const std::string& flag, const std::string& text, double* scale) {
-  if (text == "auto") {
-    *scale = 0.0;
-    return Status::Ok();
+// Validate names the field that is wrong: a flag has the same name, or that with "ransac_".
+Status CheckOptions(const Status& status) {
+  if (status.ok()) return status;
+  const std::string field = status.message.substr(0, status.message.find(' '));
+  std::string value;
+  for (const std::string& flag : {field, "ransac_" + field}) {
+    if (gflags::GetCommandLineOption(flag.c_str(), &value)) return CheckFlag(flag, status);
   }
-  if (ParseDouble(text, scale) && *scale > 0.0) return Status::Ok();
-  return Status::Invalid("--" + flag + ": '" + text + "' is neither a positive number nor 'auto'");
-}
-
-// What --conic_loss or --line_loss and their scales say; absent where they are empty.
-struct LossOverride {
-  std::optional<LossType> type;
-  std::optional<double> scale_px;
-
-  Status Read(const std::string& flag, const std::string& loss, const std::string& scale) {
-    if (!loss.empty()) {
-      const Status status = ParseLoss(flag, loss, &type.emplace());
-      if (!status.ok()) return status;
-    }
-    return scale.empty() ? Status::Ok()
-                         : ParseScale(flag + "_scale_px", scale, &scale_px.emplace());
-  }
-  LossOptions Apply(const LossOptions& common) const {
-    return {type.value_or(common.type), scale_px.value_or(common.scale_px)};
-  }
-};
-
-// Sets one field from its flag and checks it apart from the others, so that the flag can be named.
-template <typename Options, typename Field, typename Value>
-Status SetOption(const std::string& flag, Field Options::*field, const Value& value,
-                 Options* options) {
-  Options alone;
-  alone.*field = static_cast<Field>(value);
-  options->*field = static_cast<Field>(value);
-  return CheckFlag(flag, alone.Validate());
-}
-
-Status ReadLosses(const NoiseModel& noise, std::vector<LossSetting>* losses) {
-  LossOverride conic, line;
-  Status status = conic.Read("conic_loss", FLAGS_conic_loss, FLAGS_conic_loss_scale_px);
-  if (status.ok()) status = line.Read("line_loss", FLAGS_line_loss, FLAGS_line_loss_scale_px);
-  EstimationOptions common_options;
-  if (status.ok() && !ConicDistanceFromName(FLAGS_conic_distance, &common_options.conic_distance)) {
-    status = Status::Invalid("--conic_distance: '" + FLAGS_conic_distance +
-                             "' is not one of auto, sampson, orthogonal" +
-                             DidYouMean(FLAGS_conic_distance, {"auto", "sampson", "orthogonal"}));
-  }
-  common_options.noise_model = noise;
-  if (status.ok()) status = CameraSigmaFromFlags(noise, &common_options.camera_sigma);
-  if (!status.ok()) return status;
-  losses->clear();
-  for (const std::string& loss : SplitList(FLAGS_robust_loss)) {
-    LossOptions common;
-    status = ParseLoss("robust_loss", loss, &common.type);
-    for (const std::string& scale : SplitList(FLAGS_loss_scale_px)) {
-      if (status.ok()) status = ParseScale("loss_scale_px", scale, &common.scale_px);
-      LossSetting setting{loss, common.scale_px, common_options};
-      setting.estimation.conic_loss = conic.Apply(common);
-      setting.estimation.line_loss = line.Apply(common);
-      if (status.ok()) status = setting.estimation.Validate();
-      if (!status.ok()) return status;
-      const bool twice = std::any_of(losses->begin(), losses->end(), [&](const LossSetting& other) {
-        return other.loss == setting.loss && other.scale_px == setting.scale_px;
-      });
-      if (!twice) losses->push_back(setting);
-    }
-  }
-  return Status::Ok();
-}
-
-Status FirstError(const std::vector<Status>& checks) {
-  for (const Status& status : checks) {
-    if (!status.ok()) return status;
-  }
-  return Status::Ok();
+  return status;
 }
 
 Status ReadFitOptions(FitOptions* fit) {
   fit->seed = FLAGS_seed;
-  const std::vector<Status> checks = {
-      SetOption("inlier_threshold_px", &FitOptions::inlier_threshold_px, FLAGS_inlier_threshold_px,
-                fit),
-      SetOption("ransac_confidence", &FitOptions::confidence, FLAGS_ransac_confidence, fit),
-      SetOption("ransac_max_iterations", &FitOptions::max_iterations, FLAGS_ransac_max_iterations,
-                fit)};
-  const Status status = FirstError(checks);
-  return status.ok() ? fit->Validate() : status;
+  fit->inlier_threshold_px = FLAGS_inlier_threshold_px;
+  fit->confidence = FLAGS_ransac_confidence;
+  fit->max_iterations = FLAGS_ransac_max_iterations;
+  return CheckOptions(fit->Validate());
 }
 
 Status ReadDetectionOptions(DetectionOptions* detection) {
-  using D = DetectionOptions;
   detection->seed = FLAGS_seed;
-  const std::vector<Status> checks = {
-      SetOption("min_ellipse_axis_px", &D::min_ellipse_axis_px, FLAGS_min_ellipse_axis_px,
-                detection),
-      SetOption("min_arc_deg", &D::min_arc_deg, FLAGS_min_arc_deg, detection),
-      SetOption("min_segment_length_px", &D::min_segment_length_px, FLAGS_min_segment_length_px,
-                detection),
-      SetOption("max_circles", &D::max_circles, FLAGS_max_circles, detection),
-      SetOption("max_pencils", &D::max_pencils, FLAGS_max_pencils, detection)};
-  const Status status = FirstError(checks);
-  return status.ok() ? detection->Validate() : status;
+  detection->min_ellipse_axis_px = FLAGS_min_ellipse_axis_px;
+  detection->min_arc_deg = FLAGS_min_arc_deg;
+  detection->min_segment_length_px = FLAGS_min_segment_length_px;
+  detection->max_circles = FLAGS_max_circles;
+  detection->max_pencils = FLAGS_max_pencils;
+  return CheckOptions(detection->Validate());
 }
 
 Status ReadSolvers(std::vector<std::string>* solvers) {
@@ -212,15 +115,9 @@ Status ReadSolvers(std::vector<std::string>* solvers) {
 }
 
 Status ReadExports(std::vector<std::string>* exports) {
-  if (FLAGS_export_as.empty()) return Status::Ok();
-  const std::vector<std::string> known = {"colmap", "gltf", "tum"};
-  for (const std::string& name : SplitList(FLAGS_export_as)) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      return Status::Invalid("--export_as: '" + name + "' is not one of " + JoinList(known, ", "));
-    }
-    exports->push_back(name);
-  }
-  return Status::Ok();
+  std::vector<std::string> known;
+  for (const ExportFormat& format : ExportFormats()) known.push_back(format.name);
+  return NamesFromFlag("export_as", FLAGS_export_as, known, exports);
 }
 
 SolverRegistry AllSolvers() {
@@ -285,7 +182,7 @@ Status OptionsFromFlags(CompareOptions* options) {
       noise;
   if (status.ok()) status = ReadFitOptions(&options->fit);
   if (status.ok()) status = ReadDetectionOptions(&options->detection);
-  if (status.ok()) status = ReadLosses(noise, &options->losses);
+  if (status.ok()) status = LossesFromFlags(noise, &options->losses);
   if (status.ok()) {
     const EstimationOptions& first = options->losses.front().estimation;
     options->closed_form.noise_model.camera = first.camera_sigma.value_or(noise.camera);

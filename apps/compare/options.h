@@ -6,22 +6,15 @@
 #include <vector>
 
 #include "apps/common/photo_file.h"
+#include "apps/compare/estimation_flags.h"
 #include "apps/compare/finish.h"
 #include "apps/compare/inputs.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/detection/detect_observations.h"
 #include "circline/ransac/fit_observations.h"
-#include "circline/refine/estimate_pose.h"
 
 namespace circline::apps {
-
-// One point of the sweep over losses and scales.
-struct LossSetting {
-  std::string loss;              // As given to --robust_loss.
-  double scale_px = 0.0;         // As given to --loss_scale_px; 0 = auto.
-  EstimationOptions estimation;  // With the overrides for conics and lines.
-};
 
 struct CompareOptions {
   std::string output;

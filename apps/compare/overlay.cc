@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/common/output_file.h"
 #include "apps/common/text.h"
 #include "apps/compare/canvas.h"
+#include "apps/compare/encode.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/pose_curves.h"
 #include "circline/estimators/basics.h"
@@ -38,7 +40,7 @@ int PiecesOfLine(double length_px) {
 void DrawContourPoints(const CircleObservation& circle, Canvas* canvas) {
   for (std::size_t i = 0; i < circle.points.size(); ++i) {
     const bool inlier = circle.inliers.empty() || circle.inliers[i] != 0;
-    canvas->Dot(circle.points[i], inlier ? 1.6 : 2.2, inlier ? kWhite : kOutlier, 0.55);
+    canvas->Dot(circle.points[i], inlier ? 1.6 : 2.2, inlier ? kWhite : kOutlier);
   }
 }
 
@@ -192,7 +194,9 @@ bool IsUsed(const CircleObservation& circle, const SolverRun* shown) {
 cv::Mat DrawOverlay(const ImageRun& run) {
   Canvas canvas(run.photo);
   const Observations& observations = run.observations;
-  for (const CircleObservation& circle : observations.circles) DrawContourPoints(circle, &canvas);
+  canvas.Blend(0.55, [&] {
+    for (const CircleObservation& circle : observations.circles) DrawContourPoints(circle, &canvas);
+  });
   const SolverRun* shown = RunToShow(run);
   for (const CircleObservation& circle : observations.circles) {
     DrawEllipse(observations.camera, circle, IsUsed(circle, shown), &canvas);
@@ -200,6 +204,22 @@ cv::Mat DrawOverlay(const ImageRun& run) {
   DrawPencils(observations, &canvas);
   if (shown != nullptr) DrawPose(observations, shown->estimate, &canvas);
   return WithCaption(run, shown, canvas);
+}
+
+Status WriteOverlay(const std::string& folder, ImageRun* run, std::string* file, cv::Mat* picture) {
+  if (!run->read_error.empty() || run->photo.empty()) return Status::Ok();
+  *file = "overlays/" + run->image->stem + ".png";
+  const std::string path = folder + "/" + *file;
+  const Stopwatch watch;
+  try {
+    const cv::Mat drawn = DrawOverlay(*run);
+    const Status status = WriteFile(path, EncodePng(drawn));
+    run->stages.emplace_back("overlay", watch.Microseconds());
+    if (picture != nullptr) *picture = drawn;
+    return status;
+  } catch (const std::exception& error) {  // Such as a picture too large for the memory.
+    return Status::Failed(path + " cannot be drawn: " + error.what());
+  }
 }
 
 }  // namespace circline::apps

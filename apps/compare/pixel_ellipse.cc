@@ -1,5 +1,6 @@
 #include "apps/compare/pixel_ellipse.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -48,14 +49,11 @@ bool FitPixelEllipse(const CircleObservation& circle, PixelEllipse* result) {
   const std::vector<Eigen::Vector2d> points = Inliers(circle.points, circle.inliers);
   result->num_points = static_cast<int>(points.size());
   if (points.size() < 5) return false;
-  Eigen::Vector2d low = points[0], high = points[0];
-  for (const Eigen::Vector2d& point : points) {
-    low = low.cwiseMin(point);
-    high = high.cwiseMax(point);
-  }
+  Eigen::AlignedBox2d extent;
+  for (const Eigen::Vector2d& point : points) extent.extend(point);
   // Fitted in a frame in which the points have size 1; distances are pixels all the same.
-  const Eigen::Vector2d middle = (low + high) / 2;
-  const double size = std::max((high - low).maxCoeff() / 2, 1e-9);
+  const Eigen::Vector2d middle = extent.center();
+  const double size = std::max(extent.sizes().maxCoeff() / 2, 1e-9);
   std::vector<CalibratedPoint> scaled(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     scaled[i].x = (points[i] - middle) / size;

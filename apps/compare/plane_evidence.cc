@@ -1,34 +1,15 @@
 #include "apps/compare/plane_evidence.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "apps/compare/pixel_ellipse.h"
+#include "circline/estimators/metrology.h"
 
 namespace circline::apps {
 namespace {
-
-// A pixel's point on the plane Z = 0.
-struct PlanePoint {
-  Eigen::Vector2d world;
-  double depth;  // Camera frame, along the optical axis.
-};
-
-// Where the ray of a pixel meets the plane in front of the camera; false if it does not.
-bool PixelOnPlane(const Camera& camera, const CameraPose& pose, const Eigen::Vector2d& pixel,
-                  PlanePoint* result) {
-  CalibratedPoint point;
-  if (!PixelToCalibrated(camera, pixel, &point)) return false;
-  const Eigen::Vector3d ray = point.Homogeneous();
-  const Eigen::Vector3d normal = pose.rotation.col(2);
-  const double along = normal.dot(ray);
-  if (std::abs(along) < 1e-3 * ray.norm()) return false;  // Next to the vanishing line.
-  result->depth = normal.dot(pose.translation) / along;
-  result->world = (pose.rotation.transpose() * (result->depth * ray - pose.translation)).head<2>();
-  return result->depth > 0.0 && result->world.allFinite();
-}
 
 // Pixels of everything that lies on the world's plane.
 std::vector<Eigen::Vector2d> PixelsOfPlane(const Observations& observations) {
@@ -51,20 +32,27 @@ std::vector<Eigen::Vector2d> PixelsOfPlane(const Observations& observations) {
 
 }  // namespace
 
+bool PixelOnPlane(const Camera& camera, const CameraPose& pose, const Eigen::Vector2d& pixel,
+                  Eigen::Vector2d* point) {
+  CalibratedPoint ray;
+  return PixelToCalibrated(camera, pixel, &ray) && PointOnPlane(pose, ray.Homogeneous(), point);
+}
+
 Eigen::AlignedBox2d EvidenceOnPlane(const Observations& observations, const Camera& camera,
                                     const CameraPose& pose) {
   constexpr double kDepthRange = 4.0;
-  std::vector<PlanePoint> points;
+  std::vector<std::pair<double, Eigen::Vector2d>> points;  // Depth in the camera, and the point.
   double nearest = std::numeric_limits<double>::infinity();
   for (const Eigen::Vector2d& pixel : PixelsOfPlane(observations)) {
-    PlanePoint point;
+    Eigen::Vector2d point;
     if (!PixelOnPlane(camera, pose, pixel, &point)) continue;
-    points.push_back(point);
-    nearest = std::min(nearest, point.depth);
+    const double depth = pose.rotation.row(2).head<2>().dot(point) + pose.translation.z();
+    points.emplace_back(depth, point);
+    nearest = std::min(nearest, depth);
   }
   Eigen::AlignedBox2d box;
-  for (const PlanePoint& point : points) {
-    if (point.depth <= kDepthRange * nearest) box.extend(point.world);
+  for (const auto& [depth, point] : points) {
+    if (depth <= kDepthRange * nearest) box.extend(point);
   }
   return box;
 }

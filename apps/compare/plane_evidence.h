@@ -15,6 +15,10 @@ namespace circline::apps {
 Eigen::AlignedBox2d EvidenceOnPlane(const Observations& observations, const Camera& camera,
                                     const CameraPose& pose);
 
+// The point of the plane Z = 0 that is seen in a pixel; false where there is none.
+bool PixelOnPlane(const Camera& camera, const CameraPose& pose, const Eigen::Vector2d& pixel,
+                  Eigen::Vector2d* point);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMPARE_PLANE_EVIDENCE_H_

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <memory>
 
-#include "apps/compare/image_worker.h"
+#include "apps/compare/record.h"
 
 namespace circline::apps {
 

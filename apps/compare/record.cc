@@ -16,25 +16,16 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kTinyTurn = 1e-6;  // Below it a free direction does not turn.
 
-double NumberOr(const Json& line, const char* key, double otherwise) {
+// What the line has under this key, else `otherwise`; null is nothing.
+template <typename Value>
+Value Get(const Json& line, const char* key, Value otherwise = {}) {
   const auto found = line.find(key);
-  return found != line.end() && found->is_number() ? found->get<double>() : otherwise;
+  return found != line.end() && !found->is_null() ? found->get<Value>() : otherwise;
 }
 
 std::optional<double> OptionalNumber(const Json& line, const char* key) {
-  const double value = NumberOr(line, key, kUnknown);
+  const double value = Get(line, key, kUnknown);
   return std::isfinite(value) ? std::optional<double>(value) : std::nullopt;
-}
-
-std::string TextOr(const Json& line, const char* key) {
-  const auto found = line.find(key);
-  return found != line.end() && found->is_string() ? found->get<std::string>() : std::string();
-}
-
-std::vector<std::string> Texts(const Json& line, const char* key) {
-  const auto found = line.find(key);
-  return found != line.end() && found->is_array() ? found->get<std::vector<std::string>>()
-                                                  : std::vector<std::string>();
 }
 
 // Null (unbounded) is infinity.
@@ -48,8 +39,9 @@ Eigen::Vector3d ReadVector(const Json& json) {
 }
 
 SolverKey ReadKey(const Json& line) {
+  const Json scale = Get<Json>(line, "loss_scale_px");  // Also "auto".
   return {line.at("solver").get<std::string>(), line.at("stage").get<std::string>(),
-          TextOr(line, "loss"), NumberOr(line, "loss_scale_px", 0.0)};
+          Get<std::string>(line, "loss"), scale.is_number() ? scale.get<double>() : 0.0};
 }
 
 PoseErrors ReadErrors(const Json& line) {
@@ -57,9 +49,8 @@ PoseErrors ReadErrors(const Json& line) {
   errors.rotation_deg = OptionalNumber(line, "rotation_error_deg");
   errors.normal_deg = OptionalNumber(line, "normal_error_deg");
   errors.translation_deg = OptionalNumber(line, "translation_error_deg");
-  const auto directions = line.find("direction_error_deg");
-  if (directions == line.end()) return errors;
-  for (const auto& [id, error] : directions->items()) {
+  const Json directions = Get<Json>(line, "direction_error_deg");
+  for (const auto& [id, error] : directions.items()) {
     if (error.is_number()) errors.directions_deg.emplace_back(id, error.get<double>());
   }
   return errors;
@@ -75,7 +66,7 @@ void ReadIntrinsics(const Json& json, Camera* camera) {
 
 HypothesisRecord ReadHypothesis(const Json& line, const Camera& given) {
   HypothesisRecord h;
-  h.probability = NumberOr(line, "probability", kUnknown);
+  h.probability = Get(line, "probability", kUnknown);
   for (std::size_t i = 0; i < 9; ++i) {
     h.rotation(static_cast<Eigen::Index>(i / 3), static_cast<Eigen::Index>(i % 3)) =
         line.at("rotation").at(i).get<double>();
@@ -84,13 +75,13 @@ HypothesisRecord ReadHypothesis(const Json& line, const Camera& given) {
   h.metric = line.at("metric").get<bool>();
   h.origin_observed = line.at("origin_observed").get<bool>();
   if (line.contains("camera")) ReadIntrinsics(line.at("camera"), &h.camera.emplace(given));
-  h.focal_px = NumberOr(line, "focal_px", kUnknown);
-  h.focal_sigma_px = NumberOr(line, "focal_sigma_px", kUnknown);
-  h.rms_px = NumberOr(line, "rms_px", kUnknown);
+  h.focal_px = Get(line, "focal_px", kUnknown);
+  h.focal_sigma_px = Get(line, "focal_sigma_px", kUnknown);
+  h.rms_px = Get(line, "rms_px", kUnknown);
   h.num_inliers = line.at("num_inliers").get<int>();
   h.num_observations = line.at("num_observations").get<int>();
   h.sigma_rotation_deg = ReadVector(line.at("sigma_rotation_deg"));
-  h.sigma_normal_deg = NumberOr(line, "sigma_normal_deg", kUnknown);
+  h.sigma_normal_deg = Get(line, "sigma_normal_deg", kUnknown);
   for (const Json& direction : line.at("free_directions")) {
     if (ReadVector(direction).norm() > kTinyTurn) h.rotation_is_free = true;
   }
@@ -107,9 +98,9 @@ void ReadResults(const std::string& text, ImageRecord* record) {
       SolverRecord solver;
       solver.key = ReadKey(json);
       solver.status = json.at("status").get<std::string>();
-      solver.message = TextOr(json, "message");
-      solver.decided_by = TextOr(json, "decided_by");
-      solver.notes = Texts(json, "notes");
+      solver.message = Get<std::string>(json, "message");
+      solver.decided_by = Get<std::string>(json, "decided_by");
+      solver.notes = Get<std::vector<std::string>>(json, "notes");
       record->solvers.push_back(std::move(solver));
     }
     if (!has_hypothesis) continue;
@@ -147,16 +138,16 @@ void ReadObservations(const std::string& text, ImageRecord* record) {
   record->index = line.at("index").get<std::size_t>();
   record->set_size = line.at("set_size").get<std::size_t>();
   record->name = line.at("image").get<std::string>();
-  record->error = TextOr(line, "error");
-  record->overlay = TextOr(line, "overlay");
+  record->error = Get<std::string>(line, "error");
+  record->overlay = Get<std::string>(line, "overlay");
   record->detected = line.at("detected").get<bool>();
   record->num_ellipses = line.at("ellipses").size();
   record->num_segments = line.at("segments").size();
   record->num_pencils = line.at("pencils").size();
   record->camera = ReadCamera(line.at("camera"));
-  record->camera_from = TextOr(line, "camera_from");
-  record->problems = Texts(line, "problems");
-  record->flags = Texts(line, "flags");
+  record->camera_from = Get<std::string>(line, "camera_from");
+  record->problems = Get<std::vector<std::string>>(line, "problems");
+  record->flags = Get<std::vector<std::string>>(line, "flags");
 }
 
 }  // namespace

@@ -79,6 +79,13 @@ struct ImageLines {
   std::string results, observations, timings;
 };
 
+// What became of a photo.
+struct WorkedImage {
+  ImageLines lines;
+  std::string read_error;  // Not empty: the photo could not be used.
+  Status status;           // Of writing its overlay.
+};
+
 // Not ok: a sentence that says what is not as this program writes it. `timings` may be empty.
 Status ParseRecord(const ImageLines& lines, ImageRecord* record);
 

@@ -6,14 +6,13 @@
 
 #include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
+#include "apps/common/report_page.h"
 #include "apps/common/text.h"
 #include "apps/compare/encode.h"
 #include "apps/compare/record_files.h"
 #include "apps/compare/report_image.h"
 #include "apps/compare/report_plots.h"
-#include "apps/compare/report_style.h"
 #include "apps/compare/report_tables.h"
-#include "apps/compare/selection.h"
 #include "apps/compare/sweep.h"
 
 namespace circline::apps {
@@ -78,18 +77,16 @@ std::string Chapters(const Digest& digest) {
   Page page;
   page.Add("summary", "Summary", SummaryTable(summary));
   page.Add("curves", "Share of images within an error", Plots(CumulativePlots(summary)));
-  page.Add("boxes", "Spread", Plots(BoxPlots(summary)));
   page.Add("sweep", "Losses and scales", SweepChapter(summary));
   page.Add("agreement", "Agreement", AgreementChapter(digest.agreement));
-  page.Add("times", "Times", Plots(RuntimePlot(summary)));
   page.Add("images", "Images", OverlayLegend() + SweepNote(summary));
   return page.Html();
 }
 
-std::vector<std::uint8_t> ReadPicture(const std::string& folder, const std::string& overlay) {
+std::string ReadPicture(const std::string& folder, const std::string& overlay) {
   if (overlay.empty()) return {};
   const cv::Mat picture = cv::imread(folder + "/" + overlay, cv::IMREAD_COLOR);
-  return picture.empty() ? std::vector<std::uint8_t>() : EncodeJpeg(picture, kPictureWidth);
+  return picture.empty() ? "" : EncodeJpeg(picture, kPictureWidth);
 }
 
 // The rows of the tables of single images.
@@ -125,7 +122,7 @@ void WriteSections(const std::string& folder, const std::vector<ShownImage>& sho
   constexpr std::size_t kAtATime = 16;
   for (std::size_t begin = 0; begin < shown.size(); begin += kAtATime) {
     const std::size_t count = std::min(kAtATime, shown.size() - begin);
-    std::vector<std::vector<std::uint8_t>> pictures(count);
+    std::vector<std::string> pictures(count);
     InParallel(static_cast<int>(count), [&](int k) {
       const auto i = static_cast<std::size_t>(k);
       pictures[i] = ReadPicture(folder, records[begin + i].overlay);
@@ -174,21 +171,27 @@ Status AddImages(const std::string& folder, const Digest& digest, std::size_t ma
 
 }  // namespace
 
+Status ReadDigest(const std::string& folder, Digest* digest) {
+  RecordReader reader(folder);
+  ImageRecord record;
+  for (ImageLines lines; reader.Next(&lines);) {
+    const Status status = ParseRecord(lines, &record);
+    if (!status.ok()) return Status::Failed(folder + ": " + status.message);
+    digest->summary.Add(record);
+    digest->agreement.Add(record);
+    digest->scores.push_back(ScoreOf(record));
+  }
+  return Status::Ok();
+}
+
 Status WriteReport(const std::string& folder, const Digest& digest, std::size_t max_images) {
   OutputFile file(folder + "/report.html");
-  file.Write(
-      "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"
-      "<meta name='viewport' content='width=device-width,initial-scale=1'><title>circline: "
-      "comparison</title><style>");
-  file.Write(kReportStyle);
-  file.Write(
-      "</style></head><body>\n<h1>Pose from circles and parallel lines</h1><p class='lead'>" +
-      EscapeHtml(Lead(digest.summary)) + "</p>\n" + Chapters(digest));
+  file.Write(PageTop("circline: comparison") +
+             "<h1>Pose from circles and parallel lines</h1><p class='lead'>" +
+             EscapeHtml(Lead(digest.summary)) + "</p>\n" + Chapters(digest));
   const Status status = AddImages(folder, digest, max_images, &file);
   if (!status.ok()) return status;
-  file.Write("<div id='zoom'><img alt=''><p></p></div>\n<script>");
-  file.Write(kReportScript);
-  file.Write("</script></body></html>\n");
+  file.Write(PageEnd());
   return file.Commit();
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/common/report_page.h"
 #include "apps/common/text.h"
 #include "apps/compare/report_tables.h"
 
@@ -170,16 +171,10 @@ std::string EvidenceText(const ImageRecord& record) {
   return text;
 }
 
-std::string Picture(const std::string& name, const std::vector<std::uint8_t>& jpeg) {
-  return "<figure><img alt='" + EscapeHtml(name) +
-         ", with what was found in it' src='data:image/jpeg;base64," + EncodeBase64(jpeg) +
-         "'></figure>";
-}
-
 }  // namespace
 
 std::string ImageSection(const ImageRecord& record, const std::vector<SolverKey>& keys,
-                         const std::vector<std::uint8_t>& picture, const std::string& why) {
+                         const std::string& picture, const std::string& why) {
   std::string html = "<section class='image' data-why='" + why + "'><h3>" +
                      EscapeHtml(record.name) + (why.empty() ? "" : "<small>" + why + "</small>") +
                      "</h3>";
@@ -187,7 +182,10 @@ std::string ImageSection(const ImageRecord& record, const std::vector<SolverKey>
     return html + "<p class='failed'>Not read: " + EscapeHtml(record.error) + ".</p></section>\n";
   }
   html += "<div class='two'>";
-  if (!picture.empty()) html += Picture(record.name, picture);
+  if (!picture.empty()) {
+    html += "<figure>" + PictureHtml(record.name + ", with what was found in it", picture) +
+            "</figure>";
+  }
   html += "<div><p class='lead'>" + EscapeHtml(EvidenceText(record)) + ".</p>";
   if (!record.camera_from.empty())
     html += "<p class='lead'>Camera: " + EscapeHtml(record.camera_from) + ".</p>";

@@ -2,7 +2,6 @@
 #ifndef CIRCLINE_APPS_COMPARE_REPORT_IMAGE_H_
 #define CIRCLINE_APPS_COMPARE_REPORT_IMAGE_H_
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -14,7 +13,7 @@ namespace circline::apps {
 // others refused. `picture` is the
 // overlay as JPEG (may be empty), `why` as SelectImages says.
 std::string ImageSection(const ImageRecord& record, const std::vector<SolverKey>& keys,
-                         const std::vector<std::uint8_t>& picture, const std::string& why);
+                         const std::string& picture, const std::string& why);
 
 // What the colours of the overlays mean.
 std::string OverlayLegend();

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "apps/common/svg_plot.h"
-#include "apps/common/svg_rows.h"
 #include "apps/common/text.h"
 #include "apps/compare/sweep.h"
 
@@ -40,7 +39,7 @@ std::vector<PlotRow> PlotRows(const Summary& summary) {
 
 std::string InDiv(const std::string& svg) { return svg.empty() ? "" : "<div>" + svg + "</div>"; }
 
-// Share of images within x degrees, as steps; images without an answer never get there.
+// Share of images within x, as steps; images without an answer never get there.
 PlotSeries CumulativeCurve(const SummaryRow& row, std::vector<double> errors, double x_min,
                            double x_max) {
   PlotSeries series;
@@ -58,11 +57,11 @@ PlotSeries CumulativeCurve(const SummaryRow& row, std::vector<double> errors, do
   return series;
 }
 
-std::string ErrorPlot(const Summary& summary, const std::string& title,
-                      std::vector<double> SummaryRow::*errors) {
+std::string CumulativePlot(const Summary& summary, const std::string& title, const char* unit,
+                           std::vector<double> SummaryRow::*errors) {
   Plot plot;
   plot.title = title;
-  plot.x_label = "error, degrees";
+  plot.x_label = unit;
   plot.y_label = "share of images";
   plot.log_x = plot.percent_y = true;
   double low = 10.0, high = 1.0;
@@ -85,22 +84,6 @@ std::string ErrorPlot(const Summary& summary, const std::string& title,
   }
   if (plot.series.empty()) return "";
   return InDiv(RenderSvg(plot));
-}
-
-std::string BoxPlot(const Summary& summary, const std::string& title, const std::string& label,
-                    std::vector<double> SummaryRow::*list) {
-  RowsPlot plot;
-  plot.title = title;
-  plot.x_label = label;
-  for (const PlotRow& row : PlotRows(summary)) {
-    const std::vector<double>& values = row.row->*list;
-    if (values.empty()) continue;
-    SvgRow box{row.name, row.color, {}, FormatShort(Median(values))};
-    const std::array<double, 5> shares = {0.05, 0.25, 0.5, 0.75, 0.95};
-    for (std::size_t i = 0; i < 5; ++i) box.quantiles[i] = Quantile(values, shares[i]);
-    plot.rows.push_back(std::move(box));
-  }
-  return InDiv(RenderRows(plot));
 }
 
 // One measure of the sweep of one solver.
@@ -163,31 +146,12 @@ std::string SweepPlot(const Summary& summary, const std::string& solver,
 }  // namespace
 
 std::string CumulativePlots(const Summary& summary) {
-  return ErrorPlot(summary, "Rotation error", &SummaryRow::rotation_errors) +
-         ErrorPlot(summary, "Normal error of the best hypothesis", &SummaryRow::normal_errors) +
-         ErrorPlot(summary, "Direction error", &SummaryRow::direction_errors);
-}
-
-std::string BoxPlots(const Summary& summary) {
-  return BoxPlot(summary, "Rotation error", "degrees", &SummaryRow::rotation_errors) +
-         BoxPlot(summary, "Normal error", "degrees", &SummaryRow::normal_errors) +
-         BoxPlot(summary, "Residual, root mean square", "pixels", &SummaryRow::rms_px);
-}
-
-std::string RuntimePlot(const Summary& summary) {
-  RowsPlot plot;
-  plot.title = "Median time of a call";
-  plot.x_label = "milliseconds";
-  plot.bars = true;
-  for (const PlotRow& row : PlotRows(summary)) {
-    const std::vector<float>& times = row.row->microseconds;
-    if (times.empty()) continue;
-    const double time = Median({times.begin(), times.end()});
-    SvgRow bar{row.name, row.color, {}, FormatMicroseconds(time)};
-    bar.quantiles.fill(1e-3 * time);
-    plot.rows.push_back(std::move(bar));
-  }
-  return InDiv(RenderRows(plot));
+  using Row = SummaryRow;
+  return CumulativePlot(summary, "Rotation error", "degrees", &Row::rotation_errors) +
+         CumulativePlot(summary, "Normal error of the best hypothesis", "degrees",
+                        &Row::normal_errors) +
+         CumulativePlot(summary, "Direction error", "degrees", &Row::direction_errors) +
+         CumulativePlot(summary, "Residual, root mean square", "pixels", &Row::rms_px);
 }
 
 std::string SweepPlots(const Summary& summary) {

@@ -8,15 +8,9 @@
 
 namespace circline::apps {
 
-// Share of images within an error, a curve for each row: rotation, normal, direction.
+// Share of images within an error, a curve for each row: rotation, normal, direction where there is
+// a truth, and the residual.
 std::string CumulativePlots(const Summary& summary);
-
-// Boxes from quartile to quartile with the median, whiskers at 5 and 95 %: errors where there is a
-// truth, and residuals.
-std::string BoxPlots(const Summary& summary);
-
-// Median time of a call of each row.
-std::string RuntimePlot(const Summary& summary);
 
 // For each solver: median error (or residual and share of inliers) against the scale, a curve for
 // each loss; dashed: the estimated scale.

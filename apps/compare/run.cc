@@ -3,14 +3,19 @@
 #include <glog/logging.h>
 
 #include <algorithm>
+#include <exception>
+#include <memory>
 #include <opencv2/core/utility.hpp>
+#include <utility>
 
 #include "apps/common/flags_util.h"
 #include "apps/common/output_file.h"
 #include "apps/common/progress.h"
-#include "apps/compare/image_worker.h"
+#include "apps/compare/image_run.h"
 #include "apps/compare/merge.h"
+#include "apps/compare/overlay.h"
 #include "apps/compare/record_files.h"
+#include "apps/compare/results.h"
 #include "apps/compare/resume.h"
 #include "apps/compare/work_queue.h"
 
@@ -30,6 +35,33 @@ class Share {
  private:
   std::size_t first_, total_, step_;
 };
+
+// The lines of a photo that is solved, and its overlay if that is wanted.
+WorkedImage Finish(const CompareOptions& options, ImageRun* run) {
+  WorkedImage worked;
+  std::string overlay;
+  if (options.overlays) worked.status = WriteOverlay(options.output, run, &overlay);
+  try {
+    worked.lines = WriteLines(*run, overlay, options.unusual_flags, options.fit.noise_model);
+  } catch (const std::exception& error) {  // It would end the thread, and the run with it.
+    worked.status =
+        Status::Failed(run->image->path + ": its results cannot be written: " + error.what());
+  }
+  worked.read_error = run->read_error;
+  return worked;
+}
+
+// Detects and solves. Many threads may call it.
+Finishing WorkOn(const CompareOptions& options, const SolverSet& solvers, SceneImage image) {
+  struct Photo {
+    SceneImage image;
+    ImageRun run;  // Refers to `image`.
+  };
+  const auto photo = std::make_shared<Photo>();
+  photo->image = std::move(image);
+  photo->run = RunImage(options, &solvers, &photo->image);
+  return [&options, photo] { return Finish(options, &photo->run); };
+}
 
 // Writes images in order and says what there is to say of them.
 class Output {
@@ -61,13 +93,13 @@ class Output {
 };
 
 // Rank 0: after each image of its own it takes those of the other ranks that follow.
-Status WorkAndCollect(const ImageSet& images, const ImageWorker& worker, const std::string& folder,
-                      const DonePart& done, const Ranks& ranks) {
-  Output output(images, folder, done);
+Status WorkAndCollect(const ImageSet& images, const CompareOptions& options,
+                      const SolverSet& solvers, const DonePart& done, const Ranks& ranks) {
+  Output output(images, options.output, done);
   if (!output.status().ok()) return output.status();
   const Share share(done.images, images.size(), ranks);
   WorkInOrder(
-      share.size(), [&](std::size_t i) { return worker.Work(images.At(share.At(i))); },
+      share.size(), [&](std::size_t i) { return WorkOn(options, solvers, images.At(share.At(i))); },
       [&](std::size_t i, const WorkedImage& image) {
         bool go_on = output.Write(share.At(i), image);
         for (int other = 1; go_on && other < ranks.count(); ++other) {
@@ -79,11 +111,11 @@ Status WorkAndCollect(const ImageSet& images, const ImageWorker& worker, const s
   return output.status();
 }
 
-void WorkAndSend(const ImageSet& images, const ImageWorker& worker, std::size_t num_done,
-                 const Ranks& ranks) {
+void WorkAndSend(const ImageSet& images, const CompareOptions& options, const SolverSet& solvers,
+                 std::size_t num_done, const Ranks& ranks) {
   const Share share(num_done, images.size(), ranks);
   WorkInOrder(
-      share.size(), [&](std::size_t i) { return worker.Work(images.At(share.At(i))); },
+      share.size(), [&](std::size_t i) { return WorkOn(options, solvers, images.At(share.At(i))); },
       [&](std::size_t, const WorkedImage& image) {
         ranks.SendToFirst(image);
         return true;
@@ -91,7 +123,7 @@ void WorkAndSend(const ImageSet& images, const ImageWorker& worker, std::size_t 
 }
 
 // Rank 0 alone looks at the folder; it tells the others how many images are done, or to stop.
-Status Prepare(const ImageSet& images, const CompareOptions& options, const ImageWorker& worker,
+Status Prepare(const ImageSet& images, const CompareOptions& options, const SolverSet& solvers,
                const Ranks& ranks, FolderLock* lock, DonePart* done) {
   constexpr std::size_t kStop = static_cast<std::size_t>(-1);
   Status status;
@@ -99,10 +131,8 @@ Status Prepare(const ImageSet& images, const CompareOptions& options, const Imag
     status = CheckFinish(options.output, options.finish);
     if (status.ok())
       status = CreateFolder(options.overlays ? options.output + "/overlays" : options.output);
-    if (status.ok()) status = lock->Take(options.output);
-    if (status.ok()) {
-      status = PrepareFolder(options, images, worker.solvers().Keys(options), done);
-    }
+    if (status.ok()) status = lock->Acquire(options.output);
+    if (status.ok()) status = PrepareFolder(options, images, solvers.Keys(options), done);
   }
   done->images = ranks.FromFirst(status.ok() ? done->images : kStop);
   return status.ok() && done->images == kStop ? Status::Invalid("rank 0 cannot begin") : status;
@@ -122,16 +152,16 @@ Status RunComparison(const ImageSet& images, const CompareOptions& options, cons
   // More threads than cores gain nothing, and TBB would print that it has none.
   if (options.threads > 0) cv::setNumThreads(std::min(options.threads, cv::getNumberOfCPUs()));
   LOG(INFO) << images.size() << " images, " << cv::getNumThreads() << " threads";
-  const ImageWorker worker(options);
+  const SolverSet solvers(options);
   FolderLock lock;
   DonePart done;
-  Status status = Prepare(images, options, worker, ranks, &lock, &done);
+  Status status = Prepare(images, options, solvers, ranks, &lock, &done);
   if (!status.ok()) return status;
   if (!ranks.is_first()) {
-    WorkAndSend(images, worker, done.images, ranks);
+    WorkAndSend(images, options, solvers, done.images, ranks);
     return Status::Ok();
   }
-  status = WorkAndCollect(images, worker, options.output, done, ranks);
+  status = WorkAndCollect(images, options, solvers, done, ranks);
   if (!status.ok() && ranks.count() > 1) {  // The others wait to be heard.
     SayOnStderr("circline_compare: " + status.message);
     ranks.Abort(kExitUnreadable);

@@ -15,7 +15,7 @@
 namespace circline::apps {
 namespace {
 
-constexpr std::size_t kMaxAhead = 256;     // Images taken before the oldest unfinished one is done.
+constexpr std::size_t kMaxAhead = 256;     // Images begun before the oldest unfinished one is done.
 constexpr std::size_t kMaxUnfinished = 4;  // Photos that wait in memory to be drawn.
 
 class Queue {
@@ -25,7 +25,7 @@ class Queue {
 
   // The next image to work on; false if there is none. Whoever holds the oldest image never waits
   // here, so somebody always goes on.
-  bool Take(std::size_t* index) {
+  bool Next(std::size_t* index) {
     std::unique_lock<std::mutex> lock(mutex_);
     room_.wait(lock, [this] { return stopped_ || next_ < delivered_ + kMaxAhead; });
     if (stopped_ || next_ >= count_) return false;
@@ -82,7 +82,7 @@ class Queue {
   std::exception_ptr thrown_;
 };
 
-// Finishes images in a thread of its own; all that it took, before it ends.
+// Finishes images in a thread of its own; all that it accepted, before it ends.
 class Finisher {
  public:
   explicit Finisher(Queue* queue) : queue_(queue), thread_([this] { Run(); }) {}
@@ -98,7 +98,7 @@ class Finisher {
   }
 
   // False if enough wait already: the image stays with the caller.
-  bool Take(std::size_t index, Finishing* finishing) {
+  bool Accept(std::size_t index, Finishing* finishing) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (waiting_.size() >= kMaxUnfinished) return false;
@@ -143,9 +143,9 @@ void WorkInOrder(std::size_t count, const std::function<Finishing(std::size_t)>&
   {
     Finisher finisher(&queue);
     const auto work_all = [&] {
-      for (std::size_t index = 0; queue.Take(&index);) {
+      for (std::size_t index = 0; queue.Next(&index);) {
         Finishing finishing = work(index);
-        if (!finisher.Take(index, &finishing)) queue.Put(index, finishing());
+        if (!finisher.Accept(index, &finishing)) queue.Put(index, finishing());
       }
     };
     InParallel(num_workers, [&](int) { queue.Guard(work_all); });

@@ -5,9 +5,13 @@
 #include <cstddef>
 #include <functional>
 
-#include "apps/compare/image_worker.h"
+#include "apps/compare/record.h"
 
 namespace circline::apps {
+
+// What is left to do with a photo once it is solved: to draw it, and to write its lines. Called
+// once, by any thread.
+using Finishing = std::function<WorkedImage()>;
 
 // Calls `work` for 0 .. count - 1 in OpenCV's thread pool, on as many threads as cv::getNumThreads
 // says. What `work` returns is called in one more thread, so that the next image need not wait for

@@ -105,28 +105,21 @@ AdjustedPhotos Adjust(const py::iterable& given, const AdjustOptions& options) {
 
 void BindDetect(py::module_* module) {
   const DetectionOptions d;
-  const auto options = [](double min_ellipse_axis_px, double min_arc_deg,
-                          double min_segment_length_px, int max_circles, int max_pencils,
-                          double max_shared_plane_deg, std::uint64_t seed,
-                          const std::optional<NoiseModel>& noise_model) {
-    DetectionOptions chosen;
-    chosen.min_ellipse_axis_px = min_ellipse_axis_px;
-    chosen.min_arc_deg = min_arc_deg;
-    chosen.min_segment_length_px = min_segment_length_px;
-    chosen.max_circles = max_circles;
-    chosen.max_pencils = max_pencils;
-    chosen.max_shared_plane_deg = max_shared_plane_deg;
-    chosen.seed = seed;
-    if (noise_model) chosen.noise_model = *noise_model;
-    return chosen;
-  };
   module->def(
       "detect",
-      [options](const py::array& image, const Camera& camera, double axis, double arc,
-                double length, int circles, int pencils, double plane, std::uint64_t seed,
-                const std::optional<NoiseModel>& noise) {
-        return Detect(image, camera,
-                      options(axis, arc, length, circles, pencils, plane, seed, noise));
+      [](const py::array& image, const Camera& camera, double min_ellipse_axis_px,
+         double min_arc_deg, double min_segment_length_px, int max_circles, int max_pencils,
+         double max_shared_plane_deg, std::uint64_t seed, const std::optional<NoiseModel>& noise) {
+        DetectionOptions options;
+        options.min_ellipse_axis_px = min_ellipse_axis_px;
+        options.min_arc_deg = min_arc_deg;
+        options.min_segment_length_px = min_segment_length_px;
+        options.max_circles = max_circles;
+        options.max_pencils = max_pencils;
+        options.max_shared_plane_deg = max_shared_plane_deg;
+        options.seed = seed;
+        if (noise) options.noise_model = *noise;
+        return Detect(image, camera, options);
       },
       py::arg("image"), py::arg("camera"), py::kw_only(),
       py::arg("min_ellipse_axis_px") = d.min_ellipse_axis_px,
@@ -142,14 +135,15 @@ void BindDetect(py::module_* module) {
       "ransac/detection/detect_observations.h. ValueError: wrong image, camera or option.");
   module->def(
       "detect_circle",
-      [options](const py::array& image, const Camera& camera, const std::array<int, 4>& roi,
-                double axis, double arc, std::uint64_t seed,
-                const std::optional<NoiseModel>& noise) {
-        const DetectionOptions defaults;
-        return DetectCircle(
-            image, camera, roi,
-            options(axis, arc, defaults.min_segment_length_px, defaults.max_circles,
-                    defaults.max_pencils, defaults.max_shared_plane_deg, seed, noise));
+      [](const py::array& image, const Camera& camera, const std::array<int, 4>& roi,
+         double min_ellipse_axis_px, double min_arc_deg, std::uint64_t seed,
+         const std::optional<NoiseModel>& noise) {
+        DetectionOptions options;
+        options.min_ellipse_axis_px = min_ellipse_axis_px;
+        options.min_arc_deg = min_arc_deg;
+        options.seed = seed;
+        if (noise) options.noise_model = *noise;
+        return DetectCircle(image, camera, roi, options);
       },
       py::arg("image"), py::arg("camera"), py::arg("roi"), py::kw_only(),
       py::arg("min_ellipse_axis_px") = d.min_ellipse_axis_px,

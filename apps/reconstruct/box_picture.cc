@@ -6,6 +6,7 @@
 
 #include "apps/common/text.h"
 #include "apps/compare/canvas.h"
+#include "apps/compare/pose_curves.h"
 #include "apps/reconstruct/box_geometry.h"
 
 namespace circline::apps {
@@ -15,18 +16,10 @@ const cv::Scalar kColors[] = {{60, 60, 255}, {60, 220, 60}, {255, 140, 40}};
 const cv::Scalar kPoints(0, 230, 255), kLetters(255, 255, 255);
 
 // Straight in space, bent by the lens.
-std::vector<Eigen::Vector2d> EdgeCurve(const BoxFit& fit, int from, int to) {
-  constexpr int kSteps = 16;
+PixelCurve EdgeCurve(const BoxFit& fit, int from, int to) {
   const Eigen::Vector3d a = BoxCorner(fit.length, from), b = BoxCorner(fit.length, to);
-  std::vector<Eigen::Vector2d> curve;
-  for (int i = 0; i <= kSteps; ++i) {
-    const Eigen::Vector3d x = a + (b - a) * i / kSteps;
-    Eigen::Vector2d pixel;
-    if (CameraToPixel(fit.camera, fit.cam_from_box.rotation * x + fit.cam_from_box.translation,
-                      &pixel))
-      curve.push_back(pixel);
-  }
-  return curve;
+  return ProjectCurve(fit.camera, 16, 0.0, 1.0,
+                      [&](double t) { return fit.InCamera(a + t * (b - a)); });
 }
 
 // An edge is seen where one of its two faces is.
@@ -48,14 +41,14 @@ cv::Mat DrawBox(const cv::Mat& photo, const BoxObservation& box, const BoxFit& f
     const cv::Scalar& color = kColors[axis];
     for (int corner = 0; corner < 8; ++corner) {
       if ((corner >> axis & 1) != 0) continue;
-      const std::vector<Eigen::Vector2d> curve = EdgeCurve(fit, corner, corner | 1 << axis);
+      const PixelCurve curve = EdgeCurve(fit, corner, corner | 1 << axis);
       if (!IsSeen(fit, corner, axis)) {
         canvas.Dashes(curve, color, 1.0);
         continue;
       }
       canvas.Polyline(curve, color, 2.0);
       const auto k = static_cast<std::size_t>(axis);
-      if (labelled[k] || curve.empty()) continue;
+      if (labelled[k]) continue;
       labelled[k] = true;
       labels.emplace_back(curve[curve.size() / 2],
                           std::string(1, "xyz"[axis]) + " " + FormatShort(fit.length[axis]) +

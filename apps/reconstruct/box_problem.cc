@@ -55,16 +55,16 @@ void BoxProblem::SetWeighing(const Weighing& weighing) {
   }
 }
 
-std::vector<double> BoxProblem::Misses() const {
-  std::vector<double> misses, distances;
+std::vector<double> BoxProblem::ResidualsPx() const {
+  std::vector<double> residuals_px, distances;
   const std::array<double*, 7> blocks = Blocks();
   for (const FeatureCost* cost : edges_) {
     cost->Distances(blocks.data(), &distances);
     double sum = 0.0;
     for (const double d : distances) sum += d * d;
-    misses.push_back(std::sqrt(sum / static_cast<double>(distances.size())));
+    residuals_px.push_back(std::sqrt(sum / static_cast<double>(distances.size())));
   }
-  return misses;
+  return residuals_px;
 }
 
 bool BoxProblem::Covariance(Eigen::Matrix<double, 9, 9>* covariance, double* focal_sigma) {
@@ -179,11 +179,11 @@ void BoxProblem::AddLine(const FaceLine& line) {
   const bool is_first = !problem_.HasParameterBlock(direction);
   problem_.AddResidualBlock(cost, nullptr, blocks);
   if (!is_first) return;
-  const double lean = noise.pencil_axis_rad;
-  if (lean > 0.0) {
+  const double axis_sigma = noise.pencil_axis_rad;
+  if (axis_sigma > 0.0) {
     problem_.SetManifold(direction, new ceres::SphereManifold<3>);
-    problem_.AddResidualBlock(NewDirectionPrior(Eigen::Vector3d::Unit(line.axis), lean), nullptr,
-                              direction);
+    problem_.AddResidualBlock(NewDirectionPrior(Eigen::Vector3d::Unit(line.axis), axis_sigma),
+                              nullptr, direction);
   } else {
     problem_.SetParameterBlockConstant(direction);
   }
@@ -203,9 +203,10 @@ void BoxProblem::AddPriors() {
       problem_.SetParameterBlockConstant(&state_.length[k]);
     }
   }
-  const double lean = options_.noise.pencil_axis_rad;
-  if (lean > 0.0) {
-    problem_.AddResidualBlock(NewGaussianPrior({lean, lean, lean}), nullptr, state_.skew.data());
+  const double axis_sigma = options_.noise.pencil_axis_rad;
+  if (axis_sigma > 0.0) {
+    problem_.AddResidualBlock(NewGaussianPrior({axis_sigma, axis_sigma, axis_sigma}), nullptr,
+                              state_.skew.data());
   } else {
     problem_.SetParameterBlockConstant(state_.skew.data());
   }

@@ -33,7 +33,7 @@ class BoxProblem {
   double cost() const { return summary_.final_cost; }
   bool metric() const;
   // Root mean square of each edge's distances, pixels.
-  std::vector<double> Misses() const;
+  std::vector<double> ResidualsPx() const;
   // Of [delta, delta_t, length] and of log f, with the inliers at full weight.
   bool Covariance(Eigen::Matrix<double, 9, 9>* covariance, double* focal_sigma);
 

@@ -26,8 +26,7 @@ std::optional<ConvexRegion> SeenFace(const BoxFit& fit, int axis, bool far) {
   for (int corner = 0; corner < 8; ++corner) {
     if ((corner >> axis & 1) != (far ? 1 : 0)) continue;
     corners.emplace_back();
-    const Eigen::Vector3d at =
-        fit.cam_from_box.rotation * BoxCorner(fit.length, corner) + fit.cam_from_box.translation;
+    const Eigen::Vector3d at = fit.InCamera(BoxCorner(fit.length, corner));
     if (!CameraToPixel(fit.camera, at, &corners.back())) return std::nullopt;
   }
   return ConvexRegion(std::move(corners), kWithinFace);
@@ -45,8 +44,8 @@ std::vector<FaceLine> FaceLines(const std::vector<DetectedLine>& lines, const Bo
       for (const DetectedLine& line : lines) {
         if (line.length_px < least_px || !face->Contains(line.ends)) continue;
         for (int axis = 0; axis < 3; ++axis) {
-          const double miss = fit.cam_from_box.rotation.col(axis).dot(line.fit.line.normalized());
-          if (axis == across || std::abs(miss) > kLineAlongRad) continue;
+          const double sine = fit.cam_from_box.rotation.col(axis).dot(line.fit.line.normalized());
+          if (axis == across || std::abs(sine) > kLineAlongRad) continue;
           found.push_back({axis, line.points, line.sigma_px});
         }
       }

@@ -36,10 +36,10 @@ double UsualWearPx(const BoxObservation& box, const NoiseModel& noise) {
 }
 
 // What the edges' root mean squares make of it: an error in place and one in direction each.
-double WearPx(const std::vector<double>& misses, double usual_px) {
+double WearPx(const std::vector<double>& residuals_px, double usual_px) {
   double sum = kWornFreedom * usual_px * usual_px;
-  for (const double miss : misses) sum += miss * miss;
-  const double freedom = 2.0 * static_cast<double>(misses.size()) - kUnknowns;
+  for (const double residual : residuals_px) sum += residual * residual;
+  const double freedom = 2.0 * static_cast<double>(residuals_px.size()) - kUnknowns;
   return std::sqrt(sum / (kWornFreedom + std::max(freedom, 0.0)));
 }
 
@@ -131,7 +131,7 @@ BoxObservation WithZTurned(BoxObservation box) {
 // The best of the starts, where it is better than `fit`.
 void FitEdges(const Camera& camera, const BoxObservation& box, const BoxOptions& options,
               const std::vector<std::size_t>& edges, const std::vector<Eigen::Matrix3d>& starts,
-              double wear_px, BoxFit* fit, std::vector<double>* misses) {
+              double wear_px, BoxFit* fit, std::vector<double>* residuals_px) {
   for (const Eigen::Matrix3d& axes : starts) {
     BoxState state;
     if (!StartState(camera, box, edges, axes, &state)) continue;
@@ -140,12 +140,12 @@ void FitEdges(const Camera& camera, const BoxObservation& box, const BoxOptions&
     if (!fit->edges.empty() && problem.cost() >= fit->cost) continue;
     BoxFit now;
     Fill(camera, options, state, problem, &now);
-    std::vector<double> now_misses = problem.Misses();
+    std::vector<double> now_residuals_px = problem.ResidualsPx();
     if (!problem.Covariance(&now.covariance, &now.focal_sigma)) continue;
     if (options.camera.log_focal < kEstimatedFocal) now.focal_sigma = 0.0;
     now.edges = edges;
     *fit = std::move(now);
-    *misses = std::move(now_misses);
+    *residuals_px = std::move(now_residuals_px);
   }
 }
 
@@ -166,30 +166,30 @@ Status FitBox(const Camera& camera, const BoxObservation& observed, const BoxOpt
   if (start) starts.push_back(*start);
   const double usual_px = UsualWearPx(box, options.noise);
   while (true) {
-    std::vector<double> misses;
+    std::vector<double> residuals_px;
     double wear_px = usual_px;
     for (int pass = 0; pass < 2; ++pass) {
       *fit = BoxFit();
-      FitEdges(camera, box, options, edges, starts, wear_px, fit, &misses);
+      FitEdges(camera, box, options, edges, starts, wear_px, fit, &residuals_px);
       // Axes drawn left-handed have no rotation: there z begins at its other end.
-      FitEdges(camera, WithZTurned(box), options, edges, starts, wear_px, fit, &misses);
+      FitEdges(camera, WithZTurned(box), options, edges, starts, wear_px, fit, &residuals_px);
       if (fit->edges.empty()) {
         return Status::Refused("the box '" + box.id +
                                "': no box before the camera has these edges at right angles");
       }
       if (!(usual_px > 0.0)) break;
-      if (pass == 0) wear_px = WearPx(misses, usual_px);
+      if (pass == 0) wear_px = WearPx(residuals_px, usual_px);
     }
-    const auto worst =
-        static_cast<std::size_t>(std::max_element(misses.begin(), misses.end()) - misses.begin());
+    const auto worst = static_cast<std::size_t>(
+        std::max_element(residuals_px.begin(), residuals_px.end()) - residuals_px.begin());
     const BoxEdge& edge = box.edges[edges[worst]];
     const double sigma = std::hypot(edge.sigma_px, std::hypot(options.noise.line_px, usual_px));
     std::vector<std::size_t> others = edges;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(worst));
-    if (misses[worst] <= kContradiction * sigma || !CheckEdges(box, others).ok()) {
+    if (residuals_px[worst] <= kContradiction * sigma || !CheckEdges(box, others).ok()) {
       double sum = 0.0;
-      for (const double miss : misses) sum += miss * miss;
-      fit->rms_px = std::sqrt(sum / static_cast<double>(misses.size()));
+      for (const double residual : residuals_px) sum += residual * residual;
+      fit->rms_px = std::sqrt(sum / static_cast<double>(residuals_px.size()));
       break;
     }
     notes.push_back(std::string("an edge along ") + kAxisNames[edge.axis] +

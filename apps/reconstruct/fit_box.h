@@ -28,6 +28,10 @@ struct BoxFit {
   double rms_px = 0.0;             // Of the points about the edges.
   std::vector<std::size_t> edges;  // Of the observation's: those that agree.
   std::vector<std::string> notes;  // What was left out.
+
+  Eigen::Vector3d InCamera(const Eigen::Vector3d& in_box) const {
+    return cam_from_box.rotation * in_box + cam_from_box.translation;
+  }
 };
 
 // A line on one of a box's faces, parallel to its edges along an axis: what is printed there is.

@@ -1,7 +1,6 @@
-#include "apps/reconstruct/glb_file.h"
-
 #include <tiny_gltf.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cstring>
 #include <sstream>
@@ -10,6 +9,7 @@
 
 #include "apps/common/output_file.h"
 #include "apps/compare/gltf_pose.h"
+#include "apps/reconstruct/model_files.h"
 
 namespace circline::apps {
 namespace {
@@ -119,16 +119,15 @@ class GlbBuilder {
 
   int AddPoints(const Mesh& mesh) {
     std::vector<float> values;
-    Eigen::Vector3f least = mesh.points.front().cast<float>(), most = least;
+    Eigen::AlignedBox3f extent;
     for (const Eigen::Vector3d& point : mesh.points) {
       const Eigen::Vector3f p = point.cast<float>();
-      least = least.cwiseMin(p);
-      most = most.cwiseMax(p);
+      extent.extend(p);
       values.insert(values.end(), p.data(), p.data() + 3);
     }
     tinygltf::Accessor accessor;
-    accessor.minValues = {least.x(), least.y(), least.z()};
-    accessor.maxValues = {most.x(), most.y(), most.z()};
+    accessor.minValues = {extent.min().x(), extent.min().y(), extent.min().z()};
+    accessor.maxValues = {extent.max().x(), extent.max().y(), extent.max().z()};
     return AddAccessor(values, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT,
                        TINYGLTF_TYPE_VEC3, mesh.points.size(), std::move(accessor));
   }

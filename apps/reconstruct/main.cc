@@ -14,11 +14,10 @@
 #include "apps/compare/options.h"
 #include "apps/compare/overlay.h"
 #include "apps/reconstruct/box_picture.h"
-#include "apps/reconstruct/glb_file.h"
 #include "apps/reconstruct/measure_box.h"
 #include "apps/reconstruct/measurements.h"
 #include "apps/reconstruct/model.h"
-#include "apps/reconstruct/obj_file.h"
+#include "apps/reconstruct/model_files.h"
 #include "apps/reconstruct/trace_box.h"
 #include "apps/reconstruct/views.h"
 
@@ -78,13 +77,6 @@ Status FindImage(const ImageSet& images, SceneImage* image) {
                                                DidYouMean(FLAGS_image, names));
 }
 
-cv::Mat ColorPhoto(const cv::Mat& photo) {
-  cv::Mat color = photo;
-  if (photo.channels() == 1) cv::cvtColor(photo, color, cv::COLOR_GRAY2BGR);
-  if (photo.channels() == 4) cv::cvtColor(photo, color, cv::COLOR_BGRA2BGR);
-  return color;
-}
-
 // What is written: a model and how it is seen.
 struct Reconstruction {
   Model model;
@@ -109,14 +101,13 @@ Status WriteAll(const cv::Mat& photo, Reconstruction* made, const ModelOptions& 
   }
   constexpr std::size_t kMaxCaption = 6;
   if (caption.size() > kMaxCaption) caption.resize(kMaxCaption);
-  const std::vector<std::uint8_t> png =
-      EncodePng(ModelViews(made->picture, made->model, made->pose, made->title, caption));
+  const cv::Mat views = ModelViews(made->picture, made->model, made->pose, made->title, caption);
   Status status = CreateFolder(folder);
   if (status.ok()) status = WriteObj(made->model, made->camera, made->pose, folder);
   if (status.ok()) status = WriteGlb(made->model, made->camera, made->pose, folder + "/model.glb");
   if (status.ok())
     status = WriteFile(folder + "/measurements.csv", MeasurementsCsv(made->measured));
-  if (status.ok()) status = WriteFile(folder + "/views.png", std::string(png.begin(), png.end()));
+  if (status.ok()) status = WriteFile(folder + "/views.png", EncodePng(views));
   return status;
 }
 
@@ -148,11 +139,6 @@ void SeeThrough(const Camera& camera, Observations* observations) {
   observations->camera = camera;
   ResetFits(observations);
   FitDirect(FLAGS_point_sigma_px, observations);
-}
-
-int Refuse(const Status& status) {
-  SayOnStderr("circline_reconstruct: " + status.message);
-  return status.code == StatusCode::kInvalidArgument ? kExitUsage : kExitUnreadable;
 }
 
 // --- A box ---
@@ -197,7 +183,7 @@ Status ReconstructBox(const CompareOptions& options, const ImageRun& run, BoxObs
   made->camera = fit.camera;
   made->pose = fit.cam_from_box;
   made->measured = MeasureBox(fit, box, run.observations, estimation);
-  made->picture = DrawBox(ColorPhoto(run.photo), box, fit);
+  made->picture = DrawBox(run.photo, box, fit);
   made->title = fit.metric ? "a box" : "a box, in units of the distance to its origin";
   return status;
 }
@@ -263,18 +249,20 @@ int Reconstruct() {
   if (status.ok()) status = ModelFromFlags(&model_options);
   if (status.ok()) status = ImagesFromFlags(options.inputs, &images);
   if (status.ok()) status = FindImage(images, &image);
-  if (!status.ok()) return Refuse(status);
+  if (!status.ok()) return Refuse("circline_reconstruct", status);
   status = CheckSolids(image.solids);
-  if (!status.ok()) return Refuse(Status::Invalid(image.path + ": " + status.message));
+  if (!status.ok())
+    return Refuse("circline_reconstruct", Status::Invalid(image.path + ": " + status.message));
   if (options.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.inputs.guess));
   options.overlays = true;  // The photo is needed.
   const SolverSet solvers(options);
-  ImageRun run = RunImage(options, solvers, &image);
+  ImageRun run = RunImage(options, &solvers, &image);
   Reconstruction made;
   status = ReconstructImage(options, model_options, &run, &made);
-  if (!status.ok()) return Refuse({status.code, image.path + ": " + status.message});
+  if (!status.ok())
+    return Refuse("circline_reconstruct", {status.code, image.path + ": " + status.message});
   status = WriteAll(run.photo, &made, model_options, options.output);
-  if (!status.ok()) return Refuse(status);
+  if (!status.ok()) return Refuse("circline_reconstruct", status);
   std::cout << "model: " << options.output << "/model.glb\n";
   return kExitOk;
 }

@@ -22,15 +22,6 @@ struct View {
   const cv::Mat& photo;
   const Camera& camera;
   const CameraPose& pose;
-
-  bool ToPlane(const Eigen::Vector2d& pixel, Eigen::Vector3d* world) const {
-    CalibratedPoint ray;
-    Eigen::Vector2d point;
-    if (!PixelToCalibrated(camera, pixel, &ray)) return false;
-    if (!PointOnPlane(pose, ray.Homogeneous(), &point)) return false;
-    *world = {point.x(), point.y(), 0.0};
-    return true;
-  }
 };
 
 Patch PlanePatch(const Eigen::AlignedBox2d& box) {
@@ -108,12 +99,14 @@ std::vector<UprightEdge> UprightEdges(const View& view, const Observations& reso
     }
     if (DistanceToEnds(edge.foot_px, on_plane) > kNearShare * view.photo.cols) continue;
     CalibratedPoint foot, top;
+    Eigen::Vector2d foot_on_plane;
     if (!PixelToCalibrated(view.camera, edge.foot_px, &foot) ||
         !PixelToCalibrated(view.camera, edge.top_px, &top) ||
-        !view.ToPlane(edge.foot_px, &edge.foot) ||
+        !PixelOnPlane(view.camera, view.pose, edge.foot_px, &foot_on_plane) ||
         !HeightOverPlane(view.pose, foot.Homogeneous(), top.Homogeneous(), &edge.height)) {
       continue;
     }
+    edge.foot << foot_on_plane, 0.0;
     edges.push_back(std::move(edge));
   }
   return edges;

@@ -1,11 +1,10 @@
-#include "apps/reconstruct/obj_file.h"
-
 #include <iomanip>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "apps/common/output_file.h"
+#include "apps/reconstruct/model_files.h"
 
 namespace circline::apps {
 namespace {
@@ -76,10 +75,7 @@ Status WriteObj(const Model& model, const Camera& camera, const CameraPose& pose
     obj.AddPatch(patch);
     materials << "newmtl " << patch.name << "\nKa 1 1 1\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd "
               << TextureName(patch) << "\n";
-    if (status.ok()) {
-      status = WriteFile(folder + "/" + TextureName(patch),
-                         std::string(patch.png.begin(), patch.png.end()));
-    }
+    if (status.ok()) status = WriteFile(folder + "/" + TextureName(patch), patch.png);
   }
   obj.AddCamera(camera, pose, 0.15 * pose.translation.norm());
   if (status.ok()) status = WriteFile(folder + "/model.mtl", materials.str());

@@ -27,8 +27,8 @@ struct Patch {
   Eigen::Vector3d corner, u, v;
   Eigen::Vector3d w = Eigen::Vector3d::Zero();  // Of a mantle: as long as u, at right angles to it.
   double angle = 0.0;                           // Of a mantle, radians.
-  cv::Mat texture;                // BGRA; transparent where the photo does not show it.
-  std::vector<std::uint8_t> png;  // The same as the bytes of a file.
+  cv::Mat texture;  // BGRA; transparent where the photo does not show it.
+  std::string png;  // The same as the bytes of a file.
 
   Eigen::Vector3d At(double s, double t) const;
 };

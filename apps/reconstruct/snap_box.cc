@@ -44,10 +44,6 @@ struct ExpectedEdge {
   bool is_outline = false;
 };
 
-Vector3d Seen(const BoxFit& fit, const Vector3d& x) {
-  return fit.cam_from_box.rotation * x + fit.cam_from_box.translation;
-}
-
 // False where none of its two faces is seen.
 bool Expect(const BoxFit& fit, int axis, int corner, ExpectedEdge* edge) {
   int seen = 0;
@@ -58,9 +54,9 @@ bool Expect(const BoxFit& fit, int axis, int corner, ExpectedEdge* edge) {
   edge->is_outline = seen == 1;
   const Vector3d a = BoxCorner(fit.length, corner), b = BoxCorner(fit.length, corner | 1 << axis);
   Vector2d from, to, middle;
-  if (!CameraToPixel(fit.camera, Seen(fit, a), &from) ||
-      !CameraToPixel(fit.camera, Seen(fit, b), &to) ||
-      !CameraToPixel(fit.camera, Seen(fit, 0.5 * fit.length), &middle)) {
+  if (!CameraToPixel(fit.camera, fit.InCamera(a), &from) ||
+      !CameraToPixel(fit.camera, fit.InCamera(b), &to) ||
+      !CameraToPixel(fit.camera, fit.InCamera(0.5 * fit.length), &middle)) {
     return false;
   }
   const Vector2d along = (to - from).normalized();
@@ -71,7 +67,7 @@ bool Expect(const BoxFit& fit, int axis, int corner, ExpectedEdge* edge) {
   for (int i = 0; i <= steps; ++i) {
     const double share = kCornerShare + (1.0 - 2.0 * kCornerShare) * i / steps;
     Vector2d pixel;
-    if (!CameraToPixel(fit.camera, Seen(fit, a + share * (b - a)), &pixel)) return false;
+    if (!CameraToPixel(fit.camera, fit.InCamera(a + share * (b - a)), &pixel)) return false;
     edge->samples.push_back(pixel);
   }
   return true;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/compare/plane_evidence.h"
 #include "apps/reconstruct/box_geometry.h"
 #include "apps/reconstruct/model.h"
 #include "circline/estimators/metrology.h"
@@ -15,12 +16,6 @@ using Eigen::Vector3d;
 
 // Shorter by longer axis of a rim's shadow on the plane: with less it is not parallel to the plane.
 constexpr double kLeastRoundness = 0.95;
-
-bool SeenOnPlane(const Camera& camera, const CameraPose& pose, const Vector2d& pixel,
-                 Vector2d* point) {
-  CalibratedPoint ray;
-  return PixelToCalibrated(camera, pixel, &ray) && PointOnPlane(pose, ray.Homogeneous(), point);
-}
 
 const CircleEstimate* FindEstimate(const PoseHypothesis& hypothesis, const std::string& id) {
   for (const CircleEstimate& circle : hypothesis.circles) {
@@ -38,23 +33,20 @@ Status FacePatch(const FaceObservation& face, const std::string& world_plane, co
                            "', can be modelled");
   }
   std::vector<Vector2d> corners;
+  Eigen::AlignedBox2d extent;
   for (const Vector2d& pixel : face.corners) {
     Vector2d point;
-    if (!SeenOnPlane(camera, pose, pixel, &point)) {
+    if (!PixelOnPlane(camera, pose, pixel, &point)) {
       return Status::Refused("the face '" + face.id +
                              "': a corner lies on or beyond the plane's horizon");
     }
     corners.push_back(point);
-  }
-  Vector2d least = corners[0], most = corners[0];
-  for (const Vector2d& corner : corners) {
-    least = least.cwiseMin(corner);
-    most = most.cwiseMax(corner);
+    extent.extend(point);
   }
   patch->name = "face_" + FileSafe(face.id);
-  patch->corner << least, 0.0;
-  patch->u = {most.x() - least.x(), 0.0, 0.0};
-  patch->v = {0.0, most.y() - least.y(), 0.0};
+  patch->corner << extent.min(), 0.0;
+  patch->u = {extent.sizes().x(), 0.0, 0.0};
+  patch->v = {0.0, extent.sizes().y(), 0.0};
   if (corners.size() != 4) return Status::Ok();
   const Vector2d u = 0.5 * (corners[1] - corners[0] + corners[2] - corners[3]),
                  v = 0.5 * (corners[3] - corners[0] + corners[2] - corners[1]),

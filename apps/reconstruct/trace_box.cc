@@ -82,16 +82,14 @@ TracedBox FromFit(const BoxFit& fit, const TracedBox& before) {
   double best = -2.0;
   for (int corner = 0; corner < 8; ++corner) {
     if (!IsOnSeenFaces(fit, corner)) continue;
-    const Vector3d seen =
-        fit.cam_from_box.rotation * BoxCorner(fit.length, corner) + fit.cam_from_box.translation;
+    const Vector3d seen = fit.InCamera(BoxCorner(fit.length, corner));
     const double cosine = seen.normalized().dot(before.corner.normalized());
     if (cosine <= best) continue;
     best = cosine;
     nearest = corner;
   }
   TracedBox box;
-  const Vector3d corner =
-      fit.cam_from_box.rotation * BoxCorner(fit.length, nearest) + fit.cam_from_box.translation;
+  const Vector3d corner = fit.InCamera(BoxCorner(fit.length, nearest));
   box.corner = corner / corner.z();
   for (int k = 0; k < 3; ++k) {
     const Vector3d axis = fit.cam_from_box.rotation.col(k);

@@ -102,19 +102,12 @@ class Renderer {
   cv::Mat picture_, inverse_depth_;
 };
 
-// The middle of the model, and half of its diagonal.
-void Extent(const Model& model, Vector3d* center, double* radius) {
-  std::vector<Vector3d> points;
+Eigen::AlignedBox3d Extent(const Model& model) {
+  Eigen::AlignedBox3d extent;
   for (const Patch& patch : model.patches) {
-    for (const Vector3d& point : MeshOf(patch).points) points.push_back(point);
+    for (const Vector3d& point : MeshOf(patch).points) extent.extend(point);
   }
-  Vector3d least = points.front(), most = points.front();
-  for (const Vector3d& point : points) {
-    least = least.cwiseMin(point);
-    most = most.cwiseMax(point);
-  }
-  *center = 0.5 * (least + most);
-  *radius = 0.5 * (most - least).norm();
+  return extent;
 }
 
 CameraPose LookAt(const Vector3d& center, double azimuth, double elevation, double distance) {
@@ -142,9 +135,9 @@ cv::Mat ModelViews(const cv::Mat& photo, const Model& model, const CameraPose& p
   const double scale = static_cast<double>(kMostPx) / std::max(photo.cols, photo.rows);
   cv::Mat shown = photo;
   if (scale < 1.0) cv::resize(photo, shown, cv::Size(), scale, scale, cv::INTER_AREA);
-  Vector3d center;
-  double radius;
-  Extent(model, &center, &radius);
+  const Eigen::AlignedBox3d extent = Extent(model);
+  const Vector3d center = extent.center();
+  const double radius = 0.5 * extent.diagonal().norm();
   const Vector3d eye = -(pose.rotation.transpose() * pose.translation), back = eye - center;
   const double azimuth = std::atan2(back.y(), back.x());
   const double side = back.z() < 0.0 ? -1.0 : 1.0;  // Seen from below in the photo and here.

@@ -125,11 +125,6 @@ Status SimulationFromFlags(SimulationOptions* options, std::string* output) {
   return Status::Ok();
 }
 
-int Refuse(const Status& status, int exit_code) {
-  SayOnStderr("circline_simulate: " + status.message);
-  return exit_code;
-}
-
 Status SimulateStreet(const SimulationOptions& options, const std::string& output) {
   const std::vector<StreetTrial> trials =
       SimulateStreets(options.trials, options.focal_sigma, options.seed, options.threads);
@@ -150,10 +145,10 @@ int Run() {
   std::string output;
   Status status = SimulationFromFlags(&options, &output);
   if (status.ok()) status = CreateFolder(output);
-  if (!status.ok()) return Refuse(status, kExitUsage);
-  status = options.scene == SimulatedScene::kStreet ? SimulateStreet(options, output)
-                                                    : SimulatePaper(options, output);
-  return status.ok() ? kExitOk : Refuse(status, kExitUnreadable);
+  if (status.ok())
+    status = options.scene == SimulatedScene::kStreet ? SimulateStreet(options, output)
+                                                      : SimulatePaper(options, output);
+  return status.ok() ? kExitOk : Refuse("circline_simulate", status);
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include "apps/studio/export_pose.h"
 
-#include <memory>
-
 #include "apps/common/output_file.h"
 #include "apps/compare/export.h"
 #include "apps/reconstruct/measurements.h"
@@ -30,19 +28,13 @@ Status WriteMeasurements(const Json& asked, const PoseHypothesis& hypothesis, co
   return WriteFile(folder + "/measurements.csv", MeasurementsCsv(values));
 }
 
-std::unique_ptr<Exporter> MakeExporter(const std::string& format, const std::string& folder) {
-  if (format == "gltf") return MakeGltfExporter(folder);
-  if (format == "colmap") return MakeColmapExporter(folder);
-  return MakeTumExporter(folder);
-}
-
 }  // namespace
 
 std::vector<std::string> ExportedFiles(const std::string& format) {
-  if (format == "gltf") return {"cameras.gltf"};
-  if (format == "colmap") return {"images.txt", "cameras.txt", "points3D.txt"};
-  if (format == "tum") return {"trajectory.txt"};
   if (format == "csv") return {"measurements.csv"};
+  for (const ExportFormat& known : ExportFormats()) {
+    if (known.name == format) return known.files;
+  }
   throw RequestError(400, "'format' must be one of gltf, colmap, tum, csv");
 }
 
@@ -64,12 +56,9 @@ Json ExportPose(const ImageRun& run, const Json& request, const std::string& fol
     status = WriteMeasurements(AskedMeasurements(request), hypothesis, run.observations.camera,
                                folder, &note);
   } else {
-    const std::unique_ptr<Exporter> exporter = MakeExporter(format, folder);
-    const CameraPose& pose = hypothesis.cam_from_world;
-    exporter->Add(
-        {run.image->name, run.image->index, camera, pose.rotation, pose.translation, std::nullopt});
-    status = exporter->Finish();
-    note = exporter->Note();
+    status = ExportPoses(format,
+                         {{run.image->name, run.image->index, camera, hypothesis.cam_from_world}},
+                         folder, &note);
   }
   if (!status.ok()) throw RequestError(409, status.message);
   Json files = Json::array();

@@ -39,13 +39,11 @@ constexpr char kUsage[] =
 
 // One folder, one solver, one loss.
 Status CheckFlags() {
-  for (const char* name :
-       {"scene", "output", "merge", "resume", "shard", "solvers", "peers", "export_as", "roi",
-        "plugin", "save_options", "list_solvers", "circle_radius", "overlays", "threads"}) {
-    gflags::CommandLineFlagInfo info;
-    if (gflags::GetCommandLineFlagInfo(name, &info) && info.current_value != info.default_value)
-      return Status::Invalid(std::string("--") + name + ": is not a flag of circline_studio");
-  }
+  const Status status =
+      CheckNotGiven("circline_studio", {"scene", "output", "merge", "resume", "shard", "solvers",
+                                        "peers", "export_as", "roi", "plugin", "save_options",
+                                        "list_solvers", "circle_radius", "overlays", "threads"});
+  if (!status.ok()) return status;
   if (FLAGS_images.empty()) return Status::Invalid("--images is missing: a folder with photos");
   return FLAGS_port >= 0 && FLAGS_port <= 65535 ? Status::Ok()
                                                 : Status::Invalid("--port must be 0 to 65535");
@@ -67,11 +65,6 @@ Status ReadCamera(const CompareOptions& options, Camera* camera) {
   const Status status = ImagesFromFlags(options.inputs, &images);
   if (status.ok()) *camera = images.At(0).observations.camera;
   return status;
-}
-
-int Refuse(const Status& status) {
-  SayOnStderr("circline_studio: " + status.message);
-  return kExitUsage;
 }
 
 // Until SIGINT or SIGTERM, for which this thread alone waits.
@@ -102,10 +95,10 @@ int Serve() {
   Status status = CheckFlags();
   if (status.ok()) status = folder.Open(FLAGS_images);
   FolderLock lock;  // Two studios would each write over what the other one saved.
-  if (status.ok()) status = lock.Take(folder.path());
+  if (status.ok()) status = lock.Acquire(folder.path());
   if (status.ok()) status = ReadOptions(&options);
   if (status.ok()) status = ReadCamera(options, &camera);
-  if (!status.ok()) return Refuse(status);
+  if (!status.ok()) return Refuse("circline_studio", status);
   const bool guess = options.inputs.guess.wanted;
   options.inputs.guess.wanted = false;  // The studio has a camera for each photo.
   Studio studio(options, folder, guess ? nullptr : &camera);
@@ -113,7 +106,7 @@ int Serve() {
   if (!status.ok()) SayOnStderr("circline_studio: " + status.message);
   StudioServer server(&studio);
   status = server.Bind(FLAGS_port);
-  if (!status.ok()) return Refuse(status);
+  if (!status.ok()) return Refuse("circline_studio", status);
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);

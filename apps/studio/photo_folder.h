@@ -20,8 +20,7 @@ class PhotoFolder {
   // Index of the photo of that name, or size().
   std::size_t Find(const std::string& name) const;
 
-  // Where photo n is. Not ok: it is a link that leads out of the folder, no plain file, or a larger
-  // one than photos are.
+  // Where photo n is. Not ok: it is a link that leads out of the folder.
   Status PhotoPath(std::size_t n, std::string* path) const;
   // Where a file or, below it, a folder of that name may be made or replaced. Not ok: what has that
   // name is a link, which might lead out.

@@ -1,7 +1,6 @@
 #include "apps/studio/scene_document.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 
 #include "apps/common/camera_file.h"
@@ -10,47 +9,6 @@
 
 namespace circline::apps {
 namespace {
-
-// What OpenCV's reader takes: letters of a string are checked, as it knows few escapes.
-constexpr std::size_t kMaxText = 1000, kMaxValues = 2'000'000;
-constexpr int kMaxDepth = 8;
-
-void CheckText(const std::string& text) {
-  const auto is_odd = [](char c) {
-    return c == '"' || c == '\\' || static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-  };
-  if (text.size() > kMaxText) throw RequestError(400, "a text is longer than 1000 letters");
-  if (std::any_of(text.begin(), text.end(), is_odd)) {
-    throw RequestError(400, "a text has a quotation mark, a backslash or a control character");
-  }
-}
-
-// Numbers become what the file's reader takes for the same number.
-Json Checked(const Json& value, int depth, std::size_t* count) {
-  if (depth > kMaxDepth) throw RequestError(400, "the scene is nested too deeply");
-  if (++*count > kMaxValues) throw RequestError(413, "the scene has too many values");
-  if (value.is_object()) {
-    Json map = Json::object();
-    for (const auto& [key, item] : value.items()) {
-      CheckText(key);
-      if (!item.is_null()) map[key] = Checked(item, depth + 1, count);
-    }
-    return map;
-  }
-  if (value.is_array()) {
-    Json list = Json::array();
-    for (const Json& item : value) list.push_back(Checked(item, depth + 1, count));
-    return list;
-  }
-  if (value.is_string()) {
-    CheckText(value.get_ref<const std::string&>());
-    return value;
-  }
-  if (!value.is_number()) throw RequestError(400, "the scene has a value that no scene file has");
-  const double number = value.get<double>();
-  if (!std::isfinite(number)) throw RequestError(400, "the scene has a number that is not finite");
-  return value.is_number_integer() && std::abs(number) < 1e9 ? value : Json(number);
-}
 
 // Keys of names, which may be whole numbers in a file ("id: 0"), and are texts all the same.
 bool IsNameKey(const std::string& key) {
@@ -90,20 +48,18 @@ std::string FreeCameraId(const Json& camera, const Json& cameras,
   }
 }
 
-Json ListOrEmpty(const Json& scene, const char* key) {
-  return scene.is_object() && scene.contains(key) ? scene[key] : Json::array();
-}
-
 }  // namespace
+
+const Json& ListOf(const Json& scene, const char* key) {
+  static const auto* const empty = new Json(Json::array());
+  return scene.is_object() && scene.contains(key) ? scene[key] : *empty;
+}
 
 Json OneImageDocument(const Json& entry, const std::string& file, const Json& camera) {
   if (!entry.is_object())
     throw RequestError(400, "'scene' must be an image's entry of a scene file");
-  std::size_t count = 0;
   Json image = {{"file", file}, {"camera", camera.at("id")}};
-  CheckText(file);
-  const Json checked = Checked(entry, 0, &count);
-  for (const auto& [key, value] : checked.items()) {
+  for (const auto& [key, value] : entry.items()) {
     if (key == "file" && value != image["file"])
       throw RequestError(400, "the scene is of another file than " + file);
     if (key != "file" && key != "camera") image[key] = value;
@@ -120,8 +76,8 @@ SceneImage ReadDocument(const Json& document, const std::string& folder) {
 
 Json WithImage(const Json& scene, const Json& document) {
   Json image = document["images"][0], camera = document["cameras"][0];
-  Json images = ListOrEmpty(scene, "images");
-  const Json before = ListOrEmpty(scene, "cameras");
+  Json images = ListOf(scene, "images");
+  const Json before = ListOf(scene, "cameras");
   std::set<std::string> used;
   auto place = images.end();
   for (auto other = images.begin(); other != images.end(); ++other) {

@@ -27,9 +27,11 @@ class RequestError : public std::runtime_error {
   int status_;
 };
 
+// A list of a scene file; none: empty.
+const Json& ListOf(const Json& scene, const char* key);
+
 // A document of one image: `entry` (which may lack file and camera) with them. Throws RequestError
-// where it has what no scene file can: other values than short plain texts, finite numbers, lists
-// and maps, or too many of them.
+// where it is of another file.
 Json OneImageDocument(const Json& entry, const std::string& file, const Json& camera);
 
 // Read by the reader of scene files. Throws RequestError with its sentence.

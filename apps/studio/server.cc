@@ -19,7 +19,7 @@ using httplib::Response;
 
 // A scene of a few hundred contours.
 constexpr std::size_t kMaxRequestBytes = std::size_t{8} << 20;
-constexpr int kMaxRequestDepth = 16;
+const DocumentLimits kLimits = {16, 100'000};
 
 // With a parameter, as httplib compresses a plain application/json, which takes it 30 ms.
 constexpr char kJsonType[] = "application/json; charset=utf-8";
@@ -46,26 +46,6 @@ void Guarded(Response* response, const std::function<void()>& work) {
   }
 }
 
-// Brackets within brackets beyond what any request has; a parser recurses into them.
-bool IsDeep(const std::string& text) {
-  int depth = 0;
-  bool in_string = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (in_string) {
-      if (c == '\\') ++i;
-      in_string = c != '"';
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '[' || c == '{') {
-      if (++depth > kMaxRequestDepth) return true;
-    } else if (c == ']' || c == '}') {
-      --depth;
-    }
-  }
-  return false;
-}
-
 // The whole body, however it is sent; no more than so many bytes are kept of it.
 Json ReadBody(const httplib::ContentReader& reader) {
   std::string body;
@@ -75,9 +55,11 @@ Json ReadBody(const httplib::ContentReader& reader) {
     return true;
   });
   if (!whole) throw RequestError(413, "the request is larger than 8 MB, or was cut off");
-  if (IsDeep(body)) throw RequestError(400, "the request is nested too deeply");
-  Json request = Json::parse(body, nullptr, false);
-  if (!request.is_object()) throw RequestError(400, "the request must be a JSON object");
+  const std::size_t begin = std::min(body.find_first_not_of(" \t\r\n"), body.size());
+  Json request;
+  Status status = Status::Invalid("it must be a JSON object");  // Not another kind of document.
+  if (body.compare(begin, 1, "{") == 0) status = ParseDocument(body, &request, kLimits);
+  if (!status.ok()) throw RequestError(400, "the request: " + status.message);
   return request;
 }
 

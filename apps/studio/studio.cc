@@ -6,6 +6,7 @@
 
 #include "apps/common/document.h"
 #include "apps/common/output_file.h"
+#include "apps/common/photo_file.h"
 #include "apps/common/storage_node.h"
 #include "apps/compare/encode.h"
 #include "apps/studio/answer.h"
@@ -19,14 +20,8 @@ constexpr std::size_t kLosslessPixels = 3'000'000;
 // Wider ones are shown smaller; what is said of them is in their own pixels all the same.
 constexpr int kShownWidth = 6000;
 // Of what was said, which is asked again with each measurement, and of everything found.
-constexpr std::size_t kKeptRuns = 2;
+constexpr std::size_t kKeptRuns = 2, kKeptPhotos = 3;
 constexpr std::size_t kMaxDraftBytes = std::size_t{64} << 20;
-
-// A list of a scene file; none: empty.
-const Json& ListOf(const Json& scene, const char* key) {
-  static const auto* const empty = new Json(Json::array());
-  return scene.is_object() && scene.contains(key) ? scene[key] : *empty;
-}
 
 // The entry of a scene file for that photo, or null.
 Json EntryOf(const Json& scene, const std::string& name) {
@@ -56,7 +51,7 @@ Status Write(const PhotoFolder& folder, const std::string& name, const std::stri
 }  // namespace
 
 Studio::Studio(const CompareOptions& options, const PhotoFolder& folder, const Camera* camera)
-    : options_(options), solvers_(options_), folder_(folder), photos_(&folder_) {
+    : options_(options), solvers_(options_), folder_(folder) {
   if (camera != nullptr) given_camera_ = CameraEntry(*camera, {});
 }
 
@@ -133,15 +128,32 @@ Json Studio::Images() {
           {"images", images}};
 }
 
+std::shared_ptr<const LoadedPhoto> Studio::LoadPhoto(std::size_t index) {
+  const std::lock_guard<std::mutex> lock(photos_mutex_);
+  const auto known = std::find_if(photos_.begin(), photos_.end(),
+                                  [&](const auto& photo) { return photo->index == index; });
+  if (known != photos_.end()) {
+    photos_.splice(photos_.begin(), photos_, known);
+    return photos_.front();
+  }
+  auto photo = std::make_shared<LoadedPhoto>();
+  photo->index = index;
+  const Status found = folder_.PhotoPath(index, &photo->path);
+  if (!found.ok()) throw RequestError(403, found.message);
+  const std::string error = ReadPhoto(photo->path, &photo->pixels);
+  if (!error.empty()) throw RequestError(422, folder_.name(index) + ": " + error);
+  photos_.push_front(photo);
+  if (photos_.size() > kKeptPhotos) photos_.pop_back();
+  return photo;
+}
+
 ShownPhoto Studio::Photo(std::size_t n) {
-  const auto photo = photos_.Get(Index({{"image", n}}));
+  const auto photo = LoadPhoto(Index({{"image", n}}));
   ShownPhoto shown;
   shown.width = photo->pixels.cols;
   shown.height = photo->pixels.rows;
   const bool lossless = photo->pixels.total() <= kLosslessPixels;
-  const std::vector<std::uint8_t> bytes =
-      lossless ? EncodePng(photo->pixels) : EncodeJpeg(photo->pixels, kShownWidth);
-  shown.bytes.assign(bytes.begin(), bytes.end());
+  shown.bytes = lossless ? EncodePng(photo->pixels) : EncodeJpeg(photo->pixels, kShownWidth);
   shown.type = lossless ? "image/png" : "image/jpeg";
   return shown;
 }
@@ -204,7 +216,7 @@ std::shared_ptr<const PhotoRun> Studio::Run(const Json& scene,
       const auto work = [this, document, photo]() -> std::shared_ptr<const PhotoRun> {
         auto made = std::make_shared<PhotoRun>();
         made->image = ReadDocument(document, folder_.path());
-        made->run = RunPhoto(options_, solvers_, photo->pixels, &made->image);
+        made->run = RunImage(options_, &solvers_, &made->image, &photo->pixels);
         return made;
       };
       // By the first thread that waits for it.
@@ -217,18 +229,18 @@ std::shared_ptr<const PhotoRun> Studio::Run(const Json& scene,
 }
 
 Json Studio::Detect(const Json& request) {
-  const auto made = Run(Json::object(), photos_.Get(Index(request)));
+  const auto made = Run(Json::object(), LoadPhoto(Index(request)));
   if (!made->run.read_error.empty()) throw RequestError(422, made->run.read_error);
   return DetectionJson(made->run, options_.fit.noise_model);
 }
 
 Json Studio::Estimate(const Json& request) {
-  const auto photo = photos_.Get(Index(request));
+  const auto photo = LoadPhoto(Index(request));
   return EstimateJson(Run(request.value("scene", Json::object()), photo)->run, request);
 }
 
 Json Studio::Save(const Json& request) {
-  const auto photo = photos_.Get(Index(request));
+  const auto photo = LoadPhoto(Index(request));
   const Json document = Document(request.at("scene"), *photo);
   ReadDocument(document, folder_.path());
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -268,7 +280,7 @@ Json Studio::Draft(const Json& request) {
 }
 
 Json Studio::Export(const Json& request) {
-  const auto photo = photos_.Get(Index(request));
+  const auto photo = LoadPhoto(Index(request));
   const auto made = Run(request.at("scene"), photo);
   const std::string below = std::string(kExportFolder) + "/" + folder_.name(photo->index);
   std::string path;

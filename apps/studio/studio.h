@@ -8,12 +8,12 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 
 #include "apps/compare/image_run.h"
 #include "apps/compare/options.h"
-#include "apps/studio/photo_cache.h"
 #include "apps/studio/photo_folder.h"
 #include "apps/studio/scene_document.h"
 
@@ -23,6 +23,12 @@ namespace circline::apps {
 struct ShownPhoto {
   std::string bytes, type;
   int width = 0, height = 0;  // Of the photo itself; what is shown may be smaller.
+};
+
+struct LoadedPhoto {
+  std::size_t index = 0;
+  std::string path;
+  cv::Mat pixels;
 };
 
 // One document of a photo, estimated.
@@ -58,6 +64,8 @@ class Studio {
 
  private:
   std::size_t Index(const Json& request) const;
+  // Throws RequestError where the photo cannot be used.
+  std::shared_ptr<const LoadedPhoto> LoadPhoto(std::size_t index);
   Json CameraOfPhoto(const LoadedPhoto& photo);
   Json Document(const Json& scene, const LoadedPhoto& photo);
   void FollowScene();  // Where the file is another one than at the last time. Under mutex_.
@@ -75,8 +83,9 @@ class Studio {
   CompareOptions options_;
   SolverSet solvers_;
   PhotoFolder folder_;
-  PhotoCache photos_;
-  Json given_camera_;  // Null where none is given.
+  Json given_camera_;        // Null where none is given.
+  std::mutex photos_mutex_;  // Held while one is read: one at a time is in the making.
+  std::list<std::shared_ptr<const LoadedPhoto>> photos_;  // The last one first.
   std::mutex runs_mutex_;
   std::list<KeptRun> runs_;                                       // The last one first.
   std::mutex mutex_;                                              // Of what follows.

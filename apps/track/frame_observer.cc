@@ -32,7 +32,7 @@ ImageRun FrameObserver::Observe(const PoseHypothesis* last, const PoseHypothesis
   const bool looks_in_roi = options_.compare.inputs.roi && !has_given_;
   if (IsFollowed(options_, frame->image) && !looks_in_roi) return Follow(last, expected, frame);
   const Stopwatch watch;
-  run = ObservePhoto(options_.compare, frame->photo, &frame->image);
+  run = RunImage(options_.compare, nullptr, &frame->image, &frame->photo);
   was_cold_ = true;
   if (looks_in_roi && HasFit(run.observations)) {
     follower_.emplace(*camera_, options_.follow);
@@ -78,7 +78,8 @@ ImageRun FrameObserver::Follow(const PoseHypothesis* last, const PoseHypothesis*
 Status FrameObserver::SettleCamera(Frame* frame) {
   Camera& camera = frame->image.observations.camera;
   if (!camera_) {
-    if (!frame->photo.empty()) TakeGuess(options_.compare, frame->photo.size(), &frame->image);
+    if (!frame->photo.empty())
+      SetGuessedCamera(options_.compare, frame->photo.size(), &frame->image);
     guessed_sigma_ = frame->image.guessed_sigma;
     camera_from_ = frame->image.camera_from;
     camera_ = camera;

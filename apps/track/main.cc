@@ -33,11 +33,6 @@ constexpr char kUsage[] =
     "Exit code 0: every frame gave an answer or a stated refusal; 1: some frame could not be used\n"
     "(named, the rest is done); 2: unusable flags, video or scene file (nothing is written).";
 
-int Refuse(const Status& status) {
-  SayOnStderr("circline_track: " + status.message);
-  return status.code == StatusCode::kInvalidArgument ? kExitUsage : kExitUnreadable;
-}
-
 // The images of the flags; a video is one of them, which all of its frames are like.
 Status OpenSource(const TrackOptions& options, ImageSet* images,
                   std::unique_ptr<FrameSource>* source) {
@@ -70,18 +65,18 @@ int TrackFrames() {
   std::unique_ptr<FrameSource> source;
   Status status = TrackOptionsFromFlags(&options);
   if (status.ok()) status = OpenSource(options, &images, &source);
-  if (!status.ok()) return Refuse(status);
+  if (!status.ok()) return Refuse("circline_track", status);
   if (options.compare.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.compare.inputs.guess));
   if (options.compare.threads > 0)
     cv::setNumThreads(std::min(options.compare.threads, cv::getNumberOfCPUs()));
   const std::string& output = options.compare.output;
   FolderLock lock;
   status = CreateFolder(options.compare.overlays ? output + "/overlays" : output);
-  if (status.ok()) status = lock.Take(output);
+  if (status.ok()) status = lock.Acquire(output);
   std::vector<TrackedFrame> frames;
   if (status.ok()) status = RunTrack(options, source.get(), &frames);
   if (status.ok()) status = WriteTrackReport(output, frames);
-  if (!status.ok()) return Refuse(status);
+  if (!status.ok()) return Refuse("circline_track", status);
   std::cout << TrackTable(frames) << "report: " << output << "/report.html\n";
   const bool is_whole = std::all_of(frames.begin(), frames.end(),
                                     [](const TrackedFrame& f) { return f.error.empty(); });

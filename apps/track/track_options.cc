@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "apps/common/flags_util.h"
+
 DECLARE_string(images);
 DECLARE_string(scene);
 
@@ -37,13 +39,10 @@ bool EndsWith(const std::string& text, const std::string& end) {
 
 // A track is made in one go, from its first frame, and by one solver.
 Status CheckSource() {
-  for (const char* name : {"merge", "plugin", "resume", "shard", "solvers", "peers", "export_as",
-                           "save_options", "list_solvers"}) {
-    gflags::CommandLineFlagInfo info;
-    if (gflags::GetCommandLineFlagInfo(name, &info) && info.current_value != info.default_value)
-      return Status::Invalid(std::string("--") + name + ": is not a flag of circline_track");
-  }
-  if (FLAGS_video.empty()) return Status::Ok();
+  const Status status =
+      CheckNotGiven("circline_track", {"merge", "plugin", "resume", "shard", "solvers", "peers",
+                                       "export_as", "save_options", "list_solvers"});
+  if (!status.ok() || FLAGS_video.empty()) return status;
   if (!FLAGS_images.empty() || !FLAGS_scene.empty())
     return Status::Invalid("give one of --video, --images and --scene");
   FLAGS_images = FLAGS_video;  // Camera and regions of interest are said of it as of photos.

@@ -1,21 +1,19 @@
 #include "apps/track/track_report.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <utility>
 
 #include "apps/common/output_file.h"
+#include "apps/common/report_page.h"
 #include "apps/common/text.h"
 #include "apps/compare/encode.h"
-#include "apps/compare/report_style.h"
+#include "apps/compare/summary.h"
 #include "apps/track/track_plots.h"
 
 namespace circline::apps {
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr int kPictureWidth = 640;
 constexpr std::size_t kMostPictures = 24, kMostRows = 2000;
 
@@ -38,17 +36,9 @@ struct Counts {
   }
 };
 
-double Quantile(std::vector<double> values, double share) {
-  if (values.empty()) return kUnknown;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 std::string TimesText(const std::vector<double>& microseconds) {
   if (microseconds.empty()) return "-";
-  return FormatMicroseconds(Quantile(microseconds, 0.5)) +
+  return FormatMicroseconds(Median(microseconds)) +
          " (99 %: " + FormatMicroseconds(Quantile(microseconds, 0.99)) + ")";
 }
 
@@ -77,7 +67,7 @@ std::vector<std::pair<std::string, std::string>> SummaryRows(
     ++count;
   }
   if (!errors.empty()) {
-    rows.emplace_back("error, median", FormatShort(Quantile(errors, 0.5)) + " deg (90 %: " +
+    rows.emplace_back("error, median", FormatShort(Median(errors)) + " deg (90 %: " +
                                            FormatShort(Quantile(errors, 0.9)) + ")");
   }
   if (count > 0) rows.emplace_back("NEES by degree of freedom, mean", FormatShort(sum / count));
@@ -109,8 +99,7 @@ std::string Pictures(const std::string& folder, const std::vector<TrackedFrame>&
     if (picture.empty()) continue;
     const std::string caption = "frame " + std::to_string(i) + ", " +
                                 FormatFixed(frames[i].time_s, 2) + " s, " + FateText(frames[i]);
-    html += "<figure><img alt='" + EscapeHtml(caption) + "' src='data:image/jpeg;base64," +
-            EncodeBase64(EncodeJpeg(picture, kPictureWidth)) + "'><figcaption>" +
+    html += "<figure>" + PictureHtml(caption, EncodeJpeg(picture, kPictureWidth)) + "<figcaption>" +
             EscapeHtml(caption) + "</figcaption></figure>\n";
   }
   return html.empty() ? "" : "<h2>Frames</h2><div class='plots'>" + html + "</div>";
@@ -147,18 +136,12 @@ std::string TrackTable(const std::vector<TrackedFrame>& frames) {
 
 Status WriteTrackReport(const std::string& folder, const std::vector<TrackedFrame>& frames) {
   std::string html =
-      "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"
-      "<meta name='viewport' content='width=device-width,initial-scale=1'><title>circline: "
-      "track</title><style>" +
-      std::string(kReportStyle) +
-      "</style></head><body>\n<h1>Poses of a moving camera</h1><h2>Summary</h2><table>";
+      PageTop("circline: track") + "<h1>Poses of a moving camera</h1><h2>Summary</h2><table>";
   for (const auto& [what, value] : SummaryRows(frames))
     html += "<tr><td class='l'>" + what + "</td><td>" + value + "</td></tr>";
   html += "</table>";
   if (!frames.empty()) html += "<h2>Over time</h2>" + TrackPlots(frames);
-  html += Pictures(folder, frames) + FrameTable(frames) +
-          "<div id='zoom'><img alt=''><p></p></div>\n<script>" + kReportScript +
-          "</script></body></html>\n";
+  html += Pictures(folder, frames) + FrameTable(frames) + PageEnd();
   return WriteFile(folder + "/report.html", html);
 }
 

@@ -5,9 +5,7 @@
 #include <utility>
 
 #include "apps/common/flags_util.h"
-#include "apps/common/output_file.h"
 #include "apps/common/progress.h"
-#include "apps/compare/encode.h"
 #include "apps/compare/export.h"
 #include "apps/compare/overlay.h"
 #include "apps/compare/record_files.h"
@@ -52,8 +50,7 @@ class Track {
       : options_(options),
         source_(*source),
         observer_(options),
-        writer_(options.compare.output, {}),
-        trajectory_(MakeTumExporter(options.compare.output)) {
+        writer_(options.compare.output, {}) {
     if (!options.video_out.empty())
       video_.emplace(options.compare.output, options.video_out, source->fps());
   }
@@ -72,7 +69,8 @@ class Track {
       }
       if (source_.num_frames() > 0) progress.Advance();
     }
-    if (status.ok()) status = trajectory_->Finish();
+    std::string note;
+    if (status.ok()) status = ExportPoses("tum", trajectory_, options_.compare.output, &note);
     if (status.ok() && video_) status = video_->Commit();
     return status;
   }
@@ -150,32 +148,16 @@ class Track {
     tracked->sigma_deg = SigmaNormalDeg(best);
     tracked->error_deg = run.solvers.front().errors.front().Headline();
     tracked->nees = RotationNees(best, frame.image);
-    ExportedPose exported;
-    exported.name = frame.image.name;
-    exported.index = frame.index;
-    exported.camera = run.observations.camera;
-    exported.rotation = best.cam_from_world.rotation;
-    exported.translation = best.cam_from_world.translation;
-    exported.time_s = frame.time_s;
-    trajectory_->Add(exported);
+    trajectory_.push_back({frame.image.name, frame.index, run.observations.camera,
+                           best.cam_from_world, frame.time_s});
   }
 
   Status Draw(ImageRun* run, TrackedFrame* tracked) {
-    if (!options_.compare.overlays || !run->read_error.empty() || run->photo.empty())
-      return Status::Ok();
-    tracked->overlay = "overlays/" + run->image->stem + ".png";
-    const std::string path = options_.compare.output + "/" + tracked->overlay;
-    const Stopwatch watch;
-    try {
-      const cv::Mat picture = DrawOverlay(*run);
-      const std::vector<std::uint8_t> png = EncodePng(picture);
-      Status status = WriteFile(path, std::string(png.begin(), png.end()));
-      if (status.ok() && video_) status = video_->Add(picture);
-      run->stages.emplace_back("overlay", watch.Microseconds());
-      return status;
-    } catch (const std::exception& error) {  // Such as a picture too large for the memory.
-      return Status::Failed(path + " cannot be drawn: " + error.what());
-    }
+    if (!options_.compare.overlays) return Status::Ok();
+    cv::Mat picture;
+    Status status = WriteOverlay(options_.compare.output, run, &tracked->overlay, &picture);
+    if (status.ok() && video_ && !picture.empty()) status = video_->Add(picture);
+    return status;
   }
 
   Status Write(const Frame& frame, ImageRun& run, const TrackedPose& pose,
@@ -197,7 +179,7 @@ class Track {
   std::optional<PoseTracker> tracker_;
   std::optional<PoseHypothesis> last_;  // Of the frame before, if that saw it.
   RecordWriter writer_;
-  std::unique_ptr<Exporter> trajectory_;
+  std::vector<ExportedPose> trajectory_;
   std::optional<OverlayVideo> video_;
 };
 

@@ -75,13 +75,16 @@ TEST_F(Colmap, ReadsEveryCameraModel) {
       MakeCamera(CameraModel::kOpenCV, {-0.2, 0.1, 0.001, -0.002}),
       MakeCamera(CameraModel::kOpenCV, {-0.2, 0.1, 0.001, -0.002, 0.01, 0.02, 0.03, 0.04}),
       MakeCamera(CameraModel::kFisheye, {-0.02, 0.01, 0.001, -0.002})};
-  const std::unique_ptr<Exporter> exporter = MakeColmapExporter(folder_.path());
+  std::vector<ExportedPose> exported;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    exporter->Add({"photos/" + std::to_string(i) + ".jpg", i, cameras[i],
-                   Eigen::Matrix3d::Identity(), Eigen::Vector3d::UnitZ()});
+    exported.push_back({"photos/" + std::to_string(i) + ".jpg",
+                        i,
+                        cameras[i],
+                        {Eigen::Matrix3d::Identity(), Eigen::Vector3d::UnitZ()}});
   }
-  ASSERT_TRUE(exporter->Finish().ok());
-  EXPECT_EQ(exporter->Note(), "");
+  std::string note;
+  ASSERT_TRUE(ExportPoses("colmap", exported, folder_.path(), &note).ok());
+  EXPECT_EQ(note, "");
   ASSERT_NO_FATAL_FAILURE(ThroughColmap(folder_.path(), folder_ / "text"));
   EXPECT_EQ(ReadPoses(folder_ / "text/images.txt").count("photos/3.jpg"), 1U);
 
@@ -140,13 +143,15 @@ TEST_F(Colmap, ReadsPosesThatARadiusMadeMetric) {
 // COLMAP ends a name at its first space: two photos "my ..." would be one.
 TEST(ExportForColmap, NamesWithSpacesAreLeftOutAndNamed) {
   const TestFolder folder;
-  const std::unique_ptr<Exporter> exporter = MakeColmapExporter(folder.path());
+  std::vector<ExportedPose> exported;
   const Camera camera = MakeCamera(CameraModel::kPinhole, {});
   std::size_t index = 0;
   for (const char* name : {"my first.jpg", "second.jpg", "my third.jpg"})
-    exporter->Add({name, index++, camera, Eigen::Matrix3d::Identity(), Eigen::Vector3d::UnitZ()});
-  ASSERT_TRUE(exporter->Finish().ok());
-  EXPECT_CONTAINS(exporter->Note(), "'my first.jpg', 'my third.jpg'");
+    exported.push_back(
+        {name, index++, camera, {Eigen::Matrix3d::Identity(), Eigen::Vector3d::UnitZ()}});
+  std::string note;
+  ASSERT_TRUE(ExportPoses("colmap", exported, folder.path(), &note).ok());
+  EXPECT_CONTAINS(note, "'my first.jpg', 'my third.jpg'");
   const std::map<std::string, CameraPose> poses = ReadPoses(folder / "images.txt");
   ASSERT_EQ(poses.size(), 1U);
   EXPECT_EQ(poses.begin()->first, "second.jpg");

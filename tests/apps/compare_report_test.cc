@@ -6,7 +6,6 @@
 #include <string>
 
 #include "apps/common/svg_plot.h"
-#include "apps/compare/digest.h"
 #include "apps/compare/report.h"
 #include "tests/apps/board_set.h"
 #include "tests/apps/run_compare.h"
@@ -84,8 +83,7 @@ TEST(CompareReport, NarrowAxesHaveLabels) {
 TEST(CompareReport, HasEveryChapterAndNothingFromElsewhere) {
   const TestFolder folder;
   const std::string report = ReadAll(RunSweep(folder) + "/report.html");
-  for (const char* chapter :
-       {"summary", "curves", "boxes", "sweep", "agreement", "times", "images"}) {
+  for (const char* chapter : {"summary", "curves", "sweep", "agreement", "images"}) {
     EXPECT_EQ(Count(report, std::string("<h2 id='") + chapter + "'"), 1) << chapter;
   }
   for (const char* reference : {"http:", "https:", "<link", "url(", "@import", "src='/", "src=\"",

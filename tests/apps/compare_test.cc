@@ -317,7 +317,7 @@ TEST_F(CompareBadInput, FolderOfARunUnderWay) {
   std::filesystem::copy(folder_ / "out", folder_ / "shard",
                         std::filesystem::copy_options::recursive);
   FolderLock lock;
-  ASSERT_TRUE(lock.Take(folder_ / "out").ok());
+  ASSERT_TRUE(lock.Acquire(folder_ / "out").ok());
   for (const std::string& flags :
        {arguments + "--seed=3",
         "--merge='" + folder_ / "shard" + "' --output='" + folder_ / "out" + "'"}) {

@@ -38,11 +38,11 @@ TEST(FolderLock, HasOneHolder) {
   const TestFolder folder;
   {
     FolderLock first, second;
-    EXPECT_TRUE(first.Take(folder.path()).ok());
-    EXPECT_CONTAINS(second.Take(folder.path()).message, "another run is writing");
+    EXPECT_TRUE(first.Acquire(folder.path()).ok());
+    EXPECT_CONTAINS(second.Acquire(folder.path()).message, "another run is writing");
   }
   FolderLock third;
-  EXPECT_TRUE(third.Take(folder.path()).ok());
+  EXPECT_TRUE(third.Acquire(folder.path()).ok());
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 

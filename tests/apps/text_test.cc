@@ -46,14 +46,13 @@ TEST(Text, FormatsNumbersForPeople) {
 TEST(Text, EscapesHtml) { EXPECT_EQ(EscapeHtml("<a & 'b'>"), "&lt;a &amp; &#39;b&#39;&gt;"); }
 
 TEST(Text, EncodesBase64) {  // RFC 4648, section 10.
-  const auto encode = [](const std::string& s) { return EncodeBase64({s.begin(), s.end()}); };
-  EXPECT_EQ(encode(""), "");
-  EXPECT_EQ(encode("f"), "Zg==");
-  EXPECT_EQ(encode("fo"), "Zm8=");
-  EXPECT_EQ(encode("foo"), "Zm9v");
-  EXPECT_EQ(encode("foob"), "Zm9vYg==");
-  EXPECT_EQ(encode("fooba"), "Zm9vYmE=");
-  EXPECT_EQ(encode("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(EncodeBase64(""), "");
+  EXPECT_EQ(EncodeBase64("f"), "Zg==");
+  EXPECT_EQ(EncodeBase64("fo"), "Zm8=");
+  EXPECT_EQ(EncodeBase64("foo"), "Zm9v");
+  EXPECT_EQ(EncodeBase64("foob"), "Zm9vYg==");
+  EXPECT_EQ(EncodeBase64("fooba"), "Zm9vYmE=");
+  EXPECT_EQ(EncodeBase64("foobar"), "Zm9vYmFy");
 }
 
 TEST(Text, PlainNumbersHaveNoIdleZeros) {

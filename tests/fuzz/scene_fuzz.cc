@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/common/colmap_camera.h"
+#include "apps/common/colmap_file.h"
 #include "apps/common/scene.h"
 #include "tests/fuzz/fuzz.h"
 

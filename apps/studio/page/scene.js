@@ -10,7 +10,6 @@ function freshId(list, stem) {
   for (let i = 1; ; ++i) if (!ids.has(stem + i)) return stem + i;
 }
 
-// The sigma of a point that a person sets, pixels: about one pixel of the screen.
 // The entry with contours of fewer points, evenly chosen: what is enough to see where a pose goes.
 export function thinned(entry, points) {
   if (!entry.circles) return entry;
@@ -23,6 +22,7 @@ export function thinned(entry, points) {
   return {...entry, circles: entry.circles.map(thin)};
 }
 
+// The sigma of a point that a person sets, pixels: about one pixel of the screen.
 export const handSigma = (scale) => Math.max(0.3, Math.round(10 / scale) / 10);
 
 // Whether a said contour is one that is found now: its length and ends tell.

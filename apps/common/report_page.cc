@@ -1,8 +1,11 @@
-#include "apps/compare/report_style.h"
+#include "apps/common/report_page.h"
+
+#include "apps/common/text.h"
 
 namespace circline::apps {
+namespace {
 
-const char* const kReportStyle = R"css(
+constexpr char kStyle[] = R"css(
 :root{--bg:#fff;--fg:#1c2430;--soft:#5d6978;--line:#dde3ea;--card:#f6f8fa;--accent:#1f6fd1;--good:#1d8348;--bad:#c0392b}
 @media(prefers-color-scheme:dark){:root{--bg:#14181d;--fg:#e4e9ef;--soft:#9aa7b5;--line:#2d353f;--card:#1b2127;--accent:#6cb0ff;--good:#5fcf8d;--bad:#ff8a7a}}
 *{box-sizing:border-box}
@@ -45,7 +48,7 @@ details{margin:0 0 22px}summary{cursor:pointer;color:var(--accent)}
 #zoom p{position:absolute;left:0;right:0;bottom:0;margin:0;padding:8px 16px;color:#e4e9ef;background:#0d1014b0;font-size:13px;pointer-events:none}
 )css";
 
-const char* const kReportScript = R"js(
+constexpr char kScript[] = R"js(
 document.querySelectorAll('table.sortable').forEach(function(table){
   var heads=table.querySelectorAll('th');
   heads.forEach(function(head,column){head.addEventListener('click',function(){
@@ -91,5 +94,23 @@ document.querySelectorAll('.choose button[value]').forEach(function(button,i,all
     if(e.key==='ArrowRight')show(now+1);if(e.key==='ArrowLeft')show(now-1)});
 })();
 )js";
+
+}  // namespace
+
+std::string PageTop(const std::string& title) {
+  return "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"
+         "<meta name='viewport' content='width=device-width,initial-scale=1'><title>" +
+         EscapeHtml(title) + "</title><style>" + kStyle + "</style></head><body>\n";
+}
+
+std::string PageEnd() {
+  return std::string("<div id='zoom'><img alt=''><p></p></div>\n<script>") + kScript +
+         "</script></body></html>\n";
+}
+
+std::string PictureHtml(const std::string& alt, const std::string& jpeg) {
+  return "<img alt='" + EscapeHtml(alt) + "' src='data:image/jpeg;base64," + EncodeBase64(jpeg) +
+         "'>";
+}
 
 }  // namespace circline::apps
