@@ -1,8 +1,8 @@
 #include "circline/estimators/circle_focal.h"
 
 #include <Eigen/Dense>
-#include <algorithm>
 #include <cmath>
+#include <complex>
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/focal_roots.h"
@@ -56,31 +56,9 @@ Eigen::Matrix3d Adjugate(const Eigen::Matrix3d& S) {
   return adjugate.transpose();
 }
 
-// Real lambda with det(second - lambda D) = 0, the one farthest from the other two first.
-int DegenerateMembers(const ConicPencil& pencil, std::array<double, 3>* lambdas) {
-  const Eigen::Matrix3d M = ConicPencil::D() * pencil.second;
-  const double c2 = M.trace(), c1 = Adjugate(M).trace(), c0 = M.determinant();
-  // lambda = t + c2 / 3 with t^3 + p t + q = 0.
-  const double p = c1 - c2 * c2 / 3.0;
-  const double q = c2 * (c1 / 3.0 - 2.0 * c2 * c2 / 27.0) - c0;
-  const double discriminant = 0.25 * q * q + p * p * p / 27.0;
-  int count = 1;
-  if (discriminant > 0.0) {
-    const double A = -std::copysign(std::cbrt(0.5 * std::abs(q) + std::sqrt(discriminant)), q);
-    *lambdas = {A - p / (3.0 * A), 0.0, 0.0};
-  } else {
-    constexpr double kThird = 2.0943951023931953;  // Of a turn.
-    const double m = std::copysign(2.0 * std::sqrt(std::max(0.0, -p / 3.0)), -q);
-    const double angle = std::acos(m != 0.0 ? std::min(1.0, 3.0 * q / (p * m)) : 1.0) / 3.0;
-    *lambdas = {m * std::cos(angle), m * std::cos(angle + kThird), m * std::cos(angle - kThird)};
-    count = 3;
-  }
-  for (double& x : *lambdas) {  // The last digits by a Newton step.
-    x += c2 / 3.0;
-    const double step = (((x - c2) * x + c1) * x - c0) / ((3.0 * x - 2.0 * c2) * x + c1);
-    if (std::abs(step) < 1e-6 * std::abs(x)) x -= step;
-  }
-  return count;
+// The lambda with det(second - lambda D) = 0.
+Eigen::Vector3cd DegenerateMembers(const ConicPencil& pencil) {
+  return Eigen::EigenSolver<Eigen::Matrix3d>(ConicPencil::D() * pencil.second, false).eigenvalues();
 }
 
 // f^2 from both of two concentric circles.
@@ -91,9 +69,11 @@ std::array<FocalRoots, 2> Concentric(const Vector<12>& z) {
     return std::array{FocalRoots(why), FocalRoots(why)};
   };
   if (!MakeConicPencil(A, B, &pencil)) return refused(FocalRefusal::kNoEllipse);
-  std::array<double, 3> lambdas;
-  DegenerateMembers(pencil, &lambdas);
-  const Eigen::Matrix3d adjugate = Adjugate(pencil.Member(lambdas[0]));
+  // Two of them are one, of the pair of lines that touch both conics.
+  const Eigen::Vector3cd lambdas = DegenerateMembers(pencil);
+  Eigen::Index simple;
+  (3.0 * lambdas.array() - lambdas.sum()).abs().maxCoeff(&simple);
+  const Eigen::Matrix3d adjugate = Adjugate(pencil.Member(lambdas[simple].real()));
   Eigen::Index longest;
   const double size = adjugate.colwise().norm().maxCoeff(&longest);
   constexpr double kSame = 1e-9;  // A root that is triple is good to 1e-5, and enters squared.
@@ -122,13 +102,12 @@ FocalRoots Coplanar(const Vector<12>& z) {
   ConicPencil pencil;
   if (!MakeConicPencil(A, VectorToConic(z.tail<6>()), &pencil))
     return FocalRoots(FocalRefusal::kNoEllipse);
-  std::array<double, 3> lambdas;
-  const int count = DegenerateMembers(pencil, &lambdas);
   // A pair of real lines has eigenvalues of both signs beside 0: the trace of the adjugate, which
   // is their product, is negative.
   Eigen::Matrix3d pair = Eigen::Matrix3d::Zero(), adjugate = Eigen::Matrix3d::Zero();
-  for (int i = 0; i < count; ++i) {
-    const Eigen::Matrix3d member = pencil.Member(lambdas[static_cast<std::size_t>(i)]);
+  for (const std::complex<double>& lambda : DegenerateMembers(pencil)) {
+    if (lambda.imag() != 0.0) continue;
+    const Eigen::Matrix3d member = pencil.Member(lambda.real());
     const Eigen::Matrix3d of_member = Adjugate(member);
     if (of_member.trace() < adjugate.trace()) pair = member, adjugate = of_member;
   }

@@ -1,7 +1,9 @@
-#include <Eigen/Dense>
+// The closed forms of circles: which evidence each one uses, and what it reads of it.
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,6 +15,8 @@
 namespace circline {
 namespace {
 
+using Circles = std::vector<CircleObservation>;
+
 // Largest extent of a contour, pixels: the larger the circle, the more it says.
 double Extent(const CircleObservation& circle) {
   Eigen::AlignedBox2d box;
@@ -20,62 +24,27 @@ double Extent(const CircleObservation& circle) {
   return circle.points.empty() ? 0.0 : box.diagonal().norm();
 }
 
-using CircleTest = std::function<bool(const CircleObservation&)>;
-
 // Fitted circles of the world plane that pass the test, the largest first.
-std::vector<const CircleObservation*> WorldCircles(const Observations& observations,
-                                                   const CircleTest& test) {
-  std::vector<std::pair<double, const CircleObservation*>> sized;
+template <typename Test>
+Circles WorldCircles(const Observations& observations, const Test& test) {
+  std::multimap<double, const CircleObservation*, std::greater<>> by_size;
   for (const CircleObservation& circle : observations.circles) {
     if (circle.fit && circle.plane == observations.frame.plane && test(circle))
-      sized.emplace_back(Extent(circle), &circle);
+      by_size.emplace(Extent(circle), &circle);
   }
-  std::stable_sort(sized.begin(), sized.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::vector<const CircleObservation*> circles;
-  for (const auto& [extent, circle] : sized) circles.push_back(circle);
+  Circles circles;
+  for (const auto& [extent, circle] : by_size) circles.push_back(*circle);
   return circles;
 }
 
-// Copies of the first ones.
-std::vector<CircleObservation> Copies(const std::vector<const CircleObservation*>& circles,
-                                      std::size_t most) {
-  std::vector<CircleObservation> copies;
-  for (std::size_t i = 0; i < std::min(most, circles.size()); ++i) copies.push_back(*circles[i]);
-  return copies;
-}
+bool IsAny(const CircleObservation&) { return true; }
 
-// Camera, frame and known lengths of the world plane, and `circles`.
-Observations KeepCircles(const Observations& observations, std::vector<CircleObservation> circles) {
-  Observations evidence;
-  evidence.camera = observations.camera;
-  evidence.frame = observations.frame;
-  const std::string& origin = evidence.frame.origin_is_center;
-  if (std::none_of(circles.begin(), circles.end(), [&](const auto& c) { return c.id == origin; })) {
-    evidence.frame.origin_is_center.clear();
-  }
-  for (const KnownLength& known : observations.known_lengths) {
-    if (IsInWorldPlane(known, evidence)) evidence.known_lengths.push_back(known);
-  }
-  evidence.circles = std::move(circles);
-  return evidence;
-}
-
-// Without what would place their centres.
-std::vector<CircleObservation> Bare(std::vector<CircleObservation> circles) {
-  for (CircleObservation& circle : circles) {
+// Takes away what would place their centres.
+void ForgetCenters(Circles* circles) {
+  for (CircleObservation& circle : *circles) {
     circle.center.reset();
     circle.diameters.clear();
   }
-  return circles;
-}
-
-// Keeps the largest circle, its contour alone.
-Status SelectBareCircle(const Observations& observations, Observations* evidence) {
-  const auto circles = WorldCircles(observations, [](const auto&) { return true; });
-  if (circles.empty()) return Status::Refused("no circle of the world's plane could be fitted");
-  *evidence = KeepCircles(observations, Bare(Copies(circles, 1)));
-  return Status::Ok();
 }
 
 // Keeps the single line of a pencil that an axis is drawn on, as a pencil of its own.
@@ -90,86 +59,95 @@ void KeepAxisLine(const Observations& observations, const std::optional<Segment>
   evidence->pencils.push_back(std::move(kept));
 }
 
-// The lines that carry the drawn axes fix the rotation about the normal.
-void KeepAxisLines(const Observations& observations, Observations* evidence) {
+// Keeps `circles`, camera, frame and known lengths of the world plane, and the lines that carry the
+// drawn axes, which fix the rotation about the normal.
+Status Keep(Circles circles, const Observations& observations, Observations* evidence) {
+  *evidence = KeepFrame(observations, observations.frame);
+  std::string& origin = evidence->frame.origin_is_center;
+  evidence->circles = std::move(circles);
+  if (FindCircle(*evidence, origin) < 0) origin.clear();
   KeepAxisLine(observations, observations.frame.x_axis, PencilDirection::kX, evidence);
   KeepAxisLine(observations, observations.frame.y_axis, PencilDirection::kY, evidence);
+  return Status::Ok();
 }
 
-Recipe SingleCircleRecipe() {
-  Recipe r;
-  r.name = "single_circle";
-  r.needs = "a circle";
-  r.decided_by = "nothing: a circle alone has two poses";
-  r.select = [](const Observations& observations, Observations* evidence) {
-    const Status status = SelectBareCircle(observations, evidence);
-    evidence->frame = FrameObservation();
-    evidence->frame.plane = observations.frame.plane;
-    evidence->known_lengths.clear();
-    return status;
-  };
-  r.gather = [](const Observations& evidence, double sigma_px, Inputs* inputs) {
-    GatherCircle(evidence, evidence.circles.front(), sigma_px, inputs);
-    return Status::Ok();
-  };
-  r.evaluate = SingleCirclePoses;
-  return r;
+// The largest circle, its contour alone.
+Status SelectContour(const Observations& observations, Observations* evidence) {
+  Circles circles = WorldCircles(observations, IsAny);
+  if (circles.empty()) return Status::Refused("no circle of the world's plane could be fitted");
+  circles.resize(1);
+  ForgetCenters(&circles);
+  return Keep(std::move(circles), observations, evidence);
 }
 
-// One circle whose centre is known somehow: `has_center` says of which circles, `gather_center`
-// fills Inputs::center.
-Recipe CenterRecipe(
-    const std::string& name, const std::string& needs, const std::string& decided_by,
-    const std::function<bool(const Observations&, const CircleObservation&)>& has_center,
-    const std::function<Status(const Observations&, double, Inputs*)>& gather_center) {
-  Recipe r;
-  r.name = name;
-  r.needs = needs;
-  r.decided_by = decided_by;
-  r.select = [has_center, needs](const Observations& observations, Observations* evidence) {
-    const auto circles = WorldCircles(
-        observations, [&](const auto& circle) { return has_center(observations, circle); });
+// The same, without what is known of its frame.
+Status SelectSingleCircle(const Observations& observations, Observations* evidence) {
+  Observations frameless = observations;
+  frameless.frame = FrameObservation();
+  frameless.frame.plane = observations.frame.plane;
+  frameless.known_lengths.clear();
+  return SelectContour(frameless, evidence);
+}
+
+// The largest circle whose centre is known as `has_center` says, in words `needs`.
+template <typename HasCenter>
+auto SelectCentered(const std::string& needs, const HasCenter& has_center) {
+  return [needs, has_center](const Observations& observations, Observations* evidence) {
+    Circles circles = WorldCircles(observations, [&](const CircleObservation& circle) {
+      return has_center(observations, circle);
+    });
     if (circles.empty()) return Status::Refused("the world's plane does not hold " + needs);
-    *evidence = KeepCircles(observations, Copies(circles, 1));
-    KeepAxisLines(observations, evidence);
-    return Status::Ok();
+    circles.resize(1);
+    return Keep(std::move(circles), observations, evidence);
   };
-  r.gather = [gather_center](const Observations& evidence, double sigma_px, Inputs* inputs) {
-    GatherFrame(evidence, sigma_px, inputs);
-    GatherCircle(evidence, evidence.circles.front(), sigma_px, inputs);
-    GatherDrawnAxes(evidence, sigma_px, inputs);
-    return gather_center(evidence, sigma_px, inputs);
-  };
-  r.evaluate = CircleCenterPoses;
-  return r;
 }
 
-Recipe CircleCenterRecipe() {
-  return CenterRecipe(
-      "circle_center", "a circle and the image of its centre", "the image of the circle's centre",
-      [](const Observations& observations, const CircleObservation& circle) {
-        return circle.center || (observations.frame.origin && !circle.id.empty() &&
-                                 observations.frame.origin_is_center == circle.id);
-      },
-      [](const Observations& evidence, double, Inputs* inputs) {
-        return inputs->center.present()
-                   ? Status::Ok()
-                   : Status::Refused("the centre of circle '" + evidence.circles.front().id +
-                                     "' lies where the camera model cannot undistort it");
-      });
+bool IsOrigin(const CircleObservation& circle, const FrameObservation& frame) {
+  return !frame.origin_is_center.empty() && frame.origin_is_center == circle.id;
 }
 
-Recipe CircleDiametersRecipe() {
-  return CenterRecipe(
-      "circle_diameters", "a circle and two or more chords through its centre",
-      "the crossing of the diameters",
-      [](const Observations&, const CircleObservation& circle) {
-        return circle.diameters.size() >= 2;
-      },
-      [](const Observations& evidence, double sigma_px, Inputs* inputs) {
-        const CircleObservation& circle = evidence.circles.front();
-        return GatherDiameters(evidence.camera, circle, sigma_px, &inputs->center);
-      });
+bool HasCenter(const Observations& observations, const CircleObservation& circle) {
+  return circle.center || (observations.frame.origin && IsOrigin(circle, observations.frame));
+}
+
+bool HasDiameters(const Observations&, const CircleObservation& circle) {
+  return circle.diameters.size() >= 2;
+}
+
+Status SelectParallelCircles(const Observations& observations, Observations* evidence) {
+  // More circles add little to the choice of the plane, and the joint refinement uses them all.
+  constexpr std::size_t kMaxCircles = 12;
+  Circles circles = WorldCircles(observations, IsAny);
+  if (circles.size() < 2)
+    return Status::Refused("the world's plane holds fewer than two fitted circles");
+  circles.resize(std::min(circles.size(), kMaxCircles));
+  ForgetCenters(&circles);
+  for (CircleObservation& circle : circles) circle.concentric.clear();
+  return Keep(std::move(circles), observations, evidence);
+}
+
+Status SelectConcentricCircles(const Observations& observations, Observations* evidence) {
+  for (const CircleObservation& first : WorldCircles(
+           observations, [](const CircleObservation& c) { return !c.concentric.empty(); })) {
+    Circles circles = WorldCircles(observations, [&first](const CircleObservation& c) {
+      return c.concentric == first.concentric;
+    });
+    if (circles.size() < 2) continue;
+    ForgetCenters(&circles);
+    return Keep(std::move(circles), observations, evidence);
+  }
+  return Status::Refused("the world's plane holds no two fitted circles that are concentric");
+}
+
+Status SelectCircleFrame(const Observations& observations, Observations* evidence) {
+  const Status status = SelectContour(observations, evidence);
+  if (!status.ok() || (observations.frame.x_axis && observations.frame.y_axis)) return status;
+  evidence->pencils.clear();
+  for (const PencilObservation& pencil : observations.pencils) {
+    if (pencil.direction == PencilDirection::kX || pencil.direction == PencilDirection::kY)
+      evidence->pencils.push_back(pencil);
+  }
+  return status;
 }
 
 // Inverse variance of the normal, rad^2, of the first of a circle's planes.
@@ -180,104 +158,67 @@ double NormalWeight(const Measured& conic) {
   return 1.0 / (planes[0].covariance.trace() + kRounding);
 }
 
+// All kept circles, the first one with its centre and radius, and the drawn axes.
 Status GatherCircles(const Observations& evidence, double sigma_px, Inputs* inputs) {
   GatherFrame(evidence, sigma_px, inputs);
   GatherCircle(evidence, evidence.circles.front(), sigma_px, inputs);
   GatherDrawnAxes(evidence, sigma_px, inputs);
-  for (std::size_t i = 1; i < evidence.circles.size(); ++i) {
+  if (evidence.circles.size() == 1) return Status::Ok();
+  for (std::size_t i = 1; i < evidence.circles.size(); ++i)
     GatherConic(evidence.circles[i], &inputs->more_conics.emplace_back(), inputs);
-  }
   inputs->normal_weights = {NormalWeight(inputs->conic)};
   for (const Measured& conic : inputs->more_conics)
     inputs->normal_weights.push_back(NormalWeight(conic));
   return Status::Ok();
 }
 
-// More circles add little to the choice of the plane, and the joint refinement uses them all.
-constexpr std::size_t kMaxCircles = 12;
-
-Recipe ParallelCirclesRecipe() {
-  Recipe r;
-  r.name = "parallel_circles";
-  r.needs = "two or more circles of one plane";
-  r.decided_by = "the plane that the circles have in common";
-  r.select = [](const Observations& observations, Observations* evidence) {
-    const auto found = WorldCircles(observations, [](const auto&) { return true; });
-    if (found.size() < 2) {
-      return Status::Refused("the world's plane holds fewer than two fitted circles");
-    }
-    std::vector<CircleObservation> circles = Bare(Copies(found, kMaxCircles));
-    for (CircleObservation& circle : circles) circle.concentric.clear();
-    *evidence = KeepCircles(observations, std::move(circles));
-    KeepAxisLines(observations, evidence);
-    return Status::Ok();
-  };
-  r.gather = GatherCircles;
-  r.evaluate = ParallelCirclePoses;
-  return r;
+Status GatherCenter(const Observations& evidence, double sigma_px, Inputs* inputs) {
+  GatherCircles(evidence, sigma_px, inputs);
+  if (inputs->center.present()) return Status::Ok();
+  return Status::Refused("the centre of circle '" + evidence.circles.front().id +
+                         "' lies where the camera model cannot undistort it");
 }
 
-Recipe ConcentricCirclesRecipe() {
-  Recipe r;
-  r.name = "concentric_circles";
-  r.needs = "two or more concentric circles";
-  r.decided_by = "the plane and centre that the circles have in common";
-  r.select = [](const Observations& observations, Observations* evidence) {
-    for (const CircleObservation* first :
-         WorldCircles(observations, [](const auto& c) { return !c.concentric.empty(); })) {
-      const auto circles = WorldCircles(
-          observations, [first](const auto& c) { return c.concentric == first->concentric; });
-      if (circles.size() < 2) continue;
-      *evidence = KeepCircles(observations, Bare(Copies(circles, circles.size())));
-      KeepAxisLines(observations, evidence);
-      return Status::Ok();
-    }
-    return Status::Refused("the world's plane holds no two fitted circles that are concentric");
-  };
-  r.gather = GatherCircles;
-  r.evaluate = ConcentricCirclePoses;
-  return r;
+Status GatherCrossing(const Observations& evidence, double sigma_px, Inputs* inputs) {
+  GatherCircles(evidence, sigma_px, inputs);
+  return GatherDiameters(evidence.camera, evidence.circles.front(), sigma_px, &inputs->center);
 }
 
-Status GatherAxes(const Observations& evidence, double sigma_px, Inputs* inputs) {
+Status GatherCircleFrame(const Observations& evidence, double sigma_px, Inputs* inputs) {
+  GatherCircles(evidence, sigma_px, inputs);
   GatherAxisLines(evidence, sigma_px, inputs);
-  if (!inputs->x_line.present() || !inputs->y_line.present()) {
-    return Status::Refused(std::string("there is no image of the ") +
-                           (inputs->x_line.present() ? "Y" : "X") +
-                           " axis, nor of a line of the plane along it");
-  }
-  return Status::Ok();
-}
-
-Recipe CircleFrameRecipe() {
-  Recipe r;
-  r.name = "circle_frame";
-  r.needs = "a circle and the images of the X and Y axes of its plane";
-  r.decided_by = "the right angle between the axes";
-  r.select = [](const Observations& observations, Observations* evidence) {
-    const Status status = SelectBareCircle(observations, evidence);
-    if (!status.ok()) return status;
-    if (observations.frame.x_axis && observations.frame.y_axis) {
-      KeepAxisLines(observations, evidence);
-      return Status::Ok();
-    }
-    for (const PencilObservation& pencil : observations.pencils) {
-      const bool along_axis =
-          pencil.direction == PencilDirection::kX || pencil.direction == PencilDirection::kY;
-      if (along_axis) evidence->pencils.push_back(pencil);
-    }
-    return Status::Ok();
-  };
-  r.gather = [](const Observations& evidence, double sigma_px, Inputs* inputs) {
-    GatherFrame(evidence, sigma_px, inputs);
-    GatherCircle(evidence, evidence.circles.front(), sigma_px, inputs);
-    return GatherAxes(evidence, sigma_px, inputs);
-  };
-  r.evaluate = CircleFramePoses;
-  return r;
+  if (inputs->x_line.present() && inputs->y_line.present()) return Status::Ok();
+  return Status::Refused(std::string("there is no image of the ") +
+                         (inputs->x_line.present() ? "Y" : "X") +
+                         " axis, nor of a line of the plane along it");
 }
 
 }  // namespace
+
+Measured MeasuredCenter(const Observations& observations, const CircleObservation& circle,
+                        double sigma_px) {
+  const FrameObservation& frame = observations.frame;
+  const std::optional<Eigen::Vector2d>& center =
+      circle.center || !IsOrigin(circle, frame) ? circle.center : frame.origin;
+  if (!center) return {};
+  const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : sigma_px;
+  return MeasuredPoint(observations.camera, *center, sigma);
+}
+
+void GatherConic(const CircleObservation& circle, Measured* conic, Inputs* inputs) {
+  *conic = Measured(ConicToVector(circle.fit->conic), circle.fit->Covariance());
+  inputs->tilts.emplace_back(Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero());
+  inputs->contrasts.push_back(circle.contrast);
+}
+
+void GatherCircle(const Observations& observations, const CircleObservation& circle,
+                  double sigma_px, Inputs* inputs) {
+  GatherConic(circle, &inputs->conic, inputs);
+  inputs->radius = circle.radius;
+  inputs->radius_sigma = circle.radius_sigma;
+  inputs->center = MeasuredCenter(observations, circle, sigma_px);
+  inputs->origin_at_center = IsOrigin(circle, observations.frame);
+}
 
 Status GatherDiameters(const Camera& camera, const CircleObservation& circle, double sigma_px,
                        Measured* center) {
@@ -301,8 +242,24 @@ Status GatherDiameters(const Camera& camera, const CircleObservation& circle, do
 }
 
 std::vector<Recipe> CircleRecipes() {
-  return {SingleCircleRecipe(),      CircleCenterRecipe(),    CircleDiametersRecipe(),
-          ConcentricCirclesRecipe(), ParallelCirclesRecipe(), CircleFrameRecipe()};
+  const std::string center = "a circle and the image of its centre",
+                    diameters = "a circle and two or more chords through its centre";
+  return {
+      {"single_circle", "a circle", "nothing: a circle alone has two poses", SelectSingleCircle,
+       GatherCircles, SingleCirclePoses},
+      {"circle_center", center, "the image of the circle's centre",
+       SelectCentered(center, HasCenter), GatherCenter, CircleCenterPoses},
+      {"circle_diameters", diameters, "the crossing of the diameters",
+       SelectCentered(diameters, HasDiameters), GatherCrossing, CircleCenterPoses},
+      {"concentric_circles", "two or more concentric circles",
+       "the plane and centre that the circles have in common", SelectConcentricCircles,
+       GatherCircles, ConcentricCirclePoses},
+      {"parallel_circles", "two or more circles of one plane",
+       "the plane that the circles have in common", SelectParallelCircles, GatherCircles,
+       ParallelCirclePoses},
+      {"circle_frame", "a circle and the images of the X and Y axes of its plane",
+       "the right angle between the axes", SelectCircleFrame, GatherCircleFrame, CircleFramePoses},
+  };
 }
 
 }  // namespace circline

@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <complex>
 #include <limits>
 #include <utility>
 
@@ -28,18 +27,6 @@ bool ScaledPair(const CircularPoints& points, CircularPoints* scaled) {
   return true;
 }
 
-// Coordinates of a real point on the line, v = alpha real + beta imag, as alpha + i beta: up to the
-// factor -i, the bracket [m, v] of the line's projective coordinate. That of conj(m) is its
-// conjugate.
-bool Bracket(const CircularPoints& points, const Eigen::Vector3d& v,
-             std::complex<double>* bracket) {
-  Eigen::Vector3d w;
-  if (!Scaled(v, &w)) return false;
-  *bracket = {w.dot(points.real), w.dot(points.imag)};
-  constexpr double kMinNorm = 1e-24;  // Squared; below, v is the pole of the line to rounding.
-  return std::norm(*bracket) > kMinNorm * points.real.squaredNorm();
-}
-
 constexpr double kMinSine = 1e-12;  // Below, two directions are one to rounding.
 
 // The join of a pair that is scaled.
@@ -51,10 +38,12 @@ bool Join(const CircularPoints& scaled, Eigen::Vector3d* line) {
   return true;
 }
 
-// Where a line meets the vanishing line; false where it is that. Both are scaled.
+// Where a line meets the vanishing line; false where it is that.
 bool Meet(const Eigen::Vector3d& vanishing_line, const Eigen::Vector3d& line,
           Eigen::Vector3d* point) {
-  *point = vanishing_line.cross(line);
+  Eigen::Vector3d scaled;
+  if (!Scaled(line, &scaled)) return false;
+  *point = vanishing_line.cross(scaled);
   return point->squaredNorm() > kMinSine * kMinSine;
 }
 
@@ -67,38 +56,23 @@ struct Axes {
   double cosine;
 };
 
-// All scaled.
-bool FindAxes(const CircularPoints& m, const Eigen::Vector3d& x_line, const Eigen::Vector3d& y_line,
-              Axes* axes) {
+bool FindAxes(const CircularPoints& points, const Eigen::Vector3d& x_line,
+              const Eigen::Vector3d& y_line, Axes* axes) {
+  CircularPoints m;
   Eigen::Vector3d normal;
-  if (!Join(m, &normal) || !Meet(normal, x_line, &axes->x) || !Meet(normal, y_line, &axes->y))
+  if (!ScaledPair(points, &m) || !Join(m, &normal) || !Meet(normal, x_line, &axes->x) ||
+      !Meet(normal, y_line, &axes->y)) {
     return false;
+  }
   const Eigen::Vector2d x(axes->x.dot(m.real), axes->x.dot(m.imag)),
       y(axes->y.dot(m.real), axes->y.dot(m.imag));
   axes->cosine = x.dot(y) / std::sqrt(x.squaredNorm() * y.squaredNorm());
   return std::isfinite(axes->cosine);
 }
 
-bool ScaleAndFindAxes(const CircularPoints& points, const Eigen::Vector3d& x_line,
-                      const Eigen::Vector3d& y_line, Axes* axes) {
-  CircularPoints m;
-  Eigen::Vector3d x, y;
-  return ScaledPair(points, &m) && Scaled(x_line, &x) && Scaled(y_line, &y) &&
-         FindAxes(m, x, y, axes);
-}
-
-bool OrthogonalAxes(const Axes& axes, double x_variance, double y_variance,
-                    FrameRotation* rotation) {
-  rotation->deviation = std::abs(axes.cosine);
-  return RotationFromOrthogonalDirections(axes.x, x_variance, axes.y, y_variance,
-                                          &rotation->rotation);
-}
-
 CircularPoints OfUnitNormal(const Eigen::Vector3d& n) {
-  CircularPoints points;
-  points.real = n.unitOrthogonal();
-  points.imag = n.cross(points.real);
-  return points;
+  const Eigen::Vector3d real = n.unitOrthogonal();
+  return {real, n.cross(real)};
 }
 
 }  // namespace
@@ -127,11 +101,14 @@ bool VanishingLine(const CircularPoints& points, Eigen::Vector3d* line) {
 bool HarmonicConjugate(const CircularPoints& points, const Eigen::Vector3d& v,
                        Eigen::Vector3d* conjugate) {
   CircularPoints m;
-  std::complex<double> bracket;
-  if (!ScaledPair(points, &m) || !Bracket(m, v, &bracket)) return false;
-  // v = p m + conj(p m) has the conjugate p m - conj(p m), which is i times this real vector.
-  const Eigen::Vector3d turned = bracket.real() * m.imag - bracket.imag() * m.real;
-  const Eigen::Vector3d result = turned.normalized() * v.stableNorm();
+  Eigen::Vector3d w;
+  if (!ScaledPair(points, &m) || !Scaled(v, &w)) return false;
+  // v = p m + conj(p m) has the conjugate p m - conj(p m), which is i times this real vector; p is
+  // alpha + i beta up to a factor, with v = alpha real + beta imag.
+  const double alpha = w.dot(m.real), beta = w.dot(m.imag);
+  constexpr double kMinNorm = 1e-24;  // Squared; below, v is the pole of the line to rounding.
+  if (!(alpha * alpha + beta * beta > kMinNorm * m.real.squaredNorm())) return false;
+  const Eigen::Vector3d result = (alpha * m.imag - beta * m.real).normalized() * v.stableNorm();
   if (!result.allFinite()) return false;
   *conjugate = result;
   return true;
@@ -139,21 +116,19 @@ bool HarmonicConjugate(const CircularPoints& points, const Eigen::Vector3d& v,
 
 bool RotationFromCircularPoints(const CircularPoints& points, const Eigen::Vector3d& x_line,
                                 Eigen::Matrix3d* rotation) {
-  Eigen::Vector3d normal, line, v_x, v_y;
-  if (!VanishingLine(points, &normal) || !Scaled(x_line, &line) || !Meet(normal, line, &v_x) ||
+  Eigen::Vector3d normal, v_x, v_y;
+  if (!VanishingLine(points, &normal) || !Meet(normal, x_line, &v_x) ||
       !HarmonicConjugate(points, v_x.normalized(), &v_y)) {
     return false;
   }
-  rotation->col(0) = v_x.normalized();
-  rotation->col(1) = v_y;
-  rotation->col(2) = normal;
+  *rotation << v_x.normalized(), v_y, normal;
   return true;
 }
 
 double HarmonicDeviation(const CircularPoints& points, const Eigen::Vector3d& x_line,
                          const Eigen::Vector3d& y_line) {
   Axes axes;
-  if (ScaleAndFindAxes(points, x_line, y_line, &axes)) return axes.cosine;
+  if (FindAxes(points, x_line, y_line, &axes)) return axes.cosine;
   return std::numeric_limits<double>::infinity();
 }
 
@@ -161,26 +136,23 @@ bool RotationFromFrame(const CircularPoints& points, const Eigen::Vector3d& x_li
                        double x_variance, const Eigen::Vector3d& y_line, double y_variance,
                        FrameRotation* rotation) {
   Axes axes;
-  return ScaleAndFindAxes(points, x_line, y_line, &axes) &&
-         OrthogonalAxes(axes, x_variance, y_variance, rotation);
+  if (!FindAxes(points, x_line, y_line, &axes)) return false;
+  rotation->deviation = std::abs(axes.cosine);
+  return RotationFromOrthogonalDirections(axes.x, x_variance, axes.y, y_variance,
+                                          &rotation->rotation);
 }
 
 int RotationsFromCircleAndFrame(const Eigen::Matrix3d& conic, const Eigen::Vector3d& x_line,
                                 const Eigen::Vector3d& y_line,
                                 std::array<FrameRotation, 2>* rotations) {
-  Eigen::Vector3d x, y;
-  if (!Scaled(x_line, &x) || !Scaled(y_line, &y)) return 0;
   std::array<CircularPoints, 2> planes;
   const int candidates = CircularPointsOfConic(conic, &planes);
   std::size_t count = 0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(candidates); ++i) {
-    Axes axes;
-    if (FindAxes(planes[i], x, y, &axes) && OrthogonalAxes(axes, 1.0, 1.0, &(*rotations)[count]))
-      ++count;
+    if (RotationFromFrame(planes[i], x_line, 1.0, y_line, 1.0, &(*rotations)[count])) ++count;
   }
-  if (count == 2 && (*rotations)[1].deviation < (*rotations)[0].deviation) {
+  if (count == 2 && (*rotations)[1].deviation < (*rotations)[0].deviation)
     std::swap((*rotations)[0], (*rotations)[1]);
-  }
   return static_cast<int>(count);
 }
 

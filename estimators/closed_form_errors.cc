@@ -12,25 +12,10 @@
 namespace circline {
 namespace {
 
-// Of a covariance, symmetric (Cayley and Hamilton).
-Eigen::Matrix2d SquareRoot(const Eigen::Matrix2d& C) {
-  const double root = std::sqrt(std::max(0.0, C.determinant()));
-  const double scale = std::sqrt(C.trace() + 2.0 * root);
-  return (C + root * Eigen::Matrix2d::Identity()) / (scale > 0.0 ? scale : 1.0);
-}
-
 // c^T C^+ c, of a covariance of any rank; infinite where C is.
 double SquaredDistance(const Eigen::VectorXd& c, const Eigen::MatrixXd& C) {
   if (!C.allFinite()) return std::numeric_limits<double>::infinity();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(C);
-  const Eigen::VectorXd along = eigen.eigenvectors().transpose() * c;
-  const double least = static_cast<double>(c.size()) * std::numeric_limits<double>::epsilon() *
-                       eigen.eigenvalues()[c.size() - 1];
-  double sum = 0.0;
-  for (Eigen::Index k = 0; k < c.size(); ++k) {
-    if (eigen.eigenvalues()[k] > least) sum += along[k] * along[k] / eigen.eigenvalues()[k];
-  }
-  return sum;
+  return c.dot(C.completeOrthogonalDecomposition().solve(c));
 }
 
 // Adds an error of a unit vector, or of a line's normal: its covariance across the vector, over the
@@ -40,10 +25,12 @@ void AddAngularError(double sigma_rad, const Eigen::Matrix3d& shape, Measured* m
   const Eigen::Vector3d v = m->value, a = v.unitOrthogonal();
   Eigen::Matrix<double, 3, 2> across;
   across << a, v.normalized().cross(a);
-  const Eigen::Matrix2d C = across.transpose() * shape * across;
+  const Eigen::Matrix2d root =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(across.transpose() * shape * across)
+          .operatorSqrt();
   const Eigen::Index old = m->columns.cols();
   m->columns.conservativeResize(3, old + 2);
-  m->columns.rightCols<2>() = sigma_rad * v.norm() * across * SquareRoot(C);
+  m->columns.rightCols<2>() = sigma_rad * v.norm() * across * root;
 }
 
 // After the change of calibrated coordinates x' = A x.
@@ -102,26 +89,22 @@ Eigen::Matrix3d GrownEllipse(const Eigen::Matrix3d& conic, double by) {
 
 // Of one candidate or more.
 const Candidate& Nearest(const std::vector<Candidate>& candidates, const Candidate& reference) {
-  const Candidate* best = &candidates.front();
-  double best_angle = std::numeric_limits<double>::infinity();
-  for (const Candidate& c : candidates) {
-    const double angle = RotationAngle(c.pose.rotation, reference.pose.rotation);
-    if (angle < best_angle) {
-      best_angle = angle;
-      best = &c;
-    }
-  }
-  return *best;
+  const auto angle = [&reference](const Candidate& c) {
+    return RotationAngle(c.pose.rotation, reference.pose.rotation);
+  };
+  return *std::min_element(
+      candidates.begin(), candidates.end(),
+      [&angle](const Candidate& a, const Candidate& b) { return angle(a) < angle(b); });
 }
 
 // A perturbation may tip the convention that settles the senses of the axes; that is no error.
 Eigen::Matrix3d SameSenses(const Candidate& perturbed, const Candidate& reference) {
-  Eigen::Matrix3d best = perturbed.pose.rotation;
-  for (const Eigen::Matrix3d& R : SignChoices(perturbed.pose.rotation)) {
-    if (RotationAngle(R, reference.pose.rotation) < RotationAngle(best, reference.pose.rotation))
-      best = R;
-  }
-  return best;
+  const std::array<Eigen::Matrix3d, 4> choices = SignChoices(perturbed.pose.rotation);
+  const auto angle = [&reference](const Eigen::Matrix3d& R) {
+    return RotationAngle(R, reference.pose.rotation);
+  };
+  return *std::min_element(choices.begin(), choices.end(),
+                           [&angle](const auto& a, const auto& b) { return angle(a) < angle(b); });
 }
 
 // Half the difference of two perturbed candidates, in rows [delta, delta_t, contradiction].
@@ -135,11 +118,50 @@ Eigen::VectorXd HalfDifference(const Candidate& plus, const Candidate& minus,
   return half;
 }
 
-Eigen::MatrixXd FromColumns(const std::vector<Eigen::VectorXd>& columns, Eigen::Index rows) {
-  Eigen::MatrixXd matrix(rows, static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t k = 0; k < columns.size(); ++k)
-    matrix.col(static_cast<Eigen::Index>(k)) = columns[k];
-  return matrix;
+// Statistical linearisation: every error, one standard deviation up and down, through the closed
+// form itself; a part of that where it would lead to no pose (beyond the ellipses). Returns for
+// each candidate columns of [delta, delta_t, contradiction].
+std::vector<Eigen::MatrixXd> Sensitivities(const std::vector<Candidate>& candidates,
+                                           const PerturbedCandidates& perturbed,
+                                           std::size_t num_errors) {
+  constexpr double kShrink = 0.1, kSmallestPart = 1e-4;
+  const auto num_columns = static_cast<Eigen::Index>(num_errors);
+  std::vector<Eigen::MatrixXd> matrices;
+  for (const Candidate& c : candidates)
+    matrices.emplace_back(Eigen::MatrixXd::Zero(6 + c.contradiction.size(), num_columns));
+  for (std::size_t error = 0; error < num_errors; ++error) {
+    for (double part = 1.0; part > kSmallestPart; part *= kShrink) {
+      const std::vector<Candidate> plus = perturbed(error, part);
+      const std::vector<Candidate> minus = perturbed(error, -part);
+      if (plus.empty() || minus.empty()) continue;
+      for (std::size_t i = 0; i < candidates.size(); ++i) {
+        const Candidate& c = candidates[i];
+        matrices[i].col(static_cast<Eigen::Index>(error)) =
+            HalfDifference(Nearest(plus, c), Nearest(minus, c), c) / part;
+      }
+      break;
+    }
+  }
+  return matrices;
+}
+
+// Fills covariance, rank and cost, of the candidate's sensitivity `S`.
+void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseHypothesis* h) {
+  Eigen::Matrix<double, 6, Eigen::Dynamic> root = S.topRows<6>();
+  const auto leave_out = [&root](const Vector6d& free) {
+    root -= free * (free.transpose() * root);
+  };
+  for (const std::array<double, 6>& direction : h->free_directions)
+    leave_out(Eigen::Map<const Vector6d>(direction.data()));
+  Vector6d length = Vector6d::Zero();
+  length.tail<3>() = h->cam_from_world.translation;
+  if (!h->metric) leave_out(length);
+  SetCovariance(root * root.transpose(), h);
+  if (candidate.contradiction.size() > 0) {
+    const Eigen::MatrixXd tail = S.bottomRows(candidate.contradiction.size());
+    h->cost = 0.5 * SquaredDistance(candidate.contradiction, tail * tail.transpose());
+    if (!std::isfinite(h->cost)) h->cost = 0.5 * std::numeric_limits<double>::max();
+  }
 }
 
 }  // namespace
@@ -192,31 +214,7 @@ std::vector<Perturbation> Perturbations(const std::vector<MovedInput>& inputs,
   return all;
 }
 
-std::vector<Eigen::MatrixXd> Sensitivities(const PerturbedCandidates& perturbed,
-                                           std::size_t num_errors,
-                                           const std::vector<Candidate>& candidates) {
-  constexpr double kShrink = 0.1, kSmallestPart = 1e-4;
-  std::vector<std::vector<Eigen::VectorXd>> columns(candidates.size());
-  for (std::size_t error = 0; error < num_errors; ++error) {
-    for (double part = 1.0; part > kSmallestPart; part *= kShrink) {
-      const std::vector<Candidate> plus = perturbed(error, part);
-      const std::vector<Candidate> minus = perturbed(error, -part);
-      if (plus.empty() || minus.empty()) continue;
-      for (std::size_t i = 0; i < candidates.size(); ++i) {
-        columns[i].push_back(HalfDifference(Nearest(plus, candidates[i]),
-                                            Nearest(minus, candidates[i]), candidates[i]) /
-                             part);
-      }
-      break;
-    }
-  }
-  std::vector<Eigen::MatrixXd> matrices;
-  for (std::size_t i = 0; i < candidates.size(); ++i)
-    matrices.push_back(FromColumns(columns[i], 6 + candidates[i].contradiction.size()));
-  return matrices;
-}
-
-PoseHypothesis UncertainPose(const Candidate& candidate, bool metric, bool spin_is_free) {
+PoseHypothesis WithoutUncertainty(const Candidate& candidate, bool metric, bool spin_is_free) {
   PoseHypothesis h;
   h.cam_from_world = candidate.pose;
   h.metric = metric;
@@ -227,22 +225,18 @@ PoseHypothesis UncertainPose(const Candidate& candidate, bool metric, bool spin_
   return h;
 }
 
-void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseHypothesis* h) {
-  Eigen::Matrix<double, 6, Eigen::Dynamic> root = S.topRows<6>();
-  const auto leave_out = [&root](const Vector6d& free) {
-    root -= free * (free.transpose() * root);
-  };
-  for (const std::array<double, 6>& direction : h->free_directions)
-    leave_out(Eigen::Map<const Vector6d>(direction.data()));
-  Vector6d length = Vector6d::Zero();
-  length.tail<3>() = h->cam_from_world.translation;
-  if (!h->metric) leave_out(length);
-  SetCovariance(root * root.transpose(), h);
-  if (candidate.contradiction.size() > 0) {
-    const Eigen::MatrixXd tail = S.bottomRows(candidate.contradiction.size());
-    h->cost = 0.5 * SquaredDistance(candidate.contradiction, tail * tail.transpose());
-    if (!std::isfinite(h->cost)) h->cost = 0.5 * std::numeric_limits<double>::max();
+std::vector<PoseHypothesis> WithUncertainty(const std::vector<Candidate>& candidates,
+                                            const PerturbedCandidates& perturbed,
+                                            std::size_t num_errors, bool metric,
+                                            bool spin_is_free) {
+  const std::vector<Eigen::MatrixXd> sensitivities =
+      Sensitivities(candidates, perturbed, num_errors);
+  std::vector<PoseHypothesis> hypotheses;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    hypotheses.push_back(WithoutUncertainty(candidates[i], metric, spin_is_free));
+    FillUncertainty(sensitivities[i], candidates[i], &hypotheses.back());
   }
+  return hypotheses;
 }
 
 }  // namespace circline

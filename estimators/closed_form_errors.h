@@ -28,19 +28,14 @@ std::vector<Perturbation> Perturbations(const std::vector<MovedInput>& inputs,
 // All candidates with one error, by its index, at `part` of its standard deviation.
 using PerturbedCandidates = std::function<std::vector<Candidate>(std::size_t error, double part)>;
 
-// Statistical linearisation: every error, one standard deviation up and down, through the closed
-// form itself; a part of that where it would lead to no pose (beyond the ellipses). Returns for
-// each candidate columns of [delta, delta_t, contradiction].
-std::vector<Eigen::MatrixXd> Sensitivities(const PerturbedCandidates& perturbed,
-                                           std::size_t num_errors,
-                                           const std::vector<Candidate>& candidates);
-
-// A candidate as a hypothesis without uncertainty; where `spin_is_free` the turn about the plane's
+// A candidate as a hypothesis without covariance; where `spin_is_free` the turn about the plane's
 // normal is a free direction.
-PoseHypothesis UncertainPose(const Candidate& candidate, bool metric, bool spin_is_free);
+PoseHypothesis WithoutUncertainty(const Candidate& candidate, bool metric, bool spin_is_free);
 
-// Covariance, rank and cost, of the candidate's sensitivity `S`.
-void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseHypothesis* h);
+// All candidates as hypotheses, with covariance, rank and cost from what each error does to them.
+std::vector<PoseHypothesis> WithUncertainty(const std::vector<Candidate>& candidates,
+                                            const PerturbedCandidates& perturbed,
+                                            std::size_t num_errors, bool metric, bool spin_is_free);
 
 }  // namespace circline
 

@@ -186,7 +186,7 @@ void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, In
   std::optional<Angle> angle = KnownAngleBetween(pencils[0].id, pencils[1].id, evidence);
   const PencilDirection free = PencilDirection::kFree;
   if (axes_are_orthogonal && inputs->roles[0] != free && inputs->roles[1] != free) {
-    angle = Angle{1.5707963267948966, 0.0};
+    angle = Angle{kRightAngle, 0.0};
   }
   if (!angle) return;
 
@@ -296,25 +296,4 @@ void GatherFrame(const Observations& observations, double sigma_px, Inputs* inpu
   }
 }
 
-void GatherConic(const CircleObservation& circle, Measured* conic, Inputs* inputs) {
-  *conic = Measured(ConicToVector(circle.fit->conic), circle.fit->Covariance());
-  inputs->tilts.emplace_back(Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero());
-  inputs->contrasts.push_back(circle.contrast);
-}
-
-void GatherCircle(const Observations& observations, const CircleObservation& circle,
-                  double sigma_px, Inputs* inputs) {
-  GatherConic(circle, &inputs->conic, inputs);
-  inputs->radius = circle.radius;
-  inputs->radius_sigma = circle.radius_sigma;
-  const FrameObservation& frame = observations.frame;
-  const bool is_origin = !frame.origin_is_center.empty() && frame.origin_is_center == circle.id;
-  const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : sigma_px;
-  if (circle.center) {
-    inputs->center = MeasuredPoint(observations.camera, *circle.center, sigma);
-  } else if (frame.origin && is_origin) {
-    inputs->center = MeasuredPoint(observations.camera, *frame.origin, sigma);
-  }
-  inputs->origin_at_center = is_origin;
-}
 }  // namespace circline

@@ -97,6 +97,10 @@ void GatherFrame(const Observations& observations, double sigma_px, Inputs* inpu
 // `axes_are_orthogonal`, where the pencils run along two of the axes.
 void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, Inputs* inputs);
 
+// The image of a circle's centre: as given, or the origin where that is the centre; else absent.
+Measured MeasuredCenter(const Observations& observations, const CircleObservation& circle,
+                        double sigma_px);
+
 // A further circle of the world plane.
 void GatherConic(const CircleObservation& circle, Measured* conic, Inputs* inputs);
 

@@ -1,7 +1,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <functional>
 
 #include "circline/estimators/circular_points.h"
 #include "circline/estimators/closed_form_recipes.h"
@@ -71,94 +71,91 @@ Eigen::Vector3d OriginRay(const Inputs& inputs, const CirclePose& circle) {
   return circle.center;
 }
 
-// The poses of a circle, none to two.
-struct PosePair {
-  std::array<CirclePose, 2> poses;
-  int count;
-};
-
-// Those of the world's plane that a circle with this tilt against it may lie in.
-PosePair TiltedPoses(const Measured& conic, const Measured& tilt) {
-  PosePair pair;
-  pair.count = CirclePoses(VectorToConic(conic.value), &pair.poses);
-  if (tilt.value.isZero(0.0)) return pair;
-  for (CirclePose& pose : pair.poses) {
+// The circles that a conic may be the image of, turned into the world's plane, against which they
+// are tilted.
+std::vector<CirclePose> TiltedPoses(const Measured& conic, const Measured& tilt) {
+  std::array<CirclePose, 2> both;
+  const int count = CirclePoses(VectorToConic(conic.value), &both);
+  std::vector<CirclePose> poses(both.begin(), both.begin() + count);
+  if (tilt.value.isZero(0.0)) return poses;
+  for (CirclePose& pose : poses) {
     const Eigen::Vector3d a = pose.normal.unitOrthogonal(), b = pose.normal.cross(a);
     pose.normal = (pose.normal + tilt.value[0] * a + tilt.value[1] * b).normalized();
   }
-  return pair;
+  return poses;
 }
 
-// One candidate per circle plane; `contradict` says how far other evidence speaks against it.
-std::vector<Candidate> CircleCandidates(
-    const Inputs& inputs,
-    const std::function<Eigen::VectorXd(const CirclePose&, const Inputs&)>& contradict) {
+// One candidate per circle plane; `contradict(circle)` says how far other evidence speaks against
+// it.
+template <typename Contradict>
+std::vector<Candidate> CircleCandidates(const Inputs& inputs, const Contradict& contradict) {
   std::vector<Candidate> candidates;
-  const PosePair pair = TiltedPoses(inputs.conic, inputs.tilts[0]);
-  for (int i = 0; i < pair.count; ++i) {
-    const CirclePose& circle = pair.poses[static_cast<std::size_t>(i)];
+  for (const CirclePose& circle : TiltedPoses(inputs.conic, inputs.tilts[0])) {
     Candidate c;
     if (!RotationOfPlane(circle.normal, circle.center, inputs, &c.pose.rotation)) continue;
     c.pose.translation =
         Translation(circle.normal, circle.center, OriginRay(inputs, circle), inputs);
-    c.contradiction = contradict(circle, inputs);
+    c.contradiction = contradict(circle);
     c.circle = circle;
     candidates.push_back(c);
   }
   return candidates;
 }
 
-Eigen::Vector2d CenterMiss(const CirclePose& circle, const Eigen::VectorXd& measured) {
+Eigen::Vector2d CenterDeviation(const CirclePose& circle, const Eigen::VectorXd& measured) {
   return (circle.center / circle.center.z()).head<2>() - measured.head<2>() / measured[2];
 }
 
-// The weighted mean of the circles' normals, each nearest to the candidate's; and how far they miss
-// it. `more`: the poses of Inputs::more_conics.
-Candidate CommonPlane(const Candidate& seed, const std::vector<PosePair>& more,
-                      const Inputs& inputs, bool concentric, bool* valid) {
-  std::vector<CirclePose> nearest = {*seed.circle};
-  for (const auto& [poses, count] : more) {
-    if (count == 0) continue;
-    const bool second = count == 2 && poses[1].normal.dot(seed.circle->normal) >
-                                          poses[0].normal.dot(seed.circle->normal);
-    nearest.push_back(poses[second ? 1 : 0]);
-  }
-  *valid = nearest.size() == inputs.more_conics.size() + 1;
-  if (!*valid) return seed;
-  Eigen::Vector3d n = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < nearest.size(); ++i)
-    n += inputs.normal_weights[i] * nearest[i].normal;
-  n.normalize();
-  Candidate c = seed;
-  c.circle->normal = n;
-  *valid = RotationOfPlane(n, c.circle->center, inputs, &c.pose.rotation);
-  c.pose.translation = Translation(n, c.circle->center, OriginRay(inputs, *c.circle), inputs);
+// How far further circles contradict the first one: its own normal, as the mean is no independent
+// witness, in coordinates of the plane of normal `n`, and where they are concentric its centre.
+Eigen::VectorXd Contradiction(const std::vector<CirclePose>& circles, const Eigen::Vector3d& n,
+                              bool concentric) {
   const Eigen::Vector3d a = n.unitOrthogonal(), b = n.cross(a);
-  c.contradiction.resize(static_cast<Eigen::Index>((concentric ? 4 : 2) * (nearest.size() - 1)));
-  Eigen::Index row = 0;
-  for (std::size_t i = 1; i < nearest.size(); ++i) {
-    // Against the first circle's own normal: the mean is no independent witness.
-    const Eigen::Vector3d difference = nearest[i].normal - nearest[0].normal;
-    c.contradiction[row++] = a.dot(difference);
-    c.contradiction[row++] = b.dot(difference);
-    if (!concentric) continue;
-    c.contradiction.segment<2>(row) = CenterMiss(nearest[i], nearest[0].center);
-    row += 2;
+  const Eigen::Index rows = concentric ? 4 : 2;
+  Eigen::VectorXd contradiction(rows * static_cast<Eigen::Index>(circles.size() - 1));
+  for (std::size_t i = 1; i < circles.size(); ++i) {
+    const Eigen::Index row = rows * static_cast<Eigen::Index>(i - 1);
+    const Eigen::Vector3d difference = circles[i].normal - circles[0].normal;
+    contradiction.segment<2>(row) << a.dot(difference), b.dot(difference);
+    if (concentric)
+      contradiction.segment<2>(row + 2) = CenterDeviation(circles[i], circles[0].center);
   }
-  return c;
+  return contradiction;
 }
 
+// The weighted mean of the circles' normals, each nearest to the first circle's.
 std::vector<Candidate> CommonPlanes(const Inputs& inputs, bool concentric) {
-  std::vector<PosePair> more;
-  for (std::size_t i = 0; i < inputs.more_conics.size(); ++i)
+  std::vector<std::vector<CirclePose>> more;
+  for (std::size_t i = 0; i < inputs.more_conics.size(); ++i) {
     more.push_back(TiltedPoses(inputs.more_conics[i], inputs.tilts[i + 1]));
+    if (more.back().empty()) return {};
+  }
   std::vector<Candidate> common;
-  for (const Candidate& seed : SingleCirclePoses(inputs)) {
-    bool valid;
-    const Candidate c = CommonPlane(seed, more, inputs, concentric, &valid);
-    if (valid) common.push_back(c);
+  for (Candidate c : SingleCirclePoses(inputs)) {
+    std::vector<CirclePose> nearest = {*c.circle};
+    const auto is_farther = [&nearest](const CirclePose& x, const CirclePose& y) {
+      return x.normal.dot(nearest[0].normal) < y.normal.dot(nearest[0].normal);
+    };
+    for (const std::vector<CirclePose>& poses : more)
+      nearest.push_back(*std::max_element(poses.begin(), poses.end(), is_farther));
+    Eigen::Vector3d n = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < nearest.size(); ++i)
+      n += inputs.normal_weights[i] * nearest[i].normal;
+    n.normalize();
+    c.circle->normal = n;
+    if (!RotationOfPlane(n, c.circle->center, inputs, &c.pose.rotation)) continue;
+    c.pose.translation = Translation(n, c.circle->center, OriginRay(inputs, *c.circle), inputs);
+    c.contradiction = Contradiction(nearest, n, concentric);
+    common.push_back(c);
   }
   return common;
+}
+
+// The frame whose Y axis is the X axis of this one.
+Eigen::Matrix3d QuarterTurn(const Eigen::Matrix3d& R) {
+  Eigen::Matrix3d turned;
+  turned << -R.col(1), R.col(0), R.col(2);
+  return turned;
 }
 
 // Proposition 1, where the roles say that the directions are orthogonal: the excess over 90 degrees
@@ -208,15 +205,10 @@ bool RotationOfPair(const Inputs& inputs, const Eigen::Vector3d& plane_ray,
     const Eigen::Vector3d x = b - a * a.dot(b);
     return RotationFromDirections(x, a.cross(x), rotation);
   }
-  Eigen::Matrix3d R;
-  if (!RotationFromDirections(a, b, &R)) return false;
-  *rotation = R;
-  if (first == PencilDirection::kY) {
-    rotation->col(0) = -R.col(1);
-    rotation->col(1) = R.col(0);
-  } else if (first == PencilDirection::kFree) {
-    return RotationOfPlane(R.col(2), plane_ray, inputs, rotation);
-  }
+  if (!RotationFromDirections(a, b, rotation)) return false;
+  if (first == PencilDirection::kFree)
+    return RotationOfPlane(Eigen::Vector3d(rotation->col(2)), plane_ray, inputs, rotation);
+  if (first == PencilDirection::kY) *rotation = QuarterTurn(*rotation);
   return true;
 }
 
@@ -252,11 +244,8 @@ bool RotationOfPlane(const Eigen::Vector3d& n, const Eigen::Vector3d& plane_ray,
   } else if (inputs.x_line.present()) {
     valid = valid && RotationFromCircularPoints(plane, inputs.x_line.value, rotation);
   } else if (inputs.y_line.present()) {
-    Eigen::Matrix3d R;  // Its X axis is the world's Y axis.
-    valid = valid && RotationFromCircularPoints(plane, inputs.y_line.value, &R);
-    rotation->col(0) = -R.col(1);
-    rotation->col(1) = R.col(0);
-    rotation->col(2) = R.col(2);
+    valid = valid && RotationFromCircularPoints(plane, inputs.y_line.value, rotation);
+    *rotation = QuarterTurn(*rotation);
   } else {
     const Eigen::Vector3d reference =
         std::abs(n.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
@@ -269,31 +258,27 @@ bool RotationOfPlane(const Eigen::Vector3d& n, const Eigen::Vector3d& plane_ray,
 }
 
 std::vector<Candidate> SingleCirclePoses(const Inputs& inputs) {
-  return CircleCandidates(inputs, [](const CirclePose&, const Inputs&) -> Eigen::VectorXd {
-    return Eigen::VectorXd(0);
-  });
+  return CircleCandidates(inputs, [](const CirclePose&) { return Eigen::VectorXd(); });
 }
 
 std::vector<Candidate> CircleCenterPoses(const Inputs& inputs) {
-  return CircleCandidates(inputs,
-                          [](const CirclePose& circle, const Inputs& in) -> Eigen::VectorXd {
-                            return CenterMiss(circle, in.center.value);
-                          });
+  return CircleCandidates(inputs, [&inputs](const CirclePose& circle) {
+    return CenterDeviation(circle, inputs.center.value);
+  });
 }
 
 std::vector<Candidate> CircleFramePoses(const Inputs& inputs) {
-  return CircleCandidates(
-      inputs, [](const CirclePose& circle, const Inputs& in) -> Eigen::VectorXd {
-        const Eigen::Vector3d lx = in.x_line.value, ly = in.y_line.value;
-        CircularPoints plane;
-        CircularPointsOfPlane(circle.normal, &plane);
-        // Lines along the axes cross anywhere; the axes themselves, at the origin.
-        const bool at_crossing = in.origin_at_center && in.x_sense && in.y_sense;
-        Eigen::VectorXd contradiction(at_crossing ? 3 : 1);
-        contradiction[0] = HarmonicDeviation(plane, lx, ly);
-        if (at_crossing) contradiction.tail<2>() = CenterMiss(circle, lx.cross(ly));
-        return contradiction;
-      });
+  return CircleCandidates(inputs, [&inputs](const CirclePose& circle) {
+    const Eigen::Vector3d lx = inputs.x_line.value, ly = inputs.y_line.value;
+    CircularPoints plane;
+    CircularPointsOfPlane(circle.normal, &plane);
+    // Lines along the axes cross anywhere; the axes themselves, at the origin.
+    const bool at_crossing = inputs.origin_at_center && inputs.x_sense && inputs.y_sense;
+    Eigen::VectorXd contradiction(at_crossing ? 3 : 1);
+    contradiction[0] = HarmonicDeviation(plane, lx, ly);
+    if (at_crossing) contradiction.tail<2>() = CenterDeviation(circle, lx.cross(ly));
+    return contradiction;
+  });
 }
 
 std::vector<Candidate> ParallelCirclePoses(const Inputs& inputs) {

@@ -31,10 +31,10 @@ bool RotationOfPlane(const Eigen::Vector3d& n, const Eigen::Vector3d& plane_ray,
                      const Inputs& inputs, Eigen::Matrix3d* rotation);
 
 std::vector<Candidate> SingleCirclePoses(const Inputs& inputs);
-// Proposition 3; contradiction: the centre's miss, calibrated units, 2.
+// Proposition 3; contradiction: the centre's deviation, calibrated units, 2.
 std::vector<Candidate> CircleCenterPoses(const Inputs& inputs);
-// Proposition 4; contradiction: the cosine between the axes, 1, and the miss of a centre at their
-// crossing, 2.
+// Proposition 4; contradiction: the cosine between the axes, 1, and the deviation of a centre at
+// their crossing, 2.
 std::vector<Candidate> CircleFramePoses(const Inputs& inputs);
 // Common plane of several circles, weighted; contradiction: the other circles' normals, 2 each,
 // and, of concentric ones, their centres, 2 each.
@@ -47,17 +47,18 @@ std::vector<Candidate> OrthogonalDirectionPoses(const Inputs& inputs);
 
 // --- circle_recipes.cc, pencil_recipes.cc ---
 
-using Evaluate = std::function<std::vector<Candidate>(const Inputs&)>;
-
 struct Recipe {
   std::string name, needs;
+  std::string decided_by;  // What tells several hypotheses apart.
   // Keeps of the (fitted, resolved) observations what is used; a refusal says what was missing.
   std::function<Status(const Observations&, Observations*)> select;
   // Reads the kept evidence.
   std::function<Status(const Observations&, double sigma_px, Inputs*)> gather;
-  Evaluate evaluate;
-  std::string decided_by;  // What tells several hypotheses apart.
+  std::function<std::vector<Candidate>(const Inputs&)> evaluate;
 };
+
+// Camera, frame, and the known lengths of the frame's plane.
+Observations KeepFrame(const Observations& observations, const FrameObservation& frame);
 
 // A circle's centre, where its diameters cross: in calibrated coordinates that is to chords what a
 // vanishing point is to a pencil's lines.

@@ -14,11 +14,9 @@
 namespace circline {
 namespace {
 
-// The pose; where neither an axis nor a direction is known, the spin about the normal is free.
-PoseHypothesis HypothesisOf(const Candidate& candidate, const Inputs& inputs) {
-  return UncertainPose(
-      candidate, inputs.IsMetric(),
-      !inputs.x_line.present() && !inputs.y_line.present() && !inputs.directions[0].present());
+// Whether neither an axis nor a direction is known: the turn about the normal is then free.
+bool SpinIsFree(const Inputs& inputs) {
+  return !inputs.x_line.present() && !inputs.y_line.present() && !inputs.directions[0].present();
 }
 
 // The first few problems, to be added to a sentence.
@@ -141,24 +139,20 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   const std::vector<Candidate> candidates = recipe_.evaluate(inputs);
   const std::vector<Perturbation> errors =
       Perturbations(inputs.Moved(), options_.noise_model, evidence.camera);
-  Inputs moved;
-  const std::vector<Eigen::MatrixXd> sensitivities = Sensitivities(
-      [&](std::size_t error, double part) {
-        moved = inputs;
-        errors[error](part, moved.Moved());
-        return recipe_.evaluate(moved);
-      },
-      errors.size(), candidates);
+  const auto perturbed = [&](std::size_t error, double part) {
+    Inputs moved = inputs;
+    errors[error](part, moved.Moved());
+    return recipe_.evaluate(moved);
+  };
+  estimate.hypotheses =
+      WithUncertainty(candidates, perturbed, errors.size(), inputs.IsMetric(), SpinIsFree(inputs));
+  const FrameObservation& frame = evidence.frame;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const Candidate& candidate = candidates[i];
-    PoseHypothesis h = HypothesisOf(candidate, inputs);
-    const FrameObservation& frame = evidence.frame;
+    PoseHypothesis& h = estimate.hypotheses[i];
     h.origin_observed =
         frame.origin || !frame.origin_is_center.empty() || (frame.x_axis && frame.y_axis);
     FillSupport(evidence, &h);
-    if (candidate.circle) FillCircle(evidence, *candidate.circle, &h);
-    FillUncertainty(sensitivities[i], candidate, &h);
-    estimate.hypotheses.push_back(std::move(h));
+    if (candidates[i].circle) FillCircle(evidence, *candidates[i].circle, &h);
   }
   if (estimate.hypotheses.empty()) {
     estimate.status = Status::Refused(recipe_.name + ": the evidence is degenerate (" +
@@ -183,7 +177,8 @@ PoseEstimate ClosedFormSolver::Seeds(const Observations& resolved) const {
   if (estimate.status.ok()) estimate.status = Gather(&evidence, &inputs);
   if (!estimate.status.ok()) return estimate;
   for (const Candidate& candidate : recipe_.evaluate(inputs))
-    estimate.hypotheses.push_back(HypothesisOf(candidate, inputs));
+    estimate.hypotheses.push_back(
+        WithoutUncertainty(candidate, inputs.IsMetric(), SpinIsFree(inputs)));
   if (estimate.hypotheses.empty())
     estimate.status = Status::Refused(recipe_.name + ": the evidence is degenerate");
   return estimate;

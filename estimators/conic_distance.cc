@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "circline/estimators/basics.h"
-#include "circline/estimators/cholesky6.h"
 #include "circline/estimators/foot_points.h"
 #include "circline/estimators/weights.h"
 
@@ -88,12 +87,7 @@ bool MinimizeDistances(const Eigen::Matrix3d& initial, PointDistances* contour, 
     const Vector6d v = ConicToVector(*conic);
     Matrix6d A = e.information + (e.information.trace() * v) * v.transpose();
     A.diagonal() += damping * e.information.diagonal();
-    Matrix6d L;
-    Vector6d d;
-    Cholesky(A, 1e-16, &L, &d);
-    Vector6d step = -e.gradient;
-    SolveLower(L, d, &step);
-    SolveUpper(L, d, &step);
+    const Vector6d step = -A.llt().solve(e.gradient);
     if (!step.allFinite()) return false;
     // A step of 1e-5 standard deviations is the last, and not worth another pass over the points.
     const bool last =

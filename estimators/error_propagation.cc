@@ -5,7 +5,6 @@
 #include <cmath>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "circline/estimators/closed_form_errors.h"
 
@@ -24,16 +23,8 @@ bool IsFinite(const ClosedFormPose& pose) {
 }
 
 std::size_t SizeOf(InputKind kind) {
-  switch (kind) {
-    case InputKind::kPoint:
-    case InputKind::kLine:
-      return 3;
-    case InputKind::kConic:
-      return 6;
-    case InputKind::kNumber:
-      return 1;
-  }
-  return 0;
+  constexpr std::size_t kSizes[] = {3, 3, 6, 1};  // In the order of InputKind.
+  return kSizes[static_cast<std::size_t>(kind)];
 }
 
 Status CheckInputs(const MeasuredInputs& inputs) {
@@ -90,30 +81,6 @@ Candidate ToCandidate(const ClosedFormPose& pose) {
   return candidate;
 }
 
-// A closed form whose poses are looked at before they are used.
-class CheckedClosedForm {
- public:
-  explicit CheckedClosedForm(const ClosedForm& closed_form) : closed_form_(closed_form) {}
-
-  std::vector<Candidate> operator()(const MeasuredInputs& inputs) {
-    std::vector<Candidate> candidates;
-    for (const ClosedFormPose& pose : closed_form_(inputs)) {
-      const std::size_t size = pose.contradiction.size();
-      is_even_ = is_even_ && size == num_contradictions_.value_or(size);
-      num_contradictions_ = size;
-      if (is_even_ && IsFinite(pose)) candidates.push_back(ToCandidate(pose));
-    }
-    return candidates;
-  }
-  // Whether every pose so far had as many contradictions.
-  bool is_even() const { return is_even_; }
-
- private:
-  const ClosedForm& closed_form_;
-  std::optional<std::size_t> num_contradictions_;
-  bool is_even_ = true;
-};
-
 }  // namespace
 
 MeasuredInput MeasuredInput::Point(const Eigen::Vector3d& point,
@@ -151,21 +118,28 @@ Status PropagateErrors(const ClosedForm& closed_form, const std::vector<Measured
   if (status.ok()) status = noise_model.Validate();
   if (!status.ok()) return status;
   const std::vector<Perturbation> errors = ErrorsOf(inputs, camera, noise_model);
-  CheckedClosedForm checked(closed_form);
-  const std::vector<Candidate> candidates = checked(inputs);
-  const std::vector<Eigen::MatrixXd> sensitivities = Sensitivities(
-      [&](std::size_t error, double part) {
-        MeasuredInputs moved = inputs;
-        errors[error](part, MovedOf(&moved));
-        return checked(moved);
-      },
-      errors.size(), candidates);
-  if (!checked.is_even())
+  std::optional<std::size_t> num_contradictions;
+  bool all_have_as_many = true;
+  const auto evaluate = [&](const MeasuredInputs& moved) {
+    std::vector<Candidate> candidates;
+    for (const ClosedFormPose& pose : closed_form(moved)) {
+      if (!num_contradictions) num_contradictions = pose.contradiction.size();
+      const bool as_many = pose.contradiction.size() == *num_contradictions;
+      if (as_many && IsFinite(pose)) candidates.push_back(ToCandidate(pose));
+      all_have_as_many = all_have_as_many && as_many;
+    }
+    return candidates;
+  };
+  const auto perturbed = [&](std::size_t error, double part) {
+    MeasuredInputs moved = inputs;
+    errors[error](part, MovedOf(&moved));
+    return evaluate(moved);
+  };
+  *hypotheses =
+      WithUncertainty(evaluate(inputs), perturbed, errors.size(), !unknown.scale, unknown.spin);
+  if (!all_have_as_many) {
+    hypotheses->clear();
     return Status::Invalid("the closed form's poses have not all as many contradictions");
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    PoseHypothesis h = UncertainPose(candidates[i], !unknown.scale, unknown.spin);
-    FillUncertainty(sensitivities[i], candidates[i], &h);
-    hypotheses->push_back(std::move(h));
   }
   RankHypotheses(hypotheses);
   return Status::Ok();

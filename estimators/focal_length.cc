@@ -38,36 +38,22 @@ FocalRoots AtAngle(const Vector<7>& z) {
 }  // namespace
 
 const char* FocalRefusalSentence(FocalRefusal why) {
-  switch (why) {
-    case FocalRefusal::kNone:
-      return "";
-    case FocalRefusal::kNotFinite:
-      return "an input is not finite";
-    case FocalRefusal::kNoEllipse:
-      return "a conic is not an ellipse";
-    case FocalRefusal::kAtInfinity:
-      return "a vanishing point lies at infinity within its uncertainty";
-    case FocalRefusal::kParallel:
-      return "the two directions are parallel";
-    case FocalRefusal::kNoAngle:
-      return "no focal length makes the angle between the directions";
-    case FocalRefusal::kNotPositive:
-      return "the square of the focal length would not be positive";
-    case FocalRefusal::kFrontal:
-      return "the plane is seen frontally: its vanishing line lies at infinity";
-    case FocalRefusal::kLineMeetsCircle:
-      return "the vanishing line would meet the circle";
-    case FocalRefusal::kSameCircle:
-      return "the two circles coincide, or have one centre";
-    case FocalRefusal::kTooLittle:
-      return "one circle and no direction of its plane leave the focal length open";
-    case FocalRefusal::kOutOfRange:
-      return "no focal length within the range explains the plane best";
-    case FocalRefusal::kUndetermined:
-      return "the evidence leaves the focal length open by more than a factor of 2.7 (little tilt, "
-             "small circles, or lines along the axis of tilt)";
-  }
-  return "unknown";
+  constexpr const char* kSentences[] = {
+      "",
+      "an input is not finite",
+      "a conic is not an ellipse",
+      "a vanishing point lies at infinity within its uncertainty",
+      "the two directions are parallel",
+      "no focal length makes the angle between the directions",
+      "the square of the focal length would not be positive",
+      "the plane is seen frontally: its vanishing line lies at infinity",
+      "the vanishing line would meet the circle",
+      "the two circles coincide, or have one centre",
+      "one circle and no direction of its plane leave the focal length open",
+      "no focal length within the range explains the plane best",
+      "the evidence leaves the focal length open by more than a factor of 2.7 (little tilt, small "
+      "circles, or lines along the axis of tilt)"};
+  return kSentences[static_cast<std::size_t>(why)];
 }
 
 int FocalFromVanishingPoints(const VanishingPointFit& a, const VanishingPointFit& b, double angle,

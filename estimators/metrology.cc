@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <limits>
 
 #include "circline/estimators/basics.h"
 
@@ -35,9 +36,18 @@ bool VectorsOnPlane(const CameraPose& pose, const SegmentPair& segments, Vector2
   return true;
 }
 
-// Differences of angles are small.
-double Wrapped(double angle) { return std::remainder(angle, 2.0 * kPi); }
-double Plain(double difference) { return difference; }
+// Writes what is finite.
+bool Return(double value, double* result) {
+  if (!std::isfinite(value)) return false;
+  *result = value;
+  return true;
+}
+template <typename Vector>
+bool Return(const Vector& value, Vector* result) {
+  if (!value.allFinite()) return false;
+  *result = value;
+  return true;
+}
 
 // `pose` moved along one of the six parameters of its covariance.
 CameraPose Moved(const CameraPose& pose, int parameter, double by) {
@@ -65,10 +75,10 @@ bool Calibrate(const Camera& camera, double longer, const std::vector<Vector2d>&
 }
 
 // The value of `function` and its variance, by central differences along every pixel coordinate,
-// every parameter of the pose and the focal length. `subtract` tells how values are compared.
-bool Propagate(const PlaneFunction& function, double (*subtract)(double),
-               const PoseHypothesis& hypothesis, const Camera& given,
-               const std::vector<Vector2d>& pixels, double sigma_px, Measurement* result) {
+// every parameter of the pose and the focal length. Values that differ by `period` are the same.
+bool Propagate(const PlaneFunction& function, double period, const PoseHypothesis& hypothesis,
+               const Camera& given, const std::vector<Vector2d>& pixels, double sigma_px,
+               Measurement* result) {
   const CameraPose& pose = hypothesis.cam_from_world;
   const Camera camera = CameraOf(hypothesis, given);
   std::vector<CalibratedPoint> points, unused;
@@ -86,7 +96,7 @@ bool Propagate(const PlaneFunction& function, double (*subtract)(double),
       if (!function(pose, x, &high)) return false;
       x[i] = at - step;
       if (!function(pose, x, &low)) return false;
-      const double gradient = subtract(high - low) / (2.0 * kStepPx);
+      const double gradient = std::remainder(high - low, period) / (2.0 * kStepPx);
       variance += gradient * gradient * sigma_px * sigma_px;
     }
     x[i] = at;
@@ -98,7 +108,7 @@ bool Propagate(const PlaneFunction& function, double (*subtract)(double),
     const double h = k < 3 ? kStep : kStep * length;
     if (!function(Moved(pose, k, h), x, &high) || !function(Moved(pose, k, -h), x, &low))
       return false;
-    gradient[k] = subtract(high - low) / (2.0 * h);
+    gradient[k] = std::remainder(high - low, period) / (2.0 * h);
   }
   variance += gradient.dot(hypothesis.Covariance() * gradient);
   if (hypothesis.focal_sigma > 0.0) {
@@ -108,7 +118,7 @@ bool Propagate(const PlaneFunction& function, double (*subtract)(double),
         !function(pose, x_high, &high) || !function(pose, x_low, &low)) {
       return false;
     }
-    const double by_focal = subtract(high - low) / (2.0 * h);
+    const double by_focal = std::remainder(high - low, period) / (2.0 * h);
     const Eigen::Map<const Vector6d> with_pose(hypothesis.focal_covariance.data());
     variance += by_focal * (2.0 * gradient.dot(with_pose) +
                             by_focal * hypothesis.focal_sigma * hypothesis.focal_sigma);
@@ -155,10 +165,8 @@ bool PointOnPlane(const CameraPose& pose, const Vector3d& x, Vector2d* point) {
   const double s = r3.dot(pose.translation) / r3.dot(x);
   if (!(s > 0.0)) return false;
   const Vector3d offset = s * x - pose.translation;
-  const Vector2d result(pose.rotation.col(0).dot(offset), pose.rotation.col(1).dot(offset));
-  if (!result.allFinite()) return false;
-  *point = result;
-  return true;
+  return Return(Vector2d(pose.rotation.col(0).dot(offset), pose.rotation.col(1).dot(offset)),
+                point);
 }
 
 bool LineOnPlane(const CameraPose& pose, const Vector3d& line, Vector3d* plane_line) {
@@ -166,10 +174,7 @@ bool LineOnPlane(const CameraPose& pose, const Vector3d& line, Vector3d* plane_l
   const double norm = l.head<2>().norm();
   constexpr double kMinSine = 1e-15;  // Of the angle to the horizon; below, all is rounding.
   if (!(norm > kMinSine)) return false;
-  const Vector3d result = l / norm;
-  if (!result.allFinite()) return false;
-  *plane_line = result;
-  return true;
+  return Return(Vector3d(l / norm), plane_line);
 }
 
 bool ConicOnPlane(const CameraPose& pose, const Matrix3d& conic, Ellipse* ellipse) {
@@ -214,19 +219,13 @@ bool RectifyingHomography(const CameraPose& pose, Matrix3d* plane_from_image) {
 bool LengthOnPlane(const CameraPose& pose, const Vector3d& a, const Vector3d& b, double* length) {
   Vector2d p, q;
   if (!PointOnPlane(pose, a, &p) || !PointOnPlane(pose, b, &q)) return false;
-  const double result = (q - p).stableNorm();
-  if (!std::isfinite(result)) return false;
-  *length = result;
-  return true;
+  return Return((q - p).stableNorm(), length);
 }
 
 bool LengthRatio(const CameraPose& pose, const SegmentPair& segments, double* ratio) {
   Vector2d first, second;
   if (!VectorsOnPlane(pose, segments, &first, &second)) return false;
-  const double result = first.stableNorm() / second.stableNorm();
-  if (!std::isfinite(result)) return false;
-  *ratio = result;
-  return true;
+  return Return(first.stableNorm() / second.stableNorm(), ratio);
 }
 
 bool AngleOnPlane(const CameraPose& pose, const SegmentPair& segments, double* angle) {
@@ -235,10 +234,7 @@ bool AngleOnPlane(const CameraPose& pose, const SegmentPair& segments, double* a
   first = first.stableNormalized();
   second = second.stableNormalized();
   if (!(first.squaredNorm() > 0.0) || !(second.squaredNorm() > 0.0)) return false;
-  const double result = std::atan2(Cross(first, second), first.dot(second));
-  if (!std::isfinite(result)) return false;
-  *angle = result;
-  return true;
+  return Return(std::atan2(Cross(first, second), first.dot(second)), angle);
 }
 
 bool AreaOnPlane(const CameraPose& pose, const std::vector<Vector3d>& corners, double* area) {
@@ -254,9 +250,7 @@ bool AreaOnPlane(const CameraPose& pose, const std::vector<Vector3d>& corners, d
     sum += Cross(previous - first, next - first);
     previous = next;
   }
-  if (!std::isfinite(sum)) return false;
-  *area = 0.5 * std::abs(sum);
-  return true;
+  return Return(0.5 * std::abs(sum), area);
 }
 
 bool HeightOverPlane(const CameraPose& pose, const Vector3d& foot, const Vector3d& top,
@@ -271,9 +265,7 @@ bool HeightOverPlane(const CameraPose& pose, const Vector3d& foot, const Vector3
   constexpr double kMinSine = 1e-12;
   if (!(square > kMinSine * kMinSine)) return false;
   const double h = -base.cross(ray).dot(moment) / square;
-  if (!std::isfinite(h) || !(ray.dot(base + h * r3) > 0.0)) return false;
-  *height = h;
-  return true;
+  return ray.dot(base + h * r3) > 0.0 && Return(h, height);
 }
 
 bool LengthOnPlane(const PoseHypothesis& pose, const Camera& camera,
@@ -281,8 +273,7 @@ bool LengthOnPlane(const PoseHypothesis& pose, const Camera& camera,
   const auto function = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
     return LengthOnPlane(at, x[0], x[1], value);
   };
-  return Propagate(function, &Plain, pose, camera, {segment.begin(), segment.end()}, sigma_px,
-                   length);
+  return MeasureOnPlane(function, pose, camera, {segment.begin(), segment.end()}, sigma_px, length);
 }
 
 bool LengthRatio(const PoseHypothesis& pose, const Camera& camera,
@@ -290,8 +281,8 @@ bool LengthRatio(const PoseHypothesis& pose, const Camera& camera,
   const auto function = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
     return LengthRatio(at, {x[0], x[1], x[2], x[3]}, value);
   };
-  return Propagate(function, &Plain, pose, camera, {segments.begin(), segments.end()}, sigma_px,
-                   ratio);
+  return MeasureOnPlane(function, pose, camera, {segments.begin(), segments.end()}, sigma_px,
+                        ratio);
 }
 
 bool AngleOnPlane(const PoseHypothesis& pose, const Camera& camera,
@@ -299,7 +290,7 @@ bool AngleOnPlane(const PoseHypothesis& pose, const Camera& camera,
   const auto function = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
     return AngleOnPlane(at, {x[0], x[1], x[2], x[3]}, value);
   };
-  return Propagate(function, &Wrapped, pose, camera, {segments.begin(), segments.end()}, sigma_px,
+  return Propagate(function, 2.0 * kPi, pose, camera, {segments.begin(), segments.end()}, sigma_px,
                    angle);
 }
 
@@ -308,7 +299,7 @@ bool AreaOnPlane(const PoseHypothesis& pose, const Camera& camera,
   const auto function = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
     return AreaOnPlane(at, x, value);
   };
-  return Propagate(function, &Plain, pose, camera, corners, sigma_px, area);
+  return MeasureOnPlane(function, pose, camera, corners, sigma_px, area);
 }
 
 bool HeightOverPlane(const PoseHypothesis& pose, const Camera& camera,
@@ -317,14 +308,15 @@ bool HeightOverPlane(const PoseHypothesis& pose, const Camera& camera,
   const auto function = [](const CameraPose& at, const std::vector<Vector3d>& x, double* value) {
     return HeightOverPlane(at, x[0], x[1], value);
   };
-  return Propagate(function, &Plain, pose, camera, {foot_and_top.begin(), foot_and_top.end()},
-                   sigma_px, height);
+  return MeasureOnPlane(function, pose, camera, {foot_and_top.begin(), foot_and_top.end()},
+                        sigma_px, height);
 }
 
 bool MeasureOnPlane(const PlaneFunction& function, const PoseHypothesis& pose, const Camera& camera,
                     const std::vector<Vector2d>& pixels, double sigma_px,
                     Measurement* measurement) {
-  return Propagate(function, &Plain, pose, camera, pixels, sigma_px, measurement);
+  return Propagate(function, std::numeric_limits<double>::infinity(), pose, camera, pixels,
+                   sigma_px, measurement);
 }
 
 }  // namespace circline

@@ -5,49 +5,16 @@
 #include <map>
 
 namespace circline {
-
-const char* PencilDirectionName(PencilDirection direction) {
-  switch (direction) {
-    case PencilDirection::kX:
-      return "x";
-    case PencilDirection::kY:
-      return "y";
-    case PencilDirection::kZ:
-      return "z";
-    case PencilDirection::kFree:
-      return "free";
-  }
-  return "free";
-}
-
-double StatedLogFocal(const Observations& observations) {
-  const double stated = observations.stated_focal_px;
-  return stated > 0.0 ? std::log(stated / observations.camera.fx) : 0.0;
-}
-
-double LineSigma(const PencilObservation& pencil, const LineObservation& line) {
-  return line.sigma_px > 0.0 ? line.sigma_px : pencil.sigma_px;
-}
-
-bool RunsAlongAxis(const PencilObservation& pencil) {
-  return pencil.direction != PencilDirection::kFree;
-}
-
-int FindCircle(const Observations& observations, const std::string& id) {
-  for (std::size_t i = 0; i < observations.circles.size(); ++i) {
-    if (observations.circles[i].id == id) return static_cast<int>(i);
-  }
-  return -1;
-}
-
-int FindPencil(const Observations& observations, const std::string& id) {
-  for (std::size_t i = 0; i < observations.pencils.size(); ++i) {
-    if (observations.pencils[i].id == id) return static_cast<int>(i);
-  }
-  return -1;
-}
-
 namespace {
+
+// Index of the one with this id, or -1.
+template <typename Feature>
+int FindById(const std::vector<Feature>& features, const std::string& id) {
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    if (features[i].id == id) return static_cast<int>(i);
+  }
+  return -1;
+}
 
 std::string FirstNamedPlane(const Observations& observations) {
   if (!observations.frame.plane.empty()) return observations.frame.plane;
@@ -87,6 +54,32 @@ void SpanPlane(const std::string& plane, std::vector<PencilObservation>* pencils
 }
 
 }  // namespace
+
+const char* PencilDirectionName(PencilDirection direction) {
+  constexpr const char* kNames[] = {"x", "y", "z", "free"};
+  return kNames[static_cast<std::size_t>(direction)];
+}
+
+double StatedLogFocal(const Observations& observations) {
+  const double stated = observations.stated_focal_px;
+  return stated > 0.0 ? std::log(stated / observations.camera.fx) : 0.0;
+}
+
+double LineSigma(const PencilObservation& pencil, const LineObservation& line) {
+  return line.sigma_px > 0.0 ? line.sigma_px : pencil.sigma_px;
+}
+
+bool RunsAlongAxis(const PencilObservation& pencil) {
+  return pencil.direction != PencilDirection::kFree;
+}
+
+int FindCircle(const Observations& observations, const std::string& id) {
+  return FindById(observations.circles, id);
+}
+
+int FindPencil(const Observations& observations, const std::string& id) {
+  return FindById(observations.pencils, id);
+}
 
 bool IsInWorldPlane(const KnownLength& length, const Observations& resolved) {
   return length.plane.empty() || length.plane == resolved.frame.plane;

@@ -51,9 +51,19 @@ Status FirstPair(std::vector<PencilObservation> pencils,
                                                pencils[0].id + "'); a second direction is needed");
 }
 
+// Keeps the pair, and what is known of it and of the frame's plane.
+void KeepPencils(const PencilPair& pair, const FrameObservation& frame,
+                 const Observations& observations, Observations* evidence) {
+  *evidence = KeepFrame(observations, frame);
+  evidence->pencils = {pair[0], pair[1]};
+  for (const KnownAngle& known : observations.known_angles) {
+    if (IsBetween(known, pair[0].id, pair[1].id)) evidence->known_angles.push_back(known);
+  }
+}
+
 // Two fitted pencils that fix the world frame: along its axes, or in its plane. Where only pencils
 // that are tied to nothing can be had, they span a plane of their own, "pencils".
-Status SelectPencils(const Observations& observations, PencilPair* pair, FrameObservation* frame) {
+Status SelectPencils(const Observations& observations, Observations* evidence) {
   std::vector<PencilObservation> of_world, fitted;
   for (const PencilObservation& pencil : observations.pencils) {
     if (!pencil.fit) continue;
@@ -61,19 +71,36 @@ Status SelectPencils(const Observations& observations, PencilPair* pair, FrameOb
     if (RunsAlongAxis(pencil) || pencil.plane == observations.frame.plane)
       of_world.push_back(pencil);
   }
-  *frame = observations.frame;
-  frame->origin_is_center.clear();
-  if (FirstPair(of_world, observations.known_angles, pair).ok()) return Status::Ok();
-  const Status status = FirstPair(fitted, observations.known_angles, pair);
-  if (!status.ok()) return status;
-  *frame = FrameObservation();
-  frame->plane = (*pair)[0].plane = (*pair)[1].plane = "pencils";
-  (*pair)[0].direction = PencilDirection::kX;
-  (*pair)[1].direction = PencilDirection::kFree;
+  PencilPair pair;
+  FrameObservation frame = observations.frame;
+  frame.origin_is_center.clear();
+  if (!FirstPair(of_world, observations.known_angles, &pair).ok()) {
+    const Status status = FirstPair(fitted, observations.known_angles, &pair);
+    if (!status.ok()) return status;
+    frame = FrameObservation();
+    frame.plane = pair[0].plane = pair[1].plane = "pencils";
+    pair[0].direction = PencilDirection::kX;
+    pair[1].direction = PencilDirection::kFree;
+  }
+  KeepPencils(pair, frame, observations, evidence);
   return Status::Ok();
 }
 
-Status GatherPencils(const Observations& evidence, bool axes_are_orthogonal, double sigma_px,
+Status SelectPencilsAlongAxes(const Observations& observations, Observations* evidence) {
+  std::vector<PencilObservation> along_axes;
+  for (const PencilObservation& pencil : observations.pencils) {
+    if (pencil.fit && RunsAlongAxis(pencil)) along_axes.push_back(pencil);
+  }
+  PencilPair pair;
+  const Status status = FirstPair(along_axes, observations.known_angles, &pair);
+  if (!status.ok()) return Status::Refused("of the pencils along an axis: " + status.message);
+  FrameObservation frame = observations.frame;
+  frame.origin_is_center.clear();
+  KeepPencils(pair, frame, observations, evidence);
+  return Status::Ok();
+}
+
+Status GatherPencils(const Observations& evidence, double sigma_px, bool axes_are_orthogonal,
                      Inputs* inputs) {
   GatherFrame(evidence, sigma_px, inputs);
   GatherDirections(evidence, axes_are_orthogonal, inputs);
@@ -97,69 +124,29 @@ Status GatherPencils(const Observations& evidence, bool axes_are_orthogonal, dou
   return Status::Ok();
 }
 
-// The pair, and what is known of it and of the frame's plane.
-Observations KeepPencils(const Observations& observations, const PencilPair& pair,
-                         const FrameObservation& frame) {
+}  // namespace
+
+Observations KeepFrame(const Observations& observations, const FrameObservation& frame) {
   Observations evidence;
   evidence.camera = observations.camera;
   evidence.frame = frame;
-  evidence.pencils = {pair[0], pair[1]};
   for (const KnownLength& known : observations.known_lengths) {
     if (IsInWorldPlane(known, evidence)) evidence.known_lengths.push_back(known);
-  }
-  for (const KnownAngle& known : observations.known_angles) {
-    if (IsBetween(known, pair[0].id, pair[1].id)) evidence.known_angles.push_back(known);
   }
   return evidence;
 }
 
-Recipe LinePairsRecipe() {
-  Recipe r;
-  r.name = "line_pairs";
-  r.needs = "two pencils of parallel lines, two or more lines each";
-  r.select = [](const Observations& observations, Observations* evidence) {
-    PencilPair pair;
-    FrameObservation frame;
-    const Status status = SelectPencils(observations, &pair, &frame);
-    if (status.ok()) *evidence = KeepPencils(observations, pair, frame);
-    return status;
+std::vector<Recipe> PencilRecipes() {
+  const auto gather = [](bool axes_are_orthogonal) {
+    return [=](const Observations& evidence, double sigma_px, Inputs* inputs) {
+      return GatherPencils(evidence, sigma_px, axes_are_orthogonal, inputs);
+    };
   };
   // Proposition 5 makes no use of what the axes are.
-  r.gather = [](const Observations& evidence, double sigma_px, Inputs* inputs) {
-    return GatherPencils(evidence, false, sigma_px, inputs);
-  };
-  r.evaluate = LinePairPoses;
-  return r;
-}
-
-Recipe OrthogonalVanishingPointsRecipe() {
-  Recipe r;
-  r.name = "orthogonal_vanishing_points";
-  r.needs = "two pencils of parallel lines along two of the axes";
-  r.select = [](const Observations& observations, Observations* evidence) {
-    std::vector<PencilObservation> along_axes;
-    for (const PencilObservation& pencil : observations.pencils) {
-      if (pencil.fit && RunsAlongAxis(pencil)) along_axes.push_back(pencil);
-    }
-    PencilPair pair;
-    const Status status = FirstPair(along_axes, observations.known_angles, &pair);
-    if (!status.ok()) return Status::Refused("of the pencils along an axis: " + status.message);
-    FrameObservation frame = observations.frame;
-    frame.origin_is_center.clear();
-    *evidence = KeepPencils(observations, pair, frame);
-    return Status::Ok();
-  };
-  r.gather = [](const Observations& evidence, double sigma_px, Inputs* inputs) {
-    return GatherPencils(evidence, true, sigma_px, inputs);
-  };
-  r.evaluate = OrthogonalDirectionPoses;
-  return r;
-}
-
-}  // namespace
-
-std::vector<Recipe> PencilRecipes() {
-  return {OrthogonalVanishingPointsRecipe(), LinePairsRecipe()};
+  return {{"orthogonal_vanishing_points", "two pencils of parallel lines along two of the axes", "",
+           SelectPencilsAlongAxes, gather(true), OrthogonalDirectionPoses},
+          {"line_pairs", "two pencils of parallel lines, two or more lines each", "", SelectPencils,
+           gather(false), LinePairPoses}};
 }
 
 }  // namespace circline

@@ -109,38 +109,23 @@ bool AddPencils(const PlaneEvidence& evidence, const PlaneState& state, PlaneEqu
   const double f = std::exp(state.log_focal);
   const double model = evidence.pencil_sigma * evidence.pencil_sigma;
   const Vector3d n = state.basis.col(2);
-  std::size_t i = 0;
-  if (evidence.orthogonal_pencils) {
-    const Direction a(*evidence.pencils[0], f), b(*evidence.pencils[1], f);
-    const Vector3d r(n.dot(a.value), n.dot(b.value), a.value.dot(b.value));
-    Eigen::Matrix<double, 3, 4> J = Eigen::Matrix<double, 3, 4>::Zero();
-    J.col(0) << n.dot(a.by_focal), n.dot(b.by_focal),
-        a.by_focal.dot(b.value) + b.by_focal.dot(a.value);
-    J.block<1, 2>(0, 1) = a.value.transpose() * state.basis.leftCols<2>();
-    J.block<1, 2>(1, 1) = b.value.transpose() * state.basis.leftCols<2>();
-    Matrix3d by_a = Matrix3d::Zero(), by_b = Matrix3d::Zero();
-    by_a << n.transpose(), Eigen::RowVector3d::Zero(), b.value.transpose();
-    by_b << Eigen::RowVector3d::Zero(), n.transpose(), a.value.transpose();
-    const Matrix3d covariance = by_a * a.covariance * by_a.transpose() +
-                                by_b * b.covariance * by_b.transpose() +
-                                model * Matrix3d::Identity();
-    if (!Add<3>(r, J, (by_a * a.by_point + by_b * b.by_point).leftCols<2>(), covariance,
-                equations)) {
-      return false;
-    }
-    i = 2;
-  }
-  for (; i < evidence.pencils.size(); ++i) {
-    const Direction a(*evidence.pencils[i], f);
+  const auto add = [equations, model](double r, const Eigen::Matrix<double, 1, 4>& J,
+                                      const Eigen::RowVector3d& J_shift, double variance) {
+    return Add<1>(Eigen::Matrix<double, 1, 1>(r), J, J_shift.leftCols<2>(),
+                  Eigen::Matrix<double, 1, 1>(variance + model), equations);
+  };
+  for (const VanishingPointFit* fit : evidence.pencils) {
+    const Direction a(*fit, f);
     Eigen::Matrix<double, 1, 4> J;
     J << n.dot(a.by_focal), a.value.transpose() * state.basis.leftCols<2>(), 0.0;
-    const Eigen::Matrix<double, 1, 1> r(n.dot(a.value)),
-        covariance(n.dot(a.covariance * n) + model);
-    if (!Add<1>(r, J, (n.transpose() * a.by_point).leftCols<2>(), covariance, equations)) {
-      return false;
-    }
+    if (!add(n.dot(a.value), J, n.transpose() * a.by_point, n.dot(a.covariance * n))) return false;
   }
-  return true;
+  if (!evidence.orthogonal_pencils) return true;
+  const Direction a(*evidence.pencils[0], f), b(*evidence.pencils[1], f);
+  const Vector3d &va = a.value, &vb = b.value;
+  const Eigen::RowVector4d J(a.by_focal.dot(vb) + b.by_focal.dot(va), 0.0, 0.0, 0.0);
+  return add(va.dot(vb), J, vb.transpose() * a.by_point + va.transpose() * b.by_point,
+             vb.dot(a.covariance * vb) + va.dot(b.covariance * va));
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/focal_roots.h"
@@ -136,40 +138,6 @@ FocalRefusal Check(const PlaneEvidence& evidence) {
   return are_ellipses ? FocalRefusal::kNone : FocalRefusal::kNoEllipse;
 }
 
-// Distinct solutions, the lowest chi2 first.
-class Solutions {
- public:
-  explicit Solutions(std::array<FocalSolution, 4>* solutions) : list_(*solutions) {}
-
-  void Add(const FocalSolution& found) {
-    constexpr double kSame = 1e-6;  // Of log focal.
-    for (int k = 0; k < count_; ++k) {
-      if (std::abs(std::log(At(k).focal / found.focal)) < kSame) return;
-    }
-    if (count_ < static_cast<int>(list_.size())) {
-      At(count_++) = found;
-    } else if (found.chi2 < list_.back().chi2) {
-      list_.back() = found;
-    }
-    std::sort(list_.begin(), list_.begin() + count_,
-              [](const FocalSolution& a, const FocalSolution& b) { return a.chi2 < b.chi2; });
-  }
-  // Leaves out what chi2 excludes.
-  void Prune(double freedom) {
-    constexpr double kGate = 60.0;
-    if (count_ == 0) return;
-    const double best = list_[0].chi2, unit = std::max(1.0, best / std::max(1.0, freedom));
-    while (At(count_ - 1).chi2 > best + kGate * unit) --count_;
-  }
-  int count() const { return count_; }
-
- private:
-  FocalSolution& At(int k) { return list_[static_cast<std::size_t>(k)]; }
-
-  std::array<FocalSolution, 4>& list_;
-  int count_ = 0;
-};
-
 // Residuals less unknowns.
 double Freedom(const PlaneEvidence& evidence) {
   const double circles = static_cast<double>(evidence.circles.size());
@@ -192,6 +160,28 @@ bool IsNearMinimum(const Branch& branch, std::size_t i) {
   return false;
 }
 
+// Writes the distinct ones, the lowest chi2 first, without those that chi2 excludes. Returns how
+// many.
+int WriteDistinct(std::vector<FocalSolution> found, double freedom,
+                  std::array<FocalSolution, 4>* solutions) {
+  constexpr double kSame = 1e-6;  // Of log focal.
+  constexpr double kGate = 60.0;
+  std::sort(found.begin(), found.end(),
+            [](const FocalSolution& a, const FocalSolution& b) { return a.chi2 < b.chi2; });
+  std::size_t count = 0;
+  for (const FocalSolution& s : found) {
+    const double best = found[0].chi2, unit = std::max(1.0, best / std::max(1.0, freedom));
+    if (count == solutions->size() || s.chi2 > best + kGate * unit) break;
+    const auto written = solutions->begin() + static_cast<std::ptrdiff_t>(count);
+    if (std::none_of(solutions->begin(), written, [&s](const FocalSolution& other) {
+          return std::abs(std::log(other.focal / s.focal)) < kSame;
+        })) {
+      (*solutions)[count++] = s;
+    }
+  }
+  return static_cast<int>(count);
+}
+
 }  // namespace
 
 int FocalFromPlane(const PlaneEvidence& evidence, double min_focal, double max_focal,
@@ -204,7 +194,7 @@ int FocalFromPlane(const PlaneEvidence& evidence, double min_focal, double max_f
     return RefuseFocal(FocalRefusal::kNoEllipse, why);
   }
   reason = FocalRefusal::kOutOfRange;
-  Solutions found(solutions);
+  std::vector<FocalSolution> found;
   for (const Branch& branch : branches) {
     for (std::size_t i = 0; i < kStarts; ++i) {
       PlaneState state = branch[i].state;
@@ -216,12 +206,12 @@ int FocalFromPlane(const PlaneEvidence& evidence, double min_focal, double max_f
         reason = FocalRefusal::kUndetermined;
         continue;
       }
-      found.Add({std::exp(state.log_focal), covariance(0, 0),
-                 -(covariance.row(0) * equations.shift).transpose(), equations.chi2});
+      found.push_back({std::exp(state.log_focal), covariance(0, 0),
+                       -(covariance.row(0) * equations.shift).transpose(), equations.chi2});
     }
   }
-  found.Prune(Freedom(evidence));
-  return found.count() > 0 ? found.count() : RefuseFocal(reason, why);
+  if (found.empty()) return RefuseFocal(reason, why);
+  return WriteDistinct(std::move(found), Freedom(evidence), solutions);
 }
 
 }  // namespace circline

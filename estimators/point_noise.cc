@@ -59,41 +59,37 @@ double Freedom(const std::vector<Scatter>& scatters) {
 
 }  // namespace
 
+// Of a feature's points about its fit, by the fit's own figure where that left a mask.
+template <typename Feature, typename Distance>
+Scatter PointNoiseMeter::OfPoints(const Feature& feature, double parameters,
+                                  const Distance& distance) {
+  if (!feature.inliers.empty()) {
+    const double rms = feature.fit->rms_px;
+    return FromSquares(rms * rms, Count(feature.inliers), parameters);
+  }
+  CalibrateInliers(fitted_->camera, feature.points, {}, &points_);
+  residuals_.clear();
+  for (const CalibratedPoint& p : points_) residuals_.push_back(distance(p));
+  return FromMost(residuals_, &sizes_, parameters);
+}
+
 Scatter PointNoiseMeter::OfCircle(const CircleObservation& circle) {
   if (circle.sigma_px > 0.0 || !circle.fit) return {};
-  constexpr double kParameters = 5.0;
-  const double rms = circle.fit->rms_px;
-  const auto shared = [&](Scatter scatter) {
-    const double worth =
-        model_->ContourFreedom(std::sqrt(scatter.variance), circle.points, circle.inliers);
-    scatter.freedom = std::min(scatter.freedom, worth);
-    return scatter;
-  };
-  if (!circle.inliers.empty())
-    return shared(FromSquares(rms * rms, Count(circle.inliers), kParameters));
-  CalibrateInliers(fitted_->camera, circle.points, circle.inliers, &points_);
-  residuals_.clear();
-  for (const CalibratedPoint& p : points_)
-    residuals_.push_back(ConicDistancePx(p, circle.fit->conic));
-  return shared(FromMost(residuals_, &sizes_, kParameters));
+  Scatter s = OfPoints(circle, 5.0, [&circle](const CalibratedPoint& p) {
+    return ConicDistancePx(p, circle.fit->conic);
+  });
+  const double rms = std::sqrt(s.variance);
+  s.freedom = std::min(s.freedom, model_->ContourFreedom(rms, circle.points, circle.inliers));
+  return s;
 }
 
 Scatter PointNoiseMeter::OfLine(const PencilObservation& pencil, const LineObservation& line) {
   if (LineSigma(pencil, line) > 0.0 || !line.fit || IsSegment(line)) return {};
-  constexpr double kParameters = 2.0;
-  const double rms = line.fit->rms_px;
-  const auto shared = [&](Scatter scatter) {
-    const double worth =
-        model_->LineFreedom(std::sqrt(scatter.variance), line.points, line.inliers);
-    scatter.freedom = std::min(scatter.freedom, worth);
-    return scatter;
-  };
-  if (!line.inliers.empty())
-    return shared(FromSquares(rms * rms, Count(line.inliers), kParameters));
-  CalibrateInliers(fitted_->camera, line.points, line.inliers, &points_);
-  residuals_.clear();
-  for (const CalibratedPoint& p : points_) residuals_.push_back(LineDistancePx(p, line.fit->line));
-  return shared(FromMost(residuals_, &sizes_, kParameters));
+  Scatter s = OfPoints(
+      line, 2.0, [&line](const CalibratedPoint& p) { return LineDistancePx(p, line.fit->line); });
+  const double rms = std::sqrt(s.variance);
+  s.freedom = std::min(s.freedom, model_->LineFreedom(rms, line.points, line.inliers));
+  return s;
 }
 
 // All segments of two points together: their misses of the vanishing point in standard

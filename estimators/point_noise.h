@@ -64,6 +64,8 @@ class PointNoiseMeter {
   };
 
  private:
+  template <typename Feature, typename Distance>
+  Scatter OfPoints(const Feature& feature, double parameters, const Distance& distance);
   Scatter OfCircle(const CircleObservation& circle);
   Scatter OfLine(const PencilObservation& pencil, const LineObservation& line);
   Scatter OfSegments(const PencilObservation& pencil);

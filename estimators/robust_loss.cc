@@ -1,43 +1,26 @@
 #include "circline/estimators/robust_loss.h"
 
+#include <algorithm>
 #include <array>
 
 namespace circline {
 namespace {
 
-struct Loss {
-  LossType type;
-  const char* name;
-};
-
-constexpr std::array<Loss, 7> kLosses = {{
-    {LossType::kTrivial, "trivial"},
-    {LossType::kHuber, "huber"},
-    {LossType::kSoftLOne, "soft_l_one"},
-    {LossType::kCauchy, "cauchy"},
-    {LossType::kArctan, "arctan"},
-    {LossType::kTukey, "tukey"},
-    {LossType::kGemanMcClure, "geman_mcclure"},
-}};
+// In the order of LossType.
+constexpr std::array<const char*, 7> kLossNames = {"trivial", "huber", "soft_l_one",   "cauchy",
+                                                   "arctan",  "tukey", "geman_mcclure"};
 
 }  // namespace
 
-const char* LossName(LossType type) { return kLosses[static_cast<std::size_t>(type)].name; }
+const char* LossName(LossType type) { return kLossNames[static_cast<std::size_t>(type)]; }
 
 bool LossFromName(const std::string& name, LossType* type) {
-  for (const Loss& loss : kLosses) {
-    if (name == loss.name) {
-      *type = loss.type;
-      return true;
-    }
-  }
-  return false;
+  const auto found = std::find(kLossNames.begin(), kLossNames.end(), name);
+  if (found == kLossNames.end()) return false;
+  *type = static_cast<LossType>(found - kLossNames.begin());
+  return true;
 }
 
-std::vector<std::string> LossNames() {
-  std::vector<std::string> names;
-  for (const Loss& loss : kLosses) names.emplace_back(loss.name);
-  return names;
-}
+std::vector<std::string> LossNames() { return {kLossNames.begin(), kLossNames.end()}; }
 
 }  // namespace circline

@@ -2,6 +2,7 @@
 #define CIRCLINE_TESTS_TRIALS_H_
 
 #include <algorithm>
+#include <cstdlib>
 
 namespace circline {
 
@@ -16,6 +17,12 @@ inline constexpr bool kSanitized = false;
 // How many trials a statistical test takes. Where they are few, it makes no claim on their means:
 // `if (kSanitized) return;`.
 constexpr int Trials(int number) { return kSanitized ? std::max(number / 20, 3) : number; }
+
+// The same, unless the environment says how many.
+inline int Trials(const char* variable, int number) {
+  const char* text = std::getenv(variable);
+  return text != nullptr && std::atoi(text) > 0 ? std::atoi(text) : Trials(number);
+}
 
 }  // namespace circline
 

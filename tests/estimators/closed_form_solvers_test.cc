@@ -152,26 +152,6 @@ TEST(ClosedFormSolversTest, AxesDecideTheSigns) {
   EXPECT_LT(RotationAngle(estimate.hypotheses[0].cam_from_world.rotation, drawn), 1e-7);
 }
 
-// An axis through the circle's centre along the tilt makes both candidates pass
-// the test of orthogonality. They are both returned as equals, unless the origin is the centre.
-TEST(ClosedFormSolversTest, CircleFrameSaysWhenItCannotDecide) {
-  PlaneScene scene;
-  scene.pose.rotation =
-      ExpRotation({0.7, 0.0, 0.0}) * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
-  scene.pose.translation = Eigen::Vector3d(0.0, 0.0, 10.0);
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
-  DrawAxes(&scene, &observations);
-  PoseEstimate estimate = SolveClosedForm("circle_frame", observations);
-  ASSERT_EQ(estimate.hypotheses.size(), 2U);
-  EXPECT_LT(estimate.hypotheses[0].probability, 0.7);
-  observations.frame.origin_is_center = "c0";
-  estimate = SolveClosedForm("circle_frame", observations);
-  ASSERT_EQ(estimate.hypotheses.size(), 2U);
-  EXPECT_GT(estimate.hypotheses[0].probability, 0.95);
-  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
-}
-
 // Lines that run along the axes serve as well as the axes; where they cross says nothing of the
 // origin.
 TEST(ClosedFormSolversTest, CircleFrameTakesLinesAlongTheAxes) {
@@ -221,21 +201,6 @@ TEST(ClosedFormSolversTest, LinePairsForAnyTwoDirections) {
   estimate = SolveClosedForm("line_pairs", observations);
   ASSERT_EQ(estimate.hypotheses.size(), 1U) << estimate.status.message;
   EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
-}
-
-// Lines that are parallel in the image too: the vanishing point is at infinity.
-TEST(ClosedFormSolversTest, FrontalPlaneIsNothingSpecial) {
-  PlaneScene scene;
-  scene.camera.distortion = {};
-  scene.pose.rotation = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
-  Observations observations = scene.Empty();
-  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
-                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
-  DrawAxes(&scene, &observations);
-  const PoseEstimate estimate = SolveClosedForm("line_pairs", observations);
-  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-  EXPECT_LT(RotationAngle(estimate.hypotheses[0].cam_from_world.rotation, scene.pose.rotation),
-            1e-9);
 }
 
 TEST(ClosedFormSolversTest, RefusalsNameWhatIsMissing) {

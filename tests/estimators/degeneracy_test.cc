@@ -62,16 +62,6 @@ PencilObservation AlongY(PlaneScene* scene, int lines = 2) {
   return scene->Pencil("L2", PencilDirection::kY, Vector3d::UnitY(), lines);
 }
 
-TEST(DegeneracyTest, ASingleCircleHasTwoPosesAndNoFavourite) {
-  PlaneScene scene;
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
-  const PoseEstimate estimate = SolveDefined("single_circle", observations);
-  ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
-  EXPECT_NEAR(estimate.hypotheses[0].probability, 0.5, 1e-9);
-  EXPECT_LT(BestNormalError(estimate, scene), kExact);
-}
-
 // Both candidates coincide where the circle is seen straight on: the direction to its centre is
 // the normal.
 TEST(DegeneracyTest, AFrontalCircleKeepsItsNormal) {

@@ -7,7 +7,6 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <cstdlib>
 #include <utility>
 #include <vector>
 
@@ -26,10 +25,7 @@ inline constexpr double kMinFocal = 0.35, kMaxFocal = 7.0;
 inline constexpr double kSigma = 0.1;  // Pixels: small, so that first order holds.
 
 // How many a test draws: CIRCLINE_FOCAL_SCENES, else so many.
-inline int NumScenes(int number) {
-  const char* text = std::getenv("CIRCLINE_FOCAL_SCENES");
-  return text != nullptr && std::atoi(text) > 0 ? std::atoi(text) : Trials(number);
-}
+inline int NumScenes(int number) { return Trials("CIRCLINE_FOCAL_SCENES", number); }
 
 // A plane seen by a camera whose focal length is half to twice the guess.
 struct FocalScene {

@@ -6,7 +6,6 @@
 #include <Eigen/Dense>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <vector>
 
@@ -30,12 +29,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-long NumCalls() {
-  const char* text = std::getenv("CIRCLINE_FUZZ_CALLS");
-  if (text != nullptr && std::atol(text) > 0) return std::atol(text);
-  return Trials(2000000);
-}
 
 // Draws inputs. Each one is bad in its own way: how likely a number is to be strange is drawn once
 // an input, so that many inputs are strange in one place only, and some are not at all.
@@ -357,12 +350,12 @@ TEST(FuzzTest, NothingThatSucceedsIsNotFinite) {
                              {"back-projection", FuzzBackProjection},
                              {"metrology", FuzzMetrology},
                              {"camera", FuzzCamera}};
-  const long calls = NumCalls() / static_cast<long>(std::size(kCases));
+  const int calls = Trials("CIRCLINE_FUZZ_CALLS", 2000000) / static_cast<int>(std::size(kCases));
   std::uint64_t seed = 1;
   for (const Case& c : kCases) {
     Fuzzer fuzzer(seed++);
-    long bad = 0;
-    for (long i = 0; i < calls; ++i) {
+    int bad = 0;
+    for (int i = 0; i < calls; ++i) {
       fuzzer.NextInput();
       if (!c.call(&fuzzer)) ++bad;
     }

@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <vector>
 
 #include "circline/estimators/basics.h"
@@ -24,12 +23,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-int NumScenes() {
-  const char* text = std::getenv("CIRCLINE_PROPERTY_SCENES");
-  if (text != nullptr && std::atoi(text) > 0) return std::atoi(text);
-  return Trials(1000000);
-}
 
 // A plane with a circle in it, all of which is in front of the camera; the plane's frame; two
 // directions of the plane.
@@ -184,7 +177,7 @@ bool SolveLinePairs(const Scene& s, double* error) {
 TEST(PropertyTest, TheTruthIsAmongTheHypotheses) {
   Random random(2024);
   Errors circle, circle_center, circle_frame, line_pairs;
-  const int scenes = NumScenes();
+  const int scenes = Trials("CIRCLINE_PROPERTY_SCENES", 1000000);
   for (int i = 0; i < scenes; ++i) {
     const Scene s = RandomScene(&random);
     const Matrix3d conic = ProjectCircle(s.circle);
