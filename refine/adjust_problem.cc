@@ -92,7 +92,7 @@ void AdjustProblem::FreeCameras(bool coarse) {
 
 int AdjustProblem::AddRotation(const Eigen::Matrix3d& rotation) {
   const Eigen::Quaterniond q = Eigen::Quaterniond(rotation).normalized();
-  return AddBlock(4, {q.x(), q.y(), q.z(), q.w()}, std::make_unique<WorldRotationManifold>(3));
+  return AddBlock(4, {q.x(), q.y(), q.z(), q.w()}, std::make_unique<WorldRotationManifold<3>>());
 }
 
 void AdjustProblem::AddGivenPoses(const GivenFrame& given) {
@@ -145,7 +145,8 @@ void AdjustProblem::SetGauge() {
     } else {
       block(translations_[i]).is_constant = true;
     }
-    if (!x_is_fixed_[world]) SetManifold(rotations_[i], std::make_unique<WorldRotationManifold>(2));
+    if (!x_is_fixed_[world])
+      SetManifold(rotations_[i], std::make_unique<WorldRotationManifold<2>>());
   }
 }
 
@@ -204,7 +205,7 @@ int AdjustProblem::OffsetOf(int photo, const CircleObservation& circle) {
   int& offset = OneOf({photo, std::clamp(circle.contrast, -1, 1)}, &offsets_);
   if (offset < 0) {
     offset = AddBlock(1, {});
-    AddTerm(NewGaussianPrior({sigma}), {offset}, -1, -1, std::make_unique<MostlyExact>());
+    AddTerm(NewGaussianPrior({sigma}), {offset}, -1, std::make_unique<MostlyExact>());
   }
   return offset;
 }
@@ -258,10 +259,10 @@ int AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   if (is_along) d = axis;
   made.block = AddBlock(3, {d.x(), d.y(), d.z()}, std::make_unique<ceres::SphereManifold<3>>());
   if (is_along) {
-    AddTerm(NewDirectionPrior(axis, sigma), {made.block}, -1, -1, std::make_unique<MostlyExact>());
+    AddTerm(NewDirectionPrior(axis, sigma), {made.block}, -1, std::make_unique<MostlyExact>());
     x_is_fixed_[input.world] = x_is_fixed_[input.world] || pencil.direction != PencilDirection::kZ;
   } else if (pencil.direction != PencilDirection::kZ) {
-    AddTerm(NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma), {made.block}, -1, -1,
+    AddTerm(NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma), {made.block}, -1,
             std::make_unique<MostlyExact>());
   }
   return made.block;

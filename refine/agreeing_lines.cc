@@ -30,7 +30,7 @@ std::vector<AxisLine> LinesAlongAxes(const JointProblem& problem) {
         problem.observations().pencils[static_cast<std::size_t>(f.observation)];
     if (pencil.direction != PencilDirection::kX && pencil.direction != PencilDirection::kY)
       continue;
-    const LineFit& fit = *pencil.lines[static_cast<std::size_t>(f.line)].fit;
+    const LineFit& fit = *problem.LineOf(f).fit;
     lines.push_back(
         {i, f.observation, static_cast<int>(pencil.direction), fit.line, fit.covariance});
   }
@@ -78,10 +78,10 @@ bool Turn(const AxisLine& line, const FrameObservation& frame, Seed* seed) {
   return true;
 }
 
-// By how much `other` misses its axis where `line` fixes the turn, standard deviations: of the
-// plane's normal, of both lines, and of the noise model.
-double Miss(const PlaneSeed& plane, const NoiseModel& noise, const AxisLine& line,
-            const AxisLine& other) {
+// By how much `other` deviates from its axis where `line` fixes the turn, standard deviations: of
+// the plane's normal, of both lines, and of the noise model.
+double Deviation(const PlaneSeed& plane, const NoiseModel& noise, const AxisLine& line,
+                 const AxisLine& other) {
   const Eigen::Vector3d n = plane.seed.pose.rotation.col(2);
   const Eigen::Vector3d &l = line.line, &k = other.line;
   const double size = n.cross(l).norm();
@@ -125,8 +125,8 @@ std::vector<AgreeingLines> FindAgreeingLines(const JointProblem& problem,
       AgreeingLines agreeing;
       agreeing.reading.assign(problem.features().size(), 1);
       for (const AxisLine& other : lines) {
-        const bool agrees = &other == &line || Miss(plane, problem.options().noise_model, line,
-                                                    other) <= kInlierSigmas;
+        const bool agrees = &other == &line || Deviation(plane, problem.options().noise_model, line,
+                                                         other) <= kInlierSigmas;
         agreeing.reading[other.feature] = agrees ? 1 : 0;
         agreeing.num_lines += agrees ? 1 : 0;
       }

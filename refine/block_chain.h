@@ -27,26 +27,21 @@ inline Eigen::Matrix<double, 3, 4> DeltaFromQuaternion(const double* q) {
   return G;
 }
 
-// jacobians[block] (num_residuals x size, row-major) = [J; 0], where ceres asks for it.
+// jacobians[block] (num_residuals x size, row-major) = [J, 0; 0, 0], where ceres asks for it.
+template <typename Derived>
+void WriteJacobian(const Eigen::MatrixBase<Derived>& J, int num_residuals, int block,
+                   double** jacobians, int size) {
+  if (jacobians[block] == nullptr) return;
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(
+      jacobians[block], num_residuals, size);
+  out.setZero();
+  out.topLeftCorner(J.rows(), J.cols()) = J;
+}
+// The same for a block of J's size.
 template <typename Derived>
 void WriteJacobian(const Eigen::MatrixBase<Derived>& J, int num_residuals, int block,
                    double** jacobians) {
-  if (jacobians[block] == nullptr) return;
-  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(
-      jacobians[block], num_residuals, J.cols());
-  out.topRows(J.rows()) = J;
-  out.bottomRows(num_residuals - J.rows()).setZero();
-}
-
-// The camera's block where the derivatives of its last shifts are zero.
-template <typename Derived>
-void WriteCameraJacobian(const Eigen::MatrixBase<Derived>& J, int num_residuals, int block,
-                         double** jacobians) {
-  if (jacobians[block] == nullptr) return;
-  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, kCameraSize, Eigen::RowMajor>> out(
-      jacobians[block], num_residuals, kCameraSize);
-  out.setZero();
-  out.topLeftCorner(J.rows(), J.cols()) = J;
+  WriteJacobian(J, num_residuals, block, jacobians, static_cast<int>(J.cols()));
 }
 
 // Sum of squared residuals, of a feature weighed so; infinite where they cannot be evaluated.
@@ -60,16 +55,6 @@ inline double TwiceCostOf(const ceres::CostFunction& cost, const FeatureCost* fe
   if (!evaluated) return std::numeric_limits<double>::infinity();
   for (int i = 0; i < cost.num_residuals(); ++i) sum += residuals[i] * residuals[i];
   return sum;
-}
-
-// Mean square over a feature's points without any loss, standard deviations.
-inline double MeanSquareOf(const FeatureCost& cost, const double* const* parameters) {
-  Weighing weighing;
-  weighing.stretch = 1e4;  // So wide a loss is none.
-  const ImagePoints* points = cost.points();
-  const double count =
-      points == nullptr ? 1.0 : points->options().weight * static_cast<double>(points->size());
-  return TwiceCostOf(cost, &cost, weighing, parameters) / std::max(1.0, count);
 }
 
 // A circle of the plane Z = 0 in the world: centre (2), radius and, where it is not null, its tilt

@@ -60,8 +60,8 @@ bool CurveCost::EvaluateSum(const Sum& sum, double* residuals, double** jacobian
   if (variables.offset)
     WriteJacobian(root.U.col(column++), num_residuals(), offset_block_, jacobians);
   if (variables.camera)
-    WriteCameraJacobian(root.U.rightCols(root.U.cols() - column), num_residuals(), camera_block_,
-                        jacobians);
+    WriteJacobian(root.U.rightCols(root.U.cols() - column), num_residuals(), camera_block_,
+                  jacobians, kCameraSize);
   *U = root.U.leftCols(curve_size);
   return true;
 }

@@ -1,7 +1,9 @@
 #include "circline/refine/estimate_pose.h"
 
 #include <Eigen/Dense>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -12,23 +14,20 @@
 
 namespace circline {
 
+namespace {
+
+constexpr std::array kConicDistanceNames = {"auto", "sampson", "orthogonal"};  // By their type.
+
+}  // namespace
+
 const char* ConicDistanceName(ConicDistanceType type) {
-  switch (type) {
-    case ConicDistanceType::kAuto:
-      return "auto";
-    case ConicDistanceType::kSampson:
-      return "sampson";
-    case ConicDistanceType::kOrthogonal:
-      return "orthogonal";
-  }
-  return "auto";
+  return kConicDistanceNames[static_cast<std::size_t>(type)];
 }
 
 bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type) {
-  for (const auto known :
-       {ConicDistanceType::kAuto, ConicDistanceType::kSampson, ConicDistanceType::kOrthogonal}) {
-    if (name != ConicDistanceName(known)) continue;
-    *type = known;
+  for (std::size_t i = 0; i < kConicDistanceNames.size(); ++i) {
+    if (name != kConicDistanceNames[i]) continue;
+    *type = static_cast<ConicDistanceType>(i);
     return true;
   }
   return false;

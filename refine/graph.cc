@@ -17,8 +17,8 @@ BlockMatrix PlusJacobianOf(const ceres::Manifold& manifold, const double* at) {
 }
 
 int Graph::AddBlock(int size, const std::vector<double>& value,
-                    std::unique_ptr<ceres::Manifold> manifold, bool is_constant, int group) {
-  blocks_.push_back({static_cast<int>(values_.size()), size, nullptr, is_constant, group});
+                    std::unique_ptr<ceres::Manifold> manifold, bool is_constant) {
+  blocks_.push_back({static_cast<int>(values_.size()), size, nullptr, is_constant});
   values_.insert(values_.end(), value.begin(), value.end());
   values_.resize(static_cast<std::size_t>(blocks_.back().offset + size), 0.0);
   const int index = static_cast<int>(blocks_.size()) - 1;
@@ -32,17 +32,16 @@ void Graph::SetManifold(int index, std::unique_ptr<ceres::Manifold> manifold) {
   manifolds_[static_cast<std::size_t>(index)] = std::move(manifold);
 }
 
-int Graph::AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature, int group,
+int Graph::AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature,
                    std::unique_ptr<ceres::LossFunction> loss) {
-  terms_.push_back({std::unique_ptr<ceres::CostFunction>(owned), std::move(blocks), feature, group,
+  terms_.push_back({std::unique_ptr<ceres::CostFunction>(owned), std::move(blocks), feature,
                     nullptr, std::move(loss)});
   return static_cast<int>(terms_.size()) - 1;
 }
 
-int Graph::AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature,
-                          int group) {
+int Graph::AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature) {
   FeatureCost* weighed = cost.get();
-  const int index = AddTerm(cost.release(), std::move(blocks), feature, group);
+  const int index = AddTerm(cost.release(), std::move(blocks), feature);
   term(index).weighed = weighed;
   return index;
 }
@@ -51,21 +50,27 @@ void Graph::Parameters(const Term& term, const double* x, const double** out) co
   for (std::size_t k = 0; k < term.blocks.size(); ++k) out[k] = x + block(term.blocks[k]).offset;
 }
 
-double Graph::TwiceCost(const Term& term, const double* x, const Weighing& weighing) const {
+double Graph::TwiceCost(const Term& term, const double* x) const {
   const double* parameters[kMostBlocks];
   Parameters(term, x, parameters);
-  double rho[3] = {TwiceCostOf(*term.cost, term.weighed, weighing, parameters), 0.0, 0.0};
+  double rho[3] = {TwiceCostOf(*term.cost, term.weighed, Weighing(), parameters), 0.0, 0.0};
   if (term.loss != nullptr && std::isfinite(rho[0])) term.loss->Evaluate(rho[0], rho);
   return rho[0];
 }
 
-double Graph::LargestMiss(const std::vector<const Term*>& terms, const double* x) const {
+double Graph::LargestRms(const std::vector<const Term*>& terms, const double* x) const {
   double most = 0.0;
   const double* parameters[kMostBlocks];
+  Weighing least_squares;
+  least_squares.stretch = 1e4;  // So wide a loss is none.
   for (const Term* term : terms) {
     if (term->weighed == nullptr) continue;
     Parameters(*term, x, parameters);
-    const double square = MeanSquareOf(*term->weighed, parameters);
+    const ImagePoints* points = term->weighed->points();
+    const double count =
+        points == nullptr ? 1.0 : points->options().weight * static_cast<double>(points->size());
+    const double square =
+        TwiceCostOf(*term->cost, term->weighed, least_squares, parameters) / std::max(1.0, count);
     if (std::isfinite(square)) most = std::max(most, square);
   }
   return std::sqrt(most);

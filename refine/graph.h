@@ -32,7 +32,6 @@ struct Block {
   int offset, size;                           // In the values of all.
   const ceres::Manifold* manifold = nullptr;  // Null: Euclidean.
   bool is_constant = false;
-  int group = -1;  // The feature group that alone has it; -1: shared.
 
   int tangent_size() const {
     return is_constant ? 0 : manifold != nullptr ? manifold->TangentSize() : size;
@@ -48,7 +47,6 @@ struct Term {
   std::unique_ptr<ceres::CostFunction> cost;
   std::vector<int> blocks;
   int feature = -1;                // -1: a prior.
-  int group = -1;                  // Of the blocks that are nobody else's.
   FeatureCost* weighed = nullptr;  // The same, where it can be weighed anew.
   // Of a prior that is no Gaussian.
   std::unique_ptr<ceres::LossFunction> loss;
@@ -63,14 +61,12 @@ class Graph {
  public:
   // What is not in `value` is 0.
   int AddBlock(int size, const std::vector<double>& value,
-               std::unique_ptr<ceres::Manifold> manifold = {}, bool is_constant = false,
-               int group = -1);
+               std::unique_ptr<ceres::Manifold> manifold = {}, bool is_constant = false);
   void SetManifold(int block, std::unique_ptr<ceres::Manifold> manifold);
   // A prior, of a feature or of none.
-  int AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature = -1, int group = -1,
+  int AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature = -1,
               std::unique_ptr<ceres::LossFunction> loss = {});
-  int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature,
-                     int group = -1);
+  int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature);
 
   const std::vector<Block>& blocks() const { return blocks_; }
   const std::vector<Term>& terms() const { return terms_; }
@@ -78,17 +74,16 @@ class Graph {
   Block& block(int i) { return blocks_[static_cast<std::size_t>(i)]; }
   const Term& term(int i) const { return terms_[static_cast<std::size_t>(i)]; }
   Term& term(int i) { return terms_[static_cast<std::size_t>(i)]; }
-  // Values of all blocks, as added or as its user has changed them since; the others take them as
-  // x.
+  // Values of all blocks, as added or as its user has changed them since; below, x.
   const std::vector<double>& values() const { return values_; }
   double* Values(int block) { return values_.data() + this->block(block).offset; }
   const double* Values(int block) const { return values_.data() + this->block(block).offset; }
 
   void Parameters(const Term& term, const double* x, const double** out) const;
   // Infinity where it cannot be evaluated.
-  double TwiceCost(const Term& term, const double* x, const Weighing& weighing = Weighing()) const;
-  // Of all features among these, root mean square over its points, standard deviations.
-  double LargestMiss(const std::vector<const Term*>& terms, const double* x) const;
+  double TwiceCost(const Term& term, const double* x) const;
+  // The largest root mean square of a feature's points without any loss, standard deviations.
+  double LargestRms(const std::vector<const Term*>& terms, const double* x) const;
   // Of all terms that can be.
   void SetWeighing(const Weighing& weighing) const;
   // Those that these terms have, in the order in which they have them.

@@ -245,9 +245,9 @@ class ImagePoints::ToConic {
             (g - d * C.topLeftCorner<2, 2>() * NormGradient(p, by_pixel)) / G.norm();
         by_pixel = p.GradientPerPixel(by_x);
       }
-      (*row)[6] = offset_is_variable_ ? by_pixel.dot(inwards) : 0.0;
+      if (offset_is_variable_) (*row)[6] = by_pixel.dot(inwards);
       if constexpr (Row::RowsAtCompileTime > 7)
-        view_.FillCameraColumns(i, seen, d, by_pixel, row, 7);
+        view_.FillCameraColumns(i, seen, d, by_pixel, row, offset_is_variable_ ? 7 : 6);
     }
     return d;
   }
@@ -266,16 +266,8 @@ double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, con
   if (model == nullptr || (!variables.offset && !variables.camera))
     return SumPoints<6>(size(), options_, weighing, distance, model);
   if (!variables.camera) return SumPoints<7>(size(), options_, weighing, distance, model);
-  const double cost = SumWithCamera<7>(size(), options_, weighing, distance, model);
-  if (!variables.offset) {  // Its column, the seventh, is dropped.
-    const int n = num_camera();
-    model->g.segment(6, n) = model->g.tail(n).eval();
-    model->h.middleCols(6, n) = model->h.rightCols(n).eval();
-    model->h.middleRows(6, n) = model->h.bottomRows(n).eval();
-    model->g.conservativeResize(6 + n);
-    model->h.conservativeResize(6 + n, 6 + n);
-  }
-  return cost;
+  return variables.offset ? SumWithCamera<7>(size(), options_, weighing, distance, model)
+                          : SumWithCamera<6>(size(), options_, weighing, distance, model);
 }
 
 double ImagePoints::SumLine(const Eigen::Vector3d& line, const double* camera,

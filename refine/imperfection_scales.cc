@@ -63,7 +63,7 @@ NoiseModel ScaledNoiseModel(const JointProblem& problem, const State& minimum) {
   NoiseModel model = problem.options().noise_model;
   Linearization at(problem, minimum, Weighing());
   if (!at.ok() || !at.ComputeCovariance()) return model;
-  const std::vector<Linearization::Misfit> found = at.Misfits(problem.features());
+  const std::vector<Linearization::Misfit> found = at.Misfits();
   // An outlier counts for no more than a feature that is kept.
   constexpr double kMost = 9.0;
   const auto add = [&](int feature, int term, double deviations, std::vector<Misfit>* out) {
@@ -77,13 +77,14 @@ NoiseModel ScaledNoiseModel(const JointProblem& problem, const State& minimum) {
   for (const JointProblem::CircleBlocks& c : problem.circles()) {
     double deviations = 0.0;
     for (int k = 0; c.tilt >= 0 && k < 2; ++k)
-      deviations += 0.5 * PriorShare(at.OwnVariance(c.tilt, k), model.circle_tilt_rad);
+      deviations += 0.5 * PriorShare(at.OwnVariance(c.feature, c.tilt, k), model.circle_tilt_rad);
     add(c.feature, c.term, deviations, &circles);
   }
   for (const JointProblem::LineBlocks& l : problem.lines()) {
     const bool is_soft = problem.block(l.line).size > 1;
     add(l.feature, l.term,
-        is_soft ? PriorShare(at.OwnVariance(l.line, 1), model.line_direction_rad) : 0.0, &lines);
+        is_soft ? PriorShare(at.OwnVariance(l.feature, l.line, 1), model.line_direction_rad) : 0.0,
+        &lines);
   }
   if (circles.size() > kFewCircles) {
     const double s = ExpectedScale(circles, model.spread);

@@ -20,18 +20,14 @@ constexpr double kExactLength = 1e-6;  // Relative: the same for a length.
 }  // namespace
 
 int JointProblemBuilder::AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks,
-                                        int feature, int group) {
-  return p_.AddFeatureTerm(std::move(cost), WithCamera(std::move(blocks)), feature, group);
+                                        int feature) {
+  if (has_camera_) blocks.push_back(JointProblem::kCamera);
+  return p_.AddFeatureTerm(std::move(cost), std::move(blocks), feature);
 }
 
 int JointProblemBuilder::AddFeature(Feature feature) {
   p_.features_.push_back(std::move(feature));
   return static_cast<int>(p_.features_.size()) - 1;
-}
-
-std::vector<int> JointProblemBuilder::WithCamera(std::vector<int> blocks) const {
-  if (has_camera_) blocks.push_back(JointProblem::kCamera);
-  return blocks;
 }
 
 std::optional<ImagePoints> JointProblemBuilder::Points(const std::vector<Eigen::Vector2d>& pixels,
@@ -61,11 +57,8 @@ void JointProblemBuilder::Build() {
   std::unique_ptr<ceres::Manifold> manifold;
   if (!held.empty() && has_camera_)
     manifold = std::make_unique<ceres::SubsetManifold>(kCameraSize, held);
-  p_.AddBlock(kCameraSize, std::vector<double>(kCameraSize, 0.0), std::move(manifold),
-              !p_.camera_is_estimated_);
-  if (p_.camera_is_estimated_) {
-    AddCameraPrior(sigmas);
-  }
+  p_.AddBlock(kCameraSize, {}, std::move(manifold), !p_.camera_is_estimated_);
+  if (p_.camera_is_estimated_) AddCameraPrior(sigmas);
   AddOrigin();
   for (const CircleObservation& circle : obs_.circles)
     num_circles_[ContrastOf(circle)] += InPlane(circle) ? 1 : 0;
@@ -77,8 +70,11 @@ void JointProblemBuilder::Build() {
   for (std::size_t i = 0; i < obs_.known_lengths.size(); ++i) AddLength(i);
   AddTranslation();
   AddPriors();
-  p_.SetManifold(JointProblem::kRotation,
-                 std::make_unique<WorldRotationManifold>(p_.x_is_fixed_ ? 3 : 2));
+  if (p_.x_is_fixed_) {
+    p_.SetManifold(JointProblem::kRotation, std::make_unique<WorldRotationManifold<3>>());
+  } else {
+    p_.SetManifold(JointProblem::kRotation, std::make_unique<WorldRotationManifold<2>>());
+  }
 }
 
 // Of the shifts of the camera, but that the focal length may be doubtful.
@@ -92,7 +88,7 @@ void JointProblemBuilder::AddCameraPrior(std::vector<double> sigmas) {
     focal[0] = wide;
     sigmas[0] = 0.0;
     const int term =
-        p_.AddTerm(NewGaussianPrior(focal, mean), {JointProblem::kCamera}, -1, -1,
+        p_.AddTerm(NewGaussianPrior(focal, mean), {JointProblem::kCamera}, -1,
                    std::make_unique<TwoGaussians>(1.0 - kDoubtfulShare, narrow / wide, 1.0));
     p_.term(term).is_mostly_exact = false;
   }
@@ -136,13 +132,11 @@ void JointProblemBuilder::AddLength(std::size_t index) {
   Feature feature{Feature::Kind::kLength, "length[" + std::to_string(index) + "]",
                   "an end of a known length"};
   feature.observation = static_cast<int>(index);
-  const int f = AddFeature(feature), group = p_.num_groups_++;
-  const int a = p_.AddBlock(2, {0.0, 0.0}, {}, false, group),
-            b = p_.AddBlock(2, {0.0, 0.0}, {}, false, group);
-  AddPoint(known.points[0], DrawnSigma(), a, f, group);
-  AddPoint(known.points[1], DrawnSigma(), b, f, group);
+  const int f = AddFeature(feature), a = p_.AddBlock(2, {}), b = p_.AddBlock(2, {});
+  AddPoint(known.points[0], DrawnSigma(), a, f);
+  AddPoint(known.points[1], DrawnSigma(), b, f);
   const double sigma = known.sigma > 0.0 ? known.sigma : model_.length;
-  p_.AddTerm(NewLengthCost(known.value, std::max(sigma, kExactLength)), {a, b}, f, group);
+  p_.AddTerm(NewLengthCost(known.value, std::max(sigma, kExactLength)), {a, b}, f);
   p_.lengths_.push_back({a, b, f, known.value});
   is_metric_ = true;
 }

@@ -29,10 +29,9 @@ class JointProblemBuilder {
   int AddConstant(const std::vector<double>& value) {
     return p_.AddBlock(static_cast<int>(value.size()), value, {}, true);
   }
-  int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature,
-                     int group);
+  // The camera's block comes last.
+  int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature);
   int AddFeature(Feature feature);
-  std::vector<int> WithCamera(std::vector<int> blocks) const;
 
   std::optional<ImagePoints> Points(const std::vector<Eigen::Vector2d>& pixels,
                                     const std::vector<std::uint8_t>& inliers, double sigma_px,
@@ -40,25 +39,23 @@ class JointProblemBuilder {
 
   void AddOrigin();
   void AddCircle(std::size_t index);
-  int CenterBlock(const CircleObservation& circle, int group);
-  int RadiusBlock(const CircleObservation& circle, int feature, int group);
+  int CenterBlock(const CircleObservation& circle);
+  int RadiusBlock(const CircleObservation& circle, int feature);
   int OffsetBlock(const CircleObservation& circle);
-  void AddDiameter(const CircleObservation& circle, std::size_t index, int center, int group,
-                   int feature);
-  void AddMark(const CircleObservation& circle, const ImagePoints& points, int center, int group,
-               int feature);
+  void AddDiameter(const CircleObservation& circle, std::size_t index, int center, int feature);
+  void AddMark(const CircleObservation& circle, const ImagePoints& points, int center, int feature);
   void AddPencil(std::size_t index);
   void AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,
                double direction_sigma, Feature feature);
   int DirectionBlock(std::size_t pencil);
   int AxisOfLine(std::size_t pencil, std::size_t line) const;
-  void AddAxisLine(const LineObservation& line, double sigma_px, int axis, const std::string& id,
+  void AddAxisLine(ImagePoints points, const LineFit& fit, int axis, const std::string& id,
                    const std::string& name);
   void AddDrawnAxis(const std::optional<Segment>& axis, int which);
   void AddCameraPrior(std::vector<double> sigmas);
   void AddAngle(std::size_t index);
   void AddLength(std::size_t index);
-  void AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block, int feature, int group);
+  void AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block, int feature);
   void AddTranslation();
   void AddPriors();
 

@@ -43,53 +43,46 @@ void JointProblemBuilder::AddOrigin() {
   if (both_axes && (is_end(frame.x_axis) || is_end(frame.y_axis))) return;
   Feature feature{Feature::Kind::kPoint, "frame.origin", "the origin of the frame"};
   feature.dof = 2;
-  AddPoint(*frame.origin, DrawnSigma(), origin_point_, AddFeature(feature), -1);
+  AddPoint(*frame.origin, DrawnSigma(), origin_point_, AddFeature(feature));
 }
 
 void JointProblemBuilder::AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block,
-                                   int feature, int group) {
+                                   int feature) {
   CalibratedPoint unused;
   if (!PixelToCalibrated(obs_.camera, pixel, &unused)) {
     p_.unused_.push_back(p_.feature(feature).name +
                          ": not used, it lies where the camera model cannot undistort it");
     return;
   }
-  const int term =
-      AddFeatureTerm(std::make_unique<PlanePointCost>(obs_.camera, pixel, sigma_px,
-                                                      p_.options_.line_loss.type, has_camera_),
-                     {JointProblem::kRotation, JointProblem::kTranslation, block}, feature, group);
-  p_.points_.push_back({term, feature});
+  AddFeatureTerm(std::make_unique<PlanePointCost>(obs_.camera, pixel, sigma_px,
+                                                  p_.options_.line_loss.type, has_camera_),
+                 {JointProblem::kRotation, JointProblem::kTranslation, block}, feature);
 }
 
 // --- Circles ---
 
-int JointProblemBuilder::CenterBlock(const CircleObservation& circle, int group) {
+int JointProblemBuilder::CenterBlock(const CircleObservation& circle) {
   if (IsAtOrigin(circle)) {
     if (p_.center_at_origin_ < 0) p_.center_at_origin_ = static_cast<int>(p_.circles_.size());
     return origin_point_;
   }
-  if (circle.concentric.empty()) return p_.AddBlock(2, {0.0, 0.0}, {}, false, group);
+  if (circle.concentric.empty()) return p_.AddBlock(2, {});
   const auto found = concentric_.find(circle.concentric);
   if (found != concentric_.end()) return found->second;
-  return concentric_[circle.concentric] = p_.AddBlock(2, {0.0, 0.0});
+  return concentric_[circle.concentric] = p_.AddBlock(2, {});
 }
 
-int JointProblemBuilder::RadiusBlock(const CircleObservation& circle, int feature, int group) {
-  const bool grouped = !circle.radius_group.empty();
-  if (grouped) {
-    const auto found = radius_groups_.find(circle.radius_group);
-    if (found != radius_groups_.end()) return found->second;
-  }
+int JointProblemBuilder::RadiusBlock(const CircleObservation& circle, int feature) {
+  const bool is_grouped = !circle.radius_group.empty();
+  const auto found = radius_groups_.find(circle.radius_group);
+  if (found != radius_groups_.end()) return found->second;
   const double sigma = circle.radius_sigma > 0.0 ? circle.radius_sigma : model_.radius;
   const bool known = circle.radius > 0.0;
   is_metric_ = is_metric_ || known;
-  const int block = p_.AddBlock(1, {known ? circle.radius : 1.0}, {}, known && !(sigma > 0.0),
-                                grouped ? -1 : group);
-  if (known && sigma > 0.0) {
-    p_.AddTerm(NewLogPrior(circle.radius, sigma), {block}, grouped ? -1 : feature,
-               grouped ? -1 : group);
-  }
-  if (grouped) radius_groups_[circle.radius_group] = block;
+  const int block = p_.AddBlock(1, {known ? circle.radius : 1.0}, {}, known && !(sigma > 0.0));
+  if (known && sigma > 0.0)
+    p_.AddTerm(NewLogPrior(circle.radius, sigma), {block}, is_grouped ? -1 : feature);
+  if (is_grouped) radius_groups_[circle.radius_group] = block;
   return block;
 }
 
@@ -99,8 +92,8 @@ int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
   const std::size_t contrast = ContrastOf(circle);
   int& block = offsets_[contrast];
   if (block < 0 && (num_circles_[contrast] > 1 || circle.radius > 0.0)) {
-    block = p_.AddBlock(1, {0.0});
-    p_.AddTerm(NewGaussianPrior({model_.contour_offset_px}), {block}, -1, -1,
+    block = p_.AddBlock(1, {});
+    p_.AddTerm(NewGaussianPrior({model_.contour_offset_px}), {block}, -1,
                std::make_unique<MostlyExact>());
   }
   return block;
@@ -115,8 +108,7 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   feature.dof = circle.radius > 0.0 ? 3 : 2;
   feature.observation = static_cast<int>(index);
   feature.free_twice_cost = FreeTwiceCost(*points, circle.fit->conic);
-  const int f = AddFeature(feature), group = p_.num_groups_++;
-  const int center = CenterBlock(circle, group), radius = RadiusBlock(circle, f, group);
+  const int f = AddFeature(feature), center = CenterBlock(circle), radius = RadiusBlock(circle, f);
 
   PlaneCircleContourCost::Blocks blocks;
   blocks.tilt_and_height = model_.circle_tilt_rad > 0.0 || model_.circle_height > 0.0;
@@ -124,34 +116,32 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   blocks.height_sigma = model_.circle_height;
   blocks.camera = has_camera_;
   std::vector<int> used = {JointProblem::kRotation, JointProblem::kTranslation, center, radius};
-  const int tilt = blocks.tilt_and_height ? p_.AddBlock(3, {0.0, 0.0, 0.0}, {}, false, group) : -1;
+  const int tilt = blocks.tilt_and_height ? p_.AddBlock(3, {}) : -1;
   if (tilt >= 0) used.push_back(tilt);
   const int offset = OffsetBlock(circle);
   blocks.offset = offset >= 0;
   if (offset >= 0) used.push_back(offset);
   const ImagePoints kept = *points;
-  const int term = AddFeatureTerm(
-      std::make_unique<PlaneCircleContourCost>(std::move(*points), blocks), used, f, group);
+  const int term =
+      AddFeatureTerm(std::make_unique<PlaneCircleContourCost>(std::move(*points), blocks), used, f);
   p_.circles_.push_back({static_cast<int>(index), f, term, center, radius, tilt});
-  if (circle.center) AddMark(circle, kept, center, group, f);
-  for (std::size_t k = 0; k < circle.diameters.size(); ++k)
-    AddDiameter(circle, k, center, group, f);
+  if (circle.center) AddMark(circle, kept, center, f);
+  for (std::size_t k = 0; k < circle.diameters.size(); ++k) AddDiameter(circle, k, center, f);
 }
 
 // No better than the contour as a whole.
 void JointProblemBuilder::AddMark(const CircleObservation& circle, const ImagePoints& points,
-                                  int center, int group, int feature) {
+                                  int center, int feature) {
   Feature mark{Feature::Kind::kCenterMark, circle.id + ".center",
                "the centre of circle '" + circle.id + "'"};
   mark.parent = feature;
   mark.dof = 2;
   const ImagePoints::Options& contour = points.options();
-  AddPoint(*circle.center, contour.sigma_px / std::sqrt(contour.weight), center, AddFeature(mark),
-           group);
+  AddPoint(*circle.center, contour.sigma_px / std::sqrt(contour.weight), center, AddFeature(mark));
 }
 
 void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size_t index,
-                                      int center, int group, int feature) {
+                                      int center, int feature) {
   const Segment& segment = circle.diameters[index];
   const double sigma = circle.sigma_px;
   std::optional<ImagePoints> points = Points({segment[0], segment[1]}, {}, sigma, false);
@@ -163,9 +153,9 @@ void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size
   diameter.parent = feature;
   diameter.line_covariance = fit.covariance;
   const int f = AddFeature(diameter);
-  const int angle = p_.AddBlock(1, {0.0}, {}, false, group);
+  const int angle = p_.AddBlock(1, {});
   AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
-                 {JointProblem::kRotation, JointProblem::kTranslation, center, angle}, f, group);
+                 {JointProblem::kRotation, JointProblem::kTranslation, center, angle}, f);
   p_.plane_lines_.push_back({angle, fit.line});
 }
 

@@ -26,12 +26,11 @@ void ForEachCurve(const JointProblem& problem, const State& state, const Visit& 
 template <typename Visit>
 void ForEachPoint(const JointProblem& problem, const State& state, const Visit& visit) {
   const double* parameters[kMostBlocks];
-  for (const JointProblem::PointBlocks& p : problem.points()) {
-    const Term& term = problem.term(p.term);
-    if (!problem.IsActive(term, state)) continue;
-    problem.Parameters(term, state.x.data(), parameters);
-    const auto& cost = static_cast<const PlanePointCost&>(*term.cost);
-    visit(p.feature, cost, cost.MissPx(parameters));
+  for (const Term* term : problem.ActiveTerms(state)) {
+    const auto* cost = dynamic_cast<const PlanePointCost*>(term->weighed);
+    if (cost == nullptr) continue;
+    problem.Parameters(*term, state.x.data(), parameters);
+    visit(term->feature, *cost, cost->MissPx(parameters));
   }
 }
 

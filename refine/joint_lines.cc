@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/pencil_lean.h"
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/joint_builder.h"
@@ -14,12 +15,10 @@
 namespace circline {
 namespace {
 
-constexpr double kHalfPi = 1.57079632679489661923;
-
 // By how much the lines of a pencil miss its direction, beyond their own noise, radians: root mean
 // square, each as it tells of that, together with one line that misses it by what the noise model
 // says.
-double LineMiss(const PencilObservation& pencil, double usual) {
+double LineDeviation(const PencilObservation& pencil, double usual) {
   constexpr double kUnknowns = 2.0;  // Of a direction.
   double squares = usual * usual, count = 1.0 - kUnknowns;
   for (const LineObservation& line : pencil.lines) {
@@ -43,10 +42,11 @@ double AxisSigma(const PencilObservation& pencil, const NoiseModel& model,
                  const CameraSigma& camera) {
   // Of 4 and 8, on the street of scene-lund, whose directions are 88.4 degrees apart, and
   // chessboard-opencv (scene-lund-more and the boxes had no part in it).
-  constexpr double kOfMiss = 4.0;
+  constexpr double kOfDeviation = 4.0;
   const bool is_free = pencil.direction == PencilDirection::kFree;
   if (is_free || !(model.pencil_axis_rad > 0.0) || !camera.IsWide()) return model.pencil_axis_rad;
-  return std::max(model.pencil_axis_rad, kOfMiss * LineMiss(pencil, model.line_direction_rad));
+  return std::max(model.pencil_axis_rad,
+                  kOfDeviation * LineDeviation(pencil, model.line_direction_rad));
 }
 
 // What a direction may miss its axis by, as the covariance is to count it, in units of `sigma`, the
@@ -96,7 +96,7 @@ int JointProblemBuilder::DirectionBlock(std::size_t index) {
   const int feature = AddFeature(tie);
   const int term = p_.AddTerm(
       is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma) : NewDirectionPrior(axis, sigma),
-      {block}, feature, -1,
+      {block}, feature,
       p_.camera_sigma_.IsWide() ? std::make_unique<MostlyExact>(MostlyExact::kNarrowerOfGuess)
                                 : std::make_unique<MostlyExact>());
   if (!is_free) p_.term(term).lean_shape = LeanAgainst(sigma, pencil, model_, p_.camera_sigma_);
@@ -119,13 +119,14 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
     feature.observation = static_cast<int>(index);
     feature.line = static_cast<int>(j);
     const double sigma = LineSigma(pencil, line);
-    const int axis = AxisOfLine(index, j);
-    if (axis >= 0) {
-      AddAxisLine(line, sigma, axis, feature.id, feature.name);
-      continue;
-    }
     std::optional<ImagePoints> points = Points(line.points, line.inliers, sigma, false);
     if (!points) continue;
+    const int axis = AxisOfLine(index, j);
+    if (axis >= 0) {
+      AddAxisLine(std::move(*points), *line.fit, axis, feature.id, feature.name);
+      continue;
+    }
+    feature.line_covariance = line.fit->covariance;
     if (direction < 0) {
       direction = DirectionBlock(index);
       p_.pencils_.push_back({static_cast<int>(index), direction});
@@ -141,28 +142,25 @@ void JointProblemBuilder::AddLine(ImagePoints points, const Eigen::Vector3d& fit
   DirectionLineCost::Options options;
   options.direction_sigma = direction_sigma;
   options.camera = has_camera_;
-  const int f = AddFeature(std::move(feature)), group = p_.num_groups_++;
-  const int own = p_.AddBlock(direction_sigma > 0.0 ? 2 : 1, {0.0, 0.0}, {}, false, group);
+  const int f = AddFeature(std::move(feature)),
+            own = p_.AddBlock(direction_sigma > 0.0 ? 2 : 1, {});
   const int term =
       AddFeatureTerm(std::make_unique<DirectionLineCost>(std::move(points), fit, options),
-                     {JointProblem::kRotation, direction, own}, f, group);
+                     {JointProblem::kRotation, direction, own}, f);
   p_.lines_.push_back({term, own, f});
 }
 
 // A line through the observed origin, along X or Y.
-void JointProblemBuilder::AddAxisLine(const LineObservation& line, double sigma_px, int axis,
+void JointProblemBuilder::AddAxisLine(ImagePoints points, const LineFit& fit, int axis,
                                       const std::string& id, const std::string& name) {
-  std::optional<ImagePoints> points = Points(line.points, line.inliers, sigma_px, false);
-  if (!points) return;
   p_.x_is_fixed_ = true;
   Feature feature{Feature::Kind::kPlaneLine, id, name};
   feature.dof = 2;
-  feature.free_twice_cost = FreeTwiceCost(*points, line.fit->line);
-  feature.line_covariance = line.fit->covariance;
-  const int f = AddFeature(feature), angle = AddConstant({axis * kHalfPi});
-  AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
-                 {JointProblem::kRotation, JointProblem::kTranslation, origin_point_, angle}, f,
-                 -1);
+  feature.free_twice_cost = FreeTwiceCost(points, fit.line);
+  feature.line_covariance = fit.covariance;
+  const int f = AddFeature(feature), angle = AddConstant({axis * kRightAngle});
+  AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(points), has_camera_),
+                 {JointProblem::kRotation, JointProblem::kTranslation, origin_point_, angle}, f);
 }
 
 // An axis drawn apart from the pencils is a line of its own: through the origin where that is
@@ -170,22 +168,18 @@ void JointProblemBuilder::AddAxisLine(const LineObservation& line, double sigma_
 void JointProblemBuilder::AddDrawnAxis(const std::optional<Segment>& axis, int which) {
   int pencil, index;
   if (!axis || FindAxisLine(obs_, *axis, &pencil, &index)) return;
-  LineObservation line;
-  line.points = {(*axis)[0], (*axis)[1]};
   const std::string id = which == 0 ? "frame.x_axis" : "frame.y_axis",
                     name = which == 0 ? "the X axis" : "the Y axis";
-  std::optional<ImagePoints> points = Points(line.points, {}, DrawnSigma(), false);
+  std::optional<ImagePoints> points = Points({(*axis)[0], (*axis)[1]}, {}, DrawnSigma(), false);
   LineFit fit;
   if (!points || !FitLine(points->points(), DrawnSigma(), &fit).ok()) return;
-  line.fit = fit;
   if (p_.origin_observed_) {
-    AddAxisLine(line, DrawnSigma(), which, id, name);
+    AddAxisLine(std::move(*points), fit, which, id, name);
     return;
   }
   p_.x_is_fixed_ = true;
   const Eigen::Vector3d direction = Eigen::Vector3d::Unit(which);
   const int along = AddConstant({direction.x(), direction.y(), direction.z()});
-  p_.pencils_.push_back({-1, along});
   AddLine(std::move(*points), fit.line, along, 0.0, {Feature::Kind::kLine, id, name});
 }
 

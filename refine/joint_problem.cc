@@ -13,12 +13,7 @@ std::vector<std::uint8_t> JointProblem::FirstReading() const {
   std::vector<std::uint8_t> reading(features_.size(), 1);
   for (std::size_t i = 0; i < features_.size(); ++i) {
     const Feature& f = features_[i];
-    if (f.kind != Feature::Kind::kLine || f.line < 0) continue;
-    reading[i] = observations_.pencils[static_cast<std::size_t>(f.observation)]
-                         .lines[static_cast<std::size_t>(f.line)]
-                         .is_parallel
-                     ? 1
-                     : 0;
+    if (f.kind == Feature::Kind::kLine && f.line >= 0) reading[i] = LineOf(f).is_parallel ? 1 : 0;
   }
   return reading;
 }
@@ -46,13 +41,12 @@ void JointProblem::SeeThrough(const State& state) const {
 }
 
 bool JointProblem::IsMetric(const State& state) const {
-  const auto is_active = [&](int f) { return state.Has(f); };
   return std::any_of(circles_.begin(), circles_.end(),
                      [&](const CircleBlocks& c) {
-                       return is_active(c.feature) && ObservationOf(c).radius > 0.0;
+                       return state.Has(c.feature) && ObservationOf(c).radius > 0.0;
                      }) ||
          std::any_of(lengths_.begin(), lengths_.end(),
-                     [&](const LengthBlocks& l) { return is_active(l.feature); });
+                     [&](const LengthBlocks& l) { return state.Has(l.feature); });
 }
 
 bool JointProblem::OriginIsPlaced(const State& state) const {
@@ -71,10 +65,9 @@ double JointProblem::FreeCost(const State& state) const {
   return 0.5 * twice_cost;
 }
 
-double JointProblem::Cost(const State& state, const Weighing& weighing) const {
+double JointProblem::Cost(const State& state) const {
   double cost = 0.0;
-  for (const Term* term : ActiveTerms(state))
-    cost += 0.5 * TwiceCost(*term, state.x.data(), weighing);
+  for (const Term* term : ActiveTerms(state)) cost += 0.5 * TwiceCost(*term, state.x.data());
   return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
 }
 

@@ -36,7 +36,7 @@ struct Feature {
   int observation = -1, line = -1;  // Index of circle, pencil or length; line within its pencil.
   // Twice the cost of its own free fit, under the loss.
   double free_twice_cost = 0.0;
-  // Of a line that lies in the plane, not along some direction only: the covariance of its fit.
+  // Of the fit of a line.
   std::optional<Eigen::Matrix3d> line_covariance = std::nullopt;
 };
 
@@ -48,12 +48,7 @@ struct State {
 
   bool Has(int feature) const { return active[static_cast<std::size_t>(feature)] != 0; }
 };
-
-// A minimum that has been found. Another competes where it costs no more than so much above it.
-struct Rival {
-  double cost = std::numeric_limits<double>::infinity();
-  double gap = 0.0;
-};
+inline bool HasLessCost(const State& a, const State& b) { return a.cost < b.cost; }
 
 class JointProblem : public Graph {
  public:
@@ -71,8 +66,9 @@ class JointProblem : public Graph {
   // where it cannot lie there.
   bool Admit(std::size_t feature, State* state) const;
   // Runs ceres on it. Not ok where the evidence cannot be evaluated, or at the pace of a step that
-  // would not come near the rival.
-  Status Solve(int max_iterations, State* state, const Rival& rival = Rival()) const;
+  // would not lead to a cost of `most_cost`.
+  Status Solve(int max_iterations, State* state,
+               double most_cost = std::numeric_limits<double>::infinity()) const;
   // The same from a start that may be far off, where much lies in the tails of the losses: under
   // wide ones first, which narrow to their own width.
   Status SolveGraduated(int max_iterations, State* state) const;
@@ -80,7 +76,7 @@ class JointProblem : public Graph {
   // Of the active features' own free fits: no pose costs less.
   double FreeCost(const State& state) const;
   // Infinity where it cannot be evaluated.
-  double Cost(const State& state, const Weighing& weighing = Weighing()) const;
+  double Cost(const State& state) const;
   CameraPose PoseAt(const State& state) const;
   double LogFocalAt(const State& state) const { return *At(kCamera, state); }
   // Share of the contours' and lines' points within their gate.
@@ -90,6 +86,11 @@ class JointProblem : public Graph {
   const EstimationOptions& options() const { return options_; }
   const std::vector<Feature>& features() const { return features_; }
   const Feature& feature(int i) const { return features_[static_cast<std::size_t>(i)]; }
+  // The line of a feature of that kind that is one of a pencil's.
+  const LineObservation& LineOf(const Feature& feature) const {
+    return observations_.pencils[static_cast<std::size_t>(feature.observation)]
+        .lines[static_cast<std::size_t>(feature.line)];
+  }
   // A block's values.
   const double* At(int i, const State& state) const { return state.x.data() + block(i).offset; }
   double* At(int i, State* state) const { return state->x.data() + block(i).offset; }
@@ -110,7 +111,6 @@ class JointProblem : public Graph {
   bool spin_is_free() const { return !x_is_fixed_; }
   bool camera_is_estimated() const { return camera_is_estimated_; }
   const CameraSigma& camera_sigma() const { return camera_sigma_; }
-  int num_groups() const { return num_groups_; }
 
   // Blocks and terms by what they are; -1 where there is none.
   struct CircleBlocks {
@@ -119,7 +119,7 @@ class JointProblem : public Graph {
   const CircleObservation& ObservationOf(const CircleBlocks& circle) const {
     return observations_.circles[static_cast<std::size_t>(circle.observation)];
   }
-  // Pencil of a direction (observation -1: an axis drawn alone), and its lines.
+  // Pencil of a direction, and its lines.
   struct PencilBlocks {
     int observation, direction;
   };
@@ -130,9 +130,6 @@ class JointProblem : public Graph {
     int angle;
     Eigen::Vector3d fit;
   };
-  struct PointBlocks {
-    int term, feature;
-  };
   struct LengthBlocks {
     int a, b, feature;
     double length;
@@ -140,15 +137,13 @@ class JointProblem : public Graph {
   const std::vector<CircleBlocks>& circles() const { return circles_; }
   const std::vector<PencilBlocks>& pencils() const { return pencils_; }
   const std::vector<LineBlocks>& lines() const { return lines_; }
-  const std::vector<PointBlocks>& points() const { return points_; }
-  const std::vector<LengthBlocks>& lengths() const { return lengths_; }
   enum { kRotation = 0, kTranslation = 1, kCamera = 2 };  // Blocks that are always there.
 
  private:
   friend class JointProblemBuilder;
 
   Status SolveNarrowing(const std::vector<double>& widths, int max_iterations, State* state,
-                        const Rival& rival) const;
+                        double most_cost) const;
   Eigen::Matrix3d SenseOfPriors(const CameraPose& seed) const;
   // What Start has found of the circles.
   struct Placed {
@@ -156,15 +151,14 @@ class JointProblem : public Graph {
     std::vector<double> scales;  // Known radii over those in the seed's unit.
     std::optional<Eigen::Vector2d> origin;
   };
-  bool PlaceCircle(const CircleBlocks& circle, const double* camera, State* state,
-                   Eigen::Vector3d* in_plane) const;
-  Placed PlaceCircles(const double* camera, State* state) const;
-  bool PlaceOrigin(const Placed& placed, const double* camera, State* state) const;
-  void PlaceScale(Placed placed, const double* camera, State* state) const;
+  bool PlaceCircle(const CircleBlocks& circle, State* state, Eigen::Vector3d* in_plane) const;
+  Placed PlaceCircles(State* state) const;
+  bool PlaceOrigin(const Placed& placed, State* state) const;
+  void PlaceScale(Placed placed, State* state) const;
   bool PlaceLine(const LineBlocks& line, State* state) const;
-  void PlaceLines(const double* camera, State* state) const;
+  void PlaceLines(State* state) const;
   bool PlanePoint(const State& state, const Eigen::Vector3d& ray, double* xy) const;
-  bool Ray(const Eigen::Vector2d& pixel, const double* camera, Eigen::Vector3d* ray) const;
+  bool Ray(const State& state, const Eigen::Vector2d& pixel, Eigen::Vector3d* ray) const;
 
   const Observations& observations_;
   const EstimationOptions& options_;
@@ -173,10 +167,8 @@ class JointProblem : public Graph {
   std::vector<PencilBlocks> pencils_;
   std::vector<LineBlocks> lines_;
   std::vector<PlaneLineBlocks> plane_lines_;
-  std::vector<PointBlocks> points_;
   std::vector<LengthBlocks> lengths_;
   std::vector<std::string> unused_;
-  int num_groups_ = 0;
   std::vector<int> pose_priors_;  // Terms.
   int center_at_origin_ = -1;     // Circle (index in circles_) whose centre the origin is, or -1.
   CameraSigma camera_sigma_;

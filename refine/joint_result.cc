@@ -55,14 +55,10 @@ void FillFreeDirections(const JointProblem& problem, const Eigen::MatrixXd& T,
   }
 }
 
-// Unit length of the hypothesis over that of the state.
-double UnitOf(const JointProblem& problem, const State& state) {
-  return problem.IsMetric(state) ? 1.0 : 1.0 / problem.PoseAt(state).translation.norm();
-}
-
 void FillCircles(const JointProblem& problem, const State& state, Refined* refined) {
-  const double unit = UnitOf(problem, state);
   const CameraPose pose = problem.PoseAt(state);
+  // Of the hypothesis, in the state's.
+  const double unit = problem.IsMetric(state) ? 1.0 : 1.0 / pose.translation.norm();
   const double* camera = problem.At(JointProblem::kCamera, state);
   const Camera shifted = ShiftedCamera(problem.observations().camera, camera);
   const auto at = [&](int block) { return problem.At(block, state); };
@@ -76,45 +72,47 @@ void FillCircles(const JointProblem& problem, const State& state, Refined* refin
   }
 }
 
+// Standard deviation, degrees, of a pencil's direction whose block is this.
+double DirectionSigmaDeg(const JointProblem& problem, const State& state, const Linearization& at,
+                         const Eigen::Vector3d& direction, int block) {
+  const Eigen::Matrix3d R = problem.PoseAt(state).rotation;
+  std::vector<int> columns = at.Columns(JointProblem::kRotation);
+  const auto turns = static_cast<Eigen::Index>(columns.size());
+  Eigen::MatrixXd J = -CrossMatrix(direction) * R.leftCols(turns);
+  const std::vector<int> own = block >= 0 ? at.Columns(block) : std::vector<int>();
+  if (!own.empty()) {
+    const BlockMatrix plus = problem.block(block).PlusJacobian(problem.At(block, state));
+    J.conservativeResize(3, turns + plus.cols());
+    J.rightCols(plus.cols()) = R * plus;
+    columns.insert(columns.end(), own.begin(), own.end());
+  }
+  return LargestSigmaDeg(J * at.Covariance(columns) * J.transpose());
+}
+
 // Each pencil's own direction, which leans from its axis as far as the evidence says.
 void FillPencils(const JointProblem& problem, const State& state, const Linearization& at,
                  PoseHypothesis* h) {
   const Eigen::Matrix3d R = problem.PoseAt(state).rotation;
-  const std::vector<int> rotation = at.Columns(JointProblem::kRotation);
-  const Eigen::MatrixXd turns = R.leftCols(static_cast<Eigen::Index>(rotation.size()));
-  const std::vector<JointProblem::PencilBlocks>& all = problem.pencils();  // In the same order.
-  auto blocks = all.begin();
   for (std::size_t i = 0; i < problem.observations().pencils.size(); ++i) {
     const PencilObservation& pencil = problem.observations().pencils[i];
-    while (blocks != all.end() && blocks->observation < static_cast<int>(i)) ++blocks;
+    const auto found =
+        std::find_if(problem.pencils().begin(), problem.pencils().end(),
+                     [i](const auto& blocks) { return blocks.observation == static_cast<int>(i); });
+    const int block = found != problem.pencils().end() ? found->direction : -1;
     PencilEstimate estimate;
     estimate.id = pencil.id;
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-    if (blocks != all.end() && blocks->observation == static_cast<int>(i)) {
-      const Block& block = problem.block(blocks->direction);
-      estimate.direction =
-          R * Eigen::Map<const Eigen::Vector3d>(state.x.data() + block.offset).normalized();
-      Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * turns;
-      std::vector<int> columns = rotation;
-      if (at.column(blocks->direction) >= 0) {
-        const BlockMatrix plus = block.PlusJacobian(state.x.data() + block.offset);
-        J.conservativeResize(3, J.cols() + plus.cols());
-        J.rightCols(plus.cols()) = R * plus;
-        const std::vector<int> own = at.Columns(blocks->direction);
-        columns.insert(columns.end(), own.begin(), own.end());
-      }
-      covariance = J * at.Covariance(columns) * J.transpose();
+    if (block >= 0) {
+      estimate.direction = R * Eigen::Vector3d(problem.At(block, state)).normalized();
     } else if (pencil.direction != PencilDirection::kFree) {
       estimate.direction = R.col(static_cast<int>(pencil.direction));
-      const Eigen::MatrixXd J = -CrossMatrix(estimate.direction) * turns;
-      covariance = J * at.Covariance(rotation) * J.transpose();
     } else if (pencil.fit) {
       estimate.direction = pencil.fit->direction;
-      covariance = pencil.fit->covariance;
     } else {
       continue;
     }
-    estimate.sigma_deg = LargestSigmaDeg(covariance);
+    estimate.sigma_deg = block < 0 && pencil.direction == PencilDirection::kFree
+                             ? LargestSigmaDeg(pencil.fit->covariance)
+                             : DirectionSigmaDeg(problem, state, at, estimate.direction, block);
     h->pencils.push_back(estimate);
   }
 }

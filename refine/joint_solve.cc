@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <functional>
 #include <limits>
 #include <vector>
 
@@ -22,14 +21,13 @@ namespace {
 // undistorted once for both.
 class Narrowing : public ceres::EvaluationCallback {
  public:
-  using Set = std::function<void(const Weighing&)>;
-  // `widths`: tuning constants, in those of the losses, one after the other. `see` undistorts.
-  Narrowing(const Set& set, const std::function<void()>& see, const std::vector<double>& widths,
+  // `widths`: tuning constants, in those of the losses, one after the other, for `steps` each.
+  Narrowing(const JointProblem& problem, const State& state, const std::vector<double>& widths,
             int steps)
-      : set_(set), see_(see), widths_(widths), steps_each_(steps) {
+      : problem_(problem), state_(state), widths_(widths), steps_each_(steps) {
     Apply();
   }
-  ~Narrowing() override { set_(Weighing()); }
+  ~Narrowing() override { problem_.SetWeighing(Weighing()); }
   Narrowing(const Narrowing&) = delete;
   Narrowing& operator=(const Narrowing&) = delete;
 
@@ -40,7 +38,7 @@ class Narrowing : public ceres::EvaluationCallback {
     Apply();
   }
   void PrepareForEvaluation(bool jacobians, bool is_new_point) override {
-    if (is_new_point) see_();
+    if (is_new_point) problem_.SeeThrough(state_);
     const bool has_stepped = jacobians && !is_new_point;
     if (is_wide() && has_stepped && ++steps_ == steps_each_) Narrow();
   }
@@ -51,11 +49,11 @@ class Narrowing : public ceres::EvaluationCallback {
   void Apply() {
     Weighing weighing;
     if (is_wide()) weighing.stretch = widths_[next_];
-    set_(weighing);
+    problem_.SetWeighing(weighing);
   }
 
-  const Set& set_;
-  const std::function<void()>& see_;
+  const JointProblem& problem_;
+  const State& state_;  // Where ceres stands.
   const std::vector<double>& widths_;
   int steps_each_;
   std::size_t next_ = 0;
@@ -68,11 +66,11 @@ class Narrowing : public ceres::EvaluationCallback {
 // stands; and where more steps like it would not lead to what competes.
 class Watch : public ceres::IterationCallback {
  public:
-  Watch(const Rival& rival, int unknowns, const Narrowing& losses)
+  Watch(double most_cost, int unknowns, const Narrowing& losses)
       : losses_(losses),
         was_wide_(losses.is_wide()),
         little_(kLittleCost * std::max(1.0, unknowns / kFew)),
-        most_(rival.cost + rival.gap) {}
+        most_(most_cost) {}
   // The first step after the losses have narrowed led upwards: ceres compared its cost with that of
   // the wider ones.
   bool has_risen() const { return has_risen_; }
@@ -114,22 +112,20 @@ bool HasBoundedLoss(const EstimationOptions& options) {
 
 }  // namespace
 
-Status JointProblem::Solve(int max_iterations, State* state, const Rival& rival) const {
-  return SolveNarrowing({}, max_iterations, state, rival);
+Status JointProblem::Solve(int max_iterations, State* state, double most_cost) const {
+  return SolveNarrowing({}, max_iterations, state, most_cost);
 }
 
 Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_iterations,
-                                    State* state, const Rival& rival) const {
+                                    State* state, double most_cost) const {
   // Ceres prints what it cannot evaluate. Where the cost was finite before, it is.
   const bool is_finite = std::all_of(state->x.begin(), state->x.end(),
                                      [](double value) { return std::isfinite(value); });
   if (!is_finite || (!std::isfinite(state->cost) && !std::isfinite(Cost(*state))))
     return Status::Failed("the evidence cannot be evaluated at the seed");
-  const Narrowing::Set set_weighing = [this](const Weighing& weighing) { SetWeighing(weighing); };
   // A wide loss is nearly that of least squares, of which one step comes near enough for the next
   // width; not one that is bounded, and soon flat.
-  const std::function<void()> see = [this, state] { SeeThrough(*state); };
-  Narrowing losses(set_weighing, see, widths, HasBoundedLoss(options_) ? 2 : 1);
+  Narrowing losses(*this, *state, widths, HasBoundedLoss(options_) ? 2 : 1);
   ceres::Problem::Options of_problem = OwnsNothing();
   if (losses.is_wide() || camera_is_estimated_) of_problem.evaluation_callback = &losses;
   ceres::Problem problem(of_problem);
@@ -143,7 +139,7 @@ Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_i
       NearbyOptions(unknowns, max_iterations + losses.num_steps(), least_cost);
   ceres::Solver::Summary summary;
   for (bool is_done = false; !is_done;) {
-    Watch watch(rival, unknowns, losses);
+    Watch watch(most_cost, unknowns, losses);
     options.callbacks = {&watch};
     ceres::Solve(options, &problem, &summary);
     is_done = !summary.IsSolutionUsable() || (!losses.is_wide() && !watch.has_risen());
@@ -170,10 +166,10 @@ Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
   // A loss that is bounded soon has no slope to follow.
   const double near = HasBoundedLoss(options_) ? 1.5 : 3.0;
   std::vector<double> widths;
-  for (double width = std::min(LargestMiss(ActiveTerms(*state), state->x.data()), kWidest);
+  for (double width = std::min(LargestRms(ActiveTerms(*state), state->x.data()), kWidest);
        width > near; width *= kNarrower)
     widths.push_back(width);
-  return SolveNarrowing(widths, max_iterations, state, Rival());
+  return SolveNarrowing(widths, max_iterations, state, std::numeric_limits<double>::infinity());
 }
 
 }  // namespace circline

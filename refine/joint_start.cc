@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <vector>
 
 #include "circline/estimators/basics.h"
@@ -32,40 +33,37 @@ bool JointProblem::PlanePoint(const State& state, const Eigen::Vector3d& ray, do
   return true;
 }
 
-bool JointProblem::Ray(const Eigen::Vector2d& pixel, const double* camera,
+bool JointProblem::Ray(const State& state, const Eigen::Vector2d& pixel,
                        Eigen::Vector3d* ray) const {
   CalibratedPoint p;
   if (!PixelToCalibrated(observations_.camera, pixel, &p)) return false;
-  *ray = Refocused(p.Homogeneous(), camera[0]);
+  *ray = Refocused(p.Homogeneous(), LogFocalAt(state));
   return true;
 }
 
 // A circle by its points in the state's plane: its centre, its radius where that is not known.
 // `circle`: (cx, cy, r) as the points have it. False where it cannot lie there in front of the
 // camera.
-bool JointProblem::PlaceCircle(const CircleBlocks& c, const double* camera, State* state,
-                               Eigen::Vector3d* circle) const {
+bool JointProblem::PlaceCircle(const CircleBlocks& c, State* state, Eigen::Vector3d* circle) const {
   const CameraPose pose = PoseAt(*state);
   const ImagePoints& points = *term(c.term).weighed->points();
-  if (!FitPlaneCircle(points.points(), camera[0], pose, circle)) return false;
+  if (!FitPlaneCircle(points.points(), LogFocalAt(*state), pose, circle)) return false;
   const Eigen::Vector3d center(circle->x(), circle->y(), 0.0);
   if (!((pose.rotation * center + pose.translation).z() > 0.0)) return false;
-  const Block& center_block = block(c.center);
-  if (!center_block.is_constant)
-    std::copy(circle->data(), circle->data() + 2, state->x.data() + center_block.offset);
-  if (!(ObservationOf(c).radius > 0.0))
-    state->x[static_cast<std::size_t>(block(c.radius).offset)] = circle->z();
+  if (!block(c.center).is_constant)
+    std::copy(circle->data(), circle->data() + 2, At(c.center, state));
+  if (!(ObservationOf(c).radius > 0.0)) *At(c.radius, state) = circle->z();
   return true;
 }
 
 // Circles that cannot be placed are made inactive.
-JointProblem::Placed JointProblem::PlaceCircles(const double* camera, State* state) const {
+JointProblem::Placed JointProblem::PlaceCircles(State* state) const {
   Placed placed;
   for (const CircleBlocks& c : circles_) {
     std::uint8_t& is_active = state->active[static_cast<std::size_t>(c.feature)];
     Eigen::Vector3d circle;
     if (is_active == 0) continue;
-    if (!PlaceCircle(c, camera, state, &circle)) {
+    if (!PlaceCircle(c, state, &circle)) {
       is_active = 0;
       continue;
     }
@@ -81,41 +79,39 @@ JointProblem::Placed JointProblem::PlaceCircles(const double* camera, State* sta
 }
 
 // Moves the world origin to where the evidence has it. False where that lies beyond the horizon.
-bool JointProblem::PlaceOrigin(const Placed& placed, const double* camera, State* state) const {
+bool JointProblem::PlaceOrigin(const Placed& placed, State* state) const {
   double xy[2] = {0.0, 0.0};
   const FrameObservation& frame = observations_.frame;
   Eigen::Vector3d ray;
   if (placed.origin) {
     std::copy(placed.origin->data(), placed.origin->data() + 2, xy);
   } else if (frame.origin && center_at_origin_ < 0) {
-    if (!Ray(*frame.origin, camera, &ray) || !PlanePoint(*state, ray, xy)) return false;
+    if (!Ray(*state, *frame.origin, &ray) || !PlanePoint(*state, ray, xy)) return false;
   } else if (frame.x_axis && frame.y_axis && center_at_origin_ < 0) {
     std::array<Eigen::Vector3d, 4> ends;
-    ends.fill(Eigen::Vector3d::Zero());
-    const bool seen =
-        Ray((*frame.x_axis)[0], camera, &ends[0]) && Ray((*frame.x_axis)[1], camera, &ends[1]) &&
-        Ray((*frame.y_axis)[0], camera, &ends[2]) && Ray((*frame.y_axis)[1], camera, &ends[3]);
+    bool seen = true;
+    for (std::size_t k = 0; k < 4; ++k)
+      seen = seen && Ray(*state, (k < 2 ? *frame.x_axis : *frame.y_axis)[k % 2], &ends[k]);
+    if (!seen) return false;
     ray = ends[0].cross(ends[1]).cross(ends[2].cross(ends[3]));
     if (ray.z() < 0.0) ray = -ray;
-    if (!seen || !PlanePoint(*state, ray, xy)) return false;
+    if (!PlanePoint(*state, ray, xy)) return false;
   }
   const Eigen::Matrix3d R = PoseAt(*state).rotation;
   Eigen::Map<Eigen::Vector3d> t(At(kTranslation, state));
   t += R * Eigen::Vector3d(xy[0], xy[1], 0.0);
-  std::vector<std::uint8_t> moved(blocks().size(), 0);
-  for (const CircleBlocks& c : circles_) {
-    const auto block = static_cast<std::size_t>(c.center);
-    if (blocks()[block].is_constant || moved[block] != 0) continue;
-    moved[block] = 1;
-    double* center = state->x.data() + blocks()[block].offset;
-    center[0] -= xy[0];
-    center[1] -= xy[1];
+  std::set<int> centers;
+  for (const CircleBlocks& c : circles_) centers.insert(c.center);
+  for (const int center : centers) {
+    if (block(center).is_constant) continue;
+    At(center, state)[0] -= xy[0];
+    At(center, state)[1] -= xy[1];
   }
   return t.z() > 0.0 || !frame.origin;
 }
 
 // The ends of known lengths, then the unit of all: metric, or such that t is a unit vector.
-void JointProblem::PlaceScale(Placed placed, const double* camera, State* state) const {
+void JointProblem::PlaceScale(Placed placed, State* state) const {
   for (const LengthBlocks& l : lengths_) {
     Eigen::Vector3d ray;
     bool is_seen = true;
@@ -124,7 +120,7 @@ void JointProblem::PlaceScale(Placed placed, const double* camera, State* state)
         observations_.known_lengths[static_cast<std::size_t>(feature(l.feature).observation)]
             .points;
     for (std::size_t k = 0; k < 2; ++k)
-      is_seen = Ray(pixels[k], camera, &ray) && PlanePoint(*state, ray, ends[k]) && is_seen;
+      is_seen = Ray(*state, pixels[k], &ray) && PlanePoint(*state, ray, ends[k]) && is_seen;
     const double length = std::hypot(ends[0][0] - ends[1][0], ends[0][1] - ends[1][1]);
     if (!is_seen || !(length > 0.0)) {
       state->active[static_cast<std::size_t>(l.feature)] = 0;
@@ -135,21 +131,15 @@ void JointProblem::PlaceScale(Placed placed, const double* camera, State* state)
   Eigen::Map<Eigen::Vector3d> t(At(kTranslation, state));
   const double scale = placed.scales.empty() ? 1.0 / t.norm() : Median(std::move(placed.scales));
   t *= scale;
-  std::vector<std::uint8_t> scaled(blocks().size(), 0);
-  const auto apply = [&](int index) {
-    const auto i = static_cast<std::size_t>(index);
-    if (blocks()[i].is_constant || scaled[i] != 0) return;
-    scaled[i] = 1;
-    double* values = state->x.data() + blocks()[i].offset;
-    for (int k = 0; k < blocks()[i].size; ++k) values[k] *= scale;
-  };
+  std::set<int> scaled;
   for (const CircleBlocks& c : circles_) {
-    apply(c.center);
-    if (!(ObservationOf(c).radius > 0.0)) apply(c.radius);
+    scaled.insert(c.center);
+    if (!(ObservationOf(c).radius > 0.0)) scaled.insert(c.radius);
   }
-  for (const LengthBlocks& l : lengths_) {
-    apply(l.a);
-    apply(l.b);
+  for (const LengthBlocks& l : lengths_) scaled.insert({l.a, l.b});
+  for (const int index : scaled) {
+    if (!block(index).is_constant)
+      Eigen::Map<Eigen::VectorXd>(At(index, state), block(index).size) *= scale;
   }
 }
 
@@ -157,8 +147,7 @@ bool JointProblem::PlaceLine(const LineBlocks& l, State* state) const {
   const Term& term = this->term(l.term);
   const double* parameters[kMostBlocks];
   Parameters(term, state->x.data(), parameters);
-  double* line = At(l.line, state);
-  return static_cast<const DirectionLineCost&>(*term.cost).Start(parameters, line);
+  return static_cast<const DirectionLineCost&>(*term.cost).Start(parameters, At(l.line, state));
 }
 
 bool JointProblem::Admit(std::size_t feature, State* state) const {
@@ -171,9 +160,8 @@ bool JointProblem::Admit(std::size_t feature, State* state) const {
   const auto circle = std::find_if(circles_.begin(), circles_.end(), is_it);
   if (circle == circles_.end()) return false;
   const std::vector<double> before = state->x;
-  const double* camera = At(kCamera, state);
   Eigen::Vector3d unused;
-  if (!PlaceCircle(*circle, camera, state, &unused)) return false;
+  if (!PlaceCircle(*circle, state, &unused)) return false;
   // What it shares with circles that take part stays where these have it.
   for (int CircleBlocks::*const block : {&CircleBlocks::center, &CircleBlocks::radius}) {
     const bool is_shared = std::any_of(circles_.begin(), circles_.end(), [&](const auto& other) {
@@ -187,10 +175,9 @@ bool JointProblem::Admit(std::size_t feature, State* state) const {
   return true;
 }
 
-void JointProblem::PlaceLines(const double* camera, State* state) const {
+void JointProblem::PlaceLines(State* state) const {
   const Eigen::Matrix3d R = PoseAt(*state).rotation;
   for (const PencilBlocks& p : pencils_) {
-    if (p.observation < 0) continue;
     const PencilObservation& pencil =
         observations_.pencils[static_cast<std::size_t>(p.observation)];
     if (pencil.direction != PencilDirection::kFree) continue;
@@ -199,7 +186,7 @@ void JointProblem::PlaceLines(const double* camera, State* state) const {
     const double variance = R.col(2).dot(off);
     Eigen::Vector3d d = pencil.fit->direction;
     if (variance > 0.0) d -= R.col(2).dot(d) / variance * off;
-    d = R.transpose() * Refocused(d, camera[0]);
+    d = R.transpose() * Refocused(d, LogFocalAt(*state));
     d.z() = 0.0;
     if (!(d.norm() > 0.0)) continue;
     d.normalize();
@@ -210,12 +197,10 @@ void JointProblem::PlaceLines(const double* camera, State* state) const {
     if (is_active != 0 && !PlaceLine(l, state)) is_active = 0;
   }
   for (const PlaneLineBlocks& l : plane_lines_) {
-    const Block& angle = block(l.angle);
-    if (angle.is_constant) continue;
-    const double grow = std::exp(camera[0]);
+    const double grow = std::exp(LogFocalAt(*state));
     const Eigen::Vector3d line(grow * l.fit.x(), grow * l.fit.y(), l.fit.z());
     const Eigen::Vector3d d = R.transpose() * R.col(2).cross(line);
-    state->x[static_cast<std::size_t>(angle.offset)] = std::atan2(d.y(), d.x());
+    *At(l.angle, state) = std::atan2(d.y(), d.x());
   }
 }
 
@@ -268,17 +253,16 @@ Status JointProblem::Start(const CameraPose& given, double log_focal,
   Eigen::Map<Eigen::Quaterniond>(At(kRotation, state)) =
       Eigen::Quaterniond(seed.rotation).normalized();
   Eigen::Map<Eigen::Vector3d>(At(kTranslation, state)) = seed.translation;
-  const double* camera = At(kCamera, state);
   SeeThrough(*state);
-  const Placed placed = PlaceCircles(camera, state);
+  const Placed placed = PlaceCircles(state);
   if (!circles_.empty() && placed.num_circles == 0) {
     return Status::Refused(
         "no circle can lie in the plane: each crosses its horizon or lies beyond");
   }
-  if (!PlaceOrigin(placed, camera, state))
+  if (!PlaceOrigin(placed, state))
     return Status::Refused("the origin lies beyond the horizon of the plane");
-  PlaceScale(placed, camera, state);
-  PlaceLines(camera, state);
+  PlaceScale(placed, state);
+  PlaceLines(state);
   state->cost = Cost(*state);
   return Status::Ok();
 }

@@ -44,39 +44,25 @@ double LogLineInformation(const Eigen::Matrix3d& covariance, int dimensions) {
 
 // -log of the density of clutter over that of a feature at its mode, whatever the pose.
 double ClutterCost(const JointProblem& problem, const Feature& f) {
-  const Observations& observations = problem.observations();
+  const int dimensions = std::min(f.dof, 2);
+  // Normals that face the camera, or directions across a line.
+  double volume = dimensions == 2 ? 2.0 * kPi : kPi;
   double log_information = 2.0 * std::log(1e3);  // Of a milliradian, a thousandth.
-  int dimensions = 1;
-  double volume = kPi;  // Directions across a line; 2 pi: normals that face the camera.
   switch (f.kind) {
     case Feature::Kind::kCircle:
-      dimensions = 2;
-      volume = 2.0 * kPi;
-      log_information =
-          LogNormalInformation(observations.circles[static_cast<std::size_t>(f.observation)]);
+      log_information = LogNormalInformation(
+          problem.observations().circles[static_cast<std::size_t>(f.observation)]);
       break;
     case Feature::Kind::kLine:
-      if (f.observation < 0) break;
-      log_information =
-          LogLineInformation(observations.pencils[static_cast<std::size_t>(f.observation)]
-                                 .lines[static_cast<std::size_t>(f.line)]
-                                 .fit->covariance,
-                             1);
-      break;
-    case Feature::Kind::kPlaneLine:  // An axis through the origin; a diameter may turn.
-      dimensions = f.dof;
-      volume = f.dof == 2 ? 2.0 * kPi : kPi;
-      if (f.line_covariance) log_information = LogLineInformation(*f.line_covariance, f.dof);
+    case Feature::Kind::kPlaneLine:
+      if (f.line_covariance) log_information = LogLineInformation(*f.line_covariance, dimensions);
       break;
     case Feature::Kind::kAxis:
-      dimensions = f.dof;
-      volume = f.dof == 2 ? 2.0 * kPi : kPi;
-      log_information = -2.0 * f.dof * std::log(problem.options().noise_model.pencil_axis_rad);
+      log_information = -2.0 * dimensions * std::log(problem.options().noise_model.pencil_axis_rad);
       break;
     case Feature::Kind::kCenterMark:
     case Feature::Kind::kPoint: {
       constexpr double kAbout = 100.0;  // Standard deviations: where else it might have been.
-      dimensions = 2;
       volume = kAbout * kAbout;
       log_information = 0.0;
       break;

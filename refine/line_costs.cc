@@ -9,6 +9,7 @@
 #include "circline/refine/block_chain.h"
 #include "circline/refine/cost_functions.h"
 #include "circline/refine/mostly_exact.h"
+#include "circline/refine/point_sums.h"
 #include "circline/refine/square_root.h"
 
 namespace circline {
@@ -236,7 +237,6 @@ bool PlanePointCost::EvaluateWith(const Weighing& weighing, const double* const*
     CostOnly(twice_cost, 3, residuals);
     return true;
   }
-  constexpr double kLeastCurvature = 0.4;  // As for curves (image_points.cc).
   Eigen::Matrix2d W = loss.first * Eigen::Matrix2d::Identity();
   if (s > 0.0) {
     const double along = std::max(loss.first + 2.0 * s * loss.second, kLeastCurvature * loss.first);

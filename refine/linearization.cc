@@ -13,17 +13,6 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-}  // namespace
-
-Linearization::Linearization(const Graph& graph, const std::vector<const Term*>& terms,
-                             const double* x, const Weighing& weighing, Options options)
-    : graph_(graph), x_(x), options_(std::move(options)) {
-  LayOut(terms);
-  for (const Term* term : terms) ok_ = ok_ && AddTerm(*term, weighing);
-}
-
-namespace {
-
 Linearization::Options OptionsOf(const JointProblem& problem) {
   Linearization::Options options;
   options.core = {JointProblem::kRotation, JointProblem::kTranslation};
@@ -42,25 +31,39 @@ Linearization::Options OptionsOf(const JointProblem& problem) {
 
 }  // namespace
 
+Linearization::Linearization(const Graph& graph, const std::vector<const Term*>& terms,
+                             const double* x, const Weighing& weighing, Options options)
+    : graph_(graph), x_(x), options_(std::move(options)) {
+  LayOut(terms);
+  for (const Term* term : terms) ok_ = ok_ && AddTerm(*term, weighing);
+}
+
 Linearization::Linearization(const JointProblem& problem, const State& state,
                              const Weighing& weighing)
     : Linearization(problem, problem.ActiveTerms(state), state.x.data(), weighing,
-                    OptionsOf(problem)) {}
+                    OptionsOf(problem)) {
+  features_ = &problem.features();
+  rows_of_.resize(features_->size());
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    for (int f = rows_[i].feature; f >= 0; f = problem.feature(f).parent)
+      rows_of_[static_cast<std::size_t>(f)].push_back(i);
+  }
+}
 
 void Linearization::LayOut(const std::vector<const Term*>& terms) {
   columns_.assign(graph_.blocks().size(), -1);
   plus_.resize(graph_.blocks().size());
   const auto add = [&](int block, int size) {
     if (size == 0 || column(block) >= 0) return;
-    columns_[static_cast<std::size_t>(block)] = static_cast<int>(groups_.size());
-    groups_.resize(groups_.size() + static_cast<std::size_t>(size), graph_.block(block).group);
+    columns_[static_cast<std::size_t>(block)] = static_cast<int>(uses_.size());
+    uses_.resize(uses_.size() + static_cast<std::size_t>(size), 0);
   };
   for (const int block : options_.core) add(block, graph_.block(block).tangent_size());
-  core_size_ = static_cast<int>(groups_.size());
+  core_size_ = static_cast<int>(uses_.size());
   for (const Term* term : terms) {
     for (const int block : term->blocks) add(block, graph_.block(block).tangent_size());
   }
-  num_unknowns_ = static_cast<int>(groups_.size());
+  num_unknowns_ = static_cast<int>(uses_.size());
   if (options_.considered >= 0)
     add(options_.considered, static_cast<int>(PlusJacobian(options_.considered).cols()));
 }
@@ -84,7 +87,7 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
   double* jacobians[kMostBlocks];
   graph_.Parameters(term, x_, parameters);
   const int num_rows = term.cost->num_residuals();
-  Rows rows{term.feature, term.group, {}, {}, Eigen::VectorXd(num_rows)};
+  Rows rows{term.feature, {}, {}, Eigen::VectorXd(num_rows)};
   constexpr std::size_t kMostColumns = 20;  // Of nearly all.
   rows.columns.reserve(kMostColumns);
   std::size_t ambient_size = 0;
@@ -99,7 +102,10 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
     jacobians[k] = next;
     next += num_rows * graph_.block(block).size;
     const auto size = static_cast<int>(PlusJacobian(block).cols());
-    for (int c = 0; c < size; ++c) rows.columns.push_back(column(block) + c);
+    for (int c = column(block); c < column(block) + size; ++c) {
+      rows.columns.push_back(c);
+      ++uses_[static_cast<std::size_t>(c)];
+    }
   }
   const bool evaluated =
       term.weighed != nullptr
@@ -115,21 +121,22 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
     rows.J.middleCols(first, plus.cols()) = ambient.lazyProduct(plus);
     first += plus.cols();
   }
-  if (term.loss != nullptr && weighing.inliers_only) TakeLoss(term, rows.f.squaredNorm(), &rows);
+  if (term.loss != nullptr && weighing.inliers_only) CountLoss(term, rows.f.squaredNorm(), &rows);
   rows_.push_back(std::move(rows));
   return true;
 }
 
 // The loss counts its residuals W times as much as the covariance does that they are to be counted
 // with, 1 or that of leaning walls.
-void Linearization::TakeLoss(const Term& term, double twice_cost, Rows* rows) {
+void Linearization::CountLoss(const Term& term, double twice_cost, Rows* rows) {
   double rho[3];
   term.loss->Evaluate(twice_cost, rho);
   const double W = std::max(1.0, rho[1]);
   if (term.is_mostly_exact) {
-    Overcounted over{rows->columns, rows->J, rows->f};
+    Eigen::MatrixXd F = rows->J;
+    Eigen::VectorXd r = rows->f;
     double information = 1.0;
-    Eigen::MatrixXd asked = Eigen::MatrixXd::Identity(over.F.rows(), over.F.rows());
+    Eigen::MatrixXd asked = Eigen::MatrixXd::Identity(F.rows(), F.rows());
     if (term.lean_shape) {
       // In the direction's tangent plane. J^T J is P^T P, the plus Jacobian's, a multiple of 1,
       // over the variance of a direction's two components.
@@ -137,22 +144,27 @@ void Linearization::TakeLoss(const Term& term, double twice_cost, Rows* rows) {
           RotationFromBlock(x_ + graph_.block(options_.core.front()).offset) *
           PlusJacobian(term.blocks.front());
       const Eigen::Index n = turned.cols();
-      over.F = Eigen::MatrixXd::Identity(n, n);
+      F = Eigen::MatrixXd::Identity(n, n);
       information = rows->J.squaredNorm() / static_cast<double>(n);
       asked = turned.squaredNorm() / static_cast<double>(n) *
               (turned.transpose() * *term.lean_shape * turned).inverse();
-      over.r = rows->J.completeOrthogonalDecomposition().solve(rows->f);
+      r = rows->J.completeOrthogonalDecomposition().solve(rows->f);
       // Where a direction may run any way no other one is likelier, and nothing is linear.
       constexpr double kNear = 0.1;  // Radians.
-      if (information * asked.trace() * kNear * kNear < turned.squaredNorm()) over.r.setZero();
+      if (information * asked.trace() * kNear * kNear < turned.squaredNorm()) r.setZero();
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> too_much(
         information * (W * Eigen::MatrixXd::Identity(asked.rows(), asked.rows()) - asked));
     const Eigen::MatrixXd root = too_much.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
                                  too_much.eigenvectors().transpose();
-    over.F = root * over.F;
-    over.r = root * over.r;
-    overcounted_.push_back(std::move(over));
+    F = root * F;
+    r = root * r;
+    const auto first = static_cast<int>(overcounted_residuals_.size());
+    for (int c = 0; c < F.cols(); ++c) {
+      for (int k = 0; k < F.rows(); ++k)
+        overcounted_.emplace_back(first + k, rows->columns[static_cast<std::size_t>(c)], F(k, c));
+    }
+    overcounted_residuals_.insert(overcounted_residuals_.end(), r.begin(), r.end());
   }
   rows->J *= std::sqrt(W);
   rows->f *= std::sqrt(W);
@@ -185,18 +197,19 @@ Linearization::Rows Linearization::Together(const std::vector<std::size_t>& part
   return all;
 }
 
-double Linearization::OwnVariance(int block, int coordinate) const {
-  const int group = graph_.block(block).group;
-  std::vector<std::size_t> parts;
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    if (rows_[i].group == group) parts.push_back(i);
-  }
+double Linearization::OwnVariance(int feature, int block, int coordinate) const {
+  const std::vector<std::size_t>& parts = rows_of_[static_cast<std::size_t>(feature)];
   const Rows all = Together(parts);
   std::vector<Eigen::Index> own;
   Eigen::Index at = -1;
   for (std::size_t c = 0; c < all.columns.size(); ++c) {
-    if (groups_[static_cast<std::size_t>(all.columns[c])] != group) continue;
-    if (all.columns[c] == column(block) + coordinate) at = static_cast<Eigen::Index>(own.size());
+    const int column = all.columns[c];
+    const auto uses = std::count_if(parts.begin(), parts.end(), [&](std::size_t part) {
+      const std::vector<int>& columns = rows_[part].columns;
+      return std::find(columns.begin(), columns.end(), column) != columns.end();
+    });
+    if (column < core_size_ || uses < uses_[static_cast<std::size_t>(column)]) continue;
+    if (column == this->column(block) + coordinate) at = static_cast<Eigen::Index>(own.size());
     own.push_back(static_cast<Eigen::Index>(c));
   }
   if (at < 0) return 0.0;

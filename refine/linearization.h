@@ -57,29 +57,26 @@ class Linearization {
   // Of unknowns that share a residual, n x n for n columns.
   Eigen::MatrixXd Covariance(const std::vector<int>& columns) const;
 
+  // --- Of one photo. ---
+
   // By feature: d^2 = 2 (C(all) - C(without it) - C(its own free fit)), to second order, and its
   // degrees of freedom; 0 for what is inactive or has no test. Needs ComputeCovariance.
   struct Misfit {
     double d2 = 0.0;
     int dof = 1;
   };
-  std::vector<Misfit> Misfits(const std::vector<Feature>& features) const;
-  // Variance of one coordinate of a block that a feature has of its own, all shared unknowns held.
-  double OwnVariance(int block, int coordinate) const;
+  std::vector<Misfit> Misfits() const;
+  // Variance of one coordinate of a block that a feature has of its own, all unknowns held that it
+  // shares with others.
+  double OwnVariance(int feature, int block, int coordinate) const;
 
  private:
   // Residuals of one or several terms, by the columns that they have.
   struct Rows {
-    int feature = -1, group = -1;
+    int feature = -1;
     std::vector<int> columns;
     Eigen::MatrixXd J;
     Eigen::VectorXd f;
-  };
-  // F^T F: what the information holds too much of, by a loss; r: what F misses by.
-  struct Overcounted {
-    std::vector<int> columns;  // Of F.
-    Eigen::MatrixXd F;
-    Eigen::VectorXd r;
   };
   // X S X^T, a part of the covariance.
   struct Part {
@@ -88,25 +85,30 @@ class Linearization {
 
   void LayOut(const std::vector<const Term*>& terms);
   bool AddTerm(const Term& term, const Weighing& weighing);
-  void TakeLoss(const Term& term, double twice_cost, Rows* rows);
+  void CountLoss(const Term& term, double twice_cost, Rows* rows);
   const Eigen::MatrixXd& PlusJacobian(int block);  // Of the block's manifold, worked out once.
   Rows Together(const std::vector<std::size_t>& parts) const;
+  std::vector<int> CoreColumns() const;
   InverseOnPattern::Sparse Information(Eigen::MatrixXd* with_considered) const;
   bool Invert(InverseOnPattern::Sparse information);
   void AddConsidered(const Eigen::MatrixXd& with_considered);
   void AddOvercounted();
-  Misfit MisfitOf(const std::vector<Feature>& features, std::size_t feature,
-                  const std::vector<std::size_t>& parts) const;
+  Misfit MisfitOf(std::size_t feature) const;
 
   const Graph& graph_;
   const double* x_;
   const Options options_;
   bool ok_ = true;
   std::vector<int> columns_;              // By block.
-  std::vector<int> groups_;               // By column: Block::group.
+  std::vector<int> uses_;                 // By column: terms that have it.
   int core_size_ = 0, num_unknowns_ = 0;  // Columns; those of what is considered come last.
   std::vector<Rows> rows_;
-  std::vector<Overcounted> overcounted_;
+  const std::vector<Feature>* features_ = nullptr;  // Of one photo.
+  // By feature: its own, and those of what says nothing without it.
+  std::vector<std::vector<std::size_t>> rows_of_;
+  // F, where F^T F is what the information holds too much of, by a loss; and what F misses by.
+  std::vector<Eigen::Triplet<double>> overcounted_;
+  std::vector<double> overcounted_residuals_;
   std::vector<Eigen::MatrixXd> plus_;  // By block.
   std::vector<double> ambient_;        // Jacobians of one term, as its cost function writes them.
   std::optional<InverseOnPattern> inverse_;

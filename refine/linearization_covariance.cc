@@ -29,7 +29,7 @@ Eigen::MatrixXd InverseOfPositive(const Eigen::MatrixXd& matrix) {
 
 Sparse Linearization::Information(Eigen::MatrixXd* with_considered) const {
   const int n = num_unknowns_;
-  with_considered->setZero(n, static_cast<Eigen::Index>(groups_.size()) - n);
+  with_considered->setZero(n, static_cast<Eigen::Index>(uses_.size()) - n);
   std::vector<Eigen::Triplet<double>> entries;
   for (int i = 0; i < core_size_; ++i) {
     for (int j = 0; j < core_size_; ++j) entries.emplace_back(i, j, 0.0);  // All have a place.
@@ -53,6 +53,12 @@ Sparse Linearization::Information(Eigen::MatrixXd* with_considered) const {
   return information;
 }
 
+std::vector<int> Linearization::CoreColumns() const {
+  std::vector<int> core(static_cast<std::size_t>(core_size_));
+  std::iota(core.begin(), core.end(), 0);
+  return core;
+}
+
 // Directions of the core without information, at unit diagonal, are found by the variance that they
 // have where it is given next to none; with some, v v^T is what the inverse has too much.
 bool Linearization::Invert(Sparse information) {
@@ -65,11 +71,9 @@ bool Linearization::Invert(Sparse information) {
   inverse_.emplace(raised);
   null_space_.resize(n, 0);
   if (!inverse_->ok() || n == 0) return inverse_->ok();
-  std::vector<int> core(static_cast<std::size_t>(n));
-  std::iota(core.begin(), core.end(), 0);
   const Eigen::VectorXd unscale = scale.cwiseInverse();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      unscale.asDiagonal() * (*inverse_)(core)*unscale.asDiagonal());
+      unscale.asDiagonal() * (*inverse_)(CoreColumns()) * unscale.asDiagonal());
   if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) return false;
   const auto nulls = (eigen.eigenvalues().array() >= 0.5 / kNoInformation).count();
   if (nulls == 0) return true;
@@ -105,31 +109,15 @@ void Linearization::AddConsidered(const Eigen::MatrixXd& with_considered) {
 // (A - F^T F)^-1 = A^-1 + X S X^T with X = A^-1 F^T, S = (I - F X)^-1 (Woodbury), about an estimate
 // that lies X S r from here, r being what F misses by.
 void Linearization::AddOvercounted() {
-  Eigen::Index size = 0;
-  for (const Overcounted& over : overcounted_) size += over.F.rows();
+  const auto size = static_cast<Eigen::Index>(overcounted_residuals_.size());
   if (size == 0) return;
-  Eigen::MatrixXd F = Eigen::MatrixXd::Zero(size, num_unknowns_);
-  Eigen::VectorXd r(size);
-  Eigen::Index first = 0;
-  for (const Overcounted& over : overcounted_) {
-    for (Eigen::Index k = 0; k < over.F.cols(); ++k)
-      F.col(over.columns[static_cast<std::size_t>(k)]).segment(first, over.F.rows()) +=
-          over.F.col(k);
-    r.segment(first, over.r.size()) = over.r;
-    first += over.F.rows();
-  }
+  Sparse F(size, num_unknowns_);
+  F.setFromTriplets(overcounted_.begin(), overcounted_.end());
   Part part{inverse_->Times(F.transpose()), {}};
-  Eigen::MatrixXd left = Eigen::MatrixXd::Identity(size, size);
-  first = 0;
-  for (const Overcounted& over : overcounted_) {
-    for (Eigen::Index k = 0; k < over.F.cols(); ++k)
-      left.middleRows(first, over.F.rows()) -=
-          over.F.col(k) * part.X.row(over.columns[static_cast<std::size_t>(k)]);
-    first += over.F.rows();
-  }
-  part.S = InverseOfPositive(left);
+  part.S = InverseOfPositive(Eigen::MatrixXd::Identity(size, size) - F * part.X);
   if (options_.at_minimum) {
-    const Eigen::VectorXd away = part.S * r;
+    const Eigen::VectorXd away =
+        part.S * Eigen::Map<const Eigen::VectorXd>(overcounted_residuals_.data(), size);
     part.S += away * away.transpose();
   }
   parts_.push_back(std::move(part));
@@ -145,9 +133,7 @@ bool Linearization::ComputeCovariance() {
   if (!Invert(information)) return false;
   AddConsidered(with_considered);
   AddOvercounted();
-  std::vector<int> core(static_cast<std::size_t>(core_size_));
-  std::iota(core.begin(), core.end(), 0);
-  covariance_ = Covariance(core);
+  covariance_ = Covariance(CoreColumns());
   return covariance_.allFinite();
 }
 
@@ -172,11 +158,10 @@ Eigen::MatrixXd Linearization::Covariance(const std::vector<int>& columns) const
 
 // With the leverage S = J Sigma J^T of the feature's residuals f, the others would cost 1/2 f^T S
 // (I - S)^-1 f less without it. Where S is 1 the feature alone fixes an unknown: no test there.
-Linearization::Misfit Linearization::MisfitOf(const std::vector<Feature>& features,
-                                              std::size_t feature,
-                                              const std::vector<std::size_t>& parts) const {
+Linearization::Misfit Linearization::MisfitOf(std::size_t feature) const {
+  const std::vector<Feature>& features = *features_;
   Misfit misfit{-features[feature].free_twice_cost, features[feature].dof};
-  for (const std::size_t part : parts) {
+  for (const std::size_t part : rows_of_[feature]) {
     misfit.d2 += rows_[part].f.squaredNorm();
     const auto own = static_cast<std::size_t>(rows_[part].feature);
     if (own == feature) continue;
@@ -184,7 +169,7 @@ Linearization::Misfit Linearization::MisfitOf(const std::vector<Feature>& featur
     misfit.dof += features[own].dof;
   }
   misfit.d2 = std::max(0.0, misfit.d2);
-  const Rows all = Together(parts);
+  const Rows all = Together(rows_of_[feature]);
   const Eigen::MatrixXd S = all.J * Covariance(all.columns) * all.J.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(S);
   for (Eigen::Index k = 0; k < S.rows(); ++k) {
@@ -196,20 +181,10 @@ Linearization::Misfit Linearization::MisfitOf(const std::vector<Feature>& featur
   return misfit;
 }
 
-// What says nothing without a feature is a part of it.
-std::vector<Linearization::Misfit> Linearization::Misfits(
-    const std::vector<Feature>& features) const {
-  std::vector<Misfit> misfits(features.size());
-  std::vector<std::vector<std::size_t>> parts(features.size());
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    if (rows_[i].feature < 0) continue;
-    const auto feature = static_cast<std::size_t>(rows_[i].feature);
-    parts[feature].push_back(i);
-    if (features[feature].parent >= 0)
-      parts[static_cast<std::size_t>(features[feature].parent)].push_back(i);
-  }
-  for (std::size_t i = 0; i < features.size(); ++i) {
-    if (!parts[i].empty()) misfits[i] = MisfitOf(features, i, parts[i]);
+std::vector<Linearization::Misfit> Linearization::Misfits() const {
+  std::vector<Misfit> misfits(rows_of_.size());
+  for (std::size_t i = 0; i < misfits.size(); ++i) {
+    if (!rows_of_[i].empty()) misfits[i] = MisfitOf(i);
   }
   return misfits;
 }

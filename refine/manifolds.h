@@ -3,28 +3,44 @@
 #define CIRCLINE_REFINE_MANIFOLDS_H_
 
 #include <ceres/autodiff_manifold.h>
-#include <ceres/manifold.h>
 #include <ceres/rotation.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 namespace circline {
 
 // Unit quaternions (x, y, z, w), perturbed in the world: R exp([delta]x). With two tangent
 // dimensions the spin about the world's Z axis is held.
-class WorldRotationManifold : public ceres::Manifold {
- public:
-  explicit WorldRotationManifold(int tangent_size) : tangent_size_(tangent_size) {}
-  int AmbientSize() const override { return 4; }
-  int TangentSize() const override { return tangent_size_; }
-  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override;
-  bool PlusJacobian(const double* x, double* jacobian) const override;
-  bool Minus(const double* y, const double* x, double* y_minus_x) const override;
-  bool MinusJacobian(const double* x, double* jacobian) const override;
+template <int kTangentSize>
+struct TurnOfWorld {
+  template <typename T>
+  using Quaternion = Eigen::Quaternion<T>;
 
- private:
-  int tangent_size_;
+  template <typename T>
+  bool Plus(const T* x, const T* delta, T* x_plus_delta) const {
+    T angle_axis[3] = {static_cast<T>(0.0), static_cast<T>(0.0), static_cast<T>(0.0)}, turn[4];
+    std::copy(delta, delta + kTangentSize, angle_axis);
+    ceres::AngleAxisToQuaternion(angle_axis, turn);
+    Eigen::Map<Quaternion<T>> sum(x_plus_delta);
+    sum = Eigen::Map<const Quaternion<T>>(x) * Quaternion<T>(turn[0], turn[1], turn[2], turn[3]);
+    sum.normalize();
+    return true;
+  }
+  template <typename T>
+  bool Minus(const T* y, const T* x, T* y_minus_x) const {
+    const Quaternion<T> turn =
+        Eigen::Map<const Quaternion<T>>(x).conjugate() * Eigen::Map<const Quaternion<T>>(y);
+    const T by_ceres[4] = {turn.w(), turn.x(), turn.y(), turn.z()};
+    T angle_axis[3];
+    ceres::QuaternionToAngleAxis(by_ceres, angle_axis);
+    std::copy(angle_axis, angle_axis + kTangentSize, y_minus_x);
+    return true;
+  }
 };
+template <int kTangentSize>
+using WorldRotationManifold = ceres::AutoDiffManifold<TurnOfWorld<kTangentSize>, 4, kTangentSize>;
 
 // Unit vectors of the plane z = 0, turned about z.
 struct TurnInPlane {

@@ -12,7 +12,6 @@ namespace circline {
 namespace {
 
 constexpr std::size_t kMaxCircleSeeds = 6;  // Circles that propose both their planes.
-constexpr double kAnySigmaPx = 0.5;         // Every feature has its own; this is never taken.
 
 void Add(const Seed& added, std::vector<Seed>* seeds) {
   const bool known = std::any_of(seeds->begin(), seeds->end(), [&](const Seed& seed) {

@@ -11,6 +11,9 @@
 
 namespace circline {
 
+// For WorldRotation, where every feature has a noise of its own: never taken.
+inline constexpr double kAnySigmaPx = 0.5;
+
 struct Seed {
   CameraPose pose;
   double log_focal = 0.0;  // Of the camera that it was found with against the one given.

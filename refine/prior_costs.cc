@@ -1,18 +1,27 @@
 // What is known beside the pixels. Few and small: derivatives are automatic.
 #include <ceres/autodiff_cost_function.h>
-#include <ceres/dynamic_autodiff_cost_function.h>
+#include <ceres/normal_prior.h>
 #include <ceres/rotation.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "circline/estimators/basics.h"
-#include "circline/refine/block_chain.h"
 #include "circline/refine/cost_functions.h"
 #include "circline/refine/given_poses.h"
 
 namespace circline {
 namespace {
+
+template <typename T>
+using Vector3 = Eigen::Matrix<T, 3, 1>;
+// Parameter blocks: a vector, and a quaternion (x, y, z, w).
+template <typename T>
+using Vector3Block = Eigen::Map<const Vector3<T>>;
+template <typename T>
+using RotationBlock = Eigen::Map<const Eigen::Quaternion<T>>;
 
 // A value of a jet or a double.
 double Scalar(double v) { return v; }
@@ -21,18 +30,25 @@ double Scalar(const ceres::Jet<T, N>& v) {
   return v.a;
 }
 
+// Angle times axis.
+template <typename T>
+Vector3<T> AngleAxisOf(const Eigen::Quaternion<T>& q) {
+  const T by_ceres[4] = {q.w(), q.x(), q.y(), q.z()};
+  Vector3<T> angle_axis;
+  ceres::QuaternionToAngleAxis(by_ceres, angle_axis.data());
+  return angle_axis;
+}
+
 struct AngleResidual {
   double angle, sigma;
 
   template <typename T>
   bool operator()(const T* a, const T* b, T* residual) const {
     using std::atan2;
-    using std::sqrt;
-    T cross[3];
-    ceres::CrossProduct(a, b, cross);
-    const T sine = sqrt(ceres::DotProduct(cross, cross)), cosine = ceres::DotProduct(a, b);
-    if (!(Scalar(sine) > 0.0)) return false;
-    const T between = atan2(sine, cosine);
+    const Vector3Block<T> u(a), v(b);
+    const Vector3<T> cross = u.cross(v);
+    if (!(Scalar(cross.squaredNorm()) > 0.0)) return false;
+    const T between = atan2(cross.norm(), u.dot(v));
     // The angle or its supplement, whichever is nearer.
     const double folded = std::acos(std::cos(angle));
     const double direct = std::abs(Scalar(between) - folded),
@@ -74,33 +90,11 @@ struct AcrossResidual {
 
   template <typename T>
   bool operator()(const T* direction, T* residual) const {
-    for (int k = 0; k < kRows; ++k) {
-      residual[k] =
-          across(k, 0) * direction[0] + across(k, 1) * direction[1] + across(k, 2) * direction[2];
-    }
+    Eigen::Map<Eigen::Matrix<T, kRows, 1>> off(residual);
+    off = across.template cast<T>() * Vector3Block<T>(direction);
     return true;
   }
 };
-
-struct GaussianResidual {
-  std::vector<double> sigmas, mean;
-
-  template <typename T>
-  bool operator()(const T* const* x, T* residual) const {
-    for (std::size_t k = 0; k < sigmas.size(); ++k) {
-      const double at = mean.empty() ? 0.0 : mean[k];
-      residual[k] = sigmas[k] > 0.0 ? (x[0][k] - at) / sigmas[k] : static_cast<T>(0.0);
-    }
-    return true;
-  }
-};
-
-// ceres' order of a quaternion is w first.
-template <typename T>
-void ToCeres(const Eigen::Quaterniond& q, T* out) {
-  const double values[4] = {q.w(), q.x(), q.y(), q.z()};
-  for (int k = 0; k < 4; ++k) out[k] = static_cast<T>(values[k]);
-}
 
 struct PoseResidual {
   Eigen::Quaterniond inverse_mean;
@@ -109,16 +103,11 @@ struct PoseResidual {
 
   template <typename T>
   bool operator()(const T* q, const T* t, T* residual) const {
-    const T rotation[4] = {q[3], q[0], q[1], q[2]};
-    T mean[4], difference[4], delta[6];
-    ToCeres(inverse_mean, mean);
-    ceres::QuaternionProduct(rotation, mean, difference);
-    ceres::QuaternionToAngleAxis(difference, delta);
-    for (int k = 0; k < 3; ++k) delta[3 + k] = t[k] - translation[k];
-    for (int k = 0; k < 6; ++k) {
-      residual[k] = static_cast<T>(0.0);
-      for (int i = 0; i < 6; ++i) residual[k] += square_root(k, i) * delta[i];
-    }
+    Eigen::Matrix<T, 6, 1> delta;
+    delta << AngleAxisOf<T>(RotationBlock<T>(q) * inverse_mean.cast<T>()),
+        Vector3Block<T>(t) - translation.cast<T>();
+    Eigen::Map<Eigen::Matrix<T, 6, 1>> whitened(residual);
+    whitened = square_root.cast<T>() * delta;
     return true;
   }
 };
@@ -133,20 +122,12 @@ struct GivenPoseResidual {
   bool operator()(const T* q, const T* t, const T* frame_q, const T* frame_t, const T* log_scale,
                   T* residual) const {
     using std::exp;
-    T given[4];
-    ToCeres(rotation, given);
-    const T frame[4] = {frame_q[3], frame_q[0], frame_q[1], frame_q[2]};
-    const T inverse[4] = {q[3], -q[0], -q[1], -q[2]};
-    T expected[4], difference[4], moved[3];
-    ceres::QuaternionProduct(given, frame, expected);
-    ceres::QuaternionProduct(expected, inverse, difference);
-    ceres::QuaternionToAngleAxis(difference, residual);
-    ceres::UnitQuaternionRotatePoint(given, frame_t, moved);
-    for (int k = 0; k < 3; ++k) {
-      residual[k] /= rotation_sigma;
-      residual[3 + k] =
-          (t[k] - (moved[k] + translation[k]) * exp(-log_scale[0])) / translation_sigma;
-    }
+    const Eigen::Quaternion<T> given = rotation.cast<T>();
+    const Vector3<T> moved = given * Vector3Block<T>(frame_t) + translation.cast<T>();
+    Eigen::Map<Vector3<T>> turn(residual), step(residual + 3);
+    turn = AngleAxisOf<T>(given * RotationBlock<T>(frame_q) * RotationBlock<T>(q).conjugate()) /
+           static_cast<T>(rotation_sigma);
+    step = (Vector3Block<T>(t) - moved * exp(-log_scale[0])) / static_cast<T>(translation_sigma);
     return true;
   }
 };
@@ -157,23 +138,13 @@ struct MeasuredDirectionResidual {
 
   template <typename T>
   bool operator()(const T* q, T* residual) const {
-    const T rotation[4] = {q[3], q[0], q[1], q[2]};
-    const T world[3] = {static_cast<T>(in_world.x()), static_cast<T>(in_world.y()),
-                        static_cast<T>(in_world.z())};
-    T camera[3];
-    ceres::UnitQuaternionRotatePoint(rotation, world, camera);
     // All three, so that the opposite direction is no solution.
-    for (int k = 0; k < 3; ++k) residual[k] = (camera[k] - in_camera[k]) / sigma;
+    Eigen::Map<Vector3<T>> difference(residual);
+    difference =
+        (RotationBlock<T>(q) * in_world.cast<T>() - in_camera.cast<T>()) / static_cast<T>(sigma);
     return true;
   }
 };
-
-Eigen::Matrix<double, 2, 3> Across(const Eigen::Vector3d& axis, double sigma) {
-  Eigen::Matrix<double, 2, 3> across;
-  across.row(0) = axis.unitOrthogonal() / sigma;
-  across.row(1) = axis.cross(axis.unitOrthogonal()) / sigma;
-  return across;
-}
 
 }  // namespace
 
@@ -192,16 +163,21 @@ ceres::CostFunction* NewLogPrior(double value, double sigma) {
 
 ceres::CostFunction* NewGaussianPrior(const std::vector<double>& sigmas,
                                       const std::vector<double>& mean) {
-  auto* cost =
-      new ceres::DynamicAutoDiffCostFunction<GaussianResidual>(new GaussianResidual{sigmas, mean});
-  cost->AddParameterBlock(static_cast<int>(sigmas.size()));
-  cost->SetNumResiduals(static_cast<int>(sigmas.size()));
-  return cost;
+  const auto size = static_cast<Eigen::Index>(sigmas.size());
+  const Eigen::VectorXd inverse =
+      Eigen::Map<const Eigen::VectorXd>(sigmas.data(), size).unaryExpr([](double s) {
+        return s > 0.0 ? 1.0 / s : 0.0;
+      });
+  Eigen::VectorXd at = Eigen::VectorXd::Zero(size);
+  std::copy(mean.begin(), mean.end(), at.data());
+  return new ceres::NormalPrior(inverse.asDiagonal().toDenseMatrix(), at);
 }
 
 ceres::CostFunction* NewDirectionPrior(const Eigen::Vector3d& axis, double sigma) {
+  Eigen::Matrix<double, 2, 3> across;
+  across << axis.unitOrthogonal().transpose(), axis.cross(axis.unitOrthogonal()).transpose();
   return new ceres::AutoDiffCostFunction<AcrossResidual<2>, 2, 3>(
-      new AcrossResidual<2>{Across(axis, sigma)});
+      new AcrossResidual<2>{across / sigma});
 }
 
 ceres::CostFunction* NewInPlanePrior(const Eigen::Vector3d& normal, double sigma) {

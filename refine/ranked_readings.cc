@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstddef>
 #include <iterator>
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -29,14 +28,11 @@ bool IsSameMinimum(const JointProblem& problem, const Refined& a, const Refined&
 // Hypotheses of all minima that compete.
 Status FillHypotheses(const JointProblem& problem, const std::vector<State>& minima,
                       std::vector<Refined>* hypotheses) {
-  double best = std::numeric_limits<double>::infinity();
-  for (const State& minimum : minima) best = std::min(best, minimum.cost);
-  const double most = best + problem.options().max_cost_gap;
+  const auto best = std::min_element(minima.begin(), minima.end(), HasLessCost);
   std::vector<Refined>& all = *hypotheses;
-  all.clear();
   Status last = Status::Failed("no seed pose could be refined");
   for (const State& minimum : minima) {
-    if (minimum.cost > most) continue;
+    if (minimum.cost > best->cost + problem.options().max_cost_gap) continue;
     Refined refined;
     const Status status = FillRefined(problem, minimum, &refined);
     if (!status.ok()) {
@@ -49,10 +45,9 @@ Status FillHypotheses(const JointProblem& problem, const std::vector<State>& min
     if (!known) all.push_back(std::move(refined));
   }
   if (all.empty()) return last;
-  constexpr double kAnySigmaPx = 0.5;  // Every feature has its own.
+  // A spin that nothing fixes is settled by convention, whatever the seed's was.
   for (Refined& refined : all) {
     CameraPose& pose = refined.hypothesis.cam_from_world;
-    // A spin that nothing fixes is settled by convention, whatever the seed's was.
     if (problem.spin_is_free()) {
       WorldRotation(problem.observations(), pose.rotation.col(2), pose.translation, kAnySigmaPx,
                     &pose.rotation);
@@ -66,12 +61,6 @@ std::vector<PoseHypothesis> Ranked(const std::vector<Refined>& all) {
   for (const Refined& refined : all) hypotheses.push_back(refined.hypothesis);
   RankHypotheses(&hypotheses);
   return hypotheses;
-}
-
-double LeastCost(const std::vector<Refined>& all) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const Refined& refined : all) least = std::min(least, refined.hypothesis.cost);
-  return least;
 }
 
 // In PoseHypothesis::structure.
@@ -135,10 +124,9 @@ std::vector<std::size_t> LeftOutWithSecond(const JointProblem& problem,
   }
   std::stable_sort(found.begin(), found.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
+  found.resize(std::min(found.size(), kMostCircles));
   std::vector<std::size_t> circles;
-  for (const auto& [probability, i] : found) {
-    if (circles.size() < kMostCircles) circles.push_back(i);
-  }
+  for (const auto& [probability, i] : found) circles.push_back(i);
   return circles;
 }
 
@@ -156,10 +144,14 @@ std::vector<std::size_t> AddSecondReadings(const JointProblem& problem, std::vec
     std::vector<Refined> more = ReadSecond(problem, first, i);
     std::move(more.begin(), more.end(), std::back_inserter(*all));
   }
-  const double most = LeastCost(*all) + problem.options().max_cost_gap;
-  all->erase(std::remove_if(all->begin(), all->end(),
-                            [most](const Refined& r) { return r.hypothesis.cost > most; }),
-             all->end());
+  const auto cost = [](const Refined& r) { return r.hypothesis.cost; };
+  double most = problem.options().max_cost_gap;
+  most += cost(*std::min_element(all->begin(), all->end(), [&](const Refined& a, const Refined& b) {
+    return cost(a) < cost(b);
+  }));
+  all->erase(
+      std::remove_if(all->begin(), all->end(), [&](const Refined& r) { return cost(r) > most; }),
+      all->end());
   return circles;
 }
 
@@ -177,9 +169,8 @@ Status RankReadings(const JointProblem& problem, const std::vector<State>& minim
   const auto notes_of = std::find_if(all.begin(), all.end(), [&](const Refined& r) {
     return r.hypothesis.cost == best.cost && r.hypothesis.structure == best.structure;
   });
-  if (notes_of != all.end()) {
+  if (notes_of != all.end())
     estimate->notes.insert(estimate->notes.end(), notes_of->notes.begin(), notes_of->notes.end());
-  }
   for (const std::size_t i : read_again) {
     const std::string& id = problem.observations().circles[i].id;
     const bool is_best = best.structure.find(SecondOf(id)) != std::string::npos;

@@ -42,8 +42,7 @@ class ReadingSearch {
     for (std::size_t next = 0; next < queue.size() && next < most; ++next) {
       const Candidate candidate = queue[next];
       std::vector<State> minima = RefineAll(candidate);
-      std::stable_sort(minima.begin(), minima.end(),
-                       [](const State& a, const State& b) { return a.cost < b.cost; });
+      std::stable_sort(minima.begin(), minima.end(), HasLessCost);
       // A minimum that costs too much may do so because of what contradicts it.
       constexpr std::size_t kMostMinima = 4;
       minima.resize(std::min(minima.size(), kMostMinima));
@@ -95,7 +94,7 @@ class ReadingSearch {
     std::vector<std::size_t> tried;
     std::set<int> circles;  // Whose planes were tried.
     const int best_circle = BestCircle(candidate);
-    double best = std::numeric_limits<double>::infinity();
+    double best = kNoRival;
     bool is_consistent = false;  // The best one explains all that is to take part.
     for (SeedStart& start : StartsOf(problem_, seeds, candidate.reading, &last_)) {
       State& state = start.state;
@@ -110,11 +109,10 @@ class ReadingSearch {
       tried.push_back(start.seed);
       if (source < 0) circles.insert(source);
       if (!SolveFrom(is_consistent, best, &state)) continue;
-      if (std::any_of(found.begin(), found.end(), [&](const auto& other) {
-            return IsSamePose(problem_, state, other.second);
-          })) {
-        continue;
-      }
+      const bool is_known = std::any_of(found.begin(), found.end(), [&](const auto& other) {
+        return IsSamePose(problem_, state, other.second);
+      });
+      if (is_known) continue;
       if (state.cost < best) {
         best = state.cost;
         is_consistent = state.active == candidate.reading && IsConsistent(state);
@@ -133,7 +131,9 @@ class ReadingSearch {
 
   // A minimum for the answer, with all that agrees with it.
   void Keep(State state) {
-    if (HasOutliers(state)) return;
+    // What has no inliers has no say: the minimum without it is that of another reading.
+    State inliers = state;
+    if (DropOutliers(problem_, &inliers)) return;
     TakeBackWhatFits(problem_, &state);
     const auto known = std::find_if(minima_.begin(), minima_.end(), [&](const State& other) {
       return IsSamePose(problem_, state, other);
@@ -170,7 +170,7 @@ class ReadingSearch {
   bool SolveFrom(bool is_consistent, double best, State* state) {
     const int max_iterations = problem_.options().max_iterations;
     const double left_out = LeftOutCost(problem_, *state);
-    last_ = is_consistent ? problem_.Solve(max_iterations, state, {best - left_out, MaxGap()})
+    last_ = is_consistent ? problem_.Solve(max_iterations, state, best - left_out + MaxGap())
                           : problem_.SolveGraduated(max_iterations, state);
     if (!last_.ok()) return false;
     state->cost += left_out;
@@ -201,19 +201,11 @@ class ReadingSearch {
     return 1e-4 / static_cast<double>(std::max<std::ptrdiff_t>(1, active));
   }
 
-  // What has no inliers has no say: the minimum without it is that of another reading.
-  bool HasOutliers(State state) const { return DropOutliers(problem_, &state); }
-
-  double BestKept() const {
-    double best = kNoRival;
-    for (const State& minimum : minima_) best = std::min(best, minimum.cost);
-    return best;
-  }
-
   // Of many features, where steps like the one from its parent would not lead to what competes.
   bool IsHopeless(const State& minimum, double parent_cost) const {
-    return problem_.features().size() > kFew &&
-           minimum.cost - kMaxReadings * (parent_cost - minimum.cost) > BestKept() + MaxGap();
+    const auto best = std::min_element(minima_.begin(), minima_.end(), HasLessCost);
+    return problem_.features().size() > kFew && best != minima_.end() &&
+           minimum.cost - kMaxReadings * (parent_cost - minimum.cost) > best->cost + MaxGap();
   }
 
   // Readings without what contradicts this minimum.
@@ -224,7 +216,7 @@ class ReadingSearch {
     if (TotalMisfit(minimum) > ChiSquareLimit(1, FalseAlarms(minimum))) {
       Linearization at(problem_, minimum, Weighing());
       if (at.ok() && at.ComputeCovariance())
-        AddWithout(minimum, at.Misfits(problem_.features()), FalseAlarms(minimum), &rivals);
+        AddWithout(minimum, at.Misfits(), FalseAlarms(minimum), &rivals);
     }
     return rivals;
   }
@@ -249,16 +241,14 @@ class ReadingSearch {
       });
       excess.erase(better, excess.end());
       if (excess.size() > kMost) {
-        Reading without = minimum.active;
-        for (const auto& [unused, feature] : excess) without[feature] = 0;
-        rivals->push_back(std::move(without));
+        rivals->push_back(minimum.active);
+        for (const auto& [unused, feature] : excess) rivals->back()[feature] = 0;
         return;
       }
     }
     for (const auto& [unused, feature] : excess) {
-      Reading without = minimum.active;
-      without[feature] = 0;
-      rivals->push_back(std::move(without));
+      rivals->push_back(minimum.active);
+      rivals->back()[feature] = 0;
     }
   }
 

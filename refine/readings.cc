@@ -18,16 +18,13 @@
 namespace circline {
 namespace {
 
-// Wide priors of the focal length are searched at these, in standard deviations.
-constexpr double kFocalStarts[] = {-1.6, -0.8, 0.8, 1.6};
-
 // What tells the best hypothesis from the next, in words.
 std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
   if (hypotheses.size() < 2) return "only one pose fits the evidence";
   const double gap = hypotheses[1].cost - hypotheses[0].cost;
-  char text[120];
   // Below 0.5, negative included, the determinants decide, not the residuals.
   if (gap < 0.5) return "nothing decides: both poses explain the evidence equally well";
+  char text[120];
   std::snprintf(text, sizeof(text),
                 "residuals: chi-square lower by %.3g than that of the second pose", 2.0 * gap);
   return text;
@@ -71,8 +68,7 @@ std::vector<Seed> SeedsFromPrior(const JointProblem& problem, const Observations
 // and what closed forms say.
 std::vector<double> FocalStarts(const JointProblem& problem, const Observations& resolved) {
   constexpr std::size_t kMostClosedForms = 3;
-  constexpr double kReach = 3.0;       // Standard deviations of the prior.
-  constexpr double kAnySigmaPx = 0.5;  // Every feature has its own.
+  constexpr double kReach = 3.0;  // Standard deviations of the prior.
   const double sigma = problem.camera_sigma().LargestLogFocal();
   const double mean = StatedLogFocal(resolved);
   constexpr double kSameStart = 0.02;  // Near the camera's own, which is one in any case.
@@ -81,7 +77,7 @@ std::vector<double> FocalStarts(const JointProblem& problem, const Observations&
   if (resolved.stated_focal_px > 0.0) {  // The structure has been compared over the prior.
     if (std::abs(mean) > kSameStart) starts.push_back(mean);
   } else {
-    for (const double start : kFocalStarts) starts.push_back(start * sigma);
+    for (const double start : {-1.6, -0.8, 0.8, 1.6}) starts.push_back(start * sigma);
   }
   NoiseModel noise = problem.options().noise_model;
   noise.camera = problem.camera_sigma();

@@ -63,7 +63,7 @@ void KalmanUpdate(const TrackMap& map, const BlockMatrix& J, const BlockVector& 
 
 void TrackMap::Reset(bool has_position, const Camera& camera, const CameraSigma& sigma) {
   *this = TrackMap();
-  AddBlock(4, std::make_unique<WorldRotationManifold>(3));
+  AddBlock(4, std::make_unique<WorldRotationManifold<3>>());
   AddBlock(3, {}, !has_position);
   AddBlock(3);
   AddBlock(3, {}, !has_position);

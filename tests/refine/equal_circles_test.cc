@@ -89,15 +89,7 @@ TEST(EqualCirclesTest, NormalSitsOnItsBound) {
       const PoseHypothesis& best = estimate.hypotheses[0];
       const double error = NormalError(best, scene);
       rms[equal ? 1 : 0] += error * error / kTrials;
-      if (!equal) continue;
-      // Along the normal's two tangents: the spin is free here.
-      const Eigen::Matrix3d& R = best.cam_from_world.rotation;
-      const Eigen::Vector3d delta = R.col(2).cross(scene.pose.rotation.col(2));
-      const Eigen::Matrix<double, 3, 2> tangents = R.leftCols<2>();
-      const Eigen::Matrix2d covariance =
-          tangents.transpose() * best.Covariance().topLeftCorner<3, 3>() * tangents;
-      const Eigen::Vector2d across = tangents.transpose() * delta;
-      nees += across.dot(covariance.inverse() * across) / kTrials;
+      nees += equal ? NormalErrors(best, scene.pose).Nees() / kTrials : 0.0;
     }
   }
   if (kSanitized) return;

@@ -163,13 +163,8 @@ TEST(EstimatePoseTest, KnowledgeThatHasNoPartIsNamed) {
       KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(1, 0)}, "p1", 1.0}};
   PoseEstimate estimate = EstimatePose(observations, Exact());
   ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-  const auto has_note = [&estimate](const std::string& words) {
-    return std::any_of(estimate.notes.begin(), estimate.notes.end(), [&](const std::string& note) {
-      return note.find(words) != std::string::npos;
-    });
-  };
-  EXPECT_TRUE(has_note("'L1' and 'L2': not used, both run along axes"));
-  EXPECT_TRUE(has_note("a known length of the plane 'p1': not used"));
+  EXPECT_TRUE(HasNote(estimate, "'L1' and 'L2': not used, both run along axes"));
+  EXPECT_TRUE(HasNote(estimate, "a known length of the plane 'p1': not used"));
 }
 
 // A length says nothing of which of the two poses of a circle is right.
@@ -247,13 +242,10 @@ TEST(EstimatePoseTest, CovarianceIsHonest) {
     ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
     const PoseHypothesis& h = estimate.hypotheses[0];
     EXPECT_EQ(h.rank, 6);
-    const Eigen::Vector3d rotation =
-        LogRotation(scene.pose.rotation * h.cam_from_world.rotation.transpose());
+    rotation_nees += RotationNees(h, scene.pose) / kTrials;
     const Eigen::Vector3d translation = scene.pose.translation - h.cam_from_world.translation;
-    const Eigen::Matrix<double, 6, 6> C = h.Covariance();
-    rotation_nees += rotation.dot(C.topLeftCorner<3, 3>().inverse() * rotation) / kTrials;
     translation_nees +=
-        translation.dot(C.bottomRightCorner<3, 3>().inverse() * translation) / kTrials;
+        translation.dot(h.Covariance().bottomRightCorner<3, 3>().inverse() * translation) / kTrials;
   }
   if (kSanitized) return;
   EXPECT_NEAR(rotation_nees, 3.0, 0.5);
@@ -399,11 +391,7 @@ double NeesOfBands(LossType loss) {
     const PoseEstimate estimate = EstimatePose(observations, options);
     EXPECT_TRUE(estimate.status.ok()) << estimate.status.message;
     if (!estimate.status.ok()) return 0.0;
-    const PoseHypothesis& best = estimate.hypotheses.front();
-    const Eigen::Vector3d error =
-        LogRotation(PaperPose().rotation * best.cam_from_world.rotation.transpose());
-    const Eigen::Matrix3d covariance = best.Covariance().topLeftCorner<3, 3>();
-    nees += error.dot(covariance.inverse() * error) / kTrials;
+    nees += RotationNees(estimate.hypotheses.front(), PaperPose()) / kTrials;
   }
   return nees;
 }

@@ -15,7 +15,6 @@
 namespace circline {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 Observations OneCircle(PlaneScene* scene) {
@@ -273,14 +272,9 @@ TEST(GravityPriorTest, EntersTheCovariance) {
     options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.003, &scene);
     const PoseEstimate estimate = EstimatePose(observations, options);
     ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& h = estimate.hypotheses[0];
-    const Matrix3d& R = h.cam_from_world.rotation;
-    const Eigen::Matrix<double, 3, 2> tangents = R.leftCols<2>();
-    const Eigen::Matrix2d covariance =
-        tangents.transpose() * h.Covariance().topLeftCorner<3, 3>() * tangents;
-    const Eigen::Vector2d error = tangents.transpose() * R.col(2).cross(scene.pose.rotation.col(2));
-    nees += error.dot(covariance.inverse() * error) / kTrials;
-    with += covariance.trace() / kTrials;
+    const NormalErrors normal(estimate.hypotheses[0], scene.pose);
+    nees += normal.Nees() / kTrials;
+    with += normal.covariance.trace() / kTrials;
     without += alone.hypotheses[0].Covariance().topLeftCorner<3, 3>().trace() / kTrials;
   }
   if (kSanitized) return;

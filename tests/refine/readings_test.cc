@@ -23,17 +23,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Ids = std::vector<std::string>;
 
-double SigmaNormal(const PoseHypothesis& h) {
-  const Eigen::Matrix<double, 3, 2> tangents = h.cam_from_world.rotation.leftCols<2>();
-  return std::sqrt(
-      (tangents.transpose() * h.Covariance().topLeftCorner<3, 3>() * tangents).trace());
-}
-
-bool HasNote(const PoseEstimate& estimate, const std::string& words) {
-  return std::any_of(estimate.notes.begin(), estimate.notes.end(), [&](const std::string& note) {
-    return note.find(words) != std::string::npos;
-  });
-}
+double SigmaNormal(const PoseHypothesis& h) { return NormalErrors(h, {}).Sigma(); }
 
 // About an axis of the plane, from the X axis by `about`; from angle 0 to `arc`.
 CircleObservation Tilted(PlaneScene* scene, const std::string& id, const Vector2d& center,

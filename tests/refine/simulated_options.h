@@ -1,6 +1,12 @@
-// Options for simulated evidence, which has the noise of points and nothing else.
+// Options for simulated evidence, which has the noise of points and nothing else, and what its
+// estimates are asked.
 #ifndef CIRCLINE_TESTS_REFINE_SIMULATED_OPTIONS_H_
 #define CIRCLINE_TESTS_REFINE_SIMULATED_OPTIONS_H_
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <string>
 
 #include "circline/estimators/noise_model.h"
 #include "circline/refine/estimate_pose.h"
@@ -19,6 +25,33 @@ inline EstimationOptions LeastSquares(const NoiseModel& model = NoiseModel::Exac
   options.noise_model = model;
   options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
   return options;
+}
+
+inline bool HasNote(const PoseEstimate& estimate, const std::string& words) {
+  return std::any_of(estimate.notes.begin(), estimate.notes.end(), [&](const std::string& note) {
+    return note.find(words) != std::string::npos;
+  });
+}
+
+// Of a hypothesis' normal, two components.
+struct NormalErrors {
+  Eigen::Vector2d error;
+  Eigen::Matrix2d covariance;
+
+  NormalErrors(const PoseHypothesis& h, const CameraPose& truth) {
+    const Eigen::Matrix3d& R = h.cam_from_world.rotation;
+    const Eigen::Matrix<double, 3, 2> tangents = R.leftCols<2>();
+    error = tangents.transpose() * R.col(2).cross(truth.rotation.col(2));
+    covariance = tangents.transpose() * h.Covariance().topLeftCorner<3, 3>() * tangents;
+  }
+  double Nees() const { return error.dot(covariance.inverse() * error); }
+  double Sigma() const { return std::sqrt(covariance.trace()); }
+};
+
+// Of a hypothesis' rotation.
+inline double RotationNees(const PoseHypothesis& h, const CameraPose& truth) {
+  const Eigen::Vector3d error = LogRotation(truth.rotation * h.cam_from_world.rotation.transpose());
+  return error.dot(h.Covariance().topLeftCorner<3, 3>().inverse() * error);
 }
 
 }  // namespace circline
