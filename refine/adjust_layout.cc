@@ -21,10 +21,7 @@ Layout LayoutOf(const PoseHypothesis& h) {
   return layout;
 }
 
-namespace {
-
-// A pose of a photo's own world in the world that `to_shared` maps its plane to.
-CameraPose Moved(const CameraPose& own, const Similarity& to_shared) {
+CameraPose MovedPose(const CameraPose& own, const Similarity& to_shared) {
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
   turn.topLeftCorner<2, 2>() = to_shared.turn / to_shared.scale;
   CameraPose pose;
@@ -33,6 +30,8 @@ CameraPose Moved(const CameraPose& own, const Similarity& to_shared) {
                      pose.rotation * Eigen::Vector3d(to_shared.shift.x(), to_shared.shift.y(), 0.0);
   return pose;
 }
+
+namespace {
 
 // A hypothesis of a photo against the layout so far.
 struct Candidate {
@@ -129,7 +128,7 @@ void Aligner::Place(const Candidate& candidate) {
   const std::size_t i = candidate.photo;
   if (candidate.alignment) misfits_.push_back(alignment.misfit);
   out_.placed[i] = true;
-  out_.poses[i] = Moved(candidate.hypothesis->cam_from_world, alignment.to_shared);
+  out_.poses[i] = MovedPose(candidate.hypothesis->cam_from_world, alignment.to_shared);
   std::map<std::string, std::string>& names = out_.names[i];
   for (const auto& [own, shared] : alignment.pairs)
     names[*candidate.own[own].id] = *shared_[shared].id;

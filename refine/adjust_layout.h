@@ -58,6 +58,9 @@ struct Similarity {
   Eigen::Vector2d operator()(const Eigen::Vector2d& x) const { return turn * x + shift; }
 };
 
+// A pose of a photo's own world in the world that `to_shared` maps its plane to.
+CameraPose MovedPose(const CameraPose& own, const Similarity& to_shared);
+
 // Indices of a photo's own circles and of the shared ones that they are.
 using Pairs = std::vector<std::array<std::size_t, 2>>;
 

@@ -63,7 +63,7 @@ class AdjustProblem : private Graph {
   // coefficient and the focal length are free where `coarse`.
   Status Solve(double stretch, bool coarse, int max_iterations);
   // Root mean square over the points of the worst feature, standard deviations.
-  double LargestMiss() const { return Graph::LargestRms(ActiveTerms(), values().data()); }
+  double LargestRms() const { return Graph::LargestRms(ActiveTerms(), values().data()); }
 
   struct Feature {
     int photo = 0;

@@ -21,7 +21,7 @@ void Adjustment::SolveOnce() {
   }
   problem_ = std::make_unique<AdjustProblem>(inputs_, priors, options_,
                                              given_frame_ ? &*given_frame_ : nullptr);
-  double width = std::min(problem_->LargestMiss(), kWidest);
+  double width = std::min(problem_->LargestRms(), kWidest);
   for (bool first = true; width > kNear && out_.status.ok(); width *= kNarrower, first = false)
     out_.status = problem_->Solve(width, first, kIterations);
   if (out_.status.ok()) out_.status = problem_->Solve(1.0, false, options_.max_iterations);
@@ -96,7 +96,7 @@ bool Adjustment::HasMoved() const {
 }
 
 // Fits, noise and robust distances are those of the camera that the photos have led to.
-void Adjustment::SeeAnew() {
+void Adjustment::PrepareAnew() {
   std::vector<Layout> found(layouts_.size());
   for (const AdjustedCircle& circle : problem_->Circles())
     found[static_cast<std::size_t>(circle.photo + 1)][circle.id] = {circle.center.head<2>(),
@@ -116,14 +116,14 @@ void Adjustment::SeeAnew() {
   });
 }
 
-void Adjustment::SolveWithoutGross() {
+void Adjustment::SolveWithoutOutliers() {
   constexpr int kRounds = 4;
   SolveOnce();
   if (start_ != nullptr) return;  // Good enough to be compared.
   for (int round = 0; round < kRounds && out_.status.ok(); ++round) {
     const bool moved = HasMoved(), left_out = LeaveOut();
     if (!moved && !left_out) return;
-    SeeAnew();
+    PrepareAnew();
     SolveOnce();
   }
 }

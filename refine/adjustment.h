@@ -39,7 +39,7 @@ class Adjustment {
     if (out_.status.ok()) out_.status = FindCameras();
     if (out_.status.ok()) SetAsideEqualViews();
     if (out_.status.ok()) out_.status = Start();
-    if (out_.status.ok()) SolveWithoutGross();
+    if (out_.status.ok()) SolveWithoutOutliers();
     if (out_.status.ok()) Report();
     return std::move(out_);
   }
@@ -56,9 +56,9 @@ class Adjustment {
   bool PlaceByPoses();
   void ShareWorld(const SharedLayout& shared, bool by_id);
   void ScaleWorlds();
-  void SolveWithoutGross();
+  void SolveWithoutOutliers();
   bool HasMoved() const;
-  void SeeAnew();
+  void PrepareAnew();
   double JudgePhotos();
   bool LeaveOut();
   void SolveOnce();

@@ -17,16 +17,17 @@
 namespace circline {
 namespace {
 
-// What two sights of one circle may differ by: a photo's own pose of a small circle is no better.
+// What two sightings of one circle may differ by: a photo's own pose of a small circle is no
+// better.
 constexpr double kApart = 0.5;    // Radii.
 constexpr double kLarger = 1.3;   // Radius, times.
 constexpr double kTurned = 0.94;  // Cosine of the angle between normals: 20 degrees.
-// What two sights of one line group differ by beside their own deviations, degrees: old houses have
-// verticals so far apart.
-constexpr double kLeanDeg = 1.0;
+// What two sightings of one line group differ by beside their own deviations, degrees: old houses
+// have verticals so far apart.
+constexpr double kDirectionsDeg = 1.0;
 
 // A circle as a pose of its photo has it, in the frame of the given poses but for the photo's unit.
-struct Sight {
+struct Sighting {
   std::size_t photo = 0;
   const PoseHypothesis* pose = nullptr;
   Eigen::Vector3d from = Eigen::Vector3d::Zero(), ray = from, normal = from;
@@ -37,18 +38,19 @@ bool IsSamePlane(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::abs(a.dot(b)) > kTurned;
 }
 
-// A world to start from: that of one sight, in the unit that another sight of the circle gives it.
+// A world to start from: that of one sighting, in the unit that another sighting of the circle
+// gives it.
 struct Seed {
-  const Sight* sight = nullptr;
+  const Sighting* sighting = nullptr;
   double unit = 0.0, gap = 0.0;  // Of the given frame; between the rays, radii.
 };
 
-// Whether two sights may be of one circle, by where their rays meet, its size and its normal.
-bool Meet(const Sight& a, const Sight& b, Seed* seed) {
+// Whether two sightings may be of one circle, by where their rays meet, its size and its normal.
+bool Meet(const Sighting& a, const Sighting& b, Seed* seed) {
   if (!IsSamePlane(a.normal, b.normal)) return false;
   const double aa = a.ray.squaredNorm(), bb = b.ray.squaredNorm(), ab = a.ray.dot(b.ray);
-  constexpr double kParallax =
-      4e-4;  // Sine squared: rays less than 1.1 degrees apart meet anywhere.
+  // Sine squared: rays less than 1.1 degrees apart meet anywhere.
+  constexpr double kParallax = 4e-4;
   const double det = aa * bb - ab * ab;
   if (!(det > kParallax * aa * bb)) return false;
   const Eigen::Vector3d between = b.from - a.from;
@@ -71,8 +73,8 @@ class Placer {
       for (const PoseHypothesis& h : estimates[i].hypotheses) {
         for (const CircleEstimate& circle : h.circles) {
           if (!(circle.radius > 0.0)) continue;
-          sights_.push_back({i, &h, -back * given[i]->translation, back * circle.center,
-                             back * h.cam_from_world.rotation.col(2), circle.radius});
+          sightings_.push_back({i, &h, -back * given[i]->translation, back * circle.center,
+                                back * h.cam_from_world.rotation.col(2), circle.radius});
         }
       }
     }
@@ -84,11 +86,11 @@ class Placer {
     const std::vector<Seed> seeds = Seeds();
     for (const Seed& seed : seeds) {
       const GivenFrame world = WorldOf(seed);
-      const Layout layout = LayoutOf(*seed.sight->pose);
+      const Layout layout = LayoutOf(*seed.sighting->pose);
       const Places there = PlacesOf(layout);
       std::size_t count = 0;
       for (std::size_t k = 0; k < given_.size(); ++k) {
-        if (k != seed.sight->photo) count += Best(k, world, there).names.size();
+        if (k != seed.sighting->photo) count += Best(k, world, there).names.size();
       }
       if (count <= most) continue;
       most = count;
@@ -116,27 +118,27 @@ class Placer {
   std::vector<Seed> Seeds() const;
   GivenFrame WorldOf(const Seed& seed) const;
   Match Best(std::size_t photo, const GivenFrame& world, const Places& there) const;
-  static void TakeIn(std::size_t photo, const Match& match, GivenPlacement* out);
+  static void AddPhoto(std::size_t photo, const Match& match, GivenPlacement* out);
   static void NamePencils(std::size_t photo, const PoseHypothesis& h, std::vector<Known>* known,
                           SharedLayout* shared);
   GivenPlacement Assemble(const Seed& seed) const;
 
   const std::vector<PoseEstimate>& estimates_;
   const std::vector<std::optional<CameraPose>>& given_;
-  std::vector<Sight> sights_;  // By photo.
+  std::vector<Sighting> sightings_;  // By photo.
 };
 
 // The closest meetings, of photos near one another in the list first (those of a video see the
 // same), then of photos farther and farther apart until there are enough.
 std::vector<Seed> Placer::Seeds() const {
   constexpr std::size_t kNeighbours = 8, kMostSeeds = 300;
-  constexpr std::size_t kMostPairs = 5000000;  // Of sights, where neighbours are too few.
-  std::vector<std::size_t> begins;             // Of each photo with sights, in sights_.
-  for (std::size_t k = 0; k < sights_.size(); ++k) {
-    if (k == 0 || sights_[k].photo != sights_[k - 1].photo) begins.push_back(k);
+  constexpr std::size_t kMostPairs = 5000000;  // Of sightings, where neighbours are too few.
+  std::vector<std::size_t> begins;             // Of each photo with sightings, in sightings_.
+  for (std::size_t k = 0; k < sightings_.size(); ++k) {
+    if (k == 0 || sightings_[k].photo != sightings_[k - 1].photo) begins.push_back(k);
   }
   const std::size_t count = begins.size();
-  begins.push_back(sights_.size());
+  begins.push_back(sightings_.size());
   std::vector<Seed> seeds;
   Seed seed;
   std::size_t pairs = 0;
@@ -146,7 +148,7 @@ std::vector<Seed> Placer::Seeds() const {
       const std::size_t q = p + apart;
       for (std::size_t a = begins[p]; a < begins[p + 1]; ++a) {
         for (std::size_t b = begins[q]; b < begins[q + 1]; ++b) {
-          if (Meet(sights_[a], sights_[b], &seed)) seeds.push_back(seed);
+          if (Meet(sightings_[a], sightings_[b], &seed)) seeds.push_back(seed);
         }
       }
       pairs += (begins[p + 1] - begins[p]) * (begins[q + 1] - begins[q]);
@@ -159,8 +161,8 @@ std::vector<Seed> Placer::Seeds() const {
 }
 
 GivenFrame Placer::WorldOf(const Seed& seed) const {
-  const CameraPose& given = *given_[seed.sight->photo];
-  const CameraPose& own = seed.sight->pose->cam_from_world;
+  const CameraPose& given = *given_[seed.sighting->photo];
+  const CameraPose& own = seed.sighting->pose->cam_from_world;
   GivenFrame world;
   world.scale = seed.unit;
   world.rotation = given.rotation.transpose() * own.rotation;
@@ -195,42 +197,41 @@ Placer::Match Placer::Best(std::size_t photo, const GivenFrame& world, const Pla
   return best;
 }
 
-// Names a photo's line groups by their directions; takes in what is new.
+// Names a photo's pencils by their directions; adds what is new.
 void Placer::NamePencils(std::size_t photo, const PoseHypothesis& h, std::vector<Known>* known,
                          SharedLayout* shared) {
   const Eigen::Matrix3d back = shared->poses[photo].rotation.transpose();
-  std::vector<std::uint8_t> is_taken(known->size(), 0);
+  std::vector<std::uint8_t> is_matched(known->size(), 0);
   for (const PencilEstimate& pencil : h.pencils) {
     const Eigen::Vector3d own = back * pencil.direction;
-    std::size_t same = known->size();
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < is_taken.size(); ++k) {
+    std::size_t nearest = known->size();
+    double least_deg = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < is_matched.size(); ++k) {
       const Known& other = (*known)[k];
-      const double angle_deg =
-                       std::asin(std::min(1.0, own.cross(other.direction).norm())) / kDegree,
-                   gate = kInlierSigmas * std::hypot(pencil.sigma_deg, other.sigma_deg, kLeanDeg);
-      if (is_taken[k] != 0 || !IsSamePlane(own, other.direction) || !(angle_deg < gate) ||
-          !(angle_deg < least)) {
+      const double sine = own.cross(other.direction).norm(),
+                   angle_deg = std::asin(std::min(1.0, sine)) / kDegree,
+                   gate = kInlierSigmas *
+                          std::hypot(pencil.sigma_deg, other.sigma_deg, kDirectionsDeg);
+      if (is_matched[k] != 0 || !IsSamePlane(own, other.direction) ||
+          !(angle_deg < std::min(gate, least_deg)))
         continue;
-      }
-      least = angle_deg;
-      same = k;
+      least_deg = angle_deg;
+      nearest = k;
     }
-    if (same < is_taken.size()) {
-      is_taken[same] = 1;
-    } else {
-      same = known->size();
+    if (nearest == known->size()) {
       const bool is_free = std::none_of(known->begin(), known->end(),
                                         [&](const Known& k) { return k.name == pencil.id; });
       known->push_back(
           {is_free ? pencil.id : std::to_string(photo) + ":" + pencil.id, own, pencil.sigma_deg});
+    } else {
+      is_matched[nearest] = 1;
     }
-    shared->pencil_names[photo][pencil.id] = (*known)[same].name;
+    shared->pencil_names[photo][pencil.id] = (*known)[nearest].name;
   }
 }
 
 // A photo, and those of its circles that are new.
-void Placer::TakeIn(std::size_t photo, const Match& match, GivenPlacement* out) {
+void Placer::AddPhoto(std::size_t photo, const Match& match, GivenPlacement* out) {
   SharedLayout& shared = out->shared;
   shared.placed[photo] = true;
   shared.names[photo] = match.names;
@@ -252,7 +253,7 @@ GivenPlacement Placer::Assemble(const Seed& seed) const {
   out.world = WorldOf(seed);
   out.by_id = true;
   SharedLayout& shared = out.shared;
-  shared.circles = LayoutOf(*seed.sight->pose);
+  shared.circles = LayoutOf(*seed.sighting->pose);
   shared.poses.resize(given_.size());
   shared.placed.assign(given_.size(), false);
   shared.names.resize(given_.size());
@@ -267,7 +268,7 @@ GivenPlacement Placer::Assemble(const Seed& seed) const {
       if (match.names.empty()) continue;
       has_grown = true;
       shared.poses[k] = PoseInWorld(out.world, *given_[k]);
-      TakeIn(k, match, &out);
+      AddPhoto(k, match, &out);
       NamePencils(k, *match.pose, &pencils, &shared);
     }
   }

@@ -49,8 +49,8 @@ bool Fit(const Places& from, const Places& to, const Pairs& pairs, Similarity* o
 }
 
 // In place and in size, radii; or of the reach.
-double Miss(const LayoutCircle& from, const LayoutCircle& to, const Similarity& similarity,
-            const Reach& reach = {1.0, 1.0}) {
+double Deviation(const LayoutCircle& from, const LayoutCircle& to, const Similarity& similarity,
+                 const Reach& reach = {1.0, 1.0}) {
   const double size = std::log(similarity.scale * from.radius / to.radius);
   return std::hypot((similarity(from.center) - to.center).norm() / (to.radius * reach.place),
                     size / reach.size);
@@ -58,10 +58,10 @@ double Miss(const LayoutCircle& from, const LayoutCircle& to, const Similarity& 
 
 bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
   if (!Fit(from, to, alignment->pairs, &alignment->to_shared)) return false;
-  std::vector<double> misses;
+  std::vector<double> deviations;
   for (const auto& [own, shared] : alignment->pairs)
-    misses.push_back(Miss(from[own].circle, to[shared].circle, alignment->to_shared));
-  alignment->misfit = Median(std::move(misses));
+    deviations.push_back(Deviation(from[own].circle, to[shared].circle, alignment->to_shared));
+  alignment->misfit = Median(std::move(deviations));
   return true;
 }
 
@@ -87,7 +87,7 @@ Pairs NeighbourPairs(const Places& places) {
 Pairs Matches(const Places& from, const Places& to, const Similarity& similarity,
               const Reach& reach) {
   struct Match {
-    double miss;
+    double deviation;
     std::size_t own, shared;
   };
   double largest = 0.0;
@@ -103,12 +103,12 @@ Pairs Matches(const Places& from, const Places& to, const Similarity& similarity
          k < to.size() && to[k].circle.center.x() <= at.x() + farthest; ++k) {
       const LayoutCircle& circle = to[k].circle;
       if (std::abs(circle.center.y() - at.y()) > farthest) continue;
-      const double miss = Miss(from[own].circle, circle, similarity, reach);
-      if (miss < 1.0) near.push_back({miss, own, k});
+      const double deviation = Deviation(from[own].circle, circle, similarity, reach);
+      if (deviation < 1.0) near.push_back({deviation, own, k});
     }
   }
   std::stable_sort(near.begin(), near.end(),
-                   [](const Match& a, const Match& b) { return a.miss < b.miss; });
+                   [](const Match& a, const Match& b) { return a.deviation < b.deviation; });
   Pairs pairs;
   std::vector<std::uint8_t> is_matched(from.size(), 0), is_taken(to.size(), 0);
   for (const Match& match : near) {

@@ -20,14 +20,21 @@ namespace circline {
 class PoseTracker::Implementation {
  public:
   explicit Implementation(const TrackerOptions& options)
-      : options_(options), options_status_(options.Validate()), frame_(options_.estimation, map_) {}
+      : options_(options), options_status_(options.Validate()), frame_(options_, map_) {}
 
   void Update(const Observations& observations, double time, const MotionPrior& motion,
               TrackedPose* tracked) {
-    const Status status = Validate(observations, time, motion);
-    Begin(time, status, tracked);
-    if (!status.ok()) {
-      tracked->estimate.hypotheses.clear();
+    // What a caller's TrackedPose has is of no account, but for its memory.
+    tracked->timestamp_s = time;
+    tracked->reinitialized = tracked->relocalized = tracked->predicted_only = false;
+    tracked->frames_since_start = 0;
+    PoseEstimate& estimate = tracked->estimate;
+    estimate.status = Validate(observations, time, motion);
+    estimate.solver = "tracker";
+    estimate.decided_by.clear();
+    estimate.notes.clear();
+    if (!estimate.status.ok()) {
+      estimate.hypotheses.clear();
       return;
     }
     const double dt = hypotheses_.empty() ? 0.0 : time - time_;
@@ -40,8 +47,7 @@ class PoseTracker::Implementation {
     Move(dt, motion);
     if (hypotheses_.empty()) {
       Start(observations, tracked);
-      tracked->estimate.notes.emplace_back(
-          "the motion left the range of numbers: the track starts anew");
+      estimate.notes.emplace_back("the motion left the range of numbers: the track starts anew");
       return;
     }
     if (Refine()) {
@@ -67,8 +73,6 @@ class PoseTracker::Implementation {
     contradictions_ = frames_ = 0;
   }
 
-  const TrackerOptions& options() const { return options_; }
-
  private:
   Status Validate(const Observations& observations, double time, const MotionPrior& motion) const {
     if (!options_status_.ok()) return options_status_;
@@ -79,18 +83,6 @@ class PoseTracker::Implementation {
     if (status.ok() && !hypotheses_.empty() && motion.relative && !(time > time_))
       status = Status::Invalid("a relative motion takes time: give a later one");
     return status;
-  }
-
-  // What a caller's TrackedPose has is of no account, but for its memory.
-  static void Begin(double time, const Status& status, TrackedPose* tracked) {
-    tracked->timestamp_s = time;
-    tracked->reinitialized = tracked->relocalized = tracked->predicted_only = false;
-    tracked->frames_since_start = 0;
-    PoseEstimate& estimate = tracked->estimate;
-    estimate.status = status;
-    estimate.solver = "tracker";
-    estimate.decided_by.clear();
-    estimate.notes.clear();
   }
 
   void Prepare(const Observations& observations) {
@@ -121,7 +113,10 @@ class PoseTracker::Implementation {
     for (std::size_t i = 0; i < fits_.size(); ++i) {
       const TrackState& start = fits_[i].state;
       const double log_focal = std::log(estimate.hypotheses[i].focal_scale);
-      if (!start.IsInRange() || !RefineHere(start, log_focal, &hypotheses_)) continue;
+      if (!start.IsInRange() ||
+          !frame_.RefineFrom(start, start.Pose(map_), log_focal, &hypotheses_)) {
+        continue;
+      }
       TrackState& state = hypotheses_[hypotheses_.size() - 1].state;
       ConditionOnPriors(&state);
       state.log_weight = start.log_weight;  // Its evidence has been counted.
@@ -134,16 +129,15 @@ class PoseTracker::Implementation {
   // Goes on in the known map, where the frame, whose own poses `tracked` has, shows some of it and
   // agrees with the rest.
   bool Relocalize(TrackedPose* tracked) {
-    std::vector<TrackState> starts =
-        Relocated(map_, hypotheses_, tracked->estimate.hypotheses, options_);
-    if (starts.empty()) return false;
     fits_.Shorten(0);
     frame_.Reset(fitted_);
-    frame_.KeepCheapest(static_cast<std::size_t>(options_.max_hypotheses), &starts);
-    for (const TrackState& start : starts) {
+    for (const TrackState& start :
+         Relocated(map_, hypotheses_, tracked->estimate.hypotheses, options_)) {
       const double log_focal = start.x[map_.block(TrackMap::kCamera).offset];
-      if (RefineHere(start, log_focal, &fits_) && !Agrees(fits_[fits_.size() - 1]))
+      if (frame_.RefineFrom(start, start.Pose(map_), log_focal, &fits_) &&
+          !Agrees(fits_[fits_.size() - 1])) {
         fits_.Shorten(fits_.size() - 1);
+      }
     }
     if (fits_.empty()) return false;
     Merge(map_, MergedWeight::kLarger, &fits_);
@@ -152,13 +146,6 @@ class PoseTracker::Implementation {
     Use(tracked);
     tracked->estimate.notes.emplace_back("the track was lost, and is back in its world");
     return true;
-  }
-
-  // Adds the fit where there is one.
-  bool RefineHere(const TrackState& start, double log_focal, Kept<TrackFit>* fits) {
-    if (frame_.RefineHere(start, log_focal, options_, &fits->Add())) return true;
-    fits->Shorten(fits->size() - 1);
-    return false;
   }
 
   bool Agrees(const TrackFit& fit) const {
@@ -227,7 +214,7 @@ class PoseTracker::Implementation {
     if (is_blank_) return false;
     for (const TrackFit& hypothesis : hypotheses_) {
       own_fits_.Shorten(0);
-      frame_.Refine(hypothesis.state, options_, &own_fits_);
+      frame_.Refine(hypothesis.state, &own_fits_);
       Merge(map_, MergedWeight::kLarger, &own_fits_);
       for (TrackFit& fit : own_fits_) std::swap(fits_.Add(), fit);
     }

@@ -227,20 +227,18 @@ bool TrackFrame::Place(std::size_t index, TrackFit* fit) const {
       .Start(parameters, fit->own.data() + 2 * index);
 }
 
-// All unknowns at a pose; lines that cannot lie there are left out.
-bool TrackFrame::Begin(const TrackState& prior, const CameraPose& start, TrackFit* fit) const {
+// All unknowns at a pose and a focal length; lines that cannot lie there are left out.
+bool TrackFrame::Begin(const TrackState& prior, const CameraPose& start, double log_focal,
+                       TrackFit* fit) const {
   fit->state = prior;
   CameraPose pose = start;
   if (!map_.has_position()) pose.translation = prior.Pose(map_).translation;
   fit->state.SetPose(map_, pose);
+  if (!map_.camera_is_considered) fit->state.x[map_.block(TrackMap::kCamera).offset] = log_focal;
   fit->own.assign(2 * terms_.size(), 0.0);
   fit->active.assign(terms_.size(), 1);
-  bool any = false;
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
-    fit->active[i] = Place(i, fit) ? 1 : 0;
-    any = any || fit->active[i] != 0;
-  }
-  return any;
+  for (std::size_t i = 0; i < terms_.size(); ++i) fit->active[i] = Place(i, fit) ? 1 : 0;
+  return std::find(fit->active.begin(), fit->active.end(), 1) != fit->active.end();
 }
 
 // Twice a term's cost; infinite where it has none.
@@ -257,72 +255,34 @@ double TrackFrame::TermsCost(const TrackFit& fit) const {
   return cost;
 }
 
-namespace {
-
-// Half the squared distance of a pose from the prior's.
-double PriorCost(const TrackMap& map, const TrackState& prior, const CameraPose& pose) {
-  const int size = map.tangent(TrackMap::kTurnRate);
-  const CameraPose mean = prior.Pose(map);
-  BlockMatrix e(size, 1), root = prior.covariance.topLeftCorner(size, size);
-  e.topRows<3>() = LogRotation(mean.rotation.transpose() * pose.rotation);
-  if (size == 6) e.bottomRows<3>() = pose.translation - mean.translation;
-  if (!FactorInPlace(root)) return 0.0;
-  HalfSolveInPlace(root, e);
-  return 0.5 * e.squaredNorm();
+bool TrackFrame::RefineFrom(const TrackState& prior, const CameraPose& pose, double log_focal,
+                            Kept<TrackFit>* fits) {
+  TrackFit& fit = fits->Add();
+  if (Begin(prior, pose, log_focal, &fit) && Minimize(prior, &fit)) return true;
+  fits->Shorten(fits->size() - 1);
+  return false;
 }
 
-}  // namespace
-
-bool TrackFrame::RefineHere(const TrackState& prior, double log_focal,
-                            const TrackerOptions& options, TrackFit* fit) {
-  // From this camera, through which lines are placed, too.
-  TrackState start = prior;
-  if (!map_.camera_is_considered) start.x[map_.block(TrackMap::kCamera).offset] = log_focal;
-  return Begin(start, prior.Pose(map_), fit) && RefineFrom(prior, options, fit);
-}
-
-void TrackFrame::KeepCheapest(std::size_t most, std::vector<TrackState>* states) const {
-  if (states->size() <= most) return;
-  std::vector<double> costs;
-  TrackFit begun;
-  for (const TrackState& state : *states) {
-    costs.push_back(Begin(state, state.Pose(map_), &begun) ? TermsCost(begun)
-                                                           : std::numeric_limits<double>::max());
-  }
-  std::vector<double> sorted = costs;
-  std::sort(sorted.begin(), sorted.end());
-  std::vector<TrackState> cheapest;
-  for (std::size_t i = 0; i < costs.size() && cheapest.size() < most; ++i) {
-    if (costs[i] <= sorted[most - 1]) cheapest.push_back(std::move((*states)[i]));
-  }
-  *states = std::move(cheapest);
-}
-
-void TrackFrame::Refine(const TrackState& prior, const TrackerOptions& options,
-                        Kept<TrackFit>* fits) {
+void TrackFrame::Refine(const TrackState& prior, Kept<TrackFit>* fits) {
   std::array<CameraPose, 3> poses;
   std::array<double, 3> prior_costs, costs;
   const auto num_circle_poses = static_cast<std::size_t>(CircleStarts(prior, poses.data()));
-  poses[num_circle_poses] = prior.Pose(map_);
+  const CameraPose predicted = prior.Pose(map_);
+  poses[num_circle_poses] = predicted;
   std::size_t best = 0;
   for (std::size_t i = 0; i <= num_circle_poses; ++i) {
-    prior_costs[i] = PriorCost(map_, prior, poses[i]);
-    costs[i] = prior_costs[i] + (Begin(prior, poses[i], &begun_)
+    prior_costs[i] = 0.5 * SquaredDistance(predicted, poses[i], prior.PoseCovariance(map_));
+    costs[i] = prior_costs[i] + (Begin(prior, poses[i], LogFocal(prior), &begun_)
                                      ? TermsCost(begun_)
                                      : std::numeric_limits<double>::infinity());
     if (costs[i] < costs[best]) best = i;
   }
-  const auto refine = [&](const CameraPose& pose) {
-    TrackFit& fit = fits->Add();
-    if (!Begin(prior, pose, &fit) || !RefineFrom(prior, options, &fit))
-      fits->Shorten(fits->size() - 1);
-  };
-  refine(poses[best]);
+  RefineFrom(prior, poses[best], LogFocal(prior), fits);
   // The circle's other pose, where the prior does not exclude it.
   constexpr double kExcluded = 20.0;  // Of cost.
   if (num_circle_poses < 2) return;
   const std::size_t other = best < 2 ? 1 - best : prior_costs[0] > prior_costs[1] ? 0 : 1;
-  if (prior_costs[other] < kExcluded) refine(poses[other]);
+  if (prior_costs[other] < kExcluded) RefineFrom(prior, poses[other], LogFocal(prior), fits);
 }
 
 }  // namespace circline

@@ -38,8 +38,8 @@ struct TrackFit {
 class TrackFrame {
  public:
   // Of no features yet; options and map outlive this.
-  TrackFrame(const EstimationOptions& options, const TrackMap& map)
-      : options_(options), map_(map) {}
+  TrackFrame(const TrackerOptions& options, const TrackMap& map)
+      : tracker_options_(options), options_(options.estimation), map_(map) {}
 
   // Takes a frame's features in place of those before. `fitted`: with fits and noise; it is used
   // until the next call. Features that the map does not have take no part.
@@ -49,15 +49,12 @@ class TrackFrame {
   // Refines a hypothesis that has been moved on, from all starts that may lead to minima of its
   // own: the prediction, and both poses of the best known circle. Adds one fit for each minimum
   // found.
-  void Refine(const TrackState& prior, const TrackerOptions& options, Kept<TrackFit>* fits);
+  void Refine(const TrackState& prior, Kept<TrackFit>* fits);
 
-  // Refines one from where it is, but from this focal length (shift of log f). False where that
-  // fails.
-  bool RefineHere(const TrackState& prior, double log_focal, const TrackerOptions& options,
-                  TrackFit* fit);
-
-  // Of states where they are, those that the frame's terms cost least, in their order.
-  void KeepCheapest(std::size_t most, std::vector<TrackState>* states) const;
+  // Refines one from this pose and focal length (shift of log f). False, and no fit added, where
+  // that fails.
+  bool RefineFrom(const TrackState& prior, const CameraPose& pose, double log_focal,
+                  Kept<TrackFit>* fits);
 
   struct Term {
     enum class Kind { kCircle, kCenter, kLine };
@@ -89,23 +86,32 @@ class TrackFrame {
   void AddLine(const LineObservation& line, double sigma_px, const TrackMap::Direction& direction,
                double deviation, int number);
   int CircleStarts(const TrackState& prior, CameraPose* starts) const;
-  bool Begin(const TrackState& prior, const CameraPose& start, TrackFit* fit) const;
+  bool Begin(const TrackState& prior, const CameraPose& start, double log_focal,
+             TrackFit* fit) const;
+  double LogFocal(const TrackState& state) const {
+    return state.x[map_.block(TrackMap::kCamera).offset];
+  }
+  // Of a test of each term.
+  double GateProbability() const {
+    return tracker_options_.gate_probability / static_cast<double>(terms_.size());
+  }
   double TermsCost(const TrackFit& fit) const;
   int Solve(int max_evaluations, TrackFit* fit);
   double TwiceCost(std::size_t term, const TrackFit& fit) const;
   double Excess(std::size_t term, const TrackFit& fit) const;
   bool Place(std::size_t term, TrackFit* fit) const;
   int LeastOdd(TrackFit* fit) const;
-  bool LeaveOutWorst(double gate_probability, TrackFit* fit);
-  bool Score(double gate_probability, TrackFit* fit) const;
+  bool LeaveOutWorst(TrackFit* fit);
+  bool Score(TrackFit* fit) const;
   void MoveOthers(const Scratch::Vector& step, TrackState* state) const;
   bool UpdateOthers(const TrackState& before, const Scratch::Matrix& posterior,
                     const Scratch::Matrix& turn, TrackFit* fit);
   bool ResetPrior(const TrackState& before, const TrackFit& fit);
   bool Update(const TrackState& before, TrackFit* fit);
-  bool RefineFrom(const TrackState& prior, const TrackerOptions& options, TrackFit* fit);
+  bool Minimize(const TrackState& prior, TrackFit* fit);
 
-  const EstimationOptions& options_;
+  const TrackerOptions& tracker_options_;
+  const EstimationOptions& options_;  // Of the same.
   const TrackMap& map_;
   const Observations* observations_ = nullptr;
   Kept<Term> terms_;

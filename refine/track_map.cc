@@ -14,8 +14,6 @@
 namespace circline {
 namespace {
 
-// What is not known yet: of directions and turns, radians; of lengths, distances of the origin.
-constexpr double kUnknown = 1.0;
 // Bounds what a call costs; features beyond these stay without a part.
 constexpr std::size_t kMaxCircles = 64, kMaxDirections = 32;
 
@@ -156,18 +154,14 @@ class MapBuilder {
 TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const TrackerOptions& options,
                       const CameraSigma& sigma, double log_focal, double k1) {
   TrackState state;
-  const double distance = h.cam_from_world.translation.norm();
-  const Eigen::Quaterniond q(h.cam_from_world.rotation);
+  const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(kCameraSize);
+  for (const int block :
+       {TrackMap::kRotation, TrackMap::kTranslation, TrackMap::kTurnRate, TrackMap::kVelocity})
+    state.Append(map, block, zeros, zeros);
   // A turn that nothing fixes is what the first frame's convention says.
   constexpr double kConvention = 1e-4;  // Radians.
-  const Eigen::Vector3d turn(kUnknown, kUnknown, h.RotationIsFree() ? kConvention : kUnknown);
-  const auto all = [](double value) { return Eigen::VectorXd::Constant(3, value).eval(); };
-  const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(kCameraSize);
-  state.Append(map, TrackMap::kRotation, Eigen::VectorXd(q.coeffs()), Eigen::VectorXd(turn));
-  state.Append(map, TrackMap::kTranslation, Eigen::VectorXd(h.cam_from_world.translation),
-               all(kUnknown * distance));
-  state.Append(map, TrackMap::kTurnRate, zeros, all(options.initial_turn_rate_sigma));
-  state.Append(map, TrackMap::kVelocity, zeros, all(options.initial_velocity_sigma * distance));
+  SetUnknownMotion(map, options, h.cam_from_world, h.RotationIsFree() ? kConvention : kUnknown,
+                   &state);
   Eigen::VectorXd camera = zeros;
   camera.head<5>() << sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
       sigma.principal_point_px, sigma.k1;
@@ -221,6 +215,25 @@ void AddDirections(const Observations& frame, const TrackMap& map, bool shares_a
 }
 
 }  // namespace
+
+void SetUnknownMotion(const TrackMap& map, const TrackerOptions& options, const CameraPose& pose,
+                      double normal_turn_sigma, TrackState* state) {
+  const double distance = pose.translation.norm();
+  const auto set = [&](int block, const Eigen::Vector3d& sigma) {
+    const int row = map.tangent(block), size = map.block(block).tangent_size();
+    state->covariance.middleRows(row, size).setZero();
+    state->covariance.middleCols(row, size).setZero();
+    state->covariance.diagonal().segment(row, size) = sigma.head(size).cwiseAbs2();
+  };
+  const auto all = [](double sigma) -> Eigen::Vector3d { return Eigen::Vector3d::Constant(sigma); };
+  set(TrackMap::kRotation, {kUnknown, kUnknown, normal_turn_sigma});
+  set(TrackMap::kTranslation, all(kUnknown * distance));
+  set(TrackMap::kTurnRate, all(options.initial_turn_rate_sigma));
+  set(TrackMap::kVelocity, all(options.initial_velocity_sigma * distance));
+  state->SetPose(map, pose);
+  for (const int block : {TrackMap::kTurnRate, TrackMap::kVelocity})
+    state->x.segment<3>(map.block(block).offset).setZero();
+}
 
 void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& hypotheses,
               const TrackerOptions& options, TrackMap* map, Kept<TrackFit>* states) {

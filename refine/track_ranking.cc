@@ -10,19 +10,11 @@
 namespace circline {
 namespace {
 
-// Whether two fits of a frame are one minimum, or so near that it does not matter: the squared
-// distance of their poses under both covariances.
-bool IsSame(const TrackMap& map, const TrackFit& a, const TrackFit& b) {
-  constexpr double kSame = 0.25;  // Half a standard deviation.
-  const CameraPose p = a.state.Pose(map), q = b.state.Pose(map);
-  const int size = map.tangent(TrackMap::kTurnRate);
-  BlockMatrix e(size, 1), root = a.state.covariance.topLeftCorner(size, size) +
-                                 b.state.covariance.topLeftCorner(size, size);
-  e.topRows<3>() = LogRotation(p.rotation.transpose() * q.rotation);
-  if (size == 6) e.bottomRows<3>() = q.translation - p.translation;
-  if (!FactorInPlace(root)) return false;
-  HalfSolveInPlace(root, e);
-  return e.squaredNorm() < kSame;
+// Whether two fits of a frame are one minimum, or so near that it does not matter.
+bool IsSame(const TrackMap& map, const TrackState& a, const TrackState& b) {
+  constexpr double kSame = 0.25;  // Half a standard deviation of both.
+  return SquaredDistance(a.Pose(map), b.Pose(map), a.PoseCovariance(map) + b.PoseCovariance(map)) <
+         kSame;
 }
 
 double LogAdd(double a, double b) {
@@ -42,7 +34,7 @@ void Merge(const TrackMap& map, MergedWeight weight, Kept<TrackFit>* fits) {
   std::size_t merged = 0;  // The first ones are different.
   for (TrackFit& fit : *fits) {
     std::size_t same = 0;
-    while (same < merged && !IsSame(map, fit, (*fits)[same])) ++same;
+    while (same < merged && !IsSame(map, fit.state, (*fits)[same].state)) ++same;
     if (same == merged) {
       std::swap((*fits)[merged++], fit);
       continue;

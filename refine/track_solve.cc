@@ -69,7 +69,7 @@ double TrackFrame::Excess(std::size_t index, const TrackFit& fit) const {
 
 // Makes the terms inactive that contradict the others most: at a compromise of all, any may seem
 // to. True where there were any.
-bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) {
+bool TrackFrame::LeaveOutWorst(TrackFit* fit) {
   odd_.clear();
   std::ptrdiff_t num_whole = 0;
   for (std::size_t i = 0; i < terms_.size(); ++i) {
@@ -78,7 +78,7 @@ bool TrackFrame::LeaveOutWorst(double gate_probability, TrackFit* fit) {
       if (terms_[i].parent < 0) num_whole -= 2;  // Less than half of all may be left out.
       continue;
     }
-    const double beyond = Excess(i, *fit) - ChiSquareLimit(terms_[i].dof, gate_probability);
+    const double beyond = Excess(i, *fit) - ChiSquareLimit(terms_[i].dof, GateProbability());
     if (beyond > 0.0) odd_.emplace_back(beyond, i);
   }
   std::sort(odd_.begin(), odd_.end(), [](const auto& a, const auto& b) {
@@ -117,11 +117,9 @@ int TrackFrame::LeastOdd(TrackFit* fit) const {
   return least;
 }
 
-bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& options,
-                            TrackFit* fit) {
-  const double gate = options.gate_probability / static_cast<double>(terms_.size());
+bool TrackFrame::Minimize(const TrackState& before, TrackFit* fit) {
   constexpr int kFew = 2;  // Evaluations that come to nothing.
-  int left = options.max_evaluations;
+  int left = tracker_options_.max_evaluations;
   const auto solve = [&](TrackFit* at) {
     if (!ResetPrior(before, *at)) return false;
     left -= Solve(left, at);
@@ -129,7 +127,7 @@ bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& opti
   };
   if (!solve(fit)) return false;
   bool has_dropped = false;
-  while (left > kFew && LeaveOutWorst(gate, fit)) {
+  while (left > kFew && LeaveOutWorst(fit)) {
     has_dropped = true;
     if (!solve(fit)) return false;
   }
@@ -141,18 +139,18 @@ bool TrackFrame::RefineFrom(const TrackState& before, const TrackerOptions& opti
     if (back < 0) break;
     const auto i = static_cast<std::size_t>(back);
     with_.active[i] = 1;
-    agrees = solve(&with_) && Excess(i, with_) <= ChiSquareLimit(terms_[i].dof, gate);
+    agrees = solve(&with_) && Excess(i, with_) <= ChiSquareLimit(terms_[i].dof, GateProbability());
     if (agrees) {
       std::swap(*fit, with_);
     } else if (!ResetPrior(before, *fit)) {
       return false;
     }
   }
-  return Score(gate, fit) && Update(before, fit);
+  return Score(fit) && Update(before, fit);
 }
 
 // What is left out costs what clutter would: as much as what just agrees.
-bool TrackFrame::Score(double gate_probability, TrackFit* fit) const {
+bool TrackFrame::Score(TrackFit* fit) const {
   double left_out = 0.0, free = 0.0;
   fit->dof = 0;
   for (std::size_t i = 0; i < terms_.size(); ++i) {
@@ -161,7 +159,7 @@ bool TrackFrame::Score(double gate_probability, TrackFit* fit) const {
       fit->dof += term.dof;
       free += term.free_twice_cost;
     } else {
-      left_out += 0.5 * (term.free_twice_cost + ChiSquareLimit(term.dof, gate_probability));
+      left_out += 0.5 * (term.free_twice_cost + ChiSquareLimit(term.dof, GateProbability()));
     }
   }
   const double cost = TermsCost(*fit) + 0.5 * prior_.TwiceCost(map_, fit->state.x);

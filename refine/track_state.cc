@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "circline/refine/block_chain.h"
@@ -82,16 +83,10 @@ void TrackMap::Reset(bool has_position, const Camera& camera, const CameraSigma&
 }
 
 int TrackMap::AddBlock(int size, std::unique_ptr<ceres::Manifold> manifold, bool is_constant) {
-  Block block;
-  block.offset = size_ == 0 ? 0 : blocks_.back().offset + blocks_.back().size;
-  block.size = size;
-  block.manifold = manifold.get();
-  block.is_constant = is_constant;
-  blocks_.push_back(block);
-  manifolds_.push_back(std::move(manifold));
+  const int index = Graph::AddBlock(size, {}, std::move(manifold), is_constant);
   tangents_.push_back(tangent_size_);
-  tangent_size_ += block.tangent_size();
-  return size_++;
+  tangent_size_ += block(index).tangent_size();
+  return index;
 }
 
 CameraPose TrackState::Pose(const TrackMap& map) const {
@@ -131,6 +126,15 @@ void TrackState::Append(const TrackMap& map, int index, const Eigen::VectorXd& v
                         const Eigen::VectorXd& sigmas) {
   const Eigen::VectorXd variances = sigmas.head(map.block(index).tangent_size()).cwiseAbs2();
   Append(map, index, values.data(), Eigen::MatrixXd(variances.asDiagonal()));
+}
+
+double SquaredDistance(const CameraPose& from, const CameraPose& to, BlockMatrix covariance) {
+  BlockMatrix e(covariance.rows(), 1);
+  e.topRows<3>() = LogRotation(from.rotation.transpose() * to.rotation);
+  if (e.rows() == 6) e.bottomRows<3>() = to.translation - from.translation;
+  if (!FactorInPlace(covariance)) return std::numeric_limits<double>::infinity();
+  HalfSolveInPlace(covariance, e);
+  return e.squaredNorm();
 }
 
 BlockMatrix ChartOf(const Block& block, const double* at) {

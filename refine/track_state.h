@@ -12,7 +12,7 @@
 
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
-#include "circline/refine/joint_problem.h"
+#include "circline/refine/graph.h"
 #include "circline/refine/pose_tracker.h"
 #include "circline/refine/scratch.h"
 
@@ -22,8 +22,10 @@ namespace circline {
 constexpr char kXAxisId[] = "frame.x_axis", kYAxisId[] = "frame.y_axis";
 
 // The unknowns that hypotheses have in common: which there are, not their values.
-class TrackMap {
+class TrackMap : private Graph {
  public:
+  using Graph::block;
+  using Graph::blocks;
   enum { kRotation, kTranslation, kTurnRate, kVelocity, kCamera, kFirstLandmark };
   struct Circle {
     std::string id;
@@ -42,11 +44,9 @@ class TrackMap {
   // Returns the block. A null manifold is Euclidean.
   int AddBlock(int size, std::unique_ptr<ceres::Manifold> manifold = {}, bool is_constant = false);
 
-  const std::vector<Block>& blocks() const { return blocks_; }
-  const Block& block(int i) const { return blocks_[static_cast<std::size_t>(i)]; }
   // First row of a block in the covariance.
   int tangent(int i) const { return tangents_[static_cast<std::size_t>(i)]; }
-  int size() const { return size_; }
+  int size() const { return static_cast<int>(tangents_.size()); }
   int tangent_size() const { return tangent_size_; }
   bool has_camera() const { return !block(kCamera).is_constant; }
   bool has_position() const { return !block(kTranslation).is_constant; }
@@ -60,10 +60,8 @@ class TrackMap {
   bool camera_is_considered = true;
 
  private:
-  std::vector<Block> blocks_;
-  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;
   std::vector<int> tangents_;
-  int size_ = 0, tangent_size_ = 0;
+  int tangent_size_ = 0;
 };
 
 // One hypothesis: values of all blocks, and the covariance of their tangents at these.
@@ -77,6 +75,11 @@ struct TrackState {
   }
   CameraPose Pose(const TrackMap& map) const;
   void SetPose(const TrackMap& map, const CameraPose& pose);
+  // Of rotation and, where there is one, position.
+  BlockMatrix PoseCovariance(const TrackMap& map) const {
+    const int size = map.tangent(TrackMap::kTurnRate);
+    return covariance.topLeftCorner(size, size);
+  }
   bool IsInRange() const;  // Squares of all numbers, and their sums, are finite.
   // Takes in a block that has been added to the map, its numbers independent or not.
   void Append(const TrackMap& map, int block, const Eigen::VectorXd& values,
@@ -84,6 +87,10 @@ struct TrackState {
   void Append(const TrackMap& map, int block, const double* values,
               const Eigen::MatrixXd& block_covariance);
 };
+
+// Squared distance of a pose from another under a covariance of tangents there (PoseCovariance);
+// infinite where that is not positive definite.
+double SquaredDistance(const CameraPose& from, const CameraPose& to, BlockMatrix covariance);
 
 // Coordinates about a place: MinusJacobian at the place, which is linear, times the difference.
 // Tangent by ambient size.

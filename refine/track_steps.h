@@ -21,6 +21,14 @@ namespace circline {
 void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& hypotheses,
               const TrackerOptions& options, TrackMap* map, Kept<TrackFit>* states);
 
+// Of turns, radians, and of lengths, distances of the origin, of which nothing is known yet.
+constexpr double kUnknown = 1.0;
+
+// A pose and velocities of which nothing is known but where to start: the pose's turn about the
+// plane's normal as well as `normal_turn_sigma` says, radians.
+void SetUnknownMotion(const TrackMap& map, const TrackerOptions& options, const CameraPose& pose,
+                      double normal_turn_sigma, TrackState* state);
+
 // Adds what the map does not have, where each hypothesis sees it, as not known yet.
 void ExtendMap(const Observations& fitted, const TrackerOptions& options, TrackMap* map,
                Kept<TrackFit>* states);

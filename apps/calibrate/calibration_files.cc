@@ -1,13 +1,17 @@
 #include "apps/calibrate/calibration_files.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <set>
 #include <sstream>
 
 #include "apps/calibrate/calibration_report.h"
 #include "apps/common/camera_file.h"
+#include "apps/common/document.h"
 #include "apps/common/output_file.h"
+#include "apps/common/storage_node.h"
 #include "apps/common/text.h"
 #include "apps/compare/export.h"
 
@@ -45,10 +49,8 @@ Json CameraJson(const AdjustedCamera& adjusted) {
                 {"fy", camera.fy * std::hypot(f, aspect)},
                 {"cx", adjusted.Sigma(2)},
                 {"cy", adjusted.Sigma(3)}};
-  Json distortion = Json::array();
   for (std::size_t k = 0; k < d.size(); ++k)
-    distortion.push_back(adjusted.Sigma(4 + static_cast<int>(k)));
-  sigma["distortion"] = distortion;
+    sigma["distortion"].push_back(adjusted.Sigma(4 + static_cast<int>(k)));
   Json correlation = Json::array();
   for (int i = 0; i < kCameraSize; ++i) {
     Json row = Json::array();
@@ -83,18 +85,24 @@ Json PhotoJson(const AdjustedPhoto& photo, std::size_t index,
               {"status", photo.status.ok() ? "ok" : "refused"},
               {"message", WhyLeftOut(photo, names)}};
   if (!photo.status.ok()) return out;
-  Json rotation = Json::array(), translation = Json::array();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) rotation.push_back(photo.cam_from_world.rotation(i, j));
-    translation.push_back(photo.cam_from_world.translation[i]);
-  }
-  out["rotation"] = rotation;
-  out["translation"] = translation;
+  const Eigen::Matrix3d by_rows = photo.cam_from_world.rotation.transpose();
+  const Eigen::Vector3d& t = photo.cam_from_world.translation;
+  out["rotation"] = std::vector<double>(by_rows.data(), by_rows.data() + 9);
+  out["translation"] = {t.x(), t.y(), t.z()};
   out["covariance"] = photo.covariance;
   out["left_out"] = photo.left_out;
   out["rms_px"] = photo.rms_px;
   out["misfit"] = photo.misfit;
   return out;
+}
+
+Json SceneEntry(const AdjustedCamera& made) {
+  StatedCameraSigma sigma;  // One that is held has no deviation, and nothing is said of it.
+  const double point = std::max(made.Sigma(2), made.Sigma(3));
+  if (made.Sigma(0) > 0.0) sigma.log_focal = made.Sigma(0);
+  if (point > 0.0) sigma.principal_point_px = point;
+  if (made.Sigma(4) > 0.0) sigma.k1 = made.Sigma(4);
+  return CameraEntry(made.camera, sigma);
 }
 
 }  // namespace
@@ -121,14 +129,38 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
                      photo.cam_from_world});
   }
   json["notes"] = adjusted.notes;
-  if (status.ok())
-    status = WriteFile(folder + "/calibration.json",
-                       json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+  if (status.ok()) status = WriteFile(folder + "/calibration.json", DocumentText(json));
   if (status.ok()) status = ExportPoses("colmap", poses, folder, note);
   if (!note->empty()) *note += "\n";
   if (status.ok())
     status = WriteFile(folder + "/report.html", CalibrationReport(adjusted, names, pictures));
   return status;
+}
+
+Status WriteCalibratedScene(const std::string& source, const AdjustedPhotos& adjusted,
+                            const std::vector<SceneImage>& images, const std::string& path) {
+  StorageDocument given;
+  if (!source.empty()) {
+    const Status status = given.Open(source);
+    if (!status.ok()) return status;
+  }
+  Json scene;
+  if (given.root()->contains("rigid")) scene["rigid"] = (*given.root())["rigid"];
+  std::set<std::string> ids;
+  for (const AdjustedCamera& made : adjusted.cameras) {
+    scene["cameras"].push_back(SceneEntry(made));
+    ids.insert(made.camera.id);
+  }
+  for (const SceneImage& image : images) {
+    const std::string& id = image.observations.camera.id;
+    if (ids.count(id) == 0) continue;  // No photo of that camera could be read.
+    Json entry;
+    if (!source.empty()) entry = (*given.root())["images"][image.index];
+    entry["file"] = std::filesystem::absolute(image.path).lexically_normal().string();
+    entry["camera"] = id;
+    scene["images"].push_back(std::move(entry));
+  }
+  return WriteFile(path, DocumentText(scene));
 }
 
 std::string CalibrationTable(const AdjustedPhotos& adjusted,

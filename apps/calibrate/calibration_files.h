@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/common/scene.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/status.h"
 #include "circline/refine/adjust_photos.h"
@@ -18,6 +19,12 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
                         const std::vector<std::string>& names,
                         const std::vector<std::string>& pictures, const std::string& folder,
                         std::string* note);
+
+// The scene file with the estimated cameras, which state how well they are known. `source`: the
+// scene file that the images come from; empty: there was none. Photos are named with their whole
+// path.
+Status WriteCalibratedScene(const std::string& source, const AdjustedPhotos& adjusted,
+                            const std::vector<SceneImage>& images, const std::string& path);
 
 // Why a photo is left out, the other one by its name where it shows nearly the same.
 std::string WhyLeftOut(const AdjustedPhoto& photo, const std::vector<std::string>& names);

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "apps/common/colmap_file.h"
+#include "apps/common/document.h"
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
 
@@ -15,19 +16,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-bool EndsWith(const std::string& path, const std::string& name) {
-  return path == name || (path.size() > name.size() &&
-                          path.compare(path.size() - name.size(), name.size(), name) == 0 &&
-                          path[path.size() - name.size() - 1] == '/');
-}
-
-// Whether the path ends with the whole name; the longest one that it ends with. Null: none.
+// The image with whose whole name the path ends, the longest one. Null: none.
 const ColmapImage* Find(const ColmapModel& model, const std::string& path) {
-  const std::string whole = std::filesystem::path(path).lexically_normal().generic_string();
+  const std::string whole = "/" + std::filesystem::path(path).lexically_normal().generic_string();
   const ColmapImage* best = nullptr;
   for (const ColmapImage& image : model.images) {
-    if (EndsWith(whole, image.name) && (best == nullptr || image.name.size() > best->name.size()))
-      best = &image;
+    const std::string name = "/" + image.name;
+    const bool ends_so = whole.size() >= name.size() &&
+                         whole.compare(whole.size() - name.size(), name.size(), name) == 0;
+    if (ends_so && (best == nullptr || image.name.size() > best->name.size())) best = &image;
   }
   return best;
 }
@@ -68,11 +65,8 @@ Status ImportModel(const std::string& folder, const CameraSigma& sigma,
                              " are both its image " + of->name);
     }
     image.observations.camera = model.cameras[of->camera];
-    image.camera_sigma = {};
-    image.camera_sigma.log_focal = sigma.log_focal;
-    image.camera_sigma.log_aspect = sigma.log_aspect;
-    image.camera_sigma.principal_point_px = sigma.principal_point_px;
-    image.camera_sigma.k1 = sigma.k1;
+    image.camera_sigma = {sigma.log_focal, sigma.log_aspect, sigma.principal_point_px, sigma.k1,
+                          std::nullopt};
     image.guessed_sigma.reset();
     (*poses)[image.index] = of->cam_from_world;
     posed.push_back(std::move(image));
@@ -135,14 +129,13 @@ std::vector<WorldPlane> PlanesOf(const std::vector<Observations>& photos,
 Status WriteLandmarks(const AdjustedPhotos& adjusted, const std::vector<WorldPlane>& planes,
                       const std::string& folder) {
   const Inverse world(*adjusted.given);
-  Json rotation = Json::array();
-  for (int i = 0; i < 9; ++i) rotation.push_back(world.rotation(i / 3, i % 3));
+  const Eigen::Matrix3d by_rows = world.rotation.transpose();
   Json json = {
       {"metric", adjusted.metric},
       {"world_from_model",
        {{"scale", world.scale},
         {"scale_sigma", adjusted.metric ? world.scale * adjusted.given->log_scale_sigma : 0.0},
-        {"rotation", rotation},
+        {"rotation", std::vector<double>(by_rows.data(), by_rows.data() + 9)},
         {"translation", Vector(world.translation)}}},
       {"planes", Json::array()},
       {"directions", Json::array()}};
@@ -162,8 +155,7 @@ Status WriteLandmarks(const AdjustedPhotos& adjusted, const std::vector<WorldPla
   for (const AdjustedDirection& direction : adjusted.directions)
     json["directions"].push_back(
         {{"id", direction.id}, {"direction", Vector(direction.direction)}});
-  Status status = WriteFile(folder + "/landmarks.json",
-                            json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+  const Status status = WriteFile(folder + "/landmarks.json", DocumentText(json));
   if (!status.ok()) return status;
   std::ostringstream text;
   text.precision(17);

@@ -9,7 +9,6 @@
 #include <optional>
 
 #include "apps/calibrate/calibrate_options.h"
-#include "apps/calibrate/calibrated_scene.h"
 #include "apps/calibrate/calibration_files.h"
 #include "apps/calibrate/calibration_pictures.h"
 #include "apps/calibrate/import_model.h"
@@ -34,13 +33,10 @@ constexpr char kUsage[] =
     "--output=out\n"
     "                                                # scale and axes for a model of COLMAP's\n"
     "\n"
-    "Writes calibration.yml (for OpenCV and --camera), calibration.json, cameras.txt and "
-    "images.txt\n"
-    "(COLMAP), scene.yaml (the scene with the estimated cameras) and report.html; with --import "
-    "landmarks.json and "
-    "transform.txt, too. Flags for "
-    "inputs, detection and losses are those of "
-    "circline_compare.\n"
+    "Writes calibration.yml (for OpenCV and --camera), calibration.json, cameras.txt and\n"
+    "images.txt (COLMAP), scene.yaml (the scene with the estimated cameras) and report.html; with\n"
+    "--import landmarks.json and transform.txt, too. Flags for inputs, detection and losses are\n"
+    "those of circline_compare.\n"
     "Exit code 0: done; 1: some photo could not be read, or no camera came out; 2: unusable flags "
     "or scene file.";
 

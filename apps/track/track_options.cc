@@ -3,6 +3,7 @@
 #include <gflags/gflags.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "apps/common/flags_util.h"
 
@@ -33,10 +34,6 @@ DEFINE_int32(lost_after, circline::TrackerOptions().lost_after,
 namespace circline::apps {
 namespace {
 
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
 // A track is made in one go, from its first frame, and by one solver.
 Status CheckSource() {
   const Status status =
@@ -52,9 +49,9 @@ Status CheckSource() {
 Status CheckVideoOut(const TrackOptions& options) {
   const std::string& name = options.video_out;
   if (name.empty()) return Status::Ok();
-  if (name.find('/') != std::string::npos || !(EndsWith(name, ".mp4") || EndsWith(name, ".avi"))) {
+  const std::filesystem::path extension = std::filesystem::path(name).extension();
+  if (name.find('/') != std::string::npos || (extension != ".mp4" && extension != ".avi"))
     return Status::Invalid("--video_out=" + name + ": must be a name that ends in .mp4 or .avi");
-  }
   if (!options.compare.overlays)
     return Status::Invalid("--video_out needs the overlays: not with --overlays=false");
   return Status::Ok();

@@ -1,6 +1,7 @@
 #include "apps/track/track_report.h"
 
 #include <algorithm>
+#include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <utility>
 
@@ -17,60 +18,50 @@ namespace {
 constexpr int kPictureWidth = 640;
 constexpr std::size_t kMostPictures = 24, kMostRows = 2000;
 
-struct Counts {
-  int tracked = 0, predicted = 0, lost = 0, unusable = 0, begun = 0, cold = 0;
-  std::vector<double> observe_us, cold_us, track_us;
-
-  explicit Counts(const std::vector<TrackedFrame>& frames) {
-    for (const TrackedFrame& f : frames) {
-      begun += f.reinitialized ? 1 : 0;
-      if (!f.error.empty()) {
-        ++unusable;
-        continue;
-      }
-      ++(!f.has_pose ? lost : f.predicted_only ? predicted : tracked);
-      cold += f.cold ? 1 : 0;
-      (f.cold ? cold_us : observe_us).push_back(f.observe_us);
-      if (f.has_pose) track_us.push_back(f.track_us);
-    }
-  }
-};
-
 std::string TimesText(const std::vector<double>& microseconds) {
   if (microseconds.empty()) return "-";
   return FormatMicroseconds(Median(microseconds)) +
          " (99 %: " + FormatMicroseconds(Quantile(microseconds, 0.99)) + ")";
 }
 
-// The frames' rows of the summary: what, and how much of it.
+// The rows of the summary: what, and how much of it.
 std::vector<std::pair<std::string, std::string>> SummaryRows(
     const std::vector<TrackedFrame>& frames) {
-  const Counts counts(frames);
+  int tracked = 0, predicted = 0, lost = 0, unusable = 0, begun = 0, cold = 0;
+  std::vector<double> observe_us, cold_us, track_us, errors, nees;
+  for (const TrackedFrame& f : frames) {
+    begun += f.reinitialized ? 1 : 0;
+    if (f.error_deg) errors.push_back(*f.error_deg);
+    if (f.nees) nees.push_back(*f.nees);
+    if (!f.error.empty()) {
+      ++unusable;
+      continue;
+    }
+    ++(!f.has_pose ? lost : f.predicted_only ? predicted : tracked);
+    cold += f.cold ? 1 : 0;
+    (f.cold ? cold_us : observe_us).push_back(f.observe_us);
+    if (f.has_pose) track_us.push_back(f.track_us);
+  }
   std::vector<std::pair<std::string, std::string>> rows = {
       {"frames", std::to_string(frames.size())},
-      {"tracked", std::to_string(counts.tracked)},
-      {"only predicted", std::to_string(counts.predicted)},
-      {"without a pose", std::to_string(counts.lost)},
-      {"not usable", std::to_string(counts.unusable)},
-      {"the track begins (anew)", std::to_string(counts.begun)},
-      {"the whole frame looked at", std::to_string(counts.cold)},
-      {"features followed, median", TimesText(counts.observe_us)},
-      {"whole frame looked at, median", TimesText(counts.cold_us)},
-      {"pose, median", TimesText(counts.track_us)}};
-  std::vector<double> errors;
-  double sum = 0.0;
-  int count = 0;
-  for (const TrackedFrame& f : frames) {
-    if (f.error_deg) errors.push_back(*f.error_deg);
-    if (!f.nees) continue;
-    sum += *f.nees;
-    ++count;
-  }
+      {"tracked", std::to_string(tracked)},
+      {"only predicted", std::to_string(predicted)},
+      {"without a pose", std::to_string(lost)},
+      {"not usable", std::to_string(unusable)},
+      {"the track begins (anew)", std::to_string(begun)},
+      {"the whole frame looked at", std::to_string(cold)},
+      {"features followed, median", TimesText(observe_us)},
+      {"whole frame looked at, median", TimesText(cold_us)},
+      {"pose, median", TimesText(track_us)}};
   if (!errors.empty()) {
     rows.emplace_back("error, median", FormatShort(Median(errors)) + " deg (90 %: " +
                                            FormatShort(Quantile(errors, 0.9)) + ")");
   }
-  if (count > 0) rows.emplace_back("NEES by degree of freedom, mean", FormatShort(sum / count));
+  if (!nees.empty()) {
+    const double sum = std::accumulate(nees.begin(), nees.end(), 0.0);
+    rows.emplace_back("NEES by degree of freedom, mean",
+                      FormatShort(sum / static_cast<double>(nees.size())));
+  }
   return rows;
 }
 
@@ -81,24 +72,19 @@ std::string FateText(const TrackedFrame& f) {
   return f.cold ? text + ", whole frame" : text;
 }
 
-// The frames to show: where the track begins, and others evenly.
-std::vector<std::size_t> FramesToShow(const std::vector<TrackedFrame>& frames) {
-  std::vector<std::size_t> shown;
-  const std::size_t step = 1 + frames.size() / kMostPictures;
-  for (std::size_t i = 0; i < frames.size() && shown.size() < 2 * kMostPictures; ++i) {
-    if (!frames[i].overlay.empty() && (i % step == 0 || frames[i].reinitialized))
-      shown.push_back(i);
-  }
-  return shown;
-}
-
+// The frames where the track begins, and others evenly.
 std::string Pictures(const std::string& folder, const std::vector<TrackedFrame>& frames) {
   std::string html;
-  for (const std::size_t i : FramesToShow(frames)) {
-    const cv::Mat picture = cv::imread(folder + "/" + frames[i].overlay, cv::IMREAD_COLOR);
+  const std::size_t step = 1 + frames.size() / kMostPictures;
+  std::size_t shown = 0;
+  for (std::size_t i = 0; i < frames.size() && shown < 2 * kMostPictures; ++i) {
+    const TrackedFrame& f = frames[i];
+    if (f.overlay.empty() || (i % step != 0 && !f.reinitialized)) continue;
+    ++shown;
+    const cv::Mat picture = cv::imread(folder + "/" + f.overlay, cv::IMREAD_COLOR);
     if (picture.empty()) continue;
-    const std::string caption = "frame " + std::to_string(i) + ", " +
-                                FormatFixed(frames[i].time_s, 2) + " s, " + FateText(frames[i]);
+    const std::string caption =
+        "frame " + std::to_string(i) + ", " + FormatFixed(f.time_s, 2) + " s, " + FateText(f);
     html += "<figure>" + PictureHtml(caption, EncodeJpeg(picture, kPictureWidth)) + "<figcaption>" +
             EscapeHtml(caption) + "</figcaption></figure>\n";
   }
@@ -117,8 +103,8 @@ std::string FrameTable(const std::vector<TrackedFrame>& frames) {
     html += "<tr><td class='l'>" + EscapeHtml(f.name) + "</td><td>" + FormatFixed(f.time_s, 3) +
             "</td><td class='l'>" + FateText(f) + "</td><td>" +
             (f.has_pose ? FormatFixed(f.probabilities.front(), 3) : "-") + "</td><td>" +
-            (f.sigma_deg ? FormatShort(*f.sigma_deg) : "-") + "</td><td>" +
-            (f.error_deg ? FormatShort(*f.error_deg) : "-") + "</td><td class='say'>" +
+            FormatShort(f.sigma_deg.value_or(kUnknown)) + "</td><td>" +
+            FormatShort(f.error_deg.value_or(kUnknown)) + "</td><td class='say'>" +
             EscapeHtml(f.error.empty() ? f.message : f.error) + "</td></tr>\n";
   }
   return html + "</tbody></table></div></details>";

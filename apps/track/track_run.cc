@@ -1,10 +1,15 @@
 #include "apps/track/track_run.h"
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "apps/common/document.h"
 #include "apps/common/flags_util.h"
+#include "apps/common/output_file.h"
+#include "apps/common/pose_error.h"
 #include "apps/common/progress.h"
 #include "apps/compare/export.h"
 #include "apps/compare/overlay.h"
@@ -12,7 +17,6 @@
 #include "apps/compare/results.h"
 #include "apps/track/frame_observer.h"
 #include "apps/track/overlay_video.h"
-#include "apps/track/rotation_nees.h"
 
 namespace circline::apps {
 namespace {
@@ -41,7 +45,40 @@ std::string TrackLine(const std::string& best_line, const Frame& frame, const Tr
          {"rotation", std::vector<double>(by_rows.data(), by_rows.data() + 9)},
          {"translation", {t.x(), t.y(), t.z()}}});
   }
-  return line.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return JsonText(line) + "\n";
+}
+
+// Squared error of the rotation in standard deviations, by its degrees of freedom (3; 2 where only
+// the normal is known): 1 on average. The truth is the nearest of what the evidence cannot tell
+// apart. Absent without a truth, or where more than the turn about the normal is free.
+std::optional<double> RotationNees(const PoseHypothesis& hypothesis, const SceneImage& image) {
+  using Eigen::Matrix3d;
+  using Eigen::Vector3d;
+  if (!image.truth || !image.truth->rotation || !SigmaNormalDeg(hypothesis)) return std::nullopt;
+  const Matrix3d &truth = *image.truth->rotation, &estimate = hypothesis.cam_from_world.rotation;
+  const Vector3d normal = estimate.col(2);
+  const bool normal_only = hypothesis.RotationIsFree() || image.truth->symmetry == Symmetry::kAxis;
+  Vector3d error = Vector3d::Constant(1e9);  // Camera frame, radians.
+  Matrix3d covariance = hypothesis.Covariance().topLeftCorner<3, 3>();
+  if (normal_only) {  // Up to sign, and nothing of the turn about it.
+    const double sign = truth.col(2).dot(normal) < 0.0 ? -1.0 : 1.0;
+    error = LogRotation(
+        Eigen::Quaterniond::FromTwoVectors(normal, sign * truth.col(2)).toRotationMatrix());
+    const Matrix3d across = Matrix3d::Identity() - normal * normal.transpose();
+    covariance = across * covariance * across;
+  } else {
+    for (const Matrix3d& same : SymmetryGroup(image.truth->symmetry)) {
+      const Vector3d turn = LogRotation(truth * same * estimate.transpose());
+      if (turn.norm() < error.norm()) error = turn;
+    }
+  }
+  const int degrees = normal_only ? 2 : 3;
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(covariance);
+  // Eigenvalues ascend: what is free comes first.
+  const Eigen::ArrayXd variances = eigen.eigenvalues().tail(degrees);
+  const Eigen::ArrayXd along = eigen.eigenvectors().rightCols(degrees).transpose() * error;
+  if (!(variances > 0.0).all()) return std::nullopt;
+  return (along.square() / variances).sum() / degrees;
 }
 
 class Track {
