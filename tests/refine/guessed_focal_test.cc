@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <string>
 
 #include "circline/refine/estimate_pose.h"
 #include "tests/plane_scene.h"
@@ -87,7 +88,10 @@ TEST(GuessedFocalLength, IsDoubtedWithTheAxes) {
   Observations observations = Front(&scene);
   const PoseHypothesis sure = EstimatePose(observations, Guessed()).hypotheses.front();
   observations.pencils[1].axis_probability = 0.5;
-  const PoseHypothesis doubted = EstimatePose(observations, Guessed()).hypotheses.front();
+  const PoseEstimate estimate = EstimatePose(observations, Guessed());
+  const PoseHypothesis& doubted = estimate.hypotheses.front();
+  const std::string& last = estimate.notes.back();
+  EXPECT_NE(last.find("with probability 0.50 only"), std::string::npos) << last;
   EXPECT_NEAR(doubted.focal_scale, sure.focal_scale, 1e-9);
   EXPECT_LT(sure.focal_sigma, 0.25);
   EXPECT_GT(doubted.focal_sigma, 0.3);
