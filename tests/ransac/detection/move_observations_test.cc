@@ -1,10 +1,9 @@
-#include "circline/ransac/detection/follow_observations.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 
 #include "circline/estimators/basics.h"
+#include "circline/ransac/detection/follow_observations.h"
 #include "tests/pinhole_camera.h"
 
 namespace circline {
