@@ -38,6 +38,9 @@ FocalRoots AtAngle(const Vector<7>& z) {
 }  // namespace
 
 const char* FocalRefusalSentence(FocalRefusal why) {
+  constexpr const char* kOpen =
+      "the evidence leaves the focal length open by more than a factor of 2.7 (little tilt, small "
+      "circles, or lines along the axis of tilt)";
   constexpr const char* kSentences[] = {
       "",
       "an input is not finite",
@@ -51,8 +54,7 @@ const char* FocalRefusalSentence(FocalRefusal why) {
       "the two circles coincide, or have one centre",
       "one circle and no direction of its plane leave the focal length open",
       "no focal length within the range explains the plane best",
-      "the evidence leaves the focal length open by more than a factor of 2.7 (little tilt, small "
-      "circles, or lines along the axis of tilt)"};
+      kOpen};
   return kSentences[static_cast<std::size_t>(why)];
 }
 
