@@ -74,19 +74,21 @@ int ParseAndCompare(int argc, char** argv, const Ranks& ranks) {
   return Answer(command_line) ? kExitOk : Compare(ranks);
 }
 
+int RunOnRanks(int argc, char** argv) {
+  const Ranks ranks(&argc, &argv);
+  try {
+    return ParseAndCompare(argc, argv, ranks);
+  } catch (const std::exception& error) {
+    if (ranks.count() == 1) throw;
+    SayOnStderr(std::string("circline_compare: stopped: ") + error.what());
+    ranks.Abort(kExitUnreadable);  // The others wait to be heard.
+  }
+}
+
 }  // namespace
 }  // namespace circline::apps
 
 int main(int argc, char** argv) {
-  using namespace circline::apps;
-  return RunGuarded(argv[0], "circline_compare", [&] {
-    const Ranks ranks(&argc, &argv);
-    try {
-      return ParseAndCompare(argc, argv, ranks);
-    } catch (const std::exception& error) {
-      if (ranks.count() == 1) throw;
-      SayOnStderr(std::string("circline_compare: stopped: ") + error.what());
-      ranks.Abort(kExitUnreadable);  // The others wait to be heard.
-    }
-  });
+  return circline::apps::RunGuarded(argv[0], "circline_compare",
+                                    [&] { return circline::apps::RunOnRanks(argc, argv); });
 }
