@@ -118,6 +118,8 @@ ConicCandidate ConicSearch::Polished(const ConicModel::Value& value) const {
 // more seed up to two thirds.
 std::vector<ConicCandidate> ConicSearch::Run() const {
   RansacOptions options = options_.ransac;
+  // One sample is often not good enough: a second all-inlier sample.
+  options.confidence = 1.0 - (1.0 - options.confidence) * (1.0 - options.confidence);
   std::vector<ConicCandidate> candidates;
   Report report;
   Draw(options, &report);
