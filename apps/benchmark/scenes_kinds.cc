@@ -191,6 +191,15 @@ Scene DrawOutliers(double noise_px, Random* random) {
   });
 }
 
+// Half of the circle, or more, and two lines or more along x.
+Scene DrawCircleAndPencil(double noise_px, Random* random) {
+  Recipe recipe;
+  recipe.min_circles = recipe.max_circles = recipe.min_pencils = recipe.max_pencils = 1;
+  recipe.free_pencils = false;
+  recipe.min_arc_deg = 180.0;
+  return DrawScene(recipe, noise_px, random, [](Scene*) { return true; });
+}
+
 std::vector<SceneRow> OddCircleRows() {
   std::vector<SceneRow> rows;
   for (const int n : {3, 2}) {
@@ -280,6 +289,13 @@ std::vector<SceneExperiment> SceneExperiments() {
        {0.5, 1.0},
        {LossType::kCauchy, LossType::kTukey},
        {{"", DrawOutliers}}},
+      {"circle_and_pencil",
+       "a circle and a pencil, no outliers",
+       7,
+       300,
+       {0.5, 2.0},
+       {LossType::kTrivial, LossType::kCauchy},
+       {{"", DrawCircleAndPencil}}},
       {"odd_lines",
        "a circle and segments, of which some have another direction, by 10 sigma or more",
        8,
