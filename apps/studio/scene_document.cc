@@ -1,6 +1,7 @@
 #include "apps/studio/scene_document.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "apps/common/camera_file.h"
@@ -9,6 +10,32 @@
 
 namespace circline::apps {
 namespace {
+
+// The file is for OpenCV's reader, too, which knows few escapes of texts.
+void CheckText(const std::string& text) {
+  const auto is_odd = [](char c) {
+    return c == '"' || c == '\\' || static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+  };
+  if (std::any_of(text.begin(), text.end(), is_odd))
+    throw RequestError(400, "a text has a quotation mark, a backslash or a control character");
+}
+
+// The same as OpenCV's reader takes it: integers of 32 bits, and nothing that is null.
+Json Checked(const Json& value) {
+  if (value.is_string()) CheckText(value.get_ref<const std::string&>());
+  if (value.is_number_integer() && std::abs(value.get<double>()) >= 1e9) return value.get<double>();
+  if (!value.is_structured()) return value;
+  Json checked = value.is_object() ? Json::object() : Json::array();
+  for (const auto& [key, item] : value.items()) {
+    if (value.is_array()) {
+      checked.push_back(Checked(item));
+    } else if (!item.is_null()) {
+      CheckText(key);
+      checked[key] = Checked(item);
+    }
+  }
+  return checked;
+}
 
 // Keys of names, which may be whole numbers in a file ("id: 0"), and are texts all the same.
 bool IsNameKey(const std::string& key) {
@@ -59,7 +86,9 @@ Json OneImageDocument(const Json& entry, const std::string& file, const Json& ca
   if (!entry.is_object())
     throw RequestError(400, "'scene' must be an image's entry of a scene file");
   Json image = {{"file", file}, {"camera", camera.at("id")}};
-  for (const auto& [key, value] : entry.items()) {
+  CheckText(file);
+  const Json checked = Checked(entry);
+  for (const auto& [key, value] : checked.items()) {
     if (key == "file" && value != image["file"])
       throw RequestError(400, "the scene is of another file than " + file);
     if (key != "file" && key != "camera") image[key] = value;

@@ -31,7 +31,7 @@ class RequestError : public std::runtime_error {
 const Json& ListOf(const Json& scene, const char* key);
 
 // A document of one image: `entry` (which may lack file and camera) with them. Throws RequestError
-// where it is of another file.
+// where it is of another file, or has texts that no scene file can have.
 Json OneImageDocument(const Json& entry, const std::string& file, const Json& camera);
 
 // Read by the reader of scene files. Throws RequestError with its sentence.

@@ -188,15 +188,16 @@ TEST_F(StudioServerTest, SurvivesMalformedAndHugeRequests) {
                                              std::string("{\0}", 3),
                                              std::string(100000, '['),
                                              image + std::string(100000, '{') + "}"};
-  const std::vector<std::string> scenes = {"{\"circles\":[{\"id\":\"c\",\"contour\":[1e999,1]}]}}",
-                                           "{\"circles\":[{\"id\":\"c\",\"contour\":\"no\"}]}}",
-                                           "{\"circles\":[{\"id\":\"c\",\"contour\":[1,2,3,4]}]}}",
-                                           "{\"circles\":[{\"id\":\"c\",\"roi\":[-1e9,0,1,1]}]}}",
-                                           "{\"pencils\":[{\"id\":\"x\",\"segments\":[]}]}}",
-                                           "[]}",
-                                           "7}"};
-  const std::vector<std::string> odd = {
+  const std::vector<std::string> scenes = {
+      "{\"circles\":[{\"id\":\"c\",\"contour\":[1e999,1]}]}}",
+      "{\"circles\":[{\"id\":\"c\",\"contour\":\"no\"}]}}",
+      "{\"circles\":[{\"id\":\"c\",\"contour\":[1,2,3,4]}]}}",
+      "{\"circles\":[{\"id\":\"c\",\"roi\":[-1e9,0,1,1]}]}}",
       "{\"pencils\":[{\"id\":\"\\\"\\\\\\n\",\"segments\":[1,2,3,4]}]}}",
+      "{\"pencils\":[{\"id\":\"x\",\"segments\":[]}]}}",
+      "[]}",
+      "7}"};
+  const std::vector<std::string> odd = {
       "{\"circles\":[{\"id\":\"c\",\"contour\":[1,2,3,4,5,6,7,8,9,10]}]}}",
       "{\"circles\":[{\"id\":\"c\",\"roi\":[-1e5,-1e5,1e6,1e6]}]}}",
       "{},\"hypothesis\":-1}",
