@@ -6,11 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 
 #include "circline/estimators/basics.h"
-#include "circline/estimators/closed_form_solvers.h"
-#include "circline/refine/refined_solvers.h"
 #include "tests/paper_scene.h"
 #include "tests/plane_scene.h"
 #include "tests/refine/simulated_options.h"
@@ -82,139 +79,6 @@ TEST(EstimatePoseTest, ExplainingNoContourIsDear) {
       EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.05)
           << LossName(loss) << ", seed " << seed;
     }
-  }
-}
-
-TEST(EstimatePoseTest, KnownSizesMakeItMetric) {
-  PlaneScene scene(0.7, 0.05);
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.5)};
-  observations.circles[0].center = scene.Pixel(0, 0);
-  Observations with_length = observations;
-  observations.circles[0].radius = 1.5;
-  with_length.known_lengths = {
-      KnownLength{Segment{scene.Pixel(-1, 0), scene.Pixel(1, 0.5)}, "", std::hypot(2.0, 0.5)}};
-  for (const Observations& o : {observations, with_length}) {
-    const PoseEstimate estimate = EstimatePose(o, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses[0];
-    EXPECT_TRUE(best.metric);
-    EXPECT_LT((best.cam_from_world.translation - scene.pose.translation).norm(), 0.03);
-    EXPECT_NEAR(best.circles[0].radius, 1.5, 0.01);
-    EXPECT_EQ(best.rank, 5);  // All but the spin about the normal.
-  }
-}
-
-TEST(EstimatePoseTest, KnownAngleSharpensTheRotation) {
-  PlaneScene scene(0.7, 0.5);
-  Observations observations = scene.Empty();
-  observations.pencils = {
-      scene.Pencil("L1", PencilDirection::kFree, Eigen::Vector3d::UnitX()),
-      scene.Pencil("L2", PencilDirection::kFree, Eigen::Vector3d(0.6, 0.8, 0.0))};
-  EstimationOptions options = Exact();
-  options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
-  const PoseEstimate without = EstimatePose(observations, options);
-  observations.known_angles = {KnownAngle{{"L1", "L2"}, std::acos(0.6), 0.0}};
-  const PoseEstimate with = EstimatePose(observations, options);
-  ASSERT_TRUE(without.status.ok() && with.status.ok());
-  const auto variance = [](const PoseEstimate& e) {
-    return e.hypotheses[0].Covariance().topLeftCorner(3, 3).trace();
-  };
-  EXPECT_LT(variance(with), 0.9 * variance(without));
-  ASSERT_EQ(with.hypotheses[0].pencils.size(), 2U);
-  const double cosine = std::abs(
-      with.hypotheses[0].pencils[0].direction.dot(with.hypotheses[0].pencils[1].direction));
-  EXPECT_NEAR(cosine, 0.6, 1e-4);
-}
-
-// What is known of features that a solver does not take is not its business.
-TEST(EstimatePoseTest, PairsLeaveOutWhatIsKnownOfOthers) {
-  PlaneScene scene(0.7, 0.2);
-  Observations observations = scene.Empty();
-  observations.pencils = {
-      scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
-      scene.Pencil("L2", PencilDirection::kFree, Eigen::Vector3d(0.6, 0.8, 0.0)),
-      scene.Pencil("L3", PencilDirection::kFree, Eigen::Vector3d(-0.8, 0.6, 0.0))};
-  observations.circles = {scene.Circle("c0", 1.0, 1.0, 0.5)};
-  observations.circles[0].plane = "p1";
-  observations.frame.plane = "p0";
-  observations.known_angles = {KnownAngle{{"L2", "L3"}, 0.5 * kPi, 0.0}};
-  observations.known_lengths = {
-      KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(1, 0)}, "p1", 1.0}};
-  SolverRegistry registry;
-  AddClosedFormSolvers(&registry);
-  AddRefinedSolvers(&registry, Exact());
-  const PoseEstimate estimate =
-      registry.Find("line_pairs", SolverStage::kRefined)->Solve(observations);
-  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.02);
-}
-
-// What cannot be used, or contradicts every pose, is named.
-TEST(EstimatePoseTest, KnowledgeThatHasNoPartIsNamed) {
-  PlaneScene scene(1.1, 0.1);
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0), scene.Circle("c1", 2.0, 1.0, 0.4)};
-  observations.circles[1].plane = "p1";
-  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
-                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
-  observations.known_angles = {KnownAngle{{"L1", "L2"}, 1.5, 0.0}};
-  observations.known_lengths = {
-      KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(1, 0)}, "p1", 1.0}};
-  PoseEstimate estimate = EstimatePose(observations, Exact());
-  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-  EXPECT_TRUE(HasNote(estimate, "'L1' and 'L2': not used, both run along axes"));
-  EXPECT_TRUE(HasNote(estimate, "a known length of the plane 'p1': not used"));
-}
-
-// A length says nothing of which of the two poses of a circle is right.
-TEST(EstimatePoseTest, ACircleAndALengthLeaveTwoEquallyLikelyPoses) {
-  for (const double tilt : {0.5, 0.7, 0.9}) {
-    PlaneScene scene(tilt, 0.3);
-    Observations observations = scene.Empty();
-    observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
-    observations.known_lengths = {
-        KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(1, 0)}, "p0", 1.0}};
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
-    EXPECT_NEAR(estimate.hypotheses[0].probability, 0.5, 0.05) << tilt;
-    EXPECT_TRUE(estimate.hypotheses[0].metric);
-  }
-}
-
-// One end of a known length is in the sky: that turns no pose over, it is left out and named.
-TEST(EstimatePoseTest, ALengthBeyondTheHorizonIsLeftOut) {
-  PlaneScene scene(1.1, 0.1);
-  const Eigen::Vector3d normal = scene.pose.rotation.col(2), ahead = Eigen::Vector3d::UnitZ();
-  Eigen::Vector2d sky;
-  ASSERT_TRUE(CameraToPixel(scene.camera, ahead - (normal.dot(ahead) - 0.1) * normal, &sky));
-  Observations circle = scene.Empty(), lines = scene.Empty();
-  circle.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
-  circle.circles[0].center = scene.Pixel(0.5, 0.2);
-  lines.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
-                   scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
-  Observations both = circle;
-  both.pencils = lines.pencils;
-  for (Observations observations : {circle, lines, both}) {
-    observations.known_lengths = {KnownLength{Segment{scene.Pixel(0, 0), sky}, "p0", 1.0}};
-    const PoseEstimate wrong = EstimatePose(observations, Exact());
-    ASSERT_TRUE(wrong.status.ok()) << wrong.status.message;
-    // Of the circle alone another pose may explain the length and not the centre.
-    if (!observations.pencils.empty()) {
-      EXPECT_LT(NormalError(wrong.hypotheses[0], scene), 0.05);
-      EXPECT_FALSE(wrong.hypotheses[0].metric);
-      EXPECT_NE(wrong.notes.back().find("known length"), std::string::npos);
-    } else {
-      EXPECT_GT(wrong.hypotheses.size(), 1U);
-    }
-    // Another that is right makes it metric.
-    observations.known_lengths.push_back(
-        KnownLength{Segment{scene.Pixel(-1, 0), scene.Pixel(1, 0)}, "p0", 2.0});
-    const PoseEstimate right = EstimatePose(observations, Exact());
-    ASSERT_TRUE(right.status.ok()) << right.status.message;
-    EXPECT_LT(NormalError(right.hypotheses[0], scene), 0.05);
-    EXPECT_TRUE(right.hypotheses[0].metric);
-    EXPECT_TRUE(right.hypotheses[0].Covariance().allFinite());
   }
 }
 

@@ -48,6 +48,9 @@ struct NormalErrors {
   double Sigma() const { return std::sqrt(covariance.trace()); }
 };
 
+// Root of the sum of both variances, radians.
+inline double SigmaNormal(const PoseHypothesis& h) { return NormalErrors(h, {}).Sigma(); }
+
 // Of a hypothesis' rotation.
 inline double RotationNees(const PoseHypothesis& h, const CameraPose& truth) {
   const Eigen::Vector3d error = LogRotation(truth.rotation * h.cam_from_world.rotation.transpose());
