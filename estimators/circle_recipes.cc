@@ -24,16 +24,19 @@ double Extent(const CircleObservation& circle) {
   return circle.points.empty() ? 0.0 : box.diagonal().norm();
 }
 
-// Fitted circles of the world plane that pass the test, the largest first.
+// Fitted circles of the world plane that pass the test, the largest first; copies of so many.
 template <typename Test>
-Circles WorldCircles(const Observations& observations, const Test& test) {
+Circles WorldCircles(const Observations& observations, std::size_t most, const Test& test) {
   std::multimap<double, const CircleObservation*, std::greater<>> by_size;
   for (const CircleObservation& circle : observations.circles) {
     if (circle.fit && circle.plane == observations.frame.plane && test(circle))
       by_size.emplace(Extent(circle), &circle);
   }
   Circles circles;
-  for (const auto& [extent, circle] : by_size) circles.push_back(*circle);
+  for (const auto& [extent, circle] : by_size) {
+    if (circles.size() == most) break;
+    circles.push_back(*circle);
+  }
   return circles;
 }
 
@@ -73,31 +76,31 @@ Status Keep(Circles circles, const Observations& observations, Observations* evi
 
 // The largest circle, its contour alone.
 Status SelectContour(const Observations& observations, Observations* evidence) {
-  Circles circles = WorldCircles(observations, IsAny);
+  Circles circles = WorldCircles(observations, 1, IsAny);
   if (circles.empty()) return Status::Refused("no circle of the world's plane could be fitted");
-  circles.resize(1);
   ForgetCenters(&circles);
   return Keep(std::move(circles), observations, evidence);
 }
 
 // The same, without what is known of its frame.
 Status SelectSingleCircle(const Observations& observations, Observations* evidence) {
-  Observations frameless = observations;
-  frameless.frame = FrameObservation();
-  frameless.frame.plane = observations.frame.plane;
-  frameless.known_lengths.clear();
-  return SelectContour(frameless, evidence);
+  const Status status = SelectContour(observations, evidence);
+  if (!status.ok()) return status;
+  evidence->frame = FrameObservation();
+  evidence->frame.plane = observations.frame.plane;
+  evidence->known_lengths.clear();
+  evidence->pencils.clear();
+  return status;
 }
 
 // The largest circle whose centre is known as `has_center` says, in words `needs`.
 template <typename HasCenter>
 auto SelectCentered(const std::string& needs, const HasCenter& has_center) {
   return [needs, has_center](const Observations& observations, Observations* evidence) {
-    Circles circles = WorldCircles(observations, [&](const CircleObservation& circle) {
+    Circles circles = WorldCircles(observations, 1, [&](const CircleObservation& circle) {
       return has_center(observations, circle);
     });
     if (circles.empty()) return Status::Refused("the world's plane does not hold " + needs);
-    circles.resize(1);
     return Keep(std::move(circles), observations, evidence);
   };
 }
@@ -117,26 +120,33 @@ bool HasDiameters(const Observations&, const CircleObservation& circle) {
 Status SelectParallelCircles(const Observations& observations, Observations* evidence) {
   // More circles add little to the choice of the plane, and the joint refinement uses them all.
   constexpr std::size_t kMaxCircles = 12;
-  Circles circles = WorldCircles(observations, IsAny);
+  Circles circles = WorldCircles(observations, kMaxCircles, IsAny);
   if (circles.size() < 2)
     return Status::Refused("the world's plane holds fewer than two fitted circles");
-  circles.resize(std::min(circles.size(), kMaxCircles));
   ForgetCenters(&circles);
   for (CircleObservation& circle : circles) circle.concentric.clear();
   return Keep(std::move(circles), observations, evidence);
 }
 
+// Those about the centre that the largest circle has that shares its own.
 Status SelectConcentricCircles(const Observations& observations, Observations* evidence) {
-  for (const CircleObservation& first : WorldCircles(
-           observations, [](const CircleObservation& c) { return !c.concentric.empty(); })) {
-    Circles circles = WorldCircles(observations, [&first](const CircleObservation& c) {
-      return c.concentric == first.concentric;
-    });
-    if (circles.size() < 2) continue;
-    ForgetCenters(&circles);
-    return Keep(std::move(circles), observations, evidence);
+  std::map<std::string, int> sizes;
+  const auto is_of_world = [&observations](const CircleObservation& c) {
+    return c.fit && c.plane == observations.frame.plane && !c.concentric.empty();
+  };
+  for (const CircleObservation& circle : observations.circles) {
+    if (is_of_world(circle)) ++sizes[circle.concentric];
   }
-  return Status::Refused("the world's plane holds no two fitted circles that are concentric");
+  const Circles largest = WorldCircles(observations, 1, [&](const CircleObservation& c) {
+    return is_of_world(c) && sizes[c.concentric] > 1;
+  });
+  if (largest.empty())
+    return Status::Refused("the world's plane holds no two fitted circles that are concentric");
+  Circles circles = WorldCircles(
+      observations, observations.circles.size(),
+      [&](const CircleObservation& c) { return c.concentric == largest[0].concentric; });
+  ForgetCenters(&circles);
+  return Keep(std::move(circles), observations, evidence);
 }
 
 Status SelectCircleFrame(const Observations& observations, Observations* evidence) {

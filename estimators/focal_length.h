@@ -12,7 +12,7 @@
 // Every function writes ALL solutions and returns how many; where that is 0, `why` (optional)
 // receives the reason, which FocalRefusalSentence puts in words. A solution whose log f is open by
 // more than a factor of e (one standard deviation) is none. All refuse what is not finite or no
-// ellipse. Nothing allocates but FocalFromPlane; calls on different data may run at once.
+// ellipse. Nothing allocates; calls on different data may run at once.
 #ifndef CIRCLINE_ESTIMATORS_FOCAL_LENGTH_H_
 #define CIRCLINE_ESTIMATORS_FOCAL_LENGTH_H_
 

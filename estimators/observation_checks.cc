@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <string>
+#include <set>
 
 #include "circline/estimators/observations.h"
 
@@ -94,17 +94,30 @@ bool NamesPlane(const Observations& observations, const std::string& plane) {
          std::any_of(observations.pencils.begin(), observations.pencils.end(), is_on);
 }
 
-// Whether an earlier one has the id of the i-th.
-template <typename Features>
-bool IsRepeated(const Features& features, std::size_t i) {
-  return std::any_of(features.begin(), features.begin() + static_cast<std::ptrdiff_t>(i),
-                     [&](const auto& other) { return other.id == features[i].id; });
-}
+// The ids so far. Few are compared one by one, which allocates nothing.
+class Ids {
+ public:
+  // False where it has been there.
+  template <typename Features>
+  bool Insert(const Features& features, std::size_t i) {
+    constexpr std::size_t kFew = 64;
+    if (features.size() > kFew) return ids_.insert(features[i].id).second;
+    return std::none_of(features.begin(), features.begin() + static_cast<std::ptrdiff_t>(i),
+                        [&](const auto& other) { return other.id == features[i].id; });
+  }
+
+ private:
+  std::set<std::string> ids_;
+};
 
 Status ValidateKnown(const Observations& observations) {
+  std::set<std::string> pencils;
+  if (!observations.known_angles.empty()) {
+    for (const PencilObservation& pencil : observations.pencils) pencils.insert(pencil.id);
+  }
   for (const KnownAngle& angle : observations.known_angles) {
     for (const std::string& id : angle.pencils) {
-      if (FindPencil(observations, id) < 0) {
+      if (pencils.count(id) == 0) {
         return Status::Invalid("known angle: there is no pencil '" + id + "'");
       }
     }
@@ -138,14 +151,15 @@ Status Observations::Validate() const {
   if (status.ok() && !NonNegative(stated_focal_px))
     status = Status::Invalid("stated_focal_px must be 0 or more");
   if (status.ok() && !std::isfinite(found_k1)) status = Status::Invalid("found_k1 must be finite");
+  Ids circle_ids, pencil_ids;
   for (std::size_t i = 0; i < circles.size() && status.ok(); ++i) {
     status = ValidateCircle(circles[i]);
-    if (status.ok() && IsRepeated(circles, i))
+    if (status.ok() && !circle_ids.Insert(circles, i))
       status = Status::Invalid("two circles have the id '" + circles[i].id + "'");
   }
   for (std::size_t i = 0; i < pencils.size() && status.ok(); ++i) {
     status = ValidatePencil(pencils[i]);
-    if (status.ok() && IsRepeated(pencils, i))
+    if (status.ok() && !pencil_ids.Insert(pencils, i))
       status = Status::Invalid("two pencils have the id '" + pencils[i].id + "'");
   }
   if (status.ok()) status = ValidateRadiusGroups(*this);

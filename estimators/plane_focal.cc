@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
-#include <vector>
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/focal_roots.h"
@@ -160,17 +158,18 @@ bool IsNearMinimum(const Branch& branch, std::size_t i) {
   return false;
 }
 
-// Writes the distinct ones, the lowest chi2 first, without those that chi2 excludes. Returns how
-// many.
-int WriteDistinct(std::vector<FocalSolution> found, double freedom,
+// Writes the distinct ones of one or more, the lowest chi2 first, without those that chi2 excludes.
+// Returns how many.
+int WriteDistinct(FocalSolution* begin, FocalSolution* end, double freedom,
                   std::array<FocalSolution, 4>* solutions) {
   constexpr double kSame = 1e-6;  // Of log focal.
   constexpr double kGate = 60.0;
-  std::sort(found.begin(), found.end(),
+  std::sort(begin, end,
             [](const FocalSolution& a, const FocalSolution& b) { return a.chi2 < b.chi2; });
+  const double best = begin->chi2, unit = std::max(1.0, best / std::max(1.0, freedom));
   std::size_t count = 0;
-  for (const FocalSolution& s : found) {
-    const double best = found[0].chi2, unit = std::max(1.0, best / std::max(1.0, freedom));
+  for (const FocalSolution* found = begin; found != end; ++found) {
+    const FocalSolution& s = *found;
     if (count == solutions->size() || s.chi2 > best + kGate * unit) break;
     const auto written = solutions->begin() + static_cast<std::ptrdiff_t>(count);
     if (std::none_of(solutions->begin(), written, [&s](const FocalSolution& other) {
@@ -194,7 +193,8 @@ int FocalFromPlane(const PlaneEvidence& evidence, double min_focal, double max_f
     return RefuseFocal(FocalRefusal::kNoEllipse, why);
   }
   reason = FocalRefusal::kOutOfRange;
-  std::vector<FocalSolution> found;
+  std::array<FocalSolution, 2 * kStarts> found;
+  FocalSolution* end = found.data();
   for (const Branch& branch : branches) {
     for (std::size_t i = 0; i < kStarts; ++i) {
       PlaneState state = branch[i].state;
@@ -206,12 +206,12 @@ int FocalFromPlane(const PlaneEvidence& evidence, double min_focal, double max_f
         reason = FocalRefusal::kUndetermined;
         continue;
       }
-      found.push_back({std::exp(state.log_focal), covariance(0, 0),
-                       -(covariance.row(0) * equations.shift).transpose(), equations.chi2});
+      *end++ = {std::exp(state.log_focal), covariance(0, 0),
+                -(covariance.row(0) * equations.shift).transpose(), equations.chi2};
     }
   }
-  if (found.empty()) return RefuseFocal(reason, why);
-  return WriteDistinct(std::move(found), Freedom(evidence), solutions);
+  if (end == found.data()) return RefuseFocal(reason, why);
+  return WriteDistinct(found.data(), end, Freedom(evidence), solutions);
 }
 
 }  // namespace circline
