@@ -218,7 +218,7 @@ Measured MeasuredCenter(const Observations& observations, const CircleObservatio
 void GatherConic(const CircleObservation& circle, Measured* conic, Inputs* inputs) {
   *conic = Measured(ConicToVector(circle.fit->conic), circle.fit->Covariance());
   inputs->tilts.emplace_back(Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero());
-  inputs->contrasts.push_back(circle.contrast);
+  inputs->circles.push_back(&circle);
 }
 
 void GatherCircle(const Observations& observations, const CircleObservation& circle,

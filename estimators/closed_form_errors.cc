@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "circline/estimators/exactness.h"
 #include "circline/estimators/line_pose.h"
 
 namespace circline {
@@ -85,6 +86,24 @@ Eigen::Matrix3d GrownEllipse(const Eigen::Matrix3d& conic, double by) {
   ellipse.a += by;
   ellipse.b += by;
   return EllipseToConic(ellipse);
+}
+
+// The image of an oval instead of a circle, seen from afar: what perspective makes of it is of
+// second order. A share of the radius, of one of two components: longer along the axes of the
+// ellipse, or between them.
+Eigen::Matrix3d OvalEllipse(const Eigen::Matrix3d& conic, bool along_axes, double share) {
+  Ellipse e;
+  if (!ConicToEllipse(conic, &e)) return conic;
+  // The circle is u^T u = 1, u = T x, the oval u^T (I - 2 S) u = 1.
+  Eigen::Matrix3d oval = Eigen::Vector3d(1.0, 1.0, -1.0).asDiagonal();
+  if (along_axes) oval.diagonal().head<2>() += 2.0 * share * Eigen::Vector2d(-1.0, 1.0);
+  if (!along_axes) oval(0, 1) = oval(1, 0) = -2.0 * share;
+  Eigen::Matrix3d T = Eigen::Matrix3d::Identity();
+  T.topLeftCorner<2, 2>() = Eigen::Vector2d(1.0 / e.a, 1.0 / e.b).asDiagonal() *
+                            Eigen::Rotation2Dd(-e.angle).toRotationMatrix();
+  T.topRightCorner<2, 1>() = -T.topLeftCorner<2, 2>() * e.center;
+  const Eigen::Matrix3d out = T.transpose() * oval * T;
+  return out / out.norm();
 }
 
 // Of one candidate or more.
@@ -193,7 +212,18 @@ std::vector<Perturbation> Perturbations(const std::vector<MovedInput>& inputs,
         Eigen::Map<Eigen::VectorXd>(moved[i].value, column.size()) += part * column;
       });
     }
-    if (inputs[i].kind == InputKind::kConic) contrasts.insert(inputs[i].contrast);
+    if (inputs[i].kind != InputKind::kConic) continue;
+    const CircleObservation* circle = inputs[i].circle;
+    contrasts.insert(inputs[i].contrast);
+    const double shape =
+        circle != nullptr ? ShapeSigma(*circle, camera, noise) : noise.circle_shape;
+    for (const bool along_axes : {true, false}) {
+      if (shape == 0.0) continue;
+      all.push_back([=](double part, const std::vector<MovedInput>& moved) {
+        Eigen::Map<Vector6d> conic(moved[i].value);
+        conic = ConicToVector(OvalEllipse(VectorToConic(conic), along_axes, part * shape));
+      });
+    }
   }
   for (const CoordinateChange& change : CameraErrors(noise.SigmaOf(camera), camera)) {
     all.push_back([change](double part, const std::vector<MovedInput>& moved) {

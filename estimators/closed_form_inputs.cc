@@ -231,13 +231,14 @@ Measured::Measured(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covarianc
 
 std::vector<MovedInput> Inputs::Moved() {
   std::vector<MovedInput> all;
-  const auto add = [&all](InputKind kind, Measured* m, int contrast = 0) {
-    if (m->present()) all.push_back({kind, m->value.data(), m->columns, contrast});
+  const auto add = [&all](InputKind kind, Measured* m, const CircleObservation* circle = nullptr) {
+    const int contrast = circle != nullptr ? circle->contrast : 0;
+    if (m->present()) all.push_back({kind, m->value.data(), m->columns, contrast, circle});
   };
   const auto add_number = [&all](double* value, double sigma) {
     all.push_back({InputKind::kNumber, value, Eigen::MatrixXd::Constant(1, 1, sigma)});
   };
-  add(InputKind::kConic, &conic, contrasts.empty() ? 0 : contrasts[0]);
+  add(InputKind::kConic, &conic, circles.empty() ? nullptr : circles[0]);
   add(InputKind::kPoint, &center);
   add(InputKind::kLine, &x_line);
   add(InputKind::kLine, &y_line);
@@ -245,7 +246,7 @@ std::vector<MovedInput> Inputs::Moved() {
   add(InputKind::kLine, &line);
   add(InputKind::kPoint, &origin);
   for (std::size_t i = 0; i < more_conics.size(); ++i)
-    add(InputKind::kConic, &more_conics[i], contrasts[i + 1]);
+    add(InputKind::kConic, &more_conics[i], circles[i + 1]);
   for (Measured& tilt : tilts) add(InputKind::kNumber, &tilt);
   if (line.present()) add_number(&angle, angle_sigma);
   add_number(&radius, radius * radius_sigma);

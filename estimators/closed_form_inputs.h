@@ -28,8 +28,9 @@ struct Measured {
 struct MovedInput {
   InputKind kind;
   double* value;
-  Eigen::MatrixXd columns;  // As Measured has them; none: exact.
-  int contrast = 0;         // Of a conic: CircleObservation::contrast.
+  Eigen::MatrixXd columns;                    // As Measured has them; none: exact.
+  int contrast = 0;                           // Of a conic: CircleObservation::contrast.
+  const CircleObservation* circle = nullptr;  // Of a conic, where it is known.
 };
 
 using RayPair = std::array<Eigen::Vector3d, 2>;
@@ -39,9 +40,9 @@ struct Inputs {
   Measured conic;                     // ConicToVector, 6.
   std::vector<Measured> more_conics;  // Further circles of the same plane.
   // Of `conic` and `more_conics`: what their planes are tilted by against the world's, about two
-  // axes of them, 2, 0 as far as is known; and CircleObservation::contrast.
+  // axes of them, 2, 0 as far as is known; and whose they are.
   std::vector<Measured> tilts;
-  std::vector<int> contrasts;
+  std::vector<const CircleObservation*> circles;
   std::vector<double>
       normal_weights;       // Inverse variances of the normals of `conic`, `more_conics`.
   Measured center;          // Image of the circle's centre, homogeneous, 3.

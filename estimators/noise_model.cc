@@ -52,7 +52,8 @@ Status CameraSigma::Validate() const {
 NoiseModel NoiseModel::Exact() {
   NoiseModel m;
   m.contour_px = m.line_px = m.contour_offset_px = 0.0;
-  m.circle_tilt_rad = m.circle_height = m.line_direction_rad = m.pencil_axis_rad = 0.0;
+  m.circle_tilt_rad = m.circle_height = m.circle_shape = 0.0;
+  m.line_direction_rad = m.pencil_axis_rad = 0.0;
   m.radius = m.length = 0.0;
   m.camera = CameraSigma::Exact();
   return m;
@@ -66,6 +67,7 @@ Status NoiseModel::Validate() const {
                                      {"contour_offset_px", contour_offset_px},
                                      {"circle_tilt_rad", circle_tilt_rad},
                                      {"circle_height", circle_height},
+                                     {"circle_shape", circle_shape},
                                      {"line_direction_rad", line_direction_rad},
                                      {"pencil_axis_rad", pencil_axis_rad},
                                      {"radius", radius},

@@ -5,7 +5,7 @@
 // prints bleed, sheets bend, walls lean, calibrations are a little off. The defaults are those of
 // photographs, chosen between what discs (rgb), dots (visp36), a large circle, a street, a box and
 // chessboards ask for; photographs of infrared discs, of a robot's dots, of ChArUco boards and of a
-// turntable, and the harder halves of street and box had no part in it
+// turntable (but for circle_shape), and the harder halves of street and box had no part in it
 // (apps/benchmark/coverage.py).
 #ifndef CIRCLINE_ESTIMATORS_NOISE_MODEL_H_
 #define CIRCLINE_ESTIMATORS_NOISE_MODEL_H_
@@ -68,6 +68,11 @@ struct NoiseModel {
   // a share of the circle's radius.
   double circle_tilt_rad = 0.003;
   double circle_height = 0.003;
+  // How far what is called a circle is out of round: each of the two components of an oval, a share
+  // of its radius. Rims are thick and rounded, boards are sawn; what is printed is rounder, and its
+  // contour more regular, by which this is scaled (ShapeSigma). Between a turntable's rim and discs
+  // (rgb), of 0.0015 to 0.004.
+  double circle_shape = 0.0025;
   // A line against the direction of its pencil, and a wall's lines against the axis that they are
   // taken for (each of two components; LeanShape is what it makes of a pencil), radians.
   double line_direction_rad = 0.003;

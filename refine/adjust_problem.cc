@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/exactness.h"
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/given_poses.h"
 #include "circline/refine/manifolds.h"
@@ -195,6 +196,11 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservatio
   made.radius = radius;
   AddKnownRadius(world, circle, radius);
   if (model.circle_tilt_rad > 0.0 || model.circle_height > 0.0) made.tilt = AddBlock(3, {});
+  if (model.circle_shape > 0.0) {
+    made.shape = AddBlock(2, {});
+    const double sigma = ShapeSigma(circle, input.observations->camera, model);
+    AddTerm(NewGaussianPrior({sigma, sigma}), {made.shape}, -1, std::make_unique<MostlyExact>());
+  }
   return &(circles_[{world, id}] = made);
 }
 
@@ -225,6 +231,8 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle) {
   with.height_sigma = model.circle_height;
   std::vector<int> blocks = {rotations_[i], translations_[i], made->center, made->radius};
   if (made->tilt >= 0) blocks.push_back(made->tilt);
+  with.shape = made->shape >= 0;
+  if (with.shape) blocks.push_back(made->shape);
   const int offset = OffsetOf(photo, circle);
   with.offset = offset >= 0;
   if (offset >= 0) blocks.push_back(offset);

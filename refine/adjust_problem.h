@@ -103,7 +103,7 @@ class AdjustProblem : private Graph {
   struct Circle {
     std::string id;
     int world = 0;
-    int center = -1, radius = -1, tilt = -1;  // Blocks.
+    int center = -1, radius = -1, tilt = -1, shape = -1;  // Blocks.
   };
 
   struct Direction {

@@ -58,7 +58,7 @@ inline double TwiceCostOf(const ceres::CostFunction& cost, const FeatureCost* fe
 }
 
 // A circle of the plane Z = 0 in the world: centre (2), radius and, where it is not null, its tilt
-// and height (3), as PlaneCircleContourCost has them.
+// and height (3), as PlaneCircleContourCost has them; its shape is left out.
 struct PlaneCircle {
   Eigen::Vector3d center, normal;  // The latter of any length.
   double radius;

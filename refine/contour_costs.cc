@@ -10,38 +10,36 @@
 namespace circline {
 namespace {
 
-// A circle in the camera frame: centre p, normal m of any length, radius r.
+// A circle in the camera frame: centre p, normal m of any length, radius r, and its shape: the
+// points y of its plane with (y - p)^T M (y - p) = r^2, M = I where it is round.
 struct CircleInCamera {
   Eigen::Vector3d p, m;
   double r;
+  Eigen::Matrix3d M = Eigen::Matrix3d::Identity();
+
+  // A ray x meets the plane in x d / (m . x), d = m . p, which lies Q x / (m . x) from p.
+  Eigen::Matrix3d Q() const { return m.dot(p) * Eigen::Matrix3d::Identity() - p * m.transpose(); }
 };
 
-// Its image. A ray x meets the plane in x d / (m . x), d = m . p; that this is at distance r from p
-// is x^T C x = 0 with C = d^2 I - d (m p^T + p m^T) + (p . p - r^2) m m^T, negative inside.
+// Its image, negative inside.
 Eigen::Matrix3d ImageOfCircle(const CircleInCamera& c) {
-  const double d = c.m.dot(c.p);
-  const Eigen::Matrix3d mp = c.m * c.p.transpose();
-  return d * d * Eigen::Matrix3d::Identity() - d * (mp + mp.transpose()) +
-         (c.p.squaredNorm() - c.r * c.r) * c.m * c.m.transpose();
+  const Eigen::Matrix3d Q = c.Q();
+  return Q.transpose() * c.M * Q - c.r * c.r * c.m * c.m.transpose();
 }
 
 // d ConicToVector(points.Normalized(image)) / d (p, m, r).
 Eigen::Matrix<double, 6, 7> ImageJacobian(const CircleInCamera& c, const ImagePoints& points) {
-  const double d = c.m.dot(c.p), k = c.p.squaredNorm() - c.r * c.r;
-  const Eigen::Matrix3d mp = c.m * c.p.transpose(), both = mp + mp.transpose(),
-                        mm = c.m * c.m.transpose();
+  const Eigen::Matrix3d MQ = c.M * c.Q();
+  const auto by = [&points](const Eigen::Matrix3d& half) {
+    return ConicToVector(points.Normalized(half + half.transpose()));
+  };
   Eigen::Matrix<double, 6, 7> J;
   for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d e = Eigen::Vector3d::Unit(i);
-    const Eigen::Matrix3d me = c.m * e.transpose(), pe = c.p * e.transpose();
-    const Eigen::Matrix3d by_p = 2.0 * d * c.m[i] * Eigen::Matrix3d::Identity() - c.m[i] * both -
-                                 d * (me + me.transpose()) + 2.0 * c.p[i] * mm;
-    const Eigen::Matrix3d by_m = 2.0 * d * c.p[i] * Eigen::Matrix3d::Identity() - c.p[i] * both -
-                                 d * (pe + pe.transpose()) + k * (me + me.transpose());
-    J.col(i) = ConicToVector(points.Normalized(by_p));
-    J.col(3 + i) = ConicToVector(points.Normalized(by_m));
+    const Eigen::Vector3d row = MQ.row(i), e = Eigen::Vector3d::Unit(i);
+    J.col(i) = by(c.m[i] * MQ - c.m * row.transpose());
+    J.col(3 + i) = by(c.p[i] * MQ - e * (c.p.transpose() * MQ) - c.r * c.r * e * c.m.transpose());
   }
-  J.col(6) = ConicToVector(points.Normalized(-2.0 * c.r * mm));
+  J.col(6) = by(-c.r * c.m * c.m.transpose());
   return J;
 }
 
@@ -49,25 +47,44 @@ Eigen::Matrix<double, 6, 7> ImageJacobian(const CircleInCamera& c, const ImagePo
 // `U`: those of the residuals by the conic.
 template <typename Rows>
 class CircleChain {
+  template <int n>
+  using Columns = Eigen::Matrix<double, Eigen::Dynamic, n, 0, CurveModel::kMaxSize, n>;
+
  public:
   CircleChain(const Rows& U, const Eigen::Matrix3d& R, const CircleInCamera& circle,
               const ImagePoints& points)
-      : R_(R), by_circle_(U * ImageJacobian(circle, points)) {}
+      : U_(U),
+        R_(R),
+        circle_(circle),
+        points_(points),
+        by_circle_(U * ImageJacobian(circle, points)) {}
 
   auto ByPoint() const { return by_circle_.template leftCols<3>(); }
   auto ByNormal() const { return by_circle_.template middleCols<3>(3); }
   auto ByRadius() const { return by_circle_.col(6); }
-  void WritePose(const Eigen::Vector3d& C, const Eigen::Vector3d& N, const double* quaternion,
-                 int num_residuals, double** jacobians) const {
-    WriteJacobian((ByPoint() * (-R_ * CrossMatrix(C)) + ByNormal() * (-R_ * CrossMatrix(N))) *
-                      DeltaFromQuaternion(quaternion),
-                  num_residuals, 0, jacobians);
+  // By a shape R^T M R of the world that changes so.
+  Columns<1> ByShape(const Eigen::Matrix3d& rate) const {
+    const Eigen::Matrix3d RtQ = R_.transpose() * circle_.Q();
+    return U_ * ConicToVector(points_.Normalized(RtQ.transpose() * rate * RtQ));
+  }
+  // `M`: the shape in the world; null where the circle is round.
+  void WritePose(const Eigen::Vector3d& C, const Eigen::Vector3d& N, const Eigen::Matrix3d* M,
+                 const double* quaternion, int num_residuals, double** jacobians) const {
+    Columns<3> by_turn = ByPoint() * (-R_ * CrossMatrix(C)) + ByNormal() * (-R_ * CrossMatrix(N));
+    for (int i = 0; M != nullptr && i < 3; ++i) {
+      const Eigen::Matrix3d half = CrossMatrix(Eigen::Vector3d::Unit(i)) * *M;
+      by_turn.col(i) += ByShape(half + half.transpose());
+    }
+    WriteJacobian(by_turn * DeltaFromQuaternion(quaternion), num_residuals, 0, jacobians);
     WriteJacobian(ByPoint(), num_residuals, 1, jacobians);
   }
 
  private:
+  const Rows& U_;
   const Eigen::Matrix3d& R_;
-  Eigen::Matrix<double, Eigen::Dynamic, 7, 0, CurveModel::kMaxSize, 7> by_circle_;
+  const CircleInCamera& circle_;
+  const ImagePoints& points_;
+  Columns<7> by_circle_;
 };
 
 CircleInCamera WorldCircle(const Eigen::Matrix3d& R, const double* const* parameters) {
@@ -97,8 +114,8 @@ bool CircleContourCost::EvaluateWith(const Weighing& weighing, const double* con
     return false;
   if (jacobians == nullptr) return true;
   const CircleChain<Rows> by(U, R, circle, *points());
-  by.WritePose(Eigen::Vector3d(parameters[2]), Eigen::Vector3d(parameters[3]), parameters[0],
-               num_residuals(), jacobians);
+  by.WritePose(Eigen::Vector3d(parameters[2]), Eigen::Vector3d(parameters[3]), nullptr,
+               parameters[0], num_residuals(), jacobians);
   WriteJacobian(by.ByPoint() * R, num_residuals(), 2, jacobians);
   WriteJacobian(by.ByNormal() * R, num_residuals(), 3, jacobians);
   WriteJacobian(by.ByRadius(), num_residuals(), 4, jacobians);
@@ -114,24 +131,43 @@ PlaneCircle InWorld(const double* const* parameters, bool tilted) {
   return {parameters[2], parameters[3][0], tilted ? parameters[4] : nullptr};
 }
 
+// Of M in the world, by each component of the shape.
+Eigen::Matrix3d ShapeRate(int component) {
+  Eigen::Matrix3d rate = Eigen::Matrix3d::Zero();
+  if (component == 0) rate.diagonal() << -2.0, 2.0, 0.0;
+  if (component == 1) rate(0, 1) = rate(1, 0) = -2.0;
+  return rate;
+}
+
+Eigen::Matrix3d ShapeInWorld(const double* shape) {
+  return Eigen::Matrix3d::Identity() + shape[0] * ShapeRate(0) + shape[1] * ShapeRate(1);
+}
+
+// Without its shape.
 CircleInCamera InCamera(const PlaneCircle& circle, const Eigen::Matrix3d& R,
                         const double* translation) {
   return {R * circle.center + Eigen::Vector3d(translation), R * circle.normal, circle.radius};
 }
 
+std::vector<int> BlockSizes(const PlaneCircleContourCost::Blocks& blocks) {
+  std::vector<int> sizes = {4, 3, 2, 1};
+  if (blocks.tilt_and_height) sizes.push_back(3);
+  if (blocks.shape) sizes.push_back(2);
+  return sizes;
+}
+
 }  // namespace
 
 PlaneCircleContourCost::PlaneCircleContourCost(ImagePoints points, Blocks blocks)
-    : CurveCost(
-          std::move(points), 5,
-          blocks.tilt_and_height ? std::vector<int>{4, 3, 2, 1, 3} : std::vector<int>{4, 3, 2, 1},
-          blocks.offset, blocks.camera, blocks.tilt_and_height ? kPriorRows : 0),
+    : CurveCost(std::move(points), 5, BlockSizes(blocks), blocks.offset, blocks.camera,
+                blocks.tilt_and_height ? kPriorRows : 0),
       blocks_(blocks) {}
 
 void PlaneCircleContourCost::Distances(const double* const* parameters,
                                        std::vector<double>* distances) const {
-  const CircleInCamera circle = InCamera(InWorld(parameters, blocks_.tilt_and_height),
-                                         RotationFromBlock(parameters[0]), parameters[1]);
+  const Eigen::Matrix3d R = RotationFromBlock(parameters[0]);
+  CircleInCamera circle = InCamera(InWorld(parameters, blocks_.tilt_and_height), R, parameters[1]);
+  if (blocks_.shape) circle.M = R * ShapeInWorld(parameters[ShapeBlock()]) * R.transpose();
   points()->ConicDistances(ImageOfCircle(circle), Offset(parameters), CameraShifts(parameters),
                            distances);
 }
@@ -141,7 +177,12 @@ bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double
   const bool tilted = blocks_.tilt_and_height;
   const Eigen::Matrix3d R = RotationFromBlock(parameters[0]);
   const PlaneCircle in_world = InWorld(parameters, tilted);
-  const CircleInCamera circle = InCamera(in_world, R, parameters[1]);
+  CircleInCamera circle = InCamera(in_world, R, parameters[1]);
+  Eigen::Matrix3d M;
+  if (blocks_.shape) {
+    M = ShapeInWorld(parameters[ShapeBlock()]);
+    circle.M = R * M * R.transpose();
+  }
   Rows U;
   if (!(circle.p.z() > 0.0) || !(circle.r > 0.0) ||
       !SumAbout(ImageOfCircle(circle), weighing, parameters, residuals, jacobians, &U))
@@ -154,7 +195,8 @@ bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double
   if (jacobians == nullptr) return true;
   const int rows = num_residuals();
   const CircleChain<Rows> by(U, R, circle, *points());
-  by.WritePose(in_world.center, in_world.normal, parameters[0], rows, jacobians);
+  by.WritePose(in_world.center, in_world.normal, blocks_.shape ? &M : nullptr, parameters[0], rows,
+               jacobians);
   WriteJacobian(by.ByPoint() * R.leftCols<2>(), rows, 2, jacobians);
   const double height = tilted ? parameters[4][2] : 0.0;
   WriteJacobian(by.ByRadius() + height * (by.ByPoint() * R.col(2)), rows, 3, jacobians);
@@ -165,6 +207,11 @@ bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double
     WriteJacobian(by_tilt, rows, 4, jacobians);
     for (int k = 0; k < kPriorRows; ++k)
       jacobians[4][(num_curve_residuals() + k) * 3 + k] = 1.0 / sigmas[k];
+  }
+  if (blocks_.shape && jacobians[ShapeBlock()] != nullptr) {
+    Eigen::Matrix<double, Eigen::Dynamic, 2, 0, CurveModel::kMaxSize, 2> by_shape(U.rows(), 2);
+    for (int k = 0; k < 2; ++k) by_shape.col(k) = by.ByShape(ShapeRate(k));
+    WriteJacobian(by_shape, rows, ShapeBlock(), jacobians);
   }
   return true;
 }

@@ -133,13 +133,15 @@ class CircleContourCost : public CurveCost {
 };
 
 // Contour of a circle of the plane Z = 0: rotation, translation, center (2), radius (1), [tilt and
-// height (3)], [contour offset (1)], [camera]. The circle's own plane is Z = 0 but for a tilt (the
-// X and Y of its normal, radians) and a height (in radii), which have a Gaussian prior here.
+// height (3)], [shape (2)], [contour offset (1)], [camera]. The circle's own plane is Z = 0 but for
+// a tilt (the X and Y of its normal, radians) and a height (in radii), which have a Gaussian prior
+// here; and it is round but for a shape (a, b): at the angle phi from X towards Y its radius is
+// r (1 + a cos 2 phi + b sin 2 phi), to first order, which is for a prior of its own to hold small.
 class PlaneCircleContourCost : public CurveCost {
  public:
   // Which of the blocks in brackets there are, and the prior of tilt and height.
   struct Blocks {
-    bool tilt_and_height = false, offset = false, camera = false;  // In this order.
+    bool tilt_and_height = false, shape = false, offset = false, camera = false;  // In this order.
     double tilt_sigma = 0.0, height_sigma = 0.0;  // Radians, radii; 0: held at its value.
   };
   // Of the points of its contour.
@@ -152,6 +154,8 @@ class PlaneCircleContourCost : public CurveCost {
   void Distances(const double* const* parameters, std::vector<double>* distances) const override;
 
  private:
+  int ShapeBlock() const { return blocks_.tilt_and_height ? 5 : 4; }
+
   Blocks blocks_;
 };
 

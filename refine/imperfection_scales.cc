@@ -2,44 +2,15 @@
 #include <cmath>
 #include <vector>
 
+#include "circline/estimators/exactness.h"
 #include "circline/refine/linearization.h"
 #include "circline/refine/readings.h"
 
 namespace circline {
 namespace {
 
+constexpr double kMostScale = 2.0;
 constexpr std::size_t kFewCircles = 2, kFewLines = 4;  // So few hardly contradict each other.
-
-// One feature's misfit, its degrees of freedom, and the share of imperfections: their variance over
-// that of the points' own noise.
-struct Misfit {
-  double d2, dof, share;
-};
-
-// The scale s of the standard deviations of all imperfections: d^2 (1 + share) / (1 + s^2 share) is
-// chi-square with dof degrees of freedom; log s has a Gaussian prior of deviation `spread`. The
-// root of the posterior mean of s^2, which few features leave above its mode.
-double ExpectedScale(const std::vector<Misfit>& misfits, double spread) {
-  constexpr double kLeast = 0.1, kMost = 2.0;
-  constexpr int kSteps = 40;
-  double costs[kSteps + 1], scales[kSteps + 1];
-  for (int k = 0; k <= kSteps; ++k) {
-    const double s = scales[k] = kLeast * std::pow(kMost / kLeast, static_cast<double>(k) / kSteps);
-    costs[k] = std::pow(std::log(s) / spread, 2.0);
-    for (const Misfit& m : misfits) {
-      const double variance = 1.0 + s * s * m.share;
-      costs[k] += m.d2 * (1.0 + m.share) / variance + m.dof * std::log(variance);
-    }
-  }
-  const double least = *std::min_element(costs, costs + kSteps + 1);
-  double sum = 0.0, squares = 0.0;
-  for (int k = 0; k <= kSteps; ++k) {
-    const double probability = std::exp(0.5 * (least - costs[k]));
-    sum += probability;
-    squares += probability * scales[k] * scales[k];
-  }
-  return std::sqrt(squares / sum);
-}
 
 // Variance of what the points alone say of an own unknown with a Gaussian prior, from that with it.
 double PriorShare(double variance, double sigma) {
@@ -87,13 +58,14 @@ NoiseModel ScaledNoiseModel(const JointProblem& problem, const State& minimum) {
         &lines);
   }
   if (circles.size() > kFewCircles) {
-    const double s = ExpectedScale(circles, model.spread);
+    const double s = ExpectedScale(circles, model.spread, kMostScale);
     model.contour_px *= s;
     model.circle_tilt_rad *= s;
     model.circle_height *= s;
+    model.circle_shape *= s;
   }
   if (lines.size() > kFewLines) {
-    const double s = ExpectedScale(lines, model.spread);
+    const double s = ExpectedScale(lines, model.spread, kMostScale);
     model.line_px *= s;
     model.line_direction_rad *= s;
   }

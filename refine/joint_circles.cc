@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/exactness.h"
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/joint_builder.h"
 #include "circline/refine/mostly_exact.h"
@@ -118,6 +119,12 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   std::vector<int> used = {JointProblem::kRotation, JointProblem::kTranslation, center, radius};
   const int tilt = blocks.tilt_and_height ? p_.AddBlock(3, {}) : -1;
   if (tilt >= 0) used.push_back(tilt);
+  blocks.shape = model_.circle_shape > 0.0;
+  if (blocks.shape) {
+    used.push_back(p_.AddBlock(2, {}));
+    const double sigma = ShapeSigma(circle, obs_.camera, model_);
+    p_.AddTerm(NewGaussianPrior({sigma, sigma}), {used.back()}, f, std::make_unique<MostlyExact>());
+  }
   const int offset = OffsetBlock(circle);
   blocks.offset = offset >= 0;
   if (offset >= 0) used.push_back(offset);

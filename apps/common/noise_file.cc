@@ -37,6 +37,7 @@ Status ReadNoiseModel(const std::string& path, NoiseModel* model, StatedCameraSi
                       {"contour_offset_px", &read.contour_offset_px},
                       {"circle_tilt_rad", &read.circle_tilt_rad},
                       {"circle_height", &read.circle_height},
+                      {"circle_shape", &read.circle_shape},
                       {"line_direction_rad", &read.line_direction_rad},
                       {"pencil_axis_rad", &read.pencil_axis_rad},
                       {"radius", &read.radius},

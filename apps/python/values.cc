@@ -137,6 +137,8 @@ void BindNoise(py::module_* module) {
                      "A circle's plane against the world's, about each of two axes, radians.")
       .def_readwrite("circle_height", &NoiseModel::circle_height,
                      "A circle over the world's plane, a share of its radius.")
+      .def_readwrite("circle_shape", &NoiseModel::circle_shape,
+                     "How far a circle is out of round, a share of its radius.")
       .def_readwrite("line_direction_rad", &NoiseModel::line_direction_rad,
                      "A line against its pencil's direction, radians.")
       .def_readwrite("pencil_axis_rad", &NoiseModel::pencil_axis_rad,

@@ -145,6 +145,16 @@ TEST(ClosedFormCovarianceTest, TheNoiseModelIsInTheCovariance) {
   EXPECT_NEAR(tilted.trace(), 2.0 * 0.02 * 0.02, 2e-5);
   EXPECT_NEAR(normal.dot(tilted * normal), 0.0, 1e-6);
 
+  // So is an oval: the ratio cos(t) of the axes changes by 2 cos(t), and by as much between them.
+  noise = NoiseModel::Exact();
+  noise.circle_shape = 0.01;
+  noise.spread = 0.0;
+  const PoseHypothesis oval = SolveClosedForm("single_circle", observations, noise).hypotheses[0];
+  const double c = std::abs(normal.dot(oval.cam_from_world.translation.normalized()));
+  const double turn = 2.0 * noise.circle_shape * c / std::sqrt(1.0 - c * c);
+  EXPECT_NEAR((oval.Covariance().topLeftCorner<3, 3>().trace()), 2.0 * turn * turn,
+              0.1 * turn * turn);
+
   // Of the mean of two orthogonal directions: each leans by itself, and both turn.
   noise = NoiseModel::Exact();
   noise.pencil_axis_rad = 0.01;

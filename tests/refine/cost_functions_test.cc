@@ -198,7 +198,7 @@ TEST(CostFunctionsTest, ContourOfAPlaneCircle) {
       for (const double arc : {2.0 * kPi, 0.8}) {
         const auto pixels = Contour(center, Eigen::Vector3d::UnitZ(), 1.2, arc, 3);
         PlaneCircleContourCost::Blocks with;
-        with.tilt_and_height = with.offset = with.camera = true;
+        with.tilt_and_height = with.shape = with.offset = with.camera = true;
         with.tilt_sigma = 0.01;
         with.height_sigma = 0.02;
         const PlaneCircleContourCost cost(Points(pixels, loss, distance), with);
@@ -207,10 +207,12 @@ TEST(CostFunctionsTest, ContourOfAPlaneCircle) {
         blocks.Add({0.402, -0.297});
         blocks.Add({1.203});
         blocks.Add({0.004, -0.003, 0.01});
+        blocks.Add({0.02, -0.01});
         blocks.Add({0.1});
         blocks.Add(CameraShifts());
         SCOPED_TRACE(LossName(loss));
-        ExpectGradientByDifferences(cost, blocks, 3 + 3 + 2 + 1 + 3 + 1, 3 + 3 + 2 + 1 + 3 + 1 + 9);
+        ExpectGradientByDifferences(cost, blocks, 3 + 3 + 2 + 1 + 3 + 2 + 1,
+                                    3 + 3 + 2 + 1 + 3 + 2 + 1 + 9);
         const PlaneCircleContourCost plain(Points(pixels, loss, distance), {});
         blocks.values.resize(4);
         blocks.manifolds.resize(4);

@@ -1,0 +1,36 @@
+// How exact the world of a photo is, beside the figures of its NoiseModel. Internal: not installed,
+// but shown to circline_refine.
+#ifndef CIRCLINE_ESTIMATORS_EXACTNESS_H_
+#define CIRCLINE_ESTIMATORS_EXACTNESS_H_
+
+#include <vector>
+
+#include "circline/estimators/camera.h"
+#include "circline/estimators/export.h"
+#include "circline/estimators/noise_model.h"
+#include "circline/estimators/observations.h"
+
+namespace CIRCLINE_EXPORT circline {
+
+// One misfit d^2, its degrees of freedom, and the share of imperfections: their variance over that
+// of the points' own noise.
+struct Misfit {
+  double d2, dof, share;
+};
+
+// The scale s of the standard deviations of all imperfections: d^2 (1 + share) / (1 + s^2 share) is
+// chi-square with dof degrees of freedom; log s has a Gaussian prior of deviation `spread`, and s
+// is at most `most`. The root of the posterior mean of s^2, which few misfits leave above its mode;
+// 1 where there is no spread.
+double ExpectedScale(const std::vector<Misfit>& misfits, double spread, double most);
+
+// Standard deviation of each component of the shape of a circle that is fitted:
+// NoiseModel::circle_shape, scaled by how irregular its contour is otherwise: what its pieces of
+// NoiseModel::correlation_px miss the ellipse by, beside NoiseModel::contour_px. The oval itself
+// shows in no contour, as its image is an ellipse, too; but what is turned or printed is as exact
+// all around as it is round, and of a thick or sawn rim both are off.
+double ShapeSigma(const CircleObservation& circle, const Camera& camera, const NoiseModel& noise);
+
+}  // namespace circline
+
+#endif  // CIRCLINE_ESTIMATORS_EXACTNESS_H_
