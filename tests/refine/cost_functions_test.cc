@@ -207,7 +207,7 @@ TEST(CostFunctionsTest, ContourOfAPlaneCircle) {
         blocks.Add({0.402, -0.297});
         blocks.Add({1.203});
         blocks.Add({0.004, -0.003, 0.01});
-        blocks.Add({0.02, -0.01});
+        blocks.Add({0.002, -0.001});
         blocks.Add({0.1});
         blocks.Add(CameraShifts());
         SCOPED_TRACE(LossName(loss));
