@@ -68,6 +68,7 @@ class NoiseModel:
     contour_offset_px: float
     circle_tilt_rad: float
     circle_height: float
+    circle_shape: float
     line_direction_rad: float
     pencil_axis_rad: float
     radius: float
@@ -83,6 +84,7 @@ class NoiseModel:
         contour_offset_px: float = ...,
         circle_tilt_rad: float = ...,
         circle_height: float = ...,
+        circle_shape: float = ...,
         line_direction_rad: float = ...,
         pencil_axis_rad: float = ...,
         radius: float = ...,
