@@ -208,7 +208,7 @@ TEST(CostFunctionsTest, ContourOfAPlaneCircle) {
         blocks.Add({1.203});
         blocks.Add({0.004, -0.003, 0.01});
         blocks.Add({0.002, -0.001});
-        blocks.Add({0.1});
+        blocks.Add({0.03});  // How it follows the normals is in no derivative: it has to be small.
         blocks.Add(CameraShifts());
         SCOPED_TRACE(LossName(loss));
         ExpectGradientByDifferences(cost, blocks, 3 + 3 + 2 + 1 + 3 + 2 + 1,
