@@ -52,6 +52,9 @@ struct Term {
   std::unique_ptr<ceres::LossFunction> loss;
   // The covariance is that of the residuals without the loss; else that which the loss makes of it.
   bool is_mostly_exact = true;
+  // The same, but that the Gaussian stands in the information from the first: of what many features
+  // have each of its own, in linear time. Nothing is told of how far it lies from where it would.
+  bool is_counted_at_once = false;
   // Of a pencil's prior about its axis (LeanShape): counted in the covariance.
   std::optional<Eigen::Matrix3d> lean_shape = std::nullopt;
 };

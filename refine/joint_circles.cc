@@ -123,7 +123,9 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   if (blocks.shape) {
     used.push_back(p_.AddBlock(2, {}));
     const double sigma = ShapeSigma(circle, obs_.camera, model_);
-    p_.AddTerm(NewGaussianPrior({sigma, sigma}), {used.back()}, f, std::make_unique<MostlyExact>());
+    const int prior = p_.AddTerm(NewGaussianPrior({sigma, sigma}), {used.back()}, f,
+                                 std::make_unique<MostlyExact>());
+    p_.term(prior).is_counted_at_once = true;
   }
   const int offset = OffsetBlock(circle);
   blocks.offset = offset >= 0;

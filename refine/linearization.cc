@@ -132,6 +132,7 @@ void Linearization::CountLoss(const Term& term, double twice_cost, Rows* rows) {
   double rho[3];
   term.loss->Evaluate(twice_cost, rho);
   const double W = std::max(1.0, rho[1]);
+  if (term.is_counted_at_once) return;
   if (term.is_mostly_exact) {
     Eigen::MatrixXd F = rows->J;
     Eigen::VectorXd r = rows->f;
