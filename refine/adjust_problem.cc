@@ -199,7 +199,9 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservatio
   if (model.circle_shape > 0.0) {
     made.shape = AddBlock(2, {});
     const double sigma = ShapeSigma(circle, input.observations->camera, model);
-    AddTerm(NewGaussianPrior({sigma, sigma}), {made.shape}, -1, std::make_unique<MostlyExact>());
+    const int prior = AddTerm(NewGaussianPrior({sigma, sigma}), {made.shape}, -1,
+                              std::make_unique<MostlyExact>());
+    term(prior).is_counted_at_once = true;
   }
   return &(circles_[{world, id}] = made);
 }
