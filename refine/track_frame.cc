@@ -89,16 +89,13 @@ void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle) {
   // What the map knows of them is in its own Gaussian.
   constexpr double kNothing = 1e3;
   blocks.tilt_sigma = blocks.height_sigma = kNothing;
-  blocks.shape = circle.shape >= 0;
   blocks.offset = circle.offset >= 0;
   blocks.camera = map_.has_camera();
   const int parent = static_cast<int>(terms_.size());
-  Term& term =
-      AddTerm(Term::Kind::kCircle, (blocks.tilt_and_height ? 1 : 0) + (blocks.offset ? 2 : 0) +
-                                       (blocks.camera ? 4 : 0) + (blocks.shape ? 8 : 0));
+  Term& term = AddTerm(Term::Kind::kCircle, (blocks.tilt_and_height ? 1 : 0) +
+                                                (blocks.offset ? 2 : 0) + (blocks.camera ? 4 : 0));
   term.blocks = {TrackMap::kRotation, TrackMap::kTranslation, circle.center, circle.radius};
   if (blocks.tilt_and_height) term.blocks.push_back(circle.tilt);
-  if (blocks.shape) term.blocks.push_back(circle.shape);
   if (blocks.offset) term.blocks.push_back(circle.offset);
   if (blocks.camera) term.blocks.push_back(TrackMap::kCamera);
   term.id = circle.id;

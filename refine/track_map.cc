@@ -7,7 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "circline/estimators/exactness.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/plane_circle.h"
 #include "circline/refine/track_steps.h"
@@ -124,8 +123,8 @@ class MapBuilder {
     return -1;
   }
 
-  // What does not average out over frames: the circle's own tilt, height and shape, and the offset
-  // of all contours of its contrast.
+  // What does not average out over frames: the circle's own tilt and height, and the offset of all
+  // contours of its contrast.
   void AddImperfections(const CircleObservation& circle, TrackMap::Circle* added) {
     constexpr double kExact = 1e-6;  // Stands for a standard deviation of 0.
     if (noise_.circle_tilt_rad > 0.0 || noise_.circle_height > 0.0) {
@@ -133,10 +132,6 @@ class MapBuilder {
       const double tilt = std::max(noise_.circle_tilt_rad, kExact),
                    height = std::max(noise_.circle_height, kExact);
       Append(added->tilt, Eigen::Vector3d(tilt, tilt, height));
-    }
-    if (noise_.circle_shape > 0.0) {
-      added->shape = map_.AddBlock(2);
-      Append(added->shape, Eigen::Vector2d::Constant(ShapeSigma(circle, frame_.camera, noise_)));
     }
     if (!(noise_.contour_offset_px > 0.0)) return;
     added->contrast = std::clamp(circle.contrast, -1, 1);

@@ -31,7 +31,6 @@ class TrackMap : private Graph {
     std::string id;
     int center = -1, radius = -1;  // Blocks: X and Y in the world plane; in the world's unit.
     int tilt = -1;                 // X and Y of its normal, radians, and height in radii.
-    int shape = -1;                // As PlaneCircleContourCost has it.
     int offset = -1;               // Of all contours of its contrast, pixels outwards.
     int contrast = 0;
   };
