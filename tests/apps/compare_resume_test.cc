@@ -45,7 +45,9 @@ std::string MakeLongSet(const TestFolder& folder) {
 void WaitForBytes(pid_t pid, const std::string& path) {
   siginfo_t ended{};
   while (ReadAll(path).empty()) {
-    if (waitid(P_PID, pid, &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid == pid) return;
+    if (waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOHANG | WNOWAIT) != 0 ||
+        ended.si_pid == pid)
+      return;
     std::this_thread::sleep_for(std::chrono::microseconds(500));
   }
 }
