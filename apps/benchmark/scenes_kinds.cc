@@ -103,7 +103,8 @@ Scene DrawDiscs(double bleed_px, double noise_px, Random* random) {
     disc.radius = 0.35 * pitch;
     circles.clear();
     for (int k = 0; k < 12; ++k) {
-      disc.center = pitch * Eigen::Vector2d(k % 4 - 1.5, k / 4 - 1.0);
+      const int column = k % 4, row = k / 4;
+      disc.center = pitch * Eigen::Vector2d(column - 1.5, row - 1.0);
       circles.push_back(disc);
     }
     scene->world.equal_radii = true;
