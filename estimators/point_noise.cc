@@ -189,7 +189,6 @@ void PointNoiseMeter::Measure(const Observations& fitted, const NoiseModel& mode
                                           : Shrink(circles_[i], noise->conic_px, conic_worth));
   }
   const double worth = many_on_circles ? kWorth : 1.0;
-  noise->line_worth = worth;
   noise->line_px =
       Common(lines_, many_on_circles ? noise->conic_px * ratio : line_default_px, worth);
   std::size_t next = 0;

@@ -13,7 +13,6 @@ namespace CIRCLINE_EXPORT circline {
 // Standard deviations of each coordinate of a point, pixels of the photo; all positive.
 struct PointNoise {
   double conic_px = 0.0, line_px = 0.0;    // Common to the circles, to the lines.
-  double line_worth = 1.0;                 // Residuals that line_px counts for where lines differ.
   std::vector<double> circles;             // By circle.
   std::vector<std::vector<double>> lines;  // By pencil, by line.
 };

@@ -71,17 +71,6 @@ bool IsLeftOut(const std::string& id, const PoseHypothesis& hypothesis) {
   return std::find(out.begin(), out.end(), id) != out.end();
 }
 
-// What it costs that a circle is none of the world's.
-double StrangerCost(const JointProblem& problem, std::size_t circle) {
-  State state;
-  for (const Feature& f : problem.features()) {
-    const bool is_it =
-        f.kind == Feature::Kind::kCircle && f.observation == static_cast<int>(circle);
-    state.active.push_back(is_it ? 0 : 1);
-  }
-  return LeftOutCost(problem, state);
-}
-
 // Hypotheses that take the second ellipse of a contour for the circle, from the poses that are
 // known.
 std::vector<Refined> ReadSecond(const JointProblem& problem, const std::vector<Refined>& known,
@@ -98,11 +87,8 @@ std::vector<Refined> ReadSecond(const JointProblem& problem, const std::vector<R
   std::vector<Refined> all, made;
   if (!FindMinima(rival, seeds, &minima).ok() || !FillHypotheses(rival, minima, &all).ok())
     return made;
-  // Both ellipses are in the photo: whichever is not taken is a stranger.
-  const double other_stranger = StrangerCost(problem, circle) - StrangerCost(rival, circle);
   for (Refined& refined : all) {
     if (IsLeftOut(read.id, refined.hypothesis)) continue;
-    refined.hypothesis.cost += other_stranger;
     refined.hypothesis.structure += SecondOf(read.id);
     made.push_back(std::move(refined));
   }
