@@ -7,7 +7,6 @@
 #include <limits>
 #include <set>
 
-#include "circline/estimators/exactness.h"
 #include "circline/estimators/line_pose.h"
 
 namespace circline {
@@ -215,8 +214,7 @@ std::vector<Perturbation> Perturbations(const std::vector<MovedInput>& inputs,
     if (inputs[i].kind != InputKind::kConic) continue;
     const CircleObservation* circle = inputs[i].circle;
     contrasts.insert(inputs[i].contrast);
-    const double shape =
-        circle != nullptr ? ShapeSigma(*circle, camera, noise) : noise.circle_shape;
+    const double shape = noise.circle_shape * (circle != nullptr ? circle->fit->irregularity : 1.0);
     for (const bool along_axes : {true, false}) {
       if (shape == 0.0) continue;
       all.push_back([=](double part, const std::vector<MovedInput>& moved) {

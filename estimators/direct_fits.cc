@@ -1,4 +1,5 @@
 // Least-squares fits of observations.
+#include "circline/estimators/exactness.h"
 #include "circline/estimators/observations.h"
 
 namespace circline {
@@ -52,6 +53,7 @@ void FitDirect(double default_sigma_px, Observations* observations,
     const double sigma_px = sigma(circle.sigma_px);
     const Status status = FitConic(points, sigma_px, &fit, nullptr, &memory->numbers);
     if (status.ok()) {
+      fit.irregularity = Irregularity(points, fit.conic, noise);
       fit.ScaleCovariance(1.0 / noise.ContourWeight(sigma_px, circle.points, circle.inliers));
       circle.fit = fit;
     }

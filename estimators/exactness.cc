@@ -1,83 +1,93 @@
 #include "circline/estimators/exactness.h"
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 
 namespace circline {
 namespace {
 
-// Of a contour: neighbouring points, how many and what they miss by.
+// Neighbouring points of a contour, how many and what they miss by, pixels.
 struct Piece {
   double num_points = 0.0, sum = 0.0, squares = 0.0;
 
-  double Mean() const { return sum / num_points; }
+  void operator+=(const Piece& more) {
+    num_points += more.num_points;
+    sum += more.sum;
+    squares += more.squares;
+  }
 };
 
-// A point of a contour: where on the ellipse it lies (eccentric anomaly), where on the photo, and
-// its distance from the ellipse, pixels.
-struct PlacedPoint {
-  double around;
-  Eigen::Vector2d pixel;
-  double distance;
-};
+// What pieces say together.
+struct PieceSums {
+  double num_pieces = 0.0, num_points = 0.0, within = 0.0, inverses = 0.0, between = 0.0;
 
-std::vector<PlacedPoint> AlongContour(const CircleObservation& circle, const Camera& camera) {
-  std::vector<PlacedPoint> points;
-  Ellipse ellipse;
-  if (!ConicToEllipse(circle.fit->conic, &ellipse)) return points;
-  const Eigen::Vector2d major(std::cos(ellipse.angle), std::sin(ellipse.angle)),
-      minor(-major.y(), major.x());
-  for (std::size_t i = 0; i < circle.points.size(); ++i) {
-    CalibratedPoint p;
-    const bool is_inlier = circle.inliers.empty() || circle.inliers[i] != 0;
-    if (!is_inlier || !PixelToCalibrated(camera, circle.points[i], &p)) continue;
-    const Eigen::Vector2d away = p.x - ellipse.center;
-    points.push_back({std::atan2(minor.dot(away) / ellipse.b, major.dot(away) / ellipse.a),
-                      circle.points[i], ConicDistancePx(p, circle.fit->conic)});
-  }
-  std::sort(points.begin(), points.end(),
-            [](const auto& a, const auto& b) { return a.around < b.around; });
-  return points;
-}
-
-std::vector<Piece> PiecesOf(const std::vector<PlacedPoint>& points, double length_px) {
-  std::vector<Piece> pieces;
-  double length = 0.0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (i > 0) length += (points[i].pixel - points[i - 1].pixel).norm();
-    if (pieces.empty() || length > length_px) {
-      pieces.emplace_back();
-      length = 0.0;
-    }
-    Piece& piece = pieces.back();
-    piece.num_points += 1.0;
-    piece.sum += points[i].distance;
-    piece.squares += points[i].distance * points[i].distance;
-  }
-  return pieces;
-}
-
-// What the pieces miss by, against what they would if they shared contour_px.
-std::vector<Misfit> MisfitsOf(const std::vector<Piece>& pieces, double contour_px) {
-  double within = 0.0, num_points = 0.0, inverses = 0.0, between = 0.0;
-  for (const Piece& piece : pieces) {
+  void Add(const Piece& piece) {
+    if (piece.num_points == 0.0) return;
+    const double mean = piece.sum / piece.num_points;
+    num_pieces += 1.0;
     num_points += piece.num_points;
     inverses += 1.0 / piece.num_points;
-    within += piece.squares - piece.sum * piece.Mean();
-    between += piece.Mean() * piece.Mean();
+    within += piece.squares - piece.sum * mean;
+    between += mean * mean;
   }
-  const auto n = static_cast<double>(pieces.size());
-  constexpr double kOfEllipse = 5.0, kLeast = 1e-3;  // Degrees of freedom; pixels.
-  if (!(n > kOfEllipse) || !(num_points > n)) return {};
-  const double own = std::max(kLeast * kLeast, within / (num_points - n) * inverses / n),
-               shared = contour_px * contour_px;
-  return {{between / (own + shared), n - kOfEllipse, shared / own}};
-}
+};
+
+// A contour in bins of eccentric anomaly, each shorter than a piece of all but the largest.
+class Contour {
+ public:
+  Contour(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic) {
+    if (!ConicToEllipse(conic, &ellipse_)) return;
+    const Eigen::Rotation2Dd to_axes(-ellipse_.angle);
+    double calibrated_per_px = 0.0;
+    for (const CalibratedPoint& point : points) {
+      const Eigen::Vector2d away = to_axes * (point.x - ellipse_.center);
+      const double around = std::atan2(away.y() / ellipse_.b, away.x() / ellipse_.a);
+      const double distance = ConicDistancePx(point, conic);
+      if (!std::isfinite(around + distance)) continue;
+      const auto bin = static_cast<std::size_t>(0.5 * kNumBins * (around / kPi + 1.0));
+      bins_[std::min<std::size_t>(bin, kNumBins - 1)] += {1.0, distance, distance * distance};
+      const auto& J = point.x_from_pixel;
+      calibrated_per_px += std::sqrt(std::abs(J[0] * J[3] - J[1] * J[2]));
+    }
+    px_per_calibrated_ = static_cast<double>(points.size()) / calibrated_per_px;
+  }
+
+  PieceSums SumPieces(double length_px) const {
+    const double step = 2.0 * kPi / kNumBins;
+    const Eigen::Rotation2Dd turn(step);
+    Eigen::Vector2d around(-1.0, 0.0);
+    PieceSums sums;
+    Piece piece;
+    double length = 0.0;
+    for (const Piece& bin : bins_) {
+      const double bin_px =
+          step * px_per_calibrated_ * std::hypot(ellipse_.a * around.y(), ellipse_.b * around.x());
+      if (length + bin_px > length_px) {
+        sums.Add(piece);
+        piece = Piece();
+        length = 0.0;
+      }
+      length += bin_px;
+      piece += bin;
+      around = turn * around;
+    }
+    sums.Add(piece);
+    return sums;
+  }
+
+ private:
+  static constexpr int kNumBins = 256;
+
+  Ellipse ellipse_;
+  std::array<Piece, kNumBins> bins_{};
+  double px_per_calibrated_ = 0.0;
+};
 
 }  // namespace
 
@@ -85,10 +95,12 @@ double ExpectedScale(const std::vector<Misfit>& misfits, double spread, double m
   if (!(spread > 0.0)) return 1.0;
   constexpr double kLeast = 0.1;
   constexpr int kSteps = 40;
+  const double step = std::log(most / kLeast) / kSteps, ratio = std::exp(step);
   double costs[kSteps + 1], scales[kSteps + 1];
-  for (int k = 0; k <= kSteps; ++k) {
-    const double s = scales[k] = kLeast * std::pow(most / kLeast, static_cast<double>(k) / kSteps);
-    costs[k] = std::pow(std::log(s) / spread, 2.0);
+  double s = kLeast, log_s = std::log(kLeast);
+  for (int k = 0; k <= kSteps; ++k, s *= ratio, log_s += step) {
+    scales[k] = s;
+    costs[k] = log_s * log_s / (spread * spread);
     for (const Misfit& m : misfits) {
       const double variance = 1.0 + s * s * m.share;
       costs[k] += m.d2 * (1.0 + m.share) / variance + m.dof * std::log(variance);
@@ -104,13 +116,19 @@ double ExpectedScale(const std::vector<Misfit>& misfits, double spread, double m
   return std::sqrt(squares / sum);
 }
 
-double ShapeSigma(const CircleObservation& circle, const Camera& camera, const NoiseModel& noise) {
-  constexpr double kMost = 3.0;
-  if (!(noise.circle_shape > 0.0) || !circle.fit) return noise.circle_shape;
-  const std::vector<Piece> pieces = PiecesOf(AlongContour(circle, camera), noise.correlation_px);
+double Irregularity(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic,
+                    const NoiseModel& noise) {
+  if (!(noise.circle_shape > 0.0 && noise.spread > 0.0)) return 1.0;
+  constexpr double kMost = 3.0, kOfEllipse = 5.0, kLeast = 1e-3;  // -; degrees of freedom; pixels.
+  const PieceSums sums = Contour(points, conic).SumPieces(noise.correlation_px);
+  const double n = sums.num_pieces, shared = noise.contour_px * noise.contour_px;
   std::vector<Misfit> misfits;
-  if (noise.contour_px > 0.0) misfits = MisfitsOf(pieces, noise.contour_px);
-  return noise.circle_shape * ExpectedScale(misfits, noise.spread, kMost);
+  if (shared > 0.0 && n > kOfEllipse && sums.num_points > n) {
+    const double own =
+        std::max(kLeast * kLeast, sums.within / (sums.num_points - n) * sums.inverses / n);
+    misfits.push_back({sums.between / (own + shared), n - kOfEllipse, shared / own});
+  }
+  return ExpectedScale(misfits, noise.spread, kMost);
 }
 
 }  // namespace circline

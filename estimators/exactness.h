@@ -3,12 +3,12 @@
 #ifndef CIRCLINE_ESTIMATORS_EXACTNESS_H_
 #define CIRCLINE_ESTIMATORS_EXACTNESS_H_
 
+#include <Eigen/Core>
 #include <vector>
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
-#include "circline/estimators/observations.h"
 
 namespace CIRCLINE_EXPORT circline {
 
@@ -24,12 +24,13 @@ struct Misfit {
 // 1 where there is no spread.
 double ExpectedScale(const std::vector<Misfit>& misfits, double spread, double most);
 
-// Standard deviation of each component of the shape of a circle that is fitted:
-// NoiseModel::circle_shape, scaled by how irregular its contour is otherwise: what its pieces of
-// NoiseModel::correlation_px miss the ellipse by, beside NoiseModel::contour_px. The oval itself
+// How irregular a contour is (ConicFit::irregularity): the scale of what its pieces of
+// NoiseModel::correlation_px miss its ellipse by, against NoiseModel::contour_px. An oval itself
 // shows in no contour, as its image is an ellipse, too; but what is turned or printed is as exact
-// all around as it is round, and of a thick or sawn rim both are off.
-double ShapeSigma(const CircleObservation& circle, const Camera& camera, const NoiseModel& noise);
+// all around as it is round, and of a thick or sawn rim both are off. 1 where the model has no
+// circle_shape to scale.
+double Irregularity(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic,
+                    const NoiseModel& noise);
 
 }  // namespace circline
 

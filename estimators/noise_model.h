@@ -70,8 +70,8 @@ struct NoiseModel {
   double circle_height = 0.003;
   // How far what is called a circle is out of round: each of the two components of an oval, a share
   // of its radius. Rims are thick and rounded, boards are sawn; what is printed is rounder, and its
-  // contour more regular, by which this is scaled (ShapeSigma). Between a turntable's rim and discs
-  // (rgb), of 0.0015 to 0.004.
+  // contour more regular, by which this is scaled (ConicFit::irregularity). Between a turntable's
+  // rim and discs (rgb), of 0.0015 to 0.004.
   double circle_shape = 0.0025;
   // A line against the direction of its pencil, and a wall's lines against the axis that they are
   // taken for (each of two components; LeanShape is what it makes of a pencil), radians.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/exactness.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/point_noise.h"
 #include "circline/ransac/dense_clusters.h"
@@ -54,7 +55,7 @@ class PointFitter {
       CircleObservation& circle = run_.observations.circles[i];
       if (!circle.fit) continue;
       FitSecond(circles_[i], &circle);
-      ScaleCovariance(circles_[i], circle.points, circle.inliers, &*circle.fit);
+      ShareNoise(circles_[i], circle.points, circle.inliers, &*circle.fit);
     }
     FitDirections(&lines_, &run_);
   }
@@ -160,7 +161,7 @@ class PointFitter {
                        static_cast<std::ptrdiff_t>(circle->points.size());
     run_.Report("circle '" + circle->id + "'",
                 "a second ellipse passes through " + std::to_string(share) + " % of its points");
-    ScaleCovariance(f, circle->points, second.inliers, &second.fit);
+    ShareNoise(f, circle->points, second.inliers, &second.fit);
     circle->second = std::move(second);
   }
 
@@ -214,11 +215,16 @@ class PointFitter {
     }
   }
 
-  // From points of 1 px to those that there are, with what they share.
-  void ScaleCovariance(const FittedFeature& f, const std::vector<Eigen::Vector2d>& pixels,
-                       const std::vector<std::uint8_t>& inliers, ConicFit* fit) const {
+  // From points of 1 px to those that there are, with what they share and how irregular they are.
+  void ShareNoise(const FittedFeature& f, const std::vector<Eigen::Vector2d>& pixels,
+                  const std::vector<std::uint8_t>& inliers, ConicFit* fit) const {
     const double weight = run_.options.noise_model.ContourWeight(f.sigma_px, pixels, inliers);
     fit->ScaleCovariance(f.sigma_px * f.sigma_px / weight);
+    std::vector<CalibratedPoint> kept;
+    for (std::size_t i = 0; i < f.points.size(); ++i) {
+      if (inliers[static_cast<std::size_t>(f.indices[i])] != 0) kept.push_back(f.points[i]);
+    }
+    fit->irregularity = Irregularity(kept, fit->conic, run_.options.noise_model);
   }
 
   FitRun& run_;

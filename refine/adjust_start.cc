@@ -46,7 +46,7 @@ Observations Prepare(const Observations& given, const Camera& camera,
   photo.camera = camera;
   ResetFits(&photo);
   photo = ResolveWorld(photo);
-  FitDirect(kDefaultSigmaPx, &photo);
+  FitDirect(kDefaultSigmaPx, &photo, nullptr, options.noise_model);
   photo = ResolveWorld(photo);
   StateNoise(noise != nullptr ? *noise : MeasurePointNoise(photo, options.noise_model),
              options.conic_loss.scale_px, options.line_loss.scale_px, &photo);

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <utility>
 
-#include "circline/estimators/exactness.h"
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/joint_builder.h"
 #include "circline/refine/mostly_exact.h"
@@ -122,7 +121,7 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   blocks.shape = model_.circle_shape > 0.0;
   if (blocks.shape) {
     used.push_back(p_.AddBlock(2, {}));
-    const double sigma = ShapeSigma(circle, obs_.camera, model_);
+    const double sigma = model_.circle_shape * circle.fit->irregularity;
     const int prior = p_.AddTerm(NewGaussianPrior({sigma, sigma}), {used.back()}, f,
                                  std::make_unique<MostlyExact>());
     p_.term(prior).is_counted_at_once = true;

@@ -194,7 +194,7 @@ PoseEstimate RefineSeeds(const std::string& name,
   constexpr double kDefaultSigmaPx = 0.4;  // For fits that nobody has made yet.
   Observations resolved = ResolveWorld(observations);
   FitDirect(options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDefaultSigmaPx,
-            &resolved, &estimate.notes);
+            &resolved, &estimate.notes, options.noise_model);
   resolved = ResolveWorld(resolved);
   StateNoise(MeasurePointNoise(resolved, options.noise_model), options.conic_loss.scale_px,
              options.line_loss.scale_px, &resolved);

@@ -165,7 +165,8 @@ void BindFits(py::module_* module) {
       .def_readonly("conic", &ConicFit::conic, "(3, 3), unit Frobenius norm, negative inside.")
       .def_property_readonly("covariance", &ConicFit::Covariance,
                              "(6, 6), of (C00, C11, C22, sqrt2 C01, sqrt2 C02, sqrt2 C12).")
-      .def_readonly("rms_px", &ConicFit::rms_px, "Of the distances, pixels of the photo.");
+      .def_readonly("rms_px", &ConicFit::rms_px, "Of the distances, pixels of the photo.")
+      .def_readonly("irregularity", &ConicFit::irregularity, "Scales NoiseModel.circle_shape.");
   py::class_<ConicReading>(*module, "ConicReading", "An ellipse and the points that speak for it.")
       .def_readonly("fit", &ConicReading::fit)
       .def_readonly("inliers", &ConicReading::inliers, "One per point of the contour, 1: inlier.");

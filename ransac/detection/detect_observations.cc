@@ -24,11 +24,11 @@ constexpr int kMaxPencils = 100;
 
 std::vector<CircleEvidence> MakeCircles(const EdgeMap& edges,
                                         const std::vector<DetectedEllipse>& ellipses,
-                                        const NoiseModel& noise) {
+                                        const Camera& camera, const NoiseModel& noise) {
   std::vector<CircleEvidence> circles;
   for (const DetectedEllipse& ellipse : ellipses) {
     CircleEvidence circle;
-    FillCircle(edges, ellipse, noise, &circle.observation);
+    FillCircle(edges, ellipse, camera, noise, &circle.observation);
     if (ellipse.concentric >= 0) {
       circle.observation.concentric = "g" + std::to_string(ellipse.concentric);
     }
@@ -46,7 +46,7 @@ Status CollectEvidence(const EdgeMap& edges, const Camera& camera, const Detecti
   const std::vector<std::uint8_t> on_ellipses = EllipsePoints(edges, ellipses);
   evidence->num_ellipses = ellipses.size();
   ellipses.resize(std::min(ellipses.size(), static_cast<std::size_t>(options.max_circles)));
-  evidence->circles = MakeCircles(edges, ellipses, options.noise_model);
+  evidence->circles = MakeCircles(edges, ellipses, camera, options.noise_model);
   if (options.max_pencils == 0) return Status::Ok();
   LineOptions line_options;
   line_options.min_length_px = options.min_segment_length_px;
@@ -121,7 +121,7 @@ Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::R
   const std::vector<DetectedEllipse> ellipses =
       DetectEllipses(edges, shifted, {options.min_ellipse_axis_px, options.min_arc_deg});
   if (ellipses.empty()) return Status::Refused("no ellipse found inside the rectangle");
-  FillCircle(edges, ellipses.front(), options.noise_model, circle);
+  FillCircle(edges, ellipses.front(), shifted, options.noise_model, circle);
   for (Vector2d& p : circle->points) p += Vector2d(inside.x, inside.y);
   return Status::Ok();
 }

@@ -2,6 +2,9 @@
 
 #include <cstddef>
 #include <string>
+#include <vector>
+
+#include "circline/estimators/exactness.h"
 
 namespace circline {
 namespace {
@@ -19,8 +22,8 @@ constexpr double kMaxBiasPx = 1.0;
 
 }  // namespace
 
-void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const NoiseModel& noise,
-                CircleObservation* circle) {
+void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const Camera& camera,
+                const NoiseModel& noise, CircleObservation* circle) {
   const bool thin = ellipse.contour.size() >= kThinFrom;
   // The contour of a second look is not that of the edges.
   const bool has_normals = ellipse.contour.size() == ellipse.points.size();
@@ -41,6 +44,9 @@ void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const Nois
   circle->fit->ScaleCovariance(
       kCorrelationDense * kCorrelationDense /
       noise.ContourWeight(kCorrelationDense * ellipse.sigma_px, ellipse.contour, {}));
+  std::vector<CalibratedPoint> calibrated;
+  PixelsToCalibrated(camera, circle->points, &calibrated);
+  circle->fit->irregularity = Irregularity(calibrated, circle->fit->conic, noise);
   circle->inliers.clear();
 }
 

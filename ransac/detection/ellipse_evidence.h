@@ -15,8 +15,8 @@ namespace circline {
 
 // Points of an ellipse as an observation: thinned, and the fit's covariance widened by the
 // correlation of dense points and by what they all share.
-void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const NoiseModel& noise,
-                CircleObservation* circle);
+void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const Camera& camera,
+                const NoiseModel& noise, CircleObservation* circle);
 
 // Edge points that belong to an ellipse and so to no line.
 std::vector<std::uint8_t> EllipsePoints(const EdgeMap& edges,

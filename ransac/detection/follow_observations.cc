@@ -245,7 +245,7 @@ Status FollowObservations(const cv::Mat& image, const Observations& predicted, d
   for (std::size_t k = 0; k < ellipses.size(); ++k) {
     if (ellipses[k].points.empty()) continue;
     CircleObservation circle;
-    FillCircle(edges, ellipses[k], options.noise_model, &circle);
+    FillCircle(edges, ellipses[k], predicted.camera, options.noise_model, &circle);
     Continue(predicted.circles[k], &circle);
     circle.concentric = predicted.circles[k].concentric;
     expect->circles[k] = circle;

@@ -25,33 +25,30 @@ CircleObservation Rim(double radius_px, double wave_px, int num_points) {
   return circle;
 }
 
-double SigmaOf(CircleObservation circle, const NoiseModel& noise) {
-  const Camera camera = PinholeCamera();
-  std::vector<CalibratedPoint> points;
-  CalibrateInliers(camera, circle.points, {}, &points);
-  ConicFit fit;
-  EXPECT_TRUE(FitConic(points, 0.05, &fit).ok());
-  circle.fit = fit;
-  return ShapeSigma(circle, camera, noise);
+double IrregularityOf(const CircleObservation& circle, const NoiseModel& noise) {
+  Observations observations;
+  observations.camera = PinholeCamera();
+  observations.circles = {circle};
+  FitDirect(0.05, &observations, nullptr, noise);
+  return observations.circles[0].fit->irregularity;
 }
 
 TEST(Exactness, AnIrregularContourIsLessRound) {
   const NoiseModel noise;
-  const double usual = SigmaOf(Rim(20.0, 0.0, 30), noise);  // Too short to tell.
-  EXPECT_NEAR(usual, 1.3 * noise.circle_shape, 0.2 * noise.circle_shape);
-  EXPECT_LT(SigmaOf(Rim(250.0, 0.0, 400), noise), 0.5 * usual);
-  const double rough = SigmaOf(Rim(250.0, 0.5, 400), noise);
+  const double usual = IrregularityOf(Rim(20.0, 0.0, 30), noise);  // Too short to tell.
+  EXPECT_NEAR(usual, 1.3, 0.2);
+  EXPECT_LT(IrregularityOf(Rim(250.0, 0.0, 400), noise), 0.5 * usual);
+  const double rough = IrregularityOf(Rim(250.0, 0.5, 400), noise);
   EXPECT_GT(rough, 1.5 * usual);
-  EXPECT_LE(rough, 3.0 * noise.circle_shape);
-  EXPECT_GT(rough, SigmaOf(Rim(250.0, 0.2, 400), noise));
+  EXPECT_LE(rough, 3.0);
+  EXPECT_GT(rough, IrregularityOf(Rim(250.0, 0.2, 400), noise));
 }
 
 TEST(Exactness, BelievesAModelWithoutSpread) {
   NoiseModel noise;
   noise.spread = 0.0;
-  EXPECT_EQ(SigmaOf(Rim(250.0, 0.5, 400), noise), noise.circle_shape);
-  EXPECT_EQ(SigmaOf(Rim(250.0, 0.5, 400), NoiseModel::Exact()), 0.0);
-  EXPECT_EQ(ShapeSigma(CircleObservation(), PinholeCamera(), noise), noise.circle_shape);
+  EXPECT_EQ(IrregularityOf(Rim(250.0, 0.5, 400), noise), 1.0);
+  EXPECT_EQ(IrregularityOf(Rim(250.0, 0.5, 400), NoiseModel::Exact()), 1.0);
 }
 
 }  // namespace
