@@ -197,7 +197,7 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservatio
   if (model.circle_tilt_rad > 0.0 || model.circle_height > 0.0) made.tilt = AddBlock(3, {});
   if (model.circle_shape > 0.0) {
     made.shape = AddBlock(2, {});
-    const double sigma = model.circle_shape * (circle.fit ? circle.fit->irregularity : 1.0);
+    const double sigma = model.circle_shape * circle.fit->irregularity;
     const int prior = AddTerm(NewGaussianPrior({sigma, sigma}), {made.shape}, -1,
                               std::make_unique<MostlyExact>());
     term(prior).is_counted_at_once = true;
