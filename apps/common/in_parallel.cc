@@ -13,15 +13,26 @@ void Order() {
   const std::lock_guard<std::mutex> lock(mutex);
 }
 
+// Not a lambda: OpenCV would look at it in the thread before the lock.
+class Body : public cv::ParallelLoopBody {
+ public:
+  explicit Body(const std::function<void(int)>& work) : work_(work) {}
+  void operator()(const cv::Range& range) const override {
+    Order();
+    for (int i = range.start; i < range.end; ++i) work_(i);
+    Order();
+  }
+
+ private:
+  const std::function<void(int)>& work_;
+};
+
 }  // namespace
 
 void InParallel(int count, const std::function<void(int)>& work) {
+  const Body body(work);
   Order();
-  cv::parallel_for_(cv::Range(0, count), [&work](const cv::Range& range) {
-    Order();
-    for (int i = range.start; i < range.end; ++i) work(i);
-    Order();
-  });
+  cv::parallel_for_(cv::Range(0, count), body);
   Order();
 }
 
