@@ -19,9 +19,9 @@ struct ConicFit {
   // Of ConicToVector(conic), 6x6 row-major, rank 5: the conic itself is its null vector.
   std::array<double, 36> covariance{};
   double rms_px = 0.0;  // Root of the weighted mean squared distance, pixels of the photo.
-  // How irregular the contour is, times what NoiseModel says: scales NoiseModel::circle_shape.
-  // FitConic and RefineConic, which know no noise model, leave it; FitDirect, FitObservations and
-  // the detection fill it in.
+  // How irregular the contour is, 1 = as NoiseModel::contour_px says; NoiseModel::circle_shape is
+  // for such a one, and scaled by it. Filled in by FitDirect, FitObservations and the detection;
+  // FitConic and RefineConic, which know no noise model, leave it.
   double irregularity = 1.0;
 
   // `covariance` as a matrix.

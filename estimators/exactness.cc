@@ -49,11 +49,11 @@ class Contour {
       const Eigen::Vector2d away = to_axes * (point.x - ellipse_.center);
       const double around = std::atan2(away.y() / ellipse_.b, away.x() / ellipse_.a);
       const double distance = ConicDistancePx(point, conic);
+      const auto& J = point.x_from_pixel;
+      calibrated_per_px += std::sqrt(std::abs(J[0] * J[3] - J[1] * J[2]));
       if (!std::isfinite(around + distance)) continue;
       const auto bin = static_cast<std::size_t>(0.5 * kNumBins * (around / kPi + 1.0));
       bins_[std::min<std::size_t>(bin, kNumBins - 1)] += {1.0, distance, distance * distance};
-      const auto& J = point.x_from_pixel;
-      calibrated_per_px += std::sqrt(std::abs(J[0] * J[3] - J[1] * J[2]));
     }
     px_per_calibrated_ = static_cast<double>(points.size()) / calibrated_per_px;
   }
@@ -91,7 +91,7 @@ class Contour {
 
 }  // namespace
 
-double ExpectedScale(const std::vector<Misfit>& misfits, double spread, double most) {
+double ExpectedScale(const Misfit* misfits, std::size_t num_misfits, double spread, double most) {
   if (!(spread > 0.0)) return 1.0;
   constexpr double kLeast = 0.1;
   constexpr int kSteps = 40;
@@ -101,9 +101,9 @@ double ExpectedScale(const std::vector<Misfit>& misfits, double spread, double m
   for (int k = 0; k <= kSteps; ++k, s *= ratio, log_s += step) {
     scales[k] = s;
     costs[k] = log_s * log_s / (spread * spread);
-    for (const Misfit& m : misfits) {
-      const double variance = 1.0 + s * s * m.share;
-      costs[k] += m.d2 * (1.0 + m.share) / variance + m.dof * std::log(variance);
+    for (const Misfit* m = misfits; m != misfits + num_misfits; ++m) {
+      const double variance = 1.0 + s * s * m->share;
+      costs[k] += m->d2 * (1.0 + m->share) / variance + m->dof * std::log(variance);
     }
   }
   const double least = *std::min_element(costs, costs + kSteps + 1);
@@ -122,13 +122,12 @@ double Irregularity(const std::vector<CalibratedPoint>& points, const Eigen::Mat
   constexpr double kMost = 3.0, kOfEllipse = 5.0, kLeast = 1e-3;  // -; degrees of freedom; pixels.
   const PieceSums sums = Contour(points, conic).SumPieces(noise.correlation_px);
   const double n = sums.num_pieces, shared = noise.contour_px * noise.contour_px;
-  std::vector<Misfit> misfits;
-  if (shared > 0.0 && n > kOfEllipse && sums.num_points > n) {
-    const double own =
-        std::max(kLeast * kLeast, sums.within / (sums.num_points - n) * sums.inverses / n);
-    misfits.push_back({sums.between / (own + shared), n - kOfEllipse, shared / own});
-  }
-  return ExpectedScale(misfits, noise.spread, kMost);
+  if (!(shared > 0.0 && n > kOfEllipse && sums.num_points > n))
+    return ExpectedScale(nullptr, 0, noise.spread, kMost);
+  const double own =
+      std::max(kLeast * kLeast, sums.within / (sums.num_points - n) * sums.inverses / n);
+  const Misfit misfit = {sums.between / (own + shared), n - kOfEllipse, shared / own};
+  return ExpectedScale(&misfit, 1, noise.spread, kMost);
 }
 
 }  // namespace circline

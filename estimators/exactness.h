@@ -4,6 +4,7 @@
 #define CIRCLINE_ESTIMATORS_EXACTNESS_H_
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <vector>
 
 #include "circline/estimators/camera.h"
@@ -22,7 +23,7 @@ struct Misfit {
 // chi-square with dof degrees of freedom; log s has a Gaussian prior of deviation `spread`, and s
 // is at most `most`. The root of the posterior mean of s^2, which few misfits leave above its mode;
 // 1 where there is no spread.
-double ExpectedScale(const std::vector<Misfit>& misfits, double spread, double most);
+double ExpectedScale(const Misfit* misfits, std::size_t num_misfits, double spread, double most);
 
 // How irregular a contour is (ConicFit::irregularity): the scale of what its pieces of
 // NoiseModel::correlation_px miss its ellipse by, against NoiseModel::contour_px. An oval itself

@@ -58,14 +58,14 @@ NoiseModel ScaledNoiseModel(const JointProblem& problem, const State& minimum) {
         &lines);
   }
   if (circles.size() > kFewCircles) {
-    const double s = ExpectedScale(circles, model.spread, kMostScale);
+    const double s = ExpectedScale(circles.data(), circles.size(), model.spread, kMostScale);
     model.contour_px *= s;
     model.circle_tilt_rad *= s;
     model.circle_height *= s;
     model.circle_shape *= s;
   }
   if (lines.size() > kFewLines) {
-    const double s = ExpectedScale(lines, model.spread, kMostScale);
+    const double s = ExpectedScale(lines.data(), lines.size(), model.spread, kMostScale);
     model.line_px *= s;
     model.line_direction_rad *= s;
   }

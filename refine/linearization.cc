@@ -129,10 +129,10 @@ bool Linearization::AddTerm(const Term& term, const Weighing& weighing) {
 // The loss counts its residuals W times as much as the covariance does that they are to be counted
 // with, 1 or that of leaning walls.
 void Linearization::CountLoss(const Term& term, double twice_cost, Rows* rows) {
+  if (term.is_counted_at_once) return;
   double rho[3];
   term.loss->Evaluate(twice_cost, rho);
   const double W = std::max(1.0, rho[1]);
-  if (term.is_counted_at_once) return;
   if (term.is_mostly_exact) {
     Eigen::MatrixXd F = rows->J;
     Eigen::VectorXd r = rows->f;

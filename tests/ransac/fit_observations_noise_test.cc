@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/fit_observations.h"
@@ -200,6 +201,29 @@ TEST(FitObservationsNoise, SharedErrorsAreInTheCovariances) {
   options.noise_model.contour_px = 0.2;
   FitDirect(1.0, &direct, nullptr, options.noise_model);
   EXPECT_GT(direct.circles[0].fit->Covariance().trace(), 2.0 * points_alone);
+}
+
+// A robust fit tells how irregular a contour is as a direct one does.
+TEST(FitObservationsNoise, AnIrregularContourIsToldFromARegularOne) {
+  std::vector<double> irregularity;
+  for (const double wave_px : {0.0, 0.4}) {
+    Random random(5);
+    Observations observations;
+    observations.camera = TestCamera();
+    observations.circles.resize(1);
+    for (int i = 0; i < 400; ++i) {
+      const double t = 2.0 * kPi * i / 400;
+      const double r = 200.0 + wave_px * std::sin(9.0 * t) + 0.05 * random.Normal();
+      observations.circles[0].points.emplace_back(320.0 + r * std::cos(t),
+                                                  240.0 + 0.7 * r * std::sin(t));
+    }
+    Observations direct = observations;
+    FitDirect(0.05, &direct, nullptr, FitOptions().noise_model);
+    ASSERT_TRUE(FitObservations(FitOptions(), &observations).ok());
+    irregularity.push_back(observations.circles[0].fit->irregularity);
+    EXPECT_NEAR(irregularity.back(), direct.circles[0].fit->irregularity, 0.1) << wave_px;
+  }
+  EXPECT_GT(irregularity[1], 2.0 * irregularity[0]);
 }
 
 }  // namespace

@@ -47,6 +47,8 @@ TEST(DetectCircleInRoi, FindsTheCircleOfTheRectangle) {
     EXPECT_EQ(circle.radius, 0.9);
     EXPECT_GT(circle.points.size(), 30U);
     EXPECT_LT(BetterNormalDeg(circle, pose.rotation.col(2)), 0.5);
+    EXPECT_NEAR(circle.fit->irregularity, truth.fit->irregularity, 0.05);
+    EXPECT_NE(circle.fit->irregularity, 1.0);
     for (const Vector2d& p : circle.points) {
       EXPECT_TRUE(roi.contains(cv::Point(static_cast<int>(p.x()), static_cast<int>(p.y()))));
       CalibratedPoint x;
