@@ -94,16 +94,19 @@ TEST(StudioFaults, KilledAtRandomKeepsWhatItSaidWasSaved) {
       said = ReadAll(log / "out");
     }
     const int port = std::stoi(said.substr(said.find(before_port) + before_port.size()));
-    std::thread killer([pid, wait = std::chrono::milliseconds(20 + random() % 200)] {
-      std::this_thread::sleep_for(wait);
-      kill(pid, SIGKILL);
-    });
     httplib::Client client("127.0.0.1", port);
     const auto post = [&](const std::string& address, const char* key, int radius) {
       const Json body = {{"image", 0}, {key, SceneOfRadius(radius)}};
       const httplib::Result result = client.Post(address, body.dump(), "application/json");
       return result && result->status == 200;
     };
+    // Once it has saved: how long that takes is up to the machine.
+    ASSERT_TRUE(post("/api/save", "scene", ++saved));
+    ASSERT_TRUE(post("/api/draft", "state", ++drafted));
+    std::thread killer([pid, wait = std::chrono::milliseconds(random() % 200)] {
+      std::this_thread::sleep_for(wait);
+      kill(pid, SIGKILL);
+    });
     while (post("/api/save", "scene", saved + 1)) {
       ++saved;
       if (!post("/api/draft", "state", drafted + 1)) break;
@@ -112,18 +115,12 @@ TEST(StudioFaults, KilledAtRandomKeepsWhatItSaidWasSaved) {
     killer.join();
     ASSERT_EQ(waitpid(pid, nullptr, 0), pid);
     // The last one may have been written and not answered.
-    if (saved > 0) {
-      const double found = SavedRadius(folder.path());
-      EXPECT_TRUE(found == saved || found == saved + 1) << found << " " << saved;
-      saved = static_cast<int>(found);
-    }
-    if (drafted > 0) {
-      const double found = DraftedRadius(folder.path());
-      EXPECT_TRUE(found == drafted || found == drafted + 1) << found << " " << drafted;
-      drafted = static_cast<int>(found);
-    }
+    const double scene = SavedRadius(folder.path()), draft = DraftedRadius(folder.path());
+    EXPECT_TRUE(scene == saved || scene == saved + 1) << scene << " " << saved;
+    EXPECT_TRUE(draft == drafted || draft == drafted + 1) << draft << " " << drafted;
+    saved = static_cast<int>(scene);
+    drafted = static_cast<int>(draft);
   }
-  EXPECT_GE(saved, kRuns);
 }
 
 }  // namespace
