@@ -13,8 +13,9 @@ struct ExifFocalLength {
 
 // From the EXIF data of a JPEG: FocalLengthIn35mmFilm, which compares diagonals (CIPA DC-008), else
 // FocalLength with the resolution of the focal plane. `width` and `height` are those of the photo,
-// pixels; one that was made smaller since has its focal length with it. Figures that no lens has
-// are passed over. Never throws, whatever is broken in the file.
+// pixels; one that was made smaller since has its focal length with it, where EXIF's size is still
+// that of the photo as taken. Figures that no lens has are passed over. Never throws, whatever is
+// broken in the file.
 ExifFocalLength ReadExifFocalLength(const std::string& path, int width, int height);
 
 }  // namespace circline::apps

@@ -100,6 +100,23 @@ TEST_F(Exif, FocalPlaneGivesPixelsForAMillimetre) {
   EXPECT_NEAR(Read(Jpeg(longer)).focal_px, 1600.0, 1e-6);
 }
 
+// Its size was written anew, the resolution of the focal plane was not.
+TEST_F(Exif, FocalPlaneOfAPhotoMadeSmallerIsPassedOver) {
+  const auto read = [&](std::uint32_t width, std::uint32_t per_inch) {
+    return ReadExifFocalLength(folder_.Write("small.jpg", Jpeg({{kFocalLength, 6, 1},
+                                                                {kResolution, per_inch, 1},
+                                                                {kUnit, 2, {}},
+                                                                {kPixelX, width, {}}})),
+                               static_cast<int>(width), static_cast<int>(width * 3 / 4));
+  };
+  EXPECT_NEAR(read(3648, 12493).focal_px, 6.0 * 12493.0 / 25.4, 1e-6);
+  for (const std::uint32_t width : {768U, 1500U}) {
+    EXPECT_EQ(read(width, 3810).focal_px, 0.0) << width;
+    EXPECT_CONTAINS(read(width, 3810).words, "before it was made smaller");
+  }
+  EXPECT_EQ(read(1800, 20000).focal_px, 0.0);  // Of a sensor of 2.3 mm.
+}
+
 TEST_F(Exif, WhatNoLensHasIsPassedOver) {
   for (const std::vector<Tag>& tags : std::vector<std::vector<Tag>>{
            {{kFilm, 1, {}}},
