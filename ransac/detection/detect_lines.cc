@@ -193,7 +193,25 @@ class LineJoiner {
     }
     if (!FitAverages(points, &line)) return;
     SetEnds(joined, &line);
+    if (RunsAlongBorder(line.ends)) return;
     lines_.push_back(std::move(line));
+  }
+
+  // Photos end in dark rims, and scans and prints in frames: lines of the photo, not of the scene.
+  bool RunsAlongBorder(const Segment& ends) const {
+    constexpr double kRim = 0.0025;  // Of the photo's longer side.
+    const Vector2d far(edges_.map().width - 1, edges_.map().height - 1);
+    const double rim = kRim * far.maxCoeff();
+    const auto all_within = [&](const auto& distance) {
+      return std::all_of(ends.begin(), ends.end(),
+                         [&](const Vector2d& end) { return distance(end) <= rim; });
+    };
+    for (const int k : {0, 1}) {
+      if (all_within([&](const Vector2d& end) { return end[k]; }) ||
+          all_within([&](const Vector2d& end) { return far[k] - end[k]; }))
+        return true;
+    }
+    return false;
   }
 
   void AppendAverages(const LinePiece& p, const Joined& joined, std::vector<Average>* averages) {

@@ -63,6 +63,21 @@ TEST(DetectLines, KeepsALongLineWholeThroughEveryLens) {
   }
 }
 
+// A dark rim is the photo's; what runs a few pixels further in is the scene's.
+TEST(DetectLines, LeavesOutWhatRunsAlongTheBorder) {
+  Camera camera = TestCamera();
+  camera.width = 960;
+  camera.height = 720;
+  for (const int rim : {2, 12}) {
+    cv::Mat image(camera.height, camera.width, CV_8UC1, cv::Scalar(30.0));
+    const cv::Rect inside(rim, rim, camera.width - 2 * rim, camera.height - 2 * rim);
+    image(inside).setTo(200.0);
+    image(cv::Rect(300, 200, 100, 400)).setTo(60.0);
+    const std::vector<DetectedLine> lines = LinesOf(image, camera);
+    EXPECT_EQ(lines.size(), rim == 2 ? 4U : 8U) << rim;
+  }
+}
+
 TEST(DetectLines, JoinsTheSidesOfARowOfSquares) {
   const Camera camera = DistortedCamera();
   const CameraPose pose = LookAt(25.0, 15.0, 10.0, 9.0);
