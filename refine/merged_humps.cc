@@ -9,12 +9,16 @@ namespace circline {
 namespace {
 
 // What takes one pose to another: [delta, delta_t] (PoseHypothesis::covariance); of a rotation that
-// is free about the normal, the normal's turn.
+// is free about the normal, the normal's turn; of a translation that is a convention, nothing.
 Vector6d StepBetween(const PoseHypothesis& from, const PoseHypothesis& to) {
   const Eigen::Matrix3d &A = to.cam_from_world.rotation, &B = from.cam_from_world.rotation;
   Vector6d step;
   step << (from.RotationIsFree() ? B.col(2).cross(A.col(2)) : LogRotation(A * B.transpose())),
       to.cam_from_world.translation - from.cam_from_world.translation;
+  const auto is_convention = [](const PoseHypothesis& h) {
+    return h.Covariance().diagonal().tail<3>().isZero(0.0);
+  };
+  if (is_convention(from) && is_convention(to)) step.tail<3>().setZero();
   return step;
 }
 
@@ -23,7 +27,8 @@ Vector6d StepBetween(const PoseHypothesis& from, const PoseHypothesis& to) {
 // circle are two, however near.
 bool AreHumpsOfOne(const PoseHypothesis& a, const PoseHypothesis& b) {
   constexpr double kApart2 = 4.0;  // Squared, standard deviations of their difference.
-  if (a.RotationIsFree() && a.structure == b.structure) return false;
+  const bool of_one_circle = a.RotationIsFree() && a.circles.size() < 2;
+  if (of_one_circle && a.structure == b.structure) return false;
   if (a.metric != b.metric || a.free_directions.size() != b.free_directions.size()) return false;
   const double scale = a.focal_scale - b.focal_scale;
   const Vector6d step = StepBetween(a, b).cwiseAbs2(),
@@ -31,6 +36,21 @@ bool AreHumpsOfOne(const PoseHypothesis& a, const PoseHypothesis& b) {
   return (step.head<3>().array() <= kApart2 * variance.head<3>().array()).all() &&
          step.tail<3>().sum() <= kApart2 * variance.tail<3>().sum() &&
          scale * scale <= kApart2 * (a.focal_sigma * a.focal_sigma + b.focal_sigma * b.focal_sigma);
+}
+
+// The covariances of `one`, about it, where `other` is the truth with a probability of `share`.
+void Mix(double share, const PoseHypothesis& other, PoseHypothesis* one) {
+  const Vector6d step = StepBetween(*one, other);
+  const double scale = other.focal_scale - one->focal_scale;
+  const auto mixed = [&](const auto& a, const auto& b) { return (1.0 - share) * a + share * b; };
+  SetCovariance(mixed(one->Covariance(), Matrix6d(other.Covariance() + step * step.transpose())),
+                one);
+  Eigen::Map<Vector6d> across(one->focal_covariance.data());
+  across =
+      mixed(Vector6d(across),
+            Vector6d(Eigen::Map<const Vector6d>(other.focal_covariance.data()) + scale * step));
+  one->focal_sigma = std::sqrt(mixed(one->focal_sigma * one->focal_sigma,
+                                     other.focal_sigma * other.focal_sigma + scale * scale));
 }
 
 }  // namespace
@@ -45,13 +65,9 @@ void MergeHumps(std::vector<PoseHypothesis>* hypotheses) {
       merged.push_back(std::move(h));
       continue;
     }
-    if (h.cost < one->cost) std::swap(h, *one);
     const double log_odds = log_posterior(h) - log_posterior(*one),
                  share = 1.0 / (1.0 + std::exp(-log_odds));
-    const Vector6d step = StepBetween(*one, h);
-    SetCovariance(
-        (1.0 - share) * one->Covariance() + share * (h.Covariance() + step * step.transpose()),
-        &*one);
+    Mix(share, h, &*one);
     // Twice log(1 + odds), without overflow.
     one->log_det += 2.0 * (std::max(log_odds, 0.0) + std::log1p(std::exp(-std::abs(log_odds))));
   }

@@ -87,8 +87,8 @@ std::vector<AgreeingLines> FindAgreeingLines(const JointProblem& problem,
 Status RankReadings(const JointProblem& problem, const std::vector<State>& minima,
                     PoseEstimate* estimate);
 
-// Hypotheses that are less apart than they are wide become one: the pose that fits best, with the
-// covariance of all about it, and with the volume of all (log_det), so that it is as probable as
+// Hypotheses that are less apart than they are wide become one: the most probable pose, with the
+// covariances of all about it, and with the volume of all (log_det), so that it is as probable as
 // they are together. Ranks what is left. The two poses of a lone circle stay two, however near.
 void MergeHumps(std::vector<PoseHypothesis>* hypotheses);
 

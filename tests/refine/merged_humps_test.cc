@@ -45,12 +45,36 @@ TEST(MergeHumps, TheMostProbableTogetherComesFirst) {
   EXPECT_TRUE(all[0].cam_from_world.rotation.isIdentity(1e-12));
 }
 
+// Of lines alone the translation is a convention, which a focal length moves.
+TEST(MergeHumps, OneRidgeOfTheFocalLengthIsOne) {
+  std::vector<PoseHypothesis> all = {Turned(0.0, 0.5), Turned(1.0, 0.5)};
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.topLeftCorner<3, 3>() = kSigma * kSigma * Eigen::Matrix3d::Identity();
+  for (PoseHypothesis& h : all) SetCovariance(covariance, &h);
+  all[0].focal_sigma = all[1].focal_sigma = 0.2;
+  all[1].focal_scale = 1.3;
+  all[1].cam_from_world.translation = Vector3d(0.3, 0.4, 0.8);
+  std::vector<PoseHypothesis> far = all;
+  MergeHumps(&all);
+  ASSERT_EQ(all.size(), 1U);
+  EXPECT_NEAR(all[0].focal_sigma, std::sqrt(0.04 + 0.5 * 0.09), 1e-12);
+  EXPECT_NEAR(all[0].focal_covariance[1], 0.5 * 0.3 * kSigma, 1e-12);
+  EXPECT_TRUE(all[0].Covariance().bottomRows<3>().isZero(0.0));
+  far[1].focal_scale = 2.0;
+  MergeHumps(&far);
+  EXPECT_EQ(far.size(), 2U);
+}
+
 // One circle has two poses, also where it is seen from ahead.
 TEST(MergeHumps, TheTwoPosesOfACircleStay) {
   std::vector<PoseHypothesis> all = {Turned(0.0, 0.5), Turned(1.0, 0.5)};
   for (PoseHypothesis& h : all) h.free_directions = {{0.0, 0.0, 1.0, 0.0, 0.0, 0.0}};
+  std::vector<PoseHypothesis> of_two_circles = all;
   MergeHumps(&all);
   EXPECT_EQ(all.size(), 2U);
+  for (PoseHypothesis& h : of_two_circles) h.circles.resize(2);
+  MergeHumps(&of_two_circles);
+  EXPECT_EQ(of_two_circles.size(), 1U);
 }
 
 }  // namespace
