@@ -56,7 +56,8 @@ void Progress::Print(double seconds, bool last) {
   const double rate = (done_ - before_) / seconds;
   std::string line = std::to_string(done_) + " of " + std::to_string(total_) + " " + what_ + ", " +
                      FormatShort(rate, 2) + "/s, ";
-  line += last ? FormatDuration(seconds) : FormatDuration((total_ - done_) / rate) + " left";
+  line +=
+      last ? "in " + FormatDuration(seconds) : FormatDuration((total_ - done_) / rate) + " left";
   std::fprintf(stderr, terminal_ ? "\r%s\033[K" : "%s\n", line.c_str());
   std::fflush(stderr);
   printed_ = true;

@@ -266,8 +266,11 @@ const SolverRun* RunToShow(const ImageRun& run) {
     return ShowRank(r.solver, r.loss != nullptr, first.probability, first.num_observations);
   };
   for (const SolverRun& candidate : run.solvers) {
-    if (!candidate.estimate.status.ok() || candidate.estimate.hypotheses.empty()) continue;
-    if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
+    if (candidate.estimate.status.ok() && !candidate.estimate.hypotheses.empty()) {
+      if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
+    } else if (candidate.solver == kJoint) {
+      return nullptr;
+    }
   }
   return best;
 }

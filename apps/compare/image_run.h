@@ -88,7 +88,7 @@ ImageRun RunImage(const CompareOptions& options, const SolverSet* solvers, Scene
 // Gives it to the circle whose image has the longest axis, whose index is returned; -1: to none.
 int SetLargestRadius(double radius, Observations* observations);
 
-// The run to show in a picture (see ShowRank). Null if every solver refused.
+// The run to show in a picture (see ShowRank). Null if every solver refused, or joint did.
 const SolverRun* RunToShow(const ImageRun& run);
 
 }  // namespace circline::apps

@@ -163,11 +163,15 @@ std::string SigmaText(const PoseHypothesis& hypothesis) {
   return "sigma " + FormatShort(sigma.norm(), 2) + " deg";
 }
 
+// What a picture has room for: what was found, or the first reason of the last solver.
+std::string WhyNoPose(const ImageRun& run) {
+  if (!run.observations.message.empty() || run.solvers.empty()) return run.observations.message;
+  const std::string& reasons = run.solvers.back().estimate.status.message;
+  return reasons.substr(0, reasons.find("; "));
+}
+
 cv::Mat WithCaption(const ImageRun& run, const SolverRun* shown, const Canvas& canvas) {
-  if (shown == nullptr) {
-    return canvas.WithCaption(
-        "no pose", {run.solvers.empty() ? "" : run.solvers.back().estimate.status.message});
-  }
+  if (shown == nullptr) return canvas.WithCaption("no pose", {WhyNoPose(run)});
   const PoseHypothesis& best = shown->estimate.hypotheses.front();
   std::string title =
       shown->solver + (shown->stage == SolverStage::kRefined ? ", refined" : ", closed form");

@@ -196,7 +196,7 @@ bool ReadLineCounts(const std::string& observation_line, LineCounts* counts) {
 
 std::array<int, 4> ShowRank(const std::string& solver, bool refined, double probability,
                             int num_observations) {
-  return {std::isfinite(probability) ? 1 : 0, solver == "joint" ? 1 : 0, refined ? 1 : 0,
+  return {std::isfinite(probability) ? 1 : 0, solver == kJoint ? 1 : 0, refined ? 1 : 0,
           num_observations};
 }
 
@@ -211,6 +211,7 @@ const SolverRecord* SolverToShow(const ImageRecord& record) {
     return ShowRank(r.key.solver, r.key.refined(), first.probability, first.num_observations);
   };
   for (const SolverRecord& candidate : record.solvers) {
+    if (!candidate.HasAnswer() && candidate.key.solver == kJoint) return nullptr;
     if (!candidate.HasAnswer()) continue;
     if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
   }

@@ -95,6 +95,10 @@ struct LineCounts {
 };
 bool ReadLineCounts(const std::string& observation_line, LineCounts* counts);
 
+// The solver that weighs all evidence. Where it refuses there is no answer to show: what others say
+// of parts of the evidence is no pose of the photo.
+inline constexpr const char* kJoint = "joint";
+
 // The larger, the sooner an answer is the one to show for its photo: joint, else the refined answer
 // with the most evidence, else a closed form, and last the answers of peers, which state no
 // probability.
@@ -104,7 +108,7 @@ std::array<int, 4> ShowRank(const std::string& solver, bool refined, double prob
 // "--seed=2 --max_pencils=3", or that none was given.
 std::string FlagText(const std::vector<std::string>& flags);
 
-// The answer to show; of the first loss. Null if every solver refused.
+// The answer to show; of the first loss. Null if every solver refused, or joint did.
 const SolverRecord* SolverToShow(const ImageRecord& record);
 
 }  // namespace circline::apps

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "apps/common/svg_plot.h"
+#include "apps/compare/record.h"
 #include "apps/compare/report.h"
 #include "tests/apps/board_set.h"
 #include "tests/apps/run_compare.h"
@@ -32,6 +33,24 @@ std::string RunSweep(const TestFolder& folder) {
                 .exit_code,
             1);
   return folder / "out";
+}
+
+// What the closed forms say of parts of the evidence is no pose where all of it gives none.
+TEST(CompareReport, ShowsNoPoseThatTheJointSolverRefuses) {
+  ImageRecord record;
+  for (const char* solver : {"line_pairs", "joint"}) {
+    SolverRecord& made = record.solvers.emplace_back();
+    made.key = {solver, "refined", "cauchy"};
+    made.hypotheses.resize(1);
+    made.hypotheses[0].probability = 1.0;
+  }
+  ASSERT_NE(SolverToShow(record), nullptr);
+  EXPECT_EQ(SolverToShow(record)->key.solver, "joint");
+  record.solvers[1].hypotheses.clear();
+  EXPECT_EQ(SolverToShow(record), nullptr);
+  record.solvers.pop_back();  // It was not asked.
+  ASSERT_NE(SolverToShow(record), nullptr);
+  EXPECT_EQ(SolverToShow(record)->key.solver, "line_pairs");
 }
 
 TEST(CompareReport, ShowsSomeImagesAndNamesTheOthers) {
