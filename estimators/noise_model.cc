@@ -53,7 +53,7 @@ NoiseModel NoiseModel::Exact() {
   NoiseModel m;
   m.contour_px = m.line_px = m.contour_offset_px = 0.0;
   m.circle_tilt_rad = m.circle_height = m.circle_shape = 0.0;
-  m.line_direction_rad = m.pencil_axis_rad = 0.0;
+  m.line_direction_rad = m.pencil_axis_rad = m.grid_line = 0.0;
   m.radius = m.length = 0.0;
   m.camera = CameraSigma::Exact();
   return m;
@@ -70,6 +70,7 @@ Status NoiseModel::Validate() const {
                                      {"circle_shape", circle_shape},
                                      {"line_direction_rad", line_direction_rad},
                                      {"pencil_axis_rad", pencil_axis_rad},
+                                     {"grid_line", grid_line},
                                      {"radius", radius},
                                      {"length", length},
                                      {"spread", spread}});

@@ -49,6 +49,9 @@ struct AdjustOptions {
   double tangential_sigma = 0.0005;
   // kAuto: the evidence decides, and `rigid` of the answer says how.
   RigidWorld rigid = RigidWorld::kAuto;
+  // Where a photo shows lines alone, and they lie on a grid of equal squares, as a chessboard's do,
+  // they count as that (NoiseModel::grid_line). False: as lines of two directions.
+  bool square_grids = true;
   // Photos of a video that show nearly the same share their errors, and their number makes the
   // camera no better known: of those whose features lie within so much of one another, of the
   // photo's diagonal, the first one takes part. 0: all do. Of the 58 photographs of five sets here
@@ -119,8 +122,11 @@ struct AdjustedPhoto {
   // of that, and its turn about the plane's normal. What nothing speaks of in any photo (the
   // translation where lines alone are seen) has no variance either.
   std::array<double, 36> covariance{};
-  double rms_px = 0.0;                      // Of the inlier residuals, pixels.
-  double misfit = 0.0;                      // Median chi^2 of its features by residual; 1 or less.
+  double rms_px = 0.0;  // Of the inlier residuals, pixels.
+  double misfit = 0.0;  // Median chi^2 of its features by residual; 1 or less.
+  // Of its lines, on a grid of equal squares. Where there are any these are its world: the unit is
+  // a square, the origin where two lines meet, the axes run along lines.
+  int num_grid_lines = 0;
   std::vector<std::string> left_out;        // Features, as PoseHypothesis::left_out.
   std::vector<AdjustedResidual> residuals;  // Of the points that count.
 };

@@ -133,7 +133,7 @@ void AdjustProblem::SetGauge() {
   std::map<int, bool> done;
   for (std::size_t i = 0; i < photos_.size(); ++i) {
     const int world = photos_[i].world;
-    if (rotations_[i] < 0) continue;
+    if (rotations_[i] < 0 || photos_[i].grid != nullptr) continue;  // A grid says all.
     if (observed.count(translations_[i]) == 0) {
       block(translations_[i]).is_constant = true;  // Nothing speaks of it.
       continue;
@@ -277,6 +277,34 @@ int AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   return made.block;
 }
 
+double AdjustProblem::GridSigma(const SquareGrid& grid) const {
+  constexpr double kExact = 1e-5;
+  return std::max(options_.noise_model.grid_line * grid.width, kExact);
+}
+
+// All pieces of a line of the board are off their place by the same.
+int AdjustProblem::AddGridPlace(int photo, std::size_t pencil, std::size_t line,
+                                const CurveCost& cost, std::vector<int> blocks) {
+  constexpr double kPieces = 0.1;  // Of the deviation of the whole.
+  const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
+  const auto found = input.grid->places.find({pencil, line});
+  if (found == input.grid->places.end()) return -1;
+  const PencilObservation& observed = input.observations->pencils[pencil];
+  const int axis = AxisAcross(observed);
+  const double sigma = GridSigma(*input.grid);
+  int& off = OneOf({photo, axis, found->second}, &grid_lines_);
+  if (off < 0) {
+    off = AddBlock(1, {});
+    AddTerm(NewGaussianPrior({sigma}), {off});
+  }
+  const std::vector<double> none(kCameraSize, 0.0);
+  return AddTerm(
+      NewGridLinePrior(observed.lines[line].fit->line, cost.points()->Middle(none.data()),
+                       options_.noise_model.line_direction_rad > 0.0, axis, found->second,
+                       kPieces * sigma),
+      {blocks[0], blocks[1], blocks[2], blocks[3], off});
+}
+
 void AdjustProblem::AddPencil(int photo, std::size_t index) {
   const auto i = static_cast<std::size_t>(photo);
   const AdjustInput& input = photos_[i];
@@ -298,8 +326,11 @@ void AdjustProblem::AddPencil(int photo, std::size_t index) {
               camera = cameras_[static_cast<std::size_t>(input.camera)];
     const double* at[] = {Values(rotations_[i]), Values(direction), Values(place), Values(camera)};
     if (!cost->Start(at, Values(place))) continue;
+    const std::vector<int> on_plane = {rotations_[i], translations_[i], direction, place};
+    const int on_grid = input.grid != nullptr ? AddGridPlace(photo, index, j, *cost, on_plane) : -1;
     AddFeature(photo, pencil.id + "[" + std::to_string(j) + "]", std::move(cost),
                {rotations_[i], direction, place, camera});
+    features_.back().grid_term = on_grid;
   }
 }
 

@@ -19,6 +19,7 @@
 #include "circline/refine/adjust_layout.h"
 #include "circline/refine/adjust_photos.h"
 #include "circline/refine/graph.h"
+#include "circline/refine/square_grid.h"
 
 namespace circline {
 
@@ -37,6 +38,7 @@ struct AdjustInput {
   std::set<std::string> left_out;  // Ids of features that have no part in it.
   bool takes_part = true;
   const CameraPose* given = nullptr;  // In the given frame; null: none.
+  const SquareGrid* grid = nullptr;   // Of its lines, which then is its world; null: none.
 
   const std::string& NameOf(const std::string& id) const {
     const auto name = names.find(id);
@@ -70,6 +72,7 @@ class AdjustProblem : private Graph {
     std::string id;  // As PoseHypothesis::left_out.
     int term = -1;
     bool active = true;
+    int grid_term = -1;  // Of a line on a grid: its place there.
     // At the last Judge(): chi^2 of what its points agree on (a conic, a line) against the rest,
     // priors of its own imperfections included, and how many residuals that is.
     double chi2 = 0.0;
@@ -79,6 +82,13 @@ class AdjustProblem : private Graph {
   const std::vector<Feature>& features() const { return features_; }
   // Of all features that take part, per degree of freedom.
   double Misfit() const;
+  // A line of a board, all its pieces: how far it is off, in standard deviations.
+  struct GridLine {
+    std::size_t photo;
+    int axis, place;
+    double deviations;
+  };
+  std::vector<GridLine> GridLines() const;
 
   // All else marginalised; from the inliers of the features in force, of photos before `end`.
   struct Covariances {
@@ -120,6 +130,9 @@ class AdjustProblem : private Graph {
   void AddKnownRadius(int world, const CircleObservation& circle, int radius);
   int OffsetOf(int photo, const CircleObservation& circle);
   void AddPencil(int photo, std::size_t pencil);
+  double GridSigma(const SquareGrid& grid) const;  // Squares.
+  int AddGridPlace(int photo, std::size_t pencil, std::size_t line, const CurveCost& cost,
+                   std::vector<int> blocks);
   int DirectionOf(int photo, const PencilObservation& pencil);
   std::optional<ImagePoints> Points(const AdjustInput& input,
                                     const std::vector<Eigen::Vector2d>& pixels,
@@ -149,7 +162,8 @@ class AdjustProblem : private Graph {
   std::map<std::pair<int, std::string>, Direction> directions_;
   std::map<std::pair<int, std::string>, int> radius_groups_, centers_;
   std::map<std::pair<int, int>, int> offsets_;
-  std::map<int, bool> x_is_fixed_, has_scale_;  // By world.
+  std::map<std::array<int, 3>, int> grid_lines_;  // By photo, axis and place: how far off it is.
+  std::map<int, bool> x_is_fixed_, has_scale_;    // By world.
   std::set<int> known_radii_;
   std::vector<Feature> features_;
   bool metric_ = false;

@@ -16,7 +16,9 @@ namespace circline {
 std::vector<const Term*> AdjustProblem::ActiveTerms(int end) const {
   std::vector<const Term*> active;
   for (const Feature& feature : features_) {
-    if (feature.active && feature.photo < end) active.push_back(&term(feature.term));
+    if (!feature.active || feature.photo >= end) continue;
+    active.push_back(&term(feature.term));
+    if (feature.grid_term >= 0) active.push_back(&term(feature.grid_term));
   }
   std::vector<std::uint8_t> is_used(blocks().size(), 0);
   for (const int block : BlocksOf(active)) is_used[static_cast<std::size_t>(block)] = 1;
@@ -85,6 +87,15 @@ void AdjustProblem::Judge() {
       ++feature.rows;
     }
   }
+}
+
+std::vector<AdjustProblem::GridLine> AdjustProblem::GridLines() const {
+  std::vector<GridLine> lines;
+  for (const auto& [key, off] : grid_lines_) {
+    const auto i = static_cast<std::size_t>(key[0]);
+    lines.push_back({i, key[1], key[2], *Values(off) / GridSigma(*photos_[i].grid)});
+  }
+  return lines;
 }
 
 double AdjustProblem::Misfit() const {

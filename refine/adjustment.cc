@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <utility>
+#include <vector>
 
 #include "circline/refine/statistics.h"
 
@@ -84,6 +86,41 @@ bool Adjustment::LeaveOut() {
   return any;
 }
 
+// Lines of boards that are off their place, by what the board's others are: rims, and rows that
+// were made of another size. Of each board the one that is off most: it draws the others with it.
+// And grids whose lines are off on the whole: they are none.
+bool Adjustment::LeaveGridLinesOut() {
+  constexpr double kLeastScale = 0.3;   // Lines as exact as that are seen on some photos.
+  constexpr double kByChance = 1e-3;    // Probability that a board is as bent as that.
+  constexpr double kGaussian = 1.4826;  // Deviation over the median's, of a Gaussian.
+  constexpr int kUnknowns = 3;          // Place and size of a board in its plane.
+  std::map<std::size_t, std::vector<AdjustProblem::GridLine>> boards;
+  for (const AdjustProblem::GridLine& line : problem_->GridLines())
+    boards[line.photo].push_back(line);
+  bool any = false;
+  for (const auto& [photo, lines] : boards) {
+    AdjustInput& input = inputs_[photo];
+    std::vector<double> off;
+    double chi2 = 0.0;
+    for (const AdjustProblem::GridLine& line : lines) {
+      off.push_back(std::abs(line.deviations));
+      chi2 += line.deviations * line.deviations;
+    }
+    const double scale = std::clamp(kGaussian * Median(off), kLeastScale, 1.0);
+    const auto worst = std::max_element(off.begin(), off.end()) - off.begin();
+    const bool is_off = off[static_cast<std::size_t>(worst)] > kInlierSigmas * scale;
+    if (is_off)
+      grids_[photo]->Remove(prepared_[photo], lines[static_cast<std::size_t>(worst)].axis,
+                            lines[static_cast<std::size_t>(worst)].place);
+    const bool is_none =
+        (!is_off && chi2 > ChiSquareLimit(static_cast<int>(lines.size()) - kUnknowns, kByChance)) ||
+        !input.grid->HasBothAxes(prepared_[photo]);
+    if (is_none) input.grid = nullptr;
+    any = any || is_off || is_none;
+  }
+  return any;
+}
+
 // Whether the photos have led to another camera than they were prepared with.
 bool Adjustment::HasMoved() const {
   constexpr double kMoved[] = {0.005, 0.005};  // Of log f; of the first distortion coefficient.
@@ -117,14 +154,41 @@ void Adjustment::PrepareAnew() {
 }
 
 void Adjustment::SolveWithoutOutliers() {
-  constexpr int kRounds = 4;
+  constexpr int kRounds = 12;
   SolveOnce();
   if (start_ != nullptr) return;  // Good enough to be compared.
+  bool has_looked_for_grids = false;
   for (int round = 0; round < kRounds && out_.status.ok(); ++round) {
-    const bool moved = HasMoved(), left_out = LeaveOut();
-    if (!moved && !left_out) return;
+    bool changed = HasMoved();
+    changed = LeaveOut() || changed;
+    changed = LeaveGridLinesOut() || changed;
+    const bool looks_for_grids = !changed && !std::exchange(has_looked_for_grids, true);
+    if (!changed && !(looks_for_grids && FindGrids())) return;
     PrepareAnew();
+    if (looks_for_grids) StartOnGrids();
     SolveOnce();
+  }
+}
+
+// Where lines alone are seen, and lie on a grid of squares. True where there are any.
+bool Adjustment::FindGrids() {
+  if (!options_.square_grids) return false;
+  ParallelFor(static_cast<int>(given_.size()), options_.num_threads, [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    const AdjustInput& input = inputs_[i];
+    if (input.takes_part && input.layout->empty() && input.given == nullptr)
+      grids_[i] = FindSquareGrid(prepared_[i], problem_->PoseAt(index).rotation);
+  });
+  return std::any_of(grids_.begin(), grids_.end(),
+                     [](const std::optional<SquareGrid>& grid) { return grid.has_value(); });
+}
+
+// These are the worlds of their photos.
+void Adjustment::StartOnGrids() {
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    if (!grids_[i]) continue;
+    inputs_[i].grid = &*grids_[i];
+    inputs_[i].pose = grids_[i]->cam_from_board;
   }
 }
 
@@ -187,6 +251,8 @@ void Adjustment::Report() {
     AdjustedPhoto& photo = out_.photos[i];
     photo.cam_from_world = problem_->PoseAt(static_cast<int>(i));
     Eigen::Map<Matrix6d>(photo.covariance.data()) = scale * covariances.poses[i];  // Symmetric.
+    if (inputs_[i].grid != nullptr)
+      photo.num_grid_lines = static_cast<int>(inputs_[i].grid->places.size());
     photo.residuals = std::move(residuals[i]);
     const int count = static_cast<int>(photo.residuals.size());
     double sum = 0.0;
@@ -198,6 +264,13 @@ void Adjustment::Report() {
   }
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (counts[c] > 0) out_.cameras[c].rms_px = std::sqrt(squares[c] / counts[c]);
+  }
+  const auto boards = std::count_if(inputs_.begin(), inputs_.end(), [](const AdjustInput& input) {
+    return input.takes_part && input.grid != nullptr;
+  });
+  if (boards > 0) {
+    out_.notes.push_back(std::to_string(boards) +
+                         " photos show a grid of equal squares: their poses are in squares");
   }
   if (start_ == nullptr) ReportSigmas(scale);
   out_.circles = problem_->Circles();

@@ -30,7 +30,8 @@ class Adjustment {
         given_(photos),
         is_valid_(photos.size(), 0),
         prepared_(photos.size()),
-        inputs_(photos.size()) {
+        inputs_(photos.size()),
+        grids_(photos.size()) {
     out_.photos.resize(photos.size());
   }
 
@@ -57,6 +58,9 @@ class Adjustment {
   void ShareWorld(const SharedLayout& shared, bool by_id);
   void ScaleWorlds();
   void SolveWithoutOutliers();
+  bool FindGrids();
+  void StartOnGrids();
+  bool LeaveGridLinesOut();
   bool HasMoved() const;
   void PrepareAnew();
   double JudgePhotos();
@@ -77,6 +81,7 @@ class Adjustment {
   std::vector<std::uint8_t> is_valid_;  // By photo.
   std::vector<Observations> prepared_;
   std::vector<AdjustInput> inputs_;
+  std::vector<std::optional<SquareGrid>> grids_;
   std::vector<PoseEstimate> estimates_;
   std::vector<Layout> layouts_;            // By world.
   std::optional<GivenFrame> given_frame_;  // Where poses are given; as it stands.

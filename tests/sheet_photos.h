@@ -3,6 +3,7 @@
 #define CIRCLINE_TESTS_SHEET_PHOTOS_H_
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -61,6 +62,25 @@ class Photos {
       scene_.pose = poses[i];
       photos[i].pencils = {scene_.Pencil("rows", PencilDirection::kX, {1.0, 0.0, 0.0}, 4, 30),
                            scene_.Pencil("columns", PencilDirection::kY, {0.0, 1.0, 0.0}, 4, 30)};
+    }
+    return *this;
+  }
+  // One more line of the sheet along an axis, of the pencil that has all of these.
+  Photos& WithLine(PencilDirection along, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+    for (std::size_t i = 0; i < photos.size(); ++i) {
+      scene_.pose = poses[i];
+      std::vector<PencilObservation>& pencils = photos[i].pencils;
+      auto pencil = std::find_if(pencils.begin(), pencils.end(),
+                                 [&](const auto& p) { return p.direction == along; });
+      if (pencil == pencils.end()) {
+        PencilObservation made;
+        made.id = PencilDirectionName(along);
+        made.direction = along;
+        made.plane = "p0";
+        made.sigma_px = scene_.sigma();
+        pencil = pencils.insert(pencils.end(), made);
+      }
+      pencil->lines.push_back(scene_.Line({from.x(), from.y(), 0.0}, {to.x(), to.y(), 0.0}, 30));
     }
     return *this;
   }

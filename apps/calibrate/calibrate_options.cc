@@ -21,6 +21,10 @@ DEFINE_string(free, "", "What may be far from that, of: aspect, tangential; a li
 DEFINE_string(rigid, circline::RigidWorldName(circline::AdjustOptions().rigid),
               "Whether all photos show one sheet: yes, no (only the camera is common), or auto: "
               "where the circles of one id lie alike, or circles do whatever their ids.");
+DEFINE_bool(
+    square_grids, circline::AdjustOptions().square_grids,
+    "Lines on a grid of equal squares, as a chessboard's, count as that: the camera is known "
+    "better, and poses are in squares. --nosquare_grids: as lines of two directions.");
 DEFINE_string(
     import, "",
     "Folder of a COLMAP model (cameras and images, .bin or .txt) of the photos: its cameras "
@@ -90,6 +94,7 @@ Status CalibrateOptionsFromFlags(CalibrateOptions* options) {
   options->import = FLAGS_import;
   options->compare.inputs.guess.is_exact = false;  // The camera is what is to be found.
   const EstimationOptions& estimation = options->compare.losses.front().estimation;
+  options->adjust.square_grids = FLAGS_square_grids;
   options->adjust.conic_loss = estimation.conic_loss;
   options->adjust.line_loss = estimation.line_loss;
   options->adjust.noise_model = estimation.noise_model;

@@ -93,6 +93,7 @@ Json PhotoJson(const AdjustedPhoto& photo, std::size_t index,
   out["left_out"] = photo.left_out;
   out["rms_px"] = photo.rms_px;
   out["misfit"] = photo.misfit;
+  if (photo.num_grid_lines > 0) out["grid_lines"] = photo.num_grid_lines;
   return out;
 }
 

@@ -40,6 +40,7 @@ Status ReadNoiseModel(const std::string& path, NoiseModel* model, StatedCameraSi
                       {"circle_shape", &read.circle_shape},
                       {"line_direction_rad", &read.line_direction_rad},
                       {"pencil_axis_rad", &read.pencil_axis_rad},
+                      {"grid_line", &read.grid_line},
                       {"radius", &read.radius},
                       {"length", &read.length},
                       {"spread", &read.spread}},

@@ -249,8 +249,8 @@ void BindAdjustCall(py::module_* module) {
       [](const py::iterable& photos, const std::string& conic_loss, double conic_scale,
          const std::string& line_loss, double line_scale, const std::optional<NoiseModel>& noise,
          const std::map<std::string, CameraSigma>& camera_sigma, int num_radial,
-         double tangential_sigma, const std::string& rigid, double nearly_equal, int max_iterations,
-         int num_threads, int num_solver_threads) {
+         double tangential_sigma, const std::string& rigid, bool square_grids, double nearly_equal,
+         int max_iterations, int num_threads, int num_solver_threads) {
         AdjustOptions options;
         options.conic_loss = Loss(conic_loss, conic_scale, "conic_loss");
         options.line_loss = Loss(line_loss, line_scale, "line_loss");
@@ -260,6 +260,7 @@ void BindAdjustCall(py::module_* module) {
         options.tangential_sigma = tangential_sigma;
         if (!RigidWorldFromName(rigid, &options.rigid))
           throw py::value_error("rigid must be auto, yes or no");
+        options.square_grids = square_grids;
         options.nearly_equal = nearly_equal;
         options.max_iterations = max_iterations;
         options.num_threads = num_threads;
@@ -273,9 +274,9 @@ void BindAdjustCall(py::module_* module) {
       py::arg("line_loss_scale_px") = d.line_loss.scale_px, py::arg("noise_model") = py::none(),
       py::arg("camera_sigma") = std::map<std::string, CameraSigma>(),
       py::arg("num_radial") = d.num_radial, py::arg("tangential_sigma") = d.tangential_sigma,
-      py::arg("rigid") = RigidWorldName(d.rigid), py::arg("nearly_equal") = d.nearly_equal,
-      py::arg("max_iterations") = d.max_iterations, py::arg("num_threads") = d.num_threads,
-      py::arg("num_solver_threads") = d.num_solver_threads,
+      py::arg("rigid") = RigidWorldName(d.rigid), py::arg("square_grids") = d.square_grids,
+      py::arg("nearly_equal") = d.nearly_equal, py::arg("max_iterations") = d.max_iterations,
+      py::arg("num_threads") = d.num_threads, py::arg("num_solver_threads") = d.num_solver_threads,
       "The camera (or several), the pose of every photo and what is seen: AdjustedPhotos.\n\n"
       "observations_list: one Observations a photo. camera_sigma: by Camera.id; without, nothing\n"
       "is known of a camera. Options: refine/adjust_photos.h. Refused, with the reason.");

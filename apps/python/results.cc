@@ -126,6 +126,8 @@ void BindAdjusted(py::module_* module) {
           py::return_value_policy::reference_internal, "(6, 6), as of PoseHypothesis.")
       .def_readonly("rms_px", &P::rms_px, "Of the inlier residuals, pixels.")
       .def_readonly("misfit", &P::misfit, "Median chi^2 of its features by residual.")
+      .def_readonly("num_grid_lines", &P::num_grid_lines,
+                    "Lines on a grid of equal squares, its world where there are any.")
       .def_readonly("left_out", &P::left_out, "Features that contradict the rest.");
   using A = AdjustedCircle;
   py::class_<A>(*module, "AdjustedCircle", "A circle of a world.")

@@ -143,6 +143,8 @@ void BindNoise(py::module_* module) {
                      "A line against its pencil's direction, radians.")
       .def_readwrite("pencil_axis_rad", &NoiseModel::pencil_axis_rad,
                      "A pencil's direction against its axis, radians.")
+      .def_readwrite("grid_line", &NoiseModel::grid_line,
+                     "A line of a grid of equal squares from its place, a share of its width.")
       .def_readwrite("radius", &NoiseModel::radius, "A known radius without a sigma, relative.")
       .def_readwrite("length", &NoiseModel::length, "A known length without a sigma, relative.")
       .def_readwrite("camera", &NoiseModel::camera, "How well the camera is known.")

@@ -71,6 +71,7 @@ class NoiseModel:
     circle_shape: float
     line_direction_rad: float
     pencil_axis_rad: float
+    grid_line: float
     radius: float
     length: float
     camera: CameraSigma
@@ -87,6 +88,7 @@ class NoiseModel:
         circle_shape: float = ...,
         line_direction_rad: float = ...,
         pencil_axis_rad: float = ...,
+        grid_line: float = ...,
         radius: float = ...,
         length: float = ...,
         camera: CameraSigma = ...,
@@ -246,6 +248,8 @@ class AdjustedPhoto:
     @property
     def misfit(self) -> float: ...
     @property
+    def num_grid_lines(self) -> int: ...
+    @property
     def left_out(self) -> List[str]: ...
 
 class AdjustedCircle:
@@ -358,6 +362,7 @@ def adjust(
     num_radial: int = ...,
     tangential_sigma: float = ...,
     rigid: str = ...,
+    square_grids: bool = ...,
     nearly_equal: float = ...,
     max_iterations: int = ...,
     num_threads: int = ...,
