@@ -21,6 +21,12 @@ struct Look {
   LikelyFocal likeliest;
 };
 
+double LengthOfLines(const PhotoEvidence& evidence) {
+  double length = 0.0;
+  for (const DetectedLine& line : evidence.lines) length += line.length_px;
+  return length;
+}
+
 // The same focal lengths whatever the guess.
 double OnSteps(double log_focal) { return kFocalStep * std::round(log_focal / kFocalStep); }
 
@@ -104,9 +110,18 @@ Status LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& op
         camera, sigma, StatedLogFocal(*observations), diagonal_px, observations->found_k1);
     if (look.likeliest.gain > kClearly) next = OnSteps(next + look.likeliest.log_focal);
   }
-  const auto best = std::min_element(looks.begin(), looks.end(), [](const Look& a, const Look& b) {
-    return a.likeliest.gain < b.likeliest.gain;
-  });
+  // Where the lens is known, but not the focal length, a wrong one bends lines, which break: so
+  // little is left of them that it says nothing of others.
+  // Of the longest; chessboards at half the focal length have 0.4.
+  constexpr double kBroken = 0.75;
+  double longest = 0.0;
+  for (const Look& look : looks) longest = std::max(longest, LengthOfLines(look.evidence));
+  const auto miss = [&](const Look& look) {
+    const bool is_broken = LengthOfLines(look.evidence) < kBroken * longest;
+    return std::pair(is_broken, look.likeliest.gain);
+  };
+  const auto best = std::min_element(
+      looks.begin(), looks.end(), [&](const Look& a, const Look& b) { return miss(a) < miss(b); });
   look_through(best->log_focal);
   *evidence = std::move(best->evidence);
   return Status::Ok();

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "circline/ransac/detection/look_for_focal.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 #include "tests/ransac/detection/observations_test_util.h"
@@ -165,6 +166,30 @@ TEST(DetectObservations, DiscsOfASheetHaveTheirPlaneAtAnyGuess) {
     for (const CircleObservation& circle : found.circles) on_plane += circle.plane == "p0" ? 1 : 0;
     EXPECT_GE(on_plane, 14) << factor;
   }
+}
+
+// Through a known lens lines break at a wrong focal length; what is left contradicts nothing.
+TEST(LookForFocal, WhereLinesBreakNothingIsFound) {
+  const Eigen::Matrix3d axes = ExpRotation(Eigen::Vector3d(0.5, 0.6, 0.1));
+  DetectionOptions options;
+  options.noise_model.camera = Wide(0.5);
+  Observations observations;
+  observations.camera = Guess(1.6);
+  double first = 0.0;
+  int looks = 0;
+  const auto collect = [&](const Camera& camera, PhotoEvidence* evidence) {
+    if (first == 0.0) first = camera.fx;
+    ++looks;
+    const bool is_first = std::abs(std::log(camera.fx / first)) < 0.01;
+    *evidence = Edges(axes, 2, camera.fx / TestCamera().fx);
+    if (!is_first) evidence->lines.resize(12);
+    return Status::Ok();
+  };
+  PhotoEvidence evidence;
+  ASSERT_TRUE(LookForFocal(collect, options, 600.0, &evidence, &observations).ok());
+  EXPECT_GT(looks, 1);
+  EXPECT_NEAR(observations.camera.fx, first, 1e-9 * first);
+  EXPECT_EQ(evidence.lines.size(), 60U);
 }
 
 }  // namespace
