@@ -297,12 +297,11 @@ int AdjustProblem::AddGridPlace(int photo, std::size_t pencil, std::size_t line,
     off = AddBlock(1, {});
     AddTerm(NewGaussianPrior({sigma}), {off});
   }
-  const std::vector<double> none(kCameraSize, 0.0);
-  return AddTerm(
-      NewGridLinePrior(observed.lines[line].fit->line, cost.points()->Middle(none.data()),
-                       options_.noise_model.line_direction_rad > 0.0, axis, found->second,
-                       kPieces * sigma),
-      {blocks[0], blocks[1], blocks[2], blocks[3], off});
+  blocks.push_back(off);
+  return AddTerm(NewGridLinePrior(observed.lines[line].fit->line, cost.points()->Middle(nullptr),
+                                  options_.noise_model.line_direction_rad > 0.0, axis,
+                                  found->second, kPieces * sigma),
+                 std::move(blocks));
 }
 
 void AdjustProblem::AddPencil(int photo, std::size_t index) {

@@ -37,7 +37,7 @@ struct Scale {
 
 // False where the line is not seen on the plane.
 bool OffsetOf(const Observations& photo, const LineObservation& line, const Eigen::Matrix3d& R,
-              int axis, double side, PlaneOffset* out) {
+              int axis, PlaneOffset* out) {
   std::vector<CalibratedPoint> points;
   CalibrateInliers(photo.camera, line.points, line.inliers, &points);
   if (points.empty()) return false;
@@ -45,7 +45,7 @@ bool OffsetOf(const Observations& photo, const LineObservation& line, const Eige
   for (const CalibratedPoint& p : points) middle += p.x.homogeneous();
   const Eigen::Vector3d& l = line.fit->line;
   const Eigen::Vector3d q = middle / middle.z() - l.dot(middle / middle.z()) * l;
-  const Eigen::Vector3d n = side * R.col(2), across = R.col(axis);
+  const Eigen::Vector3d n = -R.col(2), across = R.col(axis);  // Away from the camera.
   const double depth = n.dot(q);
   constexpr double kHorizon = 0.01;
   if (!(depth > kHorizon * q.norm())) return false;
@@ -61,7 +61,7 @@ bool RunsInBoard(const PencilObservation& pencil) {
 }
 
 // Of the lines across an axis of the world: those that run along the other one. Sorted.
-Offsets OffsetsAlong(const Observations& photo, const Eigen::Matrix3d& R, int axis, double side) {
+Offsets OffsetsAlong(const Observations& photo, const Eigen::Matrix3d& R, int axis) {
   constexpr double kAlong = 0.98;  // Cosine.
   Offsets offsets;
   for (std::size_t i = 0; i < photo.pencils.size(); ++i) {
@@ -72,7 +72,7 @@ Offsets OffsetsAlong(const Observations& photo, const Eigen::Matrix3d& R, int ax
     }
     for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
       PlaneOffset made{i, j, 0.0, 0.0};
-      if (pencil.lines[j].fit && OffsetOf(photo, pencil.lines[j], R, axis, side, &made))
+      if (pencil.lines[j].fit && OffsetOf(photo, pencil.lines[j], R, axis, &made))
         offsets.push_back(made);
     }
   }
@@ -220,45 +220,49 @@ bool SquareGrid::HasBothAxes(const Observations& photo) const {
   return std::min(kept[0].size(), kept[1].size()) >= kFewest;
 }
 
+namespace {
+
+// Gives lines their places across an axis, from 0; returns the offset of 0, none without lines.
+std::optional<double> SetPlaces(const Offsets& offsets, double first, double square,
+                                SquareGrid* grid) {
+  std::vector<std::pair<const PlaneOffset*, int>> on_grid;
+  int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();
+  for (const PlaneOffset& o : offsets) {
+    const int place = static_cast<int>(NearestPlace(o, first, square));
+    const double sigma = std::sqrt(o.variance + kLoose * kLoose * square * square);
+    if (std::abs(o.offset - first - place * square) > kInlierSigmas * sigma) continue;
+    on_grid.emplace_back(&o, place);
+    least = std::min(least, place);
+    most = std::max(most, place);
+  }
+  if (on_grid.empty()) return std::nullopt;
+  for (const auto& [o, place] : on_grid) grid->places[{o->pencil, o->line}] = place - least;
+  grid->width = std::max(grid->width, most - least);
+  return first + least * square;
+}
+
+}  // namespace
+
 std::optional<SquareGrid> FindSquareGrid(const Observations& photo,
                                          const Eigen::Matrix3d& rotation) {
   constexpr double kSure = 15.0;  // Of log odds.
-  // Either side of the plane may face the camera.
-  for (const double side : {-1.0, 1.0}) {
-    const std::array<Offsets, 2> offsets = {OffsetsAlong(photo, rotation, 0, side),
-                                            OffsetsAlong(photo, rotation, 1, side)};
-    const std::array<Offsets, 2> merged = {Merged(offsets[0]), Merged(offsets[1])};
-    Found best;
-    for (const int axis : {0, 1}) {
-      const auto a = static_cast<std::size_t>(axis);
-      const Found found = Search(merged[a], merged[1 - a], axis);
-      if (found.log_odds > best.log_odds) best = found;
-    }
-    if (best.log_odds < kSure) continue;
-    SquareGrid grid;
-    Eigen::Vector3d origin = side * rotation.col(2);
-    for (const std::size_t axis : {0U, 1U}) {
-      const double square = best.scale.square, first = best.scale.first[axis];
-      std::vector<std::pair<const PlaneOffset*, int>> on_grid;
-      int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();
-      for (const PlaneOffset& o : offsets[axis]) {
-        const int place = static_cast<int>(NearestPlace(o, first, square));
-        const double sigma = std::sqrt(o.variance + kLoose * kLoose * square * square);
-        if (std::abs(o.offset - first - place * square) > kInlierSigmas * sigma) continue;
-        on_grid.emplace_back(&o, place);
-        least = std::min(least, place);
-        most = std::max(most, place);
-      }
-      if (on_grid.empty()) return std::nullopt;
-      for (const auto& [o, place] : on_grid) grid.places[{o->pencil, o->line}] = place - least;
-      grid.width = std::max(grid.width, most - least);
-      origin += (first + least * square) * rotation.col(static_cast<Eigen::Index>(axis));
-    }
-    if (!grid.HasBothAxes(photo)) return std::nullopt;
-    grid.cam_from_board = {rotation, origin / best.scale.square};
-    return grid;
+  const std::array<Offsets, 2> offsets = {OffsetsAlong(photo, rotation, 0),
+                                          OffsetsAlong(photo, rotation, 1)};
+  const Offsets x = Merged(offsets[0]), y = Merged(offsets[1]);
+  const Found from_x = Search(x, y, 0), from_y = Search(y, x, 1);
+  const Found& best = from_y.log_odds > from_x.log_odds ? from_y : from_x;
+  if (best.log_odds < kSure) return std::nullopt;
+  SquareGrid grid;
+  Eigen::Vector3d origin = -rotation.col(2);
+  for (const std::size_t axis : {0U, 1U}) {
+    const std::optional<double> zero =
+        SetPlaces(offsets[axis], best.scale.first[axis], best.scale.square, &grid);
+    if (!zero) return std::nullopt;
+    origin += *zero * rotation.col(static_cast<Eigen::Index>(axis));
   }
-  return std::nullopt;
+  if (!grid.HasBothAxes(photo)) return std::nullopt;
+  grid.cam_from_board = {rotation, origin / best.scale.square};
+  return grid;
 }
 
 namespace {

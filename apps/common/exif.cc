@@ -20,7 +20,7 @@ constexpr double kShortest = 0.2, kLongest = 60.0;
 
 // What makes a photo smaller sets its size anew in EXIF, and mostly leaves the pixels a millimetre,
 // which are those of the sensor: of a sensor smaller than any, mm, or a photo smaller than cameras
-// that write this take, pixels, they are not the photo's. (Eight such photographs of Debian
+// that write this take, pixels, they are not the photo's. (Seven such photographs of Debian
 // packages have 400 to 1500 pixels, the sensors that follow are 0.7 to 10 mm, truly 5.3 to 36.)
 constexpr double kSmallestSensorMm = 3.2, kSmallestTaken = 1600.0;
 

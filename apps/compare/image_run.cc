@@ -265,14 +265,15 @@ const SolverRun* RunToShow(const ImageRun& run) {
     const PoseHypothesis& first = r.estimate.hypotheses.front();
     return ShowRank(r.solver, r.loss != nullptr, first.probability, first.num_observations);
   };
+  bool joint_refuses = false;
   for (const SolverRun& candidate : run.solvers) {
     if (candidate.estimate.status.ok() && !candidate.estimate.hypotheses.empty()) {
       if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
     } else if (candidate.solver == kJoint) {
-      return nullptr;
+      joint_refuses = true;
     }
   }
-  return best;
+  return best != nullptr && joint_refuses && best->solver != kJoint ? nullptr : best;
 }
 
 }  // namespace circline::apps

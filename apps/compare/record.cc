@@ -210,12 +210,15 @@ const SolverRecord* SolverToShow(const ImageRecord& record) {
     const HypothesisRecord& first = r.hypotheses.front();
     return ShowRank(r.key.solver, r.key.refined(), first.probability, first.num_observations);
   };
+  bool joint_refuses = false;
   for (const SolverRecord& candidate : record.solvers) {
-    if (!candidate.HasAnswer() && candidate.key.solver == kJoint) return nullptr;
-    if (!candidate.HasAnswer()) continue;
-    if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
+    if (candidate.HasAnswer()) {
+      if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
+    } else if (candidate.key.solver == kJoint) {
+      joint_refuses = true;
+    }
   }
-  return best;
+  return best != nullptr && joint_refuses && best->key.solver != kJoint ? nullptr : best;
 }
 
 }  // namespace circline::apps

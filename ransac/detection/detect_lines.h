@@ -45,10 +45,11 @@ struct DetectedLine {
 // where there is none.
 bool FitAverages(const std::vector<CalibratedPoint>& points, DetectedLine* line);
 
-// Longest first. `skip` (optional, one per edge point, 1 = belongs to something else) marks points
-// that are not used. `camera` must be valid. `bent` (optional) receives what is all but straight,
-// up to a sagitta of 1.2 px and of 1.8 % of its length: edges of worn and of soft things, and arcs;
-// longest first, as many as lines at most. About 1 ms for a 640x480 photo.
+// Longest first; without those along the photo's border, of dark rims and of frames. `skip`
+// (optional, one per edge point, 1 = belongs to something else) marks points that are not used.
+// `camera` must be valid. `bent` (optional) receives what is all but straight, up to a sagitta
+// of 1.2 px and of 1.8 % of its length: edges of worn and of soft things, and arcs; longest first,
+// as many as lines at most. About 1 ms for a 640x480 photo.
 Status DetectLines(const EdgeMap& edges, const Camera& camera, const LineOptions& options,
                    std::vector<DetectedLine>* lines,
                    const std::vector<std::uint8_t>* skip = nullptr,

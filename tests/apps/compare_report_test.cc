@@ -48,7 +48,11 @@ TEST(CompareReport, ShowsNoPoseThatTheJointSolverRefuses) {
   EXPECT_EQ(SolverToShow(record)->key.solver, "joint");
   record.solvers[1].hypotheses.clear();
   EXPECT_EQ(SolverToShow(record), nullptr);
-  record.solvers.pop_back();  // It was not asked.
+  record.solvers.push_back(record.solvers[0]);  // With another loss it does not.
+  record.solvers[2].key = {"joint", "refined", "huber"};
+  ASSERT_NE(SolverToShow(record), nullptr);
+  EXPECT_EQ(SolverToShow(record)->key.loss, "huber");
+  record.solvers.resize(1);  // It was not asked.
   ASSERT_NE(SolverToShow(record), nullptr);
   EXPECT_EQ(SolverToShow(record)->key.solver, "line_pairs");
 }

@@ -15,7 +15,7 @@ TEST(NoiseFile, ReplacesWhatItNames) {
   const std::string yaml =
       "contour_px: 0.1\nline_px: 0.2\ncorrelation_px: 30\ncontour_offset_px: 0.3\n"
       "circle_tilt_rad: 0.01\ncircle_height: 0.02\ncircle_shape: 0.015\nline_direction_rad: 0.03\n"
-      "pencil_axis_rad: 0.04\nradius: 0.05\n"
+      "pencil_axis_rad: 0.04\ngrid_line: 0.002\nradius: 0.05\n"
       "camera: { log_focal: 0.06, log_aspect: 0.07, principal_point_px: 2, k1: 0.08 }\n";
   ASSERT_TRUE(ReadNoiseModel(folder.Write("noise.yml", yaml), &model).ok());
   EXPECT_EQ(model.contour_px, 0.1);
@@ -27,6 +27,7 @@ TEST(NoiseFile, ReplacesWhatItNames) {
   EXPECT_EQ(model.circle_shape, 0.015);
   EXPECT_EQ(model.line_direction_rad, 0.03);
   EXPECT_EQ(model.pencil_axis_rad, 0.04);
+  EXPECT_EQ(model.grid_line, 0.002);
   EXPECT_EQ(model.radius, 0.05);
   EXPECT_EQ(model.length, 0.0);  // As it was.
   EXPECT_EQ(model.camera.log_focal, 0.06);

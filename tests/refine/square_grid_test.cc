@@ -37,8 +37,8 @@ Photos BoardPhotos(int count, std::uint64_t seed, const Board& board = {}) {
 }
 
 std::optional<SquareGrid> GridOf(const Photos& sheet, std::size_t photo) {
-  Observations seen = sheet.photos[photo];
-  return FindSquareGrid(Prepare(seen, sheet.truth(), PoseOptions(PointNoiseOnly())),
+  const EstimationOptions options = PoseOptions(PointNoiseOnly());
+  return FindSquareGrid(Prepare(sheet.photos[photo], sheet.truth(), options),
                         sheet.poses[photo].rotation);
 }
 
