@@ -54,7 +54,8 @@ double OrthogonalEvidence::LogOdds(const Vector3d& direction) const {
   const double share = std::max(0.5 * near, near - expected) / (all + 1.0);
   double log_odds = (all - near) * std::log(1.0 - share);
   for (const double ratio : ratios) log_odds += std::log(1.0 - share + share * ratio);
-  return log_odds + 0.5 * std::log(2.0 * kPi / information) - std::log(kPi);
+  // No wider than all angles: lines through the axis' own point say nothing of any.
+  return log_odds + std::min(0.0, 0.5 * std::log(2.0 * kPi / information) - std::log(kPi));
 }
 
 std::vector<Vector3d> OrthogonalEvidence::Proposals() const {

@@ -41,6 +41,19 @@ TEST(OrthogonalEvidence, UnrelatedLinesShareNothing) {
   EXPECT_LE(found, 10);
 }
 
+// A line through the image of the axis itself does not move as a direction turns about that: no
+// evidence, however little is known of the line.
+TEST(OrthogonalEvidence, ALineAlongTheAxisSaysNothing) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed);
+    const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
+    const Vector3d axis = R.col(0);
+    const OrthogonalEvidence evidence({{R.col(1), 0.16 * Eigen::Matrix3d::Identity(), 0.0}}, axis);
+    EXPECT_LT(evidence.LogOdds(R.col(1)), 1.0) << seed;
+    EXPECT_LT(evidence.HighestLogOdds(), 1.0) << seed;
+  }
+}
+
 TEST(OrthogonalEvidence, NothingFromNothing) {
   EXPECT_FALSE(OrthogonalEvidence({}, Vector3d::UnitX()).Best());
 }
