@@ -34,9 +34,11 @@ std::vector<DetectedPencil> DetectPencils(const std::vector<DetectedLine>& lines
                                           double diagonal_px = kUsualDiagonalPx);
 
 // The first half of that: without those around the longest, which are looked for at right angles.
+// `known`: directions that other looks at the photo have found; their pencils are among the result.
 std::vector<DetectedPencil> DetectPencilsApart(const std::vector<DetectedLine>& lines,
                                                int max_pencils, std::uint64_t seed,
-                                               double diagonal_px = kUsualDiagonalPx);
+                                               double diagonal_px = kUsualDiagonalPx,
+                                               const std::vector<Eigen::Vector3d>& known = {});
 
 // Fits the pencil again, to all of lines[candidates] that share its direction within up to half a
 // degree (standard deviation, estimated): for lines that are known to be of one thing, whose sides

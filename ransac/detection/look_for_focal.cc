@@ -13,6 +13,7 @@ namespace circline {
 namespace {
 
 using Eigen::Vector2d;
+using Eigen::Vector3d;
 
 // What is seen of a photo through a camera whose focal length is a guess.
 struct Look {
@@ -25,6 +26,17 @@ double LengthOfLines(const PhotoEvidence& evidence) {
   double length = 0.0;
   for (const DetectedLine& line : evidence.lines) length += line.length_px;
   return length;
+}
+
+// A direction as a camera of another focal length has it: `factor` times nearer the axis.
+Vector3d Scaled(const Vector3d& v, double factor) {
+  return Vector3d(factor * v.x(), factor * v.y(), v.z()).normalized();
+}
+
+std::vector<Vector3d> SeenThrough(double focal, const std::vector<Vector3d>& rays) {
+  std::vector<Vector3d> directions;
+  for (const Vector3d& ray : rays) directions.push_back(Scaled(ray, 1.0 / focal));
+  return directions;
 }
 
 // The same focal lengths whatever the guess.
@@ -92,6 +104,7 @@ Status LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& op
   };
   double next = OnSteps(FirstLogFocal(camera, sigma));
   std::vector<Look> looks;
+  std::vector<Vector3d> rays;  // Of all looks' pencils, as a camera of focal length 1 has them.
   const auto is_next = [&next](const Look& look) {
     return std::abs(look.log_focal - next) < 0.5 * kFocalStep;
   };
@@ -104,10 +117,15 @@ Status LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& op
                              : collect(camera, &look.evidence);
     observations->found_k1 = camera.distortion[0] - stated_k1;
     if (!status.ok()) return status;
-    look.likeliest = LikeliestFocal(
-        look.evidence,
-        DetectPencilsApart(look.evidence.lines, options.max_pencils, options.seed, diagonal_px),
-        camera, sigma, StatedLogFocal(*observations), diagonal_px, observations->found_k1);
+    // A pencil that one look finds and another does not would tell their focal lengths apart.
+    const std::vector<DetectedPencil> pencils =
+        DetectPencilsApart(look.evidence.lines, options.max_pencils, options.seed, diagonal_px,
+                           SeenThrough(camera.fx, rays));
+    for (const DetectedPencil& pencil : pencils)
+      rays.push_back(Scaled(pencil.observation.fit->direction, camera.fx));
+    look.likeliest =
+        LikeliestFocal(look.evidence, pencils, camera, sigma, StatedLogFocal(*observations),
+                       diagonal_px, observations->found_k1);
     if (look.likeliest.gain > kClearly) next = OnSteps(next + look.likeliest.log_focal);
   }
   // Where the lens is known, but not the focal length, a wrong one bends lines, which break: so
