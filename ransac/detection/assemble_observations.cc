@@ -206,9 +206,7 @@ class Assembler {
         y.observation.direction = PencilDirection::kY;
         if (plane.circles.empty()) ReadAgain(&x, &y);
         PlacedPencil* z = SetNormalRole(x.direction, y.direction);
-        if (!(options_.camera.log_focal > 0.0)) return;
-        JudgeAxes(options_, x, &y, z);
-        if (z == nullptr) AddNormal(x, y);
+        if (options_.camera.log_focal > 0.0) Judge(x, &y, z);
         return;
       }
     }
@@ -243,12 +241,22 @@ class Assembler {
     return order;
   }
 
-  // Lines along the normal that are too few to have been found by themselves. `x` and `y` may move.
-  void AddNormal(const PlacedPencil& x, const PlacedPencil& y) {
-    auto normal = FindThirdPencil(LineSet(lines_, options_.diagonal_px), x, y, options_.camera);
-    if (!normal) return;
-    normal->observation.direction = PencilDirection::kZ;
-    pencils_.emplace_back(std::move(*normal));
+  // Where there is no z, of lines along the normal that are too few to have been found by
+  // themselves, too. All pencils may move.
+  void Judge(const PlacedPencil& x, PlacedPencil* y, PlacedPencil* z) {
+    if (z != nullptr) {
+      JudgeAxes(options_, x, y, z);
+      return;
+    }
+    auto found = FindThirdPencil(LineSet(lines_, options_.diagonal_px), x, *y, options_.camera);
+    if (!found) {
+      JudgeAxes(options_, x, y, nullptr);
+      return;
+    }
+    PlacedPencil normal(std::move(found->pencil));
+    normal.observation.direction = PencilDirection::kZ;
+    JudgeAxes(options_, x, y, &normal, found->ratio);
+    pencils_.push_back(std::move(normal));
   }
 
   // Null where no pencil can be along the normal.

@@ -36,34 +36,46 @@ double ProbabilityOfOneThing(const PlacedPencil& a, const PlacedPencil& b, doubl
   return odds / (1.0 + odds);
 }
 
+double Gaussian(double off) { return std::exp(-0.5 * off * off); }
+
 double SureOr(double probability) { return probability > kSure ? 1.0 : probability; }
 
 }  // namespace
 
 void JudgeAxes(const AssemblyOptions& options, const PlacedPencil& x, PlacedPencil* y,
-               PlacedPencil* z) {
+               PlacedPencil* z, double z_ratio) {
   const double one = ProbabilityOfOneThing(x, *y, options.diagonal_px);
-  // Summed over the focal lengths: all; those where x and y are square, and where not; of each,
-  // those where z is square to both.
-  double all = 0.0, corner = 0.0, third = 0.0;
+  // Summed over the focal lengths: all; those where x and y are square; of both those where z is
+  // square to x and y, or shares one of the axes.
+  double pairs = 0.0, corners = 0.0, all = 0.0, corner = 0.0, third = 0.0;
+  double of_third = 0.0, looked_at = 0.0;  // Near the focal length at which z was looked for.
   for (double off = -kReach; off <= kReach; off += kFocalStep / options.focal_sigma) {
     const double log_focal = options.prior_log_focal + off * options.focal_sigma;
     const CameraError camera{options.camera.middle_rad * std::exp(-log_focal), 0.0};
     const UncertainDirection a = Refocus(x.direction, log_focal),
                              b = Refocus(y->direction, log_focal);
-    const double weight = std::exp(-0.5 * off * off), is_corner = weight * one * Odds(a, b, camera);
+    const double weight = Gaussian(off), is_corner = weight * one * Odds(a, b, camera),
+                 is_pair = is_corner + weight * (1.0 - one);
     double of_z = 1.0;
     if (z != nullptr) {
       const UncertainDirection c = Refocus(z->direction, log_focal);
       const double to_x = Odds(a, c, camera), to_y = Odds(b, c, camera);
-      // Half of the corners are square; others share one of the axes.
-      const double is_third = 0.5 * to_x * to_y;
+      const double is_third = 0.5 * to_x * to_y;  // Half of the corners are square.
       of_z = is_third + 0.25 * (to_x + to_y);
-      third += is_third * (is_corner + weight * (1.0 - one));
+      third += is_third * is_pair;
+      const double near = Gaussian(log_focal / options.camera.log_focal);
+      of_third += near * is_third;
+      looked_at += near;
     }
+    pairs += is_pair;
+    corners += is_corner;
+    all += is_pair * of_z;
     corner += is_corner * of_z;
-    all += (is_corner + weight * (1.0 - one)) * of_z;
   }
+  // By accident z is where it was looked for, whatever the focal length.
+  const double by_accident = looked_at > 0.0 ? of_third / (looked_at * z_ratio) : 0.0;
+  all += by_accident * pairs;
+  corner += by_accident * corners;
   if (!(all > 0.0)) return;
   y->observation.axis_probability = SureOr(corner / all);
   if (z != nullptr) z->observation.axis_probability = SureOr(third / all);

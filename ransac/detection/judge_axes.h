@@ -7,15 +7,19 @@
 #ifndef CIRCLINE_RANSAC_DETECTION_JUDGE_AXES_H_
 #define CIRCLINE_RANSAC_DETECTION_JUDGE_AXES_H_
 
+#include <limits>
+
 #include "circline/ransac/detection/assemble_observations.h"
 #include "circline/ransac/detection/choose_plane.h"
 
 namespace circline {
 
 // Fills PencilObservation::axis_probability of y, and of z where there is one: null = none. 1 where
-// it is 0.95 or more. `options` are those of a camera whose focal length was looked for.
+// it is 0.95 or more. `options` are those of a camera whose focal length was looked for. `z_ratio`:
+// ThirdPencil::ratio where z was looked for at right angles to both at that focal length; infinity:
+// it was found by itself.
 void JudgeAxes(const AssemblyOptions& options, const PlacedPencil& x, PlacedPencil* y,
-               PlacedPencil* z);
+               PlacedPencil* z, double z_ratio = std::numeric_limits<double>::infinity());
 
 }  // namespace circline
 

@@ -31,10 +31,16 @@ struct SharedDirection {
 // the likelihood is summed over both.
 SharedDirection LinesAlong(const std::vector<LineOdds>& lines, const UncertainDirection& expected);
 
+// What FindThirdPencil finds.
+struct ThirdPencil {
+  DetectedPencil pencil;
+  double ratio = 0.0;  // Of the likelihoods that lines share this direction, and that none do.
+};
+
 // The pencil of those of the lines that are of neither of two others and along the third direction;
 // none where they are too few, or may be along it by accident.
-std::optional<DetectedPencil> FindThirdPencil(const LineSet& set, const PlacedPencil& a,
-                                              const PlacedPencil& b, const CameraError& camera);
+std::optional<ThirdPencil> FindThirdPencil(const LineSet& set, const PlacedPencil& a,
+                                           const PlacedPencil& b, const CameraError& camera);
 
 }  // namespace circline
 

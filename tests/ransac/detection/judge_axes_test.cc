@@ -74,5 +74,24 @@ TEST(JudgeAxes, AThirdDirectionIsConfirmedByTheSecond) {
   EXPECT_EQ(seen_from_above.y.observation.axis_probability, 1.0);
 }
 
+// Lines that were looked for at right angles, at the guess, are there by accident the likelier the
+// less they say; then they do not confirm the second direction either.
+TEST(JudgeAxes, WhatWasLookedForIsDoubtedAsItMayBeThereByAccident) {
+  double last = 1.0, last_y = 1.0;
+  for (const double ratio : {1e6, 100.0, 5.0}) {
+    Axes axes(kTurned, {240.0, 100.0});
+    JudgeAxes(Guessed(), axes.x, &axes.y, &axes.z, ratio);
+    EXPECT_LE(axes.z.observation.axis_probability, last) << ratio;
+    EXPECT_LE(axes.y.observation.axis_probability, last_y) << ratio;
+    last = axes.z.observation.axis_probability;
+    last_y = axes.y.observation.axis_probability;
+    if (ratio > 1e5) {
+      EXPECT_EQ(last, 1.0);
+    }
+  }
+  EXPECT_LT(last, 0.95);
+  EXPECT_GT(last, 0.05);
+}
+
 }  // namespace
 }  // namespace circline
