@@ -19,6 +19,7 @@ LineOdds::LineOdds(const LineFit& fit) : fit_(fit) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(fit.covariance);
   middle_ = fit.line.cross(eigen.eigenvectors().col(2)).normalized();
+  if (middle_.z() < 0.0) middle_ = -middle_;
 }
 
 double LineOdds::Sine(const Eigen::Vector3d& direction) const {

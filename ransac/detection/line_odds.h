@@ -21,6 +21,8 @@ class LineOdds {
   double Variance(const Eigen::Vector3d& direction) const {
     return direction.dot(fit_.covariance * direction);
   }
+  // Where the line was seen: its middle, a unit vector in front of the camera.
+  const Eigen::Vector3d& middle() const { return middle_; }
   // Sine of the angle between where the line was seen and the direction: the largest miss there.
   double Sine(const Eigen::Vector3d& direction) const;
   // Logarithm of the likelihood ratio for a miss with this variance.
@@ -28,7 +30,7 @@ class LineOdds {
 
  private:
   LineFit fit_;
-  Eigen::Vector3d middle_;  // Of the line, unit.
+  Eigen::Vector3d middle_;
 };
 
 }  // namespace circline

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <numeric>
 #include <set>
+#include <utility>
 
 #include "circline/estimators/basics.h"
 #include "tests/ransac/detection/detected_line_scene.h"
@@ -90,6 +93,46 @@ TEST(LocalPencils, LeaveDirectionsOfTheWholePhotoAlone) {
   EXPECT_FALSE(RefitWhereTheyMeet(scene.lines, &scene.pair));
   EXPECT_EQ(scene.pair[0].members, before);
   EXPECT_FALSE(RefitWhereTheyMeet({}, &scene.pair));
+}
+
+// A dozen lines along each of two directions, which meet. They span a plane whose horizon is the
+// photo's middle row; `rows`: how far the lines are below it, pixels, or above where `is_both`.
+std::vector<PlacedPencil> AlongALevelPlane(const std::array<double, 2>& rows, bool is_both,
+                                           std::vector<DetectedLine>* lines) {
+  const Camera camera = detection_test::TestCamera();
+  const std::array<Vector3d, 2> directions = {Vector3d(1.0, 0.0, 0.4).normalized(),
+                                              Vector3d(-1.0, 0.0, 0.8).normalized()};
+  Random random(5);
+  for (const Vector3d& direction : directions) {
+    for (int k = 0; k < 12; ++k) {
+      const double u = random.Uniform(60.0, 420.0), below = random.Uniform(rows[0], rows[1]);
+      const double side = is_both && k % 2 == 0 ? -1.0 : 1.0;
+      lines->push_back(
+          MakeLine(camera, u, camera.cy + side * below, direction, 60.0, 0.0, 0.1, &random));
+    }
+  }
+  std::vector<PlacedPencil> pencils;
+  std::vector<int> all(lines->size());
+  std::iota(all.begin(), all.end(), 0);
+  for (const Vector3d& direction : directions) {
+    DetectedPencil pencil = Found(*lines, direction);
+    EXPECT_TRUE(RefitPencil(*lines, all, &pencil));
+    pencils.emplace_back(std::move(pencil));
+  }
+  return pencils;
+}
+
+// What runs on both sides of the horizon of a plane is of two that face each other, floor and
+// ceiling, or of none where all of it is next to the horizon.
+TEST(ChoosePlane, NoPlaneIsSeenFromBothSides) {
+  const auto is_plane = [](const std::array<double, 2>& rows, bool is_both) {
+    std::vector<DetectedLine> lines;
+    auto pencils = AlongALevelPlane(rows, is_both, &lines);
+    return ChoosePlane(AssemblyOptions(), lines, {}, Plane(), &pencils).pencils[0] >= 0;
+  };
+  EXPECT_TRUE(is_plane({10.0, 70.0}, false));
+  EXPECT_TRUE(is_plane({90.0, 150.0}, true));
+  EXPECT_FALSE(is_plane({10.0, 70.0}, true));
 }
 
 }  // namespace
