@@ -29,7 +29,14 @@ PoseHypothesis Turned(const PoseHypothesis& hypothesis, const Eigen::Matrix3d& t
   return turned;
 }
 
-void ShareAmong(const PencilObservation& pencil, std::vector<PoseHypothesis>* hypotheses) {
+// A direction that was seen through one camera as another has it; but for distortion.
+Eigen::Vector3d SeenThrough(const Camera& other, const Camera& camera, const Eigen::Vector3d& v) {
+  return {(camera.fx * v.x() + (camera.cx - other.cx) * v.z()) / other.fx,
+          (camera.fy * v.y() + (camera.cy - other.cy) * v.z()) / other.fy, v.z()};
+}
+
+void ShareAmong(const PencilObservation& pencil, const Camera& camera,
+                std::vector<PoseHypothesis>* hypotheses) {
   const int role = static_cast<int>(pencil.direction);
   const std::size_t count = hypotheses->size();
   for (std::size_t i = 0; i < count; ++i) {
@@ -37,9 +44,11 @@ void ShareAmong(const PencilObservation& pencil, std::vector<PoseHypothesis>* hy
     const Eigen::Vector3d own = h.cam_from_world.rotation.col(role),
                           about = h.cam_from_world.rotation.col(1 - role);
     const Eigen::Vector3d aside = about.cross(own);
+    const Camera own_camera = CameraOf(h, camera);
     std::array<Side, 2> sides;
     for (const DirectionReading& reading : pencil.readings) {
-      const double turn = std::atan(reading.direction.dot(aside) / reading.direction.dot(own));
+      const Eigen::Vector3d read = SeenThrough(own_camera, camera, reading.direction);
+      const double turn = std::atan(read.dot(aside) / read.dot(own));
       Side& side = sides[turn > 0.0 ? 1 : 0];
       if (!(std::abs(turn) > kOnePose)) continue;
       side.share += reading.probability;
@@ -63,7 +72,8 @@ void ShareByReadings(const Observations& observations, std::vector<PoseHypothesi
   for (const PencilObservation& pencil : observations.pencils) {
     const bool is_in_plane =
         pencil.direction == PencilDirection::kX || pencil.direction == PencilDirection::kY;
-    if (is_in_plane && !pencil.readings.empty()) ShareAmong(pencil, hypotheses);
+    if (is_in_plane && !pencil.readings.empty())
+      ShareAmong(pencil, observations.camera, hypotheses);
   }
   RankHypotheses(hypotheses);
 }

@@ -52,5 +52,27 @@ TEST(DirectionReadings, WhatIsNearIsTheSamePose) {
   EXPECT_EQ(after.hypotheses[0].probability, before.hypotheses[0].probability);
 }
 
+// Readings are directions through the camera as it was guessed, poses through the one that was
+// found.
+TEST(DirectionReadings, AreSeenThroughTheCameraThatWasFound) {
+  PlaneScene scene(0.7, 0.1);
+  scene.camera.distortion = {};
+  Observations observations = TwoPencils(&scene);
+  observations.pencils.push_back(scene.Pencil("L2", PencilDirection::kZ, Vector3d::UnitZ()));
+  constexpr double kGuess = 1.3;
+  observations.camera.fx *= kGuess;
+  observations.camera.fy *= kGuess;
+  const Vector3d y = TurnedY(scene, 0.0);
+  observations.pencils[1].readings = {{Vector3d(y.x(), y.y(), kGuess * y.z()).normalized(), 1.0}};
+  EstimationOptions options;
+  options.camera_sigma = CameraSigma();
+  options.camera_sigma->log_focal = 0.5;
+  const PoseEstimate estimate = EstimatePose(observations, options);
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  EXPECT_NEAR(estimate.hypotheses[0].focal_scale, 1.0 / kGuess, 0.1);
+  EXPECT_EQ(estimate.hypotheses.size(), 1U);
+  EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 2.0 * kDegree);
+}
+
 }  // namespace
 }  // namespace circline
