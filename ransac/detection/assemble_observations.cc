@@ -10,6 +10,7 @@
 #include "circline/ransac/detection/choose_plane.h"
 #include "circline/ransac/detection/circle_grid.h"
 #include "circline/ransac/detection/find_box.h"
+#include "circline/ransac/detection/find_rectangle.h"
 #include "circline/ransac/detection/judge_axes.h"
 #include "circline/ransac/detection/orthogonal_evidence.h"
 #include "circline/ransac/detection/pencil_fitter.h"
@@ -47,8 +48,11 @@ class Assembler {
     // A box that stands on the plane where circles are all that this has, or one that has better
     // evidence than two pencils: its edges become the axes.
     const bool has_box = AddBoxOnCircles(&plane) || AddFreeBox(&plane);
+    const bool has_rectangle = !has_box && AddRectangle(&plane);
     SetPlane(plane);
-    if (!has_box) SetRoles(plane);
+    if (!has_box && !has_rectangle) SetRoles(plane);
+    if (has_rectangle && options_.camera.log_focal > 0.0)
+      Judge(At(plane.pencils[0]), &At(plane.pencils[1]), nullptr);
     Emit(plane, observations);
   }
 
@@ -110,6 +114,29 @@ class Assembler {
     const int first = static_cast<int>(pencils_.size());
     plane->pencils = {first, first + 1};
     PlaceBox(&*box);
+    return true;
+  }
+
+  // Where there is no plane, or that of one circle, which leaves two, and can lie in the third: the
+  // sides of a rectangle.
+  bool AddRectangle(Plane* plane) {
+    if (plane->pencils[0] >= 0 || plane->circles.size() > 1) return false;
+    auto found = FindRectangle(options_, AllLines());
+    if (!found) return false;
+    PlacedPencil x(std::move((*found)[0])), y(std::move((*found)[1]));
+    UncertainDirection normal;
+    if (!SpannedNormal(x.direction, y.direction, &normal)) return false;
+    for (const int i : plane->circles) {
+      if (!CanLieIn(*circles_[static_cast<std::size_t>(i)].observation.fit, normal)) return false;
+    }
+    plane->normal = normal;
+    plane->support_px = x.support_px + y.support_px;
+    const int first = static_cast<int>(pencils_.size());
+    plane->pencils = {first, first + 1};
+    x.observation.direction = PencilDirection::kX;
+    y.observation.direction = PencilDirection::kY;
+    pencils_.push_back(std::move(x));
+    pencils_.push_back(std::move(y));
     return true;
   }
 

@@ -37,7 +37,8 @@ struct AssemblyOptions {
 // all that lie where the two meet. Where circles are all that a plane has, a box that stands on it
 // (of `lines` and `bent` ones) gives it x and y, and tells which of a lone circle's two normals it
 // has. A box with an axis along a pencil is taken where there is no plane, and instead of two
-// pencils one of which is along none of its axes and has less evidence than they.
+// pencils one of which is along none of its axes and has less evidence than they. Where there is no
+// plane, or that of one circle which can lie in it, the sides of a rectangle are x and y.
 void AssembleObservations(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
                           const std::vector<DetectedLine>& bent,
                           std::vector<CircleEvidence>* circles,

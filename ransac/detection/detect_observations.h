@@ -16,7 +16,9 @@
 // Rows and columns of a sheet of equal circles are pencils too: of lines through the images of
 // their centres. A box that stands on the plane of circles, found by its corners, gives that plane
 // its axes x and y (one line may be all that there is along each), and tells which of the two
-// normals of a lone circle is right. What cannot be a pose is said in `message`.
+// normals of a lone circle is right. Where there is no plane else, or one circle's, it is
+// that of the largest rectangle which four lines close, a sheet of paper or a screen, if the circle
+// can lie in it: each pencil has two of its sides. What cannot be a pose is said in `message`.
 #ifndef CIRCLINE_RANSAC_DETECTION_DETECT_OBSERVATIONS_H_
 #define CIRCLINE_RANSAC_DETECTION_DETECT_OBSERVATIONS_H_
 

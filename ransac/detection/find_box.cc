@@ -43,9 +43,7 @@ constexpr double kPencilSigmaRad = 0.01;
 // Axes nearer than this, each to each, are those of one box: a cosine, 3 degrees.
 constexpr double kSameBox = 0.9986;
 
-LineOdds WornLine(const DetectedLine& line) {
-  return LineOdds(WithDirectionError(WithSharedError(line, kWornPx), kModelSigmaRad));
-}
+LineOdds WornLine(const DetectedLine& line) { return LineOdds(WornEdge(line)); }
 
 // Of an edge along an axis that is off by a Gaussian error of that variance.
 double LogOddsAlong(const LineOdds& line, const Vector3d& axis, double off_variance) {
@@ -272,6 +270,10 @@ void PutLongestFirst(int count, FoundBox* box) {
 }
 
 }  // namespace
+
+LineFit WornEdge(const DetectedLine& line) {
+  return WithDirectionError(WithSharedError(line, kWornPx), kModelSigmaRad);
+}
 
 double LogOddsOfDirection(const std::vector<DetectedLine>& lines, const std::vector<int>& members,
                           const Vector3d& direction) {

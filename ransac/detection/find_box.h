@@ -43,6 +43,10 @@ std::optional<FoundBox> FindFreeBox(const std::vector<DetectedLine>& lines,
                                     const std::vector<Eigen::Vector3d>& axes,
                                     double diagonal_px = kUsualDiagonalPx);
 
+// The line's fit as that of an edge that may be worn, and bulge: with what all of its points share,
+// and what lens and calibration leave.
+LineFit WornEdge(const DetectedLine& line);
+
 // Logarithm of how much likelier lines[members] are along the direction than along any, with the
 // errors and the prior odds of a box's edges.
 double LogOddsOfDirection(const std::vector<DetectedLine>& lines, const std::vector<int>& members,

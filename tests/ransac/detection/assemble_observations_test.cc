@@ -279,6 +279,37 @@ TEST(AssembleObservations, ABoxThatContradictsAWeakPencilIsTaken) {
   for (const PencilObservation& pencil : found.pencils) EXPECT_EQ(pencil.lines.size(), 3U);
 }
 
+// A sheet of paper gives a disc on it its axes; a disc that is turned otherwise stands for itself.
+TEST(AssembleObservations, ARectangleGivesACircleOnItItsAxes) {
+  const Camera camera = detection_test::TestCamera();
+  const Matrix3d axes = ExpRotation(Vector3d(2.4, 0.2, 0.3));
+  const Vector3d origin(0.0, 0.0, 10.0);
+  Random random(1);
+  std::vector<Eigen::Vector2d> corners(4);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double x = k == 1 || k == 2 ? 2.4 : -2.4, y = k >= 2 ? 1.6 : -1.6;
+    ASSERT_TRUE(CameraToPixel(camera, origin + x * axes.col(0) + y * axes.col(1), &corners[k]));
+  }
+  std::vector<DetectedLine> lines;
+  for (std::size_t k = 0; k < 4; ++k)
+    lines.push_back(
+        detection_test::LineThrough(camera, corners[k], corners[(k + 1) % 4], 0.15, &random));
+  for (const bool is_on_sheet : {true, false}) {
+    const Vector3d normal = is_on_sheet ? axes.col(2) : Vector3d(0.8, -0.1, -1.0);
+    std::vector<CircleEvidence> circles = {Circle(normal, 300.0, origin)};
+    std::vector<DetectedPencil> pencils;
+    Observations found;
+    AssembleObservations(AssemblyOptions(), lines, {}, &circles, &pencils, &found);
+    ASSERT_EQ(found.circles.size(), 1U);
+    EXPECT_EQ(found.circles[0].plane, "p0");
+    ASSERT_EQ(found.pencils.size(), is_on_sheet ? 2U : 0U);
+    for (const PencilObservation& pencil : found.pencils) {
+      EXPECT_EQ(pencil.plane, "p0");
+      EXPECT_EQ(pencil.lines.size(), 2U);
+    }
+  }
+}
+
 // Of directions in their plane only those of lines among them: others are so by accident.
 TEST(AssembleObservations, LinesFarFromAPlanesCirclesAreNotInIt) {
   for (const bool is_far : {false, true}) {
