@@ -20,7 +20,7 @@ constexpr double kFoundFocalSigma = 0.1;
 std::string Describe(const Observations& observations) {
   const std::size_t circles = observations.circles.size(), pencils = observations.pencils.size();
   if (circles == 0 && pencils == 0) {
-    return "nothing found: neither an ellipse nor three lines that could be parallel";
+    return "nothing found: no ellipse, no parallel lines, no rectangle";
   }
   if (circles == 0 && pencils == 1) {
     return "one pencil of parallel lines only, and no circle: that is a direction, not a pose";
