@@ -50,9 +50,11 @@ class Assembler {
     const bool has_box = AddBoxOnCircles(&plane) || AddFreeBox(&plane);
     const bool has_rectangle = !has_box && AddRectangle(&plane);
     SetPlane(plane);
-    if (!has_box && !has_rectangle) SetRoles(plane);
-    if (has_rectangle && options_.camera.log_focal > 0.0)
+    if (has_rectangle) {
       Judge(At(plane.pencils[0]), &At(plane.pencils[1]), nullptr);
+    } else if (!has_box) {
+      SetRoles(plane);
+    }
     Emit(plane, observations);
   }
 
@@ -232,8 +234,7 @@ class Assembler {
         x.observation.direction = PencilDirection::kX;
         y.observation.direction = PencilDirection::kY;
         if (plane.circles.empty()) ReadAgain(&x, &y);
-        PlacedPencil* z = SetNormalRole(x.direction, y.direction);
-        if (options_.camera.log_focal > 0.0) Judge(x, &y, z);
+        Judge(x, &y, SetNormalRole(x.direction, y.direction));
         return;
       }
     }
@@ -268,16 +269,15 @@ class Assembler {
     return order;
   }
 
-  // Where there is no z, of lines along the normal that are too few to have been found by
-  // themselves, too. All pencils may move.
+  // The axes of a camera that is a guess. Where there is no z, of lines along the normal that are
+  // too few to have been found by themselves, too. All pencils may move.
   void Judge(const PlacedPencil& x, PlacedPencil* y, PlacedPencil* z) {
-    if (z != nullptr) {
-      JudgeAxes(options_, x, y, z);
-      return;
-    }
-    auto found = FindThirdPencil(LineSet(lines_, options_.diagonal_px), x, *y, options_.camera);
+    if (!(options_.camera.log_focal > 0.0)) return;
+    std::optional<ThirdPencil> found;
+    if (z == nullptr)
+      found = FindThirdPencil(LineSet(lines_, options_.diagonal_px), x, *y, options_.camera);
     if (!found) {
-      JudgeAxes(options_, x, y, nullptr);
+      JudgeAxes(options_, x, y, z);
       return;
     }
     PlacedPencil normal(std::move(found->pencil));

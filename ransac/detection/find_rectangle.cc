@@ -20,10 +20,9 @@ using Eigen::Vector2d;
 constexpr double kMinSide = 40.0 / kUsualDiagonalPx;
 // A side is seen over this share of its length.
 constexpr double kMinSeen = 0.7;
-// Lines stop short of a corner by so much on the average, and those of other things by anything up
-// to what still is one (FormCorner): shares of the diagonal.
+// Lines stop short of a corner by so much on the average, a share of the diagonal; those of other
+// things by anything up to kMaxCornerGap.
 constexpr double kMeanGap = 3.0 / kUsualDiagonalPx;
-constexpr double kAccidentalGap = 21.0 / kUsualDiagonalPx;
 // Least logarithm of the odds that the eight ends of the sides are so near to their corners, beyond
 // that of the number of four lines that form corners in a ring. 300 drawings of 20 to 119 lines
 // that lie any way have no rectangle, and 80 photographs of nature (Debian's packages); of sheets
@@ -105,11 +104,6 @@ class RectangleSearch {
     return rings;
   }
 
-  static Vector2d Crossing(const Segment& s, const Segment& t) {
-    const Vector2d d = s[1] - s[0], e = t[1] - t[0];
-    return s[0] + d * (Cross(t[0] - s[0], e) / Cross(d, e));
-  }
-
   // False where the corners are no convex quadrilateral with sides that are seen.
   bool Judge(Ring* ring) const {
     std::array<Vector2d, 4> at;  // Where each side ends, and the next one begins.
@@ -127,7 +121,7 @@ class RectangleSearch {
       ring->perimeter += length;
       for (const Vector2d& corner : {from, to}) {
         const double gap = std::min((side.ends[0] - corner).norm(), (side.ends[1] - corner).norm());
-        ring->log_odds += std::log(kAccidentalGap / kMeanGap) - gap / unit;
+        ring->log_odds += std::log(kMaxCornerGap / kMeanGap) - gap / unit;
       }
     }
     return true;

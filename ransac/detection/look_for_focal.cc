@@ -8,6 +8,7 @@
 #include "circline/ransac/detection/detect_pencils.h"
 #include "circline/ransac/detection/straight_lens.h"
 #include "circline/ransac/detection/structure_focal.h"
+#include "circline/ransac/detection/uncertain_direction.h"
 
 namespace circline {
 namespace {
@@ -28,15 +29,8 @@ double LengthOfLines(const PhotoEvidence& evidence) {
   return length;
 }
 
-// A direction as a camera of another focal length has it: `factor` times nearer the axis.
-Vector3d Scaled(const Vector3d& v, double factor) {
-  return Vector3d(factor * v.x(), factor * v.y(), v.z()).normalized();
-}
-
-std::vector<Vector3d> SeenThrough(double focal, const std::vector<Vector3d>& rays) {
-  std::vector<Vector3d> directions;
-  for (const Vector3d& ray : rays) directions.push_back(Scaled(ray, 1.0 / focal));
-  return directions;
+Vector3d SeenThrough(double log_focal, const Vector3d& direction) {
+  return Refocus({direction, Eigen::Matrix3d::Zero()}, log_focal).vector;
 }
 
 // The same focal lengths whatever the guess.
@@ -118,11 +112,12 @@ Status LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& op
     observations->found_k1 = camera.distortion[0] - stated_k1;
     if (!status.ok()) return status;
     // A pencil that one look finds and another does not would tell their focal lengths apart.
-    const std::vector<DetectedPencil> pencils =
-        DetectPencilsApart(look.evidence.lines, options.max_pencils, options.seed, diagonal_px,
-                           SeenThrough(camera.fx, rays));
+    std::vector<Vector3d> known;
+    for (const Vector3d& ray : rays) known.push_back(SeenThrough(std::log(camera.fx), ray));
+    const std::vector<DetectedPencil> pencils = DetectPencilsApart(
+        look.evidence.lines, options.max_pencils, options.seed, diagonal_px, known);
     for (const DetectedPencil& pencil : pencils)
-      rays.push_back(Scaled(pencil.observation.fit->direction, camera.fx));
+      rays.push_back(SeenThrough(-std::log(camera.fx), pencil.observation.fit->direction));
     look.likeliest =
         LikeliestFocal(look.evidence, pencils, camera, sigma, StatedLogFocal(*observations),
                        diagonal_px, observations->found_k1);

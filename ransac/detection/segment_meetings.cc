@@ -18,7 +18,6 @@ constexpr double kNearShareOfPhoto = 25.0 / kUsualDiagonalPx;
 // Of FormCorner.
 constexpr double kCornerShare = 0.45;
 constexpr double kMinCornerGap = 9.0 / kUsualDiagonalPx;  // Shares of the diagonal.
-constexpr double kMaxCornerGap = 21.0 / kUsualDiagonalPx;
 constexpr double kMinCornerSine = 0.17;
 constexpr double kFullMeetings = 3.0;
 constexpr std::size_t kCoreMeetings = 2;
@@ -143,13 +142,18 @@ bool AreNear(const Segment& s, const Segment& t, double diagonal_px) {
   return AreWithin(kNearShareOfPhoto * diagonal_px, s, t);
 }
 
+Vector2d Crossing(const Segment& s, const Segment& t) {
+  const Vector2d d = s[1] - s[0], e = t[1] - t[0];
+  return s[0] + d * (Cross(t[0] - s[0], e) / Cross(d, e));
+}
+
 bool FormCorner(const Segment& s, const Segment& t, double diagonal_px) {
   const double least = kMinCornerGap * diagonal_px, most = kMaxCornerGap * diagonal_px;
   if (FarApart(s, t, 2.0 * most)) return false;
   const Vector2d d = s[1] - s[0], e = t[1] - t[0];
-  const double sine_scaled = Cross(d, e), d_length = d.norm(), e_length = e.norm();
-  if (std::abs(sine_scaled) <= kMinCornerSine * d_length * e_length) return false;
-  const Vector2d crossing = s[0] + d * (Cross(t[0] - s[0], e) / sine_scaled);
+  const double d_length = d.norm(), e_length = e.norm();
+  if (std::abs(Cross(d, e)) <= kMinCornerSine * d_length * e_length) return false;
+  const Vector2d crossing = Crossing(s, t);
   const auto ends_there = [&](const Segment& segment, double length) {
     const double gap = std::min((crossing - segment[0]).norm(), (crossing - segment[1]).norm());
     return gap <= std::clamp(kCornerShare * length, least, most);

@@ -24,6 +24,11 @@ constexpr double kUsualDiagonalPx = 800.0;
 // Whether they cross or come within 25 pixels.
 bool AreNear(const Segment& s, const Segment& t, double diagonal_px = kUsualDiagonalPx);
 
+// Where the lines of two segments that are not parallel cross, pixels.
+Eigen::Vector2d Crossing(const Segment& s, const Segment& t);
+
+constexpr double kMaxCornerGap = 21.0 / kUsualDiagonalPx;  // Share of the diagonal.
+
 // Whether both end where their lines cross: within 45 % of their lengths, but of 9 to 21 pixels
 // (corners are rounded, and lines stop short of them). Not for lines within ten degrees.
 bool FormCorner(const Segment& s, const Segment& t, double diagonal_px = kUsualDiagonalPx);
