@@ -80,12 +80,30 @@ void Fill(const std::vector<Vector2d>& polygon, double grey, cv::Mat* image) {
   cv::fillConvexPoly(*image, points, cv::Scalar::all(grey), cv::LINE_AA, kShift);
 }
 
+// Each pixel of the supersampled rendering by its share inside, that of a straight edge at the
+// ellipse's distance (fillConvexPoly fills what its outline touches: 0.15 px of the photo too wide).
 void FillRim(const Ellipse& rim, double grey, cv::Mat* image) {
-  constexpr int kCorners = 720;  // Under 0.001 px from the curve at 100 px.
-  std::vector<Vector2d> polygon;
-  polygon.reserve(kCorners);
-  for (int k = 0; k < kCorners; ++k) polygon.push_back(EllipsePoint(rim, 2.0 * kPi * k / kCorners));
-  Fill(polygon, grey, image);
+  const Vector2d half(rim.a + 1.0, rim.a + 1.0);
+  const auto pixel = [](double x) { return static_cast<int>(kSupersampling * (x + 0.5)); };
+  const Vector2d low = rim.center - half, high = rim.center + half;
+  const cv::Rect box = cv::Rect(cv::Point(pixel(low.x()), pixel(low.y())),
+                                cv::Point(pixel(high.x()), pixel(high.y()))) &
+                       cv::Rect({}, image->size());
+  const double cosine = std::cos(rim.angle), sine = std::sin(rim.angle);
+  for (int y = box.y; y < box.y + box.height; ++y) {
+    auto* row = image->ptr<std::uint8_t>(y);
+    for (int x = box.x; x < box.x + box.width; ++x) {
+      const Vector2d p = (Vector2d(x, y).array() + 0.5) / kSupersampling - 0.5;
+      const Vector2d d = p - rim.center;
+      const Vector2d unit((cosine * d.x() + sine * d.y()) / rim.a,
+                          (cosine * d.y() - sine * d.x()) / rim.b);
+      // Sampson's distance, negative inside.
+      const double slope = 2.0 * std::hypot(unit.x() / rim.a, unit.y() / rim.b);
+      const double distance = (unit.squaredNorm() - 1.0) / std::max(slope, 1e-12);
+      const double share = std::clamp(0.5 - kSupersampling * distance, 0.0, 1.0);
+      row[x] = cv::saturate_cast<std::uint8_t>(share * grey + (1.0 - share) * row[x]);
+    }
+  }
 }
 
 // Hides a piece of 10 to 40 % of the contour and the segment inside of it, and sticks out a little:
