@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "apps/benchmark/timing.h"
 #include "circline/estimators/basics.h"
@@ -12,6 +13,37 @@ namespace circline::apps {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+
+namespace {
+
+double Cross(const cv::Point2f& a, const cv::Point2f& b) {
+  return static_cast<double>(a.x) * static_cast<double>(b.y) -
+         static_cast<double>(a.y) * static_cast<double>(b.x);
+}
+
+// Of two convex polygons of the same sense: the first is cut along the sides of the second
+// (Sutherland and Hodgman, Reentrant polygon clipping, CACM 1974). cv::intersectConvexConvex of
+// OpenCV 4.6 finds nothing in common of some that nearly coincide.
+double CommonArea(PolygonPoints polygon, const PolygonPoints& other) {
+  const double sense = cv::contourArea(other, true) < 0.0 ? -1.0 : 1.0;
+  for (std::size_t k = 0; k < other.size(); ++k) {
+    const cv::Point2f from = other[k], along = other[(k + 1) % other.size()] - from;
+    PolygonPoints cut;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const cv::Point2f p = polygon[i], q = polygon[(i + 1) % polygon.size()];
+      const double inside_p = sense * Cross(along, p - from);
+      const double inside_q = sense * Cross(along, q - from);
+      if (inside_p >= 0.0) cut.push_back(p);
+      if (inside_p * inside_q < 0.0)
+        cut.push_back(p + static_cast<float>(inside_p / (inside_p - inside_q)) * (q - p));
+    }
+    polygon = std::move(cut);
+    if (polygon.empty()) return 0.0;
+  }
+  return cv::contourArea(polygon);
+}
+
+}  // namespace
 
 FoundEllipses FindEllipses(const cv::Mat& image, const Camera& camera) {
   FoundEllipses found;
@@ -50,9 +82,9 @@ PolygonPoints ContourPolygon(const Camera& camera, const Matrix3d& conic) {
 
 double IntersectionOverUnion(const PolygonPoints& a, const PolygonPoints& b) {
   if (a.empty() || b.empty()) return 0.0;
-  PolygonPoints common;
-  const double both = static_cast<double>(cv::intersectConvexConvex(a, b, common));
-  return both / (cv::contourArea(a) + cv::contourArea(b) - both);
+  const double area_a = cv::contourArea(a), area_b = cv::contourArea(b);
+  const double both = CommonArea(a, b);
+  return both / (area_a + area_b - both);
 }
 
 std::vector<int> Match(const std::vector<PolygonPoints>& truth,

@@ -81,7 +81,7 @@ void Fill(const std::vector<Vector2d>& polygon, double grey, cv::Mat* image) {
 }
 
 // Each pixel of the supersampled rendering by its share inside, that of a straight edge at the
-// ellipse's distance (fillConvexPoly fills what its outline touches: 0.15 px of the photo too wide).
+// ellipse's distance. (fillConvexPoly fills what its outline touches: 0.15 px of the photo more.)
 void FillRim(const Ellipse& rim, double grey, cv::Mat* image) {
   const Vector2d half(rim.a + 1.0, rim.a + 1.0);
   const auto pixel = [](double x) { return static_cast<int>(kSupersampling * (x + 0.5)); };
