@@ -89,17 +89,29 @@ struct Sides {
   }
 };
 
-// Whether one circle is about the middle of another, but not concentric with it: such are edges of
-// one solid (the rims of a cup, a saucer, a collar, a wheel), at different heights, rounded. None
-// is an exact circle: a plane that they share would choose one of two poses by how they err.
-bool AreOfOneSolid(const CircleObservation& a, const CircleObservation& b) {
+// Of each circle the others about whose middle it is, or that are about its own, but that are not
+// concentric with it: such are edges of one solid (the rims of a cup, a saucer, a collar, a wheel),
+// at different heights, rounded. None is an exact circle: a plane that they share would choose one
+// of two poses by how they err.
+std::vector<std::vector<int>> OfOneSolid(const std::vector<CircleEvidence>& circles) {
   // Centres apart by this share of the larger one's semi-minor axis. What lies on a disc by chance
   // is within it once in ten times.
   constexpr double kSameMiddle = 0.3;
-  if (!a.concentric.empty() && a.concentric == b.concentric) return false;
-  Ellipse first, second;
-  return ConicToEllipse(a.fit->conic, &first) && ConicToEllipse(b.fit->conic, &second) &&
-         (first.center - second.center).norm() < kSameMiddle * std::max(first.b, second.b);
+  std::vector<std::vector<int>> others(circles.size());
+  std::vector<Ellipse> ellipses(circles.size());
+  for (std::size_t i = 0; i < circles.size(); ++i) {
+    const CircleObservation& a = circles[i].observation;
+    ConicToEllipse(a.fit->conic, &ellipses[i]);  // Fits of contours are ellipses.
+    for (std::size_t j = 0; j < i; ++j) {
+      const CircleObservation& b = circles[j].observation;
+      if (!a.concentric.empty() && a.concentric == b.concentric) continue;
+      const double apart = (ellipses[i].center - ellipses[j].center).norm();
+      if (!(apart < kSameMiddle * std::max(ellipses[i].b, ellipses[j].b))) continue;
+      others[i].push_back(static_cast<int>(j));
+      others[j].push_back(static_cast<int>(i));
+    }
+  }
+  return others;
 }
 
 // The lines of the region in which lines of about the directions of two pencils form corners.
@@ -133,7 +145,7 @@ class PlaneChooser {
   // All must outlive it.
   PlaneChooser(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
                const std::vector<CircleEvidence>& circles)
-      : options_(options), lines_(lines), circles_(circles) {}
+      : options_(options), lines_(lines), circles_(circles), of_one_solid_(OfOneSolid(circles)) {}
 
   Plane OfCircles() const {
     Plane best;
@@ -162,10 +174,8 @@ class PlaneChooser {
  private:
   // The best supported rim of a solid speaks for all.
   bool IsOfSolidIn(const Plane& plane, std::size_t i) const {
-    return std::any_of(plane.circles.begin(), plane.circles.end(), [&](int other) {
-      return AreOfOneSolid(circles_[i].observation,
-                           circles_[static_cast<std::size_t>(other)].observation);
-    });
+    return std::find_first_of(plane.circles.begin(), plane.circles.end(), of_one_solid_[i].begin(),
+                              of_one_solid_[i].end()) != plane.circles.end();
   }
 
   void AddCircles(Plane* plane) const {
@@ -274,6 +284,7 @@ class PlaneChooser {
   const AssemblyOptions& options_;
   const std::vector<DetectedLine>& lines_;
   const std::vector<CircleEvidence>& circles_;
+  const std::vector<std::vector<int>> of_one_solid_;  // Of circles_.
 };
 
 }  // namespace
