@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "circline/estimators/basics.h"
 
@@ -20,7 +21,7 @@ constexpr double kCornerShare = 0.45;
 constexpr double kMinCornerGap = 9.0 / kUsualDiagonalPx;  // Shares of the diagonal.
 constexpr double kMinCornerSine = 0.17;
 constexpr double kFullMeetings = 3.0;
-constexpr std::size_t kCoreMeetings = 2;
+constexpr int kCoreMeetings = 2;
 
 double PointSegmentDistance(const Vector2d& p, const Segment& s) {
   const Vector2d d = s[1] - s[0];
@@ -43,84 +44,17 @@ bool AreWithin(double px, const Segment& s, const Segment& t) {
 
 double Length(const Segment& s) { return (s[1] - s[0]).norm(); }
 
-// Segments of two lists, and which of one meet which of the other. Nodes: first all of `a`, then
-// all of `b`.
-class Graph {
- public:
-  Graph(const std::vector<Segment>& a, const std::vector<Segment>& b, double corner_px)
-      : size_a_(a.size()), neighbours_(a.size() + b.size()) {
-    for (const auto* list : {&a, &b}) {
-      for (const Segment& s : *list) length_.push_back(Length(s));
-    }
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      for (std::size_t j = 0; j < b.size(); ++j) {
-        if (!AreWithin(corner_px, a[i], b[j])) continue;
-        neighbours_[i].push_back(size_a_ + j);
-        neighbours_[size_a_ + j].push_back(i);
-      }
-    }
-    dropped_.assign(neighbours_.size(), 0);
+// Where they are not zero; adds the lengths of those segments.
+std::vector<int> Chosen(const Eigen::VectorXi& marks, const std::vector<Segment>& segments,
+                        double* length) {
+  std::vector<int> indices;
+  for (int i = 0; i < static_cast<int>(segments.size()); ++i) {
+    if (marks[i] == 0) continue;
+    indices.push_back(i);
+    *length += Length(segments[static_cast<std::size_t>(i)]);
   }
-
-  // Drops nodes that meet fewer than so many, until none is left that does.
-  void DropBelow(std::size_t meetings) {
-    std::vector<std::size_t> degree, queue;
-    for (std::size_t i = 0; i < neighbours_.size(); ++i) {
-      degree.push_back(neighbours_[i].size());
-      if (degree[i] < meetings) queue.push_back(i);
-    }
-    while (!queue.empty()) {
-      const std::size_t i = queue.back();
-      queue.pop_back();
-      if (dropped_[i]) continue;
-      dropped_[i] = 1;
-      for (const std::size_t j : neighbours_[i]) {
-        if (--degree[j] < meetings) queue.push_back(j);
-      }
-    }
-  }
-
-  std::array<std::vector<int>, 2> LargestComponent() const {
-    std::vector<char> seen = dropped_;
-    std::vector<std::size_t> best;
-    double best_length = 0.0;
-    for (std::size_t start = 0; start < seen.size(); ++start) {
-      if (seen[start]) continue;
-      const std::vector<std::size_t> component = ComponentOf(start, &seen);
-      double length = 0.0;
-      for (const std::size_t i : component) length += length_[i];
-      if (length <= best_length) continue;
-      best_length = length;
-      best = component;
-    }
-    std::sort(best.begin(), best.end());
-    std::array<std::vector<int>, 2> result;
-    for (const std::size_t i : best) {
-      const std::size_t list = i < size_a_ ? 0 : 1;
-      result[list].push_back(static_cast<int>(i - list * size_a_));
-    }
-    return result;
-  }
-
- private:
-  std::vector<std::size_t> ComponentOf(std::size_t start, std::vector<char>* seen) const {
-    std::vector<std::size_t> component = {start};
-    (*seen)[start] = 1;
-    for (std::size_t k = 0; k < component.size(); ++k) {
-      for (const std::size_t j : neighbours_[component[k]]) {
-        if ((*seen)[j]) continue;
-        (*seen)[j] = 1;
-        component.push_back(j);
-      }
-    }
-    return component;
-  }
-
-  std::size_t size_a_;
-  std::vector<double> length_;
-  std::vector<std::vector<std::size_t>> neighbours_;
-  std::vector<char> dropped_;
-};
+  return indices;
+}
 
 }  // namespace
 
@@ -175,9 +109,39 @@ double MeetingLength(const std::vector<Segment>& a, const std::vector<Segment>& 
 
 std::array<std::vector<int>, 2> ConnectedCore(const std::vector<Segment>& a,
                                               const std::vector<Segment>& b, double diagonal_px) {
-  Graph graph(a, b, kCornerShareOfPhoto * diagonal_px);
-  graph.DropBelow(kCoreMeetings);
-  return graph.LargestComponent();
+  const auto n = static_cast<Eigen::Index>(a.size()), m = static_cast<Eigen::Index>(b.size());
+  Eigen::MatrixXi meets(n, m);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < m; ++j) {
+      meets(i, j) = AreWithin(kCornerShareOfPhoto * diagonal_px, a[static_cast<std::size_t>(i)],
+                              b[static_cast<std::size_t>(j)]);
+    }
+  }
+  // To drop what has too few meetings leaves others with too few.
+  for (int before = -1; before != meets.sum();) {
+    before = meets.sum();
+    for (auto row : meets.rowwise()) row *= row.sum() < kCoreMeetings ? 0 : 1;
+    for (auto column : meets.colwise()) column *= column.sum() < kCoreMeetings ? 0 : 1;
+  }
+  std::array<std::vector<int>, 2> largest;
+  double largest_length = 0.0;
+  for (Eigen::Index start = 0; start < n; ++start) {
+    if (meets.row(start).isZero()) continue;
+    Eigen::VectorXi rows = Eigen::VectorXi::Unit(n, start), columns;
+    for (int before = 0; before != rows.sum();) {
+      before = rows.sum();
+      columns = (meets.transpose() * rows).cwiseMin(1);
+      rows = (meets * columns).cwiseMin(1);
+    }
+    double length = 0.0;
+    std::array<std::vector<int>, 2> component = {Chosen(rows, a, &length),
+                                                 Chosen(columns, b, &length)};
+    for (const int i : component[0]) meets.row(i).setZero();
+    if (length <= largest_length) continue;
+    largest_length = length;
+    largest = std::move(component);
+  }
+  return largest;
 }
 
 // Andrew's monotone chain (Information Processing Letters 1979).
