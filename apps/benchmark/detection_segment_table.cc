@@ -16,6 +16,7 @@
 #include "apps/benchmark/timing.h"
 #include "circline/estimators/line.h"
 #include "circline/ransac/detection/detect_lines.h"
+#include "circline/ransac/detection/detect_observations.h"
 #include "circline/ransac/detection/edges.h"
 
 namespace circline::apps {
@@ -162,7 +163,7 @@ void MeasureSegments(const std::string& folder, const cv::FileNode& root) {
     std::vector<DetectedLine> found;
     all[0].ms.push_back(Milliseconds([&] {
       const EdgeMap edges = DetectEdges(gray);
-      DetectLines(edges, camera, LineOptions(), &found);
+      found = DetectLines(edges, camera, DetectionOptions().min_segment_length_px);
     }));
     std::vector<Segment> segments;
     for (const DetectedLine& line : found) segments.push_back(FittedEnds(line, camera));

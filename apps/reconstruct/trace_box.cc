@@ -29,6 +29,7 @@ constexpr double kLeastCovered = 0.83;
 // 0.10, of three false ones in streets (scene-lund, scene-lund-more) 0.014 to 0.023.
 constexpr double kLeastEdgeShare = 0.05;
 constexpr std::size_t kMostPolished = 24;  // Traces that are fitted, the best supported ones.
+constexpr double kMinLinePx = 20.0;        // Of the lines that are traced.
 constexpr double kCoarseReachPx = 8.0;     // From where a trace has an edge, and a fit.
 constexpr double kFineReachPx = 3.0;
 // From where a person has marked an edge: up to 5 px, and often a printed border (box-camprodon).
@@ -159,12 +160,13 @@ void DropCopies(std::vector<DetectedLine>* lines) {
 
 Status DetectPhotoLines(const std::vector<cv::Mat>& channels, const Camera& camera,
                         PhotoEdges* edges, std::vector<DetectedLine>* lines) {
+  const Status status = camera.Validate();
+  if (!status.ok()) return status;
   for (const cv::Mat& channel : channels) {
     edges->push_back(DetectEdges(channel));
-    std::vector<DetectedLine> straight, bent;  // Worn edges are bent.
-    const Status status =
-        DetectLines(edges->back(), camera, LineOptions(), &straight, nullptr, &bent);
-    if (!status.ok()) return status;
+    std::vector<DetectedLine> bent;  // Worn edges are bent.
+    std::vector<DetectedLine> straight =
+        DetectLines(edges->back(), camera, kMinLinePx, nullptr, &bent);
     UndoEdgeShift(edges->back(), camera, &straight);
     lines->insert(lines->end(), straight.begin(), straight.end());
     lines->insert(lines->end(), bent.begin(), bent.end());

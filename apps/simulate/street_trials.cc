@@ -100,28 +100,28 @@ StreetAnswer Judge(const StreetPhoto& photo, const Observations& observations) {
 }
 
 Observations Detect(const StreetPhoto& photo, std::uint64_t seed) {
-  const auto collect = [&photo](const Camera& camera, PhotoEvidence* evidence) {
+  const auto collect = [&photo](const Camera& camera) {
+    PhotoEvidence evidence;
     for (const StreetSegment& segment : photo.segments) {
       DetectedLine line;
       if (LineFromSegment(camera, segment.ends, photo.sigma_px, &line).ok())
-        evidence->lines.push_back(std::move(line));
+        evidence.lines.push_back(std::move(line));
     }
-    std::stable_sort(evidence->lines.begin(), evidence->lines.end(),
+    std::stable_sort(evidence.lines.begin(), evidence.lines.end(),
                      [](const auto& a, const auto& b) { return a.length_px > b.length_px; });
-    return Status::Ok();
+    return evidence;
   };
   DetectionOptions options;
   options.seed = seed;
   options.noise_model.camera = photo.sigma;
   const double diagonal_px = DiagonalPx(photo.camera.width, photo.camera.height);
-  PhotoEvidence evidence;
   Observations observations;
   observations.camera = photo.camera;
-  const Status status = photo.sigma.IsWide()
-                            ? LookForFocal(collect, options, diagonal_px, &evidence, &observations)
-                            : collect(photo.camera, &evidence);
-  if (status.ok()) ObserveEvidence(options, diagonal_px, &evidence, &observations);
-  return status.ok() ? observations : Observations();
+  PhotoEvidence evidence = photo.sigma.IsWide()
+                               ? LookForFocal(collect, options, diagonal_px, &observations)
+                               : collect(photo.camera);
+  ObserveEvidence(options, diagonal_px, &evidence, &observations);
+  return observations;
 }
 
 // The plane of the upright direction and of the first one that has as many lines as another, x and

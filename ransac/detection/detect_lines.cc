@@ -14,8 +14,8 @@ namespace {
 // this many pixels; an overlap up to kMaxOverlapPx is what rounded corners and crossings cause.
 constexpr double kMaxGapPx = 100.0;
 constexpr double kMaxOverlapPx = 3.0;
-// A joined piece must lie within max_distance_px plus this many standard deviations of the
-// extrapolated line, but never more than kMaxJoinPx off.
+// A joined piece must lie within half of kMaxLineDistancePx plus this many standard deviations of
+// the extrapolated line, but never more than kMaxJoinPx off.
 constexpr double kJoinSigmas = 2.0;
 constexpr double kMaxJoinPx = 1.5;
 // Standard deviation of one edge point in that extrapolation, pixels.
@@ -25,6 +25,10 @@ constexpr double kPointSigmaPx = 0.3;
 // Pieces of both kinds are joined up to this far off.
 constexpr double kBleedSigmaPx = 0.4;
 constexpr double kMaxAlternatingPx = 2.0;
+// Edge points are averaged over this length, pixels. Neighbours are correlated by the smoothing
+// anyway; averaging keeps what they know and drops the repetition.
+constexpr double kPointSpacingPx = 5.0;
+constexpr std::size_t kMaxLines = 400;
 // Averaged points are not trusted beyond this: lenses and edges are not straight to better.
 constexpr double kMinLineSigmaPx = 0.1;
 
@@ -45,11 +49,11 @@ struct Joined {
 
 class LineJoiner {
  public:
-  LineJoiner(const LineEdges& edges, const LineOptions& options)
-      : edges_(edges), options_(options) {}
+  LineJoiner(const LineEdges& edges, double min_length_px)
+      : edges_(edges), min_length_px_(min_length_px) {}
 
   std::vector<DetectedLine> Straight() {
-    CutIntoPieces(edges_, options_, &pieces_, &bent_);
+    CutIntoPieces(edges_, &pieces_, &bent_);
     std::stable_sort(pieces_.begin(), pieces_.end(), [](const LinePiece& a, const LinePiece& b) {
       return a.length_px > b.length_px;
     });
@@ -71,9 +75,7 @@ class LineJoiner {
     std::stable_sort(lines.begin(), lines.end(), [](const DetectedLine& a, const DetectedLine& b) {
       return a.length_px > b.length_px;
     });
-    if (lines.size() > static_cast<std::size_t>(options_.max_lines)) {
-      lines.resize(static_cast<std::size_t>(options_.max_lines));
-    }
+    if (lines.size() > kMaxLines) lines.resize(kMaxLines);
     return lines;
   }
 
@@ -113,7 +115,7 @@ class LineJoiner {
 
   void AddPoints(const LinePiece& p, LineMoments* moments) const {
     for (int i = p.begin; i < p.end; ++i) {
-      if (edges_.Distance(i, p.line) <= options_.max_distance_px) moments->Add(edges_.X(i).x);
+      if (edges_.Distance(i, p.line) <= kMaxLineDistancePx) moments->Add(edges_.X(i).x);
     }
   }
 
@@ -158,7 +160,7 @@ class LineJoiner {
     const double u = (0.5 * length + beyond) / std::max(length, 1.0);
     const double lever = 1.0 + 12.0 * u * u;
     const double sigma = kPointSigmaPx * std::sqrt(lever / n);
-    double limit = std::min(kMaxJoinPx, 0.5 * options_.max_distance_px + kJoinSigmas * sigma);
+    double limit = std::min(kMaxJoinPx, 0.5 * kMaxLineDistancePx + kJoinSigmas * sigma);
     if (joined.alternates || joined.gradient.dot(p.gradient) < 0.0) {
       const double pieces = static_cast<double>(joined.pieces.size());
       const double bleed = kBleedSigmaPx * std::sqrt(1.0 + (pieces > 1.0 ? lever / pieces : 1.0));
@@ -168,7 +170,7 @@ class LineJoiner {
            std::abs(LineDistancePx(edges_.X(p.end - 1), joined.line)) <= limit;
   }
 
-  // Means of points over point_spacing_px.
+  // Means of points over kPointSpacingPx.
   struct Average {
     double position;  // Along the line.
     Vector2d pixel;
@@ -183,7 +185,7 @@ class LineJoiner {
       line.length_px += p.length_px;
       AppendAverages(p, joined, &averages);
     }
-    if (line.length_px < options_.min_length_px || averages.size() < 2) return;
+    if (line.length_px < min_length_px_ || averages.size() < 2) return;
     std::stable_sort(averages.begin(), averages.end(),
                      [](const Average& a, const Average& b) { return a.position < b.position; });
     std::vector<CalibratedPoint> points;
@@ -216,8 +218,7 @@ class LineJoiner {
 
   void AppendAverages(const LinePiece& p, const Joined& joined, std::vector<Average>* averages) {
     const int n = p.end - p.begin;  // More than two.
-    const int bins =
-        static_cast<int>(std::clamp(p.length_px / options_.point_spacing_px, 2.0, 1.0 * n));
+    const int bins = static_cast<int>(std::clamp(p.length_px / kPointSpacingPx, 2.0, 1.0 * n));
     for (int k = 0; k < bins; ++k) {
       Vector2d pixel = Vector2d::Zero(), x = Vector2d::Zero();
       int count = 0;
@@ -254,21 +255,12 @@ class LineJoiner {
   }
 
   const LineEdges& edges_;
-  const LineOptions& options_;
+  const double min_length_px_;
   std::vector<LinePiece> pieces_, bent_;
   std::vector<DetectedLine> lines_;
 };
 
 }  // namespace
-
-Status LineOptions::Validate() const {
-  if (!(min_length_px > 0.0)) return Status::Invalid("min_length_px must be positive");
-  if (max_lines < 0) return Status::Invalid("max_lines must not be negative");
-  if (!(max_distance_px > 0.0)) return Status::Invalid("max_distance_px must be positive");
-  if (!(max_sagitta_px > 0.0)) return Status::Invalid("max_sagitta_px must be positive");
-  if (!(point_spacing_px > 0.0)) return Status::Invalid("point_spacing_px must be positive");
-  return Status::Ok();
-}
 
 bool FitAverages(const std::vector<CalibratedPoint>& points, DetectedLine* line) {
   LineFit fit;
@@ -281,18 +273,14 @@ bool FitAverages(const std::vector<CalibratedPoint>& points, DetectedLine* line)
   return true;
 }
 
-Status DetectLines(const EdgeMap& edges, const Camera& camera, const LineOptions& options,
-                   std::vector<DetectedLine>* lines, const std::vector<std::uint8_t>* skip,
-                   std::vector<DetectedLine>* bent) {
-  lines->clear();
-  Status status = options.Validate();
-  if (status.ok()) status = camera.Validate();
-  if (!status.ok()) return status;
+std::vector<DetectedLine> DetectLines(const EdgeMap& edges, const Camera& camera,
+                                      double min_length_px, const std::vector<std::uint8_t>* skip,
+                                      std::vector<DetectedLine>* bent) {
   const LineEdges usable(edges, camera, skip);
-  LineJoiner joiner(usable, options);
-  *lines = joiner.Straight();
+  LineJoiner joiner(usable, min_length_px);
+  std::vector<DetectedLine> lines = joiner.Straight();
   if (bent != nullptr) *bent = joiner.Bent();
-  return Status::Ok();
+  return lines;
 }
 
 }  // namespace circline

@@ -14,24 +14,9 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/observations.h"
-#include "circline/estimators/status.h"
 #include "circline/ransac/detection/edges.h"
 
 namespace circline {
-
-struct LineOptions {
-  double min_length_px = 20.0;  // Shortest line; > 0.
-  int max_lines = 400;          // The longest ones; 0 or more.
-  // Largest distance of an edge point to its line, pixels; > 0.
-  double max_distance_px = 0.8;
-  // Largest sagitta of what still counts as straight, pixels; > 0.
-  double max_sagitta_px = 0.3;
-  // Edge points are averaged over this length, pixels; > 0. Neighbours are correlated by the
-  // smoothing anyway; averaging keeps what they know and drops the repetition.
-  double point_spacing_px = 5.0;
-
-  Status Validate() const;
-};
 
 struct DetectedLine {
   std::vector<Eigen::Vector2d> points;  // Pixels of the photo, in order along the line; 2 or more.
@@ -45,15 +30,16 @@ struct DetectedLine {
 // where there is none.
 bool FitAverages(const std::vector<CalibratedPoint>& points, DetectedLine* line);
 
-// Longest first; without those along the photo's border, of dark rims and of frames. `skip`
-// (optional, one per edge point, 1 = belongs to something else) marks points that are not used.
-// `camera` must be valid. `bent` (optional) receives what is all but straight, up to a sagitta
-// of 1.2 px and of 1.8 % of its length: edges of worn and of soft things, and arcs; longest first,
-// as many as lines at most. About 1 ms for a 640x480 photo.
-Status DetectLines(const EdgeMap& edges, const Camera& camera, const LineOptions& options,
-                   std::vector<DetectedLine>* lines,
-                   const std::vector<std::uint8_t>* skip = nullptr,
-                   std::vector<DetectedLine>* bent = nullptr);
+// Lines of `min_length_px` (> 0) or more, the longest first, 400 at most; without those along the
+// photo's border, of dark rims and of frames. `camera` must be valid. `skip` (optional, one per
+// edge point, 1 = belongs to something else) marks points that are not used. `bent` (optional)
+// receives what is all but straight, up to a sagitta of 1.2 px and of 1.8 % of its length: edges of
+// worn and of soft things, and arcs; longest first, as many as lines at most. About 1 ms for a
+// 640x480 photo.
+std::vector<DetectedLine> DetectLines(const EdgeMap& edges, const Camera& camera,
+                                      double min_length_px,
+                                      const std::vector<std::uint8_t>* skip = nullptr,
+                                      std::vector<DetectedLine>* bent = nullptr);
 
 }  // namespace circline
 

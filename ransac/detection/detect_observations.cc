@@ -39,22 +39,20 @@ std::vector<CircleEvidence> MakeCircles(const EdgeMap& edges,
   return circles;
 }
 
-Status CollectEvidence(const EdgeMap& edges, const Camera& camera, const DetectionOptions& options,
-                       PhotoEvidence* evidence) {
+PhotoEvidence CollectEvidence(const EdgeMap& edges, const Camera& camera,
+                              const DetectionOptions& options) {
+  PhotoEvidence evidence;
   std::vector<DetectedEllipse> ellipses =
       DetectEllipses(edges, camera, {options.min_ellipse_axis_px, options.min_arc_deg});
   const std::vector<std::uint8_t> on_ellipses = EllipsePoints(edges, ellipses);
-  evidence->num_ellipses = ellipses.size();
+  evidence.num_ellipses = ellipses.size();
   ellipses.resize(std::min(ellipses.size(), static_cast<std::size_t>(options.max_circles)));
-  evidence->circles = MakeCircles(edges, ellipses, camera, options.noise_model);
-  if (options.max_pencils == 0) return Status::Ok();
-  LineOptions line_options;
-  line_options.min_length_px = options.min_segment_length_px;
-  const Status status =
-      DetectLines(edges, camera, line_options, &evidence->lines, &on_ellipses, &evidence->bent);
-  if (!status.ok()) return status;
-  UndoEdgeShift(edges, camera, &evidence->lines);
-  return Status::Ok();
+  evidence.circles = MakeCircles(edges, ellipses, camera, options.noise_model);
+  if (options.max_pencils == 0) return evidence;
+  evidence.lines =
+      DetectLines(edges, camera, options.min_segment_length_px, &on_ellipses, &evidence.bent);
+  UndoEdgeShift(edges, camera, &evidence.lines);
+  return evidence;
 }
 
 }  // namespace
@@ -88,16 +86,15 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   status = ToGray(image, &gray);
   if (!status.ok()) return status;
   const EdgeMap edges = DetectEdges(gray);
-  PhotoEvidence evidence;
   const double diagonal_px = DiagonalPx(image.cols, image.rows);
-  const auto collect = [&](const Camera& through, PhotoEvidence* seen) {
-    return CollectEvidence(edges, through, options, seen);
+  const auto collect = [&](const Camera& through) {
+    return CollectEvidence(edges, through, options);
   };
-  status = options.noise_model.camera.IsWide()
-               ? LookForFocal(collect, options, diagonal_px, &evidence, observations)
-               : collect(camera, &evidence);
-  if (status.ok()) ObserveEvidence(options, diagonal_px, &evidence, observations);
-  return status;
+  PhotoEvidence evidence = options.noise_model.camera.IsWide()
+                               ? LookForFocal(collect, options, diagonal_px, observations)
+                               : collect(camera);
+  ObserveEvidence(options, diagonal_px, &evidence, observations);
+  return Status::Ok();
 }
 
 Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::Rect& roi,

@@ -162,20 +162,17 @@ void ExpectPencil(const PencilObservation& pencil, const std::vector<int>& match
   place = std::move(next);
 }
 
-Status FollowEdgeLines(const Observations& predicted, const CentreLines& of_centres,
-                       const EdgeMap& edges, const std::vector<std::uint8_t>& on_ellipses,
-                       double search_px, const DetectionOptions& options, Observations* found,
-                       Observations* expect) {
+void FollowEdgeLines(const Observations& predicted, const CentreLines& of_centres,
+                     const EdgeMap& edges, const std::vector<std::uint8_t>& on_ellipses,
+                     double search_px, const DetectionOptions& options, Observations* found,
+                     Observations* expect) {
   std::vector<PencilObservation> pencils;
   for (std::size_t p = 0; p < predicted.pencils.size(); ++p) {
     if (of_centres[p].empty()) pencils.push_back(predicted.pencils[p]);
   }
-  if (pencils.empty()) return Status::Ok();
-  LineOptions line_options;
-  line_options.min_length_px = options.min_segment_length_px;
-  std::vector<DetectedLine> lines;
-  const Status status = DetectLines(edges, predicted.camera, line_options, &lines, &on_ellipses);
-  if (!status.ok()) return status;
+  if (pencils.empty()) return;
+  std::vector<DetectedLine> lines =
+      DetectLines(edges, predicted.camera, options.min_segment_length_px, &on_ellipses);
   UndoEdgeShift(edges, predicted.camera, &lines);
   const std::vector<std::vector<int>> matches = MatchLines(pencils, lines, search_px);
   for (std::size_t p = 0; p < pencils.size(); ++p) {
@@ -184,7 +181,6 @@ Status FollowEdgeLines(const Observations& predicted, const CentreLines& of_cent
     ExpectPencil(pencil, matches[p], expect);
     if (!pencil.lines.empty()) found->pencils.push_back(std::move(pencil));
   }
-  return Status::Ok();
 }
 
 // The frame that the features carry; pixels of it were those of another photo.
@@ -251,11 +247,11 @@ Status FollowObservations(const cv::Mat& image, const Observations& predicted, d
     expect->circles[k] = circle;
     found->circles.push_back(std::move(circle));
   }
-  status = FollowEdgeLines(predicted, of_centres, edges, EllipsePoints(edges, ellipses), search_px,
-                           options, found, expect);
+  FollowEdgeLines(predicted, of_centres, edges, EllipsePoints(edges, ellipses), search_px, options,
+                  found, expect);
   FollowGrid(predicted, of_centres, found, expect);
   Settle(predicted, found);
-  return status;
+  return Status::Ok();
 }
 
 }  // namespace circline

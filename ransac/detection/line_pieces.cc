@@ -11,6 +11,8 @@ namespace {
 // below, any smooth curve passes for straight.
 constexpr int kSeedPoints = 9;
 constexpr double kMinPiecePx = 10.0;
+// Largest sagitta of what still counts as straight, pixels.
+constexpr double kMaxSagittaPx = 0.3;
 // All but straight: a sagitta of up to this many pixels, and this share of the length.
 constexpr double kMaxBentPx = 1.2;
 constexpr double kMaxBentShare = 0.018;
@@ -33,9 +35,9 @@ Vector2d MainAxis(double cosine, double sine) {
 
 class PieceCutter {
  public:
-  PieceCutter(const LineEdges& edges, const LineOptions& options, std::vector<LinePiece>* straight,
+  PieceCutter(const LineEdges& edges, std::vector<LinePiece>* straight,
               std::vector<LinePiece>* bent)
-      : edges_(edges), options_(options), straight_(straight), bent_(bent) {}
+      : edges_(edges), straight_(straight), bent_(bent) {}
 
   // Greedily, from the first point on: seed, grow, go on behind.
   void CutChain(const EdgeChain& chain) {
@@ -65,7 +67,7 @@ class PieceCutter {
     piece->line = moments_.Line(&piece->along);
     for (int i = piece->begin; i < piece->end; ++i) {
       // Seeds are stricter than growth: they carry no average yet.
-      if (edges_.Distance(i, piece->line) > 0.75 * options_.max_distance_px) return false;
+      if (edges_.Distance(i, piece->line) > 0.75 * kMaxLineDistancePx) return false;
     }
     return true;
   }
@@ -73,7 +75,7 @@ class PieceCutter {
   void Grow(const EdgeChain& chain, LinePiece* piece) {
     int misses = 0, refit_at = kSeedPoints + 2;
     for (int i = piece->end; i < chain.end && edges_.Usable(i) && misses <= kMaxMisses; ++i) {
-      if (edges_.Distance(i, piece->line) > options_.max_distance_px) {
+      if (edges_.Distance(i, piece->line) > kMaxLineDistancePx) {
         ++misses;
         continue;
       }
@@ -93,12 +95,11 @@ class PieceCutter {
     piece->gradient = edges_.map().points[static_cast<std::size_t>(middle)].Normal();
     if (piece->length_px < kMinPiecePx) return;
     const double sagitta = SagittaPx(*piece);
-    if (sagitta >
-        std::max(options_.max_sagitta_px, std::min(kMaxBentPx, kMaxBentShare * piece->length_px))) {
+    if (sagitta > std::max(kMaxSagittaPx, std::min(kMaxBentPx, kMaxBentShare * piece->length_px))) {
       return;
     }
     edges_.SetRange(piece->along, *piece, &piece->from, &piece->to);
-    (sagitta <= options_.max_sagitta_px ? straight_ : bent_)->push_back(*piece);
+    (sagitta <= kMaxSagittaPx ? straight_ : bent_)->push_back(*piece);
   }
 
   // The middle half of the points on one side of the line and the ends on the other is a curve.
@@ -108,7 +109,7 @@ class PieceCutter {
     int num_middle = 0, num_ends = 0;
     for (int k = 0; k < n; ++k) {
       const double d = LineDistancePx(edges_.X(piece.begin + k), piece.line);
-      if (std::abs(d) > options_.max_distance_px) continue;
+      if (std::abs(d) > kMaxLineDistancePx) continue;
       if (4 * k >= n && 4 * k < 3 * n) {
         middle += d;
         ++num_middle;
@@ -123,7 +124,6 @@ class PieceCutter {
   }
 
   const LineEdges& edges_;
-  const LineOptions& options_;
   std::vector<LinePiece>* straight_;
   std::vector<LinePiece>* bent_;
   LineMoments moments_;
@@ -141,9 +141,9 @@ Vector3d LineMoments::Line(Vector2d* along) const {
   return {normal.x(), normal.y(), -normal.dot(mean + shift_)};
 }
 
-void CutIntoPieces(const LineEdges& edges, const LineOptions& options,
-                   std::vector<LinePiece>* straight, std::vector<LinePiece>* bent) {
-  PieceCutter cutter(edges, options, straight, bent);
+void CutIntoPieces(const LineEdges& edges, std::vector<LinePiece>* straight,
+                   std::vector<LinePiece>* bent) {
+  PieceCutter cutter(edges, straight, bent);
   for (const EdgeChain& chain : edges.map().chains) cutter.CutChain(chain);
 }
 

@@ -13,10 +13,12 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/line.h"
 #include "circline/ransac/detection/calibrated_edges.h"
-#include "circline/ransac/detection/detect_lines.h"
 #include "circline/ransac/detection/edges.h"
 
 namespace circline {
+
+// Largest distance of an edge point to its line, pixels.
+constexpr double kMaxLineDistancePx = 0.8;
 
 // Sums of calibrated points, about a shift near them so that nothing cancels.
 class LineMoments {
@@ -141,8 +143,8 @@ class PieceBeginnings {
 };
 
 // Cuts all chains into pieces that are straight, and some that are all but straight (`bent`).
-void CutIntoPieces(const LineEdges& edges, const LineOptions& options,
-                   std::vector<LinePiece>* straight, std::vector<LinePiece>* bent);
+void CutIntoPieces(const LineEdges& edges, std::vector<LinePiece>* straight,
+                   std::vector<LinePiece>* bent);
 
 }  // namespace circline
 

@@ -55,8 +55,8 @@ double BendAtCorner(double k1, const Camera& camera) {
 // Looks until the photo's lines are straight through the lens that is looked through: one that
 // bends breaks them, so each look finds longer ones. Where they do not clearly say so it is the one
 // that is known beforehand.
-Status LookForLens(const CollectEvidenceFn& collect, const DetectionOptions& options,
-                   Camera* camera, PhotoEvidence* evidence) {
+PhotoEvidence LookForLens(const CollectEvidenceFn& collect, const DetectionOptions& options,
+                          Camera* camera) {
   constexpr int kMostLooks = 3;
   // Logarithm of how much likelier it is: 20 to 1. Of 3, 6 and 10, on circles-discocal-tir, where
   // 10 leaves three of seven photos as they are, with dots and ChArUco boards beside it.
@@ -64,28 +64,27 @@ Status LookForLens(const CollectEvidenceFn& collect, const DetectionOptions& opt
   // Less breaks no lines, and the estimate finds it.
   constexpr double kMatters = 0.05;
   constexpr double kSameK1 = 0.01;
-  Status status = collect(*camera, evidence);
+  PhotoEvidence evidence = collect(*camera);
   if (camera->model != CameraModel::kOpenCV || !options.noise_model.camera.IsLensOpen())
-    return status;
+    return evidence;
   const double stated_k1 = camera->distortion[0];
-  for (int k = 1; k < kMostLooks && status.ok(); ++k) {
-    const LikelyLens likeliest = LikeliestLens(*evidence, *camera, options.noise_model, stated_k1);
+  for (int k = 1; k < kMostLooks; ++k) {
+    const LikelyLens likeliest = LikeliestLens(evidence, *camera, options.noise_model, stated_k1);
     const double k1 =
         likeliest.gain > kClearly && BendAtCorner(likeliest.k1 - stated_k1, *camera) > kMatters
             ? likeliest.k1
             : stated_k1;
     if (std::abs(k1 - camera->distortion[0]) < kSameK1) break;
     camera->distortion[0] = k1;
-    *evidence = PhotoEvidence();
-    status = collect(*camera, evidence);
+    evidence = collect(*camera);
   }
-  return status;
+  return evidence;
 }
 
 }  // namespace
 
-Status LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& options,
-                    double diagonal_px, PhotoEvidence* evidence, Observations* observations) {
+PhotoEvidence LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& options,
+                           double diagonal_px, Observations* observations) {
   constexpr std::size_t kMostLooks = 4;
   constexpr double kClearly = 0.5;  // Logarithm of how much likelier it is.
   const CameraSigma& sigma = options.noise_model.camera;
@@ -107,10 +106,8 @@ Status LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& op
     looks.push_back({next, {}, {}});
     Look& look = looks.back();
     look_through(next);
-    Status status = is_first ? LookForLens(collect, options, &camera, &look.evidence)
-                             : collect(camera, &look.evidence);
+    look.evidence = is_first ? LookForLens(collect, options, &camera) : collect(camera);
     observations->found_k1 = camera.distortion[0] - stated_k1;
-    if (!status.ok()) return status;
     // A pencil that one look finds and another does not would tell their focal lengths apart.
     std::vector<Vector3d> known;
     for (const Vector3d& ray : rays) known.push_back(SeenThrough(std::log(camera.fx), ray));
@@ -136,8 +133,7 @@ Status LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& op
   const auto best = std::min_element(
       looks.begin(), looks.end(), [&](const Look& a, const Look& b) { return miss(a) < miss(b); });
   look_through(best->log_focal);
-  *evidence = std::move(best->evidence);
-  return Status::Ok();
+  return std::move(best->evidence);
 }
 
 }  // namespace circline

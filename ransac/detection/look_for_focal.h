@@ -11,14 +11,14 @@
 namespace CIRCLINE_EXPORT circline {
 
 // What is found in the photo through a camera.
-using CollectEvidenceFn = std::function<Status(const Camera&, PhotoEvidence*)>;
+using CollectEvidenceFn = std::function<PhotoEvidence(const Camera&)>;
 
-// The camera at the focal length at which the photo's structure is likeliest, and the evidence seen
-// through that: what is found is straight and round at one focal length, so another one is looked
-// through where it is clearly likelier. Where looks lead back to an earlier one, the one that is
-// contradicted least. `observations` has the camera as it is guessed.
-Status LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& options,
-                    double diagonal_px, PhotoEvidence* evidence, Observations* observations);
+// Moves the camera of `observations`, which has it as it is guessed, to the focal length at which
+// the photo's structure is likeliest, and returns the evidence seen through that: what is found is
+// straight and round at one focal length, so another one is looked through where it is clearly
+// likelier. Where looks lead back to an earlier one, the one that is contradicted least.
+PhotoEvidence LookForFocal(const CollectEvidenceFn& collect, const DetectionOptions& options,
+                           double diagonal_px, Observations* observations);
 
 }  // namespace circline
 

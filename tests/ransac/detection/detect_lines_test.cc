@@ -24,13 +24,12 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 std::vector<DetectedLine> LinesOf(const cv::Mat& image, const Camera& camera,
-                                  const LineOptions& options = {}) {
+                                  double min_length_px = 20.0) {
   const EdgeMap edges = DetectEdges(image);
-  std::vector<DetectedLine> lines;
-  EXPECT_TRUE(DetectLines(edges, camera, options, &lines).ok());
+  std::vector<DetectedLine> lines = DetectLines(edges, camera, min_length_px);
   for (std::size_t k = 0; k < lines.size(); ++k) {
     EXPECT_GE(lines[k].points.size(), 2U);
-    EXPECT_GE(lines[k].length_px, options.min_length_px);
+    EXPECT_GE(lines[k].length_px, min_length_px);
     EXPECT_NEAR(lines[k].fit.line.norm(), 1.0, 1e-9);
     EXPECT_TRUE(lines[k].fit.covariance.allFinite());
     if (k > 0) {
@@ -176,10 +175,9 @@ TEST(DetectLines, KeepsBentEdgesApart) {
     return round && std::abs(v - 60.0) < 25.0 ? 40.0 : 160.0;
   }));
   const EdgeMap edges = DetectEdges(image);
-  std::vector<DetectedLine> lines, bent;
-  LineOptions options;
-  options.min_length_px = 45.0;
-  ASSERT_TRUE(DetectLines(edges, TestCamera(200, 120), options, &lines, nullptr, &bent).ok());
+  std::vector<DetectedLine> bent;
+  const std::vector<DetectedLine> lines =
+      DetectLines(edges, TestCamera(200, 120), 45.0, nullptr, &bent);
   const auto near = [](const DetectedLine& line, double u) {
     return std::abs(line.points[line.points.size() / 2].x() - u) < 2.0;
   };
@@ -189,7 +187,7 @@ TEST(DetectLines, KeepsBentEdgesApart) {
   ASSERT_EQ(bent.size(), 1U);
   EXPECT_TRUE(near(bent[0], 29.5));
   EXPECT_GT(bent[0].length_px, 70.0);
-  EXPECT_EQ(LinesOf(image, TestCamera(200, 120), options).size(), 2U);
+  EXPECT_EQ(LinesOf(image, TestCamera(200, 120), 45.0).size(), 2U);
 }
 
 TEST(DetectLines, DropsShortOnesAndSkippedPoints) {
@@ -198,46 +196,16 @@ TEST(DetectLines, DropsShortOnesAndSkippedPoints) {
   }));
   const Camera camera = TestCamera(120, 120);
   EXPECT_EQ(LinesOf(image, camera).size(), 4U);
-  LineOptions options;
-  options.min_length_px = 40.0;
-  EXPECT_EQ(LinesOf(image, camera, options).size(), 2U);
-  options.max_lines = 1;
-  EXPECT_EQ(LinesOf(image, camera, options).size(), 1U);
+  EXPECT_EQ(LinesOf(image, camera, 40.0).size(), 2U);
   const EdgeMap edges = DetectEdges(image);
   const std::vector<std::uint8_t> skip(edges.points.size(), 1);
-  std::vector<DetectedLine> lines;
-  ASSERT_TRUE(DetectLines(edges, camera, LineOptions(), &lines, &skip).ok());
-  EXPECT_TRUE(lines.empty());
+  EXPECT_TRUE(DetectLines(edges, camera, 20.0, &skip).empty());
 }
 
 TEST(DetectLines, FindsFewInNoiseAndNoneOnABlankImage) {
   const Camera camera = TestCamera(320, 240);
   EXPECT_TRUE(LinesOf(cv::Mat(240, 320, CV_8UC1, cv::Scalar(3)), camera).empty());
   EXPECT_LE(LinesOf(Noise(320, 240, 30.0), camera).size(), 3U);
-}
-
-TEST(DetectLines, NamesTheOptionThatIsWrong) {
-  const EdgeMap edges;
-  std::vector<DetectedLine> lines;
-  const auto message = [&](const LineOptions& options) {
-    return DetectLines(edges, TestCamera(), options, &lines).message;
-  };
-  LineOptions options;
-  options.min_length_px = 0.0;
-  EXPECT_NE(message(options).find("min_length_px"), std::string::npos);
-  options = LineOptions();
-  options.max_lines = -1;
-  EXPECT_NE(message(options).find("max_lines"), std::string::npos);
-  options = LineOptions();
-  options.max_distance_px = std::nan("");
-  EXPECT_NE(message(options).find("max_distance_px"), std::string::npos);
-  options = LineOptions();
-  options.max_sagitta_px = -1.0;
-  EXPECT_NE(message(options).find("max_sagitta_px"), std::string::npos);
-  options = LineOptions();
-  options.point_spacing_px = 0.0;
-  EXPECT_NE(message(options).find("point_spacing_px"), std::string::npos);
-  EXPECT_FALSE(DetectLines(edges, Camera(), LineOptions(), &lines).ok());
 }
 
 }  // namespace

@@ -139,10 +139,10 @@ TEST(RealPhotographs, BoxesAreRareOnNormalsOfNothing) {
     VisitSet(set, 2, [&](const cv::Mat& image, const Camera& camera, const cv::FileNode& node) {
       const Matrix3d axes = ReadRotation(node, set == "turntable-teabox" ? "box_axes_cam" : "R");
       cv::Mat gray;
-      std::vector<DetectedLine> lines, bent;
       ASSERT_TRUE(ToGray(image, &gray).ok());
       const EdgeMap edges = DetectEdges(gray);
-      ASSERT_TRUE(DetectLines(edges, camera, LineOptions(), &lines, nullptr, &bent).ok());
+      std::vector<DetectedLine> bent;
+      std::vector<DetectedLine> lines = DetectLines(edges, camera, 20.0, nullptr, &bent);
       lines.insert(lines.end(), bent.begin(), bent.end());
       for (int trial = 0; trial < 40; ++trial) {
         const double x = random.Normal(), y = random.Normal(), z = random.Normal();

@@ -177,16 +177,15 @@ TEST(LookForFocal, WhereLinesBreakNothingIsFound) {
   observations.camera = Guess(1.6);
   double first = 0.0;
   int looks = 0;
-  const auto collect = [&](const Camera& camera, PhotoEvidence* evidence) {
+  const auto collect = [&](const Camera& camera) {
     if (first == 0.0) first = camera.fx;
     ++looks;
     const bool is_first = std::abs(std::log(camera.fx / first)) < 0.01;
-    *evidence = Edges(axes, 2, camera.fx / TestCamera().fx);
-    if (!is_first) evidence->lines.resize(12);
-    return Status::Ok();
+    PhotoEvidence seen = Edges(axes, 2, camera.fx / TestCamera().fx);
+    if (!is_first) seen.lines.resize(12);
+    return seen;
   };
-  PhotoEvidence evidence;
-  ASSERT_TRUE(LookForFocal(collect, options, 600.0, &evidence, &observations).ok());
+  const PhotoEvidence evidence = LookForFocal(collect, options, 600.0, &observations);
   EXPECT_GT(looks, 1);
   EXPECT_NEAR(observations.camera.fx, first, 1e-9 * first);
   EXPECT_EQ(evidence.lines.size(), 60U);
