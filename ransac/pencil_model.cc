@@ -8,21 +8,6 @@
 #include "circline/ransac/sampler.h"
 
 namespace circline {
-namespace {
-
-bool Usable(const LineFit& line) {
-  return line.line.allFinite() && line.covariance.allFinite() && line.line.norm() > 0.5;
-}
-
-}  // namespace
-
-std::vector<int> UsableLines(const std::vector<LineFit>& lines) {
-  std::vector<int> indices;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (Usable(lines[i])) indices.push_back(static_cast<int>(i));
-  }
-  return indices;
-}
 
 PencilModel::PencilModel(const std::vector<LineFit>& lines, const std::vector<int>& indices,
                          double model_sigma_rad)
@@ -87,39 +72,27 @@ double PencilModel::Variance(const Eigen::Vector3d& direction, int i) const {
   return p * p + q * q + static_cast<double>(model_variance_);
 }
 
+// Gauss-Newton in the tangent plane of the sphere, the variances of the lines held at the current
+// direction.
 bool PencilModel::Refine(const float* weights, Value* direction) const {
-  Eigen::Vector3d v(direction->data());
-  DirectionStep step(v);
+  const Eigen::Vector3d v(direction->data()), e1 = v.unitOrthogonal(), e2 = v.cross(e1);
+  double a = 0.0, b = 0.0, c = 0.0, g1 = 0.0, g2 = 0.0;
   for (int i = 0; i < NumData(); ++i) {
     if (!(weights[i] > 0.0f)) continue;
-    step.Add(Line(i), Variance(v, i), static_cast<double>(weights[i]));
+    const double w = static_cast<double>(weights[i]) / Variance(v, i);
+    const double miss = Line(i).dot(v), d1 = Line(i).dot(e1), d2 = Line(i).dot(e2);
+    a += w * d1 * d1;
+    b += w * d1 * d2;
+    c += w * d2 * d2;
+    g1 += w * d1 * miss;
+    g2 += w * d2 * miss;
   }
-  if (!step.Move(&v)) return false;
-  *direction = {v.x(), v.y(), v.z()};
-  return true;
-}
-
-DirectionStep::DirectionStep(const Eigen::Vector3d& direction)
-    : v_(direction), e1_(direction.unitOrthogonal()), e2_(direction.cross(e1_)) {}
-
-void DirectionStep::Add(const Eigen::Vector3d& line, double variance, double weight) {
-  const double w = weight / variance;
-  const double miss = line.dot(v_), d1 = line.dot(e1_), d2 = line.dot(e2_);
-  a_ += w * d1 * d1;
-  b_ += w * d1 * d2;
-  c_ += w * d2 * d2;
-  g1_ += w * d1 * miss;
-  g2_ += w * d2 * miss;
-}
-
-bool DirectionStep::Move(Eigen::Vector3d* direction) const {
-  const double det = a_ * c_ - b_ * b_;
-  if (!(det > 1e-12 * (a_ + c_) * (a_ + c_))) return false;
-  const Eigen::Vector3d moved =
-      v_ - (c_ * g1_ - b_ * g2_) / det * e1_ - (a_ * g2_ - b_ * g1_) / det * e2_;
+  const double det = a * c - b * b;
+  if (!(det > 1e-12 * (a + c) * (a + c))) return false;
+  const Eigen::Vector3d moved = v - (c * g1 - b * g2) / det * e1 - (a * g2 - b * g1) / det * e2;
   const double norm = moved.norm();
   if (!(norm < 10.0)) return false;  // Not a small step: the start was no good, or is not finite.
-  *direction = moved / norm;
+  *direction = {moved.x() / norm, moved.y() / norm, moved.z() / norm};
   return true;
 }
 

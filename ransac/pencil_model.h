@@ -19,25 +19,6 @@ namespace CIRCLINE_EXPORT circline {
 // Lines at a smaller angle are one line, radians: far below any noise, far above rounding.
 constexpr double kCoincidentRad = 1e-9;
 
-// Indices of the lines with a finite, unit normal.
-std::vector<int> UsableLines(const std::vector<LineFit>& lines);
-
-// Gauss-Newton for a direction in the tangent plane of the sphere, the variances of the lines held
-// at the current direction.
-class DirectionStep {
- public:
-  // From this unit direction.
-  explicit DirectionStep(const Eigen::Vector3d& direction);
-  // A unit line, with the variance of its product with the direction.
-  void Add(const Eigen::Vector3d& line, double variance, double weight);
-  // False, with `direction` untouched, where the lines do not fix it.
-  bool Move(Eigen::Vector3d* direction) const;
-
- private:
-  Eigen::Vector3d v_, e1_, e2_;
-  double a_ = 0.0, b_ = 0.0, c_ = 0.0, g1_ = 0.0, g2_ = 0.0;
-};
-
 // The model for the engine: directions from two lines.
 class PencilModel {
  public:

@@ -24,13 +24,15 @@ double ChanceOfInlier(const LineFit& line, const Eigen::Vector3d& direction, dou
 // Lines with the model's error in their covariances, and which of them are in play.
 struct Pool {
   std::vector<LineFit> lines;
-  std::vector<int> all;  // Usable ones.
+  std::vector<int> all;  // Those with a finite, unit normal.
   double threshold = 0.0;
 
   Pool(const std::vector<LineFit>& input, const PencilOptions& options)
-      : all(UsableLines(input)), threshold(options.ransac.threshold) {
+      : threshold(options.ransac.threshold) {
     lines.reserve(input.size());
     for (const LineFit& line : input) {
+      if (line.line.allFinite() && line.covariance.allFinite() && line.line.norm() > 0.5)
+        all.push_back(static_cast<int>(lines.size()));
       lines.push_back(WithDirectionError(line, options.model_sigma_rad));
     }
   }
