@@ -28,22 +28,9 @@ Status RobustFitOptions::Validate() const {
   return ransac.Validate();
 }
 
-const char* StopReasonName(StopReason reason) {
-  switch (reason) {
-    case StopReason::kConfident:
-      return "confident";
-    case StopReason::kMaxIterations:
-      return "max_iterations";
-    case StopReason::kTooFewData:
-      return "too_few_data";
-  }
-  return "unknown";
-}
-
-int RequiredIterations(int num_data, int num_inliers, int num_samples, double confidence,
-                       double good_samples) {
+int RequiredIterations(int num_data, int num_inliers, int num_samples, double confidence) {
   if (num_inliers < num_samples) return INT_MAX;
-  double p = good_samples;
+  double p = 1.0;
   for (int i = 0; i < num_samples; ++i) {
     p *= static_cast<double>(num_inliers - i) / static_cast<double>(num_data - i);
   }

@@ -19,9 +19,6 @@
 //       bool Refine(const float* weights, Value* value) const;
 //       // A last look at a candidate that would become the best: false rejects it.
 //       bool Accept(const Value& value, double threshold) const;
-//       // Optional: share of all-inlier samples that can give the right value, where one that has
-//       // several parts needs samples of the right pattern. Draws are multiplied accordingly.
-//       static constexpr double kGoodSamples = 1.0;
 //     };
 //
 // A Model keeps its data in random order (see RandomOrder), so that a prefix stands for the whole:
@@ -43,7 +40,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "circline/estimators/export.h"
@@ -83,7 +79,6 @@ struct RobustFitOptions {
 
 // Why a search stopped.
 enum class StopReason { kConfident, kMaxIterations, kTooFewData };
-const char* StopReasonName(StopReason reason);  // "confident", "max_iterations", ...
 
 // What a search found.
 template <typename Value>
@@ -101,21 +96,8 @@ struct RansacReport {
 
 // Draws of `num_samples` of `num_data` without replacement after which, with probability
 // `confidence`, one held inliers only: log(1 - confidence) / log(1 - p), where p is the exact
-// (hypergeometric) probability of an all-inlier sample, times the share `good_samples` of those
-// that serve. At least 1; INT_MAX where it is never.
-int RequiredIterations(int num_data, int num_inliers, int num_samples, double confidence,
-                       double good_samples = 1.0);
-
-// Model::kGoodSamples, or 1 where a model has none.
-template <typename Model, typename = void>
-struct GoodSamples {
-  static constexpr double kShare = 1.0;  // Of a model that says nothing.
-};
-// The same of a model that has one.
-template <typename Model>
-struct GoodSamples<Model, std::void_t<decltype(Model::kGoodSamples)>> {
-  static constexpr double kShare = Model::kGoodSamples;  // As the model says.
-};
+// (hypergeometric) probability of an all-inlier sample. At least 1; INT_MAX where it is never.
+int RequiredIterations(int num_data, int num_inliers, int num_samples, double confidence);
 
 // The engine, for one kind of model.
 template <typename Model>
@@ -303,8 +285,8 @@ class Ransac {
 
   // Draws after which the search may stop.
   int Needed() const {
-    const int needed = RequiredIterations(num_data_, best_.num_inliers, Model::kMinSamples,
-                                          options_.confidence, GoodSamples<Model>::kShare);
+    const int needed =
+        RequiredIterations(num_data_, best_.num_inliers, Model::kMinSamples, options_.confidence);
     return std::min(std::max(needed, options_.min_iterations), options_.max_iterations);
   }
 

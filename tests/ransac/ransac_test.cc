@@ -22,13 +22,6 @@ TEST(RequiredIterations, IsHypergeometric) {
   EXPECT_EQ(RequiredIterations(1000000, 5, 5, 0.99), INT_MAX);
 }
 
-TEST(RequiredIterations, CountsTheSamplesOfTheRightPattern) {
-  // p = 2 / 9 as above, and a quarter of them serve: log 0.01 / log(1 - 1 / 18) = 80.6.
-  EXPECT_EQ(RequiredIterations(10, 5, 2, 0.99, 0.25), 81);
-  // Confidences that 1 - (1 - c)^k would round to one.
-  EXPECT_LT(RequiredIterations(100, 90, 4, 0.9999999, 0.125), 300);
-}
-
 TEST(Ransac, FindsTheInliers) {
   const Location model = MakeData(200, 40, 0.1);
   Ransac<Location>::Report report;
@@ -54,25 +47,6 @@ TEST(Ransac, StopsExactlyWhenConfident) {
     EXPECT_EQ(report.num_iterations, std::max(needed, model.first_good_)) << seed;
     EXPECT_EQ(report.num_iterations, model.fits_);
   }
-}
-
-// The same, of which only one sample in four could be right.
-class PatternedLocation : public Location {
- public:
-  using Location::Location;
-  static constexpr double kGoodSamples = 0.25;
-};
-
-TEST(Ransac, DrawsMoreWhereFewSamplesServe) {
-  const Location plain = MakeData(50, 20, 0.0);
-  std::vector<double> data;
-  for (int i = 0; i < 50; ++i) data.push_back(plain.Datum(i));
-  const PatternedLocation model(data);
-  const RansacOptions options;
-  Ransac<PatternedLocation>::Report report;
-  Ransac<PatternedLocation>(options).Run(model, &report);
-  EXPECT_EQ(report.num_iterations, RequiredIterations(50, 20, 2, options.confidence, 0.25));
-  EXPECT_EQ(GoodSamples<Location>::kShare, 1.0);
 }
 
 TEST(Ransac, OneDrawIsEnoughWithoutOutliers) {
