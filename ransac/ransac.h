@@ -44,6 +44,7 @@
 
 #include "circline/estimators/export.h"
 #include "circline/estimators/noise_model.h"
+#include "circline/estimators/random.h"
 #include "circline/estimators/status.h"
 #include "circline/ransac/sampler.h"
 
@@ -120,7 +121,7 @@ class Ransac {
     report->stop_reason = StopReason::kMaxIterations;
     while (report->num_iterations < needed) {
       ++report->num_iterations;
-      sampler_.Draw(sample.data());
+      DrawSample(num_data_, m, &random_, sample.data());
       Candidate candidate;
       if (!model.Fit(sample.data(), &candidate.value)) {
         ++report->num_degenerate;
@@ -168,7 +169,7 @@ class Ransac {
     report->num_degenerate = report->num_local_optimizations = 0;
     report->stop_reason = StopReason::kTooFewData;
     report->score = num_data_;
-    sampler_.Reset(num_data_, Model::kMinSamples, options_.seed);
+    random_ = Random(options_.seed);
     inverse_t2_ = static_cast<float>(1.0 / (options_.threshold * options_.threshold));
     best_ = Candidate();
     best_.score = drawn_score_ = num_data_;  // What a model without inliers has.
@@ -274,7 +275,7 @@ class Ransac {
     const int size = std::min(num_inliers / 2, kLargest);
     if (size <= Model::kMinSamples) return false;
     std::array<int, static_cast<std::size_t>(kLargest)> sample{};
-    sampler_.DrawFrom(num_inliers, size, sample.data());
+    DrawSample(num_inliers, size, &random_, sample.data());
     std::fill(weights_.begin(), weights_.end(), 0.0f);
     for (int i = 0; i < size; ++i) {
       const int datum = inliers_[static_cast<std::size_t>(sample[static_cast<std::size_t>(i)])];
@@ -303,7 +304,7 @@ class Ransac {
   }
 
   RansacOptions options_;
-  Sampler sampler_;
+  Random random_{0};
   int num_data_ = 0;
   float inverse_t2_ = 1.0f;
   Candidate best_;

@@ -18,17 +18,11 @@ std::vector<int> RandomOrder(int n, std::uint64_t seed) {
   return order;
 }
 
-void Sampler::Reset(int num_data, int num_samples, std::uint64_t seed) {
-  random_ = Random(seed);
-  num_data_ = num_data;
-  num_samples_ = num_samples;
-}
-
-void Sampler::DrawFrom(int n, int count, int* sample) {
+void DrawSample(int n, int count, Random* random, int* sample) {
   for (int i = 0; i < count; ++i) {
     bool repeated = true;
     while (repeated) {
-      sample[i] = random_.UniformInt(n);
+      sample[i] = random->UniformInt(n);
       repeated = std::find(sample, sample + i, sample[i]) != sample + i;
     }
   }

@@ -13,20 +13,8 @@ namespace CIRCLINE_EXPORT circline {
 // A permutation of 0..n-1, the same on every machine.
 std::vector<int> RandomOrder(int n, std::uint64_t seed);
 
-// Draws samples without repetition, all alike.
-class Sampler {
- public:
-  // Samples of `num_samples` of `num_data` from here on, by a new seed.
-  void Reset(int num_data, int num_samples, std::uint64_t seed);
-  // The next of these.
-  void Draw(int* sample) { DrawFrom(num_data_, num_samples_, sample); }
-  // `count` distinct numbers of 0..n-1.
-  void DrawFrom(int n, int count, int* sample);
-
- private:
-  Random random_{0};
-  int num_data_ = 0, num_samples_ = 0;
-};
+// `count` distinct numbers of 0..n-1, all alike; `count` is n at most.
+void DrawSample(int n, int count, Random* random, int* sample);
 
 }  // namespace circline
 

@@ -18,14 +18,13 @@ TEST(RandomOrder, IsAPermutation) {
   EXPECT_TRUE(RandomOrder(0, 5).empty());
 }
 
-TEST(Sampler, UniformDrawsAllAlike) {
+TEST(DrawSample, DrawsAllAlike) {
   constexpr int n = 10, m = 4, draws = 100000;
-  Sampler sampler;
-  sampler.Reset(n, m, 1);
+  Random random(1);
   std::array<int, m> sample{};
   std::vector<int> drawn(n, 0);
   for (int i = 0; i < draws; ++i) {
-    sampler.Draw(sample.data());
+    DrawSample(n, m, &random, sample.data());
     EXPECT_EQ(std::set<int>(sample.begin(), sample.end()).size(), static_cast<std::size_t>(m));
     for (const int s : sample) ++drawn[static_cast<std::size_t>(s)];
   }
