@@ -11,6 +11,16 @@
 namespace circline {
 namespace {
 
+// Which ellipses are worth a look; this keeps out what explains a straight edge or a blob of
+// clutter. Smallest semi-minor axis, pixels.
+constexpr double kMinAxisPx = 2.0;
+// Largest semi-major axis, in half diagonals of the points' box.
+constexpr double kMaxAxisRatio = 10.0;
+// Angle over which the inliers spread, degrees; see Accept.
+constexpr double kMinArcDeg = 30.0;
+// What the best straight line may explain of the ellipse's inliers, relative to the ellipse.
+constexpr double kMaxLineShare = 0.75;
+
 // Keeps 0 / 0 out of the centre of a conic; far below any squared gradient per pixel that matters.
 constexpr float kTiny = 1e-30f;
 
@@ -75,18 +85,9 @@ double GainOfLine(const SomePoints& points, double threshold) {
 
 }  // namespace
 
-Status ConicLimits::Validate() const {
-  if (!(min_axis_px >= 0.0)) return Status::Invalid("min_axis_px must not be negative");
-  if (!(max_axis_ratio > 0.0)) return Status::Invalid("max_axis_ratio must be positive");
-  if (!(min_arc_deg >= 0.0 && min_arc_deg < 360.0)) {
-    return Status::Invalid("min_arc_deg must be 0 or more and less than 360");
-  }
-  if (!(max_line_share > 0.0)) return Status::Invalid("max_line_share must be positive");
-  return Status::Ok();
-}
-
 Status EdgeDirections::Validate(std::size_t num_points) const {
-  if (normals.size() != num_points) return Status::Invalid("normals must be one for each point");
+  if (!normals.empty() && normals.size() != num_points)
+    return Status::Invalid("normals must be one for each point");
   if (!(sigma_rad > 0.0 && sigma_rad <= 0.5)) {
     return Status::Invalid("sigma_rad must be positive and 0.5 at most");
   }
@@ -96,10 +97,9 @@ Status EdgeDirections::Validate(std::size_t num_points) const {
   return Status::Ok();
 }
 
-ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLimits& limits,
-                       const EdgeDirections* directions, double threshold)
-    : limits_(limits),
-      index_(RandomOrder(static_cast<int>(points.size()), 1)),
+ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const EdgeDirections& directions,
+                       double threshold)
+    : index_(RandomOrder(static_cast<int>(points.size()), 1)),
       sigma_px_(threshold / kInlierSigmas) {
   const std::size_t n = points.size();
   if (n == 0) return;
@@ -111,7 +111,7 @@ ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLi
   center_ = 0.5 * (low + high);
   scale_ = std::max(0.5 * (high - low).norm(), 1e-12);
   box_area_ = (high - low).prod() / (scale_ * scale_);
-  data_.resize((directions != nullptr ? 8 : 6) * n);
+  data_.resize((directions.normals.empty() ? 6 : 8) * n);
   double area = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
     CalibratedPoint p = points[static_cast<std::size_t>(index_[i])];
@@ -127,7 +127,7 @@ ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const ConicLi
     points_.push_back(p);
   }
   pixel_ = std::sqrt(area / static_cast<double>(n));
-  if (directions != nullptr) ReadDirections(*directions);
+  if (!directions.normals.empty()) ReadDirections(directions);
 }
 
 void ConicModel::ReadDirections(const EdgeDirections& directions) {
@@ -168,9 +168,9 @@ bool ConicModel::Normalize(Value* value) const {
   const double k = std::abs(det) / minor;
   const double half = 0.5 * std::abs(trace);
   const double large = half + std::sqrt(std::max(0.0, half * half - minor));
-  const double min_axis = limits_.min_axis_px * pixel_;
+  const double min_axis = kMinAxisPx * pixel_;
   if (k < min_axis * min_axis * large) return false;
-  if (k * large > limits_.max_axis_ratio * limits_.max_axis_ratio * minor) return false;
+  if (k * large > kMaxAxisRatio * kMaxAxisRatio * minor) return false;
   const double norm = std::sqrt(a * a + c * c + f * f + 2.0 * (b * b + d * d + e * e));
   const double factor = (trace < 0.0 ? -1.0 : 1.0) / norm;
   for (double& v : *value) v *= factor;
@@ -235,10 +235,9 @@ bool ConicModel::Accept(const Value& value, double threshold) const {
     }
   }
   // Evenly spread inliers leave a fifth of their arc outside.
-  const int too_few =
-      static_cast<int>(std::ceil(0.8 * limits_.min_arc_deg * kConicSectors / 360.0)) - 1;
+  const int too_few = static_cast<int>(std::ceil(0.8 * kMinArcDeg * kConicSectors / 360.0)) - 1;
   if (too_few > 0 && HoldMost(counts, too_few)) return false;
-  return GainOfLine(some, threshold * pixel_) <= limits_.max_line_share * gain;
+  return GainOfLine(some, threshold * pixel_) <= kMaxLineShare * gain;
 }
 
 double ConicModel::BandShare(const Value& value, double threshold) const {
@@ -267,10 +266,6 @@ double ConicModel::DirectionMiss(const Value& value, int i) const {
   const double sine = Cross(gradient, normals_[static_cast<std::size_t>(i)]);
   const double scale = sigma_rad_ * sigma_rad_ * gradient.squaredNorm();
   return scale > 0.0 ? sine * sine / scale : 0.0;
-}
-
-bool ConicModel::DirectionFits(const Value& value, int i) const {
-  return DirectionMiss(value, i) < kInlierSigmas * kInlierSigmas;
 }
 
 }  // namespace circline

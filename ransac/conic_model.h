@@ -16,26 +16,10 @@
 
 namespace CIRCLINE_EXPORT circline {
 
-// Which ellipses are worth a look. They keep out what explains a straight edge or a blob of
-// clutter.
-struct ConicLimits {
-  double min_axis_px = 2.0;  // Smallest semi-minor axis; 0 or more.
-  // Largest semi-major axis, in half diagonals of the points' box; > 0.
-  double max_axis_ratio = 10.0;
-  // Angle (of the eccentric anomaly) over which the inliers spread, degrees, in [0, 360). Under
-  // about 60 the shape of an ellipse is open, and only its covariance says so.
-  double min_arc_deg = 30.0;
-  // What the best straight line may explain of the ellipse's inliers, relative to the ellipse; > 0.
-  double max_line_share = 0.75;
-
-  // Ok, or a sentence that names the field which is wrong.
-  Status Validate() const;
-};
-
 // Directions of the edge at the points, for those who have them (EdgePoint of edges.h has).
 struct EdgeDirections {
-  // One per point: unit gradient, across the contour, on the photo; its sense has no meaning. Zero
-  // where it is not known.
+  // None, or one per point: unit gradient, across the contour, on the photo; its sense has no
+  // meaning. Zero where it is not known.
   std::vector<Eigen::Vector2d> normals;
   double sigma_rad = 0.1;  // Standard deviation of a normal's angle, radians; in (0, 0.5].
 
@@ -54,16 +38,18 @@ class ConicModel {
   using Value = std::array<double, 6>;
   static constexpr int kMinSamples = 5;  // Points of a conic.
 
-  // `directions` (optional), one for each point, are read here only; `threshold` as the engine's.
-  ConicModel(const std::vector<CalibratedPoint>& points, const ConicLimits& limits,
-             const EdgeDirections* directions = nullptr, double threshold = kInlierSigmas);
+  // `directions` (with none, or one for each point) are read here only; `threshold` as the
+  // engine's.
+  explicit ConicModel(const std::vector<CalibratedPoint>& points,
+                      const EdgeDirections& directions = {}, double threshold = kInlierSigmas);
 
   int NumData() const { return static_cast<int>(index_.size()); }  // All points.
   // Index into the constructor's points of the datum at position i.
   int PointIndex(int i) const { return index_[static_cast<std::size_t>(i)]; }
   // The ellipse in calibrated coordinates, any scale.
   Eigen::Matrix3d ToConic(const Value& value) const;
-  // The reverse; false, where it is not a real ellipse within the limits.
+  // The reverse; false, where it is not a real ellipse, or is too small or too large for the
+  // points.
   bool FromConic(const Eigen::Matrix3d& conic, Value* value) const;
 
   // As the engine asks for it (ransac.h).
@@ -72,7 +58,8 @@ class ConicModel {
   void SquaredResiduals(const Value& value, int begin, int end, float* r2) const;
   // As the engine asks for it (ransac.h).
   bool Refine(const float* weights, Value* value) const;
-  // Whether the points within the threshold spread over limits.min_arc_deg and are no straight
+  // Whether the points within the threshold spread over 30 degrees (of the eccentric anomaly; under
+  // about 60 the shape of an ellipse is open, and only its covariance says so) and are no straight
   // edge.
   bool Accept(const Value& value, double threshold) const;
 
@@ -94,8 +81,6 @@ class ConicModel {
   double PixelsBetween(int i, int j) const { return (Position(i) - Position(j)).norm() / pixel_; }
   // Squared sine residual of datum i, in standard deviations; 0 where its direction is not known.
   double DirectionMiss(const Value& value, int i) const;
-  // Whether it is within kInlierSigmas of them.
-  bool DirectionFits(const Value& value, int i) const;
 
  private:
   friend class OrientedConicModel;
@@ -104,10 +89,9 @@ class ConicModel {
   template <bool kOriented>
   void Residuals(const Value& value, int begin, int end, float* r2) const;
   void ReadDirections(const EdgeDirections& directions);
-  // True if the value is a real ellipse within the limits; makes it negative inside, of unit norm.
+  // The same, as FromConic; makes the value negative inside, of unit norm.
   bool Normalize(Value* value) const;
 
-  ConicLimits limits_;
   std::vector<int> index_;
   // x, y, the four entries of x_from_pixel and, with directions, the normal scaled to pixels per
   // unit sine: six or eight flat arrays.

@@ -123,11 +123,10 @@ class PointFitter {
   }
 
   // Those of the points; none where the contour has none.
-  std::optional<EdgeDirections> Directions(const FittedFeature& f,
-                                           const CircleObservation& circle) const {
-    if (circle.normals.empty()) return {};
+  EdgeDirections Directions(const FittedFeature& f, const CircleObservation& circle) const {
     EdgeDirections directions;
     directions.sigma_rad = run_.options.direction_sigma_rad;
+    if (circle.normals.empty()) return directions;
     for (const int i : f.indices)
       directions.normals.push_back(circle.normals[static_cast<std::size_t>(i)]);
     return directions;
@@ -135,14 +134,13 @@ class PointFitter {
 
   // From `initial`, or by a search.
   Status FitCircle(const FittedFeature& f, const ConicFit* initial, CircleObservation* circle) {
-    const std::optional<EdgeDirections> directions = Directions(f, *circle);
-    const EdgeDirections* given = directions ? &*directions : nullptr;
+    const EdgeDirections directions = Directions(f, *circle);
     const RobustFitOptions options = NextOptions(f);
     ConicFit fit;
     const Status status =
-        initial == nullptr ? FitConicRobust(f.points, options, &fit, &mask_, ConicLimits(), given)
-                           : RefitConicRobust(f.points, options, initial->conic, &fit, &mask_,
-                                              ConicLimits(), given);
+        initial == nullptr
+            ? FitConicRobust(f.points, options, &fit, &mask_, directions)
+            : RefitConicRobust(f.points, options, initial->conic, &fit, &mask_, directions);
     if (!status.ok()) return status;
     circle->fit = fit;
     circle->inliers = PixelMask(f, circle->points.size());
@@ -150,11 +148,9 @@ class PointFitter {
   }
 
   void FitSecond(const FittedFeature& f, CircleObservation* circle) {
-    const std::optional<EdgeDirections> directions = Directions(f, *circle);
     ConicReading second;
-    const Status status =
-        FitSecondConic(f.points, NextOptions(f), circle->fit->conic, &second.fit, &mask_,
-                       ConicLimits(), directions ? &*directions : nullptr);
+    const Status status = FitSecondConic(f.points, NextOptions(f), circle->fit->conic, &second.fit,
+                                         &mask_, Directions(f, *circle));
     if (!status.ok()) return;
     second.inliers = PixelMask(f, circle->points.size());
     const auto share = 100 * std::count(mask_.begin(), mask_.end(), 1) /

@@ -26,33 +26,30 @@ struct ConicCandidate {
 // Some of the points, with their directions if there are any.
 struct ContourSubset {
   std::vector<CalibratedPoint> points;
-  std::optional<EdgeDirections> directions;
+  EdgeDirections directions;
 
-  ContourSubset(const std::vector<CalibratedPoint>& all, const EdgeDirections* all_directions,
+  ContourSubset(const std::vector<CalibratedPoint>& all, const EdgeDirections& all_directions,
                 const std::vector<int>& indices) {
-    if (all_directions != nullptr) directions = EdgeDirections{{}, all_directions->sigma_rad};
+    directions.sigma_rad = all_directions.sigma_rad;
     for (const int i : indices) {
       const auto k = static_cast<std::size_t>(i);
       points.push_back(all[k]);
-      if (directions) directions->normals.push_back(all_directions->normals[k]);
+      if (!all_directions.normals.empty()) directions.normals.push_back(all_directions.normals[k]);
     }
   }
-
-  const EdgeDirections* Directions() const { return directions ? &*directions : nullptr; }
 };
 
 // The search for one ellipse in one set of points.
 class ConicSearch {
  public:
   // All outlive the search.
-  ConicSearch(const std::vector<CalibratedPoint>& points, const EdgeDirections* directions,
-              const RobustFitOptions& options, const ConicLimits& limits)
+  ConicSearch(const std::vector<CalibratedPoint>& points, const EdgeDirections& directions,
+              const RobustFitOptions& options)
       : points_(points),
         directions_(directions),
         options_(options),
-        limits_(limits),
-        model_(points, limits, directions, options.ransac.threshold) {
-    if (directions != nullptr) oriented_.emplace(model_);
+        model_(points, directions, options.ransac.threshold) {
+    if (!directions.normals.empty()) oriented_.emplace(model_);
   }
 
   const ConicModel& model() const { return model_; }
@@ -82,9 +79,8 @@ class ConicSearch {
                    std::vector<ConicCandidate>* candidates) const;
 
   const std::vector<CalibratedPoint>& points_;
-  const EdgeDirections* directions_;
+  const EdgeDirections& directions_;
   const RobustFitOptions& options_;
-  const ConicLimits& limits_;
   ConicModel model_;
   std::optional<OrientedConicModel> oriented_;
 };
@@ -187,7 +183,7 @@ void ConicSearch::SearchAmong(const std::vector<int>& indices, const RansacOptio
   const int num_points = static_cast<int>(indices.size());
   if (10 * num_points > 9 * model_.NumData()) return;
   const ContourSubset rest(points_, directions_, indices);
-  const ConicSearch search(rest.points, rest.Directions(), options_, limits_);
+  const ConicSearch search(rest.points, rest.directions, options_);
   // What could win has more than half as many inliers; a tenth of the draws may go into that.
   constexpr int kFewest = 500;
   const int needed = RequiredIterations(num_points, std::min(num_points, num_inliers * 3 / 5),
@@ -227,7 +223,7 @@ Status ConicSearch::Finish(const ConicCandidate& candidate, ConicFit* fit,
   if (mask != nullptr) mask->assign(points_.size(), 0);
   std::vector<double> distances;
   for (int i = 0; i < model_.NumData(); ++i) {
-    if (!model_.DirectionFits(value, i)) continue;
+    if (!(model_.DirectionMiss(value, i) < kInlierSigmas * kInlierSigmas)) continue;
     const std::size_t point = static_cast<std::size_t>(model_.PointIndex(i));
     distances.push_back(ConicDistancePx(points_[point], result.conic));
     if (mask != nullptr) (*mask)[point] = std::abs(distances.back()) <= threshold ? 1 : 0;
@@ -238,10 +234,9 @@ Status ConicSearch::Finish(const ConicCandidate& candidate, ConicFit* fit,
 }
 
 Status Check(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
-             const ConicLimits& limits, const EdgeDirections* directions) {
+             const EdgeDirections& directions) {
   Status status = options.Validate();
-  if (status.ok()) status = limits.Validate();
-  if (status.ok() && directions != nullptr) status = directions->Validate(points.size());
+  if (status.ok()) status = directions.Validate(points.size());
   if (status.ok() && points.size() < 5) return Status::Refused("an ellipse needs five points");
   return status;
 }
@@ -249,11 +244,11 @@ Status Check(const std::vector<CalibratedPoint>& points, const RobustFitOptions&
 }  // namespace
 
 Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
-                      ConicFit* fit, std::vector<std::uint8_t>* mask, const ConicLimits& limits,
-                      const EdgeDirections* directions) {
-  Status status = Check(points, options, limits, directions);
+                      ConicFit* fit, std::vector<std::uint8_t>* mask,
+                      const EdgeDirections& directions) {
+  Status status = Check(points, options, directions);
   if (!status.ok()) return status;
-  const ConicSearch search(points, directions, options, limits);
+  const ConicSearch search(points, directions, options);
   status = NoEllipse();
   for (const ConicCandidate& candidate : search.Run()) {
     status = search.Finish(candidate, fit, mask);
@@ -264,11 +259,10 @@ Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFi
 
 Status RefitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                         const Eigen::Matrix3d& initial, ConicFit* fit,
-                        std::vector<std::uint8_t>* mask, const ConicLimits& limits,
-                        const EdgeDirections* directions) {
-  const Status status = Check(points, options, limits, directions);
+                        std::vector<std::uint8_t>* mask, const EdgeDirections& directions) {
+  const Status status = Check(points, options, directions);
   if (!status.ok()) return status;
-  const ConicSearch search(points, directions, options, limits);
+  const ConicSearch search(points, directions, options);
   ConicModel::Value value;
   if (!search.model().FromConic(initial, &value)) return NoEllipse();
   return search.Finish(search.Polished(value), fit, mask);
@@ -276,8 +270,8 @@ Status RefitConicRobust(const std::vector<CalibratedPoint>& points, const Robust
 
 Status FitSecondConic(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                       const Eigen::Matrix3d& first, ConicFit* fit, std::vector<std::uint8_t>* mask,
-                      const ConicLimits& limits, const EdgeDirections* directions) {
-  Status status = Check(points, options, limits, directions);
+                      const EdgeDirections& directions) {
+  Status status = Check(points, options, directions);
   if (!status.ok()) return status;
   std::vector<int> left;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -286,7 +280,7 @@ Status FitSecondConic(const std::vector<CalibratedPoint>& points, const RobustFi
   }
   if (left.size() <= 5) return NoEllipse();
   const ContourSubset rest(points, directions, left);
-  const ConicSearch search(rest.points, rest.Directions(), options, limits);
+  const ConicSearch search(rest.points, rest.directions, options);
   const std::optional<ConicCandidate> candidate = search.RunShort();
   if (!candidate) return NoEllipse();
   std::vector<std::uint8_t> rest_mask;

@@ -17,12 +17,13 @@ namespace CIRCLINE_EXPORT circline {
 // The ellipse that the points support best, as a maximum-likelihood fit of its inliers with
 // covariance; options.ransac.threshold in pixels of the photo. `mask` (optional) receives one value
 // per point, 1 where the returned ellipse passes within the threshold (and along the point's edge,
-// where directions are given). Refuses fewer than five points, and points that no ellipse within
-// `limits` explains. `fit` and `mask` are written only if the status is ok.
+// where directions are given). Refuses fewer than five points, and points that no ellipse explains:
+// one with a semi-minor axis of 2 px or more, along 30 degrees of it or more, and better than a
+// straight line. `fit` and `mask` are written only if the status is ok.
 //
-// `directions` (optional) are those of the edge at the points: samples are then of three points
-// instead of five, and clutter with another direction has no say. They choose the points; the fit
-// is one of positions.
+// `directions` (none if empty) are those of the edge at the points: samples are then of three
+// points instead of five, and clutter with another direction has no say. They choose the points;
+// the fit is one of positions.
 //
 // How good: 100 points of a full contour, sigma 1 px, uniform clutter: error over the Cramer-Rao
 // bound of the inliers (median; 0.93 is a perfect estimator's) 0.95 at 30 % outliers, 0.98 at 50,
@@ -33,14 +34,14 @@ namespace CIRCLINE_EXPORT circline {
 // directions 0.8), 42 at 90 (6.5). apps/benchmark/robust_fit_benchmark.cc measures it.
 Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                       ConicFit* fit, std::vector<std::uint8_t>* mask = nullptr,
-                      const ConicLimits& limits = {}, const EdgeDirections* directions = nullptr);
+                      const EdgeDirections& directions = {});
 
 // The same from an ellipse that is already near (tracked, predicted): its inliers, reweighted, and
 // no search.
 Status RefitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                         const Eigen::Matrix3d& initial, ConicFit* fit,
-                        std::vector<std::uint8_t>* mask = nullptr, const ConicLimits& limits = {},
-                        const EdgeDirections* directions = nullptr);
+                        std::vector<std::uint8_t>* mask = nullptr,
+                        const EdgeDirections& directions = {});
 
 // A second ellipse through points that `first` leaves out by more than twice the threshold: a
 // second rim, a neighbour. Refuses what is no better than chance: where one as good or more is
@@ -49,8 +50,8 @@ Status RefitConicRobust(const std::vector<CalibratedPoint>& points, const Robust
 // left (a sixth with directions).
 Status FitSecondConic(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                       const Eigen::Matrix3d& first, ConicFit* fit,
-                      std::vector<std::uint8_t>* mask = nullptr, const ConicLimits& limits = {},
-                      const EdgeDirections* directions = nullptr);
+                      std::vector<std::uint8_t>* mask = nullptr,
+                      const EdgeDirections& directions = {});
 
 }  // namespace circline
 

@@ -105,7 +105,7 @@ bool OursOnPoints(const ConicScene& scene, Matrix3d* conic) {
 bool OursWithDirections(const ConicScene& scene, Matrix3d* conic) {
   ConicFit fit;
   const Status status =
-      FitConicRobust(scene.points, PixelOptions(), &fit, nullptr, ConicLimits(), &scene.directions);
+      FitConicRobust(scene.points, PixelOptions(), &fit, nullptr, scene.directions);
   if (!status.ok()) return false;
   *conic = fit.conic;
   return true;

@@ -69,7 +69,7 @@ class CircleFollower {
     options.ransac.threshold = kInlierPx;
     options.ransac.max_iterations = kMaxDraws;
     ConicFit fit;
-    if (!FitConicRobust(band_, options, &fit, nullptr, ConicLimits(), &directions_).ok()) {
+    if (!FitConicRobust(band_, options, &fit, nullptr, directions_).ok()) {
       return false;
     }
     candidate.conic = fit.conic;

@@ -18,7 +18,7 @@ using conic_scene::Scene;
 
 TEST(ConicModel, ResidualsAreDistancesInPixels) {
   const Scene scene = MakeScene(2, 0.5);
-  const ConicModel model(scene.points, ConicLimits());
+  const ConicModel model(scene.points);
   const std::array<int, 5> sample{0, 1, 2, 3, 4};
   Random random(1);
   int fitted = 0;
@@ -49,7 +49,7 @@ TEST(ConicModel, ResidualsAreDistancesInPixels) {
 
 TEST(ConicModel, RefineFindsTheMaximumLikelihood) {
   const Scene scene = MakeScene(4, 0.0);
-  const ConicModel model(scene.points, ConicLimits());
+  const ConicModel model(scene.points);
   ConicFit fit;
   ASSERT_TRUE(FitConic(scene.points, 1.0, &fit).ok());
   ConicModel::Value value, best;
@@ -66,7 +66,7 @@ TEST(ConicModel, RefineFindsTheMaximumLikelihood) {
 
 TEST(ConicModel, RefineNeedsFivePoints) {
   const Scene scene = MakeScene(4, 0.0);
-  const ConicModel model(scene.points, ConicLimits());
+  const ConicModel model(scene.points);
   std::vector<float> weights(scene.points.size(), 0.0f);
   for (std::size_t i = 0; i < 4; ++i) weights[i] = 1.0f;
   ConicFit fit;

@@ -44,7 +44,7 @@ TEST(OrientedConicModel, ThreeExactPointsGiveTheExactEllipse) {
   truth.b = 0.12;
   truth.angle = 0.6;
   const Scene scene = ExactScene(truth, 40);
-  const ConicModel points(scene.points, ConicLimits(), &scene.directions);
+  const ConicModel points(scene.points, scene.directions);
   const OrientedConicModel model(points);
   Random random(1);
   for (int trial = 0; trial < 200; ++trial) {
@@ -87,7 +87,7 @@ double FitShare(const Scene& scene, const ConicModel& points, int from, int to) 
 
 TEST(OrientedConicModel, RefusesMostSamplesOfOutliersAndFewOfInliers) {
   const Scene scene = MakeScene(1, 0.7);
-  const ConicModel points(scene.points, ConicLimits(), &scene.directions);
+  const ConicModel points(scene.points, scene.directions);
   const double inliers = FitShare(scene, points, 0, 100);
   const double outliers = FitShare(scene, points, 100, points.NumData());
   EXPECT_GT(inliers, 0.7);
@@ -97,7 +97,7 @@ TEST(OrientedConicModel, RefusesMostSamplesOfOutliersAndFewOfInliers) {
 TEST(OrientedConicModel, ResidualsHoldDistanceAndDirection) {
   const Scene scene = MakeScene(2, 0.5);
   const double threshold = 2.0;
-  const ConicModel model(scene.points, ConicLimits(), &scene.directions, threshold);
+  const ConicModel model(scene.points, scene.directions, threshold);
   ConicFit truth;
   ASSERT_TRUE(FitConic(scene.truth, 1.0, &truth).ok());
   ConicModel::Value value;
@@ -121,8 +121,8 @@ TEST(OrientedConicModel, ResidualsHoldDistanceAndDirection) {
 
 TEST(OrientedConicModel, NeedsFarFewerDraws) {
   const Scene scene = MakeScene(4, 0.7);
-  const ConicModel points(scene.points, ConicLimits(), &scene.directions);
-  const ConicModel plain(scene.points, ConicLimits());
+  const ConicModel points(scene.points, scene.directions);
+  const ConicModel plain(scene.points);
   RansacOptions options;
   options.threshold = kInlierSigmas;
   RansacReport<ConicModel::Value> oriented, five;
@@ -139,7 +139,7 @@ TEST(OrientedConicModel, RefusesDegenerateSamples) {
   Scene scene = MakeScene(1, 0.0);
   scene.directions.normals[1].setZero();
   scene.points[3] = scene.points[2];
-  const ConicModel points(scene.points, ConicLimits(), &scene.directions);
+  const ConicModel points(scene.points, scene.directions);
   const OrientedConicModel model(points);
   std::vector<int> position(scene.points.size());
   for (int i = 0; i < points.NumData(); ++i) {

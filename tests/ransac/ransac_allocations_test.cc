@@ -85,8 +85,8 @@ void ExpectNoAllocations(const Model& model, double threshold) {
 
 TEST(Ransac, TheModelsAllocateNothingInTheLoop) {
   const conic_scene::Scene contour = conic_scene::MakeScene(1, 0.5);
-  const ConicModel conic(contour.points, ConicLimits());
-  const ConicModel oriented(contour.points, ConicLimits(), &contour.directions);
+  const ConicModel conic(contour.points);
+  const ConicModel oriented(contour.points, contour.directions);
   ExpectNoAllocations(conic, kInlierSigmas);
   ExpectNoAllocations(OrientedConicModel(oriented), kInlierSigmas);
   ExpectNoAllocations(LineModel(contour.points), kInlierSigmas);

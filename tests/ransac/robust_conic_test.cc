@@ -34,8 +34,8 @@ Statistics RunTrials(int trials, double outlier_ratio, double arc_deg = 360.0,
         MakeScene(static_cast<std::uint64_t>(1000 + trial), outlier_ratio, arc_deg, clutter);
     RobustFitOptions options;
     ConicFit fit;
-    const Status status = FitConicRobust(scene.points, options, &fit, nullptr, ConicLimits(),
-                                         with_directions ? &scene.directions : nullptr);
+    const Status status = FitConicRobust(scene.points, options, &fit, nullptr,
+                                         with_directions ? scene.directions : EdgeDirections());
     errors.push_back(status.ok() ? scene.Error(fit.conic) : 1e9);
     if (!(errors.back() <= 3.0)) ++statistics.wrong;
   }
@@ -96,8 +96,7 @@ TEST(FitConicRobust, MaskLeavesOutWrongDirections) {
   std::vector<std::uint8_t> near, right;
   const RobustFitOptions options;
   ASSERT_TRUE(FitConicRobust(scene.points, options, &fit, &near).ok());
-  ASSERT_TRUE(
-      FitConicRobust(scene.points, options, &fit, &right, ConicLimits(), &scene.directions).ok());
+  ASSERT_TRUE(FitConicRobust(scene.points, options, &fit, &right, scene.directions).ok());
   EXPECT_EQ(near[0], 1);
   EXPECT_EQ(right[0], 0);
   const auto in_clutter = [](const std::vector<std::uint8_t>& mask) {
@@ -111,9 +110,8 @@ TEST(FitConicRobust, UnknownDirectionsAreLikeNone) {
   Scene scene = MakeScene(1, 0.3);
   for (std::size_t i = 0; i < scene.points.size(); i += 2) scene.directions.normals[i].setZero();
   ConicFit fit;
-  ASSERT_TRUE(FitConicRobust(scene.points, RobustFitOptions(), &fit, nullptr, ConicLimits(),
-                             &scene.directions)
-                  .ok());
+  ASSERT_TRUE(
+      FitConicRobust(scene.points, RobustFitOptions(), &fit, nullptr, scene.directions).ok());
   EXPECT_LE(scene.Error(fit.conic), 2.0);
 }
 
@@ -122,7 +120,7 @@ TEST(FitConicRobust, NamesBadDirections) {
   ConicFit fit;
   const auto message = [&](const EdgeDirections& directions) {
     const Status status =
-        FitConicRobust(scene.points, RobustFitOptions(), &fit, nullptr, ConicLimits(), &directions);
+        FitConicRobust(scene.points, RobustFitOptions(), &fit, nullptr, directions);
     EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
     return status.message;
   };
@@ -265,11 +263,6 @@ TEST(FitConicRobust, NamesBadOptions) {
   RobustFitOptions options;
   options.ransac.threshold = -1.0;
   EXPECT_EQ(FitConicRobust(scene.points, options, &fit).code, StatusCode::kInvalidArgument);
-  ConicLimits limits;
-  limits.min_arc_deg = 400.0;
-  const Status status = FitConicRobust(scene.points, RobustFitOptions(), &fit, nullptr, limits);
-  EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
-  EXPECT_NE(status.message.find("min_arc_deg"), std::string::npos);
 }
 
 // Share of scenes in which what the first fit leaves holds a second ellipse.
@@ -279,12 +272,12 @@ double ShareWithSecond(double outlier_ratio, Clutter clutter, bool with_directio
   for (int trial = 0; trial < trials; ++trial) {
     const Scene scene =
         MakeScene(static_cast<std::uint64_t>(2000 + trial), outlier_ratio, 360.0, clutter);
-    const EdgeDirections* directions = with_directions ? &scene.directions : nullptr;
+    const EdgeDirections directions = with_directions ? scene.directions : EdgeDirections();
     const RobustFitOptions options;
     ConicFit first, second;
     std::vector<std::uint8_t> mask;
-    EXPECT_TRUE(FitConicRobust(scene.points, options, &first, nullptr, {}, directions).ok());
-    if (!FitSecondConic(scene.points, options, first.conic, &second, &mask, {}, directions).ok())
+    EXPECT_TRUE(FitConicRobust(scene.points, options, &first, nullptr, directions).ok());
+    if (!FitSecondConic(scene.points, options, first.conic, &second, &mask, directions).ok())
       continue;
     ++seconds;
     EXPECT_EQ(mask.size(), scene.points.size());
