@@ -83,13 +83,13 @@ class ConicModel {
   double DirectionMiss(const Value& value, int i) const;
 
  private:
-  friend class OrientedConicModel;
+  friend class OrientedConicModel;  // Derived: another way to draw samples.
 
   const CalibratedPoint& Point(int i) const { return points_[static_cast<std::size_t>(i)]; }
   template <bool kOriented>
   void Residuals(const Value& value, int begin, int end, float* r2) const;
   void ReadDirections(const EdgeDirections& directions);
-  // The same, as FromConic; makes the value negative inside, of unit norm.
+  // Whether it is an ellipse as FromConic gives them; makes it negative inside, of unit norm.
   bool Normalize(Value* value) const;
 
   std::vector<int> index_;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "circline/estimators/basics.h"
 
@@ -32,12 +33,12 @@ void AddLinePair(double k, const Side& l, const Side& m, ConicModel::Value* coni
 
 }  // namespace
 
-OrientedConicModel::OrientedConicModel(const ConicModel& model) : model_(model) {
-  tangents_.resize(model.normals_.size(), Eigen::Vector2d::Zero());
+OrientedConicModel::OrientedConicModel(ConicModel model) : ConicModel(std::move(model)) {
+  tangents_.resize(normals_.size(), Eigen::Vector2d::Zero());
   for (std::size_t i = 0; i < tangents_.size(); ++i) {
-    const Eigen::Vector2d& normal = model.normals_[i];
+    const Eigen::Vector2d& normal = normals_[i];
     if (normal.isZero(0.0)) continue;
-    const std::array<double, 4>& j = model.points_[i].x_from_pixel;
+    const std::array<double, 4>& j = points_[i].x_from_pixel;
     tangents_[i] = Eigen::Vector2d(-j[0] * normal.y() + j[1] * normal.x(),
                                    -j[2] * normal.y() + j[3] * normal.x())
                        .normalized();
@@ -46,8 +47,8 @@ OrientedConicModel::OrientedConicModel(const ConicModel& model) : model_(model) 
 
 bool OrientedConicModel::Fit(const int* sample, Value* value) const {
   std::array<const Eigen::Vector2d*, 3> x;
-  for (std::size_t i = 0; i < 3; ++i) x[i] = &model_.Position(sample[i]);
-  const double sigma = model_.sigma_px_ * model_.pixel_;
+  for (std::size_t i = 0; i < 3; ++i) x[i] = &Position(sample[i]);
+  const double sigma = sigma_px_ * pixel_;
   std::array<Side, 3> sides;
   std::array<double, 3> inverse_length2;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -72,9 +73,9 @@ bool OrientedConicModel::Fit(const int* sample, Value* value) const {
     if (both == 0.0) return false;
     ratios[i] = -along_j / along_k;
     const double slope = area / both;
-    variances[i] = slope * slope *
-                   (model_.sigma_rad_ * model_.sigma_rad_ +
-                    sigma * sigma * (inverse_length2[j] + inverse_length2[k]));
+    variances[i] =
+        slope * slope *
+        (sigma_rad_ * sigma_rad_ + sigma * sigma * (inverse_length2[j] + inverse_length2[k]));
     variance += variances[i];
     product *= ratios[i];
   }
@@ -88,7 +89,7 @@ bool OrientedConicModel::Fit(const int* sample, Value* value) const {
   AddLinePair(k0, sides[1], sides[2], value);
   AddLinePair(k1, sides[2], sides[0], value);
   AddLinePair(1.0, sides[0], sides[1], value);
-  return model_.Normalize(value);
+  return Normalize(value);
 }
 
 }  // namespace circline
