@@ -69,7 +69,7 @@ class Assembler {
     // All circles: on small ones the normal is too uncertain to tell who belongs to the plane.
     std::vector<Matrix3d> conics;
     for (const CircleEvidence& circle : circles_) conics.push_back(circle.observation.fit->conic);
-    std::vector<DetectedPencil> rows = FindGridPencils(camera, conics, of_circles.normal.vector);
+    std::vector<DetectedPencil> rows = FindGridPencils(camera, conics, of_circles.normal.direction);
     const std::size_t before = pencils_.size();
     Place(&rows);
     for (std::size_t i = before; i < pencils_.size(); ++i) pencils_[i].of_grid = true;
@@ -89,7 +89,7 @@ class Assembler {
       normals.assign(circle.normals.begin(), circle.normals.begin() + circle.num_normals);
     }
     std::vector<Vector3d> vectors;
-    for (const UncertainDirection& normal : normals) vectors.push_back(normal.vector);
+    for (const UncertainDirection& normal : normals) vectors.push_back(normal.direction);
     std::optional<FoundBox> box = FindBox(AllLines(), vectors, options_.diagonal_px);
     if (!box) return false;
     plane->normal = normals[box->given];
@@ -106,12 +106,12 @@ class Assembler {
       return false;
     std::vector<Vector3d> axes;
     for (const PlacedPencil& pencil : pencils_) {
-      if (!pencil.of_grid) axes.push_back(pencil.direction.vector);
+      if (!pencil.of_grid) axes.push_back(pencil.along.direction);
     }
     std::optional<FoundBox> box = FindFreeBox(AllLines(), axes, options_.diagonal_px);
     if (!box || (is_of_pencils && !Contradicts(*box, *plane))) return false;
     *plane = Plane();
-    plane->normal.vector = box->axes.col(2);
+    plane->normal.direction = box->axes.col(2);
     plane->support_px = box->pencils[0].support_px + box->pencils[1].support_px;
     const int first = static_cast<int>(pencils_.size());
     plane->pencils = {first, first + 1};
@@ -127,7 +127,7 @@ class Assembler {
     if (!found) return false;
     PlacedPencil x(std::move((*found)[0])), y(std::move((*found)[1]));
     UncertainDirection normal;
-    if (!SpannedNormal(x.direction, y.direction, &normal)) return false;
+    if (!SpannedNormal(x.along, y.along, &normal)) return false;
     for (const int i : plane->circles) {
       if (!CanLieIn(*circles_[static_cast<std::size_t>(i)].observation.fit, normal)) return false;
     }
@@ -154,7 +154,7 @@ class Assembler {
   PlacedPencil& At(int i) { return pencils_[static_cast<std::size_t>(i)]; }
 
   double LogOddsOf(const PlacedPencil& pencil) const {
-    return LogOddsOfDirection(lines_, pencil.members, pencil.direction.vector);
+    return LogOddsOfDirection(lines_, pencil.members, pencil.along.direction);
   }
 
   // Whether the box has another direction than the two pencils, and better evidence for it: what
@@ -168,7 +168,7 @@ class Assembler {
       bool is_axis = false;
       for (std::size_t k = 0; k < 3; ++k) {
         const Vector3d axis = box.axes.col(static_cast<Eigen::Index>(k));
-        if (!AreAlike(pencil.direction.vector, axis)) continue;
+        if (!AreAlike(pencil.along.direction, axis)) continue;
         is_axis = true;
         of_box[k] = 0.0;
       }
@@ -184,7 +184,7 @@ class Assembler {
       circles_[static_cast<std::size_t>(i)].observation.plane = "p0";
     if (plane.support_px <= 0.0) return;
     for (PlacedPencil& pencil : pencils_) {
-      if (!InPlane(pencil.direction, plane.normal, options_.max_shared_plane_deg)) continue;
+      if (!InPlane(pencil.along, plane.normal, options_.max_shared_plane_deg)) continue;
       if (BelongsTo(plane, pencil)) pencil.observation.plane = "p0";
     }
     for (const int i : plane.pencils) {
@@ -228,13 +228,12 @@ class Assembler {
     for (std::size_t a = 0; a < order.size(); ++a) {
       for (std::size_t b = a + 1; b < order.size(); ++b) {
         PlacedPencil &x = At(order[a]), &y = At(order[b]);
-        const bool grid = x.of_grid && y.of_grid && Rectangular(x.direction, y.direction);
-        if (!grid && !(RightAngle(x.direction, y.direction, options_.camera).LogOdds() > 0.0))
-          continue;
+        const bool grid = x.of_grid && y.of_grid && Rectangular(x.along, y.along);
+        if (!grid && !(RightAngle(x.along, y.along, options_.camera).LogOdds() > 0.0)) continue;
         x.observation.direction = PencilDirection::kX;
         y.observation.direction = PencilDirection::kY;
         if (plane.circles.empty()) ReadAgain(&x, &y);
-        Judge(x, &y, SetNormalRole(x.direction, y.direction));
+        Judge(x, &y, SetNormalRole(x.along, y.along));
         return;
       }
     }
@@ -243,7 +242,7 @@ class Assembler {
   // How else the less well known of two pencils may run: what lines are its own is not certain.
   void ReadAgain(PlacedPencil* x, PlacedPencil* y) const {
     if (x->of_grid || y->of_grid) return;
-    const auto variance = [](const PlacedPencil& p) { return p.direction.covariance.trace(); };
+    const auto variance = [](const PlacedPencil& p) { return p.along.covariance.trace(); };
     if (variance(*x) > variance(*y)) std::swap(x, y);
     const LineSet set(lines_, options_.diagonal_px);
     std::vector<LineFit> others;
@@ -251,7 +250,7 @@ class Assembler {
       if (!set.IsTwin(i) && !x->Has(i)) others.push_back(set.fits[static_cast<std::size_t>(i)]);
     }
     y->observation.readings =
-        ReadDirection(others, x->direction.vector, y->direction.vector, set.Count(y->members));
+        ReadDirection(others, x->along.direction, y->along.direction, set.Count(y->members));
   }
 
   // Pencils of the plane: those that span it, then the others by support, but for repetitions.
@@ -262,7 +261,7 @@ class Assembler {
     }
     for (std::size_t i = 0; i < pencils_.size(); ++i) {
       const bool is_new = std::none_of(order.begin(), order.end(), [&](int other) {
-        return AreAlike(pencils_[i].direction.vector, At(other).direction.vector);
+        return AreAlike(pencils_[i].along.direction, At(other).along.direction);
       });
       if (pencils_[i].observation.plane == "p0" && is_new) order.push_back(static_cast<int>(i));
     }
@@ -290,8 +289,8 @@ class Assembler {
   PlacedPencil* SetNormalRole(const UncertainDirection& x, const UncertainDirection& y) {
     for (PlacedPencil& pencil : pencils_) {
       if (!pencil.observation.plane.empty()) continue;
-      if (!(RightAngle(pencil.direction, x, options_.camera).LogOdds() > 0.0) ||
-          !(RightAngle(pencil.direction, y, options_.camera).LogOdds() > 0.0)) {
+      if (!(RightAngle(pencil.along, x, options_.camera).LogOdds() > 0.0) ||
+          !(RightAngle(pencil.along, y, options_.camera).LogOdds() > 0.0)) {
         continue;
       }
       pencil.observation.direction = PencilDirection::kZ;
@@ -323,7 +322,7 @@ class Assembler {
       if (static_cast<int>(observations->pencils.size()) >= options_.max_pencils) break;
       // Old houses have verticals a degree apart: what is nearly parallel to a better supported
       // pencil says nothing new, and no plane is spanned by both.
-      const Vector3d& v = pencil.direction.vector;
+      const Vector3d& v = pencil.along.direction;
       if (std::any_of(directions.begin(), directions.end(),
                       [&](const Vector3d& direction) { return AreAlike(v, direction); }))
         continue;

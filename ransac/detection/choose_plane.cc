@@ -48,7 +48,7 @@ bool HasLongerNeighbour(const std::vector<PlacedPencil>& pencils, std::size_t i)
   return !pencils[i].of_grid &&
          std::any_of(pencils.begin(), pencils.end(), [&](const PlacedPencil& other) {
            return other.support_px > pencils[i].support_px &&
-                  AreAlike(pencils[i].direction.vector, other.direction.vector);
+                  AreAlike(pencils[i].along.direction, other.along.direction);
          });
 }
 
@@ -61,9 +61,8 @@ double JointSupport(const PlacedPencil& a, const PlacedPencil& b, double diagona
   const double share = std::min(of_a / a.support_px, of_b / b.support_px);
   const double larger_share = std::max(of_a / a.support_px, of_b / b.support_px);
   const bool is_rectangle =
-      (share >= kMinRectangularShare && Rectangular(a.direction, b.direction)) ||
-      (larger_share >= kMinRectangularShare &&
-       RightAngle(a.direction, b.direction).LogOdds() > 0.0);
+      (share >= kMinRectangularShare && Rectangular(a.along, b.along)) ||
+      (larger_share >= kMinRectangularShare && RightAngle(a.along, b.along).LogOdds() > 0.0);
   const bool is_plane = share >= kMinSpanningShare || is_rectangle;
   return is_plane ? 2.0 * std::min(of_a, of_b) * std::sqrt(share) : 0.0;
 }
@@ -220,7 +219,7 @@ class PlaneChooser {
     for (const CircleEvidence& circle : circles_) {
       double ratio = 0.0;
       for (int k = 0; k < circle.num_normals; ++k)
-        ratio += LikelihoodRatio(circle.normals[static_cast<std::size_t>(k)], normal.vector);
+        ratio += LikelihoodRatio(circle.normals[static_cast<std::size_t>(k)], normal.direction);
       ratios.push_back(ratio / circle.num_normals);
     }
     return LogOddsOfMixture(ratios) + std::log(ShareOfHemisphere(normal));
@@ -237,7 +236,7 @@ class PlaneChooser {
       for (std::size_t j = i + 1; j < pencils.size(); ++j) {
         if (HasLongerNeighbour(pencils, j)) continue;
         Plane plane;
-        if (!SpannedNormal(pencils[i].direction, pencils[j].direction, &plane.normal)) continue;
+        if (!SpannedNormal(pencils[i].along, pencils[j].along, &plane.normal)) continue;
         plane.pencils = {static_cast<int>(i), static_cast<int>(j)};
         plane.support_px = JointSupport(pencils[i], pencils[j], options_.diagonal_px);
         if (!(plane.support_px > 0.0) || IsAccident(plane, pencils[i], pencils[j])) continue;
@@ -254,7 +253,7 @@ class PlaneChooser {
   // two planes that face each other, as the houses of a street and the walls of a corridor, and not
   // all far away; or they pass for parallel by accident, as ripples, rock and grass do.
   bool IsAccident(const Plane& plane, const PlacedPencil& a, const PlacedPencil& b) const {
-    const Sides of_a(lines_, a, plane.normal.vector), of_b(lines_, b, plane.normal.vector);
+    const Sides of_a(lines_, a, plane.normal.direction), of_b(lines_, b, plane.normal.direction);
     return std::min(of_a.beyond, of_b.beyond) > kMostBeyond &&
            std::max(of_a.grazing, of_b.grazing) > 0.5;
   }
@@ -270,7 +269,7 @@ class PlaneChooser {
     std::array<DetectedPencil, 2> pair = {first, second};
     if (!RefitWhereTheyMeet(lines_, &pair, options_.diagonal_px)) return true;
     const PlacedPencil a(std::move(pair[0])), b(std::move(pair[1]));
-    if (!SpannedNormal(a.direction, b.direction, &plane->normal)) {
+    if (!SpannedNormal(a.along, b.along, &plane->normal)) {
       pencils->erase(pencils->begin() + plane->pencils[1]);
       return false;
     }

@@ -14,11 +14,10 @@ namespace circline {
 // A pencil, and its direction as the tests take it.
 struct PlacedPencil : DetectedPencil {
   explicit PlacedPencil(DetectedPencil pencil)
-      : DetectedPencil(std::move(pencil)),
-        direction{observation.fit->direction, observation.fit->covariance} {}
-  PlacedPencil(DetectedPencil pencil, const Eigen::Vector3d& along)
-      : DetectedPencil(std::move(pencil)), direction{along, Eigen::Matrix3d::Zero()} {}
-  UncertainDirection direction;
+      : DetectedPencil(std::move(pencil)), along(*observation.fit) {}
+  PlacedPencil(DetectedPencil pencil, const Eigen::Vector3d& direction)
+      : DetectedPencil(std::move(pencil)), along{direction, Eigen::Matrix3d::Zero()} {}
+  UncertainDirection along;
   bool of_grid = false;  // A row or column of circles.
   bool spans = false;    // One of the two that the plane was chosen by.
 };

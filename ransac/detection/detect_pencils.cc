@@ -88,8 +88,8 @@ std::vector<int> LinesAround(const LineSet& set, const std::vector<DetectedPenci
 }
 
 // An edge that is broken into pieces is one line: where it meets another, all of them do. Of each
-// edge in lines[subset] the first piece, which is the longest.
-std::vector<int> OneOfEachEdge(const LineSet& set, const std::vector<int>& subset) {
+// edge in lines[subset] the fit of the first piece, which is the longest.
+std::vector<LineFit> OneOfEachEdge(const LineSet& set, const std::vector<int>& subset) {
   std::vector<int> edges;
   const double px = kTwinShareOfPhoto * set.diagonal_px;
   for (const int i : subset) {
@@ -102,17 +102,16 @@ std::vector<int> OneOfEachEdge(const LineSet& set, const std::vector<int>& subse
     });
     if (!set.IsTwin(i) && !is_piece) edges.push_back(i);
   }
-  return edges;
+  std::vector<LineFit> fits;
+  for (const int i : edges) fits.push_back(set.fits[static_cast<std::size_t>(i)]);
+  return fits;
 }
 
 // Boxes, boards and rooms have right angles: the direction orthogonal to `axis` that lines[subset]
 // have the best evidence of, if any.
 std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::vector<int>& subset,
                                                const Vector3d& axis) {
-  std::vector<LineFit> edges;
-  for (const int i : OneOfEachEdge(set, subset))
-    edges.push_back(set.fits[static_cast<std::size_t>(i)]);
-  const std::optional<Vector3d> best = OrthogonalEvidence(edges, axis).Best();
+  const std::optional<Vector3d> best = OrthogonalEvidence(OneOfEachEdge(set, subset), axis).Best();
   if (!best) return std::nullopt;
   return FitPencil(set, subset, *best, kParallelSigmaRad, PencilOptions().min_lines);
 }
@@ -180,16 +179,10 @@ std::vector<DetectedPencil> DetectPencils(const std::vector<DetectedLine>& lines
   return pencils;
 }
 
-std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
-                                      const std::vector<DetectedPencil>& pencils,
-                                      double diagonal_px) {
+std::vector<LineFit> EdgesAround(const std::vector<DetectedLine>& lines,
+                                 const std::vector<DetectedPencil>& pencils, double diagonal_px) {
   const LineSet set(lines, diagonal_px);
-  std::vector<DetectedLine> edges;
-  for (const int i : OneOfEachEdge(set, LinesAround(set, pencils))) {
-    edges.push_back(lines[static_cast<std::size_t>(i)]);
-    edges.back().fit = set.fits[static_cast<std::size_t>(i)];
-  }
-  return edges;
+  return OneOfEachEdge(set, LinesAround(set, pencils));
 }
 
 LineFit WithSharedError(const DetectedLine& line, double shared_px) {

@@ -46,11 +46,11 @@ std::vector<DetectedPencil> DetectPencilsApart(const std::vector<DetectedLine>& 
 bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
                  DetectedPencil* pencil, double diagonal_px = kUsualDiagonalPx);
 
-// Fits of the lines that come near those of some pencils and are of none of them, one of each edge,
-// longest first.
-std::vector<DetectedLine> EdgesAround(const std::vector<DetectedLine>& lines,
-                                      const std::vector<DetectedPencil>& pencils,
-                                      double diagonal_px = kUsualDiagonalPx);
+// Fits, as those of pencils, of the lines that come near those of some pencils and are of none of
+// them, one of each edge, longest first.
+std::vector<LineFit> EdgesAround(const std::vector<DetectedLine>& lines,
+                                 const std::vector<DetectedPencil>& pencils,
+                                 double diagonal_px = kUsualDiagonalPx);
 
 // The pencil of lines[members] along `direction`, each as good as its `fits` says (one a member):
 // the line's own with a covariance that counts whatever else the line may miss the direction by.

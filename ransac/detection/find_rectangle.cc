@@ -54,7 +54,7 @@ class RectangleSearch {
       if (ring.log_odds < least) continue;
       std::array<DetectedPencil, 2> pencils;
       if (!Pair(ring, 0, &pencils[0]) || !Pair(ring, 1, &pencils[1]) ||
-          !CanBeRight(DirectionOf(pencils[0]), DirectionOf(pencils[1])))
+          !CanBeRight(*pencils[0].observation.fit, *pencils[1].observation.fit))
         continue;
       if (pencils[1].support_px > pencils[0].support_px) std::swap(pencils[0], pencils[1]);
       return pencils;
@@ -63,10 +63,6 @@ class RectangleSearch {
   }
 
  private:
-  static UncertainDirection DirectionOf(const DetectedPencil& pencil) {
-    return {pencil.observation.fit->direction, pencil.observation.fit->covariance};
-  }
-
   const DetectedLine& line(int i) const { return lines_[static_cast<std::size_t>(i)]; }
   const std::vector<int>& corners(int i) const { return corners_[static_cast<std::size_t>(i)]; }
 

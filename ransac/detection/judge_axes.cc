@@ -52,13 +52,12 @@ void JudgeAxes(const AssemblyOptions& options, const PlacedPencil& x, PlacedPenc
   for (double off = -kReach; off <= kReach; off += kFocalStep / options.focal_sigma) {
     const double log_focal = options.prior_log_focal + off * options.focal_sigma;
     const CameraError camera{options.camera.middle_rad * std::exp(-log_focal), 0.0};
-    const UncertainDirection a = Refocus(x.direction, log_focal),
-                             b = Refocus(y->direction, log_focal);
+    const UncertainDirection a = Refocus(x.along, log_focal), b = Refocus(y->along, log_focal);
     const double weight = Gaussian(off), is_corner = weight * one * Odds(a, b, camera),
                  is_pair = is_corner + weight * (1.0 - one);
     double of_z = 1.0;
     if (z != nullptr) {
-      const UncertainDirection c = Refocus(z->direction, log_focal);
+      const UncertainDirection c = Refocus(z->along, log_focal);
       const double to_x = Odds(a, c, camera), to_y = Odds(b, c, camera);
       const double is_third = 0.5 * to_x * to_y;  // Half of the corners are square.
       of_z = is_third + 0.25 * (to_x + to_y);

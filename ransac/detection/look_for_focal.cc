@@ -30,7 +30,7 @@ double LengthOfLines(const PhotoEvidence& evidence) {
 }
 
 Vector3d SeenThrough(double log_focal, const Vector3d& direction) {
-  return Refocus({direction, Eigen::Matrix3d::Zero()}, log_focal).vector;
+  return Refocus({direction, Eigen::Matrix3d::Zero()}, log_focal).direction;
 }
 
 // The same focal lengths whatever the guess.

@@ -62,7 +62,8 @@ ConicFit Refocus(const ConicFit& fit, double log_focal) {
 // where that leads.
 struct Features {
   std::vector<ConicFit> circles;
-  std::vector<UncertainDirection> pencils, edges;  // Edges: the lines.
+  std::vector<UncertainDirection> pencils;
+  std::vector<LineFit> edges;
 
   Features(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& detected,
            double diagonal_px) {
@@ -72,16 +73,14 @@ struct Features {
     for (const DetectedPencil& pencil : detected) {
       const VanishingPointFit& fit = *pencil.observation.fit;
       const bool is_known = std::any_of(pencils.begin(), pencils.end(), [&](const auto& other) {
-        return AreAlike(other.vector, fit.direction);
+        return AreAlike(other.direction, fit.direction);
       });
-      if (!is_known && pencils.size() < kMaxPencils)
-        pencils.push_back({fit.direction, fit.covariance});
+      if (!is_known && pencils.size() < kMaxPencils) pencils.push_back(fit);
     }
     const bool tell_a_third = pencils.size() > 1 && circles.size() < 2;
     if (!tell_a_third && !IsEmpty()) return;
-    for (const DetectedLine& edge : EdgesAround(evidence.lines, detected, diagonal_px)) {
-      if (edges.size() < kMaxEdges) edges.push_back({edge.fit.line, edge.fit.covariance});
-    }
+    edges = EdgesAround(evidence.lines, detected, diagonal_px);
+    if (edges.size() > kMaxEdges) edges.resize(kMaxEdges);
   }
 
   // Whether all focal lengths are alike to them.
@@ -92,7 +91,11 @@ struct Features {
     Features at = *this;
     for (ConicFit& circle : at.circles) circle = Refocus(circle, log_focal);
     for (UncertainDirection& pencil : at.pencils) pencil = Refocus(pencil, log_focal);
-    for (UncertainDirection& edge : at.edges) edge = Refocus(edge, -log_focal);
+    for (LineFit& edge : at.edges) {
+      const auto moved = Refocus(UncertainDirection{edge.line, edge.covariance}, -log_focal);
+      edge.line = moved.direction;
+      edge.covariance = moved.covariance;
+    }
     return at;
   }
 };
@@ -105,7 +108,8 @@ class StructureEvidence {
     for (const CircleEvidence& circle : evidence.circles) {
       const UncertainDirection& normal = circle.normals[0];
       // The plane is known as well as the circle's own normal.
-      peaks_.push_back(LikelihoodRatio({normal.vector, 2.0 * normal.covariance}, normal.vector));
+      peaks_.push_back(
+          LikelihoodRatio({normal.direction, 2.0 * normal.covariance}, normal.direction));
     }
   }
 
@@ -148,23 +152,16 @@ class StructureEvidence {
     return std::log(sum / all);
   }
 
-  static std::vector<LineFit> EdgesOf(const Features& features) {
-    std::vector<LineFit> edges;
-    for (const UncertainDirection& edge : features.edges)
-      edges.push_back({edge.vector, edge.covariance, 0.0});
-    return edges;
-  }
-
   // Of the edges around the only pencil as those of one thing with it.
   static double EdgesAtRightAngles(const Features& features) {
-    const OrthogonalEvidence evidence(EdgesOf(features), features.pencils[0].vector);
+    const OrthogonalEvidence evidence(features.edges, features.pencils[0].direction);
     return std::exp(std::min(evidence.HighestLogOdds(), kMostLogOdds));
   }
 
   // Of the lines outside the pencils as those of the third direction of one thing with two of them.
   static double EdgesAlongThird(const Features& features, double middle_rad) {
     std::vector<LineOdds> lines;
-    for (const LineFit& edge : EdgesOf(features))
+    for (const LineFit& edge : features.edges)
       lines.emplace_back(WithDirectionError(edge, kParallelSigmaRad));
     const CameraError camera{middle_rad, 0.0};
     double sum = 0.0, pairs = 0.0;
@@ -212,7 +209,7 @@ class StructureEvidence {
                        const UncertainDirection& plane) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < circles.size(); ++i) {
-      const double chi2 = CircleEquations(circles[i], plane.vector).Chi2(plane);
+      const double chi2 = CircleEquations(circles[i], plane.direction).Chi2(plane);
       const double ratio = peaks_[i] * std::exp(-0.5 * chi2);
       sum += std::log(1.0 - kPlaneShare + kPlaneShare * ratio);
     }

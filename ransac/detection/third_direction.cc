@@ -57,12 +57,12 @@ std::optional<UncertainDirection> ThirdDirection(const UncertainDirection& a,
   if (!SpannedNormal(a, b, &third)) return std::nullopt;
   const double lean = std::hypot(kRightAngleSigmaDeg * kDegree, camera.middle_rad);
   third.covariance +=
-      lean * lean * (Matrix3d::Identity() - third.vector * third.vector.transpose());
+      lean * lean * (Matrix3d::Identity() - third.direction * third.direction.transpose());
   return third;
 }
 
 SharedDirection LinesAlong(const std::vector<LineOdds>& lines, const UncertainDirection& expected) {
-  const Eigen::Matrix<double, 3, 2> basis = BasisAcross(expected.vector);
+  const Eigen::Matrix<double, 3, 2> basis = BasisAcross(expected.direction);
   const Eigen::Matrix2d root =
       (basis.transpose() * expected.covariance * basis).eval().llt().matrixL();
   SharedDirection shared;
@@ -70,7 +70,7 @@ SharedDirection LinesAlong(const std::vector<LineOdds>& lines, const UncertainDi
   for (int x = -kSteps; x <= kSteps; ++x) {
     for (int y = -kSteps; y <= kSteps; ++y) {
       const Vector2d off = kStep * Vector2d(x, y);
-      const Vector3d direction = (expected.vector + basis * (root * off)).normalized();
+      const Vector3d direction = (expected.direction + basis * (root * off)).normalized();
       const double weight = std::exp(-0.5 * off.squaredNorm());
       const double ratio = weight * RatioAt(lines, direction);
       shared.ratio += ratio;
@@ -86,7 +86,7 @@ SharedDirection LinesAlong(const std::vector<LineOdds>& lines, const UncertainDi
 
 std::optional<ThirdPencil> FindThirdPencil(const LineSet& set, const PlacedPencil& a,
                                            const PlacedPencil& b, const CameraError& camera) {
-  const auto third = ThirdDirection(a.direction, b.direction, camera);
+  const auto third = ThirdDirection(a.along, b.along, camera);
   if (!third) return std::nullopt;
   std::vector<int> others;
   std::vector<LineOdds> odds;

@@ -10,6 +10,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/circle_planes.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/pose.h"
 
 namespace circline {
 namespace {
@@ -32,13 +33,13 @@ constexpr double kRectangularDeg = 4.0;
 constexpr double kMinSpanDeg = 30.0;
 
 double DegreesFromRightAngle(const UncertainDirection& a, const UncertainDirection& b) {
-  return std::asin(std::min(1.0, std::abs(a.vector.dot(b.vector)))) / kDegree;
+  return std::asin(std::min(1.0, std::abs(a.direction.dot(b.direction)))) / kDegree;
 }
 
 // Of the angle between two directions at about right angles, squared radians.
 double VarianceOfAngle(const UncertainDirection& a, const UncertainDirection& b) {
-  return std::max(0.0,
-                  a.vector.dot(b.covariance * a.vector) + b.vector.dot(a.covariance * b.vector));
+  return std::max(0.0, a.direction.dot(b.covariance * a.direction) +
+                           b.direction.dot(a.covariance * b.direction));
 }
 
 }  // namespace
@@ -58,11 +59,11 @@ Eigen::Matrix<double, 3, 2> BasisAcross(const Vector3d& vector) {
 UncertainDirection Refocus(const UncertainDirection& direction, double log_focal) {
   const double s = std::exp(-log_focal);
   const Matrix3d scale = Vector3d(s, s, 1.0).asDiagonal();
-  const Vector3d moved = scale * direction.vector;
+  const Vector3d moved = scale * direction.direction;
   UncertainDirection out;
-  out.vector = moved.normalized();
+  out.direction = moved.normalized();
   const Matrix3d J =
-      (Matrix3d::Identity() - out.vector * out.vector.transpose()) * scale / moved.norm();
+      (Matrix3d::Identity() - out.direction * out.direction.transpose()) * scale / moved.norm();
   out.covariance = J * direction.covariance * J.transpose();
   return out;
 }
@@ -78,7 +79,7 @@ bool InPlane(const UncertainDirection& direction, const UncertainDirection& norm
 // by -d_z m and by -s d_z e_z, both across it.
 RightAngle::RightAngle(const UncertainDirection& a, const UncertainDirection& b,
                        const CameraError& camera) {
-  const Vector3d &p = a.vector, &q = b.vector;
+  const Vector3d &p = a.direction, &q = b.direction;
   angle_ = std::asin(std::clamp(p.dot(q), -1.0, 1.0));
   by_middle_ = -(q.z() * p.head<2>() + p.z() * q.head<2>());
   const double by_focal = -2.0 * p.z() * q.z(), lean = kRightAngleSigmaDeg * kDegree;
@@ -104,18 +105,13 @@ bool Rectangular(const UncertainDirection& a, const UncertainDirection& b) {
 // First-order propagation through the normalised cross product.
 bool SpannedNormal(const UncertainDirection& a, const UncertainDirection& b,
                    UncertainDirection* normal) {
-  const Vector3d cross = a.vector.cross(b.vector);
+  const Vector3d cross = a.direction.cross(b.direction);
   const double sine = cross.norm();
   if (sine < std::sin(kMinSpanDeg * kDegree)) return false;
-  normal->vector = cross / sine;
+  normal->direction = cross / sine;
   const Matrix3d tangent =
-      (Matrix3d::Identity() - normal->vector * normal->vector.transpose()) / sine;
-  Matrix3d cross_a, cross_b;
-  for (int k = 0; k < 3; ++k) {
-    cross_a.col(k) = a.vector.cross(Vector3d::Unit(k));
-    cross_b.col(k) = Vector3d::Unit(k).cross(b.vector);
-  }
-  const Matrix3d ja = tangent * cross_b, jb = tangent * cross_a;
+      (Matrix3d::Identity() - normal->direction * normal->direction.transpose()) / sine;
+  const Matrix3d ja = tangent * -CrossMatrix(b.direction), jb = tangent * CrossMatrix(a.direction);
   normal->covariance = ja * a.covariance * ja.transpose() + jb * b.covariance * jb.transpose();
   return true;
 }
@@ -127,13 +123,13 @@ double PrecisionShare(const UncertainDirection& direction) {
 
 double LikelihoodRatio(const UncertainDirection& normal, const Vector3d& plane) {
   constexpr double kNearby = 0.5;  // Cosine of an angle that no standard deviation spans.
-  const double cosine = normal.vector.dot(plane);
+  const double cosine = normal.direction.dot(plane);
   if (std::abs(cosine) < kNearby) return 0.0;
   const Eigen::Matrix<double, 3, 2> across = BasisAcross(plane);
   const double model = kModelSigmaDeg * kDegree;
   const Eigen::Matrix2d covariance =
       across.transpose() * normal.covariance * across + model * model * Eigen::Matrix2d::Identity();
-  const Eigen::Vector2d residual = across.transpose() * normal.vector;
+  const Eigen::Vector2d residual = across.transpose() * normal.direction;
   // Of a hemisphere, 2 pi: the Gaussian's own factor.
   return std::exp(-0.5 * residual.dot(covariance.inverse() * residual)) /
          std::sqrt(covariance.determinant());
@@ -182,7 +178,7 @@ double CircleEquations::Chi2(const UncertainDirection& normal) const {
 }
 
 bool CanLieIn(const ConicFit& fit, const UncertainDirection& normal) {
-  return CircleEquations(fit, normal.vector).Chi2(normal) <= kMaxSigmas * kMaxSigmas;
+  return CircleEquations(fit, normal.direction).Chi2(normal) <= kMaxSigmas * kMaxSigmas;
 }
 
 UncertainDirection NormalOfCircles(const UncertainDirection& about, double sigma_deg,
@@ -192,16 +188,16 @@ UncertainDirection NormalOfCircles(const UncertainDirection& about, double sigma
   for (int step = 0; step < kSteps; ++step) {
     const double weight = std::pow(sigma_deg * kDegree, -2.0);
     Eigen::Matrix2d information = weight * Eigen::Matrix2d::Identity();
-    const Eigen::Matrix<double, 3, 2> basis = BasisAcross(normal.vector);
-    Eigen::Vector2d gradient = weight * basis.transpose() * (normal.vector - about.vector);
+    const Eigen::Matrix<double, 3, 2> basis = BasisAcross(normal.direction);
+    Eigen::Vector2d gradient = weight * basis.transpose() * (normal.direction - about.direction);
     for (const ConicFit* circle : circles) {
-      const CircleEquations equations(*circle, normal.vector);
+      const CircleEquations equations(*circle, normal.direction);
       const Eigen::Matrix2d JW = equations.by_normal.transpose() * equations.covariance.inverse();
       information += JW * equations.by_normal;
       gradient += JW * equations.value;
     }
     const Eigen::Matrix2d covariance = information.inverse();
-    normal.vector = (normal.vector - basis * (covariance * gradient)).normalized();
+    normal.direction = (normal.direction - basis * (covariance * gradient)).normalized();
     normal.covariance = basis * covariance * basis.transpose();
   }
   return normal;

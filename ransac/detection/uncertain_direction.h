@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/vanishing_point.h"
 
 namespace circline {
 
@@ -20,12 +21,8 @@ constexpr double kRightAngleSigmaDeg = 0.7;
 // allow for this much, as NoiseModel::line_direction_rad does. Radians.
 constexpr double kParallelSigmaRad = 3e-3;
 
-// A unit vector (a normal, or a pencil's direction), its sense without meaning, and its covariance,
-// rank 2, rad^2.
-struct UncertainDirection {
-  Eigen::Vector3d vector = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-};
+// A unit vector (a normal, or a pencil's direction), its sense without meaning, and its covariance.
+using UncertainDirection = VanishingPointFit;
 
 // Whether two unit vectors are parallel within 3 degrees: they stand for one direction.
 bool AreAlike(const Eigen::Vector3d& a, const Eigen::Vector3d& b);

@@ -71,12 +71,12 @@ TEST(CircleNormals, BothAndTheirSpread) {
   const Vector3d normal = Vector3d(0.3, 0.5, -1.0).normalized();
   const CircleEvidence circle = Circle(normal, 100.0);
   ASSERT_EQ(circle.num_normals, 2);
-  EXPECT_LT(std::min(AxisDeg(circle.normals[0].vector, normal),
-                     AxisDeg(circle.normals[1].vector, normal)),
+  EXPECT_LT(std::min(AxisDeg(circle.normals[0].direction, normal),
+                     AxisDeg(circle.normals[1].direction, normal)),
             1e-6);
   for (const UncertainDirection& n : circle.normals) {
     EXPECT_GT(n.covariance.trace(), 0.0);
-    EXPECT_NEAR(n.vector.dot(n.covariance * n.vector), 0.0, 0.01 * n.covariance.trace());
+    EXPECT_NEAR(n.direction.dot(n.covariance * n.direction), 0.0, 0.01 * n.covariance.trace());
   }
   ConicFit worse = *circle.observation.fit;
   worse.ScaleCovariance(4.0);

@@ -28,7 +28,7 @@ TEST(ThirdDirection, IsAtRightAnglesToBoth) {
   const Matrix3d R = segment_scene::RandomRotation(&random);
   const auto third = ThirdDirection(Known(R.col(0), 0.01), Known(R.col(1), 0.0), CameraError());
   ASSERT_TRUE(third);
-  EXPECT_NEAR(std::abs(third->vector.dot(R.col(2))), 1.0, 1e-12);
+  EXPECT_NEAR(std::abs(third->direction.dot(R.col(2))), 1.0, 1e-12);
   // It turns with the one that is not exact about the other, and leans as houses do.
   const double lean = kRightAngleSigmaDeg * kDegree;
   EXPECT_NEAR(std::sqrt(R.col(0).dot(third->covariance * R.col(0))), std::hypot(0.01, lean), 1e-9);

@@ -19,10 +19,11 @@ using Eigen::Vector3d;
 
 UncertainDirection Make(const Vector3d& vector, double sigma_deg) {
   UncertainDirection direction;
-  direction.vector = vector.normalized();
+  direction.direction = vector.normalized();
   const double sigma = sigma_deg * kDegree;
   direction.covariance =
-      sigma * sigma * (Matrix3d::Identity() - direction.vector * direction.vector.transpose());
+      sigma * sigma *
+      (Matrix3d::Identity() - direction.direction * direction.direction.transpose());
   return direction;
 }
 
@@ -73,17 +74,17 @@ TEST(UncertainDirection, TheSpannedNormalHasTheSpreadOfItsSamples) {
   const UncertainDirection b = Make(Vector3d(0.2, 0.9, -0.4), 0.6);
   UncertainDirection normal;
   ASSERT_TRUE(SpannedNormal(a, b, &normal));
-  EXPECT_NEAR(normal.vector.dot(a.vector), 0.0, 1e-12);
-  EXPECT_NEAR(normal.vector.dot(b.vector), 0.0, 1e-12);
+  EXPECT_NEAR(normal.direction.dot(a.direction), 0.0, 1e-12);
+  EXPECT_NEAR(normal.direction.dot(b.direction), 0.0, 1e-12);
   Random random(1);
   const auto moved = [&random](const UncertainDirection& d, double sigma_deg) {
     const Vector3d noise(random.Normal(), random.Normal(), random.Normal());
-    return Vector3d(d.vector + sigma_deg * kDegree * d.vector.cross(noise));
+    return Vector3d(d.direction + sigma_deg * kDegree * d.direction.cross(noise));
   };
   Matrix3d scatter = Matrix3d::Zero();
   constexpr int kSamples = 100000;
   for (int k = 0; k < kSamples; ++k) {
-    const Vector3d d = moved(a, 0.3).cross(moved(b, 0.6)).normalized() - normal.vector;
+    const Vector3d d = moved(a, 0.3).cross(moved(b, 0.6)).normalized() - normal.direction;
     scatter += d * d.transpose() / kSamples;
   }
   EXPECT_LT((scatter - normal.covariance).norm(), 0.02 * scatter.norm());
@@ -150,7 +151,7 @@ TEST(UncertainDirection, DiscsTellTheirPlaneAsWellAsTheyState) {
       }
       const UncertainDirection found =
           NormalOfCircles(Make(normal + 0.05 * DrawNormal(90.0, &random), 0.0), 30.0, all);
-      const Vector3d u = found.vector.unitOrthogonal(), v = found.vector.cross(u);
+      const Vector3d u = found.direction.unitOrthogonal(), v = found.direction.cross(u);
       Eigen::Matrix<double, 3, 2> basis;
       basis << u, v;
       const Eigen::Vector2d error = basis.transpose() * normal;
