@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <utility>
 
 #include "circline/estimators/basics.h"
@@ -33,8 +32,26 @@ constexpr double kSameCenterPx = 1.0;
 // Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
 constexpr double kDuplicatePx = 2.5;
 
+using Eigen::Matrix3d;
 using Eigen::Vector2d;
-using Eigen::Vector3d;
+
+// A pose of an ellipse, in radii of its circle, and where it puts the circle's centre on the photo.
+struct SeenPose {
+  CirclePose pose;
+  Vector2d center;
+};
+
+std::vector<SeenPose> SeenPoses(const Matrix3d& conic, const Camera& camera) {
+  std::array<CirclePose, 2> poses;
+  const int n = CirclePoses(conic, &poses);
+  std::vector<SeenPose> seen;
+  for (int i = 0; i < n; ++i) {
+    const CirclePose& pose = poses[static_cast<std::size_t>(i)];
+    Vector2d center;
+    if (CameraToPixel(camera, pose.center, &center)) seen.push_back({pose, center});
+  }
+  return seen;
+}
 
 class EllipseDetector {
  public:
@@ -116,18 +133,13 @@ class EllipseDetector {
 
   // Where one rim is known, circles about its centre in its plane need no arc that determines them:
   // those that edges lie along.
-  void AddRims(const Eigen::Matrix3d& rim) {
-    std::array<CirclePose, 2> poses;
-    const int n = CirclePoses(rim, &poses);
-    std::optional<Vector2d> first;
-    for (int i = 0; i < n; ++i) {
-      const CirclePose& pose = poses[static_cast<std::size_t>(i)];
-      Vector2d center;
-      if (!CameraToPixel(camera_, pose.center, &center)) continue;
+  void AddRims(const Matrix3d& rim) {
+    const std::vector<SeenPose> seen = SeenPoses(rim, camera_);
+    for (const SeenPose& pose : seen) {
       // Where perspective is weak both planes show the same rims.
-      if (first && (center - *first).norm() < kSameCenterPx) break;
-      first = center;
-      AddRimsOf(pose);
+      const bool is_same =
+          &pose != &seen[0] && (pose.center - seen[0].center).norm() < kSameCenterPx;
+      if (!is_same) AddRimsOf(pose.pose);
     }
   }
 
@@ -198,26 +210,6 @@ class EllipseDetector {
   std::vector<DetectedEllipse> accepted_;
 };
 
-// A pose of an ellipse: the plane's normal, and where it puts the circle's centre on the photo.
-struct SeenPose {
-  Vector3d normal;
-  Vector2d center;
-  double distance;  // Over the circle's radius.
-};
-
-std::vector<SeenPose> SeenPoses(const DetectedEllipse& ellipse, const Camera& camera) {
-  std::array<CirclePose, 2> poses;
-  const int n = CirclePoses(ellipse.fit.conic, &poses);
-  std::vector<SeenPose> seen;
-  for (int i = 0; i < n; ++i) {
-    const CirclePose& pose = poses[static_cast<std::size_t>(i)];
-    Vector2d pixel;
-    if (CameraToPixel(camera, pose.center, &pixel))
-      seen.push_back({pose.normal, pixel, pose.center.norm()});
-  }
-  return seen;
-}
-
 bool CanBeConcentric(const std::vector<SeenPose>& a, const std::vector<SeenPose>& b) {
   // Both centres within this many pixels. The centre of a well-seen rim is good to a tenth of one.
   constexpr double kMaxCentrePx = 1.5;
@@ -227,9 +219,10 @@ bool CanBeConcentric(const std::vector<SeenPose>& a, const std::vector<SeenPose>
   // of the other pose of the rim would be.
   constexpr double kSameRimRatio = 0.85;
   const auto agree = [](const SeenPose& p, const SeenPose& q) {
+    const double distance_p = p.pose.center.norm(), distance_q = q.pose.center.norm();
     return (p.center - q.center).squaredNorm() < kMaxCentrePx * kMaxCentrePx &&
-           p.normal.dot(q.normal) >= kMinNormalCosineConcentric &&
-           std::min(p.distance, q.distance) < kSameRimRatio * std::max(p.distance, q.distance);
+           p.pose.normal.dot(q.pose.normal) >= kMinNormalCosineConcentric &&
+           std::min(distance_p, distance_q) < kSameRimRatio * std::max(distance_p, distance_q);
   };
   return std::any_of(a.begin(), a.end(), [&](const SeenPose& p) {
     return std::any_of(b.begin(), b.end(), [&](const SeenPose& q) { return agree(p, q); });
@@ -239,7 +232,7 @@ bool CanBeConcentric(const std::vector<SeenPose>& a, const std::vector<SeenPose>
 // Numbers the groups in the order of their best members.
 void GroupConcentric(const Camera& camera, std::vector<DetectedEllipse>* ellipses) {
   std::vector<std::vector<SeenPose>> poses;
-  for (const DetectedEllipse& e : *ellipses) poses.push_back(SeenPoses(e, camera));
+  for (const DetectedEllipse& e : *ellipses) poses.push_back(SeenPoses(e.fit.conic, camera));
   int groups = 0;
   for (std::size_t i = 0; i < ellipses->size(); ++i) {
     DetectedEllipse& a = (*ellipses)[i];

@@ -105,15 +105,12 @@ cv::Rect EllipseFitter::Surroundings() const {
 // log-odds of a rim; minus infinity where there is no ellipse at all.
 double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) {
   constexpr double kNone = -std::numeric_limits<double>::infinity();
-  if (!Gather(*candidate, 0.7, kGatherPx.back())) return kNone;
-  UndoCurvatureBias(candidate->conic, e);
-  if (fit_points_.size() < 6 || !FitLikeliest(&candidate->conic)) return kNone;
+  if (!GatherUnbiased(*candidate, kGatherPx.back(), e) || !FitLikeliest(&candidate->conic))
+    return kNone;
   const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
   // What is gathered about a fit to all that is as near depends less on where the first started.
-  if (!Gather(*candidate, 0.7, reach)) return kNone;
-  UndoCurvatureBias(candidate->conic, e);
-  if (fit_points_.size() < 6 || !FitTrimmed(&candidate->conic, 1)) return kNone;
-  if (!Gather(*candidate, 0.7, reach) || !FitSupport(candidate->conic, e)) return kNone;
+  if (!GatherUnbiased(*candidate, reach, e) || !FitTrimmed(&candidate->conic, 1)) return kNone;
+  if (!GatherUnbiased(*candidate, reach, e) || !FitUnbiased(candidate->conic, e)) return kNone;
   candidate->conic = e->fit.conic;
   if (!Plausible(candidate->bright) || contour_.minor_px() < options_.min_axis_px ||
       e->fit.rms_px > kMaxRmsPx) {
@@ -166,8 +163,11 @@ double EllipseFitter::TruncatedCost(const Matrix3d& conic, double sigma_px) {
   return sum;
 }
 
-// The edge points of the support where they would lie if the contour, `conic`, were straight.
-void EllipseFitter::UndoCurvatureBias(const Matrix3d& conic, DetectedEllipse* e) {
+// The edge points along the candidate where they would lie if it were straight; false where they
+// are too few.
+bool EllipseFitter::GatherUnbiased(const EllipseCandidate& candidate, double reach,
+                                   DetectedEllipse* e) {
+  if (!Gather(candidate, 0.7, reach)) return false;
   e->points.clear();
   e->contour.clear();
   fit_points_.clear();
@@ -181,28 +181,26 @@ void EllipseFitter::UndoCurvatureBias(const Matrix3d& conic, DetectedEllipse* e)
     if (!calibrated_.Get(i, &moved)) continue;
     const EdgePoint& edge = map_.points[static_cast<std::size_t>(i)];
     Vector2d outward;
-    const double curvature = CurvatureAt(conic, moved, &outward);
+    const double curvature = CurvatureAt(candidate.conic, moved, &outward);
     const Vector2d shift = CurvatureBias(edge, blur, curvature) * outward;
     moved.x += FromPixels(moved, shift);
     e->points.push_back(i);
     e->contour.push_back(edge.Position() + shift);
     fit_points_.push_back(moved);
   }
+  return fit_points_.size() >= 6;
 }
 
-bool EllipseFitter::FitSupport(const Matrix3d& initial, DetectedEllipse* e) {
-  UndoCurvatureBias(initial, e);
-  if (fit_points_.size() < 6) return false;
+bool EllipseFitter::FitUnbiased(const Matrix3d& initial, DetectedEllipse* e) {
   if (!RefineConic(fit_points_, 1.0, initial, &e->fit).ok()) return false;
-  if (DropOutliers(e)) {
-    if (fit_points_.size() < 6) return false;
-    const Matrix3d conic = e->fit.conic;
-    if (!RefineConic(fit_points_, 1.0, conic, &e->fit).ok()) return false;
+  if (DropOutliers(e) &&
+      (fit_points_.size() < 6 || !RefineConic(fit_points_, 1.0, e->fit.conic, &e->fit).ok())) {
+    return false;
   }
   // Degrees of freedom: five go into the ellipse.
   const double n = static_cast<double>(fit_points_.size());
   e->sigma_px = std::max(kMinEllipseSigmaPx, e->fit.rms_px * std::sqrt(n / (n - 5.0)));
-  for (double& c : e->fit.covariance) c *= e->sigma_px * e->sigma_px;
+  e->fit.ScaleCovariance(e->sigma_px * e->sigma_px);
   return true;
 }
 

@@ -95,11 +95,8 @@ double EllipseFitter::Coverage(const EllipseCandidate& candidate) {
 }
 
 void EllipseFitter::Take(const DetectedEllipse& e) {
-  EllipseCandidate candidate;
-  candidate.conic = e.fit.conic;
-  candidate.bright = e.bright;
   // What a wider gathering finds belongs to it as well.
-  if (Gather(candidate, 0.7, kGatherPx[1])) collector_.Take(support_.points);
+  if (Gather({e.fit.conic, e.bright, 0.0}, 0.7, kGatherPx[1])) collector_.Take(support_.points);
   collector_.Take(e.points);
 }
 

@@ -82,8 +82,8 @@ class EllipseFitter {
   bool SecondLook(EllipseCandidate* candidate, DetectedEllipse* e);
   cv::Rect Surroundings() const;
   double FinalFit(EllipseCandidate* candidate, DetectedEllipse* e);
-  void UndoCurvatureBias(const Eigen::Matrix3d& conic, DetectedEllipse* e);
-  bool FitSupport(const Eigen::Matrix3d& initial, DetectedEllipse* e);
+  bool GatherUnbiased(const EllipseCandidate& candidate, double reach, DetectedEllipse* e);
+  bool FitUnbiased(const Eigen::Matrix3d& initial, DetectedEllipse* e);
   bool DropOutliers(DetectedEllipse* e);
 
   const EdgeMap& map_;
