@@ -136,9 +136,10 @@ bool Refit(const Pool& pool, const std::vector<int>& indices, const PencilOption
   if (!status.ok() || static_cast<int>(members.size()) < options.min_lines) return false;
   pencil->fit = fit;
   pencil->lines = members;
-  pencil->log_false_alarms = LogFalseAlarms(indices.size(), PencilModel::kMinSamples,
-                                            pool.Expected(indices, fit.direction), members.size());
-  return pencil->log_false_alarms <= std::log(options.max_false_alarms);
+  const double log_false_alarms =
+      LogFalseAlarms(indices.size(), PencilModel::kMinSamples,
+                     pool.Expected(indices, fit.direction), members.size());
+  return log_false_alarms <= std::log(options.max_false_alarms);
 }
 
 // From the seven tenths of the lines that agree best.

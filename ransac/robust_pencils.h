@@ -39,8 +39,6 @@ struct PencilOptions {
 struct FoundPencil {
   VanishingPointFit fit;   // Of its lines.
   std::vector<int> lines;  // Indices of its members, ascending.
-  // Natural logarithm of the number of pencils this good expected by chance; very negative = sure.
-  double log_false_alarms = 0.0;
 };
 
 // The direction with the most support and its covariance, fitted to the inliers (which `mask`,

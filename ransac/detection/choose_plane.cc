@@ -7,6 +7,7 @@
 
 #include "circline/estimators/conic.h"
 #include "circline/ransac/detection/line_odds.h"
+#include "circline/ransac/detection/pencil_fitter.h"
 #include "circline/ransac/detection/segment_meetings.h"
 
 namespace circline {
@@ -290,6 +291,7 @@ class PlaneChooser {
 
 bool RefitWhereTheyMeet(const std::vector<DetectedLine>& lines, std::array<DetectedPencil, 2>* pair,
                         double diagonal_px) {
+  const LineSet set(lines, diagonal_px);
   std::array<DetectedPencil, 2> local = *pair;
   std::vector<int> before;
   constexpr int kPasses = 4;  // Each time with the directions that the last one gave.
@@ -297,7 +299,7 @@ bool RefitWhereTheyMeet(const std::vector<DetectedLine>& lines, std::array<Detec
     std::vector<int> inside = LinesWhereTheyMeet(lines, local, diagonal_px);
     if (pass > 0 && inside == before) break;
     for (DetectedPencil& pencil : local) {
-      if (!RefitPencil(lines, inside, &pencil, diagonal_px)) return false;
+      if (!RefitPencil(set, inside, &pencil)) return false;
     }
     before = std::move(inside);
   }

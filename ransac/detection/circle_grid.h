@@ -16,8 +16,6 @@ namespace circline {
 // of points, in order.
 struct PointLattice {
   std::array<std::vector<std::vector<int>>, 2> lines;
-
-  bool empty() const { return lines[0].empty() && lines[1].empty(); }
 };
 
 // The lattice that most of the points lie on: its two shortest steps, found among the differences

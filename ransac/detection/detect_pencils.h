@@ -40,12 +40,6 @@ std::vector<DetectedPencil> DetectPencilsApart(const std::vector<DetectedLine>& 
                                                double diagonal_px = kUsualDiagonalPx,
                                                const std::vector<Eigen::Vector3d>& known = {});
 
-// Fits the pencil again, to all of lines[candidates] that share its direction within up to half a
-// degree (standard deviation, estimated): for lines that are known to be of one thing, whose sides
-// may bend or be badly printed. False, and nothing changed, where none do.
-bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
-                 DetectedPencil* pencil, double diagonal_px = kUsualDiagonalPx);
-
 // Fits, as those of pencils, of the lines that come near those of some pencils and are of none of
 // them, one of each edge, longest first.
 std::vector<LineFit> EdgesAround(const std::vector<DetectedLine>& lines,

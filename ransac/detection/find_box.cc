@@ -118,7 +118,6 @@ class BoxSearch {
   FoundBox Finish(const BoxHypothesis& box) const {
     FoundBox found;
     found.given = box.given;
-    found.log_odds = box.log_odds;
     found.axes = box.axes;
     for (std::size_t k = 0; k < 3; ++k) {
       std::vector<LineFit> fits;

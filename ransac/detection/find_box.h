@@ -22,10 +22,9 @@ struct FoundBox {
   std::size_t given = 0;                  // Which of the normals, or axes, it has.
   Eigen::Matrix3d axes;                   // A rotation: directions in the plane, the normal.
   std::array<DetectedPencil, 3> pencils;  // Along them; one line or more each, no fit.
-  // Logarithm of how much likelier the lines are as edges of the box than as lines of any
-  // direction.
-  double log_odds = 0.0;
-  std::array<double, 3> log_odds_along{};  // The part that the lines along each axis have in it.
+  // Logarithm of how much likelier the lines along each axis are as edges of the box than as lines
+  // of any direction.
+  std::array<double, 3> log_odds_along{};
 };
 
 // The box with the highest odds on a plane with one of the normals (unit, camera frame); none where

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "circline/estimators/conic.h"
-#include "circline/ransac/detection/detect_pencils.h"
+#include "circline/ransac/detection/pencil_fitter.h"
 
 namespace circline {
 namespace {
@@ -107,7 +107,7 @@ PencilObservation FollowPencil(const PencilObservation& predicted,
     std::vector<int> all(own.size());
     std::iota(all.begin(), all.end(), 0);
     pencil.observation.fit = predicted.fit;
-    if (!predicted.fit || !RefitPencil(own, all, &pencil, diagonal_px)) {
+    if (!predicted.fit || !RefitPencil(LineSet(own, diagonal_px), all, &pencil)) {
       // One line, or few that do not meet: no direction of their own, but evidence all the same
       // where the pencil has a role.
       std::vector<LineFit> fits;

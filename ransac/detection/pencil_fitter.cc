@@ -110,11 +110,9 @@ Vector3d DensestDirection(const LineSet& set, const std::vector<int>& lines,
   return is_found ? densest.front().fit.direction : direction;
 }
 
-bool RefitPencil(const std::vector<DetectedLine>& lines, const std::vector<int>& candidates,
-                 DetectedPencil* pencil, double diagonal_px) {
+bool RefitPencil(const LineSet& set, const std::vector<int>& candidates, DetectedPencil* pencil) {
   std::optional<DetectedPencil> found =
-      FitPencil(LineSet(lines, diagonal_px), candidates, pencil->observation.fit->direction,
-                kMaxSpreadRad, 1);
+      FitPencil(set, candidates, pencil->observation.fit->direction, kMaxSpreadRad, 1);
   if (!found) return false;
   *pencil = std::move(*found);
   return true;

@@ -34,6 +34,11 @@ std::optional<DetectedPencil> FitPencil(const LineSet& set, const std::vector<in
                                         const Eigen::Vector3d& direction, double max_spread_rad,
                                         int min_lines);
 
+// Fits the pencil again, to all of `candidates` that share its direction within up to half a degree
+// (standard deviation, estimated): for lines that are known to be of one thing, whose sides may
+// bend or be badly printed. False, and nothing changed, where none do.
+bool RefitPencil(const LineSet& set, const std::vector<int>& candidates, DetectedPencil* pencil);
+
 // The direction that most of the lines have if they are exactly parallel; `direction` where there
 // is none.
 Eigen::Vector3d DensestDirection(const LineSet& set, const std::vector<int>& lines,

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
+#include "circline/ransac/detection/pencil_fitter.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
@@ -116,7 +117,7 @@ std::vector<PlacedPencil> AlongALevelPlane(const std::array<double, 2>& rows, bo
   std::iota(all.begin(), all.end(), 0);
   for (const Vector3d& direction : directions) {
     DetectedPencil pencil = Found(*lines, direction);
-    EXPECT_TRUE(RefitPencil(*lines, all, &pencil));
+    EXPECT_TRUE(RefitPencil(LineSet(*lines, kUsualDiagonalPx), all, &pencil));
     pencils.emplace_back(std::move(pencil));
   }
   return pencils;

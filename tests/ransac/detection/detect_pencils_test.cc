@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "circline/estimators/basics.h"
+#include "circline/ransac/detection/pencil_fitter.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
@@ -127,7 +128,8 @@ TEST(DetectPencils, ARefitTakesAllLinesOfWhatBends) {
   auto pencils = DetectPencils(lines, 1, 1);
   ASSERT_FALSE(pencils.empty());
   DetectedPencil& pencil = pencils[0];
-  ASSERT_TRUE(RefitPencil(lines, all, &pencil));
+  const LineSet set(lines, kUsualDiagonalPx);
+  ASSERT_TRUE(RefitPencil(set, all, &pencil));
   EXPECT_GE(pencil.members.size(), 0.9 * kLines);
   EXPECT_LT(pencil.members.back(), kLines);
   const double error = AxisDeg(pencil.observation.fit->direction, kFirst);
@@ -135,7 +137,7 @@ TEST(DetectPencils, ARefitTakesAllLinesOfWhatBends) {
   EXPECT_LT(error, 3.0 * sigma);
   EXPECT_LT(sigma, 0.6);
   const DetectedPencil before = pencil;
-  EXPECT_FALSE(RefitPencil(lines, {}, &pencil));
+  EXPECT_FALSE(RefitPencil(set, {}, &pencil));
   EXPECT_EQ(pencil.members, before.members);
 }
 
