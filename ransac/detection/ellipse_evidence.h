@@ -22,9 +22,10 @@ void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const Came
 std::vector<std::uint8_t> EllipsePoints(const EdgeMap& edges,
                                         const std::vector<DetectedEllipse>& ellipses);
 
-// Bad options or camera, an empty image, or one of another size than the camera's.
-Status CheckDetectionInput(const cv::Mat& image, const Camera& camera,
-                           const DetectionOptions& options);
+// The grey image that edges are looked for in. Refuses bad options or a bad camera, what ToGray
+// refuses, and an image of another size than the camera's.
+Status ReadGray(const cv::Mat& image, const Camera& camera, const DetectionOptions& options,
+                cv::Mat* gray);
 
 }  // namespace circline
 

@@ -227,8 +227,7 @@ Status FollowObservations(const cv::Mat& image, const Observations& predicted, d
   found->stated_focal_px = predicted.stated_focal_px;
   found->found_k1 = predicted.found_k1;
   cv::Mat gray;
-  Status status = CheckDetectionInput(image, predicted.camera, options);
-  if (status.ok()) status = ToGray(image, &gray);
+  const Status status = ReadGray(image, predicted.camera, options, &gray);
   if (!status.ok()) return status;
   CentreLines of_centres;
   for (const PencilObservation& pencil : predicted.pencils)
@@ -251,7 +250,7 @@ Status FollowObservations(const cv::Mat& image, const Observations& predicted, d
                   found, expect);
   FollowGrid(predicted, of_centres, found, expect);
   Settle(predicted, found);
-  return Status::Ok();
+  return status;
 }
 
 }  // namespace circline
