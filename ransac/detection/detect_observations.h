@@ -61,8 +61,8 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
                           const DetectionOptions& options, Observations* observations);
 
 // The same inside a rectangle (clipped to the photo): the ellipse best supported there becomes the
-// points of `circle`, with its sigma_px and fit; all else of `circle` stays as it is. Refuses where
-// there is none.
+// points of `circle`, with its sigma_px and fit, and no second reading; all else of `circle` stays
+// as it is. Refuses where there is none.
 Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::Rect& roi,
                          const DetectionOptions& options, CircleObservation* circle);
 

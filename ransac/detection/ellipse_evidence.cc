@@ -48,6 +48,7 @@ void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const Came
   PixelsToCalibrated(camera, circle->points, &calibrated);
   circle->fit->irregularity = Irregularity(calibrated, circle->fit->conic, noise);
   circle->inliers.clear();
+  circle->second.reset();
 }
 
 std::vector<std::uint8_t> EllipsePoints(const EdgeMap& edges,

@@ -13,7 +13,8 @@
 
 namespace circline {
 
-// Points of an ellipse as an observation: thinned, and the fit's covariance widened by the
+// Points of an ellipse as an observation, with all that is known of them and nothing of what was
+// there: thinned, and the fit's covariance widened by the
 // correlation of dense points and by what they all share. `camera`: of the edges.
 void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const Camera& camera,
                 const NoiseModel& noise, CircleObservation* circle);

@@ -41,10 +41,12 @@ TEST(DetectCircleInRoi, FindsTheCircleOfTheRectangle) {
     CircleObservation circle;
     circle.id = "mine";
     circle.radius = 0.9;
+    circle.second.emplace();  // Of the points that it had.
     const Status status = DetectCircleInRoi(image, camera, roi, DetectionOptions(), &circle);
     ASSERT_TRUE(status.ok()) << status.message;
     EXPECT_EQ(circle.id, "mine");
     EXPECT_EQ(circle.radius, 0.9);
+    EXPECT_FALSE(circle.second);
     EXPECT_GT(circle.points.size(), 30U);
     EXPECT_LT(BetterNormalDeg(circle, pose.rotation.col(2)), 0.5);
     EXPECT_NEAR(circle.fit->irregularity, truth.fit->irregularity, 0.05);
