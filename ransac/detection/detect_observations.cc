@@ -83,6 +83,8 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   cv::Mat gray;
   const Status status = ReadGray(image, camera, options, &gray);
   if (!status.ok()) return status;
+  observations->camera.width = image.cols;
+  observations->camera.height = image.rows;
   const EdgeMap edges = DetectEdges(gray);
   const double diagonal_px = DiagonalPx(image.cols, image.rows);
   const auto collect = [&](const Camera& through) {
@@ -90,7 +92,7 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   };
   PhotoEvidence evidence = options.noise_model.camera.IsWide()
                                ? LookForFocal(collect, options, diagonal_px, observations)
-                               : collect(camera);
+                               : collect(observations->camera);
   ObserveEvidence(options, diagonal_px, &evidence, observations);
   return Status::Ok();
 }

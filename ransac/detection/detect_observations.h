@@ -54,9 +54,10 @@ struct DetectionOptions {
   Status Validate() const;
 };
 
-// Detects everything; fits included. `image` is 8-bit, 1, 3 or 4 channels. The status is not ok for
-// an empty image, a wrong type, a wrong size (against camera.width x height) or bad options; a
-// photo in which nothing is found is ok; observations->message says so, and what was cut.
+// Detects everything; fits included. Observations::camera has the photo's size, known or not.
+// `image` is 8-bit, 1, 3 or 4 channels. The status is not ok for an empty image, a wrong type, a
+// wrong size (against camera.width x height) or bad options; a photo in which nothing is found is
+// ok; observations->message says so, and what was cut.
 Status DetectObservations(const cv::Mat& image, const Camera& camera,
                           const DetectionOptions& options, Observations* observations);
 

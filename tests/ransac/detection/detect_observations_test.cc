@@ -225,6 +225,25 @@ TEST(DetectObservations, TakesColourAndIsRepeatableWithAnyNumberOfThreads) {
   }
 }
 
+TEST(DetectObservations, TakesTheSizeOfTheCameraFromThePhoto) {
+  const cv::Mat image = Develop(
+      RenderPlane(TestCamera(), LookAt(30.0, 10.0, 15.0, 6.0), 200.0, [](double x, double y) {
+        return std::max(std::abs(x), std::abs(y)) < 1.5 && std::hypot(x, y) > 0.7 ? 60.0 : 200.0;
+      }));
+  DetectionOptions options;
+  options.noise_model.camera.log_focal = 0.3;
+  Camera guess = TestCamera();
+  guess.fx = guess.fy = 1.3 * guess.fx;
+  const Observations known = Detect(image, guess, options);
+  guess.width = guess.height = 0;
+  const Observations unknown = Detect(image, guess, options);
+  EXPECT_EQ(unknown.camera.width, image.cols);
+  EXPECT_EQ(unknown.camera.height, image.rows);
+  EXPECT_EQ(unknown.camera.fx, known.camera.fx);
+  ASSERT_EQ(unknown.circles.size(), known.circles.size());
+  EXPECT_EQ(unknown.circles[0].fit->conic, known.circles[0].fit->conic);
+}
+
 TEST(DetectObservations, SaysWhatIsWrongWithTheInput) {
   const Camera camera = TestCamera(64, 48);
   const cv::Mat image(48, 64, CV_8UC1, cv::Scalar(9));
