@@ -106,6 +106,8 @@ Status FeatureFollower::Cold(const cv::Mat& image, Observations* found, Observat
     next_ = before;
     *found = Observations();
     found->camera = camera_;
+    found->stated_focal_px = stated_focal_px_;
+    found->found_k1 = found_k1_;
     found->message = "nothing of the frames before was found in this one";
     *expect = held_;
     return status;
@@ -142,6 +144,7 @@ void FeatureFollower::Start(const Observations& given) {
                 lines.end());
   }
   is_given_ = true;
+  frames_lost_ = 0;
   num_at_look_ = CountFeatures(given);
   num_circles_at_look_ = static_cast<int>(given.circles.size());
 }

@@ -176,12 +176,17 @@ TEST(FeatureFollower, ACutIsSeenAndNamesNothingAfterWhatWasBefore) {
 // A covered frame, and a board that has moved on meanwhile, are no cut.
 TEST(FeatureFollower, ACoveredFramePasses) {
   const Camera camera = TestCamera();
-  FeatureFollower follower(camera, FollowOptions());
+  FollowOptions options;
+  options.detection.noise_model.camera.log_focal = 0.2;  // It is looked for, once.
+  FeatureFollower follower(camera, options);
   Observations before, covered, after;
   ASSERT_TRUE(follower.Next(Photo(camera, PoseAt(0), 3), &before).ok());
   ASSERT_TRUE(
       follower.Next(detection_test::Noise(camera.width, camera.height, 2.0), &covered).ok());
   EXPECT_TRUE(covered.circles.empty() && covered.pencils.empty());
+  EXPECT_EQ(before.stated_focal_px, camera.fx);
+  EXPECT_EQ(covered.stated_focal_px, before.stated_focal_px);
+  EXPECT_EQ(covered.camera.fx, before.camera.fx);
   EXPECT_FALSE(follower.was_cut());
   ASSERT_TRUE(follower.Next(Photo(camera, PoseAt(2), 3), &after).ok());
   EXPECT_FALSE(follower.was_cut());
