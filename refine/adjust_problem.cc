@@ -150,14 +150,6 @@ void AdjustProblem::SetGauge() {
   }
 }
 
-std::optional<ImagePoints> AdjustProblem::Points(const AdjustInput& input,
-                                                 const std::vector<Eigen::Vector2d>& pixels,
-                                                 const std::vector<std::uint8_t>& inliers,
-                                                 double sigma_px, bool is_circle) const {
-  return EvidencePoints(input.observations->camera, pixels, inliers, sigma_px, is_circle,
-                        pose_options_, num_distortion_);
-}
-
 void AdjustProblem::AddKnownRadius(int world, const CircleObservation& circle, int radius) {
   if (!(circle.radius > 0.0) || !known_radii_.insert(radius).second) return;
   const double sigma =
@@ -182,7 +174,7 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservatio
   const NoiseModel& model = options_.noise_model;
   // Where circles were matched by how they lie, ids of groups are a photo's own.
   const std::string own = input.names.empty() ? "" : std::to_string(photo) + ":";
-  Circle made{id, world};
+  Circle made;
   int& center =
       circle.concentric.empty() ? made.center : OneOf({world, own + circle.concentric}, &centers_);
   const Eigen::Vector2d& at = start->second.center;
@@ -194,7 +186,11 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservatio
   if (radius < 0) radius = AddBlock(1, {start->second.radius});
   made.radius = radius;
   AddKnownRadius(world, circle, radius);
-  if (model.circle_tilt_rad > 0.0 || model.circle_height > 0.0) made.tilt = AddBlock(3, {});
+  const std::vector<double> tilt_sigmas = TiltSigmas(model);
+  if (!tilt_sigmas.empty()) {
+    made.tilt = AddBlock(3, {});
+    AddTerm(NewGaussianPrior(tilt_sigmas), {made.tilt});
+  }
   if (model.circle_shape > 0.0) {
     made.shape = AddBlock(2, {});
     const double sigma = model.circle_shape * circle.fit->irregularity;
@@ -220,30 +216,31 @@ int AdjustProblem::OffsetOf(int photo, const CircleObservation& circle) {
 void AdjustProblem::AddCircle(int photo, const CircleObservation& circle) {
   const auto i = static_cast<std::size_t>(photo);
   const AdjustInput& input = photos_[i];
-  std::optional<ImagePoints> points =
-      Points(input, circle.points, circle.inliers, circle.sigma_px, true);
-  const Circle* made = points ? CircleOf(photo, circle) : nullptr;
+  ImagePoints points;
+  if (!FillEvidencePoints(input.observations->camera, circle.points, circle.inliers,
+                          circle.sigma_px, true, pose_options_, num_distortion_, &points))
+    return;
+  const Circle* made = CircleOf(photo, circle);
   if (made == nullptr) return;
-  const NoiseModel& model = options_.noise_model;
+  // No better than the contour as a whole.
+  const double center_sigma = points.options().sigma_px / std::sqrt(points.options().weight);
+  const int offset = OffsetOf(photo, circle);
   PlaneCircleContourCost::Blocks with;
   with.tilt_and_height = made->tilt >= 0;
-  with.camera = true;
-  with.tilt_sigma = model.circle_tilt_rad;
-  with.height_sigma = model.circle_height;
-  std::vector<int> blocks = {rotations_[i], translations_[i], made->center, made->radius};
-  if (made->tilt >= 0) blocks.push_back(made->tilt);
   with.shape = made->shape >= 0;
-  if (with.shape) blocks.push_back(made->shape);
-  const int offset = OffsetOf(photo, circle);
   with.offset = offset >= 0;
-  if (offset >= 0) blocks.push_back(offset);
+  with.camera = true;
+  std::vector<int> blocks = {rotations_[i], translations_[i], made->center, made->radius};
+  for (const int block : {made->tilt, made->shape, offset}) {
+    if (block >= 0) blocks.push_back(block);
+  }
   blocks.push_back(cameras_[static_cast<std::size_t>(input.camera)]);
-  AddFeature(photo, circle.id, std::make_unique<PlaneCircleContourCost>(std::move(*points), with),
+  AddFeature(photo, circle.id, std::make_unique<PlaneCircleContourCost>(std::move(points), with),
              blocks);
   if (!circle.center) return;
   AddFeature(photo, circle.id + ".center",
              std::make_unique<PlanePointCost>(input.observations->camera, *circle.center,
-                                              circle.sigma_px, options_.conic_loss.type, true),
+                                              center_sigma, options_.line_loss.type, true),
              {rotations_[i], translations_[i], made->center, blocks.back()});
 }
 
@@ -313,14 +310,16 @@ void AdjustProblem::AddPencil(int photo, std::size_t index) {
   const int direction = DirectionOf(photo, pencil);
   for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
     const LineObservation& line = pencil.lines[j];
-    if (!line.fit) continue;
-    std::optional<ImagePoints> points =
-        Points(input, line.points, line.inliers, LineSigma(pencil, line), false);
-    if (!points) continue;
+    if (!line.fit || !line.is_parallel) continue;
+    ImagePoints points;
+    if (!FillEvidencePoints(input.observations->camera, line.points, line.inliers,
+                            LineSigma(pencil, line), false, pose_options_, num_distortion_,
+                            &points))
+      continue;
     DirectionLineCost::Options options;
     options.direction_sigma = options_.noise_model.line_direction_rad;
     options.camera = true;
-    auto cost = std::make_unique<DirectionLineCost>(std::move(*points), line.fit->line, options);
+    auto cost = std::make_unique<DirectionLineCost>(std::move(points), line.fit->line, options);
     const int place = AddBlock(options.direction_sigma > 0.0 ? 2 : 1, {}),
               camera = cameras_[static_cast<std::size_t>(input.camera)];
     const double* at[] = {Values(rotations_[i]), Values(direction), Values(place), Values(camera)};

@@ -111,8 +111,6 @@ class AdjustProblem : private Graph {
 
  private:
   struct Circle {
-    std::string id;
-    int world = 0;
     int center = -1, radius = -1, tilt = -1, shape = -1;  // Blocks.
   };
 
@@ -134,10 +132,6 @@ class AdjustProblem : private Graph {
   int AddGridPlace(int photo, std::size_t pencil, std::size_t line, const CurveCost& cost,
                    std::vector<int> blocks);
   int DirectionOf(int photo, const PencilObservation& pencil);
-  std::optional<ImagePoints> Points(const AdjustInput& input,
-                                    const std::vector<Eigen::Vector2d>& pixels,
-                                    const std::vector<std::uint8_t>& inliers, double sigma_px,
-                                    bool is_circle) const;
   void AddFeature(int photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
                   std::vector<int> blocks);
   void FreeCameras(bool coarse);

@@ -243,7 +243,7 @@ std::vector<AdjustedCircle> AdjustProblem::Circles() const {
   for (const auto& [key, circle] : circles_) {
     const PlaneCircle at(Values(circle.center), *Values(circle.radius),
                          circle.tilt >= 0 ? Values(circle.tilt) : nullptr);
-    out.push_back({circle.id, key.first - 1, at.center, at.normal.normalized(), at.radius});
+    out.push_back({key.second, key.first - 1, at.center, at.normal.normalized(), at.radius});
   }
   return out;
 }

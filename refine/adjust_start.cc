@@ -46,6 +46,7 @@ Observations Prepare(const Observations& given, const Camera& camera,
   photo.camera = camera;
   ResetFits(&photo);
   photo = ResolveWorld(photo);
+  photo.num_dropped_points = 0;
   FitDirect(kDefaultSigmaPx, &photo, nullptr, options.noise_model);
   photo = ResolveWorld(photo);
   StateNoise(noise != nullptr ? *noise : MeasurePointNoise(photo, options.noise_model),
@@ -53,30 +54,12 @@ Observations Prepare(const Observations& given, const Camera& camera,
   return photo;
 }
 
-namespace {
-
-// Points that the camera cannot have seen.
-int NumImpossible(const Observations& observations) {
-  CalibratedPoint unused;
-  int count = 0;
-  const auto add = [&](const std::vector<Eigen::Vector2d>& pixels) {
-    for (const Eigen::Vector2d& pixel : pixels)
-      count += PixelToCalibrated(observations.camera, pixel, &unused) ? 0 : 1;
-  };
-  for (const CircleObservation& circle : observations.circles) add(circle.points);
-  for (const PencilObservation& pencil : observations.pencils) {
-    for (const LineObservation& line : pencil.lines) add(line.points);
-  }
-  return count;
-}
-
-}  // namespace
-
 double CoarsePose(const Observations& photo, const EstimationOptions& options,
                   PoseEstimate* estimate) {
   constexpr int kIterations = 3;
   constexpr double kImpossible = 0.5 * kInlierSigmas * kInlierSigmas;  // As an outlier.
-  const double impossible = kImpossible * NumImpossible(photo);
+  // Points that the camera cannot have seen.
+  const double impossible = kImpossible * photo.num_dropped_points;
   SolverRegistry registry;
   AddClosedFormSolvers(&registry);
   std::vector<std::string> unused;

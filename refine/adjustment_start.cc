@@ -94,11 +94,11 @@ Status Adjustment::CheckGivenPoses() {
 
 void Adjustment::SetAsideEqualViews() {
   if (!(options_.nearly_equal > 0.0)) return;
-  const std::vector<int> equal = NearlyEqualViews(given_, options_.nearly_equal);
+  const std::vector<int> equal = NearlyEqualViews(given_, is_valid_, options_.nearly_equal);
   const auto count =
       std::count_if(equal.begin(), equal.end(), [](int other) { return other >= 0; });
   for (std::size_t i = 0; i < equal.size(); ++i) {
-    if (equal[i] < 0 || is_valid_[i] == 0) continue;
+    if (equal[i] < 0) continue;
     is_valid_[i] = 0;
     out_.photos[i].same_as = equal[i];
     out_.photos[i].status =

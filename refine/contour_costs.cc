@@ -1,6 +1,5 @@
 // The cost functions of contours: how a circle's image follows from pose and circle.
 #include <Eigen/Dense>
-#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -124,9 +123,6 @@ bool CircleContourCost::EvaluateWith(const Weighing& weighing, const double* con
 
 namespace {
 
-constexpr int kPriorRows = 3;
-constexpr double kHeld = 1e-6;  // Stands for a standard deviation of 0.
-
 PlaneCircle InWorld(const double* const* parameters, bool tilted) {
   return {parameters[2], parameters[3][0], tilted ? parameters[4] : nullptr};
 }
@@ -159,8 +155,7 @@ std::vector<int> BlockSizes(const PlaneCircleContourCost::Blocks& blocks) {
 }  // namespace
 
 PlaneCircleContourCost::PlaneCircleContourCost(ImagePoints points, Blocks blocks)
-    : CurveCost(std::move(points), 5, BlockSizes(blocks), blocks.offset, blocks.camera,
-                blocks.tilt_and_height ? kPriorRows : 0),
+    : CurveCost(std::move(points), 5, BlockSizes(blocks), blocks.offset, blocks.camera, 0),
       blocks_(blocks) {}
 
 void PlaneCircleContourCost::Distances(const double* const* parameters,
@@ -187,11 +182,6 @@ bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double
   if (!(circle.p.z() > 0.0) || !(circle.r > 0.0) ||
       !SumAbout(ImageOfCircle(circle), weighing, parameters, residuals, jacobians, &U))
     return false;
-  const double tilt_sigma = std::max(blocks_.tilt_sigma, kHeld),
-               height_sigma = std::max(blocks_.height_sigma, kHeld);
-  const double sigmas[kPriorRows] = {tilt_sigma, tilt_sigma, height_sigma};
-  double* prior = residuals + num_curve_residuals();
-  for (int k = 0; tilted && k < kPriorRows; ++k) prior[k] = parameters[4][k] / sigmas[k];
   if (jacobians == nullptr) return true;
   const int rows = num_residuals();
   const CircleChain<Rows> by(U, R, circle, *points());
@@ -205,8 +195,6 @@ bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double
     by_tilt.leftCols<2>() = by.ByNormal() * R.leftCols<2>();
     by_tilt.col(2) = circle.r * (by.ByPoint() * R.col(2));
     WriteJacobian(by_tilt, rows, 4, jacobians);
-    for (int k = 0; k < kPriorRows; ++k)
-      jacobians[4][(num_curve_residuals() + k) * 3 + k] = 1.0 / sigmas[k];
   }
   if (blocks_.shape && jacobians[ShapeBlock()] != nullptr) {
     Eigen::Matrix<double, Eigen::Dynamic, 2, 0, CurveModel::kMaxSize, 2> by_shape(U.rows(), 2);

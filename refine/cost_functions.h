@@ -94,13 +94,10 @@ class CurveCost : public FeatureCost {
   // Derivatives of the points' residuals by a curve: ConicToVector of its Normalized(), or a line.
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
                              CurveModel::kMaxSize, 6>;
-  // Writes the points' residuals about a conic or a line, and their derivatives by the optional
-  // blocks; `U` receives those by the curve, where any are asked for. False where a point has no
-  // finite cost.
-  bool SumAbout(const Eigen::Matrix3d& conic, const Weighing& weighing,
-                const double* const* parameters, double* residuals, double** jacobians,
-                Rows* U) const;
-  bool SumAbout(const Eigen::Vector3d& line, const Weighing& weighing,
+  // Writes the points' residuals about a conic (3 x 3) or a line (3 x 1), and their derivatives by
+  // the optional blocks; `U` receives those by the curve, where any are asked for. False where a
+  // point has no finite cost.
+  bool SumAbout(const Eigen::Ref<const Eigen::Matrix3Xd>& curve, const Weighing& weighing,
                 const double* const* parameters, double* residuals, double** jacobians,
                 Rows* U) const;
   // The points' share of the residuals; those of priors come behind.
@@ -108,8 +105,6 @@ class CurveCost : public FeatureCost {
 
  private:
   int Rank(bool camera_is_variable) const;
-  template <typename Sum>
-  bool EvaluateSum(const Sum& sum, double* residuals, double** jacobians, Rows* U) const;
 
   ImagePoints points_;
   int curve_rank_, num_priors_;
@@ -134,15 +129,14 @@ class CircleContourCost : public CurveCost {
 
 // Contour of a circle of the plane Z = 0: rotation, translation, center (2), radius (1), [tilt and
 // height (3)], [shape (2)], [contour offset (1)], [camera]. The circle's own plane is Z = 0 but for
-// a tilt (the X and Y of its normal, radians) and a height (in radii), which have a Gaussian prior
-// here; and it is round but for a shape (a, b): at the angle phi from X towards Y its radius is
-// r (1 + a cos 2 phi + b sin 2 phi), to first order, which is for a prior of its own to hold small.
+// a tilt (the X and Y of its normal, radians) and a height (in radii); and it is round but for a
+// shape (a, b): at the angle phi from X towards Y its radius is r (1 + a cos 2 phi + b sin 2 phi),
+// to first order. Both are for priors of their own to hold small (NewGaussianPrior).
 class PlaneCircleContourCost : public CurveCost {
  public:
-  // Which of the blocks in brackets there are, and the prior of tilt and height.
+  // Which of the blocks in brackets there are.
   struct Blocks {
     bool tilt_and_height = false, shape = false, offset = false, camera = false;  // In this order.
-    double tilt_sigma = 0.0, height_sigma = 0.0;  // Radians, radii; 0: held at its value.
   };
   // Of the points of its contour.
   PlaneCircleContourCost(ImagePoints points, Blocks blocks);

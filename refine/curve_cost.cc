@@ -36,14 +36,19 @@ int CurveCost::Rank(bool camera_is_variable) const {
          (camera_is_variable ? points_.options().num_distortion : 0);
 }
 
-template <typename Sum>
-bool CurveCost::EvaluateSum(const Sum& sum, double* residuals, double** jacobians, Rows* U) const {
+bool CurveCost::SumAbout(const Eigen::Ref<const Eigen::Matrix3Xd>& curve, const Weighing& weighing,
+                         const double* const* parameters, double* residuals, double** jacobians,
+                         Rows* U) const {
   // Only where somebody asks: a camera that is held has no derivatives.
   const ImagePoints::Variables variables{
       offset_block_ >= 0,
       camera_block_ >= 0 && jacobians != nullptr && jacobians[camera_block_] != nullptr};
-  CurveModel model;
-  const double twice_cost = sum(variables, jacobians != nullptr ? &model : nullptr);
+  CurveModel model, *wanted = jacobians != nullptr ? &model : nullptr;
+  const double* camera = CameraShifts(parameters);
+  const double twice_cost =
+      curve.cols() == 1
+          ? points_.SumLine(curve.col(0), camera, weighing, variables.camera, wanted)
+          : points_.SumConic(curve, Offset(parameters), camera, weighing, variables, wanted);
   if (!std::isfinite(twice_cost)) return false;
   const int rows = num_residuals() - num_priors_;
   if (jacobians == nullptr) {
@@ -64,25 +69,6 @@ bool CurveCost::EvaluateSum(const Sum& sum, double* residuals, double** jacobian
                   jacobians, kCameraSize);
   *U = root.U.leftCols(curve_size);
   return true;
-}
-
-bool CurveCost::SumAbout(const Eigen::Matrix3d& conic, const Weighing& weighing,
-                         const double* const* parameters, double* residuals, double** jacobians,
-                         Rows* U) const {
-  const auto sum = [&](const ImagePoints::Variables& variables, CurveModel* model) {
-    return points_.SumConic(conic, Offset(parameters), CameraShifts(parameters), weighing,
-                            variables, model);
-  };
-  return EvaluateSum(sum, residuals, jacobians, U);
-}
-
-bool CurveCost::SumAbout(const Eigen::Vector3d& line, const Weighing& weighing,
-                         const double* const* parameters, double* residuals, double** jacobians,
-                         Rows* U) const {
-  const auto sum = [&](const ImagePoints::Variables& variables, CurveModel* model) {
-    return points_.SumLine(line, CameraShifts(parameters), weighing, variables.camera, model);
-  };
-  return EvaluateSum(sum, residuals, jacobians, U);
 }
 
 }  // namespace circline

@@ -63,10 +63,12 @@ bool IsIn(const View& a, const View& b, double distance) {
 
 }  // namespace
 
-std::vector<int> NearlyEqualViews(const std::vector<Observations>& photos, double distance) {
+std::vector<int> NearlyEqualViews(const std::vector<Observations>& photos,
+                                  const std::vector<std::uint8_t>& takes_part, double distance) {
   std::vector<int> equal(photos.size(), -1);
-  std::vector<View> views;
-  for (const Observations& photo : photos) views.push_back(ViewOf(photo));
+  std::vector<View> views;  // That of a photo that takes no part is like none.
+  for (std::size_t i = 0; i < photos.size(); ++i)
+    views.push_back(takes_part[i] != 0 ? ViewOf(photos[i]) : View());
   for (std::size_t i = 0; i < photos.size(); ++i) {
     const Camera& camera = photos[i].camera;
     const double pixels = distance * std::hypot(camera.width, camera.height);

@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <optional>
-#include <utility>
 #include <vector>
 
 #include "circline/estimators/noise_model.h"
@@ -39,17 +37,12 @@ inline bool FillEvidencePoints(const Camera& camera, const std::vector<Eigen::Ve
   return true;
 }
 
-// The same, made anew.
-inline std::optional<ImagePoints> EvidencePoints(const Camera& camera,
-                                                 const std::vector<Eigen::Vector2d>& pixels,
-                                                 const std::vector<std::uint8_t>& inliers,
-                                                 double sigma_px, bool is_contour,
-                                                 const EstimationOptions& how, int num_distortion) {
-  std::optional<ImagePoints> points(std::in_place);
-  if (!FillEvidencePoints(camera, pixels, inliers, sigma_px, is_contour, how, num_distortion,
-                          &*points))
-    points.reset();
-  return points;
+// Of a circle's tilt and height (PlaneCircleContourCost); empty where both are exact.
+inline std::vector<double> TiltSigmas(const NoiseModel& noise) {
+  constexpr double kExact = 1e-6;  // Stands for a standard deviation of 0.
+  if (!(noise.circle_tilt_rad > 0.0) && !(noise.circle_height > 0.0)) return {};
+  const double tilt = std::max(noise.circle_tilt_rad, kExact);
+  return {tilt, tilt, std::max(noise.circle_height, kExact)};
 }
 
 // Twice what the points cost under their loss at their own best curve, by one step from a fit.

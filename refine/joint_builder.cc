@@ -30,11 +30,11 @@ int JointProblemBuilder::AddFeature(Feature feature) {
   return static_cast<int>(p_.features_.size()) - 1;
 }
 
-std::optional<ImagePoints> JointProblemBuilder::Points(const std::vector<Eigen::Vector2d>& pixels,
-                                                       const std::vector<std::uint8_t>& inliers,
-                                                       double sigma_px, bool is_circle) const {
-  return EvidencePoints(obs_.camera, pixels, inliers, sigma_px, is_circle, p_.options_,
-                        p_.camera_sigma_.k1 > 0.0 ? 1 : 0);
+bool JointProblemBuilder::Points(const std::vector<Eigen::Vector2d>& pixels,
+                                 const std::vector<std::uint8_t>& inliers, double sigma_px,
+                                 bool is_circle, ImagePoints* points) const {
+  return FillEvidencePoints(obs_.camera, pixels, inliers, sigma_px, is_circle, p_.options_,
+                            p_.camera_sigma_.k1 > 0.0 ? 1 : 0, points);
 }
 
 void JointProblemBuilder::Build() {

@@ -33,9 +33,8 @@ class JointProblemBuilder {
   int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature);
   int AddFeature(Feature feature);
 
-  std::optional<ImagePoints> Points(const std::vector<Eigen::Vector2d>& pixels,
-                                    const std::vector<std::uint8_t>& inliers, double sigma_px,
-                                    bool is_circle) const;
+  bool Points(const std::vector<Eigen::Vector2d>& pixels, const std::vector<std::uint8_t>& inliers,
+              double sigma_px, bool is_circle, ImagePoints* points) const;
 
   void AddOrigin();
   void AddCircle(std::size_t index);

@@ -102,22 +102,25 @@ int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
 void JointProblemBuilder::AddCircle(std::size_t index) {
   const CircleObservation& circle = obs_.circles[index];
   if (!InPlane(circle)) return;
-  std::optional<ImagePoints> points = Points(circle.points, circle.inliers, circle.sigma_px, true);
-  if (!points) return;
+  ImagePoints points;
+  if (!Points(circle.points, circle.inliers, circle.sigma_px, true, &points)) return;
   Feature feature{Feature::Kind::kCircle, circle.id, "circle '" + circle.id + "'"};
   feature.dof = circle.radius > 0.0 ? 3 : 2;
   feature.observation = static_cast<int>(index);
-  feature.free_twice_cost = FreeTwiceCost(*points, circle.fit->conic);
+  feature.free_twice_cost = FreeTwiceCost(points, circle.fit->conic);
   const int f = AddFeature(feature), center = CenterBlock(circle), radius = RadiusBlock(circle, f);
 
   PlaneCircleContourCost::Blocks blocks;
-  blocks.tilt_and_height = model_.circle_tilt_rad > 0.0 || model_.circle_height > 0.0;
-  blocks.tilt_sigma = model_.circle_tilt_rad;
-  blocks.height_sigma = model_.circle_height;
   blocks.camera = has_camera_;
   std::vector<int> used = {JointProblem::kRotation, JointProblem::kTranslation, center, radius};
-  const int tilt = blocks.tilt_and_height ? p_.AddBlock(3, {}) : -1;
-  if (tilt >= 0) used.push_back(tilt);
+  int tilt = -1;
+  const std::vector<double> tilt_sigmas = TiltSigmas(model_);
+  blocks.tilt_and_height = !tilt_sigmas.empty();
+  if (blocks.tilt_and_height) {
+    tilt = p_.AddBlock(3, {});
+    used.push_back(tilt);
+    p_.AddTerm(NewGaussianPrior(tilt_sigmas), {tilt}, f);
+  }
   blocks.shape = model_.circle_shape > 0.0;
   if (blocks.shape) {
     used.push_back(p_.AddBlock(2, {}));
@@ -129,9 +132,9 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   const int offset = OffsetBlock(circle);
   blocks.offset = offset >= 0;
   if (offset >= 0) used.push_back(offset);
-  const ImagePoints kept = *points;
+  const ImagePoints kept = points;
   const int term =
-      AddFeatureTerm(std::make_unique<PlaneCircleContourCost>(std::move(*points), blocks), used, f);
+      AddFeatureTerm(std::make_unique<PlaneCircleContourCost>(std::move(points), blocks), used, f);
   p_.circles_.push_back({static_cast<int>(index), f, term, center, radius, tilt});
   if (circle.center) AddMark(circle, kept, center, f);
   for (std::size_t k = 0; k < circle.diameters.size(); ++k) AddDiameter(circle, k, center, f);
@@ -152,9 +155,11 @@ void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size
                                       int center, int feature) {
   const Segment& segment = circle.diameters[index];
   const double sigma = circle.sigma_px;
-  std::optional<ImagePoints> points = Points({segment[0], segment[1]}, {}, sigma, false);
+  ImagePoints points;
   LineFit fit;
-  if (!points || !FitLine(points->points(), sigma, &fit).ok()) return;
+  if (!Points({segment[0], segment[1]}, {}, sigma, false, &points) ||
+      !FitLine(points.points(), sigma, &fit).ok())
+    return;
   Feature diameter{Feature::Kind::kPlaneLine,
                    circle.id + ".diameters[" + std::to_string(index) + "]",
                    "a diameter of circle '" + circle.id + "'"};
@@ -162,7 +167,7 @@ void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size
   diameter.line_covariance = fit.covariance;
   const int f = AddFeature(diameter);
   const int angle = p_.AddBlock(1, {});
-  AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(*points), has_camera_),
+  AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(points), has_camera_),
                  {JointProblem::kRotation, JointProblem::kTranslation, center, angle}, f);
   p_.plane_lines_.push_back({angle, fit.line});
 }

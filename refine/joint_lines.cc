@@ -119,11 +119,11 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
     feature.observation = static_cast<int>(index);
     feature.line = static_cast<int>(j);
     const double sigma = LineSigma(pencil, line);
-    std::optional<ImagePoints> points = Points(line.points, line.inliers, sigma, false);
-    if (!points) continue;
+    ImagePoints points;
+    if (!Points(line.points, line.inliers, sigma, false, &points)) continue;
     const int axis = AxisOfLine(index, j);
     if (axis >= 0) {
-      AddAxisLine(std::move(*points), *line.fit, axis, feature.id, feature.name);
+      AddAxisLine(std::move(points), *line.fit, axis, feature.id, feature.name);
       continue;
     }
     feature.line_covariance = line.fit->covariance;
@@ -131,7 +131,7 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
       direction = DirectionBlock(index);
       p_.pencils_.push_back({static_cast<int>(index), direction});
     }
-    AddLine(std::move(*points), line.fit->line, direction, model_.line_direction_rad, feature);
+    AddLine(std::move(points), line.fit->line, direction, model_.line_direction_rad, feature);
   }
   if (direction >= 0) directions_[pencil.id] = direction;
 }
@@ -170,17 +170,19 @@ void JointProblemBuilder::AddDrawnAxis(const std::optional<Segment>& axis, int w
   if (!axis || FindAxisLine(obs_, *axis, &pencil, &index)) return;
   const std::string id = which == 0 ? "frame.x_axis" : "frame.y_axis",
                     name = which == 0 ? "the X axis" : "the Y axis";
-  std::optional<ImagePoints> points = Points({(*axis)[0], (*axis)[1]}, {}, DrawnSigma(), false);
+  ImagePoints points;
   LineFit fit;
-  if (!points || !FitLine(points->points(), DrawnSigma(), &fit).ok()) return;
+  if (!Points({(*axis)[0], (*axis)[1]}, {}, DrawnSigma(), false, &points) ||
+      !FitLine(points.points(), DrawnSigma(), &fit).ok())
+    return;
   if (p_.origin_observed_) {
-    AddAxisLine(std::move(*points), fit, which, id, name);
+    AddAxisLine(std::move(points), fit, which, id, name);
     return;
   }
   p_.x_is_fixed_ = true;
   const Eigen::Vector3d direction = Eigen::Vector3d::Unit(which);
   const int along = AddConstant({direction.x(), direction.y(), direction.z()});
-  AddLine(std::move(*points), fit.line, along, 0.0, {Feature::Kind::kLine, id, name});
+  AddLine(std::move(points), fit.line, along, 0.0, {Feature::Kind::kLine, id, name});
 }
 
 }  // namespace circline

@@ -42,11 +42,12 @@ struct DirectionLineCost::Placed {
   Eigen::Vector3d in_world, d, m, turned, line, by_angle;
   double c, s, e, along, norm;
 
-  // (d line / d d)^T u.
-  Eigen::Vector3d ByDirection(const Eigen::Vector3d& fit, const Eigen::Vector3d& u) const {
-    const Eigen::Vector3d by_m = c * u + s * u.cross(d);
-    const Eigen::Vector3d across = (m.dot(by_m) * m - by_m) / norm;
-    return along * across + d.dot(across) * fit + s * m.cross(u) + e * u;
+  // d line / d d.
+  Eigen::Matrix3d ByDirection(const Eigen::Vector3d& fit) const {
+    const Eigen::Matrix3d by_m = c * Eigen::Matrix3d::Identity() + s * CrossMatrix(d);
+    const Eigen::Matrix3d m_by_across = (Eigen::Matrix3d::Identity() - m * m.transpose()) / norm;
+    const Eigen::Matrix3d across_by_d = -d * fit.transpose() - along * Eigen::Matrix3d::Identity();
+    return by_m * m_by_across * across_by_d - s * CrossMatrix(m) + e * Eigen::Matrix3d::Identity();
   }
 };
 
@@ -115,24 +116,14 @@ bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* con
   const AsSquare prior(deviation);
   if (soft) residuals[line_rows] = weighing.inliers_only ? deviation : prior.value;
   if (jacobians == nullptr) return true;
-  for (int k = 0; k < 3; ++k) {
-    if (jacobians[k] != nullptr)
-      std::fill_n(jacobians[k], rows * parameter_block_sizes()[static_cast<std::size_t>(k)], 0.0);
-  }
-  const Eigen::Matrix<double, 3, 4> by_quaternion = DeltaFromQuaternion(parameters[0]);
   const int own_size = soft ? 2 : 1;
-  for (int row = 0; row < static_cast<int>(U.rows()); ++row) {
-    const Eigen::Vector3d u = U.row(row).head<3>();
-    const Eigen::Vector3d by_world = p.R.transpose() * p.ByDirection(fit_, u);
-    if (jacobians[0] != nullptr) {
-      Eigen::Map<Eigen::RowVector4d>(jacobians[0] + 4 * row) =
-          p.in_world.cross(by_world).transpose() * by_quaternion;
-    }
-    if (jacobians[1] != nullptr) Eigen::Map<Eigen::Vector3d>(jacobians[1] + 3 * row) = by_world;
-    if (jacobians[2] == nullptr) continue;
-    jacobians[2][own_size * row] = u.dot(p.by_angle);
-    if (soft) jacobians[2][own_size * row + 1] = u.dot(p.d);
-  }
+  const Eigen::Matrix3d by_world = p.ByDirection(fit_) * p.R;
+  Eigen::Matrix<double, 3, 2> by_own;
+  by_own << p.by_angle, p.d;
+  WriteJacobian(U * (by_world * -CrossMatrix(p.in_world)) * DeltaFromQuaternion(parameters[0]),
+                rows, 0, jacobians);
+  WriteJacobian(U * by_world, rows, 1, jacobians);
+  WriteJacobian(U * by_own.leftCols(own_size), rows, 2, jacobians);
   if (soft && jacobians[2] != nullptr) {
     jacobians[2][own_size * line_rows + 1] =
         (weighing.inliers_only ? 1.0 : prior.slope) / options_.direction_sigma;
@@ -260,8 +251,8 @@ bool PlanePointCost::EvaluateWith(const Weighing& weighing, const double* const*
     by_camera.col(0) = pixel - Eigen::Vector2d(camera.cx, camera.cy);
     by_camera(1, 1) = pixel.y() - camera.cy;
     by_camera.block<2, 2>(0, 2).setIdentity();
-    if (camera.model != CameraModel::kPinhole)
-      by_camera.col(4) = LensSlope(camera, 0).At(camera, p.head<2>() / p.z(), nullptr);
+    for (int k = 0; camera.model != CameraModel::kPinhole && 4 + k < kCameraSize; ++k)
+      by_camera.col(4 + k) = LensSlope(camera, k).At(camera, p.head<2>() / p.z(), nullptr);
     WriteJacobian(root.U * by_camera / sigma_px_, 3, 3, jacobians);
   }
   return true;

@@ -23,13 +23,6 @@ using Vector3Block = Eigen::Map<const Vector3<T>>;
 template <typename T>
 using RotationBlock = Eigen::Map<const Eigen::Quaternion<T>>;
 
-// A value of a jet or a double.
-double Scalar(double v) { return v; }
-template <typename T, int N>
-double Scalar(const ceres::Jet<T, N>& v) {
-  return v.a;
-}
-
 // Angle times axis.
 template <typename T>
 Vector3<T> AngleAxisOf(const Eigen::Quaternion<T>& q) {
@@ -44,16 +37,16 @@ struct AngleResidual {
 
   template <typename T>
   bool operator()(const T* a, const T* b, T* residual) const {
+    using std::abs;
     using std::atan2;
     const Vector3Block<T> u(a), v(b);
     const Vector3<T> cross = u.cross(v);
-    if (!(Scalar(cross.squaredNorm()) > 0.0)) return false;
+    if (!(cross.squaredNorm() > T(0.0))) return false;
     const T between = atan2(cross.norm(), u.dot(v));
     // The angle or its supplement, whichever is nearer.
     const double folded = std::acos(std::cos(angle));
-    const double direct = std::abs(Scalar(between) - folded),
-                 other = std::abs(Scalar(between) - (kPi - folded));
-    residual[0] = (between - (direct <= other ? folded : kPi - folded)) / sigma;
+    const T direct = between - folded, other = between - (kPi - folded);
+    residual[0] = (abs(direct) <= abs(other) ? direct : other) / sigma;
     return true;
   }
 };
@@ -65,7 +58,7 @@ struct LengthResidual {
   bool operator()(const T* a, const T* b, T* residual) const {
     using std::log;
     const T x = b[0] - a[0], y = b[1] - a[1], squared = x * x + y * y;
-    if (!(Scalar(squared) > 0.0)) return false;
+    if (!(squared > T(0.0))) return false;
     residual[0] = 0.5 * log(squared / (length * length)) / sigma;
     return true;
   }
@@ -77,21 +70,8 @@ struct LogResidual {
   template <typename T>
   bool operator()(const T* x, T* residual) const {
     using std::log;
-    if (!(Scalar(x[0]) > 0.0)) return false;
+    if (!(x[0] > T(0.0))) return false;
     residual[0] = log(x[0] / value) / sigma;
-    return true;
-  }
-};
-
-// Rows of `across` times the direction.
-template <int kRows>
-struct AcrossResidual {
-  Eigen::Matrix<double, kRows, 3> across;
-
-  template <typename T>
-  bool operator()(const T* direction, T* residual) const {
-    Eigen::Map<Eigen::Matrix<T, kRows, 1>> off(residual);
-    off = across.template cast<T>() * Vector3Block<T>(direction);
     return true;
   }
 };
@@ -176,13 +156,11 @@ ceres::CostFunction* NewGaussianPrior(const std::vector<double>& sigmas,
 ceres::CostFunction* NewDirectionPrior(const Eigen::Vector3d& axis, double sigma) {
   Eigen::Matrix<double, 2, 3> across;
   across << axis.unitOrthogonal().transpose(), axis.cross(axis.unitOrthogonal()).transpose();
-  return new ceres::AutoDiffCostFunction<AcrossResidual<2>, 2, 3>(
-      new AcrossResidual<2>{across / sigma});
+  return new ceres::NormalPrior(across / sigma, Eigen::Vector3d::Zero());
 }
 
 ceres::CostFunction* NewInPlanePrior(const Eigen::Vector3d& normal, double sigma) {
-  return new ceres::AutoDiffCostFunction<AcrossResidual<1>, 1, 3>(
-      new AcrossResidual<1>{normal.transpose() / sigma});
+  return new ceres::NormalPrior(normal.transpose() / sigma, Eigen::Vector3d::Zero());
 }
 
 ceres::CostFunction* NewPosePrior(const Eigen::Matrix3d& rotation,

@@ -16,14 +16,6 @@
 namespace circline {
 namespace {
 
-// The shortest turn of one unit vector into another.
-Eigen::Matrix3d RotationBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-  const Eigen::Vector3d across = from.cross(to);
-  const double sine = across.norm();
-  const Eigen::Vector3d axis = sine > 0.0 ? Eigen::Vector3d(across / sine) : from.unitOrthogonal();
-  return ExpRotation(std::atan2(sine, from.dot(to)) * axis);
-}
-
 int NumDistortion(const EstimationOptions& options) {
   return options.camera_sigma.value_or(options.noise_model.camera).k1 > 0.0 ? 1 : 0;
 }
@@ -86,9 +78,6 @@ void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle) {
   points_.RemoveCurvatureBias(seen.fit->conic, seen.sigma_px);
   PlaneCircleContourCost::Blocks blocks;
   blocks.tilt_and_height = circle.tilt >= 0;
-  // What the map knows of them is in its own Gaussian.
-  constexpr double kNothing = 1e3;
-  blocks.tilt_sigma = blocks.height_sigma = kNothing;
   blocks.offset = circle.offset >= 0;
   blocks.camera = map_.has_camera();
   const int parent = static_cast<int>(terms_.size());
@@ -209,8 +198,8 @@ int TrackFrame::CircleStarts(const TrackState& prior, CameraPose* starts) const 
   for (int i = 0; i < count; ++i) {
     const CirclePose& p = poses[static_cast<std::size_t>(i)];
     CameraPose start;
-    start.rotation =
-        RotationBetween(normal, faces ? p.normal : Eigen::Vector3d(-p.normal)) * predicted.rotation;
+    start.rotation = Eigen::Quaterniond::FromTwoVectors(normal, (faces ? 1.0 : -1.0) * p.normal) *
+                     predicted.rotation;
     start.translation = radius * p.center - start.rotation * in_plane;
     if (start.rotation.allFinite() && start.translation.allFinite()) starts[num_starts++] = start;
   }

@@ -126,12 +126,10 @@ class MapBuilder {
   // What does not average out over frames: the circle's own tilt and height, and the offset of all
   // contours of its contrast.
   void AddImperfections(const CircleObservation& circle, TrackMap::Circle* added) {
-    constexpr double kExact = 1e-6;  // Stands for a standard deviation of 0.
-    if (noise_.circle_tilt_rad > 0.0 || noise_.circle_height > 0.0) {
+    const std::vector<double> tilt = TiltSigmas(noise_);
+    if (!tilt.empty()) {
       added->tilt = map_.AddBlock(3);
-      const double tilt = std::max(noise_.circle_tilt_rad, kExact),
-                   height = std::max(noise_.circle_height, kExact);
-      Append(added->tilt, Eigen::Vector3d(tilt, tilt, height));
+      Append(added->tilt, Eigen::Vector3d(tilt.data()));
     }
     if (!(noise_.contour_offset_px > 0.0)) return;
     added->contrast = std::clamp(circle.contrast, -1, 1);

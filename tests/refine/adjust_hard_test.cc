@@ -113,6 +113,11 @@ TEST(AdjustHard, NearlyEqualFramesTakePartWhereThatIsAskedFor) {
   const AdjustedPhotos adjusted = AdjustPhotos(views.photos, options);
   ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
   EXPECT_EQ(adjusted.cameras[0].num_photos, 3);
+  // One that cannot take part stands for no other.
+  views.photos[0].circles[0].radius = -1.0;
+  const AdjustedPhotos others = AdjustPhotos(views.photos, PointNoiseOnly());
+  ASSERT_TRUE(others.status.ok()) << others.status.message;
+  EXPECT_EQ(others.cameras[0].num_photos, 2);
   options.nearly_equal = -1.0;
   EXPECT_EQ(AdjustPhotos(views.photos, options).status.code, StatusCode::kInvalidArgument);
 }
