@@ -58,8 +58,7 @@ AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
 void AdjustProblem::AddFeature(int photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
                                std::vector<int> blocks) {
   const bool active = photos_[static_cast<std::size_t>(photo)].left_out.count(id) == 0;
-  const int term =
-      AddFeatureTerm(std::move(cost), std::move(blocks), static_cast<int>(features_.size()));
+  const int term = AddTerm(cost.release(), std::move(blocks), static_cast<int>(features_.size()));
   features_.push_back({photo, id, term, active});
 }
 
@@ -76,17 +75,14 @@ void AdjustProblem::AddCameras(const std::vector<CameraPrior>& priors) {
 
 // Of what has a prior width all, or the focal length and the first distortion coefficient only.
 void AdjustProblem::FreeCameras(bool coarse) {
-  constexpr int kFocal = 0, kFirstRadial = 4;
+  constexpr std::size_t kFocal = 0, kFirstRadial = 4;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    std::vector<int> held;
-    for (int k = 0; k < kCameraSize; ++k) {
-      const bool is_held = !(camera_sigmas_[c][static_cast<std::size_t>(k)] > 0.0);
-      if (is_held || (coarse && k != kFocal && k != kFirstRadial)) held.push_back(k);
+    Shifts sigmas = camera_sigmas_[c];
+    for (std::size_t k = 0; coarse && k < sigmas.size(); ++k) {
+      if (k != kFocal && k != kFirstRadial) sigmas[k] = 0.0;
     }
-    const bool is_free = held.size() < kCameraSize;
-    block(cameras_[c]).is_constant = !is_free;
-    SetManifold(cameras_[c],
-                is_free ? std::make_unique<ceres::SubsetManifold>(kCameraSize, held) : nullptr);
+    SetManifold(cameras_[c], ShiftManifold(sigmas));
+    block(cameras_[c]).is_constant = block(cameras_[c]).manifold == nullptr;
   }
 }
 

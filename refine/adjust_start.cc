@@ -62,8 +62,7 @@ double CoarsePose(const Observations& photo, const EstimationOptions& options,
   const double impossible = kImpossible * photo.num_dropped_points;
   SolverRegistry registry;
   AddClosedFormSolvers(&registry);
-  std::vector<std::string> unused;
-  const std::vector<Seed> seeds = CollectSeeds(photo, registry.solvers(), 0.0, &unused);
+  const std::vector<Seed> seeds = CollectSeeds(photo, registry.solvers(), 0.0);
   const JointProblem problem(photo, options);
   Status last;
   std::vector<SeedStart> starts = StartsOf(problem, seeds, problem.FirstReading(), &last);

@@ -16,8 +16,6 @@
 
 namespace circline {
 
-using Shifts = std::array<double, kCameraSize>;  // In the order of camera_shifts.h.
-
 // Prior standard deviations of a camera's shifts; 0 = held.
 Shifts ShiftSigmas(const Camera& camera, const CameraSigma& prior, const AdjustOptions& options);
 // From one camera to another of its model.

@@ -7,7 +7,7 @@
 #include "circline/refine/adjust_start.h"
 #include "circline/refine/adjustment.h"
 #include "circline/refine/given_poses.h"
-#include "circline/refine/is_rotation.h"
+#include "circline/refine/known_pose.h"
 #include "circline/refine/statistics.h"
 
 namespace circline {
@@ -22,10 +22,8 @@ bool IsSameCamera(const Camera& a, const Camera& b) {
 
 // kOpenCV has k1 k2 p1 p2 k3, kFisheye k1 to k4.
 Shifts ShiftSigmas(const Camera& camera, const CameraSigma& prior, const AdjustOptions& options) {
-  Shifts sigma{};
-  sigma[0] = prior.log_focal;
-  sigma[1] = prior.log_aspect;
-  sigma[2] = sigma[3] = prior.principal_point_px;
+  Shifts sigma = ShiftSigmas(camera, prior);
+  sigma[4] = 0.0;
   if (camera.model == CameraModel::kPinhole) return sigma;
   const bool opencv = camera.model == CameraModel::kOpenCV;
   const std::array<std::size_t, 4> radial = {4, 5, opencv ? 8U : 6U, 7};

@@ -1,10 +1,15 @@
 #include "circline/refine/camera_shifts.h"
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 
 namespace circline {
+
+Shifts ShiftSigmas(const Camera& camera, const CameraSigma& sigma) {
+  const double k1 = camera.model != CameraModel::kPinhole ? sigma.k1 : 0.0;
+  return {sigma.log_focal, sigma.log_aspect, sigma.principal_point_px, sigma.principal_point_px,
+          k1};
+}
 
 Camera ShiftedCamera(const Camera& camera, const double* shifts) {
   Camera shifted = camera;

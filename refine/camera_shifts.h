@@ -3,9 +3,11 @@
 #define CIRCLINE_REFINE_CAMERA_SHIFTS_H_
 
 #include <Eigen/Core>
+#include <array>
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/export.h"
+#include "circline/estimators/noise_model.h"
 
 namespace CIRCLINE_EXPORT circline {
 
@@ -13,6 +15,9 @@ namespace CIRCLINE_EXPORT circline {
 // log f (both focal lengths); 1: of log (fy / fx); 2, 3: of the principal point, pixels; from 4 on:
 // of the distortion coefficients.
 constexpr int kCameraSize = 12;
+using Shifts = std::array<double, kCameraSize>;
+// Standard deviations; of the coefficients of a lens, where the camera has one, only the first.
+Shifts ShiftSigmas(const Camera& camera, const CameraSigma& sigma);
 Camera ShiftedCamera(const Camera& camera, const double* shifts);
 // What one distortion coefficient does to a pixel. The models are linear in their coefficients but
 // for the rational ones of kOpenCV (k4 to k6), for which it holds at 0.

@@ -22,9 +22,16 @@ struct Side {
 };
 
 // The world turned about its origin, which stays where it is seen.
-PoseHypothesis Turned(const PoseHypothesis& hypothesis, const Eigen::Matrix3d& turn) {
+PoseHypothesis Turned(const PoseHypothesis& hypothesis, const Eigen::Matrix3d& turn,
+                      const Camera& camera) {
   PoseHypothesis turned = hypothesis;
   turned.cam_from_world.rotation = turn * hypothesis.cam_from_world.rotation;
+  const Eigen::Vector3d& origin = turned.cam_from_world.translation;
+  for (CircleEstimate& circle : turned.circles) {
+    circle.normal = turn * circle.normal;
+    circle.center = origin + turn * (circle.center - origin);
+    CameraToPixel(camera, circle.center, &circle.center_px);
+  }
   for (PencilEstimate& pencil : turned.pencils) pencil.direction = turn * pencil.direction;
   return turned;
 }
@@ -58,7 +65,7 @@ void ShareAmong(const PencilObservation& pencil, const Camera& camera,
     for (const Side& side : sides) {
       if (!(side.share > kLeastShare)) continue;
       const Eigen::AngleAxisd turn(side.turn / side.share, about);
-      hypotheses->push_back(Turned((*hypotheses)[i], turn.toRotationMatrix()));
+      hypotheses->push_back(Turned((*hypotheses)[i], turn.toRotationMatrix(), own_camera));
       hypotheses->back().cost -= std::log(side.share);
       hypotheses->back().structure += " + turned " + pencil.id;
     }

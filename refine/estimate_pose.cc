@@ -4,12 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <memory>
 #include <utility>
 #include <vector>
 
 #include "circline/estimators/closed_form_solvers.h"
-#include "circline/refine/is_rotation.h"
+#include "circline/refine/known_pose.h"
 #include "circline/refine/readings.h"
 
 namespace circline {
@@ -60,13 +59,10 @@ Status EstimationOptions::Validate() const {
   if (!(max_cost_gap > 0.0)) return Status::Invalid("max_cost_gap must be positive");
   if (prior && !IsPose(*prior))
     return Status::Invalid("prior must be a rotation and a translation that is not zero");
-  if (pose_prior) {
-    const Eigen::LLT<Matrix6d> llt(Eigen::Map<const Matrix6d>(pose_prior->covariance.data()));
-    if (!IsPose(pose_prior->mean) || llt.info() != Eigen::Success) {
-      return Status::Invalid(
-          "pose_prior must be a rotation, a translation that is not zero and a positive definite "
-          "covariance");
-    }
+  if (pose_prior && (!IsPose(pose_prior->mean) || !IsPositiveDefinite(pose_prior->covariance))) {
+    return Status::Invalid(
+        "pose_prior must be a rotation, a translation that is not zero and a positive definite "
+        "covariance");
   }
   if (gravity_prior && (!IsUnit(gravity_prior->in_world) || !IsUnit(gravity_prior->in_camera) ||
                         !(gravity_prior->sigma_rad > 0.0))) {
@@ -82,11 +78,7 @@ PoseEstimate EstimatePose(const Observations& observations, const EstimationOpti
     AddClosedFormSolvers(&built_in);
     registry = &built_in;
   }
-  std::vector<std::shared_ptr<const Solver>> seeders;
-  for (const std::shared_ptr<const Solver>& solver : registry->solvers()) {
-    if (solver->stage() == SolverStage::kClosedForm) seeders.push_back(solver);
-  }
-  return RefineSeeds("joint", seeders, observations, options);
+  return RefineSeeds("joint", registry->solvers(), observations, options);
 }
 
 }  // namespace circline

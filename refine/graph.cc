@@ -8,42 +8,49 @@
 #include "circline/refine/block_chain.h"
 
 namespace circline {
+namespace {
 
-BlockMatrix PlusJacobianOf(const ceres::Manifold& manifold, const double* at) {
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kCameraSize, kCameraSize>
-      J(manifold.AmbientSize(), manifold.TangentSize());
-  manifold.PlusJacobian(at, J.data());
+using RowMajorBlock = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
+                                    kCameraSize, kCameraSize>;
+
+}  // namespace
+
+std::unique_ptr<ceres::Manifold> ShiftManifold(const Shifts& sigmas) {
+  std::vector<int> held;
+  for (int k = 0; k < kCameraSize; ++k) {
+    if (!(sigmas[static_cast<std::size_t>(k)] > 0.0)) held.push_back(k);
+  }
+  if (held.size() == kCameraSize) return nullptr;
+  return std::make_unique<ceres::SubsetManifold>(kCameraSize, held);
+}
+
+BlockMatrix Block::PlusJacobian(const double* at) const {
+  if (manifold == nullptr) return BlockMatrix::Identity(size, size);
+  RowMajorBlock J(manifold->AmbientSize(), manifold->TangentSize());
+  manifold->PlusJacobian(at, J.data());
+  return J;
+}
+
+BlockMatrix Block::Chart(const double* at) const {
+  if (manifold == nullptr) return BlockMatrix::Identity(size, size);
+  RowMajorBlock J(tangent_size(), size);
+  manifold->MinusJacobian(at, J.data());
   return J;
 }
 
 int Graph::AddBlock(int size, const std::vector<double>& value,
                     std::unique_ptr<ceres::Manifold> manifold, bool is_constant) {
-  blocks_.push_back({static_cast<int>(values_.size()), size, nullptr, is_constant});
+  blocks_.push_back({static_cast<int>(values_.size()), size, std::move(manifold), is_constant});
   values_.insert(values_.end(), value.begin(), value.end());
   values_.resize(static_cast<std::size_t>(blocks_.back().offset + size), 0.0);
-  const int index = static_cast<int>(blocks_.size()) - 1;
-  manifolds_.emplace_back();
-  SetManifold(index, std::move(manifold));
-  return index;
-}
-
-void Graph::SetManifold(int index, std::unique_ptr<ceres::Manifold> manifold) {
-  block(index).manifold = manifold.get();
-  manifolds_[static_cast<std::size_t>(index)] = std::move(manifold);
+  return static_cast<int>(blocks_.size()) - 1;
 }
 
 int Graph::AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature,
                    std::unique_ptr<ceres::LossFunction> loss) {
   terms_.push_back({std::unique_ptr<ceres::CostFunction>(owned), std::move(blocks), feature,
-                    nullptr, std::move(loss)});
+                    dynamic_cast<FeatureCost*>(owned), std::move(loss)});
   return static_cast<int>(terms_.size()) - 1;
-}
-
-int Graph::AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature) {
-  FeatureCost* weighed = cost.get();
-  const int index = AddTerm(cost.release(), std::move(blocks), feature);
-  term(index).weighed = weighed;
-  return index;
 }
 
 void Graph::Parameters(const Term& term, const double* x, const double** out) const {
@@ -97,8 +104,7 @@ int Graph::Fill(const std::vector<const Term*>& terms, double* x, ceres::Problem
   int unknowns = 0;
   for (const int index : BlocksOf(terms)) {
     const Block& block = this->block(index);
-    problem->AddParameterBlock(x + block.offset, block.size,
-                               const_cast<ceres::Manifold*>(block.manifold));  // Not owned.
+    problem->AddParameterBlock(x + block.offset, block.size, block.manifold.get());
     if (block.is_constant) problem->SetParameterBlockConstant(x + block.offset);
     unknowns += block.tangent_size();
   }

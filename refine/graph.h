@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "circline/refine/cost_functions.h"
@@ -22,24 +23,27 @@ using BlockMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCameraSize, kCameraSize>;
 using BlockVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCameraSize, 1>;
 
+// Of a camera of which some shifts are held, those with a standard deviation of 0; null where all
+// are.
+std::unique_ptr<ceres::Manifold> ShiftManifold(const Shifts& sigmas);
+
 // A term has no more blocks.
 constexpr std::size_t kMostBlocks = 8;
-
-BlockMatrix PlusJacobianOf(const ceres::Manifold& manifold, const double* at);
 
 // One parameter block.
 struct Block {
   int offset, size;                           // In the values of all.
-  const ceres::Manifold* manifold = nullptr;  // Null: Euclidean.
+  std::unique_ptr<ceres::Manifold> manifold;  // Null: Euclidean.
   bool is_constant = false;
 
   int tangent_size() const {
     return is_constant ? 0 : manifold != nullptr ? manifold->TangentSize() : size;
   }
   // Of its manifold, constant or not: ambient by tangent size.
-  BlockMatrix PlusJacobian(const double* at) const {
-    return manifold != nullptr ? PlusJacobianOf(*manifold, at) : BlockMatrix::Identity(size, size);
-  }
+  BlockMatrix PlusJacobian(const double* at) const;
+  // Coordinates about a place: MinusJacobian there, which is linear, times the difference; tangent
+  // by ambient size.
+  BlockMatrix Chart(const double* at) const;
 };
 
 // One residual block.
@@ -65,11 +69,12 @@ class Graph {
   // What is not in `value` is 0.
   int AddBlock(int size, const std::vector<double>& value,
                std::unique_ptr<ceres::Manifold> manifold = {}, bool is_constant = false);
-  void SetManifold(int block, std::unique_ptr<ceres::Manifold> manifold);
-  // A prior, of a feature or of none.
+  void SetManifold(int block, std::unique_ptr<ceres::Manifold> manifold) {
+    this->block(block).manifold = std::move(manifold);
+  }
+  // Points of a feature, or a prior, of a feature or of none.
   int AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature = -1,
               std::unique_ptr<ceres::LossFunction> loss = {});
-  int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature);
 
   const std::vector<Block>& blocks() const { return blocks_; }
   const std::vector<Term>& terms() const { return terms_; }
@@ -99,7 +104,6 @@ class Graph {
   std::vector<Block> blocks_;
   std::vector<Term> terms_;
   std::vector<double> values_;
-  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;  // By block.
 };
 
 }  // namespace circline

@@ -28,13 +28,6 @@ class InverseOnPattern {
     const int i = std::max(order[row], order[col]), j = std::min(order[row], order[col]);
     return i == j ? diagonal_[i] : inverse_.coeff(i, j);
   }
-  // Of these rows and columns.
-  Eigen::MatrixXd operator()(const std::vector<int>& at) const {
-    const auto n = static_cast<Eigen::Index>(at.size());
-    return Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index i, Eigen::Index j) {
-      return (*this)(at[static_cast<std::size_t>(i)], at[static_cast<std::size_t>(j)]);
-    });
-  }
   // The inverse times this.
   Eigen::MatrixXd Times(const Eigen::MatrixXd& right) const { return factor_.solve(right); }
 

@@ -22,7 +22,7 @@ constexpr double kExactLength = 1e-6;  // Relative: the same for a length.
 int JointProblemBuilder::AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks,
                                         int feature) {
   if (has_camera_) blocks.push_back(JointProblem::kCamera);
-  return p_.AddFeatureTerm(std::move(cost), std::move(blocks), feature);
+  return p_.AddTerm(cost.release(), std::move(blocks), feature);
 }
 
 int JointProblemBuilder::AddFeature(Feature feature) {
@@ -38,31 +38,20 @@ bool JointProblemBuilder::Points(const std::vector<Eigen::Vector2d>& pixels,
 }
 
 void JointProblemBuilder::Build() {
-  const CameraSigma& sigma = p_.camera_sigma_;
-  const bool has_distortion = obs_.camera.model != CameraModel::kPinhole;
-  std::vector<double> sigmas(kCameraSize, 0.0);
-  sigmas[0] = sigma.log_focal;
-  sigmas[1] = sigma.log_aspect;
-  sigmas[2] = sigmas[3] = sigma.principal_point_px;
-  sigmas[4] = has_distortion ? sigma.k1 : 0.0;
-  has_camera_ = std::any_of(sigmas.begin(), sigmas.end(), [](double s) { return s > 0.0; });
-  p_.camera_is_estimated_ = sigma.IsEstimated();
+  const Shifts sigmas = ShiftSigmas(obs_.camera, p_.camera_sigma_);
+  std::unique_ptr<ceres::Manifold> manifold = ShiftManifold(sigmas);
+  has_camera_ = manifold != nullptr;
+  p_.camera_is_estimated_ = p_.camera_sigma_.IsEstimated();
 
   p_.AddBlock(4, {0.0, 0.0, 0.0, 1.0});
   p_.AddBlock(3, {0.0, 0.0, 1.0});
-  std::vector<int> held;
-  for (int k = 0; k < kCameraSize; ++k) {
-    if (!(sigmas[static_cast<std::size_t>(k)] > 0.0)) held.push_back(k);
-  }
-  std::unique_ptr<ceres::Manifold> manifold;
-  if (!held.empty() && has_camera_)
-    manifold = std::make_unique<ceres::SubsetManifold>(kCameraSize, held);
   p_.AddBlock(kCameraSize, {}, std::move(manifold), !p_.camera_is_estimated_);
-  if (p_.camera_is_estimated_) AddCameraPrior(sigmas);
+  if (p_.camera_is_estimated_) AddCameraPrior({sigmas.begin(), sigmas.end()});
   AddOrigin();
   for (const CircleObservation& circle : obs_.circles)
     num_circles_[ContrastOf(circle)] += InPlane(circle) ? 1 : 0;
   for (std::size_t i = 0; i < obs_.circles.size(); ++i) AddCircle(i);
+  p_.directions_.assign(obs_.pencils.size(), -1);
   for (std::size_t i = 0; i < obs_.pencils.size(); ++i) AddPencil(i);
   AddDrawnAxis(obs_.frame.x_axis, 0);
   AddDrawnAxis(obs_.frame.y_axis, 1);
@@ -101,13 +90,12 @@ void JointProblemBuilder::AddAngle(std::size_t index) {
       "the known angle between '" + known.pencils[0] + "' and '" + known.pencils[1] + "'";
   int blocks[2];
   for (std::size_t k = 0; k < 2; ++k) {
-    const auto direction = directions_.find(known.pencils[k]);
-    if (direction == directions_.end()) {
+    blocks[k] = p_.directions_[static_cast<std::size_t>(FindPencil(obs_, known.pencils[k]))];
+    if (blocks[k] < 0) {
       p_.unused_.push_back(name + ": not used, '" + known.pencils[k] +
                            "' is no pencil of the world's plane");
       return;
     }
-    blocks[k] = direction->second;
   }
   if (p_.block(blocks[0]).is_constant && p_.block(blocks[1]).is_constant) {
     p_.unused_.push_back(name + ": not used, both run along axes, which are orthogonal");
@@ -137,7 +125,7 @@ void JointProblemBuilder::AddLength(std::size_t index) {
   AddPoint(known.points[1], DrawnSigma(), b, f);
   const double sigma = known.sigma > 0.0 ? known.sigma : model_.length;
   p_.AddTerm(NewLengthCost(known.value, std::max(sigma, kExactLength)), {a, b}, f);
-  p_.lengths_.push_back({a, b, f, known.value});
+  p_.lengths_.push_back({a, b, f});
   is_metric_ = true;
 }
 

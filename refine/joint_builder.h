@@ -42,7 +42,7 @@ class JointProblemBuilder {
   int RadiusBlock(const CircleObservation& circle, int feature);
   int OffsetBlock(const CircleObservation& circle);
   void AddDiameter(const CircleObservation& circle, std::size_t index, int center, int feature);
-  void AddMark(const CircleObservation& circle, const ImagePoints& points, int center, int feature);
+  void AddMark(const CircleObservation& circle, double sigma_px, int center, int feature);
   void AddPencil(std::size_t index);
   void AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,
                double direction_sigma, Feature feature);
@@ -64,7 +64,6 @@ class JointProblemBuilder {
   static std::size_t ContrastOf(const CircleObservation& circle) {
     return static_cast<std::size_t>(std::clamp(circle.contrast, -1, 1) + 1);
   }
-  bool IsAtOrigin(const CircleObservation& circle) const;
   // Of points drawn by hand: axes, the origin, lengths' ends.
   double DrawnSigma() const {
     constexpr double kDrawnSigmaPx = 0.5;
@@ -75,11 +74,11 @@ class JointProblemBuilder {
   const Observations& obs_;
   const NoiseModel& model_;
   bool has_camera_ = false, is_metric_ = false;
-  int origin_point_ = -1;  // Constant block (0, 0).
-  std::string origin_circle_;
+  int origin_point_ = -1;                             // Constant block (0, 0).
+  const CircleObservation* origin_circle_ = nullptr;  // Whose centre is there.
   // Of one contrast, by ContrastOf: circles in the plane, the block of their offset.
   std::array<int, 3> num_circles_ = {0, 0, 0}, offsets_ = {-1, -1, -1};
-  std::map<std::string, int> concentric_, radius_groups_, directions_;
+  std::map<std::string, int> concentric_, radius_groups_;
 };
 
 }  // namespace circline

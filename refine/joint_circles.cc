@@ -11,30 +11,29 @@ namespace circline {
 
 // --- The origin ---
 
-bool JointProblemBuilder::IsAtOrigin(const CircleObservation& circle) const {
-  if (origin_circle_.empty()) return false;
-  if (circle.id == origin_circle_) return true;
-  if (circle.concentric.empty()) return false;
-  const int index = FindCircle(obs_, origin_circle_);
-  return index >= 0 &&
-         obs_.circles[static_cast<std::size_t>(index)].concentric == circle.concentric;
-}
-
 void JointProblemBuilder::AddOrigin() {
   const FrameObservation& frame = obs_.frame;
   origin_point_ = AddConstant({0.0, 0.0});
-  const bool both_axes = frame.x_axis && frame.y_axis;
-  p_.origin_observed_ = both_axes || frame.origin;
+  const auto is_seen = [this](const std::optional<Eigen::Vector2d>& pixel) {
+    CalibratedPoint unused;
+    return pixel && PixelToCalibrated(obs_.camera, *pixel, &unused);
+  };
+  const bool both_axes = frame.x_axis && frame.y_axis && is_seen((*frame.x_axis)[0]) &&
+                         is_seen((*frame.x_axis)[1]) && is_seen((*frame.y_axis)[0]) &&
+                         is_seen((*frame.y_axis)[1]);
+  p_.origin_observed_ = both_axes || is_seen(frame.origin);
   const int named = frame.origin_is_center.empty() ? -1 : FindCircle(obs_, frame.origin_is_center);
   if (named >= 0 && InPlane(obs_.circles[static_cast<std::size_t>(named)])) {
-    origin_circle_ = frame.origin_is_center;
+    origin_circle_ = &obs_.circles[static_cast<std::size_t>(named)];
     p_.origin_observed_ = true;
   } else if (!p_.origin_observed_) {
     // By convention the first circle's centre.
     const auto first = std::find_if(obs_.circles.begin(), obs_.circles.end(),
                                     [this](const CircleObservation& c) { return InPlane(c); });
-    if (first != obs_.circles.end()) origin_circle_ = first->id;
+    if (first != obs_.circles.end()) origin_circle_ = &*first;
   }
+  if (origin_circle_ != nullptr && !origin_circle_->concentric.empty())
+    concentric_[origin_circle_->concentric] = origin_point_;
   if (!frame.origin) return;
   // An origin that is an end point of a drawn axis is no measurement of its own.
   const auto is_end = [&](const std::optional<Segment>& axis) {
@@ -62,14 +61,13 @@ void JointProblemBuilder::AddPoint(const Eigen::Vector2d& pixel, double sigma_px
 // --- Circles ---
 
 int JointProblemBuilder::CenterBlock(const CircleObservation& circle) {
-  if (IsAtOrigin(circle)) {
-    if (p_.center_at_origin_ < 0) p_.center_at_origin_ = static_cast<int>(p_.circles_.size());
-    return origin_point_;
-  }
-  if (circle.concentric.empty()) return p_.AddBlock(2, {});
-  const auto found = concentric_.find(circle.concentric);
-  if (found != concentric_.end()) return found->second;
-  return concentric_[circle.concentric] = p_.AddBlock(2, {});
+  int own = &circle == origin_circle_ ? origin_point_ : -1;
+  int& block =
+      circle.concentric.empty() ? own : concentric_.emplace(circle.concentric, -1).first->second;
+  if (block < 0) block = p_.AddBlock(2, {});
+  if (block == origin_point_ && p_.center_at_origin_ < 0)
+    p_.center_at_origin_ = static_cast<int>(p_.circles_.size());
+  return block;
 }
 
 int JointProblemBuilder::RadiusBlock(const CircleObservation& circle, int feature) {
@@ -132,23 +130,22 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   const int offset = OffsetBlock(circle);
   blocks.offset = offset >= 0;
   if (offset >= 0) used.push_back(offset);
-  const ImagePoints kept = points;
+  // No better than the contour as a whole.
+  const double mark_sigma = points.options().sigma_px / std::sqrt(points.options().weight);
   const int term =
       AddFeatureTerm(std::make_unique<PlaneCircleContourCost>(std::move(points), blocks), used, f);
   p_.circles_.push_back({static_cast<int>(index), f, term, center, radius, tilt});
-  if (circle.center) AddMark(circle, kept, center, f);
+  if (circle.center) AddMark(circle, mark_sigma, center, f);
   for (std::size_t k = 0; k < circle.diameters.size(); ++k) AddDiameter(circle, k, center, f);
 }
 
-// No better than the contour as a whole.
-void JointProblemBuilder::AddMark(const CircleObservation& circle, const ImagePoints& points,
-                                  int center, int feature) {
+void JointProblemBuilder::AddMark(const CircleObservation& circle, double sigma_px, int center,
+                                  int feature) {
   Feature mark{Feature::Kind::kCenterMark, circle.id + ".center",
                "the centre of circle '" + circle.id + "'"};
   mark.parent = feature;
   mark.dof = 2;
-  const ImagePoints::Options& contour = points.options();
-  AddPoint(*circle.center, contour.sigma_px / std::sqrt(contour.weight), center, AddFeature(mark));
+  AddPoint(*circle.center, sigma_px, center, AddFeature(mark));
 }
 
 void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size_t index,

@@ -92,13 +92,12 @@ int JointProblemBuilder::DirectionBlock(std::size_t index) {
   const int block = p_.AddBlock(3, value, std::make_unique<ceres::SphereManifold<3>>());
   Feature tie{Feature::Kind::kAxis, pencil.id, "the direction of pencil '" + pencil.id + "'"};
   tie.dof = is_free ? 1 : 2;
-  tie.observation = static_cast<int>(index);
   const int feature = AddFeature(tie);
   const int term = p_.AddTerm(
       is_free ? NewInPlanePrior(Eigen::Vector3d::UnitZ(), sigma) : NewDirectionPrior(axis, sigma),
       {block}, feature,
-      p_.camera_sigma_.IsWide() ? std::make_unique<MostlyExact>(MostlyExact::kNarrowerOfGuess)
-                                : std::make_unique<MostlyExact>());
+      std::make_unique<MostlyExact>(p_.camera_sigma_.IsWide() ? MostlyExact::kNarrowerOfGuess
+                                                              : MostlyExact::kNarrower));
   if (!is_free) p_.term(term).lean_shape = LeanAgainst(sigma, pencil, model_, p_.camera_sigma_);
   return block;
 }
@@ -110,7 +109,7 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
   if (is_free && (pencil.plane != obs_.frame.plane || !pencil.fit)) return;
   p_.x_is_fixed_ = p_.x_is_fixed_ || pencil.direction == PencilDirection::kX ||
                    pencil.direction == PencilDirection::kY;
-  int direction = -1;
+  int& direction = p_.directions_[index];
   for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
     const LineObservation& line = pencil.lines[j];
     if (!line.fit) continue;
@@ -127,13 +126,9 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
       continue;
     }
     feature.line_covariance = line.fit->covariance;
-    if (direction < 0) {
-      direction = DirectionBlock(index);
-      p_.pencils_.push_back({static_cast<int>(index), direction});
-    }
+    if (direction < 0) direction = DirectionBlock(index);
     AddLine(std::move(points), line.fit->line, direction, model_.line_direction_rad, feature);
   }
-  if (direction >= 0) directions_[pencil.id] = direction;
 }
 
 void JointProblemBuilder::AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,

@@ -65,10 +65,12 @@ class JointProblem : public Graph {
   // Makes an inactive line or circle active, at the state's pose. False for other features, and
   // where it cannot lie there.
   bool Admit(std::size_t feature, State* state) const;
-  // Runs ceres on it. Not ok where the evidence cannot be evaluated, or at the pace of a step that
-  // would not lead to a cost of `most_cost`.
+  // Runs ceres on it, under losses of these `widths`, one after the other, before their own. Not ok
+  // where the evidence cannot be evaluated, or at the pace of a step that would not lead to a cost
+  // of `most_cost`.
   Status Solve(int max_iterations, State* state,
-               double most_cost = std::numeric_limits<double>::infinity()) const;
+               double most_cost = std::numeric_limits<double>::infinity(),
+               const std::vector<double>& widths = {}) const;
   // The same from a start that may be far off, where much lies in the tails of the losses: under
   // wide ones first, which narrow to their own width.
   Status SolveGraduated(int max_iterations, State* state) const;
@@ -119,10 +121,6 @@ class JointProblem : public Graph {
   const CircleObservation& ObservationOf(const CircleBlocks& circle) const {
     return observations_.circles[static_cast<std::size_t>(circle.observation)];
   }
-  // Pencil of a direction, and its lines.
-  struct PencilBlocks {
-    int observation, direction;
-  };
   struct LineBlocks {
     int term, line, feature;
   };
@@ -132,18 +130,15 @@ class JointProblem : public Graph {
   };
   struct LengthBlocks {
     int a, b, feature;
-    double length;
   };
   const std::vector<CircleBlocks>& circles() const { return circles_; }
-  const std::vector<PencilBlocks>& pencils() const { return pencils_; }
+  const std::vector<int>& directions() const { return directions_; }
   const std::vector<LineBlocks>& lines() const { return lines_; }
   enum { kRotation = 0, kTranslation = 1, kCamera = 2 };  // Blocks that are always there.
 
  private:
   friend class JointProblemBuilder;
 
-  Status SolveNarrowing(const std::vector<double>& widths, int max_iterations, State* state,
-                        double most_cost) const;
   Eigen::Matrix3d SenseOfPriors(const CameraPose& seed) const;
   // What Start has found of the circles.
   struct Placed {
@@ -157,14 +152,13 @@ class JointProblem : public Graph {
   void PlaceScale(Placed placed, State* state) const;
   bool PlaceLine(const LineBlocks& line, State* state) const;
   void PlaceLines(State* state) const;
-  bool PlanePoint(const State& state, const Eigen::Vector3d& ray, double* xy) const;
   bool Ray(const State& state, const Eigen::Vector2d& pixel, Eigen::Vector3d* ray) const;
 
   const Observations& observations_;
   const EstimationOptions& options_;
   std::vector<Feature> features_;
   std::vector<CircleBlocks> circles_;
-  std::vector<PencilBlocks> pencils_;
+  std::vector<int> directions_;  // By pencil; -1: it takes no part.
   std::vector<LineBlocks> lines_;
   std::vector<PlaneLineBlocks> plane_lines_;
   std::vector<LengthBlocks> lengths_;

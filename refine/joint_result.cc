@@ -95,10 +95,7 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
   const Eigen::Matrix3d R = problem.PoseAt(state).rotation;
   for (std::size_t i = 0; i < problem.observations().pencils.size(); ++i) {
     const PencilObservation& pencil = problem.observations().pencils[i];
-    const auto found =
-        std::find_if(problem.pencils().begin(), problem.pencils().end(),
-                     [i](const auto& blocks) { return blocks.observation == static_cast<int>(i); });
-    const int block = found != problem.pencils().end() ? found->direction : -1;
+    const int block = problem.directions()[i];
     PencilEstimate estimate;
     estimate.id = pencil.id;
     if (block >= 0) {
@@ -121,22 +118,21 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
 constexpr double kPriorDecides = 0.95;
 
 // What of the camera beside the focal length the evidence could have told, and does not.
-void NoteWhatStays(const JointProblem& problem, const Linearization& at, Refined* refined) {
+void NoteWhatStays(const JointProblem& problem, const State& state, const Linearization& at,
+                   Refined* refined) {
   const CameraSigma& sigma = problem.camera_sigma();
   constexpr double kWidePx = 5.0;  // What is known better needs no word.
-  int column = at.column(JointProblem::kCamera) + 1 + (sigma.log_aspect > 0.0 ? 1 : 0);
-  std::string stays;
-  const auto stays_at = [&](int k, double prior) {
-    return std::sqrt(at.covariance()(k, k)) >= kPriorDecides * prior;
+  const BlockMatrix plus =
+      problem.block(JointProblem::kCamera).PlusJacobian(problem.At(JointProblem::kCamera, state));
+  const Eigen::MatrixXd shifts =
+      plus * at.Covariance(at.Columns(JointProblem::kCamera)) * plus.transpose();
+  const auto stays_at = [&](int shift, double prior) {
+    return prior > 0.0 && std::sqrt(shifts(shift, shift)) >= kPriorDecides * prior;
   };
-  if (sigma.principal_point_px > 0.0) {
-    const double prior = sigma.principal_point_px;
-    if (prior > kWidePx && stays_at(column, prior) && stays_at(column + 1, prior))
-      stays = "principal point";
-    column += 2;
-  }
-  const bool has_k1 = sigma.k1 > 0.0 && at.core_size() > column;
-  if (has_k1 && stays_at(column, sigma.k1)) stays += stays.empty() ? "k1" : " and k1";
+  const double middle = sigma.principal_point_px;
+  std::string stays;
+  if (middle > kWidePx && stays_at(2, middle) && stays_at(3, middle)) stays = "principal point";
+  if (stays_at(4, sigma.k1)) stays += stays.empty() ? "k1" : " and k1";
   if (stays.empty()) return;
   refined->notes.push_back("camera: the evidence cannot tell " + stays +
                            ", the prior alone decides");
@@ -195,7 +191,7 @@ void FillFocal(const JointProblem& problem, const State& state, const Linearizat
   std::snprintf(text, sizeof(text), "focal length: %.4f times the camera's, +- %.4f%s",
                 std::exp(off), std::exp(off) * h->focal_sigma / h->focal_scale, remark);
   refined->notes.push_back(text);
-  NoteWhatStays(problem, at, refined);
+  NoteWhatStays(problem, state, at, refined);
   NoteDoubtedAxes(problem.observations(), refined);
 }
 

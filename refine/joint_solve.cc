@@ -112,16 +112,14 @@ bool HasBoundedLoss(const EstimationOptions& options) {
 
 }  // namespace
 
-Status JointProblem::Solve(int max_iterations, State* state, double most_cost) const {
-  return SolveNarrowing({}, max_iterations, state, most_cost);
-}
-
-Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_iterations,
-                                    State* state, double most_cost) const {
+Status JointProblem::Solve(int max_iterations, State* state, double most_cost,
+                           const std::vector<double>& widths) const {
+  const auto is_finite = [state] {
+    return Eigen::Map<const Eigen::VectorXd>(state->x.data(), Eigen::Index(state->x.size()))
+        .allFinite();
+  };
   // Ceres prints what it cannot evaluate. Where the cost was finite before, it is.
-  const bool is_finite = std::all_of(state->x.begin(), state->x.end(),
-                                     [](double value) { return std::isfinite(value); });
-  if (!is_finite || (!std::isfinite(state->cost) && !std::isfinite(Cost(*state))))
+  if (!is_finite() || (!std::isfinite(state->cost) && !std::isfinite(Cost(*state))))
     return Status::Failed("the evidence cannot be evaluated at the seed");
   // A wide loss is nearly that of least squares, of which one step comes near enough for the next
   // width; not one that is bounded, and soon flat.
@@ -150,26 +148,22 @@ Status JointProblem::SolveNarrowing(const std::vector<double>& widths, int max_i
   if (!summary.IsSolutionUsable() && summary.termination_type != ceres::NO_CONVERGENCE)
     return Status::Failed("the evidence cannot be evaluated at the seed");
   state->cost = summary.final_cost;
-  for (const double v : state->x) {
-    if (!std::isfinite(v)) return Status::Failed("the refinement left the range of numbers");
-  }
-  return std::isfinite(state->cost) ? Status::Ok()
-                                    : Status::Failed("the refinement left the range of numbers");
+  return std::isfinite(state->cost) && is_finite()
+             ? Status::Ok()
+             : Status::Failed("the refinement left the range of numbers");
 }
 
 Status JointProblem::SolveGraduated(int max_iterations, State* state) const {
-  if (options_.conic_loss.type == LossType::kTrivial &&
-      options_.line_loss.type == LossType::kTrivial) {
-    return Solve(max_iterations, state);
-  }
-  constexpr double kWidest = 300.0, kNarrower = 0.25;
+  constexpr double kWidest = 300.0, kNarrower = 0.25,
+                   kAny = std::numeric_limits<double>::infinity();
+  const bool are_losses = options_.conic_loss.type != LossType::kTrivial ||
+                          options_.line_loss.type != LossType::kTrivial;
   // A loss that is bounded soon has no slope to follow.
   const double near = HasBoundedLoss(options_) ? 1.5 : 3.0;
+  double width = are_losses ? LargestRms(ActiveTerms(*state), state->x.data()) : 0.0;
   std::vector<double> widths;
-  for (double width = std::min(LargestRms(ActiveTerms(*state), state->x.data()), kWidest);
-       width > near; width *= kNarrower)
-    widths.push_back(width);
-  return SolveNarrowing(widths, max_iterations, state, std::numeric_limits<double>::infinity());
+  for (width = std::min(width, kWidest); width > near; width *= kNarrower) widths.push_back(width);
+  return Solve(max_iterations, state, kAny, widths);
 }
 
 }  // namespace circline

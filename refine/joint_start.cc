@@ -26,13 +26,6 @@ Eigen::Vector3d Refocused(const Eigen::Vector3d& ray, double log_focal) {
 
 }  // namespace
 
-bool JointProblem::PlanePoint(const State& state, const Eigen::Vector3d& ray, double* xy) const {
-  Eigen::Vector2d point;
-  if (!PointOnPlane(PoseAt(state), ray, &point)) return false;
-  std::copy(point.data(), point.data() + 2, xy);
-  return true;
-}
-
 bool JointProblem::Ray(const State& state, const Eigen::Vector2d& pixel,
                        Eigen::Vector3d* ray) const {
   CalibratedPoint p;
@@ -80,53 +73,48 @@ JointProblem::Placed JointProblem::PlaceCircles(State* state) const {
 
 // Moves the world origin to where the evidence has it. False where that lies beyond the horizon.
 bool JointProblem::PlaceOrigin(const Placed& placed, State* state) const {
-  double xy[2] = {0.0, 0.0};
+  Eigen::Vector2d xy = placed.origin.value_or(Eigen::Vector2d::Zero());
   const FrameObservation& frame = observations_.frame;
-  Eigen::Vector3d ray;
-  if (placed.origin) {
-    std::copy(placed.origin->data(), placed.origin->data() + 2, xy);
-  } else if (frame.origin && center_at_origin_ < 0) {
-    if (!Ray(*state, *frame.origin, &ray) || !PlanePoint(*state, ray, xy)) return false;
-  } else if (frame.x_axis && frame.y_axis && center_at_origin_ < 0) {
-    std::array<Eigen::Vector3d, 4> ends;
-    bool seen = true;
-    for (std::size_t k = 0; k < 4; ++k)
-      seen = seen && Ray(*state, (k < 2 ? *frame.x_axis : *frame.y_axis)[k % 2], &ends[k]);
-    if (!seen) return false;
-    ray = ends[0].cross(ends[1]).cross(ends[2].cross(ends[3]));
-    if (ray.z() < 0.0) ray = -ray;
-    if (!PlanePoint(*state, ray, xy)) return false;
+  if (origin_observed_ && center_at_origin_ < 0) {
+    Eigen::Vector3d ray;
+    if (!frame.origin || !Ray(*state, *frame.origin, &ray)) {
+      std::array<Eigen::Vector3d, 4> ends;
+      for (std::size_t k = 0; k < 4; ++k)
+        Ray(*state, (k < 2 ? *frame.x_axis : *frame.y_axis)[k % 2], &ends[k]);
+      ray = ends[0].cross(ends[1]).cross(ends[2].cross(ends[3]));
+      if (ray.z() < 0.0) ray = -ray;
+    }
+    if (!PointOnPlane(PoseAt(*state), ray, &xy)) return false;
   }
-  const Eigen::Matrix3d R = PoseAt(*state).rotation;
   Eigen::Map<Eigen::Vector3d> t(At(kTranslation, state));
-  t += R * Eigen::Vector3d(xy[0], xy[1], 0.0);
+  t += PoseAt(*state).rotation.leftCols<2>() * xy;
   std::set<int> centers;
   for (const CircleBlocks& c : circles_) centers.insert(c.center);
   for (const int center : centers) {
-    if (block(center).is_constant) continue;
-    At(center, state)[0] -= xy[0];
-    At(center, state)[1] -= xy[1];
+    if (!block(center).is_constant) Eigen::Map<Eigen::Vector2d>(At(center, state)) -= xy;
   }
   return t.z() > 0.0 || !frame.origin;
 }
 
 // The ends of known lengths, then the unit of all: metric, or such that t is a unit vector.
 void JointProblem::PlaceScale(Placed placed, State* state) const {
+  const CameraPose pose = PoseAt(*state);
   for (const LengthBlocks& l : lengths_) {
     Eigen::Vector3d ray;
     bool is_seen = true;
-    double* ends[2] = {At(l.a, state), At(l.b, state)};
-    const Segment& pixels =
-        observations_.known_lengths[static_cast<std::size_t>(feature(l.feature).observation)]
-            .points;
+    std::array<Eigen::Vector2d, 2> ends;
+    const KnownLength& known =
+        observations_.known_lengths[static_cast<std::size_t>(feature(l.feature).observation)];
     for (std::size_t k = 0; k < 2; ++k)
-      is_seen = Ray(*state, pixels[k], &ray) && PlanePoint(*state, ray, ends[k]) && is_seen;
-    const double length = std::hypot(ends[0][0] - ends[1][0], ends[0][1] - ends[1][1]);
-    if (!is_seen || !(length > 0.0)) {
+      is_seen = Ray(*state, known.points[k], &ray) && PointOnPlane(pose, ray, &ends[k]) && is_seen;
+    const double length = is_seen ? (ends[0] - ends[1]).norm() : 0.0;
+    if (!(length > 0.0)) {
       state->active[static_cast<std::size_t>(l.feature)] = 0;
-    } else if (state->Has(l.feature)) {
-      placed.scales.push_back(l.length / length);
+      continue;
     }
+    Eigen::Map<Eigen::Vector2d>(At(l.a, state)) = ends[0];
+    Eigen::Map<Eigen::Vector2d>(At(l.b, state)) = ends[1];
+    if (state->Has(l.feature)) placed.scales.push_back(known.value / length);
   }
   Eigen::Map<Eigen::Vector3d> t(At(kTranslation, state));
   const double scale = placed.scales.empty() ? 1.0 / t.norm() : Median(std::move(placed.scales));
@@ -177,10 +165,9 @@ bool JointProblem::Admit(std::size_t feature, State* state) const {
 
 void JointProblem::PlaceLines(State* state) const {
   const Eigen::Matrix3d R = PoseAt(*state).rotation;
-  for (const PencilBlocks& p : pencils_) {
-    const PencilObservation& pencil =
-        observations_.pencils[static_cast<std::size_t>(p.observation)];
-    if (pencil.direction != PencilDirection::kFree) continue;
+  for (std::size_t i = 0; i < observations_.pencils.size(); ++i) {
+    const PencilObservation& pencil = observations_.pencils[i];
+    if (directions_[i] < 0 || pencil.direction != PencilDirection::kFree) continue;
     // Where in the plane its lines would have it: the conditional mean, given that it lies there.
     const Eigen::Vector3d off = pencil.fit->covariance * R.col(2);
     const double variance = R.col(2).dot(off);
@@ -190,7 +177,7 @@ void JointProblem::PlaceLines(State* state) const {
     d.z() = 0.0;
     if (!(d.norm() > 0.0)) continue;
     d.normalize();
-    std::copy(d.data(), d.data() + 3, At(p.direction, state));
+    std::copy(d.data(), d.data() + 3, At(directions_[i], state));
   }
   for (const LineBlocks& l : lines_) {
     std::uint8_t& is_active = state->active[static_cast<std::size_t>(l.feature)];

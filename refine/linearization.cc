@@ -19,11 +19,9 @@ Linearization::Options OptionsOf(const JointProblem& problem) {
   if (problem.camera_is_estimated()) {
     options.core.push_back(JointProblem::kCamera);
   } else {
-    const CameraSigma& sigma = problem.camera_sigma();
-    options.considered_sigmas = {sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
-                                 sigma.principal_point_px, sigma.k1};
-    if (std::any_of(options.considered_sigmas.begin(), options.considered_sigmas.end(),
-                    [](double s) { return s > 0.0; }))
+    const Shifts sigmas = ShiftSigmas(problem.observations().camera, problem.camera_sigma());
+    options.considered_sigmas = {sigmas.begin(), sigmas.end()};
+    if (std::any_of(sigmas.begin(), sigmas.end(), [](double s) { return s > 0.0; }))
       options.considered = JointProblem::kCamera;
   }
   return options;

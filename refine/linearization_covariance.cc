@@ -73,7 +73,7 @@ bool Linearization::Invert(Sparse information) {
   if (!inverse_->ok() || n == 0) return inverse_->ok();
   const Eigen::VectorXd unscale = scale.cwiseInverse();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      unscale.asDiagonal() * (*inverse_)(CoreColumns()) * unscale.asDiagonal());
+      unscale.asDiagonal() * Covariance(CoreColumns()) * unscale.asDiagonal());
   if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) return false;
   const auto nulls = (eigen.eigenvalues().array() >= 0.5 / kNoInformation).count();
   if (nulls == 0) return true;

@@ -60,9 +60,10 @@ std::vector<Seed> CollectSeeds(const Observations& resolved,
   std::vector<Seed> seeds;
   int source = 0;
   for (const std::shared_ptr<const Solver>& seeder : seeders) {
+    if (seeder->stage() != SolverStage::kClosedForm) continue;
     const PoseEstimate estimate = seeder->Seeds(resolved);
     if (!estimate.status.ok()) {
-      reasons->push_back(seeder->name() + ": " + estimate.status.message);
+      if (reasons != nullptr) reasons->push_back(seeder->name() + ": " + estimate.status.message);
       continue;
     }
     ++source;

@@ -29,10 +29,10 @@ bool IsSameSeed(const Seed& a, const Seed& b);
 
 // Poses that the closed forms propose for the same world plane, in their order, and those of its
 // circles. `resolved`: fitted, with a world (ResolveWorld) and a noise for every feature. `reasons`
-// receives why closed forms refused.
+// (may be null) receives why closed forms refused; other solvers are not asked.
 std::vector<Seed> CollectSeeds(const Observations& resolved,
                                const std::vector<std::shared_ptr<const Solver>>& seeders,
-                               double log_focal, std::vector<std::string>* reasons);
+                               double log_focal, std::vector<std::string>* reasons = nullptr);
 
 // Of the largest circles alone: both planes of each.
 void AddCircleSeeds(const Observations& resolved, double log_focal, std::vector<Seed>* seeds);

@@ -42,18 +42,16 @@ Status FillHypotheses(const JointProblem& problem, const std::vector<State>& min
     const bool known = std::any_of(all.begin(), all.end(), [&](const Refined& r) {
       return IsSameMinimum(problem, r, refined);
     });
-    if (!known) all.push_back(std::move(refined));
-  }
-  if (all.empty()) return last;
-  // A spin that nothing fixes is settled by convention, whatever the seed's was.
-  for (Refined& refined : all) {
-    CameraPose& pose = refined.hypothesis.cam_from_world;
+    if (known) continue;
+    all.push_back(std::move(refined));
+    CameraPose& pose = all.back().hypothesis.cam_from_world;
+    // A spin that nothing fixes is settled by convention, whatever the seed's was.
     if (problem.spin_is_free()) {
       WorldRotation(problem.observations(), pose.rotation.col(2), pose.translation, kAnySigmaPx,
                     &pose.rotation);
     }
   }
-  return Status::Ok();
+  return all.empty() ? last : Status::Ok();
 }
 
 std::vector<PoseHypothesis> Ranked(const std::vector<Refined>& all) {
@@ -119,13 +117,9 @@ std::vector<std::size_t> LeftOutWithSecond(const JointProblem& problem,
 // A circle that contradicts the rest may have been misread: of two rims on one contour the wrong
 // one. Returns the circles that were read again.
 std::vector<std::size_t> AddSecondReadings(const JointProblem& problem, std::vector<Refined>* all) {
-  const std::vector<CircleObservation>& observed = problem.observations().circles;
-  if (std::none_of(observed.begin(), observed.end(),
-                   [](const CircleObservation& circle) { return circle.second.has_value(); })) {
-    return {};
-  }
+  const std::vector<std::size_t> circles = LeftOutWithSecond(problem, Ranked(*all));
+  if (circles.empty()) return circles;
   const std::vector<Refined> first = *all;
-  const std::vector<std::size_t> circles = LeftOutWithSecond(problem, Ranked(first));
   for (const std::size_t i : circles) {
     std::vector<Refined> more = ReadSecond(problem, first, i);
     std::move(more.begin(), more.end(), std::back_inserter(*all));
@@ -166,7 +160,8 @@ Status RankReadings(const JointProblem& problem, const std::vector<State>& minim
                               (is_best ? "takes" : "does not take"));
   }
   // What is known of the pose beforehand speaks against turns, too, and is not in the readings.
-  if (!problem.options().pose_prior) ShareByReadings(problem.observations(), &estimate->hypotheses);
+  if (!problem.options().pose_prior && !problem.options().gravity_prior)
+    ShareByReadings(problem.observations(), &estimate->hypotheses);
   return Status::Ok();
 }
 

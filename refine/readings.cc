@@ -118,8 +118,7 @@ void AddSecondDirections(const Observations& resolved,
     if (!second) continue;
     Observations other = resolved;
     other.pencils[i].fit = second;
-    std::vector<std::string> unused;
-    const std::vector<Seed> more = CollectSeeds(other, seeders, 0.0, &unused);
+    const std::vector<Seed> more = CollectSeeds(other, seeders, 0.0);
     seeds->insert(seeds->end(), more.begin(), more.end());
   }
 }
@@ -131,9 +130,7 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
   AddSecondDirections(resolved, seeders, &seeds);
   if (!problem.camera_is_estimated() || !problem.camera_sigma().IsWide()) return seeds;
   for (const double start : FocalStarts(problem, resolved)) {
-    std::vector<std::string> unused;
-    const std::vector<Seed> more =
-        CollectSeeds(Refocused(resolved, start), seeders, start, &unused);
+    const std::vector<Seed> more = CollectSeeds(Refocused(resolved, start), seeders, start);
     seeds.insert(seeds.end(), more.begin(), more.end());
   }
   return seeds;
@@ -144,10 +141,10 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
 NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* seeds) {
   Status unused;
   std::vector<SeedStart> starts = StartsOf(problem, *seeds, problem.FirstReading(), &unused);
-  if (starts.empty()) return problem.options().noise_model;
-  State& best = starts.front().state;
-  if (!problem.SolveGraduated(problem.options().max_iterations, &best).ok())
+  if (starts.empty() ||
+      !problem.SolveGraduated(problem.options().max_iterations, &starts.front().state).ok())
     return problem.options().noise_model;
+  const State& best = starts.front().state;
   Seed* best_seed = &(*seeds)[starts.front().seed];
   best_seed->pose = problem.PoseAt(best);
   best_seed->log_focal = problem.LogFocalAt(best);

@@ -58,14 +58,12 @@ class JointSolver : public Solver {
 }  // namespace
 
 void AddRefinedSolvers(SolverRegistry* registry, const EstimationOptions& options) {
-  std::vector<SharedSolver> closed_forms;
-  for (const SharedSolver& solver : registry->solvers()) {
-    if (solver->stage() == SolverStage::kClosedForm) closed_forms.push_back(solver);
+  const std::vector<SharedSolver> seeders = registry->solvers();
+  for (const SharedSolver& solver : seeders) {
+    if (solver->stage() == SolverStage::kClosedForm)
+      registry->Add(std::make_shared<RefinedSolver>(solver, options));
   }
-  for (const SharedSolver& solver : closed_forms) {
-    registry->Add(std::make_shared<RefinedSolver>(solver, options));
-  }
-  registry->Add(std::make_shared<JointSolver>(std::move(closed_forms), options));
+  registry->Add(std::make_shared<JointSolver>(seeders, options));
 }
 
 }  // namespace circline

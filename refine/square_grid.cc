@@ -29,12 +29,6 @@ struct PlaneOffset {
 };
 using Offsets = std::vector<PlaneOffset>;
 
-// offset = first + place * square.
-struct Scale {
-  double square = 0.0;
-  std::array<double, 2> first{};  // By axis.
-};
-
 // False where the line is not seen on the plane.
 bool OffsetOf(const Observations& photo, const LineObservation& line, const Eigen::Matrix3d& R,
               int axis, PlaneOffset* out) {
@@ -162,9 +156,10 @@ bool Grow(const Offsets& offsets, double* first, double* square) {
   return true;
 }
 
+// offset = first + place * square.
 struct Found {
-  double log_odds = 0.0;
-  Scale scale;
+  double log_odds = 0.0, square = 0.0;
+  std::array<double, 2> first{};  // By axis.
 };
 
 // The best grid along one axis, and how many were tried. Along the other one the same square.
@@ -176,8 +171,8 @@ Found Search(const Offsets& along, const Offsets& other, int axis) {
   for (std::size_t i = 0; i < along.size(); ++i) {
     for (std::size_t j = i + 1; j < std::min(along.size(), i + 1 + kNeighbours); ++j) {
       Found made;
-      double& first = made.scale.first[static_cast<std::size_t>(axis)];
-      double& square = made.scale.square;
+      double& first = made.first[static_cast<std::size_t>(axis)];
+      double& square = made.square;
       first = along[i].offset;
       square = along[j].offset - along[i].offset;
       ++tried;
@@ -188,7 +183,7 @@ Found Search(const Offsets& along, const Offsets& other, int axis) {
         const double odds = LogOdds(other, o.offset, square);
         if (odds > most) {
           most = odds;
-          made.scale.first[static_cast<std::size_t>(1 - axis)] = o.offset;
+          made.first[static_cast<std::size_t>(1 - axis)] = o.offset;
         }
       }
       made.log_odds = LogOdds(along, first, square) + most;
@@ -222,9 +217,8 @@ bool SquareGrid::HasBothAxes(const Observations& photo) const {
 
 namespace {
 
-// Gives lines their places across an axis, from 0; returns the offset of 0, none without lines.
-std::optional<double> SetPlaces(const Offsets& offsets, double first, double square,
-                                SquareGrid* grid) {
+// Gives lines their places across an axis, from 0; returns the offset of 0.
+double SetPlaces(const Offsets& offsets, double first, double square, SquareGrid* grid) {
   std::vector<std::pair<const PlaneOffset*, int>> on_grid;
   int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();
   for (const PlaneOffset& o : offsets) {
@@ -235,7 +229,7 @@ std::optional<double> SetPlaces(const Offsets& offsets, double first, double squ
     least = std::min(least, place);
     most = std::max(most, place);
   }
-  if (on_grid.empty()) return std::nullopt;
+  if (on_grid.empty()) return first;
   for (const auto& [o, place] : on_grid) grid->places[{o->pencil, o->line}] = place - least;
   grid->width = std::max(grid->width, most - least);
   return first + least * square;
@@ -255,13 +249,11 @@ std::optional<SquareGrid> FindSquareGrid(const Observations& photo,
   SquareGrid grid;
   Eigen::Vector3d origin = -rotation.col(2);
   for (const std::size_t axis : {0U, 1U}) {
-    const std::optional<double> zero =
-        SetPlaces(offsets[axis], best.scale.first[axis], best.scale.square, &grid);
-    if (!zero) return std::nullopt;
-    origin += *zero * rotation.col(static_cast<Eigen::Index>(axis));
+    origin += SetPlaces(offsets[axis], best.first[axis], best.square, &grid) *
+              rotation.col(static_cast<Eigen::Index>(axis));
   }
   if (!grid.HasBothAxes(photo)) return std::nullopt;
-  grid.cam_from_board = {rotation, origin / best.scale.square};
+  grid.cam_from_board = {rotation, origin / best.square};
   return grid;
 }
 

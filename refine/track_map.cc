@@ -150,7 +150,7 @@ class MapBuilder {
 // Pose, velocities and camera of a hypothesis, as a first frame's evidence finds them.
 // `log_focal`, `k1`: the prior's mean, against the camera that the frame comes with.
 TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const TrackerOptions& options,
-                      const CameraSigma& sigma, double log_focal, double k1) {
+                      const Shifts& camera_sigmas, double log_focal, double k1) {
   TrackState state;
   const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(kCameraSize);
   for (const int block :
@@ -160,14 +160,13 @@ TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const Tracke
   constexpr double kConvention = 1e-4;  // Radians.
   SetUnknownMotion(map, options, h.cam_from_world, h.RotationIsFree() ? kConvention : kUnknown,
                    &state);
-  Eigen::VectorXd camera = zeros;
-  camera.head<5>() << sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
-      sigma.principal_point_px, sigma.k1;
   const Block& block = map.block(TrackMap::kCamera);
   Eigen::MatrixXd covariance(0, 0);
   if (block.tangent_size() > 0) {
-    const Eigen::MatrixXd chart = ChartOf(block, zeros.data());
-    covariance = chart * camera.cwiseAbs2().asDiagonal() * chart.transpose();
+    const Eigen::MatrixXd chart =
+        block.Chart(zeros.data()) *
+        Eigen::Map<const Eigen::VectorXd>(camera_sigmas.data(), kCameraSize).asDiagonal();
+    covariance = chart * chart.transpose();
   }
   Eigen::VectorXd mean = zeros;
   if (block.tangent_size() > 0) {
@@ -251,7 +250,8 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
   const double log_focal = sigma.log_focal > 0.0 ? StatedLogFocal(resolved) : 0.0;
   const double k1 = sigma.k1 > 0.0 ? -resolved.found_k1 : 0.0;
   for (const PoseHypothesis& h : hypotheses)
-    states->Add().state = FirstState(*map, h, options, sigma, log_focal, k1);
+    states->Add().state =
+        FirstState(*map, h, options, ShiftSigmas(resolved.camera, sigma), log_focal, k1);
   MapBuilder builder(resolved, options, map, states);
   if (has_position) {
     const auto is_at_origin = [&](const CircleObservation& c) {

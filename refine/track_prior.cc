@@ -195,7 +195,7 @@ bool TrackPrior::Reset(const TrackMap& map, const TrackState& state,
   for (const int b : blocks) {
     const Block& block = map.block(b);
     charts.block(row, column, block.tangent_size(), block.size) =
-        ChartOf(block, state.x.data() + block.offset);
+        block.Chart(state.x.data() + block.offset);
     row += block.tangent_size();
     column += block.size;
   }

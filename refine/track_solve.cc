@@ -36,8 +36,7 @@ int TrackFrame::Solve(int max_evaluations, TrackFit* fit) {
   parameters_.clear();
   for (const int b : prior_.blocks) {
     const Block& block = map_.block(b);
-    problem.AddParameterBlock(x + block.offset, block.size,
-                              const_cast<ceres::Manifold*>(block.manifold));  // Not owned.
+    problem.AddParameterBlock(x + block.offset, block.size, block.manifold.get());
     parameters_.push_back(x + block.offset);
   }
   problem.AddResidualBlock(prior_.cost(), nullptr, parameters_);

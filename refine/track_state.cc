@@ -12,9 +12,6 @@
 namespace circline {
 namespace {
 
-using BlockJacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
-                                    kCameraSize, kCameraSize>;
-
 // d exp(v) = exp(v) at the left: exp([v + dv]x) = exp([J dv]x) exp([v]x), to second order in v.
 Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& v) {
   const Eigen::Matrix3d V = CrossMatrix(v);
@@ -68,18 +65,10 @@ void TrackMap::Reset(bool has_position, const Camera& camera, const CameraSigma&
   AddBlock(3, {}, !has_position);
   AddBlock(3);
   AddBlock(3, {}, !has_position);
-  const double k1 = camera.model != CameraModel::kPinhole ? sigma.k1 : 0.0;
-  const double sigmas[] = {sigma.log_focal, sigma.log_aspect, sigma.principal_point_px,
-                           sigma.principal_point_px, k1};
-  std::vector<int> held;
-  for (int k = 0; k < kCameraSize; ++k) {
-    if (k >= 5 || !(sigmas[k] > 0.0)) held.push_back(k);
-  }
-  const bool is_exact = held.size() == kCameraSize;
+  std::unique_ptr<ceres::Manifold> manifold = ShiftManifold(ShiftSigmas(camera, sigma));
+  const bool is_exact = manifold == nullptr;
   camera_is_considered = !sigma.IsEstimated();
-  AddBlock(kCameraSize,
-           is_exact ? nullptr : std::make_unique<ceres::SubsetManifold>(kCameraSize, held),
-           is_exact);
+  AddBlock(kCameraSize, std::move(manifold), is_exact);
 }
 
 int TrackMap::AddBlock(int size, std::unique_ptr<ceres::Manifold> manifold, bool is_constant) {
@@ -135,13 +124,6 @@ double SquaredDistance(const CameraPose& from, const CameraPose& to, BlockMatrix
   if (!FactorInPlace(covariance)) return std::numeric_limits<double>::infinity();
   HalfSolveInPlace(covariance, e);
   return e.squaredNorm();
-}
-
-BlockMatrix ChartOf(const Block& block, const double* at) {
-  if (block.manifold == nullptr) return BlockMatrix::Identity(block.size, block.size);
-  BlockJacobian J(block.tangent_size(), block.size);
-  block.manifold->MinusJacobian(at, J.data());
-  return J;
 }
 
 void Plus(const Block& block, const BlockVector& step, double* values) {

@@ -92,9 +92,6 @@ struct TrackState {
 // infinite where that is not positive definite.
 double SquaredDistance(const CameraPose& from, const CameraPose& to, BlockMatrix covariance);
 
-// Coordinates about a place: MinusJacobian at the place, which is linear, times the difference.
-// Tangent by ambient size.
-BlockMatrix ChartOf(const Block& block, const double* at);
 // Moves a block by a tangent.
 void Plus(const Block& block, const BlockVector& step, double* values);
 

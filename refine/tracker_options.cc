@@ -1,22 +1,12 @@
 // What a tracker and a call of it may be asked for.
-#include <Eigen/Dense>
 #include <cmath>
 #include <string>
 #include <utility>
 
-#include "circline/refine/is_rotation.h"
+#include "circline/refine/known_pose.h"
 #include "circline/refine/pose_tracker.h"
 
 namespace circline {
-namespace {
-
-bool IsPositiveDefinite(const std::array<double, 36>& covariance) {
-  const Eigen::Map<const Matrix6d> P(covariance.data());
-  return P.allFinite() && Eigen::LLT<Matrix6d>(P).info() == Eigen::Success;
-}
-
-}  // namespace
-
 Status TrackerOptions::Validate() const {
   const Status status = estimation.Validate();
   if (!status.ok()) return status;

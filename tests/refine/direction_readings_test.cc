@@ -41,6 +41,21 @@ TEST(DirectionReadings, WhatIsFarFromThePoseIsAHypothesisOfItsOwn) {
   EXPECT_GT(std::abs(turned.col(0).dot(scene.pose.rotation.col(0))), std::cos(1.0 * kDegree));
 }
 
+TEST(DirectionReadings, CirclesTurnWithThePose) {
+  PlaneScene scene(0.7, 0.1);
+  Observations observations = TwoPencils(&scene);
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 0.3)};
+  observations.frame.origin = scene.Pixel(0.0, 0.0);
+  observations.pencils[1].readings = {{TurnedY(scene, 0.0), 0.7}, {TurnedY(scene, 8.0), 0.3}};
+  const PoseEstimate estimate = EstimatePose(observations);
+  ASSERT_TRUE(estimate.status.ok());
+  ASSERT_GE(estimate.hypotheses.size(), 2U);
+  for (const PoseHypothesis& h : estimate.hypotheses) {
+    ASSERT_EQ(h.circles.size(), 1U);
+    EXPECT_GT(std::abs(h.circles[0].normal.dot(h.cam_from_world.rotation.col(2))), 1.0 - 1e-3);
+  }
+}
+
 TEST(DirectionReadings, WhatIsNearIsTheSamePose) {
   PlaneScene scene(0.7, 0.1);
   Observations observations = TwoPencils(&scene);

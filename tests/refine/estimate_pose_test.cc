@@ -156,6 +156,26 @@ TEST(EstimatePoseTest, RefusalsAndBadInputHaveASentence) {
   estimate = EstimatePose(scene.Empty(), options);
   EXPECT_EQ(estimate.status.code, StatusCode::kInvalidArgument);
   EXPECT_NE(estimate.status.message.find("conic_loss.scale_px"), std::string::npos);
+  options = Exact();
+  options.pose_prior = PosePrior{scene.pose, {}};
+  options.pose_prior->covariance.fill(std::nan(""));
+  estimate = EstimatePose(scene.Empty(), options);
+  EXPECT_EQ(estimate.status.code, StatusCode::kInvalidArgument);
+  EXPECT_NE(estimate.status.message.find("pose_prior"), std::string::npos);
+}
+
+// The origin is the centre of a lone circle, whatever that is called.
+TEST(EstimatePoseTest, TheOriginIsTheCenterOfALoneCircle) {
+  PlaneScene scene(0.7, 0.3, 3);
+  for (const char* id : {"c0", ""}) {
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle(id, 0.5, 0.2, 1.0)};
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& best = estimate.hypotheses[0];
+    EXPECT_LT((best.circles[0].center - best.cam_from_world.translation).norm(), 1e-9);
+    EXPECT_GT(best.covariance[35], 0.0);
+  }
 }
 
 // The origin, measured by itself, is the centre of two rings: whichever of them is named, and in

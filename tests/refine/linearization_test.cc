@@ -54,8 +54,7 @@ class ByCeres {
         double* values = state->x.data() + block.offset;
         blocks.push_back(values);
         if (problem_.HasParameterBlock(values)) continue;
-        problem_.AddParameterBlock(values, block.size,
-                                   const_cast<ceres::Manifold*>(block.manifold));  // Not owned.
+        problem_.AddParameterBlock(values, block.size, block.manifold.get());
         if (block.is_constant) problem_.SetParameterBlockConstant(values);
       }
       problem_.AddResidualBlock(term.cost.get(), nullptr, blocks);
@@ -106,8 +105,7 @@ TEST(Linearization, HasTheCovarianceOfAllUnknownsAtOnce) {
   ASSERT_TRUE(at.ok() && at.ComputeCovariance());
 
   std::vector<int> blocks = {JointProblem::kRotation, JointProblem::kCamera};
-  for (const JointProblem::PencilBlocks& pencil : problem.pencils())
-    blocks.push_back(pencil.direction);
+  blocks.insert(blocks.end(), problem.directions().begin(), problem.directions().end());
   for (const JointProblem::CircleBlocks& circle : problem.circles()) {
     for (const int block : {circle.center, circle.radius}) {
       if (at.column(block) >= 0 && std::find(blocks.begin(), blocks.end(), block) == blocks.end())
