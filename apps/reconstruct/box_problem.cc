@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 
+#include "apps/reconstruct/box_edge_cost.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/observations.h"
 

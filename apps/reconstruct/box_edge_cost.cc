@@ -1,11 +1,11 @@
-// The cost function of a box's edges.
+#include "apps/reconstruct/box_edge_cost.h"
+
 #include <Eigen/Dense>
 #include <utility>
 
 #include "circline/refine/block_chain.h"
-#include "circline/refine/cost_functions.h"
 
-namespace circline {
+namespace circline::apps {
 namespace {
 
 enum Block { kRotation, kTranslation, kLength, kSkew = kLength + 3 };
@@ -81,4 +81,4 @@ bool BoxEdgeCost::EvaluateWith(const Weighing& weighing, const double* const* pa
   return true;
 }
 
-}  // namespace circline
+}  // namespace circline::apps
