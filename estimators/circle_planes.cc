@@ -3,6 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <cstddef>
 
+#include "circline/estimators/conic.h"
+
 namespace circline {
 namespace {
 
@@ -17,9 +19,15 @@ Eigen::Vector3d NearestNormal(const Vector6d& conic, const Eigen::Vector3d& norm
 
 }  // namespace
 
-int CirclePlanes(const Vector6d& conic, const Matrix6d& root, std::array<CirclePlane, 2>* planes) {
+int CirclePlanes(const ConicFit& fit, std::array<CirclePlane, 2>* planes) {
+  // The errors of the conic are the sum of the columns of a square root of its covariance, each
+  // times a number of standard deviation 1.
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(fit.Covariance());
+  const Matrix6d root =
+      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const Vector6d conic = ConicToVector(fit.conic);
   std::array<CirclePose, 2> poses;
-  const int count = CirclePoses(VectorToConic(conic), &poses);
+  const int count = CirclePoses(fit.conic, &poses);
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     (*planes)[i] = {poses[i]};
     // Statistical linearisation: over a standard deviation to each side, not at a point, as a
@@ -31,12 +39,6 @@ int CirclePlanes(const Vector6d& conic, const Matrix6d& root, std::array<CircleP
     }
   }
   return count;
-}
-
-int CirclePlanes(const ConicFit& fit, std::array<CirclePlane, 2>* planes) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(fit.Covariance());
-  const Vector6d sigmas = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  return CirclePlanes(ConicToVector(fit.conic), eigen.eigenvectors() * sigmas.asDiagonal(), planes);
 }
 
 }  // namespace circline

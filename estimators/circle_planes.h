@@ -7,7 +7,6 @@
 #include <array>
 
 #include "circline/estimators/circle_pose.h"
-#include "circline/estimators/conic.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/export.h"
 
@@ -18,9 +17,7 @@ struct CirclePlane {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Of the unit normal.
 };
 
-// How many there are, as of CirclePoses. The errors of the conic (ConicToVector) are the sum of the
-// columns of a square root of its covariance, each times a number of standard deviation 1.
-int CirclePlanes(const Vector6d& conic, const Matrix6d& root, std::array<CirclePlane, 2>* planes);
+// How many there are, as of CirclePoses.
 int CirclePlanes(const ConicFit& fit, std::array<CirclePlane, 2>* planes);
 
 }  // namespace circline

@@ -161,24 +161,29 @@ Status SelectCircleFrame(const Observations& observations, Observations* evidenc
 }
 
 // Inverse variance of the normal, rad^2, of the first of a circle's planes.
-double NormalWeight(const Measured& conic) {
+double NormalWeight(const ConicFit& fit) {
   constexpr double kRounding = 1e-18;
   std::array<CirclePlane, 2> planes;
-  CirclePlanes(conic.value, conic.columns, &planes);
+  CirclePlanes(fit, &planes);
   return 1.0 / (planes[0].covariance.trace() + kRounding);
 }
 
 // All kept circles, the first one with its centre and radius, and the drawn axes.
 Status GatherCircles(const Observations& evidence, double sigma_px, Inputs* inputs) {
   GatherFrame(evidence, sigma_px, inputs);
-  GatherCircle(evidence, evidence.circles.front(), sigma_px, inputs);
   GatherDrawnAxes(evidence, sigma_px, inputs);
-  if (evidence.circles.size() == 1) return Status::Ok();
-  for (std::size_t i = 1; i < evidence.circles.size(); ++i)
-    GatherConic(evidence.circles[i], &inputs->more_conics.emplace_back(), inputs);
-  inputs->normal_weights = {NormalWeight(inputs->conic)};
-  for (const Measured& conic : inputs->more_conics)
-    inputs->normal_weights.push_back(NormalWeight(conic));
+  for (const CircleObservation& circle : evidence.circles) {
+    inputs->circles.push_back({{ConicToVector(circle.fit->conic), circle.fit->Covariance()},
+                               {Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()},
+                               evidence.circles.size() > 1 ? NormalWeight(*circle.fit) : 1.0,
+                               circle.contrast,
+                               circle.fit->irregularity});
+  }
+  const CircleObservation& first = evidence.circles.front();
+  inputs->radius = first.radius;
+  inputs->radius_sigma = first.radius_sigma;
+  inputs->center = MeasuredCenter(evidence, first, sigma_px);
+  inputs->origin_at_center = IsOrigin(first, evidence.frame);
   return Status::Ok();
 }
 
@@ -213,21 +218,6 @@ Measured MeasuredCenter(const Observations& observations, const CircleObservatio
   if (!center) return {};
   const double sigma = circle.sigma_px > 0.0 ? circle.sigma_px : sigma_px;
   return MeasuredPoint(observations.camera, *center, sigma);
-}
-
-void GatherConic(const CircleObservation& circle, Measured* conic, Inputs* inputs) {
-  *conic = Measured(ConicToVector(circle.fit->conic), circle.fit->Covariance());
-  inputs->tilts.emplace_back(Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero());
-  inputs->circles.push_back(&circle);
-}
-
-void GatherCircle(const Observations& observations, const CircleObservation& circle,
-                  double sigma_px, Inputs* inputs) {
-  GatherConic(circle, &inputs->conic, inputs);
-  inputs->radius = circle.radius;
-  inputs->radius_sigma = circle.radius_sigma;
-  inputs->center = MeasuredCenter(observations, circle, sigma_px);
-  inputs->origin_at_center = IsOrigin(circle, observations.frame);
 }
 
 Status GatherDiameters(const Camera& camera, const CircleObservation& circle, double sigma_px,

@@ -192,9 +192,10 @@ void AddModelErrors(const NoiseModel& noise, Inputs* inputs) {
   if (!inputs->x_sense) AddAngularError(noise.pencil_axis_rad, alike, &inputs->x_line);
   if (!inputs->y_sense) AddAngularError(noise.pencil_axis_rad, alike, &inputs->y_line);
   const double tilt_variance = noise.circle_tilt_rad * noise.circle_tilt_rad;
-  for (Measured& tilt : inputs->tilts)
-    tilt.columns = noise.circle_tilt_rad * Eigen::Matrix2d::Identity();
-  for (double& weight : inputs->normal_weights) weight = 1.0 / (1.0 / weight + 2.0 * tilt_variance);
+  for (MeasuredCircle& circle : inputs->circles) {
+    circle.tilt.columns = noise.circle_tilt_rad * Eigen::Matrix2d::Identity();
+    circle.normal_weight = 1.0 / (1.0 / circle.normal_weight + 2.0 * tilt_variance);
+  }
   if (inputs->radius_sigma == 0.0) inputs->radius_sigma = noise.radius;
   if (inputs->length_sigma == 0.0) inputs->length_sigma = noise.length;
 }
@@ -212,9 +213,8 @@ std::vector<Perturbation> Perturbations(const std::vector<MovedInput>& inputs,
       });
     }
     if (inputs[i].kind != InputKind::kConic) continue;
-    const CircleObservation* circle = inputs[i].circle;
     contrasts.insert(inputs[i].contrast);
-    const double shape = noise.circle_shape * (circle != nullptr ? circle->fit->irregularity : 1.0);
+    const double shape = noise.circle_shape * inputs[i].irregularity;
     for (const bool along_axes : {true, false}) {
       if (shape == 0.0) continue;
       all.push_back([=](double part, const std::vector<MovedInput>& moved) {

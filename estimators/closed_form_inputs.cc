@@ -231,23 +231,23 @@ Measured::Measured(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covarianc
 
 std::vector<MovedInput> Inputs::Moved() {
   std::vector<MovedInput> all;
-  const auto add = [&all](InputKind kind, Measured* m, const CircleObservation* circle = nullptr) {
-    const int contrast = circle != nullptr ? circle->contrast : 0;
-    if (m->present()) all.push_back({kind, m->value.data(), m->columns, contrast, circle});
+  const auto add = [&all](InputKind kind, Measured* m) {
+    if (m->present()) all.push_back({kind, m->value.data(), m->columns});
   };
   const auto add_number = [&all](double* value, double sigma) {
     all.push_back({InputKind::kNumber, value, Eigen::MatrixXd::Constant(1, 1, sigma)});
   };
-  add(InputKind::kConic, &conic, circles.empty() ? nullptr : circles[0]);
+  for (MeasuredCircle& circle : circles) {
+    all.push_back({InputKind::kConic, circle.conic.value.data(), circle.conic.columns,
+                   circle.contrast, circle.irregularity});
+    add(InputKind::kNumber, &circle.tilt);
+  }
   add(InputKind::kPoint, &center);
   add(InputKind::kLine, &x_line);
   add(InputKind::kLine, &y_line);
   for (Measured& direction : directions) add(InputKind::kPoint, &direction);
   add(InputKind::kLine, &line);
   add(InputKind::kPoint, &origin);
-  for (std::size_t i = 0; i < more_conics.size(); ++i)
-    add(InputKind::kConic, &more_conics[i], circles[i + 1]);
-  for (Measured& tilt : tilts) add(InputKind::kNumber, &tilt);
   if (line.present()) add_number(&angle, angle_sigma);
   add_number(&radius, radius * radius_sigma);
   add_number(&length, length * length_sigma);

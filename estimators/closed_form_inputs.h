@@ -28,26 +28,28 @@ struct Measured {
 struct MovedInput {
   InputKind kind;
   double* value;
-  Eigen::MatrixXd columns;                    // As Measured has them; none: exact.
-  int contrast = 0;                           // Of a conic: CircleObservation::contrast.
-  const CircleObservation* circle = nullptr;  // Of a conic, where it is known.
+  Eigen::MatrixXd columns;    // As Measured has them; none: exact.
+  int contrast = 0;           // Of a conic: CircleObservation::contrast,
+  double irregularity = 1.0;  // ConicFit::irregularity.
 };
 
 using RayPair = std::array<Eigen::Vector3d, 2>;
 
+struct MeasuredCircle {
+  Measured conic;  // ConicToVector, 6.
+  Measured
+      tilt;  // Of its plane against the world's, about two axes of it, 2; 0 as far as is known.
+  double normal_weight = 1.0;  // Inverse variance of its normal.
+  int contrast = 0;            // CircleObservation::contrast.
+  double irregularity = 1.0;   // ConicFit::irregularity.
+};
+
 // All calibrated.
 struct Inputs {
-  Measured conic;                     // ConicToVector, 6.
-  std::vector<Measured> more_conics;  // Further circles of the same plane.
-  // Of `conic` and `more_conics`: what their planes are tilted by against the world's, about two
-  // axes of them, 2, 0 as far as is known; and whose they are.
-  std::vector<Measured> tilts;
-  std::vector<const CircleObservation*> circles;
-  std::vector<double>
-      normal_weights;       // Inverse variances of the normals of `conic`, `more_conics`.
-  Measured center;          // Image of the circle's centre, homogeneous, 3.
-  Measured x_line, y_line;  // Images of the axes or of lines parallel to them, 3.
-  std::array<Measured, 2> directions;  // Vanishing points of two pencils, 3.
+  std::vector<MeasuredCircle> circles;  // Of one plane; of the first:
+  Measured center;                      // Image of its centre, homogeneous, 3.
+  Measured x_line, y_line;              // Images of the axes or of lines parallel to them, 3.
+  std::array<Measured, 2> directions;   // Vanishing points of two pencils, 3.
   // What of a wall's lean turns each of them (LeanShape).
   std::array<Eigen::Matrix3d, 2> lean_shapes = {Eigen::Matrix3d::Identity(),
                                                 Eigen::Matrix3d::Identity()};
@@ -60,14 +62,14 @@ struct Inputs {
   Measured origin;  // Image of the world origin, homogeneous, 3.
   std::array<PencilDirection, 2> roles{PencilDirection::kFree, PencilDirection::kFree};
   std::optional<RayPair> x_sense, y_sense;  // Oriented axes, homogeneous.
-  bool origin_at_center = false;            // The origin is the circle's centre.
+  bool origin_at_center = false;            // The origin is the first circle's centre.
   double radius = 0.0, radius_sigma = 0.0;  // Metric scale from the circle, or 0; relative.
   std::optional<RayPair> length_points;     // Metric scale from two points ...
   double length = 0.0, length_sigma = 0.0;  // ... of the plane, or 0; relative.
 
   // Every input that an error may move, by its value in this.
   std::vector<MovedInput> Moved();
-  bool IsMetric() const { return (conic.present() && radius > 0.0) || length > 0.0; }
+  bool IsMetric() const { return (!circles.empty() && radius > 0.0) || length > 0.0; }
 };
 
 // `sigma_px` below: of points that state none. `observations` are fitted and resolved.
@@ -101,13 +103,6 @@ void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, In
 // The image of a circle's centre: as given, or the origin where that is the centre; else absent.
 Measured MeasuredCenter(const Observations& observations, const CircleObservation& circle,
                         double sigma_px);
-
-// A further circle of the world plane.
-void GatherConic(const CircleObservation& circle, Measured* conic, Inputs* inputs);
-
-// A circle of the world plane, its centre if known, its radius.
-void GatherCircle(const Observations& observations, const CircleObservation& circle,
-                  double sigma_px, Inputs* inputs);
 
 }  // namespace circline
 

@@ -51,7 +51,7 @@ Eigen::Vector3d Translation(const Eigen::Vector3d& n, const Eigen::Vector3d& in_
   const double distance = n.dot(in_plane), along = n.dot(origin_ray);
   if (distance == 0.0 || along == 0.0) return origin_ray.normalized();
   const Eigen::Vector3d t = distance / along * origin_ray;
-  if (inputs.conic.present() && inputs.radius > 0.0) return inputs.radius * t;
+  if (!inputs.circles.empty() && inputs.radius > 0.0) return inputs.radius * t;
   if (inputs.length > 0.0) {
     const Eigen::Vector3d a = (*inputs.length_points)[0], b = (*inputs.length_points)[1];
     const double units = std::abs(distance) * (a / n.dot(a) - b / n.dot(b)).norm();
@@ -73,29 +73,30 @@ Eigen::Vector3d OriginRay(const Inputs& inputs, const CirclePose& circle) {
 
 // The circles that a conic may be the image of, turned into the world's plane, against which they
 // are tilted.
-std::vector<CirclePose> TiltedPoses(const Measured& conic, const Measured& tilt) {
+std::vector<CirclePose> TiltedPoses(const MeasuredCircle& circle) {
   std::array<CirclePose, 2> both;
-  const int count = CirclePoses(VectorToConic(conic.value), &both);
+  const int count = CirclePoses(VectorToConic(circle.conic.value), &both);
   std::vector<CirclePose> poses(both.begin(), both.begin() + count);
-  if (tilt.value.isZero(0.0)) return poses;
+  const Eigen::VectorXd& tilt = circle.tilt.value;
+  if (tilt.isZero(0.0)) return poses;
   for (CirclePose& pose : poses) {
     const Eigen::Vector3d a = pose.normal.unitOrthogonal(), b = pose.normal.cross(a);
-    pose.normal = (pose.normal + tilt.value[0] * a + tilt.value[1] * b).normalized();
+    pose.normal = (pose.normal + tilt[0] * a + tilt[1] * b).normalized();
   }
   return poses;
 }
 
-// One candidate per circle plane; `contradict(circle)` says how far other evidence speaks against
-// it.
+// One candidate per plane of the first circle; `contradict(&circle)` says how far other evidence
+// speaks against it, and may turn it first into the plane that all of it says.
 template <typename Contradict>
 std::vector<Candidate> CircleCandidates(const Inputs& inputs, const Contradict& contradict) {
   std::vector<Candidate> candidates;
-  for (const CirclePose& circle : TiltedPoses(inputs.conic, inputs.tilts[0])) {
+  for (CirclePose circle : TiltedPoses(inputs.circles[0])) {
     Candidate c;
+    c.contradiction = contradict(&circle);
     if (!RotationOfPlane(circle.normal, circle.center, inputs, &c.pose.rotation)) continue;
     c.pose.translation =
         Translation(circle.normal, circle.center, OriginRay(inputs, circle), inputs);
-    c.contradiction = contradict(circle);
     c.circle = circle;
     candidates.push_back(c);
   }
@@ -126,29 +127,23 @@ Eigen::VectorXd Contradiction(const std::vector<CirclePose>& circles, const Eige
 // The weighted mean of the circles' normals, each nearest to the first circle's.
 std::vector<Candidate> CommonPlanes(const Inputs& inputs, bool concentric) {
   std::vector<std::vector<CirclePose>> more;
-  for (std::size_t i = 0; i < inputs.more_conics.size(); ++i) {
-    more.push_back(TiltedPoses(inputs.more_conics[i], inputs.tilts[i + 1]));
+  for (std::size_t i = 1; i < inputs.circles.size(); ++i) {
+    more.push_back(TiltedPoses(inputs.circles[i]));
     if (more.back().empty()) return {};
   }
-  std::vector<Candidate> common;
-  for (Candidate c : SingleCirclePoses(inputs)) {
-    std::vector<CirclePose> nearest = {*c.circle};
+  return CircleCandidates(inputs, [&](CirclePose* circle) {
+    std::vector<CirclePose> nearest = {*circle};
     const auto is_farther = [&nearest](const CirclePose& x, const CirclePose& y) {
       return x.normal.dot(nearest[0].normal) < y.normal.dot(nearest[0].normal);
     };
     for (const std::vector<CirclePose>& poses : more)
       nearest.push_back(*std::max_element(poses.begin(), poses.end(), is_farther));
-    Eigen::Vector3d n = Eigen::Vector3d::Zero();
+    circle->normal.setZero();
     for (std::size_t i = 0; i < nearest.size(); ++i)
-      n += inputs.normal_weights[i] * nearest[i].normal;
-    n.normalize();
-    c.circle->normal = n;
-    if (!RotationOfPlane(n, c.circle->center, inputs, &c.pose.rotation)) continue;
-    c.pose.translation = Translation(n, c.circle->center, OriginRay(inputs, *c.circle), inputs);
-    c.contradiction = Contradiction(nearest, n, concentric);
-    common.push_back(c);
-  }
-  return common;
+      circle->normal += inputs.circles[i].normal_weight * nearest[i].normal;
+    circle->normal.normalize();
+    return Contradiction(nearest, circle->normal, concentric);
+  });
 }
 
 // The frame whose Y axis is the X axis of this one.
@@ -258,25 +253,25 @@ bool RotationOfPlane(const Eigen::Vector3d& n, const Eigen::Vector3d& plane_ray,
 }
 
 std::vector<Candidate> SingleCirclePoses(const Inputs& inputs) {
-  return CircleCandidates(inputs, [](const CirclePose&) { return Eigen::VectorXd(); });
+  return CircleCandidates(inputs, [](const CirclePose*) { return Eigen::VectorXd(); });
 }
 
 std::vector<Candidate> CircleCenterPoses(const Inputs& inputs) {
-  return CircleCandidates(inputs, [&inputs](const CirclePose& circle) {
-    return CenterDeviation(circle, inputs.center.value);
+  return CircleCandidates(inputs, [&inputs](const CirclePose* circle) {
+    return CenterDeviation(*circle, inputs.center.value);
   });
 }
 
 std::vector<Candidate> CircleFramePoses(const Inputs& inputs) {
-  return CircleCandidates(inputs, [&inputs](const CirclePose& circle) {
+  return CircleCandidates(inputs, [&inputs](const CirclePose* circle) {
     const Eigen::Vector3d lx = inputs.x_line.value, ly = inputs.y_line.value;
     CircularPoints plane;
-    CircularPointsOfPlane(circle.normal, &plane);
+    CircularPointsOfPlane(circle->normal, &plane);
     // Lines along the axes cross anywhere; the axes themselves, at the origin.
     const bool at_crossing = inputs.origin_at_center && inputs.x_sense && inputs.y_sense;
     Eigen::VectorXd contradiction(at_crossing ? 3 : 1);
     contradiction[0] = HarmonicDeviation(plane, lx, ly);
-    if (at_crossing) contradiction.tail<2>() = CenterDeviation(circle, lx.cross(ly));
+    if (at_crossing) contradiction.tail<2>() = CenterDeviation(*circle, lx.cross(ly));
     return contradiction;
   });
 }

@@ -21,7 +21,7 @@ namespace circline {
 struct Candidate {
   CameraPose pose;
   Eigen::VectorXd contradiction;     // Zero where all evidence agrees; may be empty.
-  std::optional<CirclePose> circle;  // Of Inputs::conic.
+  std::optional<CirclePose> circle;  // The first of Inputs::circles.
 };
 
 // Rotation of a plane with unit normal +-n: in-plane angle from the axis lines (proposition 2;
