@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "circline/estimators/directions.h"
 #include "circline/estimators/line_pose.h"
 
 namespace circline {
@@ -22,9 +23,8 @@ double SquaredDistance(const Eigen::VectorXd& c, const Eigen::MatrixXd& C) {
 // variance `sigma_rad` squared.
 void AddAngularError(double sigma_rad, const Eigen::Matrix3d& shape, Measured* m) {
   if (!m->present() || sigma_rad == 0.0) return;
-  const Eigen::Vector3d v = m->value, a = v.unitOrthogonal();
-  Eigen::Matrix<double, 3, 2> across;
-  across << a, v.normalized().cross(a);
+  const Eigen::Vector3d v = m->value;
+  const Eigen::Matrix<double, 3, 2> across = BasisAcross(v.normalized());
   const Eigen::Matrix2d root =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(across.transpose() * shape * across)
           .operatorSqrt();

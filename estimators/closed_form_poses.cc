@@ -5,6 +5,7 @@
 
 #include "circline/estimators/circular_points.h"
 #include "circline/estimators/closed_form_recipes.h"
+#include "circline/estimators/directions.h"
 #include "circline/estimators/line_pose.h"
 
 namespace circline {
@@ -77,11 +78,10 @@ std::vector<CirclePose> TiltedPoses(const MeasuredCircle& circle) {
   std::array<CirclePose, 2> both;
   const int count = CirclePoses(VectorToConic(circle.conic.value), &both);
   std::vector<CirclePose> poses(both.begin(), both.begin() + count);
-  const Eigen::VectorXd& tilt = circle.tilt.value;
+  const Eigen::Vector2d tilt = circle.tilt.value;
   if (tilt.isZero(0.0)) return poses;
   for (CirclePose& pose : poses) {
-    const Eigen::Vector3d a = pose.normal.unitOrthogonal(), b = pose.normal.cross(a);
-    pose.normal = (pose.normal + tilt[0] * a + tilt[1] * b).normalized();
+    pose.normal = (pose.normal + BasisAcross(pose.normal) * tilt).normalized();
   }
   return poses;
 }
@@ -111,13 +111,12 @@ Eigen::Vector2d CenterDeviation(const CirclePose& circle, const Eigen::VectorXd&
 // witness, in coordinates of the plane of normal `n`, and where they are concentric its centre.
 Eigen::VectorXd Contradiction(const std::vector<CirclePose>& circles, const Eigen::Vector3d& n,
                               bool concentric) {
-  const Eigen::Vector3d a = n.unitOrthogonal(), b = n.cross(a);
+  const Eigen::Matrix<double, 3, 2> across = BasisAcross(n);
   const Eigen::Index rows = concentric ? 4 : 2;
   Eigen::VectorXd contradiction(rows * static_cast<Eigen::Index>(circles.size() - 1));
   for (std::size_t i = 1; i < circles.size(); ++i) {
     const Eigen::Index row = rows * static_cast<Eigen::Index>(i - 1);
-    const Eigen::Vector3d difference = circles[i].normal - circles[0].normal;
-    contradiction.segment<2>(row) << a.dot(difference), b.dot(difference);
+    contradiction.segment<2>(row) = across.transpose() * (circles[i].normal - circles[0].normal);
     if (concentric)
       contradiction.segment<2>(row + 2) = CenterDeviation(circles[i], circles[0].center);
   }

@@ -10,6 +10,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/closed_form_errors.h"
 #include "circline/estimators/closed_form_recipes.h"
+#include "circline/estimators/directions.h"
 
 namespace circline {
 namespace {
@@ -52,9 +53,7 @@ void FillSupport(const Observations& evidence, PoseHypothesis* h) {
     PencilEstimate estimate;
     estimate.id = pencil.id;
     estimate.direction = pencil.fit->direction;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(pencil.fit->covariance,
-                                                               Eigen::EigenvaluesOnly);
-    estimate.sigma_deg = std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
+    estimate.sigma_deg = LargestSigmaDeg(pencil.fit->covariance);
     h->pencils.push_back(estimate);
   }
   if (h->num_inliers > 0) h->rms_px = std::sqrt(squares / h->num_inliers);

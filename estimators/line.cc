@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "circline/estimators/directions.h"
 #include "circline/estimators/geometric_residuals.h"
 #include "circline/estimators/weights.h"
 
@@ -34,13 +35,6 @@ bool RegressLine(const std::vector<CalibratedPoint>& points, const std::vector<d
   const Eigen::Vector2d normal(-std::sin(angle), std::cos(angle));
   *line = Eigen::Vector3d(normal.x(), normal.y(), -normal.dot(mean)).normalized();
   return true;
-}
-
-Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& unit) {
-  Eigen::Matrix<double, 3, 2> basis;
-  basis.col(0) = unit.unitOrthogonal();
-  basis.col(1) = unit.cross(basis.col(0));
-  return basis;
 }
 
 }  // namespace
@@ -80,13 +74,13 @@ Status FitLine(const std::vector<CalibratedPoint>& points, double sigma_px, Line
       sum += w;
     }
     if (pass + 1 == kPasses) break;
-    const Eigen::Matrix<double, 3, 2> basis = TangentBasis(line);
+    const Eigen::Matrix<double, 3, 2> basis = BasisAcross(line);
     const Eigen::Vector2d step =
         (basis.transpose() * information * basis).inverse() * (basis.transpose() * gradient);
     if (!step.allFinite()) return Status::Refused("the points of the line coincide");
     line = (line - basis * step).normalized();
   }
-  const Eigen::Matrix<double, 3, 2> basis = TangentBasis(line);
+  const Eigen::Matrix<double, 3, 2> basis = BasisAcross(line);
   const Eigen::Matrix2d covariance =
       sigma_px * sigma_px * (basis.transpose() * information * basis).inverse();
   if (!covariance.allFinite()) return Status::Refused("the points of the line coincide");

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/directions.h"
 
 namespace circline {
 namespace {
@@ -22,8 +23,7 @@ Eigen::Matrix3d LeanShape(const PencilObservation& pencil) {
   constexpr double kVariance = kLeaning * kLeaning;
   if (!pencil.fit) return kVariance * Eigen::Matrix3d::Identity();
   const Eigen::Vector3d v = pencil.fit->direction;
-  Eigen::Matrix<double, 3, 2> across;
-  across << v.unitOrthogonal(), v.cross(v.unitOrthogonal());
+  const Eigen::Matrix<double, 3, 2> across = BasisAcross(v);
   const Eigen::Matrix3d one_wall = kVariance * across * across.transpose();
   // Of each sector's lines: a line of normal n and variance s^2 measures n . v.
   struct Sector {

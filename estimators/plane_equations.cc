@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "circline/estimators/directions.h"
+
 namespace circline {
 namespace {
 
@@ -132,8 +134,7 @@ bool AddPencils(const PlaneEvidence& evidence, const PlaneState& state, PlaneEqu
 
 bool PlaneState::Set(const Vector3d& normal, const Matrix3d& conic) {
   basis.col(2) = normal;
-  basis.col(0) = normal.unitOrthogonal();
-  basis.col(1) = normal.cross(basis.col(0));
+  basis.leftCols<2>() = BasisAcross(normal);
   const Matrix3d G = ImageFromPlane(*this);
   PlaneShape shape;
   if (!shape.Set(G.transpose() * conic * G)) return false;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/directions.h"
 #include "circline/estimators/weights.h"
 
 namespace circline {
@@ -35,8 +36,7 @@ bool Descend(const std::vector<LineFit>& lines, const std::vector<double>* weigh
   Eigen::Matrix<double, 3, 2> basis;
   double damping = 0.0;
   for (int iteration = 0;; ++iteration) {
-    basis.col(0) = v.unitOrthogonal();
-    basis.col(1) = v.cross(basis.col(0));
+    basis = BasisAcross(v);
     information.setZero();
     Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
     for (std::size_t i = 0; i < lines.size(); ++i) {

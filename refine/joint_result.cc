@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/directions.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/camera_shifts.h"
 #include "circline/refine/linearization.h"
@@ -235,11 +236,6 @@ void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double uni
   estimate->radius = unit * std::abs(circle.radius);
   estimate->center_px.setZero();
   CameraToPixel(camera, in_camera, &estimate->center_px);
-}
-
-double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
 }
 
 Status FillRefined(const JointProblem& problem, State state, Refined* refined) {

@@ -29,9 +29,6 @@ struct Refined {
 void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double unit,
                    const Camera& camera, CircleEstimate* estimate);
 
-// Standard deviation of a direction of this covariance, the larger of two components, degrees.
-double LargestSigmaDeg(const Eigen::Matrix3d& covariance);
-
 // Fills everything but the probability from a minimum. Not ok: no feature has inliers, or some
 // number is not finite.
 Status FillRefined(const JointProblem& problem, State state, Refined* refined);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/directions.h"
 #include "circline/refine/camera_shifts.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/track_steps.h"

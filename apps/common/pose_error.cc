@@ -1,11 +1,11 @@
 #include "apps/common/pose_error.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/directions.h"
 
 namespace circline::apps {
 namespace {
@@ -91,8 +91,7 @@ std::optional<double> SigmaNormalDeg(const PoseHypothesis& hypothesis) {
   const Eigen::Matrix3d covariance =
       across * hypothesis.Covariance().topLeftCorner<3, 3>() * across;
   if (!covariance.allFinite()) return std::nullopt;  // Of a solver that gives none.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
+  return LargestSigmaDeg(covariance);
 }
 
 PoseErrors ComparePose(const PoseHypothesis& hypothesis, const SceneImage& image) {

@@ -1,6 +1,6 @@
 #include "apps/compare/results.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -9,6 +9,7 @@
 #include "apps/common/document.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "circline/estimators/basics.h"
+#include "circline/estimators/directions.h"
 #include "circline/estimators/pencil_lean.h"
 
 namespace circline::apps {
@@ -166,11 +167,8 @@ Json PencilJson(const PencilObservation& pencil, double pencil_axis_rad) {
   json["direction"] = pencil.fit ? Array(pencil.fit->direction) : Json();
   json["num_segments"] = pencil.lines.size();
   if (pencil.fit) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
-        pencil.fit->covariance + pencil_axis_rad * pencil_axis_rad * LeanShape(pencil),
-        Eigen::EigenvaluesOnly);
-    const double variance = std::max(0.0, eigen.eigenvalues()[2]);
-    json["sigma_deg"] = Number(std::sqrt(variance) / kDegree);
+    json["sigma_deg"] = Number(LargestSigmaDeg(
+        pencil.fit->covariance + pencil_axis_rad * pencil_axis_rad * LeanShape(pencil)));
   } else {
     json["sigma_deg"] = nullptr;
   }
