@@ -184,6 +184,12 @@ Status GatherCircles(const Observations& evidence, double sigma_px, Inputs* inpu
   inputs->radius_sigma = first.radius_sigma;
   inputs->center = MeasuredCenter(evidence, first, sigma_px);
   inputs->origin_at_center = IsOrigin(first, evidence.frame);
+  const int origin = FindCircle(evidence, evidence.frame.origin_is_center);
+  const bool at_same_center =
+      origin >= 0 && !first.concentric.empty() &&
+      evidence.circles[static_cast<std::size_t>(origin)].concentric == first.concentric;
+  inputs->origin_observed = inputs->origin_observed || inputs->origin_at_center || at_same_center ||
+                            inputs->DrawnAxesCross();
   return Status::Ok();
 }
 

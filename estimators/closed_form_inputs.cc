@@ -288,10 +288,12 @@ void GatherFrame(const Observations& observations, double sigma_px, Inputs* inpu
   if (frame.x_axis) inputs->x_sense = CalibrateSegment(camera, *frame.x_axis);
   if (frame.y_axis) inputs->y_sense = CalibrateSegment(camera, *frame.y_axis);
   if (frame.origin) inputs->origin = MeasuredPoint(camera, *frame.origin, sigma_px);
+  inputs->origin_observed = inputs->origin.present();
   for (const KnownLength& known : observations.known_lengths) {
     if (!IsInWorldPlane(known, observations)) continue;
     inputs->length_points = CalibrateSegment(camera, known.points);
-    inputs->length = inputs->length_points ? known.value : 0.0;
+    if (!inputs->length_points) continue;
+    inputs->length = known.value;
     inputs->length_sigma = known.sigma;
     break;
   }

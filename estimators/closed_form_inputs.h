@@ -37,8 +37,8 @@ using RayPair = std::array<Eigen::Vector3d, 2>;
 
 struct MeasuredCircle {
   Measured conic;  // ConicToVector, 6.
-  Measured
-      tilt;  // Of its plane against the world's, about two axes of it, 2; 0 as far as is known.
+  // Of its plane against the world's, about two axes of it, 2; 0 as far as is known.
+  Measured tilt;
   double normal_weight = 1.0;  // Inverse variance of its normal.
   int contrast = 0;            // CircleObservation::contrast.
   double irregularity = 1.0;   // ConicFit::irregularity.
@@ -59,7 +59,8 @@ struct Inputs {
   std::size_t on_line = 0;
   Eigen::Vector3d rough = Eigen::Vector3d::Zero();
   double angle = 0.0, angle_sigma = 0.0;
-  Measured origin;  // Image of the world origin, homogeneous, 3.
+  Measured origin;               // Image of the world origin, homogeneous, 3.
+  bool origin_observed = false;  // Else it is a convention.
   std::array<PencilDirection, 2> roles{PencilDirection::kFree, PencilDirection::kFree};
   std::optional<RayPair> x_sense, y_sense;  // Oriented axes, homogeneous.
   bool origin_at_center = false;            // The origin is the first circle's centre.
@@ -69,6 +70,7 @@ struct Inputs {
 
   // Every input that an error may move, by its value in this.
   std::vector<MovedInput> Moved();
+  bool DrawnAxesCross() const { return x_sense && y_sense && x_line.present() && y_line.present(); }
   bool IsMetric() const { return (!circles.empty() && radius > 0.0) || length > 0.0; }
 };
 

@@ -65,8 +65,7 @@ Eigen::Vector3d Translation(const Eigen::Vector3d& n, const Eigen::Vector3d& in_
 // axes, or the circle's centre.
 Eigen::Vector3d OriginRay(const Inputs& inputs, const CirclePose& circle) {
   if (inputs.origin.present() && !inputs.origin_at_center) return inputs.origin.value;
-  if (!inputs.origin_at_center && inputs.x_sense && inputs.y_sense && inputs.x_line.present() &&
-      inputs.y_line.present()) {
+  if (!inputs.origin_at_center && inputs.DrawnAxesCross()) {
     return Eigen::Vector3d(inputs.x_line.value).cross(Eigen::Vector3d(inputs.y_line.value));
   }
   return circle.center;

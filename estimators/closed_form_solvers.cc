@@ -145,20 +145,19 @@ PoseEstimate ClosedFormSolver::Solve(const Observations& observations) const {
   };
   estimate.hypotheses =
       WithUncertainty(candidates, perturbed, errors.size(), inputs.IsMetric(), SpinIsFree(inputs));
-  const FrameObservation& frame = evidence.frame;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     PoseHypothesis& h = estimate.hypotheses[i];
-    h.origin_observed =
-        frame.origin || !frame.origin_is_center.empty() || (frame.x_axis && frame.y_axis);
+    h.origin_observed = inputs.origin_observed;
     FillSupport(evidence, &h);
     if (candidates[i].circle) FillCircle(evidence, *candidates[i].circle, &h);
+  }
+  if (evidence.pencils.size() == 2 && evidence.pencils[0].fit && evidence.pencils[1].fit) {
+    estimate.notes.push_back(AngleBetween(evidence.pencils[0], evidence.pencils[1]));
   }
   if (estimate.hypotheses.empty()) {
     estimate.status = Status::Refused(recipe_.name + ": the evidence is degenerate (" +
                                       recipe_.needs + " are needed)");
-  }
-  if (evidence.pencils.size() == 2 && evidence.pencils[0].fit && evidence.pencils[1].fit) {
-    estimate.notes.push_back(AngleBetween(evidence.pencils[0], evidence.pencils[1]));
+    return estimate;
   }
   RankHypotheses(&estimate.hypotheses);
   estimate.decided_by = estimate.hypotheses.size() > 1 ? recipe_.decided_by : "only one pose fits";

@@ -118,7 +118,9 @@ Status GatherPencils(const Observations& evidence, double sigma_px, bool axes_ar
       inputs->roles[0] == PencilDirection::kY || inputs->roles[1] == PencilDirection::kX;
   const std::size_t x = y_first ? 1 : 0;
   Eigen::Vector3d crossing = line(inputs->x_line, x).cross(line(inputs->y_line, 1 - x));
-  if (!(std::abs(crossing.z()) > 1e-9 * crossing.norm())) crossing = Eigen::Vector3d::UnitZ();
+  const bool is_finite = std::abs(crossing.z()) > 1e-9 * crossing.norm();
+  if (!is_finite) crossing = Eigen::Vector3d::UnitZ();
+  inputs->origin_observed = is_finite && inputs->DrawnAxesCross();
   inputs->origin.value = crossing / crossing.z();
   inputs->origin.columns = Eigen::MatrixXd::Zero(3, 0);
   return Status::Ok();
