@@ -31,7 +31,7 @@ class StorageNode {
   void Fail(const std::string& message) const;
   bool ok() const { return status_->ok(); }
 
-  // Of a map: notes an error for a key that is not listed, or that stands there twice.
+  // Of a map: notes an error for a key that is not listed.
   void AllowKeys(const std::vector<std::string>& keys) const;
   StorageNode Get(const std::string& key) const;      // May not exist.
   StorageNode Require(const std::string& key) const;  // Notes an error if it does not.

@@ -23,8 +23,8 @@ struct LossSetting {
 // one line that names the flag.
 Status NoiseFromFlags(NoiseModel* model, CameraGuess* guess);
 
-// Every loss with every scale. `camera_sigma` is what --focal_sigma says; absent where it leaves
-// that to the noise model and the scene file. Not ok: one line that names the flag.
+// Every loss with every scale. Their camera_sigma is what --focal_sigma says; absent where it
+// leaves that to the noise model and the scene file. Not ok: one line that names the flag.
 Status LossesFromFlags(const NoiseModel& noise, std::vector<LossSetting>* losses);
 
 }  // namespace circline::apps

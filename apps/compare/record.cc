@@ -73,7 +73,6 @@ HypothesisRecord ReadHypothesis(const Json& line, const Camera& given) {
   }
   h.translation = ReadVector(line.at("translation"));
   h.metric = line.at("metric").get<bool>();
-  h.origin_observed = line.at("origin_observed").get<bool>();
   if (line.contains("camera")) ReadIntrinsics(line.at("camera"), &h.camera.emplace(given));
   h.focal_px = Get(line, "focal_px", kUnknown);
   h.focal_sigma_px = Get(line, "focal_sigma_px", kUnknown);

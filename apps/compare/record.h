@@ -38,7 +38,7 @@ struct HypothesisRecord {
   double probability = kUnknown;
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  bool metric = false, origin_observed = false, rotation_is_free = false;
+  bool metric = false, rotation_is_free = false;
   std::optional<Camera> camera;                           // As it was estimated, where it was.
   double focal_px = kUnknown, focal_sigma_px = kUnknown;  // Where they are stated.
   double rms_px = kUnknown;
