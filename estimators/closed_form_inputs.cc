@@ -39,18 +39,6 @@ Measured BestLine(const Observations& observations, PencilDirection role) {
   return best == nullptr ? Measured() : FromLine(*best);
 }
 
-// The angle between two pencils, from 0 to pi, and its standard deviation; radians.
-struct Angle {
-  double value, sigma;
-};
-std::optional<Angle> KnownAngleBetween(const std::string& a, const std::string& b,
-                                       const Observations& observations) {
-  for (const KnownAngle& known : observations.known_angles) {
-    if (IsBetween(known, a, b)) return Angle{std::acos(std::cos(known.value)), known.sigma};
-  }
-  return {};
-}
-
 using Directions = std::array<Eigen::Vector3d, 2>;
 
 // Cost of two directions: of all lines of both pencils, 1/2 chi^2.
@@ -176,6 +164,13 @@ bool IsBetween(const KnownAngle& known, const std::string& a, const std::string&
          (known.pencils[0] == b && known.pencils[1] == a);
 }
 
+const KnownAngle* FindKnownAngle(const std::vector<KnownAngle>& known, const std::string& a,
+                                 const std::string& b) {
+  const auto found = std::find_if(known.begin(), known.end(),
+                                  [&](const KnownAngle& k) { return IsBetween(k, a, b); });
+  return found == known.end() ? nullptr : &*found;
+}
+
 void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, Inputs* inputs) {
   const std::array<PencilObservation, 2> pencils = {evidence.pencils[0], evidence.pencils[1]};
   for (std::size_t k = 0; k < 2; ++k) {
@@ -183,16 +178,14 @@ void GatherDirections(const Observations& evidence, bool axes_are_orthogonal, In
     inputs->lean_shapes[k] = LeanShape(pencils[k]);
     inputs->roles[k] = pencils[k].direction;
   }
-  std::optional<Angle> angle = KnownAngleBetween(pencils[0].id, pencils[1].id, evidence);
-  const PencilDirection free = PencilDirection::kFree;
-  if (axes_are_orthogonal && inputs->roles[0] != free && inputs->roles[1] != free) {
-    angle = Angle{kRightAngle, 0.0};
-  }
-  if (!angle) return;
+  const KnownAngle* known = FindKnownAngle(evidence.known_angles, pencils[0].id, pencils[1].id);
+  const bool is_right =
+      axes_are_orthogonal && RunsAlongAxis(pencils[0]) && RunsAlongAxis(pencils[1]);
+  if (!is_right && known == nullptr) return;
 
-  inputs->angle = angle->value;
-  inputs->angle_sigma = angle->sigma;
-  const std::vector<Reading> readings = ReadDirections(pencils, angle->value);
+  inputs->angle = is_right ? kRightAngle : std::acos(std::cos(known->value));  // From 0 to pi.
+  inputs->angle_sigma = is_right ? 0.0 : known->sigma;
+  const std::vector<Reading> readings = ReadDirections(pencils, inputs->angle);
   double lowest = readings.front().cost;
   for (const Reading& r : readings) lowest = std::min(lowest, r.cost);
   // Among what the lines allow, by what is expected: the lowest cost alone would make whichever is

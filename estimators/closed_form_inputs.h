@@ -76,7 +76,10 @@ struct Inputs {
 
 // `sigma_px` below: of points that state none. `observations` are fitted and resolved.
 
-bool IsBetween(const KnownAngle& known, const std::string& a, const std::string& b);  // Pencils.
+// Whether it is the one of two pencils, and the first that is; null where none is.
+bool IsBetween(const KnownAngle& known, const std::string& a, const std::string& b);
+const KnownAngle* FindKnownAngle(const std::vector<KnownAngle>& known, const std::string& a,
+                                 const std::string& b);
 
 // A pixel as a homogeneous calibrated point; absent where the camera cannot undistort it.
 Measured MeasuredPoint(const Camera& camera, const Eigen::Vector2d& pixel, double sigma_px);

@@ -80,11 +80,16 @@ class Starts {
   }
   std::optional<KnownAngle> AngleBetween(const PencilObservation& a,
                                          const PencilObservation& b) const {
-    for (const KnownAngle& known : observations_.known_angles) {
-      if (IsBetween(known, a.id, b.id)) return known;
-    }
+    const KnownAngle* known = FindKnownAngle(observations_.known_angles, a.id, b.id);
+    if (known != nullptr) return *known;
     if (!AreAlongDifferentAxes(a, b)) return {};
     return KnownAngle{{a.id, b.id}, kRightAngle, std::sqrt(2.0) * noise_.pencil_axis_rad};
+  }
+
+  // Whether an angle is one of 90 degrees.
+  static bool IsRight(const std::optional<KnownAngle>& angle) {
+    constexpr double kRight = 1e-9;  // Cosine.
+    return angle && std::abs(std::cos(angle->value)) <= kRight;
   }
 
   void FromPencils() {
@@ -104,8 +109,11 @@ class Starts {
               !AreAlongDifferentAxes(c, a)) {
             continue;
           }
+          const std::optional<KnownAngle> of_bc = AngleBetween(b, c), of_ca = AngleBetween(c, a);
+          if (!IsRight(angle) || !IsRight(of_bc) || !IsRight(of_ca)) continue;
+          const double sigma = std::max({angle->sigma, of_bc->sigma, of_ca->sigma});
           FocalSolution one;
-          count = FocalFromThreeVanishingPoints({*a.fit, *b.fit, *c.fit}, angle->sigma, &one, &why);
+          count = FocalFromThreeVanishingPoints({*a.fit, *b.fit, *c.fit}, sigma, &one, &why);
           Add(Named("pencils", a.id) + ", '" + b.id + "' and '" + c.id + "'", count, &one, why);
         }
       }
@@ -152,11 +160,10 @@ class Starts {
       if (pencil->plane == plane || (of_world && along_plane)) pencils.push_back(pencil);
     }
     evidence->pencil_sigma = noise_.pencil_axis_rad;
-    constexpr double kRight = 1e-9;  // Cosine.
     for (std::size_t i = 0; i < pencils.size() && !evidence->orthogonal_pencils; ++i) {
       for (std::size_t j = i + 1; j < pencils.size() && !evidence->orthogonal_pencils; ++j) {
         const std::optional<KnownAngle> angle = AngleBetween(*pencils[i], *pencils[j]);
-        if (!angle || std::abs(std::cos(angle->value)) > kRight) continue;
+        if (!IsRight(angle)) continue;
         evidence->orthogonal_pencils = true;
         evidence->pencil_sigma = std::max(evidence->pencil_sigma, angle->sigma);
         std::swap(pencils[0], pencils[i]);

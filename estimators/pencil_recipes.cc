@@ -19,10 +19,8 @@ bool Differ(const PencilObservation& a, const PencilObservation& b,
   constexpr double kGate = 3.0, kRounding = 1e-9;
   if (!(a.fit->direction.cross(b.fit->direction).norm() > kRounding)) return false;
   if (RunsAlongAxis(a) && RunsAlongAxis(b)) return a.direction != b.direction;
-  for (const KnownAngle& known : known_angles) {
-    if (IsBetween(known, a.id, b.id) && std::abs(std::sin(known.value)) > kGate * known.sigma)
-      return true;
-  }
+  const KnownAngle* known = FindKnownAngle(known_angles, a.id, b.id);
+  if (known != nullptr && std::abs(std::sin(known->value)) > kGate * known->sigma) return true;
   return DirectionSeparation(*a.fit, *b.fit) > kGate;
 }
 
@@ -30,10 +28,7 @@ bool Differ(const PencilObservation& a, const PencilObservation& b,
 // those with one.
 Status FirstPair(std::vector<PencilObservation> pencils,
                  const std::vector<KnownAngle>& known_angles, PencilPair* pair) {
-  std::stable_sort(pencils.begin(), pencils.end(),
-                   [](const PencilObservation& a, const PencilObservation& b) {
-                     return RunsAlongAxis(a) > RunsAlongAxis(b);
-                   });
+  std::stable_partition(pencils.begin(), pencils.end(), RunsAlongAxis);
   for (std::size_t i = 0; i < pencils.size(); ++i) {
     for (std::size_t j = i + 1; j < pencils.size(); ++j) {
       if (!Differ(pencils[i], pencils[j], known_angles)) continue;
@@ -51,10 +46,11 @@ Status FirstPair(std::vector<PencilObservation> pencils,
                                                pencils[0].id + "'); a second direction is needed");
 }
 
-// Keeps the pair, and what is known of it and of the frame's plane.
+// Keeps the pair, and what is known of it and of the frame's plane, without circles.
 void KeepPencils(const PencilPair& pair, const FrameObservation& frame,
                  const Observations& observations, Observations* evidence) {
   *evidence = KeepFrame(observations, frame);
+  evidence->frame.origin_is_center.clear();
   evidence->pencils = {pair[0], pair[1]};
   for (const KnownAngle& known : observations.known_angles) {
     if (IsBetween(known, pair[0].id, pair[1].id)) evidence->known_angles.push_back(known);
@@ -73,7 +69,6 @@ Status SelectPencils(const Observations& observations, Observations* evidence) {
   }
   PencilPair pair;
   FrameObservation frame = observations.frame;
-  frame.origin_is_center.clear();
   if (!FirstPair(of_world, observations.known_angles, &pair).ok()) {
     const Status status = FirstPair(fitted, observations.known_angles, &pair);
     if (!status.ok()) return status;
@@ -94,9 +89,7 @@ Status SelectPencilsAlongAxes(const Observations& observations, Observations* ev
   PencilPair pair;
   const Status status = FirstPair(along_axes, observations.known_angles, &pair);
   if (!status.ok()) return Status::Refused("of the pencils along an axis: " + status.message);
-  FrameObservation frame = observations.frame;
-  frame.origin_is_center.clear();
-  KeepPencils(pair, frame, observations, evidence);
+  KeepPencils(pair, observations.frame, observations, evidence);
   return Status::Ok();
 }
 
