@@ -128,12 +128,11 @@ FocalRoots Coplanar(const Vector<12>& z) {
   return roots;
 }
 
-// False, with the reason, where one is no ellipse.
-bool SetConics(const ConicFit& a, const ConicFit& b, FocalInputs<12>* inputs, FocalRefusal* why) {
-  const bool first = inputs->SetConic(0, a), second = inputs->SetConic(6, b);
-  if (inputs->IsFinite() && first && second) return true;
-  RefuseFocal(inputs->IsFinite() ? FocalRefusal::kNoEllipse : FocalRefusal::kNotFinite, why);
-  return false;
+FocalInputs<12> TwoConics(const ConicFit& a, const ConicFit& b) {
+  FocalInputs<12> inputs;
+  inputs.SetConic(0, a);
+  inputs.SetConic(6, b);
+  return inputs;
 }
 
 }  // namespace
@@ -163,9 +162,8 @@ int FocalFromCircleAndCenter(const ConicFit& circle, const Eigen::Vector3d& cent
                              const Eigen::Matrix3d& center_covariance, FocalSolution* solution,
                              FocalRefusal* why) {
   FocalInputs<9> inputs;
-  const bool is_ellipse = inputs.SetConic(0, circle);
+  inputs.SetConic(0, circle);
   inputs.SetPoint(6, center, center_covariance);
-  if (inputs.IsFinite() && !is_ellipse) return RefuseFocal(FocalRefusal::kNoEllipse, why);
   return FocalSolutionsOf<9>(
       [](const Vector<9>& z) {
         const Eigen::Matrix3d C = VectorToConic(z.head<6>());
@@ -176,16 +174,12 @@ int FocalFromCircleAndCenter(const ConicFit& circle, const Eigen::Vector3d& cent
 
 int FocalFromConcentricCircles(const ConicFit& a, const ConicFit& b, FocalSolution* solution,
                                FocalRefusal* why) {
-  FocalInputs<12> inputs;
-  if (!SetConics(a, b, &inputs, why)) return 0;
-  return CombinedSolution<2>(Concentric, inputs, solution, why);
+  return CombinedSolution<2>(Concentric, TwoConics(a, b), solution, why);
 }
 
 int FocalFromCoplanarCircles(const ConicFit& a, const ConicFit& b,
                              std::array<FocalSolution, 2>* solutions, FocalRefusal* why) {
-  FocalInputs<12> inputs;
-  if (!SetConics(a, b, &inputs, why)) return 0;
-  return FocalSolutionsOf<12>(Coplanar, inputs, solutions->data(), why);
+  return FocalSolutionsOf<12>(Coplanar, TwoConics(a, b), solutions->data(), why);
 }
 
 }  // namespace circline

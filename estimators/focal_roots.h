@@ -31,6 +31,7 @@ struct FocalInputs {
   Vector<N> z = Vector<N>::Zero();
   Eigen::Matrix<double, N, N> covariance = Eigen::Matrix<double, N, N>::Zero();
   Eigen::Matrix<double, N, 2> shift = Eigen::Matrix<double, N, 2>::Zero();  // Per principal point.
+  bool are_ellipses = true;                                                 // All conics.
 
   void SetPoint(int at, const Eigen::Vector3d& v, const Eigen::Matrix3d& v_covariance) {
     const double norm = v.norm();
@@ -38,8 +39,7 @@ struct FocalInputs {
     covariance.template block<3, 3>(at, at) = v_covariance / (norm * norm);
     shift(at, 0) = shift(at + 1, 1) = -v.z() / norm;
   }
-  // False for what is no ellipse.
-  bool SetConic(int at, const ConicFit& fit) {
+  void SetConic(int at, const ConicFit& fit) {
     z.template segment<6>(at) = ConicToVector(fit.conic);
     covariance.template block<6, 6>(at, at) = fit.Covariance();
     for (int k = 0; k < 2; ++k) {
@@ -47,9 +47,13 @@ struct FocalInputs {
       shift.template block<6, 1>(at, k) = ConicToVector(half + half.transpose());
     }
     Eigen::Matrix3d normalized;
-    return NormalizeEllipse(fit.conic, &normalized);
+    are_ellipses = NormalizeEllipse(fit.conic, &normalized) && are_ellipses;
   }
-  bool IsFinite() const { return z.allFinite() && covariance.allFinite(); }
+  // Why there can be no solution, if there cannot.
+  FocalRefusal Why() const {
+    if (!z.allFinite() || !covariance.allFinite()) return FocalRefusal::kNotFinite;
+    return are_ellipses ? FocalRefusal::kNone : FocalRefusal::kNoEllipse;
+  }
 };
 
 // f^2 of up to two solutions, and what became of the others.
@@ -94,7 +98,7 @@ template <int N, typename Solve>
 int FocalSolutionsOf(const Solve& solve, const FocalInputs<N>& inputs, FocalSolution* solutions,
                      FocalRefusal* why) {
   const Vector<N>& z = inputs.z;
-  if (!inputs.IsFinite()) return RefuseFocal(FocalRefusal::kNotFinite, why);
+  if (inputs.Why() != FocalRefusal::kNone) return RefuseFocal(inputs.Why(), why);
   const FocalRoots roots = solve(z);
   FocalRefusal reason = roots.why;
   int count = 0;
@@ -116,7 +120,7 @@ int FocalSolutionsOf(const Solve& solve, const FocalInputs<N>& inputs, FocalSolu
 template <std::size_t K, int N, typename Solve>
 int CombinedSolution(const Solve& solve, const FocalInputs<N>& inputs, FocalSolution* solution,
                      FocalRefusal* why) {
-  if (!inputs.IsFinite()) return RefuseFocal(FocalRefusal::kNotFinite, why);
+  if (inputs.Why() != FocalRefusal::kNone) return RefuseFocal(inputs.Why(), why);
   constexpr double kRounding2 = 1e-24;  // Of log f, squared.
   constexpr int kSize = static_cast<int>(K);
   Eigen::Matrix<double, N, kSize> gradients = Eigen::Matrix<double, N, kSize>::Zero();
