@@ -38,56 +38,48 @@ struct PieceSums {
   }
 };
 
-// A contour in bins of eccentric anomaly, each shorter than a piece of all but the largest.
-class Contour {
- public:
-  Contour(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic) {
-    if (!ConicToEllipse(conic, &ellipse_)) return;
-    const Eigen::Rotation2Dd to_axes(-ellipse_.angle);
-    double calibrated_per_px = 0.0;
-    for (const CalibratedPoint& point : points) {
-      const Eigen::Vector2d away = to_axes * (point.x - ellipse_.center);
-      const double around = std::atan2(away.y() / ellipse_.b, away.x() / ellipse_.a);
-      const double distance = ConicDistancePx(point, conic);
-      const auto& J = point.x_from_pixel;
-      calibrated_per_px += std::sqrt(std::abs(J[0] * J[3] - J[1] * J[2]));
-      if (!std::isfinite(around + distance)) continue;
-      const auto bin = static_cast<std::size_t>(0.5 * kNumBins * (around / kPi + 1.0));
-      bins_[std::min<std::size_t>(bin, kNumBins - 1)] += {1.0, distance, distance * distance};
-    }
-    px_per_calibrated_ = static_cast<double>(points.size()) / calibrated_per_px;
+// Pieces of so many pixels of a contour, nothing where its conic is no ellipse.
+PieceSums SumPieces(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic,
+                    double length_px) {
+  // Bins of eccentric anomaly, each shorter than a piece of all but the largest.
+  constexpr int kNumBins = 256;
+  std::array<Piece, kNumBins> bins{};
+  PieceSums sums;
+  Ellipse ellipse;
+  if (!ConicToEllipse(conic, &ellipse)) return sums;
+  const Eigen::Rotation2Dd to_axes(-ellipse.angle);
+  double calibrated_per_px = 0.0;
+  for (const CalibratedPoint& point : points) {
+    const Eigen::Vector2d away = to_axes * (point.x - ellipse.center);
+    const double around = std::atan2(away.y() / ellipse.b, away.x() / ellipse.a);
+    const double distance = ConicDistancePx(point, conic);
+    const auto& J = point.x_from_pixel;
+    calibrated_per_px += std::sqrt(std::abs(J[0] * J[3] - J[1] * J[2]));
+    if (!std::isfinite(around + distance)) continue;
+    const auto bin = static_cast<std::size_t>(0.5 * kNumBins * (around / kPi + 1.0));
+    bins[std::min<std::size_t>(bin, kNumBins - 1)] += {1.0, distance, distance * distance};
   }
-
-  PieceSums SumPieces(double length_px) const {
-    const double step = 2.0 * kPi / kNumBins;
-    const Eigen::Rotation2Dd turn(step);
-    Eigen::Vector2d around(-1.0, 0.0);
-    PieceSums sums;
-    Piece piece;
-    double length = 0.0;
-    for (const Piece& bin : bins_) {
-      const double bin_px =
-          step * px_per_calibrated_ * std::hypot(ellipse_.a * around.y(), ellipse_.b * around.x());
-      if (length + bin_px > length_px) {
-        sums.Add(piece);
-        piece = Piece();
-        length = 0.0;
-      }
-      length += bin_px;
-      piece += bin;
-      around = turn * around;
+  const double px_per_calibrated = static_cast<double>(points.size()) / calibrated_per_px;
+  const double step = 2.0 * kPi / kNumBins;
+  const Eigen::Rotation2Dd turn(step);
+  Eigen::Vector2d around(-1.0, 0.0);
+  Piece piece;
+  double length = 0.0;
+  for (const Piece& bin : bins) {
+    const double bin_px =
+        step * px_per_calibrated * std::hypot(ellipse.a * around.y(), ellipse.b * around.x());
+    if (length + bin_px > length_px) {
+      sums.Add(piece);
+      piece = Piece();
+      length = 0.0;
     }
-    sums.Add(piece);
-    return sums;
+    length += bin_px;
+    piece += bin;
+    around = turn * around;
   }
-
- private:
-  static constexpr int kNumBins = 256;
-
-  Ellipse ellipse_;
-  std::array<Piece, kNumBins> bins_{};
-  double px_per_calibrated_ = 0.0;
-};
+  sums.Add(piece);
+  return sums;
+}
 
 }  // namespace
 
@@ -120,7 +112,7 @@ double Irregularity(const std::vector<CalibratedPoint>& points, const Eigen::Mat
                     const NoiseModel& noise) {
   if (!(noise.circle_shape > 0.0 && noise.spread > 0.0)) return 1.0;
   constexpr double kMost = 3.0, kOfEllipse = 5.0, kLeast = 1e-3;  // -; degrees of freedom; pixels.
-  const PieceSums sums = Contour(points, conic).SumPieces(noise.correlation_px);
+  const PieceSums sums = SumPieces(points, conic, noise.correlation_px);
   const double n = sums.num_pieces, shared = noise.contour_px * noise.contour_px;
   if (!(shared > 0.0 && n > kOfEllipse && sums.num_points > n))
     return ExpectedScale(nullptr, 0, noise.spread, kMost);
