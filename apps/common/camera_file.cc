@@ -1,8 +1,8 @@
 #include "apps/common/camera_file.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "apps/common/colmap_file.h"
@@ -11,8 +11,7 @@
 namespace circline::apps {
 namespace {
 
-constexpr std::array<CameraModel, 3> kModels = {CameraModel::kPinhole, CameraModel::kOpenCV,
-                                                CameraModel::kFisheye};
+constexpr const char* kModels[] = {"pinhole", "opencv", "fisheye"};  // In CameraModel's order.
 
 void SetIntrinsics(const StorageNode& matrix_node, Camera* camera) {
   const std::vector<double> k = matrix_node.Numbers(9);
@@ -120,25 +119,17 @@ bool LooksLikeStorage(const std::string& text) {
 
 }  // namespace
 
-const char* ModelName(CameraModel model) {
-  return model == CameraModel::kPinhole  ? "pinhole"
-         : model == CameraModel::kOpenCV ? "opencv"
-                                         : "fisheye";
-}
+const char* ModelName(CameraModel model) { return kModels[static_cast<std::size_t>(model)]; }
 
 bool ModelFromName(const std::string& name, CameraModel* model) {
-  for (const CameraModel known : kModels) {
-    if (name != ModelName(known)) continue;
-    *model = known;
-    return true;
-  }
-  return false;
+  const auto found = std::find(std::begin(kModels), std::end(kModels), name);
+  if (found == std::end(kModels)) return false;
+  *model = static_cast<CameraModel>(found - std::begin(kModels));
+  return true;
 }
 
 std::string NoSuchModel(const std::string& name) {
-  std::vector<std::string> names;
-  for (const CameraModel known : kModels) names.emplace_back(ModelName(known));
-  return NotOneOf(name, names);
+  return NotOneOf(name, {std::begin(kModels), std::end(kModels)});
 }
 
 std::vector<double> Distortion(const Camera& camera) {

@@ -58,10 +58,7 @@ Status ReadNoiseModel(const std::string& path, NoiseModel* model, StatedCameraSi
   }
   read.camera = of_camera.Over(read.camera);
   if (status.ok()) status = read.Validate();
-  if (!status.ok()) {
-    const std::string separator = status.message.compare(0, 2, ": ") == 0 ? "" : ": ";
-    return Status::Invalid(path + separator + status.message);
-  }
+  if (!status.ok()) return Status::Invalid(path + ": " + status.message);
   *model = read;
   if (stated != nullptr) *stated = of_camera;
   return status;

@@ -15,6 +15,8 @@ namespace {
 
 using Ids = std::set<std::string>;
 
+constexpr const char* kSymmetries[] = {"none", "D2", "D4", "axis"};
+
 void ReadCircle(const StorageNode& node, Ids* ids, SceneImage* image) {
   node.AllowKeys({"id", "contour", "roi", "center", "radius", "radius_sigma", "plane", "concentric",
                   "radius_group", "sigma_px", "diameters"});
@@ -41,23 +43,13 @@ void ReadCircle(const StorageNode& node, Ids* ids, SceneImage* image) {
   image->observations.circles.push_back(std::move(circle));
 }
 
-PencilDirection ReadDirection(const StorageNode& node) {
-  if (!node.Exists()) return PencilDirection::kFree;
-  const std::string name = node.Text();
-  for (const PencilDirection direction :
-       {PencilDirection::kX, PencilDirection::kY, PencilDirection::kZ, PencilDirection::kFree}) {
-    if (name == PencilDirectionName(direction)) return direction;
-  }
-  node.Fail(NotOneOf(name, {"x", "y", "z", "free"}));
-  return PencilDirection::kFree;
-}
-
 void ReadPencil(const StorageNode& node, Ids* ids, Observations* observations) {
   node.AllowKeys({"id", "segments", "direction", "plane", "sigma_px"});
   PencilObservation pencil;
   pencil.id = node.Require("id").Text();
   if (!ids->insert(pencil.id).second) node.Fail("id '" + pencil.id + "' is used twice");
-  pencil.direction = ReadDirection(node.Get("direction"));
+  pencil.direction =
+      ReadChoice(node.Get("direction"), {"x", "y", "z", "free"}, PencilDirection::kFree);
   pencil.plane = ReadOptionalText(node.Get("plane"));
   pencil.sigma_px = ReadPositive(node.Get("sigma_px"));
   for (const Segment& segment : ReadSegments(node.Require("segments"))) {
@@ -138,23 +130,14 @@ void ReadKnown(const StorageNode& node, const Ids& pencil_ids, bool detect_every
   }
 }
 
-Symmetry ReadSymmetry(const StorageNode& node) {
-  if (!node.Exists()) return Symmetry::kNone;
-  const std::string name = node.Text();
-  for (const Symmetry known : {Symmetry::kNone, Symmetry::kD2, Symmetry::kD4, Symmetry::kAxis}) {
-    if (name == SymmetryName(known)) return known;
-  }
-  node.Fail(NotOneOf(name, {"none", "D2", "D4", "axis"}));
-  return Symmetry::kNone;
-}
-
 void ReadTruth(const StorageNode& node, SceneImage* image) {
   if (!node.Exists()) return;
   node.AllowKeys({"rotation", "translation", "symmetry", "directions"});
   Truth truth;
   if (node.Get("rotation").Exists()) truth.rotation = ReadRotation(node.Get("rotation"));
   if (node.Get("translation").Exists()) truth.translation = ReadVector3(node.Get("translation"));
-  truth.symmetry = ReadSymmetry(node.Get("symmetry"));
+  truth.symmetry = ReadChoice(node.Get("symmetry"),
+                              {std::begin(kSymmetries), std::end(kSymmetries)}, Symmetry::kNone);
   for (const StorageNode& item : node.Get("directions").Items()) {
     item.AllowKeys({"pencil", "value"});
     TrueDirection direction{item.Require("pencil").Text(), ReadVector3(item.Require("value"))};
@@ -239,10 +222,7 @@ SceneImage ReadImage(StorageNode node, const std::filesystem::path& folder,
 }  // namespace
 
 const char* SymmetryName(Symmetry symmetry) {
-  return symmetry == Symmetry::kNone ? "none"
-         : symmetry == Symmetry::kD2 ? "D2"
-         : symmetry == Symmetry::kD4 ? "D4"
-                                     : "axis";
+  return kSymmetries[static_cast<std::size_t>(symmetry)];
 }
 
 Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
@@ -287,8 +267,7 @@ Status ParseScene(const std::string& name, const std::string& text, const std::s
   if (status.ok() && images->empty()) root.Get("images").Fail("has no image");
   if (!status.ok()) {
     images->clear();
-    const std::string separator = status.message.compare(0, 2, ": ") == 0 ? "" : ": ";
-    return Status::Invalid(name + separator + status.message);
+    return Status::Invalid(name + ": " + status.message);
   }
   return Status::Ok();
 }

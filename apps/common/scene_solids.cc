@@ -78,18 +78,17 @@ void ReadBase(const StorageNode& node, const std::vector<FaceObservation>& faces
 
 void ReadEdge(const StorageNode& node, double sigma_px, BoxObservation* box) {
   node.AllowKeys({"along", "far", "points"});
-  const std::string along = node.Require("along").Text();
-  const auto axis = std::find(std::begin(kAxes), std::end(kAxes), along) - std::begin(kAxes);
-  if (axis == 3) return node.Get("along").Fail(NotOneOf(along, {"x", "y", "z"}));
+  const int axis = ReadChoice(node.Require("along"), {std::begin(kAxes), std::end(kAxes)}, -1);
+  if (axis < 0) return;
   std::array<bool, 3> far{};
   const std::string at = ReadOptionalText(node.Get("far"));
   for (const char name : at) {
-    if (name < 'x' || name > 'z' || name == along[0]) {
+    if (name < 'x' || name > 'z' || name - 'x' == axis) {
       return node.Get("far").Fail("'" + at + "' must name axes across the edge: x, y, z, or two");
     }
     far[static_cast<std::size_t>(name - 'x')] = true;
   }
-  AddEdge(node, static_cast<int>(axis), far, ReadPixels(node.Require("points"), 2), sigma_px, box);
+  AddEdge(node, axis, far, ReadPixels(node.Require("points"), 2), sigma_px, box);
 }
 
 BoxObservation ReadBox(const StorageNode& node, const std::vector<FaceObservation>& faces) {

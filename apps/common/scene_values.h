@@ -3,6 +3,7 @@
 #define CIRCLINE_APPS_COMMON_SCENE_VALUES_H_
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "apps/common/solids.h"
 #include "apps/common/storage_node.h"
+#include "apps/common/text.h"
 #include "circline/estimators/observations.h"
 
 namespace circline::apps {
@@ -26,6 +28,16 @@ std::array<int, 4> ReadRectangle(const StorageNode& node);
 double ReadPositive(const StorageNode& node);
 // Empty where it is not given.
 std::string ReadOptionalText(const StorageNode& node);
+// The value, counted from 0, that has this one of the names; `otherwise` where it is not given.
+template <typename Value>
+Value ReadChoice(const StorageNode& node, const std::vector<std::string>& names, Value otherwise) {
+  if (!node.Exists()) return otherwise;
+  const std::string name = node.Text();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<Value>(found - names.begin());
+  node.Fail(NotOneOf(name, names));
+  return otherwise;
+}
 Eigen::Vector3d ReadVector3(const StorageNode& node);
 // The nearest rotation, so that nine printed digits do not cost accuracy.
 Eigen::Matrix3d ReadRotation(const StorageNode& node);

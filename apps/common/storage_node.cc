@@ -63,7 +63,7 @@ bool StorageNode::Exists() const { return node_ != nullptr && !node_->is_null();
 
 void StorageNode::Fail(const std::string& message) const {
   if (!status_->ok()) return;
-  *status_ = Status::Invalid(place_ + ": " + message);
+  *status_ = Status::Invalid(place_.empty() ? message : place_ + ": " + message);
 }
 
 bool StorageNode::RequireThat(bool condition, const std::string& expected) const {
