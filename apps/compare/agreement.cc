@@ -7,22 +7,11 @@
 namespace circline::apps {
 namespace {
 
-constexpr std::size_t kMaxKept = 2048;
-
 bool SameLoss(const SolverKey& a, const SolverKey& b) {
   return a.loss == b.loss && a.scale_px == b.scale_px;
 }
 
 }  // namespace
-
-void Agreement::Angles::Add(double angle) {
-  if (seen++ % stride != 0) return;
-  kept.push_back(static_cast<float>(angle));
-  if (kept.size() < kMaxKept) return;
-  for (std::size_t i = 0; 2 * i < kept.size(); ++i) kept[i] = kept[2 * i];
-  kept.resize(kept.size() / 2);
-  stride *= 2;
-}
 
 std::size_t Agreement::Slot(std::size_t i, std::size_t j) {
   const std::size_t high = std::max(i, j), low = std::min(i, j);
@@ -48,16 +37,16 @@ void Agreement::Add(const ImageRecord& record) {
     for (std::size_t j = 0; j < i; ++j) {
       const SolverRecord& b = record.solvers[positions_[j]];
       if (!b.HasAnswer()) continue;
-      angles_[Slot(i, j)].Add(AngleWithoutSenseDeg(a.hypotheses.front().rotation.col(2),
-                                                   b.hypotheses.front().rotation.col(2)));
+      angles_[Slot(i, j)].push_back(static_cast<float>(AngleWithoutSenseDeg(
+          a.hypotheses.front().rotation.col(2), b.hypotheses.front().rotation.col(2))));
     }
   }
 }
 
 std::optional<double> Agreement::MedianDeg(std::size_t i, std::size_t j) const {
-  const std::vector<float>& kept = At(i, j).kept;
-  if (kept.empty()) return std::nullopt;
-  return Median({kept.begin(), kept.end()});
+  const std::vector<float>& angles = At(i, j);
+  if (angles.empty()) return std::nullopt;
+  return Median({angles.begin(), angles.end()});
 }
 
 }  // namespace circline::apps

@@ -19,15 +19,10 @@ class Agreement {
   // Degrees; absent where no photo has both answers.
   std::optional<double> MedianDeg(std::size_t i, std::size_t j) const;
   // Photos that have both.
-  std::size_t Count(std::size_t i, std::size_t j) const { return At(i, j).seen; }
+  std::size_t Count(std::size_t i, std::size_t j) const { return At(i, j).size(); }
 
  private:
-  // At most a few thousand of the angles, evenly spread over all, so that memory stays bounded.
-  struct Angles {
-    std::vector<float> kept;
-    std::size_t seen = 0, stride = 1;
-    void Add(double angle);
-  };
+  using Angles = std::vector<float>;
   static std::size_t Slot(std::size_t i, std::size_t j);
   const Angles& At(std::size_t i, std::size_t j) const { return angles_[Slot(i, j)]; }
 
