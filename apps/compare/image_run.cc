@@ -90,39 +90,30 @@ void Observe(const CompareOptions& options, ImageRun* run) {
 
 // What a refinement with this loss is given: where the user says how noisy points are, that holds,
 // and not what the detection measured.
-class LossEvidence {
- public:
-  explicit LossEvidence(const ImageRun& image) : image_(image) {}
-  const Observations& For(const LossSetting* loss) {
-    if (loss == nullptr || !image_.image->detect_everything) return image_.observations;
-    const bool conic = loss->estimation.conic_loss.scale_px > 0.0;
-    const bool line = loss->estimation.line_loss.scale_px > 0.0;
-    if (!conic && !line) return image_.observations;
-    stated_ = image_.observations;
-    for (CircleObservation& circle : stated_.circles) circle.sigma_px *= conic ? 0.0 : 1.0;
-    for (PencilObservation& pencil : stated_.pencils) {
-      if (!line) break;
-      pencil.sigma_px = 0.0;
-      for (LineObservation& observation : pencil.lines) observation.sigma_px = 0.0;
-    }
-    return stated_;
+Observations EvidenceFor(const LossSetting* loss, const ImageRun& image) {
+  Observations evidence = image.observations;
+  if (loss == nullptr || !image.image->detect_everything) return evidence;
+  const bool conic = loss->estimation.conic_loss.scale_px > 0.0;
+  const bool line = loss->estimation.line_loss.scale_px > 0.0;
+  for (CircleObservation& circle : evidence.circles) circle.sigma_px *= conic ? 0.0 : 1.0;
+  for (PencilObservation& pencil : evidence.pencils) {
+    if (!line) break;
+    pencil.sigma_px = 0.0;
+    for (LineObservation& observation : pencil.lines) observation.sigma_px = 0.0;
   }
-
- private:
-  const ImageRun& image_;
-  Observations stated_;
-};
+  return evidence;
+}
 
 SolverRun RunSolver(const SolverSet::Task& task, const CompareOptions& options,
-                    const ImageRun& image, LossEvidence* evidence) {
+                    const ImageRun& image) {
   SolverRun run;
   run.solver = task.peer != nullptr ? task.peer->name : task.solver->name();
   run.stage = task.peer != nullptr ? task.peer->stage : task.solver->stage();
   if (task.loss >= 0) run.loss = &options.losses[static_cast<std::size_t>(task.loss)];
-  const Observations& observations = evidence->For(run.loss);
+  const Observations evidence = EvidenceFor(run.loss, image);
   const Stopwatch watch;
   run.estimate = task.peer != nullptr ? task.peer->Solve(*image.image, image.observations)
-                                      : task.solver->Solve(observations);
+                                      : task.solver->Solve(evidence);
   run.microseconds = watch.Microseconds();
   for (const PoseHypothesis& hypothesis : run.estimate.hypotheses) {
     run.errors.push_back(ComparePose(hypothesis, *image.image));
@@ -158,12 +149,11 @@ void ReadAndObserve(const CompareOptions& options, const cv::Mat* photo, SceneIm
 void RunSolvers(const CompareOptions& options, const SolverSet& solvers, ImageRun* run) {
   if (!run->read_error.empty()) return;
   const SceneImage& image = *run->image;
-  LossEvidence evidence(*run);
   std::optional<SolverSet> own_solvers;
   if (image.camera_sigma.IsAny() || image.guessed_sigma)
     own_solvers.emplace(WithCamera(options, image));
   for (const SolverSet::Task& task : (own_solvers ? *own_solvers : solvers).tasks()) {
-    run->solvers.push_back(RunSolver(task, options, *run, &evidence));
+    run->solvers.push_back(RunSolver(task, options, *run));
   }
   NoteOtherPlanes(&run->solvers);
 }

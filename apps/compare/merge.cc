@@ -71,12 +71,6 @@ Status CheckFolders(const std::vector<std::string>& folders, const std::string& 
   return Status::Ok();
 }
 
-std::vector<SolverKey> Keys(const ImageRecord& record) {
-  std::vector<SolverKey> keys;
-  for (const SolverRecord& solver : record.solvers) keys.push_back(solver.key);
-  return keys;
-}
-
 // Every index of the set once, the same solvers and flags everywhere.
 Status CheckImages(const std::vector<std::string>& folders) {
   Merger merger(folders);
@@ -107,8 +101,8 @@ Status CheckImages(const std::vector<std::string>& folders) {
                              ", others with " + FlagText(flags));
     }
     if (!record.error.empty()) continue;
-    if (!keys) keys = Keys(record);
-    if (!(*keys == Keys(record))) {
+    if (!keys) keys = KeysOf(record);
+    if (*keys != KeysOf(record)) {
       return Status::Invalid("--merge: " + source->folder + " ran other solvers or losses");
     }
   }

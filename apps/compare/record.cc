@@ -168,6 +168,12 @@ bool SolverKey::operator==(const SolverKey& other) const {
          std::tie(other.solver, other.stage, other.loss, other.scale_px);
 }
 
+std::vector<SolverKey> KeysOf(const ImageRecord& record) {
+  std::vector<SolverKey> keys;
+  for (const SolverRecord& solver : record.solvers) keys.push_back(solver.key);
+  return keys;
+}
+
 Status ParseRecord(const ImageLines& lines, ImageRecord* record) {
   *record = {};
   try {

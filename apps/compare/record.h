@@ -74,6 +74,9 @@ struct ImageRecord {
   std::vector<SolverRecord> solvers;
 };
 
+// Of its solvers, in order.
+std::vector<SolverKey> KeysOf(const ImageRecord& record);
+
 // The lines of one photo in results.jsonl, observations.jsonl (one line) and timings.jsonl.
 struct ImageLines {
   std::string results, observations, timings;

@@ -39,15 +39,6 @@ Status CheckFlags(const std::string& folder, const std::string& flags) {
   return before == flags ? Status::Ok() : OtherRun(folder, FirstDifference(before, flags));
 }
 
-bool SameSolvers(const ImageRecord& record, const std::vector<SolverKey>& solvers) {
-  if (!record.error.empty()) return true;
-  if (record.solvers.size() != solvers.size()) return false;
-  for (std::size_t i = 0; i < solvers.size(); ++i) {
-    if (!(record.solvers[i].key == solvers[i])) return false;
-  }
-  return true;
-}
-
 Status FindDone(const CompareOptions& options, const ImageSet& images,
                 const std::vector<SolverKey>& solvers, DonePart* done) {
   const std::string& folder = options.output;
@@ -61,7 +52,8 @@ Status FindDone(const CompareOptions& options, const ImageSet& images,
       return OtherRun(folder, "its image " + std::to_string(done->images + 1) + " is " +
                                   record.name + ", not " + name);
     }
-    if (!SameSolvers(record, solvers)) return OtherRun(folder, "its solvers or losses differ");
+    if (record.error.empty() && KeysOf(record) != solvers)
+      return OtherRun(folder, "its solvers or losses differ");
     if (record.flags != options.unusual_flags) {
       return OtherRun(folder, "it was made with " + FlagText(record.flags) + ", not with " +
                                   FlagText(options.unusual_flags));

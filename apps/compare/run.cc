@@ -92,34 +92,29 @@ class Output {
   Status status_;
 };
 
-// Rank 0: after each image of its own it takes those of the other ranks that follow.
-Status WorkAndCollect(const ImageSet& images, const CompareOptions& options,
-                      const SolverSet& solvers, const DonePart& done, const Ranks& ranks) {
+// Rank 0 writes: after each image of its own it takes those of the other ranks that follow.
+Status WorkOnShare(const ImageSet& images, const CompareOptions& options, const SolverSet& solvers,
+                   const DonePart& done, const Ranks& ranks) {
+  const Share share(done.images, images.size(), ranks);
+  const auto work = [&](std::size_t i) { return WorkOn(options, solvers, images.At(share.At(i))); };
+  if (!ranks.is_first()) {
+    WorkInOrder(share.size(), work, [&](std::size_t, const WorkedImage& image) {
+      ranks.SendToFirst(image);
+      return true;
+    });
+    return Status::Ok();
+  }
   Output output(images, options.output, done);
   if (!output.status().ok()) return output.status();
-  const Share share(done.images, images.size(), ranks);
-  WorkInOrder(
-      share.size(), [&](std::size_t i) { return WorkOn(options, solvers, images.At(share.At(i))); },
-      [&](std::size_t i, const WorkedImage& image) {
-        bool go_on = output.Write(share.At(i), image);
-        for (int other = 1; go_on && other < ranks.count(); ++other) {
-          const std::size_t theirs = share.At(i) + static_cast<std::size_t>(other);
-          if (theirs < images.size()) go_on = output.Write(theirs, ranks.Receive(other));
-        }
-        return go_on;
-      });
+  WorkInOrder(share.size(), work, [&](std::size_t i, const WorkedImage& image) {
+    bool go_on = output.Write(share.At(i), image);
+    for (int other = 1; go_on && other < ranks.count(); ++other) {
+      const std::size_t theirs = share.At(i) + static_cast<std::size_t>(other);
+      if (theirs < images.size()) go_on = output.Write(theirs, ranks.Receive(other));
+    }
+    return go_on;
+  });
   return output.status();
-}
-
-void WorkAndSend(const ImageSet& images, const CompareOptions& options, const SolverSet& solvers,
-                 std::size_t num_done, const Ranks& ranks) {
-  const Share share(num_done, images.size(), ranks);
-  WorkInOrder(
-      share.size(), [&](std::size_t i) { return WorkOn(options, solvers, images.At(share.At(i))); },
-      [&](std::size_t, const WorkedImage& image) {
-        ranks.SendToFirst(image);
-        return true;
-      });
 }
 
 // Rank 0 alone looks at the folder; it tells the others how many images are done, or to stop.
@@ -157,11 +152,8 @@ Status RunComparison(const ImageSet& images, const CompareOptions& options, cons
   DonePart done;
   Status status = Prepare(images, options, solvers, ranks, &lock, &done);
   if (!status.ok()) return status;
-  if (!ranks.is_first()) {
-    WorkAndSend(images, options, solvers, done.images, ranks);
-    return Status::Ok();
-  }
-  status = WorkAndCollect(images, options, solvers, done, ranks);
+  status = WorkOnShare(images, options, solvers, done, ranks);
+  if (!ranks.is_first()) return status;
   if (!status.ok() && ranks.count() > 1) {  // The others wait to be heard.
     SayOnStderr("circline_compare: " + status.message);
     ranks.Abort(kExitUnreadable);
