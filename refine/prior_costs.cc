@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/directions.h"
 #include "circline/refine/cost_functions.h"
 #include "circline/refine/given_poses.h"
 
@@ -154,9 +155,7 @@ ceres::CostFunction* NewGaussianPrior(const std::vector<double>& sigmas,
 }
 
 ceres::CostFunction* NewDirectionPrior(const Eigen::Vector3d& axis, double sigma) {
-  Eigen::Matrix<double, 2, 3> across;
-  across << axis.unitOrthogonal().transpose(), axis.cross(axis.unitOrthogonal()).transpose();
-  return new ceres::NormalPrior(across / sigma, Eigen::Vector3d::Zero());
+  return new ceres::NormalPrior(BasisAcross(axis).transpose() / sigma, Eigen::Vector3d::Zero());
 }
 
 ceres::CostFunction* NewInPlanePrior(const Eigen::Vector3d& normal, double sigma) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/directions.h"
 
 namespace circline {
 namespace {

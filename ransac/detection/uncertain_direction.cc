@@ -10,6 +10,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/circle_planes.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/directions.h"
 #include "circline/estimators/pose.h"
 
 namespace circline {
@@ -47,13 +48,6 @@ double VarianceOfAngle(const UncertainDirection& a, const UncertainDirection& b)
 bool AreAlike(const Vector3d& a, const Vector3d& b) {
   constexpr double kDistinctSine = 0.0523;
   return a.cross(b).norm() < kDistinctSine;
-}
-
-Eigen::Matrix<double, 3, 2> BasisAcross(const Vector3d& vector) {
-  Eigen::Matrix<double, 3, 2> basis;
-  basis.col(0) = vector.unitOrthogonal();
-  basis.col(1) = vector.cross(basis.col(0));
-  return basis;
 }
 
 UncertainDirection Refocus(const UncertainDirection& direction, double log_focal) {

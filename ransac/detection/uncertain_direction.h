@@ -27,9 +27,6 @@ using UncertainDirection = VanishingPointFit;
 // Whether two unit vectors are parallel within 3 degrees: they stand for one direction.
 bool AreAlike(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
-// Two unit vectors across a unit vector, as columns.
-Eigen::Matrix<double, 3, 2> BasisAcross(const Eigen::Vector3d& vector);
-
 // A direction seen through a camera of another focal length, its logarithm over that of the first.
 UncertainDirection Refocus(const UncertainDirection& direction, double log_focal);
 
