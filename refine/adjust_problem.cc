@@ -182,10 +182,10 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservatio
   if (radius < 0) radius = AddBlock(1, {start->second.radius});
   made.radius = radius;
   AddKnownRadius(world, circle, radius);
-  const std::vector<double> tilt_sigmas = TiltSigmas(model);
-  if (!tilt_sigmas.empty()) {
+  const std::array<double, 3> tilt_sigmas = TiltSigmas(model);
+  if (tilt_sigmas[0] > 0.0) {
     made.tilt = AddBlock(3, {});
-    AddTerm(NewGaussianPrior(tilt_sigmas), {made.tilt});
+    AddTerm(NewGaussianPrior({tilt_sigmas.begin(), tilt_sigmas.end()}), {made.tilt});
   }
   if (model.circle_shape > 0.0) {
     made.shape = AddBlock(2, {});

@@ -155,7 +155,8 @@ std::vector<int> BlockSizes(const PlaneCircleContourCost::Blocks& blocks) {
 }  // namespace
 
 PlaneCircleContourCost::PlaneCircleContourCost(ImagePoints points, Blocks blocks)
-    : CurveCost(std::move(points), 5, BlockSizes(blocks), blocks.offset, blocks.camera, 0),
+    : CurveCost(std::move(points), 5, BlockSizes(blocks), blocks.offset, blocks.camera,
+                NumPriors(blocks)),
       blocks_(blocks) {}
 
 void PlaneCircleContourCost::Distances(const double* const* parameters,
@@ -182,8 +183,10 @@ bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double
   if (!(circle.p.z() > 0.0) || !(circle.r > 0.0) ||
       !SumAbout(ImageOfCircle(circle), weighing, parameters, residuals, jacobians, &U))
     return false;
+  const int rows = num_residuals(), prior = num_curve_residuals();
+  for (int k = 0; prior + k < rows; ++k)
+    residuals[prior + k] = parameters[4][k] / blocks_.tilt_sigmas[static_cast<std::size_t>(k)];
   if (jacobians == nullptr) return true;
-  const int rows = num_residuals();
   const CircleChain<Rows> by(U, R, circle, *points());
   by.WritePose(in_world.center, in_world.normal, blocks_.shape ? &M : nullptr, parameters[0], rows,
                jacobians);
@@ -195,6 +198,8 @@ bool PlaneCircleContourCost::EvaluateWith(const Weighing& weighing, const double
     by_tilt.leftCols<2>() = by.ByNormal() * R.leftCols<2>();
     by_tilt.col(2) = circle.r * (by.ByPoint() * R.col(2));
     WriteJacobian(by_tilt, rows, 4, jacobians);
+    for (int k = 0; prior + k < rows; ++k)
+      jacobians[4][(prior + k) * 3 + k] = 1.0 / blocks_.tilt_sigmas[static_cast<std::size_t>(k)];
   }
   if (blocks_.shape && jacobians[ShapeBlock()] != nullptr) {
     Eigen::Matrix<double, Eigen::Dynamic, 2, 0, CurveModel::kMaxSize, 2> by_shape(U.rows(), 2);

@@ -30,6 +30,7 @@
 #include <ceres/cost_function.h>
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "circline/estimators/conic.h"
@@ -130,12 +131,14 @@ class CircleContourCost : public CurveCost {
 // height (3)], [shape (2)], [contour offset (1)], [camera]. The circle's own plane is Z = 0 but for
 // a tilt (the X and Y of its normal, radians) and a height (in radii); and it is round but for a
 // shape (a, b): at the angle phi from X towards Y its radius is r (1 + a cos 2 phi + b sin 2 phi),
-// to first order. Both are for priors of their own to hold small (NewGaussianPrior).
+// to first order. Both are for priors to hold small: of their own (NewGaussianPrior), which a
+// circle that several photos see has once; or, of tilt and height, here, which costs less time.
 class PlaneCircleContourCost : public CurveCost {
  public:
-  // Which of the blocks in brackets there are.
+  // Which of the blocks in brackets there are, and the prior.
   struct Blocks {
     bool tilt_and_height = false, shape = false, offset = false, camera = false;  // In this order.
+    std::array<double, 3> tilt_sigmas = {0.0, 0.0, 0.0};  // Radians, radii; 0: no prior here.
   };
   // Of the points of its contour.
   PlaneCircleContourCost(ImagePoints points, Blocks blocks);
@@ -148,6 +151,9 @@ class PlaneCircleContourCost : public CurveCost {
 
  private:
   int ShapeBlock() const { return blocks_.tilt_and_height ? 5 : 4; }
+  static int NumPriors(const Blocks& blocks) {
+    return blocks.tilt_and_height && blocks.tilt_sigmas[0] > 0.0 ? 3 : 0;
+  }
 
   Blocks blocks_;
 };

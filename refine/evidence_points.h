@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -37,10 +38,10 @@ inline bool FillEvidencePoints(const Camera& camera, const std::vector<Eigen::Ve
   return true;
 }
 
-// Of a circle's tilt and height (PlaneCircleContourCost); empty where both are exact.
-inline std::vector<double> TiltSigmas(const NoiseModel& noise) {
+// Of a circle's tilt and height (PlaneCircleContourCost); zeros where both are exact.
+inline std::array<double, 3> TiltSigmas(const NoiseModel& noise) {
   constexpr double kExact = 1e-6;  // Stands for a standard deviation of 0.
-  if (!(noise.circle_tilt_rad > 0.0) && !(noise.circle_height > 0.0)) return {};
+  if (!(noise.circle_tilt_rad > 0.0) && !(noise.circle_height > 0.0)) return {0.0, 0.0, 0.0};
   const double tilt = std::max(noise.circle_tilt_rad, kExact);
   return {tilt, tilt, std::max(noise.circle_height, kExact)};
 }

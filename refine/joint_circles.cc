@@ -111,14 +111,10 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   PlaneCircleContourCost::Blocks blocks;
   blocks.camera = has_camera_;
   std::vector<int> used = {JointProblem::kRotation, JointProblem::kTranslation, center, radius};
-  int tilt = -1;
-  const std::vector<double> tilt_sigmas = TiltSigmas(model_);
-  blocks.tilt_and_height = !tilt_sigmas.empty();
-  if (blocks.tilt_and_height) {
-    tilt = p_.AddBlock(3, {});
-    used.push_back(tilt);
-    p_.AddTerm(NewGaussianPrior(tilt_sigmas), {tilt}, f);
-  }
+  blocks.tilt_sigmas = TiltSigmas(model_);
+  blocks.tilt_and_height = blocks.tilt_sigmas[0] > 0.0;
+  const int tilt = blocks.tilt_and_height ? p_.AddBlock(3, {}) : -1;
+  if (tilt >= 0) used.push_back(tilt);
   blocks.shape = model_.circle_shape > 0.0;
   if (blocks.shape) {
     used.push_back(p_.AddBlock(2, {}));

@@ -126,8 +126,8 @@ class MapBuilder {
   // What does not average out over frames: the circle's own tilt and height, and the offset of all
   // contours of its contrast.
   void AddImperfections(const CircleObservation& circle, TrackMap::Circle* added) {
-    const std::vector<double> tilt = TiltSigmas(noise_);
-    if (!tilt.empty()) {
+    const std::array<double, 3> tilt = TiltSigmas(noise_);
+    if (tilt[0] > 0.0) {
       added->tilt = map_.AddBlock(3);
       Append(added->tilt, Eigen::Vector3d(tilt.data()));
     }

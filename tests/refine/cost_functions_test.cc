@@ -54,6 +54,10 @@ TEST(CostFunctionsTest, ContourOfAPlaneCircle) {
         SCOPED_TRACE(LossName(loss));
         ExpectGradientByDifferences(cost, blocks, 3 + 3 + 2 + 1 + 3 + 2 + 1,
                                     3 + 3 + 2 + 1 + 3 + 2 + 1 + 9);
+        with.tilt_sigmas = {0.01, 0.01, 0.02};
+        const PlaneCircleContourCost with_prior(Points(pixels, loss, distance), with);
+        ExpectGradientByDifferences(with_prior, blocks, 3 + 3 + 2 + 1 + 3 + 2 + 1,
+                                    3 + 3 + 2 + 1 + 3 + 2 + 1 + 9);
         const PlaneCircleContourCost plain(Points(pixels, loss, distance), {});
         blocks.values.resize(4);
         blocks.manifolds.resize(4);
