@@ -90,18 +90,20 @@ void Observe(const CompareOptions& options, ImageRun* run) {
 
 // What a refinement with this loss is given: where the user says how noisy points are, that holds,
 // and not what the detection measured.
-Observations EvidenceFor(const LossSetting* loss, const ImageRun& image) {
-  Observations evidence = image.observations;
-  if (loss == nullptr || !image.image->detect_everything) return evidence;
+const Observations& EvidenceFor(const LossSetting* loss, const ImageRun& image,
+                                Observations* stated) {
+  if (loss == nullptr || !image.image->detect_everything) return image.observations;
   const bool conic = loss->estimation.conic_loss.scale_px > 0.0;
   const bool line = loss->estimation.line_loss.scale_px > 0.0;
-  for (CircleObservation& circle : evidence.circles) circle.sigma_px *= conic ? 0.0 : 1.0;
-  for (PencilObservation& pencil : evidence.pencils) {
+  if (!conic && !line) return image.observations;
+  *stated = image.observations;
+  for (CircleObservation& circle : stated->circles) circle.sigma_px *= conic ? 0.0 : 1.0;
+  for (PencilObservation& pencil : stated->pencils) {
     if (!line) break;
     pencil.sigma_px = 0.0;
     for (LineObservation& observation : pencil.lines) observation.sigma_px = 0.0;
   }
-  return evidence;
+  return *stated;
 }
 
 SolverRun RunSolver(const SolverSet::Task& task, const CompareOptions& options,
@@ -110,7 +112,8 @@ SolverRun RunSolver(const SolverSet::Task& task, const CompareOptions& options,
   run.solver = task.peer != nullptr ? task.peer->name : task.solver->name();
   run.stage = task.peer != nullptr ? task.peer->stage : task.solver->stage();
   if (task.loss >= 0) run.loss = &options.losses[static_cast<std::size_t>(task.loss)];
-  const Observations evidence = EvidenceFor(run.loss, image);
+  Observations stated;
+  const Observations& evidence = EvidenceFor(run.loss, image, &stated);
   const Stopwatch watch;
   run.estimate = task.peer != nullptr ? task.peer->Solve(*image.image, image.observations)
                                       : task.solver->Solve(evidence);
