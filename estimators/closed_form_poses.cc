@@ -90,7 +90,8 @@ std::vector<CirclePose> TiltedPoses(const MeasuredCircle& circle) {
 template <typename Contradict>
 std::vector<Candidate> CircleCandidates(const Inputs& inputs, const Contradict& contradict) {
   std::vector<Candidate> candidates;
-  for (CirclePose circle : TiltedPoses(inputs.circles[0])) {
+  std::vector<CirclePose> circles = TiltedPoses(inputs.circles[0]);
+  for (CirclePose& circle : circles) {
     Candidate c;
     c.contradiction = contradict(&circle);
     if (!RotationOfPlane(circle.normal, circle.center, inputs, &c.pose.rotation)) continue;

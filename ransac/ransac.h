@@ -169,7 +169,7 @@ class Ransac {
     report->num_degenerate = report->num_local_optimizations = 0;
     report->stop_reason = StopReason::kTooFewData;
     report->score = num_data_;
-    random_ = Random(options_.seed);
+    random_ = Random{options_.seed};
     inverse_t2_ = static_cast<float>(1.0 / (options_.threshold * options_.threshold));
     best_ = Candidate();
     best_.score = drawn_score_ = num_data_;  // What a model without inliers has.

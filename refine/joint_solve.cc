@@ -115,7 +115,8 @@ bool HasBoundedLoss(const EstimationOptions& options) {
 Status JointProblem::Solve(int max_iterations, State* state, double most_cost,
                            const std::vector<double>& widths) const {
   const auto is_finite = [state] {
-    return Eigen::Map<const Eigen::VectorXd>(state->x.data(), Eigen::Index(state->x.size()))
+    return Eigen::Map<const Eigen::VectorXd>(state->x.data(),
+                                             static_cast<Eigen::Index>(state->x.size()))
         .allFinite();
   };
   // Ceres prints what it cannot evaluate. Where the cost was finite before, it is.

@@ -42,7 +42,7 @@ struct AngleResidual {
     using std::atan2;
     const Vector3Block<T> u(a), v(b);
     const Vector3<T> cross = u.cross(v);
-    if (!(cross.squaredNorm() > T(0.0))) return false;
+    if (!(cross.squaredNorm() > 0.0)) return false;
     const T between = atan2(cross.norm(), u.dot(v));
     // The angle or its supplement, whichever is nearer.
     const double folded = std::acos(std::cos(angle));
@@ -59,7 +59,7 @@ struct LengthResidual {
   bool operator()(const T* a, const T* b, T* residual) const {
     using std::log;
     const T x = b[0] - a[0], y = b[1] - a[1], squared = x * x + y * y;
-    if (!(squared > T(0.0))) return false;
+    if (!(squared > 0.0)) return false;
     residual[0] = 0.5 * log(squared / (length * length)) / sigma;
     return true;
   }
@@ -71,7 +71,7 @@ struct LogResidual {
   template <typename T>
   bool operator()(const T* x, T* residual) const {
     using std::log;
-    if (!(x[0] > T(0.0))) return false;
+    if (!(x[0] > 0.0)) return false;
     residual[0] = log(x[0] / value) / sigma;
     return true;
   }
