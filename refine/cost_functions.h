@@ -94,10 +94,11 @@ class CurveCost : public FeatureCost {
   // Derivatives of the points' residuals by a curve: ConicToVector of its Normalized(), or a line.
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
                              CurveModel::kMaxSize, 6>;
-  // Writes the points' residuals about a conic (3 x 3) or a line (3 x 1), and their derivatives by
-  // the optional blocks; `U` receives those by the curve, where any are asked for. False where a
-  // point has no finite cost.
-  bool SumAbout(const Eigen::Ref<const Eigen::Matrix3Xd>& curve, const Weighing& weighing,
+  // A conic (3 x 3) or a line (3 x 1), calibrated.
+  using Curve = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3>;
+  // Writes the points' residuals about a curve, and their derivatives by the optional blocks; `U`
+  // receives those by the curve, where any are asked for. False where a point has no finite cost.
+  bool SumAbout(const Eigen::Ref<const Curve>& curve, const Weighing& weighing,
                 const double* const* parameters, double* residuals, double** jacobians,
                 Rows* U) const;
   // The points' share of the residuals; those of priors come behind.

@@ -36,7 +36,7 @@ int CurveCost::Rank(bool camera_is_variable) const {
          (camera_is_variable ? points_.options().num_distortion : 0);
 }
 
-bool CurveCost::SumAbout(const Eigen::Ref<const Eigen::Matrix3Xd>& curve, const Weighing& weighing,
+bool CurveCost::SumAbout(const Eigen::Ref<const Curve>& curve, const Weighing& weighing,
                          const double* const* parameters, double* residuals, double** jacobians,
                          Rows* U) const {
   // Only where somebody asks: a camera that is held has no derivatives.

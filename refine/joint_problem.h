@@ -148,6 +148,7 @@ class JointProblem : public Graph {
   };
   bool PlaceCircle(const CircleBlocks& circle, State* state, Eigen::Vector3d* in_plane) const;
   Placed PlaceCircles(State* state) const;
+  bool OriginRay(const State& state, Eigen::Vector3d* ray) const;
   bool PlaceOrigin(const Placed& placed, State* state) const;
   void PlaceScale(Placed placed, State* state) const;
   bool PlaceLine(const LineBlocks& line, State* state) const;

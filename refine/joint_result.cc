@@ -125,10 +125,10 @@ void NoteWhatStays(const JointProblem& problem, const State& state, const Linear
   constexpr double kWidePx = 5.0;  // What is known better needs no word.
   const BlockMatrix plus =
       problem.block(JointProblem::kCamera).PlusJacobian(problem.At(JointProblem::kCamera, state));
-  const Eigen::MatrixXd shifts =
+  const Eigen::MatrixXd covariance =
       plus * at.Covariance(at.Columns(JointProblem::kCamera)) * plus.transpose();
   const auto stays_at = [&](int shift, double prior) {
-    return prior > 0.0 && std::sqrt(shifts(shift, shift)) >= kPriorDecides * prior;
+    return prior > 0.0 && std::sqrt(covariance(shift, shift)) >= kPriorDecides * prior;
   };
   const double middle = sigma.principal_point_px;
   std::string stays;

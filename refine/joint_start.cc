@@ -71,21 +71,26 @@ JointProblem::Placed JointProblem::PlaceCircles(State* state) const {
   return placed;
 }
 
+// Where the origin is seen: at a pixel, or where two drawn axes cross.
+bool JointProblem::OriginRay(const State& state, Eigen::Vector3d* ray) const {
+  const FrameObservation& frame = observations_.frame;
+  if (frame.origin && Ray(state, *frame.origin, ray)) return true;
+  if (!frame.x_axis || !frame.y_axis) return false;
+  std::array<Eigen::Vector3d, 4> ends;
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (!Ray(state, (k < 2 ? *frame.x_axis : *frame.y_axis)[k % 2], &ends[k])) return false;
+  }
+  *ray = ends[0].cross(ends[1]).cross(ends[2].cross(ends[3]));
+  if (ray->z() < 0.0) *ray = -*ray;
+  return true;
+}
+
 // Moves the world origin to where the evidence has it. False where that lies beyond the horizon.
 bool JointProblem::PlaceOrigin(const Placed& placed, State* state) const {
   Eigen::Vector2d xy = placed.origin.value_or(Eigen::Vector2d::Zero());
-  const FrameObservation& frame = observations_.frame;
-  if (origin_observed_ && center_at_origin_ < 0) {
-    Eigen::Vector3d ray;
-    if (!frame.origin || !Ray(*state, *frame.origin, &ray)) {
-      std::array<Eigen::Vector3d, 4> ends;
-      for (std::size_t k = 0; k < 4; ++k)
-        Ray(*state, (k < 2 ? *frame.x_axis : *frame.y_axis)[k % 2], &ends[k]);
-      ray = ends[0].cross(ends[1]).cross(ends[2].cross(ends[3]));
-      if (ray.z() < 0.0) ray = -ray;
-    }
-    if (!PointOnPlane(PoseAt(*state), ray, &xy)) return false;
-  }
+  Eigen::Vector3d ray;
+  if (center_at_origin_ < 0 && OriginRay(*state, &ray) && !PointOnPlane(PoseAt(*state), ray, &xy))
+    return false;
   Eigen::Map<Eigen::Vector3d> t(At(kTranslation, state));
   t += PoseAt(*state).rotation.leftCols<2>() * xy;
   std::set<int> centers;
@@ -93,7 +98,7 @@ bool JointProblem::PlaceOrigin(const Placed& placed, State* state) const {
   for (const int center : centers) {
     if (!block(center).is_constant) Eigen::Map<Eigen::Vector2d>(At(center, state)) -= xy;
   }
-  return t.z() > 0.0 || !frame.origin;
+  return t.z() > 0.0 || !observations_.frame.origin;
 }
 
 // The ends of known lengths, then the unit of all: metric, or such that t is a unit vector.

@@ -6,6 +6,7 @@
 
 #include "apps/benchmark/timing.h"
 #include "circline/estimators/basics.h"
+#include "circline/ransac/detection/detect_observations.h"
 #include "circline/ransac/detection/edges.h"
 
 namespace circline::apps {
@@ -51,8 +52,11 @@ FoundEllipses FindEllipses(const cv::Mat& image, const Camera& camera) {
   if (!ToGray(image, &gray).ok()) return found;
   EdgeMap edges;
   found.edges_ms = Milliseconds([&] { edges = DetectEdges(gray); });
-  found.ellipses_ms =
-      Milliseconds([&] { found.ellipses = DetectEllipses(edges, camera, EllipseOptions()); });
+  const DetectionOptions options;
+  found.ellipses_ms = Milliseconds([&] {
+    found.ellipses =
+        DetectEllipses(edges, camera, {options.min_ellipse_axis_px, options.min_arc_deg});
+  });
   for (const DetectedEllipse& e : found.ellipses)
     found.polygons.push_back(ContourPolygon(camera, e.fit.conic));
   return found;

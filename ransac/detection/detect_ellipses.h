@@ -17,16 +17,14 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic_fit.h"
-#include "circline/ransac/detection/detect_observations.h"
 #include "circline/ransac/detection/edges.h"
 
 namespace circline {
 
 struct EllipseOptions {
-  // Smallest semi-minor axis; > 0.
-  double min_axis_px = DetectionOptions().min_ellipse_axis_px;
+  double min_axis_px = 3.0;  // Smallest semi-minor axis; > 0.
   // Smallest share of the contour that edges support, of 360; in (0, 360].
-  double min_arc_deg = DetectionOptions().min_arc_deg;
+  double min_arc_deg = 100.0;
 };
 
 struct DetectedEllipse {

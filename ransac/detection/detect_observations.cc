@@ -81,7 +81,8 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   *observations = Observations();
   observations->camera = camera;
   cv::Mat gray;
-  const Status status = ReadGray(image, camera, options, &gray);
+  Status status = CheckDetectionInput(image, camera, options);
+  if (status.ok()) status = ToGray(image, &gray);
   if (!status.ok()) return status;
   observations->camera.width = image.cols;
   observations->camera.height = image.rows;
@@ -99,20 +100,22 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
 
 Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::Rect& roi,
                          const DetectionOptions& options, CircleObservation* circle) {
-  cv::Mat gray;
-  const Status status = ReadGray(image, camera, options, &gray);
+  Status status = CheckDetectionInput(image, camera, options);
   if (!status.ok()) return status;
   const cv::Rect inside = roi & cv::Rect(0, 0, image.cols, image.rows);
   if (inside.width < 3 || inside.height < 3) {
     return Status::Invalid("the rectangle does not overlap the image");
   }
+  cv::Mat gray;
+  status = ToGray(image(inside), &gray);
+  if (!status.ok()) return status;
   // The same camera, seen from the rectangle's corner: fits are calibrated, so they stay valid.
   Camera shifted = camera;
   shifted.width = inside.width;
   shifted.height = inside.height;
   shifted.cx -= inside.x;
   shifted.cy -= inside.y;
-  const EdgeMap edges = DetectEdges(gray(inside));
+  const EdgeMap edges = DetectEdges(gray);
   const std::vector<DetectedEllipse> ellipses =
       DetectEllipses(edges, shifted, {options.min_ellipse_axis_px, options.min_arc_deg});
   if (ellipses.empty()) return Status::Refused("no ellipse found inside the rectangle");

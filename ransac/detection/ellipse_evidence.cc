@@ -60,12 +60,12 @@ std::vector<std::uint8_t> EllipsePoints(const EdgeMap& edges,
   return mask;
 }
 
-Status ReadGray(const cv::Mat& image, const Camera& camera, const DetectionOptions& options,
-                cv::Mat* gray) {
+Status CheckDetectionInput(const cv::Mat& image, const Camera& camera,
+                           const DetectionOptions& options) {
   Status status = options.Validate();
   if (status.ok()) status = camera.Validate();
-  if (status.ok()) status = ToGray(image, gray);
   if (!status.ok()) return status;
+  if (image.empty()) return Status::Invalid("the image is empty");
   if ((camera.width > 0 && camera.width != image.cols) ||
       (camera.height > 0 && camera.height != image.rows)) {
     return Status::Invalid("the image is " + std::to_string(image.cols) + " x " +

@@ -14,8 +14,8 @@
 namespace circline {
 
 // Points of an ellipse as an observation, with all that is known of them and nothing of what was
-// there: thinned, and the fit's covariance widened by the
-// correlation of dense points and by what they all share. `camera`: of the edges.
+// there: thinned, and the fit's covariance widened by the correlation of dense points and by what
+// they all share. `camera`: of the edges.
 void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const Camera& camera,
                 const NoiseModel& noise, CircleObservation* circle);
 
@@ -23,10 +23,9 @@ void FillCircle(const EdgeMap& edges, const DetectedEllipse& ellipse, const Came
 std::vector<std::uint8_t> EllipsePoints(const EdgeMap& edges,
                                         const std::vector<DetectedEllipse>& ellipses);
 
-// The grey image that edges are looked for in. Refuses bad options or a bad camera, what ToGray
-// refuses, and an image of another size than the camera's.
-Status ReadGray(const cv::Mat& image, const Camera& camera, const DetectionOptions& options,
-                cv::Mat* gray);
+// Bad options or camera, an empty image, or one of another size than the camera's.
+Status CheckDetectionInput(const cv::Mat& image, const Camera& camera,
+                           const DetectionOptions& options);
 
 }  // namespace circline
 

@@ -227,7 +227,8 @@ Status FollowObservations(const cv::Mat& image, const Observations& predicted, d
   found->stated_focal_px = predicted.stated_focal_px;
   found->found_k1 = predicted.found_k1;
   cv::Mat gray;
-  const Status status = ReadGray(image, predicted.camera, options, &gray);
+  Status status = CheckDetectionInput(image, predicted.camera, options);
+  if (status.ok()) status = ToGray(image, &gray);
   if (!status.ok()) return status;
   CentreLines of_centres;
   for (const PencilObservation& pencil : predicted.pencils)

@@ -1,4 +1,4 @@
-// What a tracker allocates once it runs: nothing but what ceres does.
+// What a cost function allocates, and a tracker once it runs: nothing but what ceres does.
 #include <gtest/gtest.h>
 
 #include "tests/trials.h"
@@ -24,7 +24,9 @@
 #include <vector>
 
 #include "apps/benchmark/trajectory.h"
+#include "circline/refine/cost_functions.h"
 #include "circline/refine/pose_tracker.h"
+#include "tests/plane_scene.h"
 #include "tests/refine/track_sequences.h"
 
 namespace circline {
@@ -162,6 +164,54 @@ int posix_memalign(void** p, std::size_t alignment, std::size_t size) noexcept {
 namespace circline {
 namespace {
 
+// Reads the symbols; false where programs have none.
+bool FindAllFunctions() {
+  if (functions.empty()) {
+    dl_iterate_phdr(FindFunctions, nullptr);
+    std::sort(functions.begin(), functions.end(),
+              [](const Function& a, const Function& b) { return a.begin < b.begin; });
+  }
+  void* warm[kMaxFrames];
+  backtrace(warm, kMaxFrames);  // Allocates at its first call.
+  return !functions.empty();
+}
+
+TEST(CostFunctionAllocations, NoneInAnEvaluation) {
+  if (!FindAllFunctions()) GTEST_SKIP() << "programs have no symbols";
+  PlaneScene scene(0.7, 0.1);
+  const std::vector<Eigen::Vector2d> circle = scene.Circle("c", 0.0, 0.0, 1.0).points;
+  const std::vector<Eigen::Vector2d> line =
+      scene.Line({-1.0, 0.0, 0.0}, {1.0, 0.0, 0.0}, 30).points;
+  const auto points = [&](const auto& pixels) { return ImagePoints(scene.camera, pixels, {}, {}); };
+  PlaneCircleContourCost::Blocks with;
+  with.tilt_and_height = with.shape = with.offset = with.camera = true;
+  with.tilt_sigmas = {0.01, 0.01, 0.01};
+  const PlaneCircleContourCost of_circle(points(circle), with);
+  const PlaneLineCost of_plane(points(line), true);
+  LineFit fit;
+  ASSERT_TRUE(FitLine(points(line).points(), 1.0, &fit).ok());
+  const DirectionLineCost of_direction(points(line), fit.line, {0.01, true});
+  const Eigen::Quaterniond q(scene.pose.rotation);
+  const double *rotation = q.coeffs().data(), *translation = scene.pose.translation.data();
+  const double zeros[kCameraSize] = {}, radius = 1.0, x[3] = {1.0, 0.0, 0.0};
+  const std::vector<std::pair<const FeatureCost*, std::vector<const double*>>> all = {
+      {&of_circle, {rotation, translation, zeros, &radius, zeros, zeros, zeros, zeros}},
+      {&of_plane, {rotation, translation, zeros, zeros, zeros}},
+      {&of_direction, {rotation, x, zeros, zeros}}};
+  std::vector<double> residuals(32), room(8 * 32 * kCameraSize);
+  std::vector<double*> jacobians;
+  for (std::size_t k = 0; k < 8; ++k) jacobians.push_back(&room[k * 32 * kCameraSize]);
+  for (const auto& [cost, parameters] : all) {
+    counts.ours = counts.of_ceres = 0;
+    is_counting = true;
+    const bool ok = cost->Evaluate(parameters.data(), residuals.data(), jacobians.data());
+    is_counting = false;
+    PrintSites();
+    EXPECT_TRUE(ok);
+    EXPECT_EQ(counts.ours + counts.of_ceres, 0);
+  }
+}
+
 struct Case {
   const char* name;
   bool pencil, second_circle, fitted, exact, knows_motion;
@@ -170,12 +220,7 @@ struct Case {
 class AllocationsTest : public testing::TestWithParam<Case> {};
 
 TEST_P(AllocationsTest, NoneOfOursInSteadyState) {
-  if (functions.empty()) {
-    dl_iterate_phdr(FindFunctions, nullptr);
-    std::sort(functions.begin(), functions.end(),
-              [](const Function& a, const Function& b) { return a.begin < b.begin; });
-  }
-  if (functions.empty()) GTEST_SKIP() << "programs have no symbols";
+  if (!FindAllFunctions()) GTEST_SKIP() << "programs have no symbols";
   TrajectoryOptions trajectory;
   trajectory.pencil = GetParam().pencil;
   trajectory.second_circle = GetParam().second_circle;
@@ -191,8 +236,6 @@ TEST_P(AllocationsTest, NoneOfOursInSteadyState) {
     frames.back().camera.id = "a camera with a long name";
     if (GetParam().fitted) FitDirect(trajectory.noise_px, &frames.back());
   }
-  void* warm[kMaxFrames];
-  backtrace(warm, kMaxFrames);  // Allocates at its first call.
   PoseTracker tracker(options);
   TrackedPose tracked;
   const std::size_t first_counted = frames.size() / 2;

@@ -164,6 +164,20 @@ TEST(EstimatePoseTest, RefusalsAndBadInputHaveASentence) {
   EXPECT_NE(estimate.status.message.find("pose_prior"), std::string::npos);
 }
 
+// A circle of too few points can be no origin: it is as if none were named.
+TEST(EstimatePoseTest, AnOriginWithoutPointsIsNone) {
+  PlaneScene scene(0.7, 0.3, 3);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0), scene.Circle("c1", -1.0, 0.5, 0.7)};
+  FitDirect(0.3, &observations);
+  observations.circles[0].inliers.assign(observations.circles[0].points.size(), 0);
+  observations.frame.origin_is_center = "c0";
+  const PoseEstimate estimate = EstimatePose(observations, Exact());
+  for (const PoseHypothesis& h : estimate.hypotheses)
+    EXPECT_TRUE(h.cam_from_world.translation.allFinite());
+  EXPECT_TRUE(estimate.status.ok() || !estimate.status.message.empty());
+}
+
 // The origin is the centre of a lone circle, whatever that is called.
 TEST(EstimatePoseTest, TheOriginIsTheCenterOfALoneCircle) {
   PlaneScene scene(0.7, 0.3, 3);
