@@ -58,8 +58,11 @@ class JointProblemBuilder {
   void AddTranslation();
   void AddPriors();
 
+  // Whether it takes part.
   bool InPlane(const CircleObservation& circle) const {
-    return circle.fit && circle.plane == obs_.frame.plane;
+    const auto inliers = std::count(circle.inliers.begin(), circle.inliers.end(), 1);
+    const bool has_points = circle.inliers.empty() || inliers >= 5;
+    return circle.fit && circle.plane == obs_.frame.plane && has_points;
   }
   static std::size_t ContrastOf(const CircleObservation& circle) {
     return static_cast<std::size_t>(std::clamp(circle.contrast, -1, 1) + 1);

@@ -164,54 +164,6 @@ TEST(EstimatePoseTest, RefusalsAndBadInputHaveASentence) {
   EXPECT_NE(estimate.status.message.find("pose_prior"), std::string::npos);
 }
 
-// A circle of too few points can be no origin: it is as if none were named.
-TEST(EstimatePoseTest, AnOriginWithoutPointsIsNone) {
-  PlaneScene scene(0.7, 0.3, 3);
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0), scene.Circle("c1", -1.0, 0.5, 0.7)};
-  FitDirect(0.3, &observations);
-  observations.circles[0].inliers.assign(observations.circles[0].points.size(), 0);
-  observations.frame.origin_is_center = "c0";
-  const PoseEstimate estimate = EstimatePose(observations, Exact());
-  for (const PoseHypothesis& h : estimate.hypotheses)
-    EXPECT_TRUE(h.cam_from_world.translation.allFinite());
-  EXPECT_TRUE(estimate.status.ok() || !estimate.status.message.empty());
-}
-
-// The origin is the centre of a lone circle, whatever that is called.
-TEST(EstimatePoseTest, TheOriginIsTheCenterOfALoneCircle) {
-  PlaneScene scene(0.7, 0.3, 3);
-  for (const char* id : {"c0", ""}) {
-    Observations observations = scene.Empty();
-    observations.circles = {scene.Circle(id, 0.5, 0.2, 1.0)};
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses[0];
-    EXPECT_LT((best.circles[0].center - best.cam_from_world.translation).norm(), 1e-9);
-    EXPECT_GT(best.covariance[35], 0.0);
-  }
-}
-
-// The origin, measured by itself, is the centre of two rings: whichever of them is named, and in
-// whatever order they come.
-TEST(EstimatePoseTest, TheOriginIsTheCenterOfAllRingsAboutIt) {
-  PlaneScene scene(0.7, 0.3, 3);
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("a", 0.5, 0.2, 1.0), scene.Circle("b", 0.5, 0.2, 1.6)};
-  for (CircleObservation& circle : observations.circles) circle.concentric = "rings";
-  observations.frame.origin = scene.Pixel(0.5, 0.2);
-  for (const char* named : {"a", "b"}) {
-    observations.frame.origin_is_center = named;
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses[0];
-    for (const CircleEstimate& circle : best.circles) {
-      EXPECT_LT((circle.center - best.cam_from_world.translation).norm(), 1e-9)
-          << circle.id << " where " << named << " is named";
-    }
-  }
-}
-
 // The sense of an X axis that points straight down in the photo is a toss-up; that makes no second
 // pose.
 TEST(EstimatePoseTest, AVerticalAxisMakesNoSecondPose) {
