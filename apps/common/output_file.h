@@ -32,7 +32,7 @@ class OutputFile {
 };
 
 // Grows under its own name; each Append is handed to the system at once, so that what was appended
-// outlives this process however it ends.
+// outlives this process however it ends. A kill in the midst of one may leave a part of it.
 class AppendFile {
  public:
   // Keeps the first `keep_bytes` of what is there.

@@ -28,7 +28,7 @@ class RecordReader {
 };
 
 // Appends images. Each file grows by whole lines, an image at a time and the results last, so that
-// what results.jsonl has is done.
+// what results.jsonl has is done. What a kill cuts off RecordReader does not return.
 class RecordWriter {
  public:
   // Cuts the files back to `keep_bytes` of each: zeros to begin, RecordReader::bytes_read to go on.
