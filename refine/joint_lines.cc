@@ -34,33 +34,39 @@ double LineDeviation(const PencilObservation& pencil, double usual) {
   return std::sqrt(std::max(0.0, squares) / std::max(1.0, count));
 }
 
-// Standard deviation of a pencil's direction against its axis. A photo tells the focal length or
-// whether a corner is square, not both. Where the focal length is an unknown the corner is as
-// square as its sides are straight and parallel: those of a board to a fraction of a degree, those
-// of an old street, of which each misses its direction by a third of a degree, to one or two.
+// Standard deviation of a pencil's direction against its axis: a corner is as square as its sides
+// are straight and parallel. Those of a board are so to a fraction of a degree; those of an old
+// street, of which each misses its direction by a third of a degree, to one or two. A photo tells
+// the focal length or whether a corner is square, not both: where that is an unknown, twice as
+// much.
 double AxisSigma(const PencilObservation& pencil, const NoiseModel& model,
                  const CameraSigma& camera) {
-  // Of 4 and 8, on the street of scene-lund, whose directions are 88.4 degrees apart, and
-  // chessboard-opencv (scene-lund-more and the boxes had no part in it).
-  constexpr double kOfDeviation = 4.0;
+  // In units of the lines' deviation. Of 1, 2 and 4, and of 2 to 8, on the street of scene-lund,
+  // whose directions are 88.4 degrees apart, and chessboard-opencv (scene-lund-more, the boxes and
+  // the drawn streets had no part in it).
+  constexpr double kOfKnownCamera = 2.0, kOfGuessedCamera = 4.0;
   const bool is_free = pencil.direction == PencilDirection::kFree;
-  if (is_free || !(model.pencil_axis_rad > 0.0) || !camera.IsWide()) return model.pencil_axis_rad;
+  if (is_free || !(model.pencil_axis_rad > 0.0)) return model.pencil_axis_rad;
+  const double of_deviation = camera.IsWide() ? kOfGuessedCamera : kOfKnownCamera;
   return std::max(model.pencil_axis_rad,
-                  kOfDeviation * LineDeviation(pencil, model.line_direction_rad));
+                  of_deviation * LineDeviation(pencil, model.line_direction_rad));
 }
 
 // What a direction may miss its axis by, as the covariance is to count it, in units of `sigma`, the
-// axis' own: LeanShape. Where the focal length is an unknown, walls lean apart by what the noise
-// model says, whatever the corner, and the direction may run any way where it may be no axis.
+// axis' own: walls lean apart by what the noise model says (LeanShape), and whatever more the
+// corner is off square by is of all of them. Where the focal length is an unknown the direction
+// may run any way where it may be no axis.
 Eigen::Matrix3d LeanAgainst(double sigma, const PencilObservation& pencil, const NoiseModel& model,
                             const CameraSigma& camera) {
   constexpr double kAnyWay = 0.6;  // Radians: of each component of a direction without sense.
-  if (!camera.IsWide()) return LeanShape(pencil);
   const double walls = std::pow(model.pencil_axis_rad / sigma, 2.0);
-  const double any = std::pow(kAnyWay / sigma, 2.0) * (1.0 - pencil.axis_probability);
+  double alike = 1.0 - walls;
+  if (camera.IsWide())
+    alike = kLeaning * kLeaning * alike +
+            std::pow(kAnyWay / sigma, 2.0) * (1.0 - pencil.axis_probability);
   Eigen::Matrix3d one_wall = Eigen::Matrix3d::Identity();
   if (pencil.fit) one_wall -= pencil.fit->direction * pencil.fit->direction.transpose();
-  return walls * LeanShape(pencil) + ((1.0 - walls) * kLeaning * kLeaning + any) * one_wall;
+  return walls * LeanShape(pencil) + alike * one_wall;
 }
 
 }  // namespace

@@ -142,6 +142,41 @@ TEST(ImperfectionsTest, PencilsOffTheirAxesAreCountedHonestly) {
   ExpectHonest("pencils off their axes", nees / 3.0);
 }
 
+// The corner of an old street, 1.6 degrees off square, one side of which hardly converges: what its
+// lines say of their direction counts for more than that corners are square, be they straight or
+// crooked.
+TEST(ImperfectionsTest, ACornerIsAsSquareAsItsSidesAreStraight) {
+  constexpr int kTrials = Trials(40), kLines = 12;
+  const double kCorner = 1.6 * kDegree;
+  for (const double crooked_rad : {0.0, 0.006}) {
+    double misses = 0.0;
+    for (int i = 0; i < kTrials; ++i) {
+      PlaneScene scene(0.7, 0.2, static_cast<std::uint64_t>(i + 1));
+      const auto side = [&](const char* id, PencilDirection along, double angle, double apart) {
+        PencilObservation pencil = scene.Pencil(id, along, Vector3d::UnitX(), 0);
+        const Vector3d middle(std::cos(angle), std::sin(angle), 0.0),
+            across(-middle.y(), middle.x(), 0.0);
+        for (int k = 0; k < kLines; ++k) {
+          const Vector3d lean = crooked_rad * scene.random.Normal() * across;
+          const Vector3d start = across * (apart * (k - 5.5)) - 1.5 * middle;
+          pencil.lines.push_back(scene.Line(start, start + 3.0 * (middle + lean), 9));
+        }
+        return pencil;
+      };
+      Observations observations = scene.Empty();
+      observations.pencils = {side("L1", PencilDirection::kX, 0.0, 0.4),
+                              side("L2", PencilDirection::kY, 0.5 * kPi - kCorner, 0.2)};
+      const PoseEstimate estimate = EstimatePose(observations, LeastSquares(NoiseModel()));
+      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      const std::vector<PencilEstimate>& pencils = estimate.hypotheses[0].pencils;
+      const double corner = std::acos(std::abs(pencils[0].direction.dot(pencils[1].direction)));
+      misses += std::abs(corner - (0.5 * kPi - kCorner)) / kDegree / kTrials;
+    }
+    std::printf("crooked by %.3f: the corner is %.2f degrees off\n", crooked_rad, misses);
+    EXPECT_LT(misses, 0.8);
+  }
+}
+
 // All prints bleed alike: one offset for all contours.
 TEST(ImperfectionsTest, ContoursThatShareAnOffsetAreCountedHonestly) {
   constexpr int kTrials = Trials(300);
