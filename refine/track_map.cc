@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "circline/refine/evidence_points.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/plane_circle.h"
 #include "circline/refine/track_steps.h"
