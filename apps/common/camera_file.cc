@@ -160,6 +160,16 @@ CameraSigma StatedCameraSigma::Over(CameraSigma sigma) const {
   return sigma;
 }
 
+CameraSigma StatedCameraSigma::OverCalibrated(const CameraSigma& sigma) const {
+  CameraSigma stated = Over(sigma);
+  // Where the focal length is a guess the lens tells it, by how it bends what is straight: so well
+  // that what a calibration's k1 is off counts. Of 0.001 to 0.01 any will do
+  // (circles-discocal-tir).
+  constexpr double kCalibratedK1 = 0.001;
+  if (stated.IsWide() && !k1) stated.k1 = std::max(stated.k1, kCalibratedK1);
+  return stated;
+}
+
 Camera ReadSceneCamera(const StorageNode& node, StatedCameraSigma* sigma) {
   node.AllowKeys({"id", "model", "width", "height", "camera_matrix", "distortion", "focal_sigma",
                   "focal_sigma_doubtful", "principal_point_sigma_px", "k1_sigma"});

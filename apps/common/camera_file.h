@@ -38,6 +38,8 @@ struct StatedCameraSigma {
   }
   // `sigma` with what is stated in its place.
   CameraSigma Over(CameraSigma sigma) const;
+  // The same of a camera that was calibrated, whose focal length may be a guess all the same.
+  CameraSigma OverCalibrated(const CameraSigma& sigma) const;
 };
 
 // A camera of a scene file: id, model, width, height, camera_matrix, distortion; focal_sigma,

@@ -188,16 +188,10 @@ int SetLargestRadius(double radius, Observations* observations) {
 
 CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image) {
   if (image.guessed_sigma) return *image.guessed_sigma;
-  const CameraSigma common =
-      options.camera_sigma.value_or(options.noise_model.SigmaOf(image.observations.camera));
-  CameraSigma sigma = image.camera_sigma.Over(common);
-  if (options.camera_sigma) sigma.log_focal = common.log_focal;
-  // Where the focal length is a guess the lens tells it, by how it bends what is straight: so well
-  // that what a calibration's k1 is off counts. Of 0.001 to 0.01 any will do
-  // (circles-discocal-tir).
-  constexpr double kCalibratedK1 = 0.001;
-  if (sigma.IsWide() && !image.camera_sigma.k1) sigma.k1 = std::max(sigma.k1, kCalibratedK1);
-  return sigma;
+  StatedCameraSigma stated = image.camera_sigma;
+  if (options.camera_sigma) stated.log_focal.reset();  // The flag's.
+  return stated.OverCalibrated(
+      options.camera_sigma.value_or(options.noise_model.SigmaOf(image.observations.camera)));
 }
 
 SolverSet::SolverSet(const CompareOptions& options) {

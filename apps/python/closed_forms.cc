@@ -21,6 +21,12 @@ std::vector<CirclePose> PosesOf(const Eigen::Matrix3d& conic) {
   return {poses.begin(), poses.begin() + count};
 }
 
+Eigen::Matrix3d ImageOf(const CirclePose& pose) {
+  const Eigen::Matrix3d conic = ProjectCircle(pose);
+  if (!conic.allFinite()) throw Refused("the circle's normal or center is zero or not finite");
+  return conic;
+}
+
 std::vector<std::pair<Eigen::Matrix3d, double>> FrameRotations(const Eigen::Matrix3d& conic,
                                                                const Eigen::Vector3d& x_line,
                                                                const Eigen::Vector3d& y_line) {
@@ -62,9 +68,9 @@ void BindClosedForms(py::module_* module) {
   module->def("circle_poses", &PosesOf, py::arg("conic"),
               "The one or two circles whose image is the ellipse `conic` (3, 3), calibrated\n"
               "coordinates, any scale. Their order has no meaning. Refused: no proper ellipse.");
-  module->def("project_circle", &ProjectCircle, py::arg("pose"),
+  module->def("project_circle", &ImageOf, py::arg("pose"),
               "Image of a circle of radius 1: a conic (3, 3), calibrated, unit norm, negative "
-              "inside.");
+              "inside. Refused: there is none.");
   module->def("rotation_from_circle_and_frame", &FrameRotations, py::arg("conic"),
               py::arg("x_line"), py::arg("y_line"),
               "Rotations (3, 3) of the world frame, each with the cosine by which its axes miss a\n"

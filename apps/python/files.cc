@@ -32,7 +32,9 @@ py::list LoadScene(const std::filesystem::path& path) {
     for (const apps::CircleRoi& roi : image.rois)
       rois[py::int_(roi.circle)] = py::cast(roi.rectangle);
     py::object camera_sigma = py::none(), rotation = py::none(), translation = py::none();
-    if (image.camera_sigma.IsAny()) camera_sigma = py::cast(image.camera_sigma.Over(CameraSigma()));
+    if (image.camera_sigma.IsAny())
+      camera_sigma = py::cast(
+          image.camera_sigma.OverCalibrated(NoiseModel().SigmaOf(image.observations.camera)));
     if (image.truth && image.truth->rotation) rotation = py::cast(*image.truth->rotation);
     if (image.truth && image.truth->translation) translation = py::cast(*image.truth->translation);
     const apps::Symmetry symmetry = image.truth ? image.truth->symmetry : apps::Symmetry::kNone;

@@ -42,9 +42,9 @@ std::optional<Segment> SegmentFromPython(const py::handle& object, const char* n
 }
 
 std::vector<std::uint8_t> MaskFromPython(const py::handle& object, const char* name) {
-  const auto array = py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>(
-      py::reinterpret_borrow<py::object>(object));
-  if (array.ndim() != 1) throw py::value_error(std::string(name) + " must be of shape (N,)");
+  const auto array = py::array_t<bool, py::array::c_style | py::array::forcecast>::ensure(object);
+  if (!array || array.ndim() != 1)
+    throw py::value_error(std::string(name) + " must be of shape (N,), true: inlier");
   return {array.data(), array.data() + array.size()};
 }
 
@@ -53,7 +53,7 @@ T Get(const py::handle& object, const char* name) {
   const py::object value = object.attr(name);
   try {
     return value.cast<T>();
-  } catch (const py::cast_error&) {
+  } catch (const py::builtin_exception&) {  // None is no cast_error where a struct is expected.
     throw py::value_error(std::string(name) + " cannot be " + py::repr(value).cast<std::string>());
   }
 }

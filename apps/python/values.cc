@@ -24,19 +24,57 @@ CameraModel ModelOf(const std::string& name) {
   return model;
 }
 
+// The values that a class's objects hold, by name.
+template <typename T>
+py::dict PropertiesOf() {
+  const py::object property = py::module_::import("builtins").attr("property");
+  py::dict properties;
+  for (const auto& [name, attribute] : py::dict(py::type::of<T>().attr("__dict__")))
+    if (py::isinstance(attribute, property)) properties[name] = attribute;
+  return properties;
+}
+
 // A value with the attributes given by name; an unknown one is a TypeError, as of a Python class.
 template <typename T>
 T FromKeywords(const py::kwargs& keywords) {
   T value;
   const py::object object = py::cast(&value, py::return_value_policy::reference);
+  const py::dict properties = PropertiesOf<T>();
   for (const auto& [name, given] : keywords) {
-    if (!py::hasattr(object, name)) {
+    if (!properties.contains(name)) {
       throw py::type_error("got an unexpected keyword argument '" + std::string(py::str(name)) +
                            "'");
     }
     object.attr(name) = given;
   }
   return value;
+}
+
+// For copy and pickle: as the keywords that make it.
+template <typename T>
+auto PickledAsKeywords() {
+  return py::pickle(
+      [](const T& value) {
+        const py::object object = py::cast(value);
+        py::dict state;
+        for (const auto& [name, property] : PropertiesOf<T>()) state[name] = object.attr(name);
+        return state;
+      },
+      [](const py::dict& state) {
+        return FromKeywords<T>(py::reinterpret_borrow<py::kwargs>(state));
+      });
+}
+
+// The same, as a tuple of these fields.
+template <typename T, typename... Field>
+auto Pickled(Field T::*... fields) {
+  return py::pickle([=](const T& value) { return py::make_tuple(value.*fields...); },
+                    [=](const py::tuple& state) {
+                      T value;
+                      std::size_t i = 0;
+                      ((value.*fields = state[i++].template cast<Field>()), ...);
+                      return value;
+                    });
 }
 
 // Of N x 3 points, camera frame: N x 2 pixels, NaN where the camera does not see them.
@@ -80,6 +118,7 @@ void BindCamera(py::module_* module) {
       "Camera(model='opencv', width=640, height=480, fx=500, fy=500, cx=320, cy=240,\n"
       "       distortion=[k1, k2, p1, p2])")
       .def(py::init(&FromKeywords<Camera>))
+      .def(PickledAsKeywords<Camera>())
       .def_readwrite("id", &Camera::id, "Photos with the same id share a camera.")
       .def_property(
           "model", [](const Camera& camera) { return apps::ModelName(camera.model); },
@@ -92,8 +131,8 @@ void BindCamera(py::module_* module) {
       .def_readwrite("cx", &Camera::cx, "Principal point, pixels.")
       .def_readwrite("cy", &Camera::cy, "Principal point, pixels.")
       .def_property(
-          "distortion", [](const Camera& camera) { return camera.distortion; }, &SetDistortion,
-          "Up to 8 coefficients, as the model orders them; unused ones are 0.")
+          "distortion", [](const Camera& camera) { return py::tuple(py::cast(camera.distortion)); },
+          &SetDistortion, "Up to 8 coefficients, as the model orders them; unused ones are 0.")
       .def("project", &Project, py::arg("points"),
            "Pixels (N, 2) of points (N, 3) in the camera frame; NaN for those out of view.")
       .def("calibrate", &Calibrate, py::arg("pixels"),
@@ -112,6 +151,7 @@ void BindNoise(py::module_* module) {
                           "How well a camera is known: standard deviations; 0: exact. The defaults "
                           "are those of a good calibration.")
       .def(py::init(&FromKeywords<CameraSigma>))
+      .def(PickledAsKeywords<CameraSigma>())
       .def_static("exact", &CameraSigma::Exact, "All zero.")
       .def_readwrite("log_focal", &CameraSigma::log_focal, "Of the focal length's logarithm.")
       .def_readwrite("log_aspect", &CameraSigma::log_aspect, "Of log (fy / fx).")
@@ -124,6 +164,7 @@ void BindNoise(py::module_* module) {
                          "What is not exact beside the noise of points: standard deviations; 0: "
                          "exact. The defaults are those of photographs.")
       .def(py::init(&FromKeywords<NoiseModel>))
+      .def(PickledAsKeywords<NoiseModel>())
       .def_static("exact", &NoiseModel::Exact,
                   "Nothing but the noise of points: for simulated evidence.")
       .def_readwrite("contour_px", &NoiseModel::contour_px,
@@ -158,28 +199,35 @@ void BindPose(py::module_* module) {
              return CameraPose{rotation, translation};
            }),
            py::arg("rotation"), py::arg("translation"))
+      .def(Pickled(&CameraPose::rotation, &CameraPose::translation))
       .def_readonly("rotation", &CameraPose::rotation, "(3, 3), read-only.")
       .def_readonly("translation", &CameraPose::translation, "(3,), read-only.");
 }
 
 void BindFits(py::module_* module) {
   py::class_<ConicFit>(*module, "ConicFit", "An ellipse in calibrated coordinates.")
+      .def(Pickled(&ConicFit::conic, &ConicFit::covariance, &ConicFit::rms_px,
+                   &ConicFit::irregularity))
       .def_readonly("conic", &ConicFit::conic, "(3, 3), unit Frobenius norm, negative inside.")
       .def_property_readonly("covariance", &ConicFit::Covariance,
                              "(6, 6), of (C00, C11, C22, sqrt2 C01, sqrt2 C02, sqrt2 C12).")
       .def_readonly("rms_px", &ConicFit::rms_px, "Of the distances, pixels of the photo.")
       .def_readonly("irregularity", &ConicFit::irregularity, "Scales NoiseModel.circle_shape.");
   py::class_<ConicReading>(*module, "ConicReading", "An ellipse and the points that speak for it.")
+      .def(Pickled(&ConicReading::fit, &ConicReading::inliers))
       .def_readonly("fit", &ConicReading::fit)
       .def_readonly("inliers", &ConicReading::inliers, "One per point of the contour, 1: inlier.");
   py::class_<DirectionReading>(*module, "DirectionReading", "A direction that a pencil may have.")
+      .def(Pickled(&DirectionReading::direction, &DirectionReading::probability))
       .def_readonly("direction", &DirectionReading::direction, "(3,), unit, without sense.")
       .def_readonly("probability", &DirectionReading::probability);
   py::class_<LineFit>(*module, "LineFit", "A line in calibrated coordinates.")
+      .def(Pickled(&LineFit::line, &LineFit::covariance, &LineFit::rms_px))
       .def_readonly("line", &LineFit::line, "(3,), unit, without sense.")
       .def_readonly("covariance", &LineFit::covariance, "(3, 3), of the line.")
       .def_readonly("rms_px", &LineFit::rms_px, "Of the points about it, pixels of the photo.");
   py::class_<VanishingPointFit>(*module, "VanishingPointFit", "The direction of a pencil.")
+      .def(Pickled(&VanishingPointFit::direction, &VanishingPointFit::covariance))
       .def_readonly("direction", &VanishingPointFit::direction,
                     "(3,), unit, camera frame, without sense.")
       .def_readonly("covariance", &VanishingPointFit::covariance, "(3, 3), of it, rad^2.");

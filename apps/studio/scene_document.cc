@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <set>
 
 #include "apps/common/camera_file.h"
@@ -77,6 +78,10 @@ std::string FreeCameraId(const Json& camera, const Json& cameras,
 
 }  // namespace
 
+std::string FileOf(const Json& entry) {
+  return std::filesystem::path(entry.value("file", "")).lexically_normal().string();
+}
+
 const Json& ListOf(const Json& scene, const char* key) {
   static const auto* const empty = new Json(Json::array());
   return scene.is_object() && scene.contains(key) ? scene[key] : *empty;
@@ -112,7 +117,7 @@ Json WithImage(const Json& scene, const Json& document) {
   for (auto other = images.begin(); other != images.end(); ++other) {
     // It may go without where there is one camera, which there may be no longer.
     if (!other->contains("camera") && before.size() == 1) (*other)["camera"] = before[0]["id"];
-    if (other->value("file", "") == image["file"])
+    if (place == images.end() && FileOf(*other) == FileOf(image))
       place = other;
     else
       used.insert(other->value("camera", ""));

@@ -27,6 +27,9 @@ class RequestError : public std::runtime_error {
   int status_;
 };
 
+// The photo of an image's entry, however that writes the path: "./a.jpg" is "a.jpg".
+std::string FileOf(const Json& entry);
+
 // A list of a scene file; none: empty.
 const Json& ListOf(const Json& scene, const char* key);
 

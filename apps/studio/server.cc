@@ -121,6 +121,11 @@ class StudioServer::Routes {
          {"Referrer-Policy", "no-referrer"},
          {"X-Content-Type-Options", "nosniff"}});
     server_.set_pre_routing_handler([this](const Request& request, Response& response) {
+      if (request.ranges.size() > 1) {  // A small request for as many copies of a photo.
+        SetError(416, "one range at a time", &response);
+        response.set_header("Connection", "close");
+        return httplib::Server::HandlerResponse::Handled;
+      }
       if (IsAllowed(request)) return httplib::Server::HandlerResponse::Unhandled;
       SetError(403, "only pages of this studio, on this machine, may ask", &response);
       response.set_header("Connection", "close");

@@ -26,7 +26,7 @@ constexpr std::size_t kMaxDraftBytes = std::size_t{64} << 20;
 // The entry of a scene file for that photo, or null.
 Json EntryOf(const Json& scene, const std::string& name) {
   for (const Json& image : ListOf(scene, "images")) {
-    if (image.value("file", "") == name) return image;
+    if (FileOf(image) == name) return image;
   }
   return nullptr;
 }
@@ -113,7 +113,7 @@ Json Studio::Images() {
   const std::lock_guard<std::mutex> lock(mutex_);
   FollowScene();
   std::set<std::string> saved;
-  for (const Json& image : ListOf(scene_, "images")) saved.insert(image.value("file", ""));
+  for (const Json& image : ListOf(scene_, "images")) saved.insert(FileOf(image));
   Json images = Json::array();
   for (std::size_t n = 0; n < folder_.size(); ++n) {
     const std::string& name = folder_.name(n);

@@ -105,6 +105,22 @@ TEST_F(StudioSceneTest, TakesTheOnlyCameraAndNumbersAsNames) {
   for (const SceneImage& image : Saved()) EXPECT_EQ(image.observations.camera.fx, 317.5);
 }
 
+// However the scene file writes its path; the first of several entries, which is the one shown.
+TEST_F(StudioSceneTest, SavesTheEntryThatItShows) {
+  WriteByHand("scene.json", std::string("cameras:\n  - ") + kCameraText +
+                                "\nimages:\n  - { file: ./a.png, pencils: [ { id: first, "
+                                "segments: [1,2,30,40] } ] }\n  - { file: a.png }\n");
+  const auto studio = Open(nullptr);
+  EXPECT_EQ(studio->Images()["images"][0]["saved"], true);
+  EXPECT_EQ(studio->Session(0)["saved"]["pencils"][0]["id"], "first");
+  const Json scene = SceneOfDisc(studio->Detect({{"image", 0}}));
+  studio->Save({{"image", 0}, {"scene", scene}});
+  const std::vector<SceneImage> saved = Saved();
+  ASSERT_EQ(saved.size(), 2U);
+  EXPECT_EQ(saved[0].observations.circles.size(), 1U);
+  EXPECT_TRUE(saved[1].detect_everything);
+}
+
 TEST_F(StudioSceneTest, KeepsWhatAnotherHandWroteMeanwhile) {
   const auto studio = Open(nullptr);
   const Json scene = SceneOfDisc(studio->Detect({{"image", 0}}));

@@ -239,6 +239,20 @@ TEST_F(StudioServerTest, SurvivesMalformedAndHugeRequests) {
   EXPECT_TRUE(IsAlive());
 }
 
+TEST_F(StudioServerTest, GivesOneRangeOfAPhoto) {
+  Start();
+  const auto get = [&](const std::string& ranges) {
+    return client_->Get("/api/image/0", {{"Range", "bytes=" + ranges}});
+  };
+  const auto one = get("0-99");
+  ASSERT_TRUE(one);
+  EXPECT_EQ(one->status, 206);
+  EXPECT_EQ(one->body.size(), 100U);
+  const auto many = get("0-99,0-99");
+  ASSERT_TRUE(many);
+  EXPECT_EQ(many->status, 416);
+}
+
 // Requests with bytes changed at random.
 TEST_F(StudioServerTest, SurvivesFuzzedRequests) {
   Start();

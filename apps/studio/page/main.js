@@ -75,7 +75,9 @@ function keepDraft(leaving = false) {
   clearTimeout(draftTimer);
   draftTimer = 0;
   if (!app.photo) return;  // Its doc is not there yet.
-  const state = isSaved() && !app.doc.measure.length && !app.doc.hypothesis ? null : app.doc;
+  const {measure, hypothesis} = app.doc;
+  // The scene file has what is saved, and another hand may change that.
+  const state = !isSaved() ? app.doc : measure.length || hypothesis ? {measure, hypothesis} : null;
   keeping = api.draft(app.image, state, leaving)
     .catch((error) => toast(`The draft is not kept: ${error.message}`, true));
 }
@@ -104,7 +106,7 @@ async function open(image) {
     const [photo, session] = await Promise.all([api.photo(image), keeping.then(() => api.session(image))]);
     if (image !== app.image) return;
     const saved = session.saved ? docOfEntry(session.saved) : emptyDoc();
-    app.doc = session.draft || saved;
+    app.doc = {...saved, ...session.draft};
     setSaved(entryOf(saved));
     app.images[image].draft = !isSaved();
     app.photo = photo;

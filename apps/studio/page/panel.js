@@ -1,6 +1,6 @@
 // The panel beside the photo: the pose and its rivals, the camera, what was said, what was measured.
 import {app, change, changed, isSaid, shownHypothesis, shownIndex} from './store.js';
-import {dropCircle, dropPencil, dropSelected, dropUnknownPlane, planesOf, sameSelection} from './scene.js';
+import {dropCircle, dropPencil, dropSelected, dropDangling, planesOf, sameSelection} from './scene.js';
 import {drawThumbnail, measureText, withSigma} from './view.js';
 import {drawOrbit, watchOrbit} from './orbit.js';
 
@@ -125,7 +125,7 @@ function planeChoice(circle, index) {
     onclick: (event) => event.stopPropagation(),
     onchange: (event) => change((doc) => {
       setOrDrop(doc.scene.circles[index], 'plane', event.target.value);
-      dropUnknownPlane(doc);
+      dropDangling(doc);
     })}, ...options);
 }
 

@@ -84,24 +84,35 @@ export function dropLine(doc, pencil, segment) {
 }
 
 export function dropPencil(doc, index) {
-  const [gone] = doc.scene.pencils.splice(index, 1);
-  const angles = doc.scene.known.angle_deg;
-  if (angles) doc.scene.known.angle_deg = angles.filter((a) => !a.pencils.includes(gone.id));
-  dropUnknownPlane(doc);
+  doc.scene.pencils.splice(index, 1);
+  dropDangling(doc);
 }
 
 export function dropCircle(doc, index) {
-  const [gone] = doc.scene.circles.splice(index, 1);
-  if (doc.scene.frame.origin_is_center === gone.id) delete doc.scene.frame.origin_is_center;
-  dropUnknownPlane(doc);
+  doc.scene.circles.splice(index, 1);
+  dropDangling(doc);
 }
 
-// A frame or a length in a plane that nothing names any longer.
-export function dropUnknownPlane(doc) {
-  const {circles, pencils, frame, known} = doc.scene;
-  const planes = new Set([...circles, ...pencils].map((item) => item.plane));
+// What is said of a circle, lines or a plane that nothing names any longer: no scene may say that.
+export function dropDangling(doc) {
+  const {circles, pencils, frame, known, truth, solids} = doc.scene;
+  const namesOf = (items, key) => new Set(items.map((item) => item[key]));
+  const planes = namesOf([...circles, ...pencils], 'plane');
+  const circleIds = namesOf(circles, 'id'), pencilIds = namesOf(pencils, 'id');
   if (frame.plane && !planes.has(frame.plane)) delete frame.plane;
+  if (frame.origin_is_center && !circleIds.has(frame.origin_is_center)) delete frame.origin_is_center;
   for (const length of known.length) if (!planes.has(length.plane)) delete length.plane;
+  if (known.angle_deg) {
+    known.angle_deg = known.angle_deg.filter((angle) => angle.pencils.every((id) => pencilIds.has(id)));
+  }
+  if (truth && truth.directions) {
+    truth.directions = truth.directions.filter((direction) => pencilIds.has(direction.pencil));
+    if (!truth.directions.length) delete truth.directions;
+  }
+  if (solids) {
+    const isThere = (id) => !id || circleIds.has(id);
+    doc.scene.solids = solids.filter((solid) => isThere(solid.base) && isThere(solid.rim));
+  }
 }
 
 export function planesOf(doc) {
@@ -122,6 +133,7 @@ export function sayAllFound(doc, detection) {
     if (pencil.plane) said.plane = pencil.plane;
     doc.scene.pencils.push(said);
   }
+  dropDangling(doc);
 }
 
 // Every point that can be dragged: {selection, list, at}: list[at], list[at + 1] are its pixels.
