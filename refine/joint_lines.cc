@@ -37,14 +37,13 @@ double LineDeviation(const PencilObservation& pencil, double usual) {
 // Standard deviation of a pencil's direction against its axis: a corner is as square as its sides
 // are straight and parallel. Those of a board are so to a fraction of a degree; those of an old
 // street, of which each misses its direction by a third of a degree, to one or two. A photo tells
-// the focal length or whether a corner is square, not both: where that is an unknown, twice as
-// much.
+// the focal length or whether a corner is square, not both: where that is an unknown, more so.
 double AxisSigma(const PencilObservation& pencil, const NoiseModel& model,
                  const CameraSigma& camera) {
-  // In units of the lines' deviation. Of 1, 2 and 4, and of 2 to 8, on the street of scene-lund,
-  // whose directions are 88.4 degrees apart, and chessboard-opencv (scene-lund-more, the boxes and
-  // the drawn streets had no part in it).
-  constexpr double kOfKnownCamera = 2.0, kOfGuessedCamera = 4.0;
+  // In units of the lines' deviation. Of 1 to 4, on the streets of scene-lund (and -more), whose
+  // directions are 88.4 degrees apart, and drawn ones (seed 1); and of 2 to 8, on scene-lund and
+  // chessboard-opencv. Boxes, other boards and other seeds had no part in it.
+  constexpr double kOfKnownCamera = 1.5, kOfGuessedCamera = 4.0;
   const bool is_free = pencil.direction == PencilDirection::kFree;
   if (is_free || !(model.pencil_axis_rad > 0.0)) return model.pencil_axis_rad;
   const double of_deviation = camera.IsWide() ? kOfGuessedCamera : kOfKnownCamera;
