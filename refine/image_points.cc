@@ -31,7 +31,7 @@ void ImagePoints::Reset(const Camera& camera, const std::vector<Eigen::Vector2d>
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   CalibratedPoint p;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (!inliers.empty() && inliers[i] == 0) continue;
+    if (!inliers.empty() && (i >= inliers.size() || inliers[i] == 0)) continue;
     if (!PixelToCalibrated(camera, pixels[i], &p)) continue;
     points_.push_back(p);
     pixels_.push_back(pixels[i]);
@@ -195,7 +195,7 @@ Eigen::Vector2d MoveInwards(const Eigen::Matrix3d& conic, double pixels, Calibra
 // The distance is wanted orthogonally, and defined. The smallest radius of curvature of an ellipse
 // of semi-axes a >= b is b^2 / a.
 bool ImagePoints::IsOrthogonal(const Eigen::Matrix3d& conic, double* level) const {
-  if (options_.distance == ConicDistanceType::kSampson) return false;
+  if (options_.distance == ConicDistanceType::kSampson || points_.empty()) return false;
   *level = EllipseLevel(conic);
   if (!(conic.topLeftCorner<2, 2>().determinant() > 0.0 && *level > 0.0)) return false;
   if (options_.distance == ConicDistanceType::kOrthogonal) return true;

@@ -64,8 +64,9 @@ class ImagePoints {
     int num_distortion = 1;  // Distortion coefficients with derivatives; the others are constant.
   };
 
-  // Points with inliers[i] == 0 are left out (`inliers` may be empty), and so are those that the
-  // camera cannot undistort.
+  // Points with inliers[i] == 0 are left out, those beyond the end of `inliers` too (it may be
+  // empty, for all points), and so are those that the camera cannot undistort. None may be left:
+  // residuals are zero then.
   ImagePoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
               const std::vector<std::uint8_t>& inliers, const Options& options) {
     Reset(camera, pixels, inliers, options);

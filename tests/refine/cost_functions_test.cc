@@ -195,6 +195,20 @@ TEST(CostFunctionsTest, GaussNewtonHessianIsThatOfThePoints) {
   EXPECT_LT((H - expected).norm(), 1e-5 * expected.norm());
 }
 
+// A contour of which no point is left, here as none is an inlier, says nothing.
+TEST(CostFunctionsTest, NoPointsSayNothing) {
+  const auto pixels = Contour({0.4, -0.3, 0.0}, Eigen::Vector3d::UnitZ(), 1.2, 6.0, 0);
+  const ImagePoints none(LensCamera(), pixels, {0}, {});
+  const PlaneCircleContourCost cost(none, {});
+  Blocks blocks;
+  blocks.AddPose();
+  blocks.Add({0.4, -0.3});
+  blocks.Add({1.2});
+  std::vector<double> r(static_cast<std::size_t>(cost.num_residuals()), 1.0);
+  EXPECT_TRUE(cost.Evaluate(blocks.Pointers().data(), r.data(), nullptr));
+  for (const double residual : r) EXPECT_EQ(residual, 0.0);
+}
+
 // Behind the camera there is no image: ceres is told so, and nothing is NaN.
 TEST(CostFunctionsTest, BehindTheCameraIsRefused) {
   const auto pixels = Contour({0.4, -0.3, 0.0}, Eigen::Vector3d::UnitZ(), 1.2, 6.0, 0);
