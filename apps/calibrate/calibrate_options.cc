@@ -98,7 +98,8 @@ Status CalibrateOptionsFromFlags(CalibrateOptions* options) {
   options->adjust.conic_loss = estimation.conic_loss;
   options->adjust.line_loss = estimation.line_loss;
   options->adjust.noise_model = estimation.noise_model;
-  if (options->compare.threads > 0) cv::setNumThreads(options->compare.threads);
+  if (options->compare.threads > 0)
+    cv::setNumThreads(std::min(options->compare.threads, cv::getNumberOfCPUs()));
   options->adjust.num_threads = std::max(1, cv::getNumThreads());
   return status;
 }

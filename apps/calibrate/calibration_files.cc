@@ -117,7 +117,8 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
   for (std::size_t c = 0; c < adjusted.cameras.size() && status.ok(); ++c) {
     json["cameras"].push_back(CameraJson(adjusted.cameras[c]));
     const std::string name =
-        c == 0 ? "calibration.yml" : "calibration_" + adjusted.cameras[c].camera.id + ".yml";
+        c == 0 ? "calibration.yml"
+               : "calibration_" + FileSafe(adjusted.cameras[c].camera.id) + ".yml";
     status = WriteFile(folder + "/" + name, CalibrationYaml(adjusted.cameras[c]));
   }
   std::vector<ExportedPose> poses;

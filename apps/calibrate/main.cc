@@ -82,7 +82,8 @@ struct Calibration {
 CameraSigma PriorOf(const CalibrateOptions& options, const SceneImage& image,
                     const Camera& camera) {
   const EstimationOptions& estimation = options.compare.losses.front().estimation;
-  CameraSigma sigma = image.camera_sigma.Over(UnknownCamera(camera));
+  CameraSigma sigma =
+      image.camera_sigma.Over(options.compare.inputs.guess.stated.Over(UnknownCamera(camera)));
   if (image.guessed_sigma) sigma.log_focal = image.guessed_sigma->LargestLogFocal();
   if (estimation.camera_sigma) sigma.log_focal = estimation.camera_sigma->log_focal;
   if (options.fix_principal_point) sigma.principal_point_px = 0.0;

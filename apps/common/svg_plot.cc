@@ -20,7 +20,7 @@ std::string SvgNumber(double value) { return FormatFixed(value, 1); }
 
 std::string TickText(double value) {
   if (value == 0.0) return "0";
-  if (value < 1e-4) return FormatShort(value, 1);
+  if (std::abs(value) < 1e-4) return FormatShort(value, 1);
   std::string text = FormatFixed(value, 4);
   text.erase(text.find_last_not_of('0') + 1);
   if (text.back() == '.') text.pop_back();

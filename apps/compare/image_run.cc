@@ -189,7 +189,10 @@ int SetLargestRadius(double radius, Observations* observations) {
 CameraSigma CameraSigmaOf(const EstimationOptions& options, const SceneImage& image) {
   if (image.guessed_sigma) return *image.guessed_sigma;
   StatedCameraSigma stated = image.camera_sigma;
-  if (options.camera_sigma) stated.log_focal.reset();  // The flag's.
+  if (options.camera_sigma) {  // The flag's.
+    stated.log_focal.reset();
+    stated.doubtful_log_focal.reset();
+  }
   return stated.OverCalibrated(
       options.camera_sigma.value_or(options.noise_model.SigmaOf(image.observations.camera)));
 }

@@ -201,7 +201,7 @@ Status OptionsFromFlags(CompareOptions* options) {
     return Status::Invalid("--output is missing: the folder for the results");
   options->output = FLAGS_output;
   options->threads = FLAGS_threads;
-  if (!(FLAGS_max_megapixels > 0.0))
+  if (!(FLAGS_max_megapixels > 0.0) || !std::isfinite(FLAGS_max_megapixels))
     return CheckFlag("max_megapixels", Status::Invalid("must be positive"));
   options->max_megapixels = FLAGS_max_megapixels;
   options->overlays = FLAGS_overlays;

@@ -163,10 +163,14 @@ std::string SigmaText(const PoseHypothesis& hypothesis) {
   return "sigma " + FormatShort(sigma.norm(), 2) + " deg";
 }
 
-// What a picture has room for: what was found, or the first reason of the last solver.
+// What a picture has room for: what was found, or the first reason of `joint`, else of the last
+// solver.
 std::string WhyNoPose(const ImageRun& run) {
   if (!run.observations.message.empty() || run.solvers.empty()) return run.observations.message;
-  const std::string& reasons = run.solvers.back().estimate.status.message;
+  auto told = std::find_if(run.solvers.begin(), run.solvers.end(),
+                           [](const SolverRun& solver) { return solver.solver == "joint"; });
+  if (told == run.solvers.end()) --told;
+  const std::string& reasons = told->estimate.status.message;
   return reasons.substr(0, reasons.find("; "));
 }
 

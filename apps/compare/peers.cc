@@ -10,18 +10,21 @@ namespace {
 
 constexpr std::size_t kFewestPoints = 4;
 
-// Infinite if the pose has a point where the camera does not see it, behind itself above all.
-double RmsPx(const CameraPose& pose, const SceneImage& image, const Camera& camera) {
+// Of the points that a solver is given. Infinite if the pose has one where the camera does not see
+// it, behind itself above all.
+double RmsPx(const CameraPose& pose, const SceneImage& image, const Camera& camera, int* count) {
   double sum = 0.0;
-  int count = 0;
+  *count = 0;
   for (const KnownPoint& point : image.points) {
+    CalibratedPoint ray;
+    if (!PixelToCalibrated(camera, point.pixel, &ray)) continue;
     Eigen::Vector2d pixel;
     const Eigen::Vector3d seen = pose.rotation * point.world + pose.translation;
     if (!CameraToPixel(camera, seen, &pixel)) return std::numeric_limits<double>::infinity();
     sum += (pixel - point.pixel).squaredNorm();
-    count += 2;
+    *count += 2;
   }
-  return std::sqrt(sum / std::max(1, count));
+  return std::sqrt(sum / std::max(1, *count));
 }
 
 }  // namespace
@@ -84,8 +87,9 @@ PoseHypothesis PeerHypothesis(const CameraPose& pose) {
 PoseHypothesis PointsHypothesis(const CameraPose& pose, const SceneImage& image,
                                 const Camera& camera) {
   PoseHypothesis hypothesis = PeerHypothesis(pose);
-  hypothesis.rms_px = RmsPx(pose, image, camera);
-  hypothesis.num_inliers = hypothesis.num_observations = 2 * static_cast<int>(image.points.size());
+  int count = 0;
+  hypothesis.rms_px = RmsPx(pose, image, camera, &count);
+  hypothesis.num_inliers = hypothesis.num_observations = count;
   return hypothesis;
 }
 

@@ -150,7 +150,8 @@ std::string CumulativePlots(const Summary& summary) {
   return CumulativePlot(summary, "Rotation error", "degrees", &Row::rotation_errors) +
          CumulativePlot(summary, "Normal error of the best hypothesis", "degrees",
                         &Row::normal_errors) +
-         CumulativePlot(summary, "Direction error", "degrees", &Row::direction_errors) +
+         CumulativePlot(summary, "Error of the worst direction", "degrees",
+                        &Row::worst_direction_errors) +
          CumulativePlot(summary, "Residual, root mean square", "pixels", &Row::rms_px);
 }
 

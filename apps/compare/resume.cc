@@ -52,6 +52,8 @@ Status FindDone(const CompareOptions& options, const ImageSet& images,
       return OtherRun(folder, "its image " + std::to_string(done->images + 1) + " is " +
                                   record.name + ", not " + name);
     }
+    if (record.set_size != images.At(done->images).set_size)
+      return OtherRun(folder, "it is of a set of " + std::to_string(record.set_size) + " images");
     if (record.error.empty() && KeysOf(record) != solvers)
       return OtherRun(folder, "its solvers or losses differ");
     if (record.flags != options.unusual_flags) {
@@ -65,11 +67,14 @@ Status FindDone(const CompareOptions& options, const ImageSet& images,
   return Status::Ok();
 }
 
-// Pictures that were being written when the run was stopped.
+// What was being written when the run was stopped; nothing that is not its own.
 void RemoveParts(const std::string& folder) {
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    if (entry.path().extension() == ".part") fs::remove(entry.path(), error);
+  for (const char* name : {"summary.csv", "report.html", "unfinished.flags"})
+    fs::remove(folder + "/" + name + ".part", error);
+  for (const auto& entry : fs::directory_iterator(folder + "/overlays", error)) {
+    const fs::path& path = entry.path();
+    if (path.extension() == ".part" && path.stem().extension() == ".png") fs::remove(path, error);
   }
 }
 
@@ -91,7 +96,6 @@ Status PrepareFolder(const CompareOptions& options, const ImageSet& images,
     }
   }
   RemoveParts(folder);
-  RemoveParts(folder + "/overlays");
   return WriteFile(MarkerPath(folder), options.result_flags);
 }
 

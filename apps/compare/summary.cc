@@ -33,7 +33,12 @@ void AddErrors(const std::vector<HypothesisRecord>& hypotheses, SummaryRow* row)
   const PoseErrors& best = hypotheses.front().errors;
   if (best.rotation_deg) row->rotation_errors.push_back(*best.rotation_deg);
   if (best.normal_deg) row->normal_errors.push_back(*best.normal_deg);
-  for (const auto& [id, error] : best.directions_deg) row->direction_errors.push_back(error);
+  double worst = -1.0;
+  for (const auto& [id, error] : best.directions_deg) {
+    row->direction_errors.push_back(error);
+    worst = std::max(worst, error);
+  }
+  if (worst >= 0.0) row->worst_direction_errors.push_back(worst);
   if (best.Headline()) row->headline_errors.push_back(*best.Headline());
   const int nearest = NearestHypothesis(hypotheses);
   if (nearest < 0) return;

@@ -18,7 +18,9 @@ struct SummaryRow {
   int ambiguous = 0;       // Images with two or more hypotheses and a truth.
   int best_is_better = 0;  // Images with a truth whose best hypothesis is the nearest to it.
   // Of the best hypothesis, one for each image that has it, in the order of images.
-  std::vector<double> rotation_errors, normal_errors, direction_errors, headline_errors, rms_px;
+  std::vector<double> rotation_errors, normal_errors, worst_direction_errors, headline_errors,
+      rms_px;
+  std::vector<double> direction_errors;  // The same, one for each direction of the truth.
   std::vector<double> inlier_shares;
   std::vector<double> better_normal_errors;  // Of the hypothesis nearest to the truth.
   std::vector<float> microseconds;

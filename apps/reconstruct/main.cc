@@ -135,10 +135,10 @@ Status ChoosePose(const ImageRun& run, const PoseHypothesis** hypothesis) {
 }
 
 // The evidence fitted anew, where the photo itself has told the camera.
-void SeeThrough(const Camera& camera, Observations* observations) {
+void SeeThrough(const Camera& camera, const NoiseModel& noise, Observations* observations) {
   observations->camera = camera;
   ResetFits(observations);
-  FitDirect(FLAGS_point_sigma_px, observations);
+  FitDirect(FLAGS_point_sigma_px, observations, nullptr, noise);
 }
 
 // --- A box ---
@@ -182,7 +182,9 @@ Status ReconstructBox(const CompareOptions& options, const ImageRun& run, BoxObs
   for (const std::string& note : fit.notes) SayOnStderr("circline_reconstruct: " + note);
   made->camera = fit.camera;
   made->pose = fit.cam_from_box;
-  made->measured = MeasureBox(fit, box, run.observations, estimation);
+  EstimationOptions seen = estimation;
+  seen.camera_sigma = box_options.camera;
+  made->measured = MeasureBox(fit, box, run.observations, seen);
   made->picture = DrawBox(run.photo, box, fit);
   made->title = fit.metric ? "a box" : "a box, in units of the distance to its origin";
   return status;
@@ -190,11 +192,12 @@ Status ReconstructBox(const CompareOptions& options, const ImageRun& run, BoxObs
 
 // --- A plane and what stands on it ---
 
-Status ReconstructPlane(const ModelOptions& options, ImageRun* run, Reconstruction* made) {
+Status ReconstructPlane(const NoiseModel& noise, const ModelOptions& options, ImageRun* run,
+                        Reconstruction* made) {
   const PoseHypothesis* hypothesis = nullptr;
   Status status = ChoosePose(*run, &hypothesis);
   if (!status.ok()) return status;
-  if (hypothesis->camera) SeeThrough(*hypothesis->camera, &run->observations);
+  if (hypothesis->camera) SeeThrough(*hypothesis->camera, noise, &run->observations);
   made->model = PlaneModel(run->photo, run->observations, *hypothesis, options);
   if (made->model.patches.empty()) return Status::Refused("no evidence lies in the world's plane");
   status = AddSolids(run->image->solids, run->observations, *hypothesis, FLAGS_point_sigma_px,
@@ -223,7 +226,7 @@ Status ReconstructImage(const CompareOptions& options, const ModelOptions& model
     SayOnStderr("circline_reconstruct: " + status.message + "; modelling the plane");
     *made = Reconstruction();
   }
-  return ReconstructPlane(model_options, run, made);
+  return ReconstructPlane(options.losses.front().estimation.noise_model, model_options, run, made);
 }
 
 // A photo with a box is modelled as that box alone.

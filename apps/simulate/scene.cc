@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -203,6 +204,7 @@ Eigen::Matrix3d PaperScene::BoundCovariance(Evidence evidence, const InlierMasks
   for (int k = 0; k < kNumParameters; ++k) {
     if (information(k, k) > 0.0) used.push_back(k);
   }
+  if (used.size() < 3) return Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   const Eigen::MatrixXd own = information(used, used);
   return own.inverse().topLeftCorner<3, 3>();
 }

@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_TRACK_FRAME_OBSERVER_H_
 #define CIRCLINE_APPS_TRACK_FRAME_OBSERVER_H_
 
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -42,7 +43,8 @@ class FrameObserver {
   bool has_given_ = false;        // The circle in --roi was found and is followed.
   std::string circle_of_radius_;  // Id of the one that --circle_radius speaks of.
   bool was_cold_ = false, was_cut_ = false;
-  double last_s_ = 0.0;  // Of the last frame that was looked at.
+  // Of the last frame that was looked at.
+  double last_s_ = -std::numeric_limits<double>::infinity();
 };
 
 }  // namespace circline::apps

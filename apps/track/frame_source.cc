@@ -58,8 +58,8 @@ class VideoSource : public FrameSource {
 
 class PhotoSource : public FrameSource {
  public:
-  PhotoSource(const ImageSet& images, double fps, bool reads_all)
-      : images_(images), reads_all_(reads_all) {
+  PhotoSource(const ImageSet& images, double fps, bool reads_all, double max_megapixels)
+      : images_(images), reads_all_(reads_all), max_megapixels_(max_megapixels) {
     fps_ = fps > 0.0 ? fps : kPhotosPerSecond;
   }
   bool Next(Frame* frame) override {
@@ -69,7 +69,7 @@ class PhotoSource : public FrameSource {
     frame->time_s = TimeOf(frame->index);
     frame->image = images_.At(frame->index);
     if (reads_all_ || frame->image.detect_everything || !frame->image.rois.empty())
-      frame->read_error = ReadPhoto(frame->image.path, &frame->photo);
+      frame->read_error = ReadPhoto(frame->image.path, &frame->photo, max_megapixels_);
     return true;
   }
   int num_frames() const override { return static_cast<int>(images_.size()); }
@@ -77,6 +77,7 @@ class PhotoSource : public FrameSource {
  private:
   const ImageSet& images_;
   const bool reads_all_;
+  const double max_megapixels_;
   std::size_t next_ = 0;
 };
 
@@ -99,8 +100,9 @@ Status OpenVideo(const std::string& path, const SceneImage& pattern, double fps,
   return Status::Ok();
 }
 
-std::unique_ptr<FrameSource> OpenPhotos(const ImageSet& images, double fps, bool reads_all) {
-  return std::make_unique<PhotoSource>(images, fps, reads_all);
+std::unique_ptr<FrameSource> OpenPhotos(const ImageSet& images, double fps, bool reads_all,
+                                        double max_megapixels) {
+  return std::make_unique<PhotoSource>(images, fps, reads_all, max_megapixels);
 }
 
 Status ReadTimes(const std::string& path, std::vector<double>* times_s) {

@@ -46,7 +46,8 @@ class FrameSource {
 Status OpenVideo(const std::string& path, const SceneImage& pattern, double fps,
                  std::unique_ptr<FrameSource>* source);
 // `images` outlives the source. Only photos that something is to be found in are read, or all.
-std::unique_ptr<FrameSource> OpenPhotos(const ImageSet& images, double fps, bool reads_all);
+std::unique_ptr<FrameSource> OpenPhotos(const ImageSet& images, double fps, bool reads_all,
+                                        double max_megapixels);
 
 // Seconds, a number a line; # starts a comment. Not ok: names file and line.
 Status ReadTimes(const std::string& path, std::vector<double>* times_s);

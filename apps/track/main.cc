@@ -43,14 +43,15 @@ Status OpenSource(const TrackOptions& options, ImageSet* images,
       return Status::Invalid("a track has one camera; " + images->name(i) + " has another");
   }
   if (options.video.empty()) {
-    *source = OpenPhotos(*images, options.fps, options.compare.overlays);
+    *source =
+        OpenPhotos(*images, options.fps, options.compare.overlays, options.compare.max_megapixels);
   } else {
     status = OpenVideo(options.video, images->At(0), options.fps, source);
   }
   std::vector<double> times_s;
   if (status.ok() && !options.timestamps.empty()) status = ReadTimes(options.timestamps, &times_s);
   const int num_frames = status.ok() ? (*source)->num_frames() : 0;
-  if (!times_s.empty() && static_cast<int>(times_s.size()) < num_frames) {
+  if (status.ok() && !options.timestamps.empty() && static_cast<int>(times_s.size()) < num_frames) {
     return Status::Invalid("--timestamps=" + options.timestamps + ": has " +
                            std::to_string(times_s.size()) + " times for " +
                            std::to_string(num_frames) + " frames");

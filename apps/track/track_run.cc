@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -135,7 +136,9 @@ class Track {
         options.estimation.camera_sigma = CameraSigmaOf(options.estimation, frame.image);
         tracker_.emplace(options);
       }
-      if (observer_.was_cut()) tracker_->Reset();  // Another scene: another world.
+      // Another scene: another world. A time that runs backwards is for the tracker to refuse.
+      if (observer_.was_cut() && frame.time_s > last_s_) tracker_->Reset();
+      last_s_ = std::max(last_s_, frame.time_s);
       pose = tracker_->Update(run->observations, frame.time_s);
       if (pose.reinitialized && !observer_.was_cut() &&
           observer_.SettleRadius(&run->observations)) {
@@ -214,6 +217,7 @@ class Track {
   FrameSource& source_;
   FrameObserver observer_;
   std::optional<PoseTracker> tracker_;
+  double last_s_ = -std::numeric_limits<double>::infinity();  // Of the latest frame so far.
   std::optional<PoseHypothesis> last_;  // Of the frame before, if that saw it.
   RecordWriter writer_;
   std::vector<ExportedPose> trajectory_;

@@ -49,8 +49,10 @@ void JudgeAxes(const AssemblyOptions& options, const PlacedPencil& x, PlacedPenc
   // square to x and y, or shares one of the axes.
   double pairs = 0.0, corners = 0.0, all = 0.0, corner = 0.0, third = 0.0;
   double of_third = 0.0, looked_at = 0.0;  // Near the focal length at which z was looked for.
-  for (double off = -kReach; off <= kReach; off += kFocalStep / options.focal_sigma) {
-    const double log_focal = options.prior_log_focal + off * options.focal_sigma;
+  constexpr double kAnyFocal = 3.0;        // Of log f: what is known less is not known at all.
+  const double focal_sigma = std::min(options.focal_sigma, kAnyFocal);
+  for (double off = -kReach; off <= kReach; off += kFocalStep / focal_sigma) {
+    const double log_focal = options.prior_log_focal + off * focal_sigma;
     const CameraError camera{options.camera.middle_rad * std::exp(-log_focal), 0.0};
     const UncertainDirection a = Refocus(x.along, log_focal), b = Refocus(y->along, log_focal);
     const double weight = Gaussian(off), is_corner = weight * one * Odds(a, b, camera),
