@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 #include <array>
 
-#include "circline/estimators/basics.h"
+#include "circline/estimators/conic.h"
 
 namespace circline {
 
