@@ -146,7 +146,7 @@ TEST(ImperfectionsTest, PencilsOffTheirAxesAreCountedHonestly) {
 // lines say of their direction counts for more than that corners are square, be they straight or
 // crooked.
 TEST(ImperfectionsTest, ACornerIsAsSquareAsItsSidesAreStraight) {
-  constexpr int kTrials = Trials(40), kLines = 12;
+  constexpr int kTrials = 40, kLines = 12;
   const double kCorner = 1.6 * kDegree;
   for (const double crooked_rad : {0.0, 0.006}) {
     double misses = 0.0;
