@@ -114,11 +114,12 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
                         std::string* note) {
   Json json = {{"rigid", adjusted.rigid}, {"metric", adjusted.metric}, {"cameras", Json::array()}};
   Status status;
+  std::vector<std::string> ids;
+  for (const AdjustedCamera& camera : adjusted.cameras) ids.push_back(camera.camera.id);
+  const std::vector<std::string> stems = UniqueStems(ids);
   for (std::size_t c = 0; c < adjusted.cameras.size() && status.ok(); ++c) {
     json["cameras"].push_back(CameraJson(adjusted.cameras[c]));
-    const std::string name =
-        c == 0 ? "calibration.yml"
-               : "calibration_" + FileSafe(adjusted.cameras[c].camera.id) + ".yml";
+    const std::string name = c == 0 ? "calibration.yml" : "calibration_" + stems[c] + ".yml";
     status = WriteFile(folder + "/" + name, CalibrationYaml(adjusted.cameras[c]));
   }
   std::vector<ExportedPose> poses;

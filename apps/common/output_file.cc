@@ -149,15 +149,6 @@ Status FolderLock::Acquire(const std::string& folder) {
   return Status::Invalid(folder + ": another run is writing into this folder");
 }
 
-std::string FileSafe(const std::string& name) {
-  std::string safe = name;
-  for (char& c : safe) {
-    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '.';
-    if (!plain) c = '_';
-  }
-  return safe;
-}
-
 std::vector<std::string> UniqueStems(const std::vector<std::string>& paths) {
   constexpr int kMaxFolders = 8;
   std::vector<std::string> stems(paths.size());

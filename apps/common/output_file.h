@@ -72,9 +72,6 @@ class FolderLock {
   int descriptor_ = -1;
 };
 
-// The name with "_" for all but letters, digits, "-" and ".", so that it can be part of a file's.
-std::string FileSafe(const std::string& name);
-
 // One file name stem for each path, all different: the path's own stem where no other path has it,
 // else with as many folders in front as it takes ("left/01.jpg" -> "left_01"), or a number.
 std::vector<std::string> UniqueStems(const std::vector<std::string>& paths);

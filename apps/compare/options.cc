@@ -202,7 +202,7 @@ Status OptionsFromFlags(CompareOptions* options) {
   options->output = FLAGS_output;
   options->threads = FLAGS_threads;
   if (!(FLAGS_max_megapixels > 0.0) || !std::isfinite(FLAGS_max_megapixels))
-    return CheckFlag("max_megapixels", Status::Invalid("must be positive"));
+    return CheckFlag("max_megapixels", Status::Invalid("must be positive and finite"));
   options->max_megapixels = FLAGS_max_megapixels;
   options->overlays = FLAGS_overlays;
   options->resume = FLAGS_resume;

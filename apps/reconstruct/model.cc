@@ -2,11 +2,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "apps/common/output_file.h"
 #include "apps/compare/encode.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/plane_evidence.h"
@@ -144,6 +144,15 @@ std::vector<Patch> Faces(const View& view, const Observations& resolved,
 
 double CenterSigmaPx(double sigma_px, std::size_t num_points) {
   return sigma_px / std::sqrt(0.5 * static_cast<double>(num_points));
+}
+
+std::string FileSafe(const std::string& name) {
+  std::string safe = name;
+  for (char& c : safe) {
+    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '.';
+    if (!plain) c = '_';
+  }
+  return safe;
 }
 
 Model PlaneModel(const cv::Mat& photo, const Observations& observations,

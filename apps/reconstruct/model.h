@@ -73,6 +73,9 @@ void FaceTheCamera(const CameraPose& pose, Model* model);
 void TextureModel(const cv::Mat& photo, const Camera& camera, const CameraPose& pose,
                   const ModelOptions& options, Model* model);
 
+// A name that can be part of a file name.
+std::string FileSafe(const std::string& name);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_RECONSTRUCT_MODEL_H_

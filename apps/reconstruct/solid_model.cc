@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/common/output_file.h"
 #include "apps/compare/plane_evidence.h"
 #include "apps/reconstruct/box_geometry.h"
 #include "apps/reconstruct/model.h"

@@ -103,6 +103,21 @@ TEST(CompareResume, DropsALineThatWasCutOff) {
   }
 }
 
+TEST(CompareResume, LeavesTheFilesOfOthers) {
+  const TestFolder folder;
+  const std::string scene = MakeSet(folder);
+  fs::create_directories(folder / "out/overlays");
+  for (const char* name : {"out/download.part", "out/overlays/film.mp4.part"})
+    folder.Write(name, "theirs");
+  for (const char* name : {"out/report.html.part", "out/overlays/01.png.part"})
+    folder.Write(name, "cut off");
+  ASSERT_EQ(RunCompare("--scene='" + scene + "' --output='" + folder / "out" + "'").exit_code, 0);
+  EXPECT_EQ(ReadAll(folder / "out/download.part"), "theirs");
+  EXPECT_EQ(ReadAll(folder / "out/overlays/film.mp4.part"), "theirs");
+  EXPECT_FALSE(fs::exists(folder / "out/report.html.part"));
+  EXPECT_FALSE(fs::exists(folder / "out/overlays/01.png.part"));
+}
+
 TEST(CompareResume, SkipsWhatIsDone) {
   const TestFolder folder;
   const std::string scene = MakeSet(folder);
