@@ -1,9 +1,10 @@
 #include "circline/refine/pose_seeds.h"
 
-#include <Eigen/Geometry>
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/closed_form_solvers.h"
@@ -19,6 +20,66 @@ void Add(const Seed& added, std::vector<Seed>* seeds) {
            IsSameSeed(seed, added);
   });
   if (!known) seeds->push_back(added);
+}
+
+// Whether the ellipse of an arc leaves its planes open: whether one standard deviation of it turns
+// them by much, or leads beyond the ellipses. Where they lie then is no matter of small errors.
+bool PlanesAreOpen(const ConicFit& fit) {
+  constexpr double kOpen = 0.1;  // Radians; 0.05 and 0.2 do as well (scenes "lone_arcs").
+  std::array<CirclePose, 2> poses, moved;
+  const int count = CirclePoses(fit.conic, &poses);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> spread(fit.Covariance());
+  const Vector6d widest =
+      std::sqrt(std::max(0.0, spread.eigenvalues()[5])) * spread.eigenvectors().col(5);
+  for (const double side : {-1.0, 1.0}) {
+    Eigen::Matrix3d conic = VectorToConic(ConicToVector(fit.conic) + side * widest);
+    const int count_moved = NormalizeEllipse(conic, &conic) ? CirclePoses(conic, &moved) : 0;
+    for (int i = 0; i < count; ++i) {
+      double least = 1.0;
+      for (int k = 0; k < count_moved; ++k)
+        least = std::min(least, poses[static_cast<std::size_t>(i)]
+                                    .normal.cross(moved[static_cast<std::size_t>(k)].normal)
+                                    .norm());
+      if (least > kOpen) return true;
+    }
+  }
+  return false;
+}
+
+// The direction of the plane's one pencil, camera frame; none where there are several, as two know
+// the plane.
+std::optional<Eigen::Vector3d> OnlyDirection(const Observations& resolved) {
+  std::optional<Eigen::Vector3d> direction;
+  for (const PencilObservation& pencil : resolved.pencils) {
+    if (!pencil.fit || pencil.plane != resolved.frame.plane) continue;
+    if (direction || pencil.direction == PencilDirection::kZ) return {};
+    direction = pencil.fit->direction;
+  }
+  return direction;
+}
+
+// Planes of an arc that leaves them open, all about the one direction that is known of them. Their
+// tilts are even in the inverse Gudermannian function: the foreshortening changes from one to the
+// next by the same factor, the steeper they are.
+void AddSweep(const Observations& resolved, const CircleObservation& arc,
+              const Eigen::Vector3d& direction, const Seed& like, std::vector<Seed>* seeds) {
+  constexpr int kPlanes = 12;
+  constexpr double kSteepest = 3.3;  // A tilt of 85.8 degrees.
+  CalibratedPoint middle;
+  if (arc.points.empty() ||
+      !PixelToCalibrated(resolved.camera, arc.points[arc.points.size() / 2], &middle)) {
+    return;
+  }
+  Seed seed = like;
+  seed.pose.translation = middle.Homogeneous().normalized();
+  const Eigen::Vector3d across = direction.cross(seed.pose.translation).normalized(),
+                        facing = direction.cross(across);
+  for (int i = 0; i < kPlanes; ++i) {
+    const double tilt = kSteepest * ((2.0 * i + 1.0) / kPlanes - 1.0);
+    const Eigen::Vector3d normal = facing / std::cosh(tilt) + std::tanh(tilt) * across;
+    if (WorldRotation(resolved, normal, seed.pose.translation, kAnySigmaPx, &seed.pose.rotation))
+      Add(seed, seeds);
+  }
 }
 
 }  // namespace
@@ -52,6 +113,10 @@ void AddCircleSeeds(const Observations& resolved, double log_focal, std::vector<
       Add({pose, log_focal, source, index}, seeds);
     }
   }
+  const std::optional<Eigen::Vector3d> direction = OnlyDirection(resolved);
+  if (circles.empty() || !direction || !PlanesAreOpen(*circles[0]->fit)) return;
+  const auto index = static_cast<int>(circles[0] - resolved.circles.data());
+  AddSweep(resolved, *circles[0], *direction, {CameraPose(), log_focal, -1, index}, seeds);
 }
 
 std::vector<Seed> CollectSeeds(const Observations& resolved,

@@ -34,7 +34,8 @@ std::vector<Seed> CollectSeeds(const Observations& resolved,
                                const std::vector<std::shared_ptr<const Solver>>& seeders,
                                double log_focal, std::vector<std::string>* reasons = nullptr);
 
-// Of the largest circles alone: both planes of each.
+// Of the best known circles alone: both planes of each, and, of an arc whose ellipse leaves them
+// open and one pencil, planes all about the pencil's direction.
 void AddCircleSeeds(const Observations& resolved, double log_focal, std::vector<Seed>* seeds);
 
 // The same observations, fits included, through a camera of another focal length.

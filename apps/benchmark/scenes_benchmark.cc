@@ -21,9 +21,10 @@
 #include "apps/common/text.h"
 #include "circline/estimators/status.h"
 
-DEFINE_string(experiment, "all",
-              "A list of: random, short_arcs, odd_circles, bleed, focal_length, outliers, "
-              "odd_lines, tracking; or all.");
+DEFINE_string(
+    experiment, "all",
+    "A list of: random, short_arcs, lone_arcs, odd_circles, bleed, focal_length, outliers, "
+    "circle_and_pencil, odd_lines, tracking; or all.");
 DEFINE_int32(trials, 0, "Scenes for each row; 0: a few, each experiment's own number.");
 DEFINE_uint64(seed, 1, "Of the scenes and their noise.");
 DEFINE_string(noise_px, "",

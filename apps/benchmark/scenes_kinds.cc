@@ -93,6 +93,23 @@ Scene DrawShortArc(double noise_px, Random* random) {
   });
 }
 
+// Arcs and a pencil of four lines; the bound says how well the plane is known.
+Scene DrawLoneArcs(int num_arcs, double arc_deg, double noise_px, Random* random) {
+  constexpr double kHardlyDetermined = 20.0 * kDegree;
+  Recipe recipe = CircleAndPencils(1, 1, 4, 4);
+  recipe.min_circles = recipe.max_circles = num_arcs;
+  Scene scene;
+  scene.request.noise_px = noise_px;
+  do {
+    scene.world = DrawWorld(recipe, random);
+    for (WorldCircle& circle : scene.world.circles) circle.arc = arc_deg * kDegree;
+    scene.bound = ComputeBound(scene.world, scene.request);
+  } while (!IsVisible(scene.world) || !scene.bound.finite ||
+           scene.bound.rotation_rad > kHardlyDetermined);
+  if (scene.bound.rotation_rad > kMaxRotationRad) scene.kind = ", bound > 2 deg";
+  return scene;
+}
+
 // Twelve equal discs on a lattice, whose print bleeds.
 Scene DrawDiscs(double bleed_px, double noise_px, Random* random) {
   return DrawScene(WholeCircles(1, 1), noise_px, random, [&](Scene* scene) {
@@ -201,6 +218,17 @@ Scene DrawCircleAndPencil(double noise_px, Random* random) {
   return DrawScene(recipe, noise_px, random, [](Scene*) { return true; });
 }
 
+std::vector<SceneRow> LoneArcRows() {
+  std::vector<SceneRow> rows;
+  for (const int arcs : {1, 2}) {
+    for (const double deg : {60.0, 90.0, 120.0}) {
+      rows.push_back({std::to_string(arcs) + " of " + FormatPlain(deg) + " deg",
+                      [=](double noise, Random* r) { return DrawLoneArcs(arcs, deg, noise, r); }});
+    }
+  }
+  return rows;
+}
+
 std::vector<SceneRow> OddCircleRows() {
   std::vector<SceneRow> rows;
   for (const int n : {3, 2}) {
@@ -259,6 +287,13 @@ std::vector<SceneExperiment> SceneExperiments() {
        {0.5, 1.0},
        cauchy,
        {{"", DrawShortArc}}},
+      {"lone_arcs",
+       "one or two circles, an arc of each, and a pencil of four lines; the bound 20 deg or less",
+       9,
+       100,
+       {0.5},
+       cauchy,
+       LoneArcRows()},
       {"odd_circles",
        "one circle has a plane of its own, or a wrong radius, by 10 sigma or more; errors are of "
        "the pose by the others",

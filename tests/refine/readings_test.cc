@@ -232,6 +232,30 @@ TEST(ReadingsTest, ThreeCirclesAndAShortArcAgree) {
   EXPECT_LE(left_out, kScenes / 100);
 }
 
+// A sixth of a rim and one pencil may lie in planes of which the rim's ellipse says nothing.
+TEST(ReadingsTest, AShortArcAndAPencilHaveAllTheirPlanes) {
+  constexpr int kScenes = Trials(200);
+  int missing = 0, sure_and_wrong = 0;
+  for (int i = 0; i < kScenes; ++i) {
+    Random random(static_cast<std::uint64_t>(i + 1));
+    PlaneScene scene(random.Uniform(0.3, 1.2), 0.3, static_cast<std::uint64_t>(i + 1));
+    Observations observations = scene.Empty();
+    observations.circles = {Tilted(&scene, "arc", {0.2, 0.1}, 2.5, 0.0, random.Uniform(0.0, 6.28),
+                                   60.0 * kDegree, 100)};
+    observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX(), 4, 30)};
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const auto is_near = [&](const PoseHypothesis& h) {
+      return NormalError(h, scene) < std::max(2.0 * kDegree, 4.0 * SigmaNormal(h));
+    };
+    const std::vector<PoseHypothesis>& all = estimate.hypotheses;
+    missing += std::none_of(all.begin(), all.end(), is_near) ? 1 : 0;
+    sure_and_wrong += all[0].probability >= 0.99 && !is_near(all[0]) ? 1 : 0;
+  }
+  EXPECT_LE(missing, kScenes / 100);
+  EXPECT_LE(sure_and_wrong, kScenes / 100);
+}
+
 TEST(ReadingsTest, NothingIsLeftOutOfWhatAgrees) {
   constexpr int kScenes = Trials(150);
   int left_out = 0;
