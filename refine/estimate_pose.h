@@ -32,7 +32,9 @@ const char* ConicDistanceName(ConicDistanceType type);  // "auto", "sampson", "o
 bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type);
 
 // A pose that is known from elsewhere (odometry, the filter's prediction), in the same world frame:
-// evidence like any other, in the estimate, in its covariance and in the ranking.
+// evidence like any other, in the estimate, in its covariance and in the ranking. One that
+// contradicts the photo is left out ("pose_prior"), but where nothing else tells the turn about the
+// normal.
 struct PosePrior {
   CameraPose mean;  // cam_from_world.
   // Of [delta, delta_t], 6x6 row-major, as PoseHypothesis::covariance; positive definite. Where the
@@ -40,7 +42,8 @@ struct PosePrior {
   std::array<double, 36> covariance{};
 };
 
-// A direction of the world that is known in the camera: gravity from an accelerometer.
+// A direction of the world that is known in the camera: gravity from an accelerometer. Likewise
+// evidence ("gravity_prior").
 struct GravityPrior {
   Eigen::Vector3d in_world = Eigen::Vector3d::UnitZ();   // Unit.
   Eigen::Vector3d in_camera = Eigen::Vector3d::UnitY();  // Unit.

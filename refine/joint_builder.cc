@@ -58,7 +58,9 @@ void JointProblemBuilder::Build() {
   for (std::size_t i = 0; i < obs_.known_angles.size(); ++i) AddAngle(i);
   for (std::size_t i = 0; i < obs_.known_lengths.size(); ++i) AddLength(i);
   AddTranslation();
-  AddPriors();
+  p_.x_is_seen_ = p_.x_is_fixed_;
+  if (p_.options_.pose_prior) AddPosePrior(*p_.options_.pose_prior);
+  if (p_.options_.gravity_prior) AddGravityPrior(*p_.options_.gravity_prior);
   if (p_.x_is_fixed_) {
     p_.SetManifold(JointProblem::kRotation, std::make_unique<WorldRotationManifold<3>>());
   } else {
@@ -141,38 +143,47 @@ void JointProblemBuilder::AddTranslation() {
   }
 }
 
-void JointProblemBuilder::AddPriors() {
-  p_.x_is_seen_ = p_.x_is_fixed_;
-  if (p_.options_.pose_prior) {
-    const PosePrior& prior = *p_.options_.pose_prior;
-    Matrix6d covariance = Eigen::Map<const Matrix6d>(prior.covariance.data());
-    Eigen::Vector3d mean = prior.mean.translation;
-    constexpr double kUnknown = 1e6;  // Standard deviation that says nothing.
-    if (!is_metric_ || !p_.origin_observed_) {
-      // A direction only, or nothing.
-      const double norm = mean.norm();
-      mean /= norm;
-      covariance.bottomRightCorner<3, 3>() /= norm * norm;
-      covariance.topRightCorner<3, 3>() /= norm;
-      covariance.bottomLeftCorner<3, 3>() /= norm;
-      const Eigen::Matrix3d more = p_.origin_observed_ ? Eigen::Matrix3d(mean * mean.transpose())
-                                                       : Eigen::Matrix3d::Identity();
-      covariance.bottomRightCorner<3, 3>() += kUnknown * kUnknown * more;
-    }
-    if (ceres::CostFunction* cost = NewPosePrior(prior.mean.rotation, mean, covariance)) {
-      p_.pose_priors_.push_back(
-          p_.AddTerm(cost, {JointProblem::kRotation, JointProblem::kTranslation}));
-      p_.x_is_fixed_ = true;
-    }
+// What is known of the pose is evidence, which may contradict the photo: a feature to leave out,
+// but where nothing else tells the spin.
+void JointProblemBuilder::AddPrior(ceres::CostFunction* cost, std::vector<int> blocks,
+                                   bool tells_spin, Feature feature) {
+  const bool can_go = p_.x_is_seen_ || !tells_spin;
+  p_.pose_priors_.push_back(
+      p_.AddTerm(cost, std::move(blocks), can_go ? AddFeature(std::move(feature)) : -1));
+  p_.x_is_fixed_ = p_.x_is_fixed_ || tells_spin;
+}
+
+void JointProblemBuilder::AddPosePrior(const PosePrior& prior) {
+  Matrix6d covariance = Eigen::Map<const Matrix6d>(prior.covariance.data());
+  Eigen::Vector3d mean = prior.mean.translation;
+  Feature feature{Feature::Kind::kPrior, "pose_prior", "the pose known beforehand"};
+  feature.dof = 6;
+  feature.covariance = covariance.topLeftCorner<3, 3>();
+  constexpr double kUnknown = 1e6;  // Standard deviation that says nothing.
+  if (!is_metric_ || !p_.origin_observed_) {
+    // A direction only, or nothing.
+    const double norm = mean.norm();
+    mean /= norm;
+    covariance.bottomRightCorner<3, 3>() /= norm * norm;
+    covariance.topRightCorner<3, 3>() /= norm;
+    covariance.bottomLeftCorner<3, 3>() /= norm;
+    const Eigen::Matrix3d more = p_.origin_observed_ ? Eigen::Matrix3d(mean * mean.transpose())
+                                                     : Eigen::Matrix3d::Identity();
+    covariance.bottomRightCorner<3, 3>() += kUnknown * kUnknown * more;
+    feature.dof = p_.origin_observed_ ? 5 : 3;
   }
-  if (p_.options_.gravity_prior) {
-    const GravityPrior& prior = *p_.options_.gravity_prior;
-    p_.pose_priors_.push_back(
-        p_.AddTerm(NewDirectionMeasurement(prior.in_world, prior.in_camera, prior.sigma_rad),
-                   {JointProblem::kRotation}));
-    constexpr double kAlongNormal = 1e-3;  // Then it does not tell the spin about it.
-    p_.x_is_fixed_ = p_.x_is_fixed_ || prior.in_world.head<2>().norm() > kAlongNormal;
-  }
+  if (ceres::CostFunction* cost = NewPosePrior(prior.mean.rotation, mean, covariance))
+    AddPrior(cost, {JointProblem::kRotation, JointProblem::kTranslation}, true, std::move(feature));
+}
+
+void JointProblemBuilder::AddGravityPrior(const GravityPrior& prior) {
+  constexpr double kAlongNormal = 1e-3;  // Then it does not tell the spin about it.
+  Feature feature{Feature::Kind::kPrior, "gravity_prior", "the direction of gravity"};
+  feature.dof = 2;
+  feature.covariance = prior.sigma_rad * prior.sigma_rad * Eigen::Matrix3d::Identity();
+  AddPrior(NewDirectionMeasurement(prior.in_world, prior.in_camera, prior.sigma_rad),
+           {JointProblem::kRotation}, prior.in_world.head<2>().norm() > kAlongNormal,
+           std::move(feature));
 }
 
 JointProblem::JointProblem(const Observations& observations, const EstimationOptions& options)

@@ -56,7 +56,10 @@ class JointProblemBuilder {
   void AddLength(std::size_t index);
   void AddPoint(const Eigen::Vector2d& pixel, double sigma_px, int block, int feature);
   void AddTranslation();
-  void AddPriors();
+  void AddPosePrior(const PosePrior& prior);
+  void AddGravityPrior(const GravityPrior& prior);
+  void AddPrior(ceres::CostFunction* cost, std::vector<int> blocks, bool tells_spin,
+                Feature feature);
 
   // Whether it takes part.
   bool InPlane(const CircleObservation& circle) const {

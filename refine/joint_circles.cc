@@ -157,7 +157,7 @@ void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size
                    circle.id + ".diameters[" + std::to_string(index) + "]",
                    "a diameter of circle '" + circle.id + "'"};
   diameter.parent = feature;
-  diameter.line_covariance = fit.covariance;
+  diameter.covariance = fit.covariance;
   const int f = AddFeature(diameter);
   const int angle = p_.AddBlock(1, {});
   AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(points), has_camera_),

@@ -130,7 +130,7 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
       AddAxisLine(std::move(points), *line.fit, axis, feature.id, feature.name);
       continue;
     }
-    feature.line_covariance = line.fit->covariance;
+    feature.covariance = line.fit->covariance;
     if (direction < 0) direction = DirectionBlock(index);
     AddLine(std::move(points), line.fit->line, direction, model_.line_direction_rad, feature);
   }
@@ -157,7 +157,7 @@ void JointProblemBuilder::AddAxisLine(ImagePoints points, const LineFit& fit, in
   Feature feature{Feature::Kind::kPlaneLine, id, name};
   feature.dof = 2;
   feature.free_twice_cost = FreeTwiceCost(points, fit.line);
-  feature.line_covariance = fit.covariance;
+  feature.covariance = fit.covariance;
   const int f = AddFeature(feature), angle = AddConstant({axis * kRightAngle});
   AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(points), has_camera_),
                  {JointProblem::kRotation, JointProblem::kTranslation, origin_point_, angle}, f);

@@ -27,7 +27,7 @@ namespace circline {
 
 // What can be left out as a whole.
 struct Feature {
-  enum class Kind { kCircle, kCenterMark, kLine, kPlaneLine, kPoint, kLength, kAxis };
+  enum class Kind { kCircle, kCenterMark, kLine, kPlaneLine, kPoint, kLength, kAxis, kPrior };
   Kind kind;
   std::string id;                   // PoseHypothesis::left_out: "c1", "kerbs[3]", "length[0]".
   std::string name;                 // For people: "circle 'c1'".
@@ -36,8 +36,8 @@ struct Feature {
   int observation = -1, line = -1;  // Index of circle, pencil or length; line within its pencil.
   // Twice the cost of its own free fit, under the loss.
   double free_twice_cost = 0.0;
-  // Of the fit of a line.
-  std::optional<Eigen::Matrix3d> line_covariance = std::nullopt;
+  // Of the fit of a line, or of the turn [delta] that a prior knows.
+  std::optional<Eigen::Matrix3d> covariance = std::nullopt;
 };
 
 // Where a refinement stands.
@@ -62,8 +62,8 @@ class JointProblem : public Graph {
   // inactive. Refused where no circle of several can, or the origin lies beyond the horizon.
   Status Start(const CameraPose& seed, double log_focal, const std::vector<std::uint8_t>& reading,
                State* state) const;
-  // Makes an inactive line or circle active, at the state's pose. False for other features, and
-  // where it cannot lie there.
+  // Makes an inactive line, circle or prior active, at the state's pose. False for other features,
+  // and where it cannot lie there.
   bool Admit(std::size_t feature, State* state) const;
   // Runs ceres on it, under losses of these `widths`, one after the other, before their own. Not ok
   // where the evidence cannot be evaluated, or at the pace of a step that would not lead to a cost

@@ -33,8 +33,8 @@ double LogNormalInformation(const CircleObservation& circle) {
 }
 
 // The same of a line's fit: of where its direction may be seen, one degree of freedom, or of the
-// whole line, two.
-double LogLineInformation(const Eigen::Matrix3d& covariance, int dimensions) {
+// whole line, two; of a prior's direction, two, or turn, three.
+double LogTurnInformation(const Eigen::Matrix3d& covariance, int dimensions) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
   double log_information = 0.0;
   for (int k = 3 - dimensions; k < 3; ++k)
@@ -44,9 +44,10 @@ double LogLineInformation(const Eigen::Matrix3d& covariance, int dimensions) {
 
 // -log of the density of clutter over that of a feature at its mode, whatever the pose.
 double ClutterCost(const JointProblem& problem, const Feature& f) {
-  const int dimensions = std::min(f.dof, 2);
-  // Normals that face the camera, or directions across a line.
-  double volume = dimensions == 2 ? 2.0 * kPi : kPi;
+  constexpr double kAbout = 100.0;  // Standard deviations: where else a place might have been.
+  const int dimensions = std::min(f.dof, f.kind == Feature::Kind::kPrior ? 3 : 2);
+  // Rotations, normals that face the camera, or directions across a line.
+  double volume = dimensions == 3 ? 8.0 * kPi * kPi : dimensions == 2 ? 2.0 * kPi : kPi;
   double log_information = 2.0 * std::log(1e3);  // Of a milliradian, a thousandth.
   switch (f.kind) {
     case Feature::Kind::kCircle:
@@ -55,18 +56,17 @@ double ClutterCost(const JointProblem& problem, const Feature& f) {
       break;
     case Feature::Kind::kLine:
     case Feature::Kind::kPlaneLine:
-      if (f.line_covariance) log_information = LogLineInformation(*f.line_covariance, dimensions);
+    case Feature::Kind::kPrior:
+      if (f.covariance) log_information = LogTurnInformation(*f.covariance, dimensions);
       break;
     case Feature::Kind::kAxis:
       log_information = -2.0 * dimensions * std::log(problem.options().noise_model.pencil_axis_rad);
       break;
     case Feature::Kind::kCenterMark:
-    case Feature::Kind::kPoint: {
-      constexpr double kAbout = 100.0;  // Standard deviations: where else it might have been.
+    case Feature::Kind::kPoint:
       volume = kAbout * kAbout;
       log_information = 0.0;
       break;
-    }
     case Feature::Kind::kLength:
       volume = 1.0;  // Of its logarithm.
       break;
@@ -77,6 +77,8 @@ double ClutterCost(const JointProblem& problem, const Feature& f) {
     constexpr double kRadiusSigma = 0.003;  // Relative; the radius might have been any other.
     cost -= std::log(std::sqrt(2.0 * kPi) * kRadiusSigma);
   }
+  if (f.kind == Feature::Kind::kPrior)  // What more it knows is where the origin is.
+    cost += (f.dof - dimensions) * std::log(kAbout / std::sqrt(2.0 * kPi));
   return std::max(0.0, cost);
 }
 

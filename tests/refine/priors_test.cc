@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "circline/refine/estimate_pose.h"
 #include "tests/plane_scene.h"
@@ -222,6 +224,30 @@ GravityPrior Measured(const Vector3d& in_world, double sigma_rad, PlaneScene* sc
   return gravity;
 }
 
+// Odometry that has slipped.
+TEST(PosePriorTest, IsLeftOutWhereThePhotoContradictsIt) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlaneScene scene(0.6, 0.3, seed);
+    Observations observations = OneCircle(&scene);
+    observations.circles[0].radius = 1.0;
+    observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX()),
+                            scene.Pencil("L2", PencilDirection::kY, Vector3d::UnitY())};
+    for (const double off : {0.0, 0.2}) {
+      EstimationOptions options = LeastSquares();
+      options.pose_prior = Around(scene.pose, 0.01, 0.02);
+      options.pose_prior->mean.rotation =
+          ExpRotation(off * Vector3d(0.6, 0.0, 0.8)) * options.pose_prior->mean.rotation;
+      const PoseEstimate estimate = EstimatePose(observations, options);
+      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      const PoseHypothesis& h = estimate.hypotheses[0];
+      EXPECT_EQ(h.left_out,
+                off > 0.0 ? std::vector<std::string>{"pose_prior"} : std::vector<std::string>());
+      EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.02) << seed;
+      EXPECT_GT(h.probability, 0.99);
+    }
+  }
+}
+
 // A round thing on the ground: gravity tells which of its two planes is level.
 TEST(GravityPriorTest, DecidesBetweenThePosesOfACircle) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -299,6 +325,30 @@ TEST(GravityPriorTest, TellsTheSpinOfACircleOnAWall) {
     EXPECT_FALSE(h.RotationIsFree());
     EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.05) << turn;
     EXPECT_LT(h.SigmaRotation().maxCoeff(), 0.02) << turn;
+  }
+}
+
+// What the photo contradicts, an accelerometer in a braking car, is left out and named; what agrees
+// is not.
+TEST(GravityPriorTest, IsLeftOutWhereThePhotoContradictsIt) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlaneScene scene(0.6, 0.3, seed);
+    Observations observations = OneCircle(&scene);
+    observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX()),
+                            scene.Pencil("L2", PencilDirection::kY, Vector3d::UnitY())};
+    for (const double off : {0.0, 0.15, 0.6}) {
+      EstimationOptions options = LeastSquares();
+      options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.01, &scene);
+      options.gravity_prior->in_camera =
+          ExpRotation(off * Vector3d::UnitX()) * options.gravity_prior->in_camera;
+      const PoseEstimate estimate = EstimatePose(observations, options);
+      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      const PoseHypothesis& h = estimate.hypotheses[0];
+      EXPECT_EQ(h.left_out,
+                off > 0.0 ? std::vector<std::string>{"gravity_prior"} : std::vector<std::string>());
+      EXPECT_LT(NormalError(h, scene), 0.02) << seed;
+      EXPECT_GT(h.probability, 0.99);
+    }
   }
 }
 
