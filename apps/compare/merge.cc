@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 
@@ -71,12 +72,43 @@ Status CheckFolders(const std::vector<std::string>& folders, const std::string& 
   return Status::Ok();
 }
 
-// Every index of the set once, the same solvers and flags everywhere.
+// What the photos of one run have in common.
+class OneRun {
+ public:
+  // What is not as in the records before, to follow the name of its folder; empty where nothing is.
+  std::string Add(const ImageRecord& record) {
+    if (!first_) first_ = record;
+    if (record.set_size != first_->set_size) {
+      return " is of a set of " + std::to_string(record.set_size) + " images, not " +
+             std::to_string(first_->set_size);
+    }
+    if (record.flags != first_->flags)
+      return " ran with " + FlagText(record.flags) + ", others with " + FlagText(first_->flags);
+    if (!record.error.empty()) return "";
+    const bool guessed = !record.camera_from.empty();
+    if (cameras_.empty()) {
+      keys_ = KeysOf(record);
+      guessed_ = guessed;
+    }
+    if (keys_ != KeysOf(record)) return " ran other solvers or losses";
+    const Camera& camera = cameras_.emplace(record.camera.id, record.camera).first->second;
+    const bool same = guessed == guessed_ && (guessed || IsSameLens(camera, record.camera));
+    return same ? "" : " ran with another camera '" + record.camera.id + "'";
+  }
+  std::size_t set_size() const { return first_ ? first_->set_size : 0; }
+
+ private:
+  std::optional<ImageRecord> first_;
+  std::vector<SolverKey> keys_;
+  std::map<std::string, Camera> cameras_;  // By id, of the photos that could be used.
+  bool guessed_ = false;                   // Those cameras; each photo has one of its own.
+};
+
+// Every index of the set once, of one run.
 Status CheckImages(const std::vector<std::string>& folders) {
   Merger merger(folders);
-  std::size_t expected = 0, set_size = 0;
-  std::optional<std::vector<SolverKey>> keys;
-  std::vector<std::string> flags;
+  OneRun run;
+  std::size_t expected = 0;
   while (const Source* source = merger.Next()) {
     ImageRecord record;
     const Status status = ParseRecord(source->lines, &record);
@@ -87,28 +119,13 @@ Status CheckImages(const std::vector<std::string>& folders) {
           "--merge: image " + std::to_string(twice ? source->index : expected) +
           (twice ? " (" + record.name + ") is there twice" : " is missing: is a shard not named?"));
     }
-    if (expected++ == 0) {
-      set_size = record.set_size;
-      flags = record.flags;
-    }
-    if (record.set_size != set_size) {
-      return Status::Invalid("--merge: " + source->folder + " is of a set of " +
-                             std::to_string(record.set_size) + " images, not " +
-                             std::to_string(set_size));
-    }
-    if (record.flags != flags) {
-      return Status::Invalid("--merge: " + source->folder + " ran with " + FlagText(record.flags) +
-                             ", others with " + FlagText(flags));
-    }
-    if (!record.error.empty()) continue;
-    if (!keys) keys = KeysOf(record);
-    if (*keys != KeysOf(record)) {
-      return Status::Invalid("--merge: " + source->folder + " ran other solvers or losses");
-    }
+    ++expected;
+    const std::string difference = run.Add(record);
+    if (!difference.empty()) return Status::Invalid("--merge: " + source->folder + difference);
   }
-  if (expected < set_size) {
+  if (expected < run.set_size()) {
     return Status::Invalid("--merge: image " + std::to_string(expected) + " of " +
-                           std::to_string(set_size) + " is missing: is a shard not named?");
+                           std::to_string(run.set_size()) + " is missing: is a shard not named?");
   }
   return expected > 0 ? Status::Ok() : Status::Invalid("--merge: there are no images");
 }

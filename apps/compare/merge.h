@@ -11,7 +11,7 @@ namespace circline::apps {
 
 // Writes results.jsonl, observations.jsonl, timings.jsonl and the overlays as a run without --shard
 // would have; `folders` in any order. Nothing is written unless every folder is finished, all ran
-// the same solvers with the same flags, and together they have every image once.
+// the same solvers with the same flags and cameras, and together they have every image once.
 Status MergeFolders(const std::vector<std::string>& folders, const std::string& output);
 
 }  // namespace circline::apps

@@ -128,8 +128,8 @@ SolverRegistry AllSolvers() {
   return registry;
 }
 
-// The flags beside solvers and losses that shape what is found in a photo; and those that say how
-// to see photos without a scene file.
+// The flags beside solvers and losses that shape what is found in a photo; and those that say which
+// photos are read, and how to see them without a scene file.
 std::vector<std::string> TuningFlags() {
   return {"conic_loss",
           "conic_loss_scale_px",
@@ -149,7 +149,9 @@ std::vector<std::string> TuningFlags() {
           "max_pencils",
           "seed"};
 }
-std::vector<std::string> InputFlags() { return {"fov_deg", "focal_px", "roi", "circle_radius"}; }
+std::vector<std::string> InputFlags() {
+  return {"fov_deg", "focal_px", "roi", "circle_radius", "max_megapixels"};
+}
 
 using FlagInfo = gflags::CommandLineFlagInfo;
 

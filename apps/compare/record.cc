@@ -168,6 +168,11 @@ bool SolverKey::operator==(const SolverKey& other) const {
          std::tie(other.solver, other.stage, other.loss, other.scale_px);
 }
 
+bool IsSameLens(const Camera& a, const Camera& b) {
+  return std::tie(a.model, a.fx, a.fy, a.cx, a.cy, a.distortion) ==
+         std::tie(b.model, b.fx, b.fy, b.cx, b.cy, b.distortion);
+}
+
 std::vector<SolverKey> KeysOf(const ImageRecord& record) {
   std::vector<SolverKey> keys;
   for (const SolverRecord& solver : record.solvers) keys.push_back(solver.key);

@@ -74,6 +74,9 @@ struct ImageRecord {
   std::vector<SolverRecord> solvers;
 };
 
+// Whether both see the same pixel along the same ray. Their sizes may be those of photos.
+bool IsSameLens(const Camera& a, const Camera& b);
+
 // Of its solvers, in order.
 std::vector<SolverKey> KeysOf(const ImageRecord& record);
 

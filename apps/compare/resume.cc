@@ -39,6 +39,12 @@ Status CheckFlags(const std::string& folder, const std::string& flags) {
   return before == flags ? Status::Ok() : OtherRun(folder, FirstDifference(before, flags));
 }
 
+// Flags say how a camera is guessed.
+bool IsSameCamera(const ImageRecord& record, const SceneImage& image, bool guess) {
+  if (guess || !record.camera_from.empty()) return guess && !record.camera_from.empty();
+  return IsSameLens(record.camera, image.observations.camera);
+}
+
 Status FindDone(const CompareOptions& options, const ImageSet& images,
                 const std::vector<SolverKey>& solvers, DonePart* done) {
   const std::string& folder = options.output;
@@ -52,10 +58,13 @@ Status FindDone(const CompareOptions& options, const ImageSet& images,
       return OtherRun(folder, "its image " + std::to_string(done->images + 1) + " is " +
                                   record.name + ", not " + name);
     }
-    if (record.set_size != images.At(done->images).set_size)
+    const SceneImage image = images.At(done->images);
+    if (record.set_size != image.set_size)
       return OtherRun(folder, "it is of a set of " + std::to_string(record.set_size) + " images");
     if (record.error.empty() && KeysOf(record) != solvers)
       return OtherRun(folder, "its solvers or losses differ");
+    if (record.error.empty() && !IsSameCamera(record, image, options.inputs.guess.wanted))
+      return OtherRun(folder, "the camera of " + name + " differs");
     if (record.flags != options.unusual_flags) {
       return OtherRun(folder, "it was made with " + FlagText(record.flags) + ", not with " +
                                   FlagText(options.unusual_flags));

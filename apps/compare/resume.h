@@ -22,7 +22,7 @@ struct DonePart {
 };
 
 // Clears a folder of the results of an earlier run, or, with `resume`, finds what of them stands.
-// Not ok: they are those of other images, solvers or flags. Photos that could not be read are named
+// Not ok: they are those of other images, cameras, solvers or flags. Photos that could not be read are named
 // on stderr again.
 Status PrepareFolder(const CompareOptions& options, const ImageSet& images,
                      const std::vector<SolverKey>& solvers, DonePart* done);

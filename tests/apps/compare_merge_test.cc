@@ -73,6 +73,28 @@ TEST_F(CompareMerge, RefusesWhatIsNotOneSet) {
   }
 }
 
+TEST_F(CompareMerge, RefusesOtherCameras) {
+  for (const char* name : {"0.png", "1.png"}) Board(35.0).Paint(folder_ / name);
+  const auto run = [&](const std::string& flags, const std::string& output) {
+    return RunCompare("--overlays=false --images='" + folder_ / "?.png" + "' " + flags +
+                      " --output='" + folder_ / output + "'");
+  };
+  const auto camera = [&](const std::string& focal) {
+    return " --camera='" +
+           folder_.Write(focal + ".txt", "1 SIMPLE_PINHOLE 320 240 " + focal + " 160 120\n") + "'";
+  };
+  ASSERT_EQ(run("--shard=0/2" + camera("300"), "a").exit_code, 0);
+  ASSERT_EQ(run("--shard=1/2" + camera("301"), "longer").exit_code, 0);
+  ASSERT_EQ(run("--shard=1/2", "guess").exit_code, 0);
+  ASSERT_EQ(run("--shard=1/2" + camera("300"), "b").exit_code, 0);
+  for (const char* other : {"longer", "guess"}) {
+    const Outcome outcome = Merge(std::string("a ") + other);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_CONTAINS(outcome.err, (std::string(other) + " ran with another camera").c_str());
+  }
+  EXPECT_EQ(Merge("a b").exit_code, 0);
+}
+
 TEST_F(CompareMerge, SweepNamesTheBestAndSavesItsFlags) {
   const std::string best = folder_ / "best.flags";
   const Outcome outcome =

@@ -145,7 +145,30 @@ TEST(CompareResume, RefusesTheResultsOfAnotherRun) {
   outcome = RunCompare(arguments + "--seed=2 --max_pencils=4");
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_CONTAINS(outcome.err, "with the default flags, not with --max_pencils=4 --seed=2");
+  outcome = RunCompare(arguments + "--max_megapixels=50");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_CONTAINS(outcome.err, "with the default flags, not with --max_megapixels=50");
   EXPECT_EQ(RunCompare(arguments + "--seed=1").exit_code, 0);  // The default, said aloud.
+  EXPECT_EQ(ReadAll(folder / "out/results.jsonl"), before);
+}
+
+TEST(CompareResume, RefusesTheResultsOfAnotherCamera) {
+  const TestFolder folder;
+  Board(35.0).Paint(folder / "board.png");
+  const std::string arguments = "--resume --overlays=false --images='" + folder / "board.png" +
+                                "' --output='" + folder / "out" + "' ";
+  const auto camera = [&](const std::string& focal) {
+    return "--camera='" +
+           folder.Write(focal + ".txt", "1 SIMPLE_PINHOLE 320 240 " + focal + " 160 120\n") + "'";
+  };
+  ASSERT_EQ(RunCompare(arguments + camera("300")).exit_code, 0);
+  const std::string before = ReadAll(folder / "out/results.jsonl");
+  for (const std::string& other : {camera("301"), std::string()}) {
+    const Outcome outcome = RunCompare(arguments + other);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_CONTAINS(outcome.err, "board.png differs");
+  }
+  EXPECT_EQ(RunCompare(arguments + camera("300")).exit_code, 0);
   EXPECT_EQ(ReadAll(folder / "out/results.jsonl"), before);
 }
 
