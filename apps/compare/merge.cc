@@ -162,6 +162,7 @@ Status MergeFolders(const std::vector<std::string>& folders, const std::string& 
     status = CopyOverlays(folder, output);
     if (!status.ok()) return status;
   }
+  MarkFinished(output);  // Of a run that was stopped there before.
   return Status::Ok();
 }
 

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Lies in the folder while a run is under way, and says with which flags.
+// Lies in the folder while photos are missing, and says with which flags the run was begun.
 std::string MarkerPath(const std::string& folder) { return folder + "/unfinished.flags"; }
 
 Status OtherRun(const std::string& folder, const std::string& what) {

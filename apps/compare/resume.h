@@ -22,12 +22,12 @@ struct DonePart {
 };
 
 // Clears a folder of the results of an earlier run, or, with `resume`, finds what of them stands.
-// Not ok: they are those of other images, cameras, solvers or flags. Photos that could not be read are named
-// on stderr again.
+// Not ok: they are those of other images, cameras, solvers or flags. Photos that could not be read
+// are named on stderr again.
 Status PrepareFolder(const CompareOptions& options, const ImageSet& images,
                      const std::vector<SolverKey>& solvers, DonePart* done);
 
-// A folder is unfinished from PrepareFolder until this.
+// A folder is unfinished, as photos are missing, from PrepareFolder until this.
 void MarkFinished(const std::string& folder);
 bool IsUnfinished(const std::string& folder);
 

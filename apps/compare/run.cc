@@ -158,8 +158,8 @@ Status RunComparison(const ImageSet& images, const CompareOptions& options, cons
     SayOnStderr("circline_compare: " + status.message);
     ranks.Abort(kExitUnreadable);
   }
-  if (status.ok()) status = FinishFolder(options.output, options.finish, result);
   if (status.ok()) MarkFinished(options.output);
+  if (status.ok()) status = FinishFolder(options.output, options.finish, result);
   return status;
 }
 

@@ -73,6 +73,21 @@ TEST_F(CompareMerge, RefusesWhatIsNotOneSet) {
   }
 }
 
+// Where all photos are done: another run was stopped in the folder, or there was no flag to save.
+TEST_F(CompareMerge, AFolderWithAllPhotosIsFinished) {
+  const std::string flags = "--overlays=false --solvers=parallel_circles ";
+  for (const std::string i : {"0", "1"}) {
+    const Outcome outcome =
+        Run(flags + "--shard=" + i + "/2 --save_options='" + folder_ / "best'", i);
+    EXPECT_CONTAINS(outcome.err, "--save_options: no refined solver has an answer");
+    EXPECT_FALSE(std::filesystem::exists(folder_ / i + "/unfinished.flags"));
+  }
+  std::filesystem::create_directory(folder_ / "merged");
+  folder_.Write("merged/unfinished.flags", "--seed=7\n");
+  EXPECT_EQ(Merge("0 1").exit_code, 1);  // One photo is not there.
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "merged/unfinished.flags"));
+}
+
 TEST_F(CompareMerge, RefusesOtherCameras) {
   for (const char* name : {"0.png", "1.png"}) Board(35.0).Paint(folder_ / name);
   const auto run = [&](const std::string& flags, const std::string& output) {
