@@ -92,6 +92,7 @@ Status WriteAll(const cv::Mat& photo, Reconstruction* made, const ModelOptions& 
   made->camera.width = photo.cols;
   made->camera.height = photo.rows;
   FaceTheCamera(made->pose, &made->model);
+  NamePatches(&made->model);
   TextureModel(photo, made->camera, made->pose, options, &made->model);
   std::vector<std::string> caption;
   for (const MeasuredValue& value : made->measured) {

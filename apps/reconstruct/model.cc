@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "apps/common/output_file.h"
 #include "apps/compare/encode.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/plane_evidence.h"
@@ -45,7 +46,7 @@ std::vector<Patch> DiscPatches(const PoseHypothesis& hypothesis, double lift) {
     if (std::abs(center.z()) < lift) center.z() += side * lift;
     const double r = circle.radius;
     Patch patch;
-    patch.name = "circle_" + FileSafe(circle.id);
+    patch.name = "circle_" + circle.id;
     patch.shape = PatchShape::kDisc;
     patch.corner = center - Eigen::Vector3d(r, r, 0.0);
     patch.u = {2.0 * r, 0.0, 0.0};
@@ -131,7 +132,7 @@ std::vector<Patch> Faces(const View& view, const Observations& resolved,
     if (a == nullptr || b == nullptr || a == b) continue;
     const double height = 0.5 * (a->height + b->height);
     Patch patch;
-    patch.name = "face_" + FileSafe(segment.name);
+    patch.name = "face_" + segment.name;
     patch.corner = a->foot;
     patch.u = b->foot - a->foot;
     patch.v = {0.0, 0.0, height};
@@ -144,15 +145,6 @@ std::vector<Patch> Faces(const View& view, const Observations& resolved,
 
 double CenterSigmaPx(double sigma_px, std::size_t num_points) {
   return sigma_px / std::sqrt(0.5 * static_cast<double>(num_points));
-}
-
-std::string FileSafe(const std::string& name) {
-  std::string safe = name;
-  for (char& c : safe) {
-    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '.';
-    if (!plain) c = '_';
-  }
-  return safe;
 }
 
 Model PlaneModel(const cv::Mat& photo, const Observations& observations,
@@ -185,6 +177,19 @@ void FaceTheCamera(const CameraPose& pose, Model* model) {
     patch.corner += side;
     side = -side;
   }
+}
+
+void NamePatches(Model* model) {
+  std::vector<std::string> files;
+  for (const Patch& patch : model->patches) {
+    std::string& file = files.emplace_back(patch.name);
+    std::replace_if(
+        file.begin(), file.end(),
+        [](unsigned char c) { return std::isalnum(c) == 0 && c != '-' && c != '.'; }, '_');
+    file += ".png";
+  }
+  const std::vector<std::string> stems = UniqueStems(files);
+  for (std::size_t i = 0; i < stems.size(); ++i) model->patches[i].name = stems[i];
 }
 
 void TextureModel(const cv::Mat& photo, const Camera& camera, const CameraPose& pose,

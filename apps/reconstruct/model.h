@@ -73,8 +73,9 @@ void FaceTheCamera(const CameraPose& pose, Model* model);
 void TextureModel(const cv::Mat& photo, const Camera& camera, const CameraPose& pose,
                   const ModelOptions& options, Model* model);
 
-// A name that can be part of a file name.
-std::string FileSafe(const std::string& name);
+// Gives all patches names of files, letters, digits, "_", "-" and "." only, no two of which are the
+// same; most stay what they are.
+void NamePatches(Model* model);
 
 }  // namespace circline::apps
 

@@ -22,7 +22,7 @@ enum class PatchShape {
 
 // s and t run from 0 to 1, in the texture s to the right and t upwards.
 struct Patch {
-  std::string name;  // Of files and materials, too: letters, digits, "_", "-", "." only.
+  std::string name;  // Unlike those of others; after NamePatches of files and materials, too.
   PatchShape shape = PatchShape::kParallelogram;
   Eigen::Vector3d corner, u, v;
   Eigen::Vector3d w = Eigen::Vector3d::Zero();  // Of a mantle: as long as u, at right angles to it.

@@ -43,7 +43,7 @@ Status FacePatch(const FaceObservation& face, const std::string& world_plane, co
     corners.push_back(point);
     extent.extend(point);
   }
-  patch->name = "face_" + FileSafe(face.id);
+  patch->name = "face_" + face.id;
   patch->corner << extent.min(), 0.0;
   patch->u = {extent.sizes().x(), 0.0, 0.0};
   patch->v = {0.0, extent.sizes().y(), 0.0};
@@ -148,13 +148,12 @@ Status AddCylinder(const CylinderObservation& cylinder, const Observations& obse
   const double radius = upper > 0.0 ? 0.5 * (base->radius + upper) : base->radius;
   // What was the plane's disc is now the cylinder's.
   const auto is_own = [&](const Patch& patch) {
-    return patch.name == "circle_" + FileSafe(cylinder.base) ||
-           patch.name == "circle_" + FileSafe(cylinder.rim);
+    return patch.name == "circle_" + cylinder.base || patch.name == "circle_" + cylinder.rim;
   };
   model->patches.erase(std::remove_if(model->patches.begin(), model->patches.end(), is_own),
                        model->patches.end());
-  AddMantle("cylinder_" + FileSafe(cylinder.id), foot, foot + Vector3d(0.0, 0.0, height.value),
-            radius, eye, model);
+  AddMantle("cylinder_" + cylinder.id, foot, foot + Vector3d(0.0, 0.0, height.value), radius, eye,
+            model);
   model->heights.push_back(
       {cylinder.id, height.value, height.sigma, std::copysign(cylinder.true_height, height.value)});
   return Status::Ok();

@@ -134,6 +134,27 @@ TEST_F(ReconstructCylinder, ModelsAFace) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
+// Ids that differ in what no file name has, or in the case of letters.
+TEST_F(ReconstructCylinder, EachPatchHasFilesOfItsOwn) {
+  const std::string here =
+      Numbers({Pixel(-.6, -.15, 0), Pixel(-.4, -.15, 0), Pixel(-.4, .15, 0), Pixel(-.6, .15, 0)});
+  const std::string beside =
+      Numbers({Pixel(-1, -.15, 0), Pixel(-.8, -.15, 0), Pixel(-.8, .15, 0), Pixel(-1, .15, 0)});
+  const auto face = [](const std::string& id, const std::string& corners) {
+    return "{ id: \"" + id + "\", corners: " + corners + ", plane: \"ground\" }";
+  };
+  const Outcome outcome =
+      Run(", faces: [ " + face("a label", here) + ", " + face("a/label", beside) + ", " +
+          face("A.1", here) + ", " + face("a.1", beside) + " ]");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const cv::Vec4b label(kLabel, kLabel, kLabel, 255), ground(kGround, kGround, kGround, 255);
+  EXPECT_EQ(Middle("face_a_label"), label);
+  EXPECT_EQ(Middle("face_a_label_2"), ground);
+  EXPECT_EQ(Middle("face_A.1"), label);
+  EXPECT_EQ(Middle("face_a.1_2"), ground);
+  EXPECT_CONTAINS(ReadAll(folder_ / "out/model.obj"), "usemtl face_a_label_2\n");
+}
+
 TEST_F(ReconstructCylinder, SaysWhatIsWrong) {
   const Outcome outcome = Run(Tin("rim: \"leaning\""));
   EXPECT_EQ(outcome.exit_code, 1);
