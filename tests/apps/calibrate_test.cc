@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "apps/common/scene.h"
+#include "apps/common/text.h"
 #include "circline/estimators/basics.h"
 #include "tests/apps/board_set.h"
 #include "tests/apps/run_compare.h"
@@ -174,6 +175,16 @@ TEST_F(CalibrateTest, ItsReportShowsThePhotosAndWhatEachHasAdded) {
   for (std::size_t k = 1; k < sigmas.size(); ++k)
     EXPECT_LE(sigmas[k][1].get<double>(), 1.001 * sigmas[k - 1][1].get<double>());
   EXPECT_EQ(sigmas.back()[0], 5);
+}
+
+TEST_F(CalibrateTest, ItsReportShowsItsNotes) {
+  std::filesystem::copy(folder_ / "board0.png", folder_ / "board9.png");
+  ASSERT_EQ(Calibrate(Photos() + " --output=" + Output()).exit_code, 0);
+  const nlohmann::json notes = ReadJson(Output() + "/calibration.json")["notes"];
+  ASSERT_FALSE(notes.empty());
+  for (const std::string note : notes)
+    EXPECT_CONTAINS(ReadAll(Output() + "/report.html"),
+                    ("<li>" + EscapeHtml(note) + "</li>").c_str());
 }
 
 TEST_F(CalibrateTest, NamesAGrossPhotoOfTen) {
