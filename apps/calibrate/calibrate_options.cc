@@ -70,7 +70,12 @@ Status ParametersFromFlags(CalibrateOptions* options) {
 }  // namespace
 
 Status CalibrateOptionsFromFlags(CalibrateOptions* options) {
-  Status status = OptionsFromFlags(&options->compare);
+  // All photos count, in one adjustment of its own.
+  Status status = CheckNotGiven("circline_calibrate",
+                                {"merge", "plugin", "resume", "solvers", "peers", "export_as",
+                                 "save_options", "list_solvers", "conic_distance"});
+  if (status.ok()) status = OptionsFromFlags(&options->compare);
+  if (status.ok()) status = CheckOneLoss(options->compare);
   if (status.ok()) status = ModelFromFlag(&options->model);
   if (status.ok()) status = ParametersFromFlags(options);
   if (status.ok() && !RigidWorldFromName(FLAGS_rigid, &options->adjust.rigid))

@@ -221,6 +221,13 @@ Status OptionsFromFlags(CompareOptions* options) {
   return Status::Ok();
 }
 
+Status CheckOneLoss(const CompareOptions& options) {
+  return options.losses.size() == 1
+             ? Status::Ok()
+             : Status::Invalid(
+                   "--robust_loss, --loss_scale_px: only circline_compare takes a list");
+}
+
 std::vector<std::string> SolverNames() {
   const SolverRegistry registry = AllSolvers();
   std::vector<std::string> names;

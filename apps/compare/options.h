@@ -40,6 +40,9 @@ struct CompareOptions {
 // and the libraries of --plugin is read.
 Status OptionsFromFlags(CompareOptions* options);
 
+// For programs that make one answer of a photo: not ok where losses or their scales are lists.
+Status CheckOneLoss(const CompareOptions& options);
+
 // Loads the libraries of --plugin, whose solvers then are among the others (LoadPlugins).
 Status PluginsFromFlags();
 

@@ -42,9 +42,8 @@ constexpr char kUsage[] =
     "\n"
     "Writes model.glb, model.obj, model.mtl and textures (Z is up), measurements.csv and "
     "views.png. "
-    "The flags "
-    "for inputs,\n"
-    "detection and losses are those of circline_compare; its others have no meaning here.\n"
+    "Flags for inputs,\n"
+    "detection, solvers and losses are those of circline_compare.\n"
     "Exit code 0: done; 1: the photo could not be read or gives no pose; 2: unusable flags or "
     "scene file.";
 
@@ -249,7 +248,11 @@ int Reconstruct() {
   ModelOptions model_options;
   ImageSet images;
   SceneImage image;
-  Status status = OptionsFromFlags(&options);
+  Status status =
+      CheckNotGiven("circline_reconstruct",
+                    {"merge", "resume", "export_as", "save_options", "list_solvers", "overlays"});
+  if (status.ok()) status = OptionsFromFlags(&options);
+  if (status.ok()) status = CheckOneLoss(options);
   if (status.ok()) status = ModelFromFlags(&model_options);
   if (status.ok()) status = ImagesFromFlags(options.inputs, &images);
   if (status.ok()) status = FindImage(images, &image);

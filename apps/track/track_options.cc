@@ -62,9 +62,8 @@ Status CheckVideoOut(const TrackOptions& options) {
 Status TrackOptionsFromFlags(TrackOptions* options) {
   Status status = CheckSource();
   if (status.ok()) status = OptionsFromFlags(&options->compare);
+  if (status.ok()) status = CheckOneLoss(options->compare);
   if (!status.ok()) return status;
-  if (options->compare.losses.size() > 1)
-    return Status::Invalid("--robust_loss, --loss_scale_px: a track takes one, not a list");
   options->video = FLAGS_video;
   options->video_out = FLAGS_video_out;
   options->timestamps = FLAGS_timestamps;

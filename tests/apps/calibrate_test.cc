@@ -255,7 +255,10 @@ TEST_F(CalibrateTest, NamesThePhotoThatAnotherOneRepeats) {
 TEST_F(CalibrateTest, UnusableFlagsWriteNothing) {
   for (const char* flag :
        {"--model=round", "--fix=k9", "--free=k1", "--rigid=perhaps", "--robust_loss=none",
-        "--conic_distance=far", "--fix=aspect --free=aspect", "--nonsense=1"}) {
+        "--conic_distance=far", "--fix=aspect --free=aspect", "--export_as=colmap",
+        "--save_options=best.flags", "--solvers=joint", "--resume", "--peers", "--list_solvers",
+        "--merge=a,b", "--plugin=a.so", "--conic_distance=sampson", "--robust_loss=huber,cauchy",
+        "--loss_scale_px=1,2", "--nonsense=1"}) {
     const Outcome run = Calibrate(Photos() + " " + flag + " --output=" + Output());
     EXPECT_EQ(run.exit_code, 2) << flag << run.err;
     EXPECT_FALSE(std::filesystem::exists(Output())) << flag;

@@ -223,6 +223,11 @@ TEST_F(Reconstruct, SaysWhatItCannotDo) {
   expect("--image=box.png --texture_px=1", 2, "--texture_px must be");
   expect("--image=box.png --margin=nan", 2, "--margin must be");
   expect("--image=box.png --hypothesis=9", 1, "--hypothesis=9: there are");
+  for (const char* flag : {"--export_as=colmap", "--save_options=best.flags", "--resume",
+                           "--merge=a,b", "--list_solvers", "--overlays=false"})
+    expect(std::string("--image=box.png ") + flag, 2, "is not a flag of circline_reconstruct");
+  for (const char* flag : {"--robust_loss=huber,cauchy", "--loss_scale_px=1,2"})
+    expect(std::string("--image=box.png ") + flag, 2, "only circline_compare takes a list");
   expect("--image=box.png --bogus", 2, "unknown flag --bogus");
   std::filesystem::remove(folder_ / "box.png");
   expect("--image=box.png", 1, "the file does not exist");
