@@ -66,7 +66,10 @@ std::vector<std::string> PhotosInFolder(const std::string& folder) {
 
 Status ListPhotos(const std::string& patterns, std::vector<std::string>* paths) {
   paths->clear();
-  for (const std::string& pattern : SplitList(patterns)) {
+  std::error_code error;
+  const bool is_one = std::filesystem::exists(patterns, error);
+  for (const std::string& pattern :
+       is_one ? std::vector<std::string>{patterns} : SplitList(patterns)) {
     if (pattern.empty()) continue;
     std::vector<std::string> named;
     const Status status = ExpandPattern(pattern, &named);

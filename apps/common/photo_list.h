@@ -15,7 +15,8 @@ std::vector<std::string> PhotosInFolder(const std::string& folder);
 
 // Paths of the photos that a comma-separated list of files, folders and wildcards names, sorted
 // within each. A plain file name need not exist (reading it will tell); a wildcard that matches
-// nothing, or a folder without photos, is an error.
+// nothing, or a folder without photos, is an error. What exists under the whole name is one, commas
+// and all.
 Status ListPhotos(const std::string& patterns, std::vector<std::string>* paths);
 
 }  // namespace circline::apps

@@ -25,6 +25,9 @@ TEST(PhotoList, NamesFilesFoldersAndWildcards) {
   EXPECT_EQ(names(), "/b.jpg /c.jpg ");
   ASSERT_TRUE(ListPhotos(folder / "c.jpg" + ", " + folder / "missing.jpg", &paths).ok());
   EXPECT_EQ(names(), "/c.jpg /missing.jpg ");
+  folder.Write("left, right.jpg", "x");
+  ASSERT_TRUE(ListPhotos(folder / "left, right.jpg", &paths).ok());
+  EXPECT_EQ(names(), "/left, right.jpg ");
   EXPECT_CONTAINS(ListPhotos(folder / "*.tif", &paths).message, "nothing matches");
 }
 

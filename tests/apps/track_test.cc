@@ -107,11 +107,12 @@ TEST_F(TrackTest, ReadsTheVideoThatItWrites) {
   ASSERT_EQ(wrote.exit_code, 0) << wrote.err;
   ASSERT_TRUE(std::filesystem::exists(folder_ / "out/overlays.avi"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out/part.overlays.avi"));
-  const Outcome read =
-      Track("--video=" + (folder_ / "out/overlays.avi") + " --overlays=false", "again");
+  const std::string video = folder_ / "left,right.avi";
+  std::filesystem::rename(folder_ / "out/overlays.avi", video);
+  const Outcome read = Track("--video=" + video + " --overlays=false", "again");
   EXPECT_EQ(read.exit_code, 0) << read.err;
   const std::vector<json> results = Results("again");
-  EXPECT_EQ(results.size(), 6U);
+  ASSERT_EQ(results.size(), 6U);
   EXPECT_CONTAINS(results.back()["image"].get<std::string>(), "#000005");
 }
 
