@@ -28,11 +28,19 @@ constexpr char kTooManyKeys[] = "a map has too many keys", kTooDeep[] = "is nest
 
 std::string DuplicateKey(const std::string& key) { return "key '" + key + "' stands there twice"; }
 
+// "007" is a name: as a number it would lose its zeros.
+bool HasLeadingZero(const std::string& text) {
+  const std::size_t first = text.find_first_not_of("+-");
+  return first != std::string::npos && text[first] == '0' &&
+         text.find_first_of("0123456789", first + 1) == first + 1;
+}
+
 // YAML 1.1 writes what is no number as ".inf" and ".nan", which the reader of values then refuses.
 Json PlainScalar(const std::string& text) {
   int whole = 0;
   double number = 0.0;
   if (text.empty() || text == "~" || text == "null") return {};
+  if (HasLeadingZero(text)) return text;
   if (ParseInt(text, &whole)) return whole;
   if (text.find_first_not_of("+-.0123456789eE") == std::string::npos) {
     if (ParseDouble(text, &number)) return number;

@@ -38,6 +38,8 @@ TEST(Document, ScalarsAreNumbersWherePlain) {
       Parsed("a: [ 3, -2.5, 1., .5, 1e3, +7, \"3\", '4', x3, 1.2.3, ., e, -, 0x10 ]\nb:\n"),
       OrderedJson::parse(R"({"a": [3, -2.5, 1.0, 0.5, 1000.0, 7, "3", "4", "x3", "1.2.3", ".", "e",
                                    "-", "0x10"], "b": null})"));
+  EXPECT_EQ(Parsed("a: [ 007, -01, 00.5, 0, 0.5, -0.5, 0e1, 10 ]"),
+            OrderedJson::parse(R"({"a": ["007", "-01", "00.5", 0, 0.5, -0.5, 0, 10]})"));
   EXPECT_TRUE(std::isinf(Parsed("a: -.Inf")["a"].get<double>()));
   EXPECT_TRUE(std::isnan(Parsed("a: .nan")["a"].get<double>()));
   EXPECT_EQ(Parsed("a: 4294967680")["a"].get<double>(), 4294967680.0);
