@@ -84,9 +84,10 @@ StorageNode GetAny(const StorageNode& node, const std::vector<std::string>& name
   return node.Get(names.front());
 }
 
-Status ReadOpenCvCalibration(const std::string& path, std::vector<Camera>* cameras) {
+Status ParseOpenCvCalibration(const std::string& path, const std::string& text,
+                              std::vector<Camera>* cameras) {
   StorageDocument document;
-  Status status = document.Open(path);
+  Status status = document.Parse(path, text);
   if (!status.ok()) return status;
   const StorageNode root(document.root(), path, &status);
   const StorageNode matrix = GetAny(root, {"camera_matrix", "Camera_Matrix", "cameraMatrix"});
@@ -145,7 +146,7 @@ Status ReadCameraFile(const std::string& path, std::vector<Camera>* cameras) {
   std::string text;
   const Status status = ReadTextFile(path, &text);
   if (!status.ok()) return status;
-  const Status parsed = LooksLikeStorage(text) ? ReadOpenCvCalibration(path, cameras)
+  const Status parsed = LooksLikeStorage(text) ? ParseOpenCvCalibration(path, text, cameras)
                                                : ParseColmapCameras(path, text, cameras);
   if (!parsed.ok()) cameras->clear();
   return parsed;

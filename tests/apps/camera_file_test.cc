@@ -1,7 +1,10 @@
 #include "apps/common/camera_file.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <array>
+#include <string>
 #include <vector>
 
 #include "tests/apps/test_files.h"
@@ -53,6 +56,20 @@ TEST(CameraFile, ReadsAnOpenCvCalibration) {
   EXPECT_EQ(cameras[0].fx, 500.5);
   EXPECT_EQ(cameras[0].cy, 240.0);
   EXPECT_EQ(cameras[0].distortion, (std::array<double, 8>{-0.2, 0.1, 1e-3, -2e-3, 0.05, 0, 0, 0}));
+}
+
+// What can be read once only, as of --camera=<(...).
+TEST(CameraFile, ReadsAPipe) {
+  std::array<int, 2> ends{};
+  ASSERT_EQ(pipe(ends.data()), 0);
+  const std::string text = kCalibration;
+  ASSERT_EQ(write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  close(ends[1]);
+  std::vector<Camera> cameras;
+  const Status status = ReadCameraFile("/dev/fd/" + std::to_string(ends[0]), &cameras);
+  close(ends[0]);
+  ASSERT_TRUE(status.ok()) << status.message;
+  EXPECT_EQ(cameras[0].fx, 500.5);
 }
 
 TEST(CameraFile, ReadsAFisheyeCalibration) {
