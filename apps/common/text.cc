@@ -97,7 +97,9 @@ std::string FormatFixed(double value, int decimals) {
   if (!std::isfinite(value)) return "-";
   char buffer[64];
   std::snprintf(buffer, sizeof(buffer), "%.*f", decimals, value);
-  return buffer;
+  const std::string text = buffer;
+  const bool is_zero = text.find_first_not_of("-0.") == std::string::npos;
+  return is_zero && text[0] == '-' ? text.substr(1) : text;
 }
 
 std::string FormatShort(double value, int digits) {

@@ -38,6 +38,9 @@ TEST(Text, FormatsNumbersForPeople) {
   EXPECT_EQ(FormatShort(1234.5), "1234");
   EXPECT_EQ(FormatShort(5e-15), "0");
   EXPECT_EQ(FormatShort(std::numeric_limits<double>::quiet_NaN()), "-");
+  EXPECT_EQ(FormatFixed(-0.04, 1), "0.0");
+  EXPECT_EQ(FormatFixed(-0.06, 1), "-0.1");
+  EXPECT_EQ(FormatFixed(-0.4, 0), "0");
   EXPECT_EQ(FormatMicroseconds(412.4), "412 us");
   EXPECT_EQ(FormatMicroseconds(3140.0), "3.1 ms");
   EXPECT_EQ(FormatMicroseconds(2.4e6), "2.4 s");
