@@ -80,9 +80,10 @@ class TimePlots {
       plot.x_max = std::max(plot.x_max, f.time_s);
     }
     plot.series = std::move(series);
-    const auto is_empty = [](const PlotSeries& s) {
-      return std::none_of(s.points.begin(), s.points.end(),
-                          [](const auto& p) { return std::isfinite(p.second); });
+    const auto is_empty = [log_y](const PlotSeries& s) {
+      return std::none_of(s.points.begin(), s.points.end(), [log_y](const auto& p) {
+        return std::isfinite(p.second) && (!log_y || p.second > 0.0);
+      });
     };
     plot.series.erase(std::remove_if(plot.series.begin(), plot.series.end(), is_empty),
                       plot.series.end());
