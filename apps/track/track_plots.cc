@@ -53,7 +53,11 @@ class TimePlots {
     series.color = SeriesColor(color);
     for (std::size_t i = 0; i < frames_.size(); i += stride_) {
       const TrackedFrame& frame = frames_[i];
-      if (frame.reinitialized) series.points.emplace_back(frame.time_s, kNone);  // Another world.
+      // Another world, be it since a frame that is passed over.
+      const auto end = frames_.begin() + static_cast<std::ptrdiff_t>(i) + 1;
+      const bool begins = std::any_of(end - static_cast<std::ptrdiff_t>(std::min(stride_, i + 1)),
+                                      end, [](const TrackedFrame& f) { return f.reinitialized; });
+      if (begins) series.points.emplace_back(frame.time_s, kNone);
       series.points.emplace_back(frame.time_s, value(frame));
     }
     // A value with none beside it has no line: it is a dot.
