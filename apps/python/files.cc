@@ -17,9 +17,19 @@ namespace {
 namespace py = pybind11;
 using py::literals::operator""_a;
 
+// As os.fsdecode has it: a path need not be UTF-8.
+py::str PathText(const std::string& text) {
+  PyObject* decoded =
+      PyUnicode_DecodeFSDefaultAndSize(text.data(), static_cast<Py_ssize_t>(text.size()));
+  if (decoded == nullptr) throw py::error_already_set();
+  return py::reinterpret_steal<py::str>(decoded);
+}
+
 // What is wrong with a file is the caller's to mend.
 void ThrowUnlessRead(const Status& status) {
-  if (!status.ok()) throw py::value_error(status.message);
+  if (status.ok()) return;
+  PyErr_SetObject(PyExc_ValueError, PathText(status.message).ptr());
+  throw py::error_already_set();
 }
 
 py::list LoadScene(const std::filesystem::path& path) {
@@ -39,7 +49,7 @@ py::list LoadScene(const std::filesystem::path& path) {
     if (image.truth && image.truth->translation) translation = py::cast(*image.truth->translation);
     const apps::Symmetry symmetry = image.truth ? image.truth->symmetry : apps::Symmetry::kNone;
     loaded.append(scene_image(
-        "name"_a = image.name, "path"_a = image.path,
+        "name"_a = image.name, "path"_a = PathText(image.path),
         "observations"_a = ObservationsToPython(std::move(image.observations)),
         "camera_sigma"_a = camera_sigma, "detect_everything"_a = image.detect_everything,
         "rois"_a = rois, "true_rotation"_a = rotation, "true_translation"_a = translation,

@@ -27,6 +27,20 @@ images:
 """
 
 
+def test_paths_need_not_be_utf8(tmp_path):
+    folder = os.fsencode(tmp_path) + b"/\xe9t\xe9"
+    try:
+        os.mkdir(folder)
+    except OSError:
+        pytest.skip("the file system takes UTF-8 only")
+    with open(folder + b"/scene.yaml", "w", encoding="utf-8") as file:
+        file.write(SCENE.replace("SIGMA", "").replace("TRUTH", ""))
+    (image,) = circline.load_scene(os.fsdecode(folder + b"/scene.yaml"))
+    assert os.fsencode(image.path) == folder + b"/a.png"
+    with pytest.raises(ValueError, match="cannot be opened"):
+        circline.load_cameras(os.fsdecode(folder + b"/none.yaml"))
+
+
 def test_scene_files_say_how_well_their_camera_is_known(tmp_path):
     path = tmp_path / "scene.yaml"
     path.write_text(SCENE.replace("SIGMA", "").replace("TRUTH", ""))
