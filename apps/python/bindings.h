@@ -54,7 +54,7 @@ CircleObservation CircleFromPython(const pybind11::handle& circle);
 pybind11::object CircleToPython(CircleObservation&& circle);
 
 // Parts of the module, in the order in which they need each other.
-void BindValues(pybind11::module_* module);       // Camera, NoiseModel, Pose, fits.
+void BindValues(pybind11::module_* module);       // Camera, NoiseModel, Pose, priors, fits.
 void BindResults(pybind11::module_* module);      // What estimate and adjust return.
 void BindClosedForms(pybind11::module_* module);  // circle_poses, rotation_from_...
 void BindCalls(pybind11::module_* module);        // detect, fit, estimate, adjust.

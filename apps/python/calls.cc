@@ -181,28 +181,6 @@ void BindFit(py::module_* module) {
 }
 
 void BindEstimateCall(py::module_* module) {
-  py::class_<PosePrior>(*module, "PosePrior", "A pose known from elsewhere, with its covariance.")
-      .def(py::init([](const CameraPose& mean, const Matrix6d& covariance) {
-             PosePrior prior;
-             prior.mean = mean;
-             Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(prior.covariance.data()) =
-                 covariance;
-             return prior;
-           }),
-           py::arg("mean"), py::arg("covariance"), "covariance: (6, 6), of [delta, delta_t].");
-  py::class_<GravityPrior>(*module, "GravityPrior",
-                           "A world direction that is known in the camera.")
-      .def(py::init([](const Eigen::Vector3d& in_world, const Eigen::Vector3d& in_camera,
-                       double sigma_rad) {
-             GravityPrior prior;
-             prior.in_world = in_world;
-             prior.in_camera = in_camera;
-             prior.sigma_rad = sigma_rad;
-             return prior;
-           }),
-           py::arg("in_world"), py::arg("in_camera"),
-           py::arg("sigma_rad") = GravityPrior().sigma_rad,
-           "Unit vectors (3,); sigma of each of two components, radians.");
   const EstimationOptions d;
   module->def(
       "estimate",
@@ -250,7 +228,9 @@ void BindAdjustCall(py::module_* module) {
          const std::string& line_loss, double line_scale, const std::optional<NoiseModel>& noise,
          const std::map<std::string, CameraSigma>& camera_sigma, int num_radial,
          double tangential_sigma, const std::string& rigid, bool square_grids, double nearly_equal,
-         int max_iterations, int num_threads, int num_solver_threads) {
+         std::vector<std::optional<CameraPose>> given_poses, double given_rotation_sigma,
+         double given_translation_sigma, int max_iterations, int num_threads,
+         int num_solver_threads) {
         AdjustOptions options;
         options.conic_loss = Loss(conic_loss, conic_scale, "conic_loss");
         options.line_loss = Loss(line_loss, line_scale, "line_loss");
@@ -262,6 +242,9 @@ void BindAdjustCall(py::module_* module) {
           throw py::value_error("rigid must be auto, yes or no");
         options.square_grids = square_grids;
         options.nearly_equal = nearly_equal;
+        options.given_poses = std::move(given_poses);
+        options.given_rotation_sigma = given_rotation_sigma;
+        options.given_translation_sigma = given_translation_sigma;
         options.max_iterations = max_iterations;
         options.num_threads = num_threads;
         options.num_solver_threads = num_solver_threads;
@@ -275,11 +258,16 @@ void BindAdjustCall(py::module_* module) {
       py::arg("camera_sigma") = std::map<std::string, CameraSigma>(),
       py::arg("num_radial") = d.num_radial, py::arg("tangential_sigma") = d.tangential_sigma,
       py::arg("rigid") = RigidWorldName(d.rigid), py::arg("square_grids") = d.square_grids,
-      py::arg("nearly_equal") = d.nearly_equal, py::arg("max_iterations") = d.max_iterations,
-      py::arg("num_threads") = d.num_threads, py::arg("num_solver_threads") = d.num_solver_threads,
+      py::arg("nearly_equal") = d.nearly_equal,
+      py::arg("given_poses") = std::vector<std::optional<CameraPose>>(),
+      py::arg("given_rotation_sigma") = d.given_rotation_sigma,
+      py::arg("given_translation_sigma") = d.given_translation_sigma,
+      py::arg("max_iterations") = d.max_iterations, py::arg("num_threads") = d.num_threads,
+      py::arg("num_solver_threads") = d.num_solver_threads,
       "The camera (or several), the pose of every photo and what is seen: AdjustedPhotos.\n\n"
       "observations_list: one Observations a photo. camera_sigma: by Camera.id; without, nothing\n"
-      "is known of a camera. Options: refine/adjust_photos.h. Refused, with the reason.");
+      "is known of a camera. given_poses: none, or of each photo a CameraPose from elsewhere, or\n"
+      "None. Options: refine/adjust_photos.h. Refused, with the reason.");
 }
 
 }  // namespace

@@ -111,6 +111,8 @@ void BindAdjusted(py::module_* module) {
       .def_readonly("at_prior", &C::at_prior, "What the photos say next to nothing of.")
       .def_readonly("num_photos", &C::num_photos)
       .def_readonly("rms_px", &C::rms_px, "Of the inlier residuals, pixels.")
+      .def_readonly("sigma_by_photos", &C::sigma_by_photos,
+                    "Of log f from the first photos alone: how many, and that.")
       .def_property_readonly("sigma_focal_px", &C::SigmaFocalPx, "Of fx, pixels.");
   using P = AdjustedPhoto;
   py::class_<P>(*module, "AdjustedPhoto", "One photo's part.")
@@ -136,11 +138,26 @@ void BindAdjusted(py::module_* module) {
       .def_readonly("center", &A::center, "(3,), world frame.")
       .def_readonly("normal", &A::normal, "(3,), world frame.")
       .def_readonly("radius", &A::radius);
+  using D = AdjustedDirection;
+  py::class_<D>(*module, "AdjustedDirection", "A pencil's direction in a world, without sense.")
+      .def_readonly("id", &D::id)
+      .def_readonly("photo", &D::photo, "Of whose world; -1: that of all photos.")
+      .def_readonly("direction", &D::direction, "(3,), unit, world frame.");
+  using G = GivenFrame;
+  py::class_<G>(*module, "GivenFrame",
+                "Of given poses: X_given = scale * rotation @ X_world + translation.")
+      .def_readonly("scale", &G::scale)
+      .def_readonly("rotation", &G::rotation, "(3, 3).")
+      .def_readonly("translation", &G::translation, "(3,), in the unit of the given poses.")
+      .def_readonly("log_scale_sigma", &G::log_scale_sigma,
+                    "Meaningful where the world is metric.");
   py::class_<AdjustedPhotos>(*module, "AdjustedPhotos",
-                             "Cameras, poses and circles of many photos.")
+                             "Cameras, poses, circles and directions of many photos.")
       .def_readonly("cameras", &AdjustedPhotos::cameras)
       .def_readonly("photos", &AdjustedPhotos::photos, "One for each of the input.")
       .def_readonly("circles", &AdjustedPhotos::circles)
+      .def_readonly("directions", &AdjustedPhotos::directions)
+      .def_readonly("given", &AdjustedPhotos::given, "Where poses were given: a GivenFrame.")
       .def_readonly("rigid", &AdjustedPhotos::rigid, "Whether all photos show one world.")
       .def_readonly("metric", &AdjustedPhotos::metric)
       .def_readonly("notes", &AdjustedPhotos::notes);

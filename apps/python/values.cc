@@ -1,4 +1,4 @@
-// Camera, its uncertainty, the noise model, poses and fits.
+// Camera, its uncertainty, the noise model, poses, priors and fits.
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -11,6 +11,7 @@
 #include "apps/python/bindings.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/pose.h"
+#include "circline/refine/estimate_pose.h"
 
 namespace circline::python {
 namespace {
@@ -204,6 +205,31 @@ void BindPose(py::module_* module) {
       .def_readonly("translation", &CameraPose::translation, "(3,), read-only.");
 }
 
+void BindPriors(py::module_* module) {
+  py::class_<PosePrior>(*module, "PosePrior", "A pose known from elsewhere, with its covariance.")
+      .def(py::init([](const CameraPose& mean, const Eigen::Matrix<double, 6, 6>& covariance) {
+             PosePrior prior;
+             prior.mean = mean;
+             Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(prior.covariance.data()) =
+                 covariance;
+             return prior;
+           }),
+           py::arg("mean"), py::arg("covariance"), "covariance: (6, 6), of [delta, delta_t].");
+  py::class_<GravityPrior>(*module, "GravityPrior",
+                           "A world direction that is known in the camera.")
+      .def(py::init([](const Eigen::Vector3d& in_world, const Eigen::Vector3d& in_camera,
+                       double sigma_rad) {
+             GravityPrior prior;
+             prior.in_world = in_world;
+             prior.in_camera = in_camera;
+             prior.sigma_rad = sigma_rad;
+             return prior;
+           }),
+           py::arg("in_world"), py::arg("in_camera"),
+           py::arg("sigma_rad") = GravityPrior().sigma_rad,
+           "Unit vectors (3,); sigma of each of two components, radians.");
+}
+
 void BindFits(py::module_* module) {
   py::class_<ConicFit>(*module, "ConicFit", "An ellipse in calibrated coordinates.")
       .def(Pickled(&ConicFit::conic, &ConicFit::covariance, &ConicFit::rms_px,
@@ -239,6 +265,7 @@ void BindValues(py::module_* module) {
   BindCamera(module);
   BindNoise(module);
   BindPose(module);
+  BindPriors(module);
   BindFits(module);
 }
 

@@ -270,6 +270,29 @@ def test_adjusts_many_photos():
     assert 0 < camera.sigma_focal_px < 20
 
 
+def test_adjusts_photos_of_given_poses():
+    photos = [scenes.observations(seed=k, tilt=0.7 * np.cos(k), turn=1.3 * k) for k in range(5)]
+    photos = [circline.fit(photo) for photo in photos]
+    alone = circline.adjust(photos, rigid="yes")
+    assert alone.given is None and alone.directions
+    assert abs(np.linalg.norm(alone.directions[0].direction) - 1.0) < 1e-9
+    counts, sigmas = zip(*alone.cameras[0].sigma_by_photos)
+    assert counts == (1, 2, 4, 5) and sigmas[0] > sigmas[-1] > 0
+    given = [
+        circline.CameraPose(p.cam_from_world.rotation, 3.0 * p.cam_from_world.translation)
+        for p in alone.photos
+    ]
+    adjusted = circline.adjust(photos, given_poses=[*given[:4], None])
+    assert [photo.ok for photo in adjusted.photos] == [True] * 4 + [False]
+    frame = adjusted.given
+    assert frame.rotation.shape == (3, 3) and frame.translation.shape == (3,)
+    seen, world = given[1], adjusted.photos[1].cam_from_world
+    rotation = world.rotation @ frame.rotation.T
+    assert np.allclose(rotation, seen.rotation, atol=0.01)
+    translation = frame.scale * world.translation - rotation @ frame.translation
+    assert np.allclose(translation, seen.translation, atol=0.02 * frame.scale)
+
+
 def test_adjust_names_wrong_input():
     with pytest.raises((circline.Refused, ValueError)):
         circline.adjust([])

@@ -12,6 +12,7 @@ with the library's sentence. Every function may run in many threads at once.
 from ._circline import (
     AdjustedCamera,
     AdjustedCircle,
+    AdjustedDirection,
     AdjustedPhoto,
     AdjustedPhotos,
     Camera,
@@ -22,6 +23,7 @@ from ._circline import (
     ConicFit,
     ConicReading,
     DirectionReading,
+    GivenFrame,
     GravityPrior,
     LineFit,
     NoiseModel,
@@ -59,6 +61,7 @@ from .scene import SceneImage
 __all__ = [
     "AdjustedCamera",
     "AdjustedCircle",
+    "AdjustedDirection",
     "AdjustedPhoto",
     "AdjustedPhotos",
     "Camera",
@@ -71,6 +74,7 @@ __all__ = [
     "ConicReading",
     "DirectionReading",
     "FrameObservation",
+    "GivenFrame",
     "GravityPrior",
     "KnownAngle",
     "KnownLength",
