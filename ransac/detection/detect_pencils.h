@@ -52,6 +52,9 @@ std::vector<LineFit> EdgesAround(const std::vector<DetectedLine>& lines,
 DetectedPencil MakePencil(const std::vector<DetectedLine>& lines, const std::vector<int>& members,
                           const std::vector<LineFit>& fits, const Eigen::Vector3d& direction);
 
+// Gives that the direction by its lines alone, whatever else it was made by; none of one line.
+void FitAlone(DetectedPencil* pencil);
+
 // A line's fit if all of its points share an error, pixels: no number of them averages it out.
 LineFit WithSharedError(const DetectedLine& line, double shared_px);
 

@@ -126,6 +126,7 @@ class BoxSearch {
       const Vector3d axis = box.axes.col(static_cast<Eigen::Index>(k));
       found.log_odds_along[k] = LogOddsOfDirection(lines_, box.edges[k], axis);
       found.pencils[k] = MakePencil(lines_, box.edges[k], fits, axis);
+      FitAlone(&found.pencils[k]);
     }
     return found;
   }

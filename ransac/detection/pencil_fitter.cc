@@ -144,4 +144,11 @@ DetectedPencil MakePencil(const std::vector<DetectedLine>& lines, const std::vec
   return pencil;
 }
 
+void FitAlone(DetectedPencil* pencil) {
+  std::vector<LineFit> fits;
+  for (const LineObservation& line : pencil->observation.lines) fits.push_back(*line.fit);
+  VanishingPointFit fit;
+  if (FitVanishingPoint(fits, &fit).ok()) pencil->observation.fit = fit;
+}
+
 }  // namespace circline

@@ -62,7 +62,11 @@ TEST(FindBox, FindsItsAxesOnTheRightOfTwoPlanes) {
     EXPECT_LT(AxisErrorDeg(box->axes.col(0)), 1.0) << seed;
     EXPECT_NEAR(box->axes.determinant(), 1.0, 1e-9);
     // All three edges along each direction, and hardly anything else.
-    for (const DetectedPencil& pencil : box->pencils) {
+    for (int k = 0; k < 3; ++k) {
+      const DetectedPencil& pencil = box->pencils[static_cast<std::size_t>(k)];
+      ASSERT_TRUE(pencil.observation.fit.has_value()) << seed;
+      EXPECT_LT(AxisDeg(pencil.observation.fit->direction, box->axes.col(k)), 3.0) << seed;
+      EXPECT_GT(pencil.observation.fit->covariance.trace(), 0.0) << seed;
       EXPECT_GE(
           std::count_if(pencil.members.begin(), pencil.members.end(), [](int i) { return i < 9; }),
           3)
