@@ -110,7 +110,8 @@ ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const EdgeDir
   }
   center_ = 0.5 * (low + high);
   scale_ = std::max(0.5 * (high - low).norm(), 1e-12);
-  box_area_ = (high - low).prod() / (scale_ * scale_);
+  half_box_ = 0.5 * (high - low) / scale_;
+  box_area_ = 4.0 * half_box_.prod();
   data_.resize((directions.normals.empty() ? 6 : 8) * n);
   double area = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -241,17 +242,18 @@ bool ConicModel::Accept(const Value& value, double threshold) const {
 }
 
 double ConicModel::BandShare(const Value& value, double threshold) const {
-  // Semi-axes: squares are k / eigenvalue with k = -det / minor.
-  const auto [p, q, r, d, e, f] = value;
-  const double minor = p * r - q * q;
-  const double k = std::abs(f * minor - p * e * e - r * d * d + 2.0 * q * d * e) / minor;
-  const double half = 0.5 * (p + r);
-  const double large = half + std::sqrt(std::max(0.0, half * half - minor));
-  const double a = std::sqrt(k * large / minor), b = std::sqrt(k / large);
-  // Ramanujan's first approximation of the perimeter.
-  const double perimeter = kPi * (3.0 * (a + b) - std::sqrt((3.0 * a + b) * (a + 3.0 * b)));
-  const double area = perimeter * 2.0 * threshold * pixel_;
-  return area < box_area_ ? area / box_area_ : 1.0;
+  Ellipse ellipse;
+  if (!(box_area_ > 0.0) || !ConicToEllipse(ToMatrix(value), &ellipse)) return 1.0;
+  // The length of what of the ellipse lies in the box.
+  constexpr int kSteps = 180;
+  double length = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double t = 2.0 * kPi * i / kSteps;
+    const Eigen::Vector2d x = EllipsePoint(ellipse, t);
+    if ((x.cwiseAbs().array() > half_box_.array()).any()) continue;
+    length += std::hypot(ellipse.a * std::sin(t), ellipse.b * std::cos(t)) * 2.0 * kPi / kSteps;
+  }
+  return std::min(1.0, length * 2.0 * threshold * pixel_ / box_area_);
 }
 
 double ConicModel::Distance(const Value& value, int i) const {

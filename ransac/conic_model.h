@@ -63,8 +63,8 @@ class ConicModel {
   // edge.
   bool Accept(const Value& value, double threshold) const;
 
-  // Area within the threshold of the ellipse over that of the points' box: the chance that a stray
-  // point is an inlier.
+  // Area within the threshold of the ellipse, as far as it lies in the points' box, over that of
+  // the box: the chance that a stray point is an inlier.
   double BandShare(const Value& value, double threshold) const;
 
   // Signed distance of datum i, pixels, in double precision.
@@ -102,8 +102,10 @@ class ConicModel {
   double sigma_px_ = 1.0;  // threshold / kInlierSigmas.
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
   double scale_ = 1.0;
-  double box_area_ = 0.0;  // Of the points, in the model's coordinates.
-  double pixel_ = 1.0;     // Size of a pixel in the model's coordinates, on average.
+  // Of the points, in the model's coordinates.
+  Eigen::Vector2d half_box_ = Eigen::Vector2d::Zero();
+  double box_area_ = 0.0;
+  double pixel_ = 1.0;  // Size of a pixel in the model's coordinates, on average.
 };
 
 }  // namespace circline

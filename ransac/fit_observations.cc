@@ -11,6 +11,7 @@
 #include "circline/estimators/exactness.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/point_noise.h"
+#include "circline/ransac/conic_search.h"
 #include "circline/ransac/dense_clusters.h"
 #include "circline/ransac/fit_directions.h"
 #include "circline/ransac/line_model.h"
@@ -50,6 +51,8 @@ class PointFitter {
       }
     }
     for (int round = 0; round < FitRun::kMaxRounds && FollowNoise(); ++round) continue;
+    for (std::size_t i = 0; i < circles_.size(); ++i)
+      JudgeCircle(&circles_[i], &run_.observations.circles[i]);
     ReportFailures();
     for (std::size_t i = 0; i < circles_.size(); ++i) {
       CircleObservation& circle = run_.observations.circles[i];
@@ -138,9 +141,8 @@ class PointFitter {
     const RobustFitOptions options = NextOptions(f);
     ConicFit fit;
     const Status status =
-        initial == nullptr
-            ? FitConicRobust(f.points, options, &fit, &mask_, directions)
-            : RefitConicRobust(f.points, options, initial->conic, &fit, &mask_, directions);
+        FindConic(f.points, options, initial == nullptr ? nullptr : &initial->conic, &fit, &mask_,
+                  directions);
     if (!status.ok()) return status;
     circle->fit = fit;
     circle->inliers = PixelMask(f, circle->points.size());
@@ -196,6 +198,23 @@ class PointFitter {
       }
     }
     return moved;
+  }
+
+  // Takes back what chance explains, now that the noise is known.
+  void JudgeCircle(FittedFeature* f, CircleObservation* circle) {
+    if (!circle->fit) return;
+    const ConicSupport support =
+        SupportOfConic(f->points, NextOptions(*f), circle->fit->conic, Directions(*f, *circle));
+    if (!support.MayBeChance()) return;
+    if (!support.IsRefused()) {
+      run_.Report("circle '" + circle->id + "'",
+                  "scattered points would lie as near to an ellipse as its " +
+                      std::to_string(support.num_inliers) + " do");
+      return;
+    }
+    f->status = support.Refusal();
+    circle->fit.reset();
+    circle->inliers.clear();
   }
 
   void ReportFailures() const {

@@ -1,288 +1,48 @@
 #include "circline/ransac/robust_conic.h"
 
-#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <optional>
 
-#include "circline/estimators/random.h"
-#include "circline/ransac/conic_weights.h"
-#include "circline/ransac/dense_clusters.h"
-#include "circline/ransac/false_alarms.h"
-#include "circline/ransac/inlier_weights.h"
-#include "circline/ransac/oriented_conic_model.h"
+#include "circline/ransac/conic_search.h"
 
 namespace circline {
-namespace {
-
-Status NoEllipse() { return Status::Refused("no ellipse explains the points"); }
-
-// An ellipse with what the points say of it.
-struct ConicCandidate {
-  ConicModel::Value value{};
-  ConicWeights weights;
-  double log_likelihood = 0.0;
-};
-
-// Some of the points, with their directions if there are any.
-struct ContourSubset {
-  std::vector<CalibratedPoint> points;
-  EdgeDirections directions;
-
-  ContourSubset(const std::vector<CalibratedPoint>& all, const EdgeDirections& all_directions,
-                const std::vector<int>& indices) {
-    directions.sigma_rad = all_directions.sigma_rad;
-    for (const int i : indices) {
-      const auto k = static_cast<std::size_t>(i);
-      points.push_back(all[k]);
-      if (!all_directions.normals.empty()) directions.normals.push_back(all_directions.normals[k]);
-    }
-  }
-};
-
-// The search for one ellipse in one set of points.
-class ConicSearch {
- public:
-  // All outlive the search.
-  ConicSearch(const std::vector<CalibratedPoint>& points, const EdgeDirections& directions,
-              const RobustFitOptions& options)
-      : points_(points),
-        directions_(directions),
-        options_(options),
-        model_(points, directions, options.ransac.threshold) {
-    if (!directions.normals.empty()) oriented_.emplace(model_);
-  }
-
-  const ConicModel& model() const { return model_; }
-
-  // What a few searches found, the likeliest first.
-  std::vector<ConicCandidate> Run() const;
-  // What a short search found, if chance does not explain it.
-  std::optional<ConicCandidate> RunShort() const;
-  // The ellipse after reweighted steps.
-  ConicCandidate Polished(const ConicModel::Value& value) const;
-  // Maximum likelihood with the candidate's weights, its covariance, and (optional) the mask of the
-  // result; both are written only if the status is ok.
-  Status Finish(const ConicCandidate& candidate, ConicFit* fit,
-                std::vector<std::uint8_t>* mask) const;
-
- private:
-  using Report = RansacReport<ConicModel::Value>;
-
-  // One run of the engine, by samples with directions where there are any.
-  void Draw(const RansacOptions& options, Report* report) const {
-    if (oriented_) return Ransac<OrientedConicModel>(options).Run(*oriented_, report);
-    Ransac<ConicModel>(options).Run(model_, report);
-  }
-  bool IsGood(const ConicCandidate& candidate, int num_inliers) const;
-  std::vector<int> OutsideClusters() const;
-  void SearchAmong(const std::vector<int>& indices, const RansacOptions& options, int num_inliers,
-                   std::vector<ConicCandidate>* candidates) const;
-
-  const std::vector<CalibratedPoint>& points_;
-  const EdgeDirections& directions_;
-  const RobustFitOptions& options_;
-  ConicModel model_;
-  std::optional<OrientedConicModel> oriented_;
-};
-
-ConicCandidate ConicSearch::Polished(const ConicModel::Value& value) const {
-  constexpr int kMaxPasses = 30;
-  // Of half the points' box: a hundredth of a pixel in a hundred.
-  constexpr double kConverged = 1e-4;
-  using Map = Eigen::Map<const Vector6d>;
-  ConicCandidate result;
-  result.value = value;
-  for (int pass = 0; pass < kMaxPasses; ++pass) {
-    WeighConic(model_, result.value, options_.ransac.threshold, &result.weights);
-    const ConicModel::Value before = result.value;
-    if (!model_.Refine(result.weights.weights.data(), &result.value)) break;
-    const Map now(result.value.data());
-    if ((now - Map(before.data())).lpNorm<Eigen::Infinity>() < kConverged) break;
-  }
-  WeighConic(model_, result.value, options_.ransac.threshold, &result.weights);
-  result.log_likelihood = result.weights.LogLikelihood();
-  return result;
-}
-
-// The engine counts inliers, and that misleads it in two ways: on short or sparse contours it may
-// end on an ellipse that takes in clutter where the contour has none, and a dense blob of clutter
-// holds an ellipse with more inliers than the contour has. Both have far less likelihood than the
-// contour, whose inliers lie close to it and have nothing beside them. So where less than half of
-// the points are inliers, searches from other seeds and, where the ellipse explains its inliers
-// badly, among the points outside dense clusters, are compared by likelihood. With directions,
-// which need so few draws that an ellipse through parts of two rims may come first, there is one
-// more seed up to two thirds.
-std::vector<ConicCandidate> ConicSearch::Run() const {
-  RansacOptions options = options_.ransac;
-  // One sample is often not good enough: a second all-inlier sample.
-  options.confidence = 1.0 - (1.0 - options.confidence) * (1.0 - options.confidence);
-  std::vector<ConicCandidate> candidates;
-  Report report;
-  Draw(options, &report);
-  if (!report.success) return candidates;
-  candidates.push_back(Polished(report.model));
-  const int num_inliers = report.num_inliers, n = model_.NumData();
-  const bool good = IsGood(candidates[0], num_inliers);
-  const bool are_most = good && 2 * num_inliers >= n;
-  if (are_most && (!oriented_ || 3 * num_inliers >= 2 * n)) return candidates;
-  if (!good) SearchAmong(OutsideClusters(), options, num_inliers, &candidates);
-  const int num_seeds = are_most ? 2 : 3;
-  for (int k = 1; k < num_seeds; ++k) {
-    options.seed = Random(options.seed).Next();
-    options.max_iterations -= report.num_iterations;  // They are for all seeds.
-    if (options.max_iterations <= 0) break;
-    Draw(options, &report);
-    if (report.success) candidates.push_back(Polished(report.model));
-  }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const ConicCandidate& a, const ConicCandidate& b) {
-                     return a.log_likelihood > b.log_likelihood;
-                   });
-  return candidates;
-}
-
-std::optional<ConicCandidate> ConicSearch::RunShort() const {
-  RansacOptions options = options_.ransac;
-  constexpr int kMost = 500;
-  options.max_iterations = std::min(kMost, options.max_iterations);
-  Report report;
-  Draw(options, &report);
-  if (!report.success) return {};
-  ConicCandidate candidate = Polished(report.model);
-  if (!IsGood(candidate, report.num_inliers)) return {};
-  const double stray = static_cast<double>(model_.NumData() - report.num_inliers);
-  const double log_false_alarms = LogFalseAlarms(
-      points_.size(), oriented_ ? OrientedConicModel::kMinSamples : ConicModel::kMinSamples,
-      DirectionChance(model_) * stray * model_.BandShare(candidate.value, options.threshold),
-      static_cast<std::size_t>(report.num_inliers));
-  constexpr double kMaxFalseAlarms = 0.01;
-  if (log_false_alarms > std::log(kMaxFalseAlarms)) return {};
-  return candidate;
-}
-
-// Log-likelihood for each inlier: 4 in sparse clutter, 3 among twice as many, 1 to 2.5 in a blob.
-bool ConicSearch::IsGood(const ConicCandidate& candidate, int num_inliers) const {
-  constexpr double kGood = 3.0;
-  return candidate.log_likelihood >= kGood * num_inliers &&
-         model_.Accept(candidate.value, options_.ransac.threshold);
-}
-
-std::vector<int> ConicSearch::OutsideClusters() const {
-  constexpr int kSome = 300;  // Points, in random order, that stand for all.
-  std::vector<int> indices =
-      circline::OutsideClusters(model_.NumData(), kSome, [this](int i, int j) {
-        return model_.PixelsBetween(i, j) < kClusterThresholds * options_.ransac.threshold;
-      });
-  for (int& i : indices) i = model_.PointIndex(i);
-  return indices;
-}
-
-// Adds the best ellipse among some of the points, if these are not nearly all.
-void ConicSearch::SearchAmong(const std::vector<int>& indices, const RansacOptions& options,
-                              int num_inliers, std::vector<ConicCandidate>* candidates) const {
-  const int num_points = static_cast<int>(indices.size());
-  if (10 * num_points > 9 * model_.NumData()) return;
-  const ContourSubset rest(points_, directions_, indices);
-  const ConicSearch search(rest.points, rest.directions, options_);
-  // What could win has more than half as many inliers; a tenth of the draws may go into that.
-  constexpr int kFewest = 500;
-  const int needed = RequiredIterations(num_points, std::min(num_points, num_inliers * 3 / 5),
-                                        ConicModel::kMinSamples, options.confidence);
-  RansacOptions limited = options;
-  limited.min_iterations = kFewest;
-  limited.max_iterations =
-      std::clamp(needed, kFewest, std::max(kFewest, options.max_iterations / 10));
-  Report report;
-  search.Draw(limited, &report);
-  ConicModel::Value value;
-  if (report.success && model_.FromConic(search.model().ToConic(report.model), &value)) {
-    candidates->push_back(Polished(value));
-  }
-}
-
-Status ConicSearch::Finish(const ConicCandidate& candidate, ConicFit* fit,
-                           std::vector<std::uint8_t>* mask) const {
-  std::vector<CalibratedPoint> chosen;
-  std::vector<double> weights;
-  for (int i = 0; i < model_.NumData(); ++i) {
-    const double w = static_cast<double>(candidate.weights.weights[static_cast<std::size_t>(i)]);
-    if (w < 1e-3) continue;
-    chosen.push_back(points_[static_cast<std::size_t>(model_.PointIndex(i))]);
-    weights.push_back(w);
-  }
-  if (chosen.size() < 5) return NoEllipse();
-  ConicFit result;
-  const Status status =
-      RefineConic(chosen, options_.sigma_px, model_.ToConic(candidate.value), &result, &weights);
-  if (!status.ok()) return status;
-  ConicModel::Value value;
-  const double threshold = options_.ransac.threshold;
-  if (!model_.FromConic(result.conic, &value) || !model_.Accept(value, threshold)) {
-    return NoEllipse();
-  }
-  if (mask != nullptr) mask->assign(points_.size(), 0);
-  std::vector<double> distances;
-  for (int i = 0; i < model_.NumData(); ++i) {
-    if (!(model_.DirectionMiss(value, i) < kInlierSigmas * kInlierSigmas)) continue;
-    const std::size_t point = static_cast<std::size_t>(model_.PointIndex(i));
-    distances.push_back(ConicDistancePx(points_[point], result.conic));
-    if (mask != nullptr) (*mask)[point] = std::abs(distances.back()) <= threshold ? 1 : 0;
-  }
-  result.rms_px = InlierRms(distances, threshold);
-  *fit = result;
-  return Status::Ok();
-}
-
-Status Check(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
-             const EdgeDirections& directions) {
-  Status status = options.Validate();
-  if (status.ok()) status = directions.Validate(points.size());
-  if (status.ok() && points.size() < 5) return Status::Refused("an ellipse needs five points");
-  return status;
-}
-
-}  // namespace
-
 Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                       ConicFit* fit, std::vector<std::uint8_t>* mask,
                       const EdgeDirections& directions) {
-  Status status = Check(points, options, directions);
+  ConicFit found;
+  std::vector<std::uint8_t> found_mask;
+  const Status status = FindConic(points, options, nullptr, &found, &found_mask, directions);
   if (!status.ok()) return status;
-  const ConicSearch search(points, directions, options);
-  status = NoEllipse();
-  for (const ConicCandidate& candidate : search.Run()) {
-    status = search.Finish(candidate, fit, mask);
-    if (status.ok()) break;
-  }
+  const ConicSupport support = SupportOfConic(points, options, found.conic, directions);
+  if (support.IsRefused()) return support.Refusal();
+  *fit = found;
+  if (mask != nullptr) mask->swap(found_mask);
   return status;
 }
 
 Status RefitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                         const Eigen::Matrix3d& initial, ConicFit* fit,
                         std::vector<std::uint8_t>* mask, const EdgeDirections& directions) {
-  const Status status = Check(points, options, directions);
-  if (!status.ok()) return status;
-  const ConicSearch search(points, directions, options);
-  ConicModel::Value value;
-  if (!search.model().FromConic(initial, &value)) return NoEllipse();
-  return search.Finish(search.Polished(value), fit, mask);
+  return FindConic(points, options, &initial, fit, mask, directions);
 }
 
 Status FitSecondConic(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                       const Eigen::Matrix3d& first, ConicFit* fit, std::vector<std::uint8_t>* mask,
                       const EdgeDirections& directions) {
-  Status status = Check(points, options, directions);
+  Status status = CheckConicInput(points, options, directions);
   if (!status.ok()) return status;
+  const Status none = Status::Refused("no second ellipse explains the points");
   std::vector<int> left;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double distance = std::abs(ConicDistancePx(points[i], first));
     if (!(distance <= 2.0 * options.ransac.threshold)) left.push_back(static_cast<int>(i));
   }
-  if (left.size() <= 5) return NoEllipse();
+  if (left.size() <= 5) return none;
   const ContourSubset rest(points, directions, left);
   const ConicSearch search(rest.points, rest.directions, options);
   const std::optional<ConicCandidate> candidate = search.RunShort();
-  if (!candidate) return NoEllipse();
+  if (!candidate) return none;
   std::vector<std::uint8_t> rest_mask;
   status = search.Finish(*candidate, fit, &rest_mask);
   if (!status.ok() || mask == nullptr) return status;

@@ -19,7 +19,9 @@ namespace CIRCLINE_EXPORT circline {
 // per point, 1 where the returned ellipse passes within the threshold (and along the point's edge,
 // where directions are given). Refuses fewer than five points, and points that no ellipse explains:
 // one with a semi-minor axis of 2 px or more, along 30 degrees of it or more, and better than a
-// straight line. `fit` and `mask` are written only if the status is ok.
+// straight line. Refuses what is no better than chance, too: an ellipse that leaves points out,
+// where one as good or more is expected among clutter as dense as these (Desolneux, Moisan, Morel,
+// IJCV 2000). `fit` and `mask` are written only if the status is ok.
 //
 // `directions` (none if empty) are those of the edge at the points: samples are then of three
 // points instead of five, and clutter with another direction has no say. They choose the points;
@@ -37,7 +39,7 @@ Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFi
                       const EdgeDirections& directions = {});
 
 // The same from an ellipse that is already near (tracked, predicted): its inliers, reweighted, and
-// no search.
+// no search, nor whether chance explains it.
 Status RefitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                         const Eigen::Matrix3d& initial, ConicFit* fit,
                         std::vector<std::uint8_t>* mask = nullptr,
@@ -45,9 +47,8 @@ Status RefitConicRobust(const std::vector<CalibratedPoint>& points, const Robust
 
 // A second ellipse through points that `first` leaves out by more than twice the threshold: a
 // second rim, a neighbour. Refuses what is no better than chance: where one as good or more is
-// expected in a hundred sets of as many stray points (Desolneux, Moisan, Morel, IJCV 2000), or the
-// points are a blob. 500 draws at the most, 0.2 ms: it is found where it has a third of what is
-// left (a sixth with directions).
+// expected in a hundred sets of as many stray points, or the points are a blob. 500 draws at the
+// most, 0.2 ms: it is found where it has a third of what is left (a sixth with directions).
 Status FitSecondConic(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                       const Eigen::Matrix3d& first, ConicFit* fit,
                       std::vector<std::uint8_t>* mask = nullptr,

@@ -257,6 +257,21 @@ TEST(FitConicRobust, RefusesWhatHoldsNoEllipse) {
   EXPECT_EQ(mask, std::vector<std::uint8_t>(3, 9));
 }
 
+TEST(FitConicRobust, RefusesWhatChanceExplains) {
+  Random random(1);
+  std::vector<CalibratedPoint> points;
+  for (int i = 0; i < 50; ++i) {
+    const double x = random.Uniform(0.0, 300.0), y = random.Uniform(0.0, 200.0);
+    CalibratedPoint p;
+    ASSERT_TRUE(PixelToCalibrated(conic_scene::TestCamera(), {200.0 + x, 100.0 + y}, &p));
+    points.push_back(p);
+  }
+  ConicFit fit;
+  const Status status = FitConicRobust(points, RobustFitOptions(), &fit);
+  EXPECT_EQ(status.code, StatusCode::kRefused);
+  EXPECT_NE(status.message.find("of 50 points"), std::string::npos) << status.message;
+}
+
 TEST(FitConicRobust, NamesBadOptions) {
   const Scene scene = MakeScene(1, 0.0);
   ConicFit fit;
