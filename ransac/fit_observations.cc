@@ -16,6 +16,7 @@
 #include "circline/ransac/fit_directions.h"
 #include "circline/ransac/line_model.h"
 #include "circline/ransac/robust_conic.h"
+#include "circline/ransac/stated_noise.h"
 
 namespace circline {
 namespace {
@@ -51,8 +52,10 @@ class PointFitter {
       }
     }
     for (int round = 0; round < FitRun::kMaxRounds && FollowNoise(); ++round) continue;
-    for (std::size_t i = 0; i < circles_.size(); ++i)
+    for (std::size_t i = 0; i < circles_.size(); ++i) {
       JudgeCircle(&circles_[i], &run_.observations.circles[i]);
+      DoubtStatedNoise(run_.observations.circles[i], &circles_[i]);
+    }
     ReportFailures();
     for (std::size_t i = 0; i < circles_.size(); ++i) {
       CircleObservation& circle = run_.observations.circles[i];
@@ -215,6 +218,14 @@ class PointFitter {
     f->status = support.Refusal();
     circle->fit.reset();
     circle->inliers.clear();
+  }
+
+  // Where that is what makes outliers of most points, it is to blame, and not they.
+  void DoubtStatedNoise(const CircleObservation& circle, FittedFeature* f) const {
+    const std::string problem = StatedNoiseProblem(run_.options, run_.observations.camera, circle);
+    if (problem.empty()) return;
+    f->status = Status::Refused(problem);
+    if (circle.fit) run_.Report("circle '" + circle.id + "'", problem);
   }
 
   void ReportFailures() const {

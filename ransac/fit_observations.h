@@ -39,7 +39,8 @@ struct FitOptions {
 // lines that are not parallel to the others of their pencil. What cannot be fitted stays without a
 // fit; `problems` (optional) receives one sentence for each, and for each such line, naming it.
 // An ellipse that scattered points explain as well counts as none where it leaves points out;
-// where it has them all, because they are few or their noise is as large as it, it is named. A
+// where it has them all, because they are few or their noise is as large as it, it is named. So is
+// a stated noise that is a third of the true one or less and makes outliers of most points. A
 // contour whose outliers hold an ellipse of their own has that as its second reading, and is named
 // too: the first is the likelier one. The returned status is not ok only for invalid options or
 // observations.

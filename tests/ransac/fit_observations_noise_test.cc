@@ -136,6 +136,33 @@ TEST(FitObservationsNoise, AContourOfFewNoisyPointsIsNotJudgedByAFewOfThem) {
   EXPECT_LE(few, 0.01 * trials);
 }
 
+// It is told from points that have no ellipse: by how much it is too small, and what to do.
+TEST(FitObservationsNoise, AStatedNoiseThatIsFarTooSmallIsNamed) {
+  for (const double stated_px : {0.01, 0.05, 0.5}) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      Random random(seed);
+      Observations observations;
+      observations.camera = TestCamera();
+      CircleObservation circle;
+      circle.id = "c0";
+      circle.sigma_px = stated_px;
+      for (int i = 0; i < 100; ++i) {
+        const double t = 2.0 * kPi * i / 100;
+        circle.points.push_back(Pixel(0.25 * std::cos(t), 0.2 * std::sin(t), &random, 0.5));
+      }
+      observations.circles.push_back(circle);
+      std::vector<std::string> problems;
+      ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+      if (stated_px == 0.5) {
+        EXPECT_TRUE(problems.empty()) << problems[0];
+        continue;
+      }
+      ASSERT_FALSE(problems.empty()) << stated_px << ' ' << seed;
+      EXPECT_NE(problems[0].find("state none, or a larger one"), std::string::npos) << problems[0];
+    }
+  }
+}
+
 // A manhole's rim and, over 40 % of it, that of its frame.
 TEST(FitObservationsNoise, ASecondRimIsASecondReadingAndNamed) {
   Random random(5);
