@@ -5,7 +5,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/manifolds.h"
@@ -16,6 +19,16 @@ namespace {
 
 constexpr double kExactAngle = 1e-6;   // Radians: stands for an angle that is known exactly.
 constexpr double kExactLength = 1e-6;  // Relative: the same for a length.
+
+// Features of a kind, the first few by name.
+std::string Names(const char* kind, const std::vector<std::string>& ids) {
+  constexpr std::size_t kMost = 3;
+  std::string names = ids.size() == 1 ? kind : std::string(kind) + "s";
+  for (std::size_t i = 0; i < std::min(kMost, ids.size()); ++i)
+    names += (i == 0 ? " '" : ", '") + ids[i] + "'";
+  if (ids.size() > kMost) names += " and " + std::to_string(ids.size() - kMost) + " more";
+  return names;
+}
 
 }  // namespace
 
@@ -61,6 +74,7 @@ void JointProblemBuilder::Build() {
   p_.x_is_seen_ = p_.x_is_fixed_;
   if (p_.options_.pose_prior) AddPosePrior(*p_.options_.pose_prior);
   if (p_.options_.gravity_prior) AddGravityPrior(*p_.options_.gravity_prior);
+  NoteWhatIsOutside();
   if (p_.x_is_fixed_) {
     p_.SetManifold(JointProblem::kRotation, std::make_unique<WorldRotationManifold<3>>());
   } else {
@@ -84,6 +98,26 @@ void JointProblemBuilder::AddCameraPrior(std::vector<double> sigmas) {
     p_.term(term).is_mostly_exact = false;
   }
   p_.AddTerm(NewGaussianPrior(sigmas, mean), {JointProblem::kCamera});
+}
+
+// A circle says nothing of a plane that it does not name; nor does a pencil of another one.
+void JointProblemBuilder::NoteWhatIsOutside() {
+  const std::string& plane = obs_.frame.plane;
+  bool is_named = false;
+  std::vector<std::string> circles, pencils;
+  for (const CircleObservation& circle : obs_.circles) {
+    is_named = is_named || circle.plane == plane;
+    if (circle.fit && circle.plane != plane) circles.push_back(circle.id);
+  }
+  for (const PencilObservation& pencil : obs_.pencils) {
+    is_named = is_named || pencil.plane == plane;
+    const bool is_elsewhere = !pencil.plane.empty() && pencil.plane != plane;
+    if (is_elsewhere && !RunsAlongAxis(pencil)) pencils.push_back(pencil.id);
+  }
+  const std::string why = ": not used, not in the world's plane '" + plane + "'" +
+                          (is_named ? "" : ", which no circle or pencil names");
+  if (!circles.empty()) p_.unused_.push_back(Names("circle", circles) + why);
+  if (!pencils.empty()) p_.unused_.push_back(Names("pencil", pencils) + why);
 }
 
 void JointProblemBuilder::AddAngle(std::size_t index) {

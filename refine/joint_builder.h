@@ -60,6 +60,7 @@ class JointProblemBuilder {
   void AddGravityPrior(const GravityPrior& prior);
   void AddPrior(ceres::CostFunction* cost, std::vector<int> blocks, bool tells_spin,
                 Feature feature);
+  void NoteWhatIsOutside();
 
   // Whether it takes part.
   bool InPlane(const CircleObservation& circle) const {

@@ -93,6 +93,31 @@ TEST(KnownMeasuresTest, KnowledgeThatHasNoPartIsNamed) {
   ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
   EXPECT_TRUE(HasNote(estimate, "'L1' and 'L2': not used, both run along axes"));
   EXPECT_TRUE(HasNote(estimate, "a known length of the plane 'p1': not used"));
+  EXPECT_TRUE(HasNote(estimate, "circle 'c1': not used, not in the world's plane 'p0'"));
+}
+
+// A circle that names no plane lies in none of the world, and nothing does in one misspelt.
+TEST(KnownMeasuresTest, WhatIsOutsideTheWorldsPlaneIsNamed) {
+  PlaneScene scene(1.1, 0.1);
+  Observations observations = scene.Empty();
+  for (const char* id : {"c0", "c1", "c2", "c3", "c4"}) {
+    observations.circles.push_back(scene.Circle(id, 0.5, 0.2, 1.0));
+    observations.circles.back().plane.clear();
+  }
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+  const PoseEstimate beside = EstimatePose(observations, Exact());
+  ASSERT_TRUE(beside.status.ok()) << beside.status.message;
+  EXPECT_TRUE(HasNote(beside, "circles 'c0', 'c1', 'c2' and 2 more: not used, not in the world's"));
+
+  for (CircleObservation& circle : observations.circles) circle.plane = "p0";
+  observations.pencils.push_back(
+      scene.Pencil("L3", PencilDirection::kFree, Eigen::Vector3d(0.6, 0.8, 0.0)));
+  EXPECT_FALSE(HasNote(EstimatePose(observations, Exact()), "not used"));
+  observations.frame.plane = "P0";
+  const PoseEstimate misspelt = EstimatePose(observations, Exact());
+  EXPECT_TRUE(HasNote(misspelt, "plane 'P0', which no circle or pencil names"));
+  EXPECT_TRUE(HasNote(misspelt, "pencil 'L3': not used"));
 }
 
 // A length says nothing of which of the two poses of a circle is right.
