@@ -174,7 +174,7 @@ void FillUncertainty(const Eigen::MatrixXd& S, const Candidate& candidate, PoseH
   Vector6d length = Vector6d::Zero();
   length.tail<3>() = h->cam_from_world.translation;
   if (!h->metric) leave_out(length);
-  SetCovariance(root * root.transpose(), h);
+  SetCovariance(root * root.transpose(), h, h->metric ? 6 : 5);
   if (candidate.contradiction.size() > 0) {
     const Eigen::MatrixXd tail = S.bottomRows(candidate.contradiction.size());
     h->cost = 0.5 * SquaredDistance(candidate.contradiction, tail * tail.transpose());

@@ -59,7 +59,7 @@ Eigen::Vector3d PoseHypothesis::SigmaRotation() const {
   return sigma;
 }
 
-void SetCovariance(Matrix6d covariance, PoseHypothesis* hypothesis) {
+void SetCovariance(Matrix6d covariance, PoseHypothesis* hypothesis, int num_variables) {
   constexpr double kRounding = 1e-12;
   const double nothing = kRounding * covariance.cwiseAbs().maxCoeff();
   // Where next to nothing is known of a direction, rounding may leave less than that.
@@ -78,8 +78,10 @@ void SetCovariance(Matrix6d covariance, PoseHypothesis* hypothesis) {
     }
   }
   const Matrix6d correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
-  hypothesis->rank =
+  const auto rank =
       static_cast<int>(Eigen::FullPivLU<Matrix6d>(correlation).setThreshold(1e-9).rank());
+  const int most = num_variables - static_cast<int>(hypothesis->free_directions.size());
+  hypothesis->rank = std::min(rank, std::max(0, most));
   Eigen::Map<Matrix6d>(hypothesis->covariance.data()) = covariance;
 }
 

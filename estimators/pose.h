@@ -97,7 +97,9 @@ void RankHypotheses(std::vector<PoseHypothesis>* hypotheses);
 
 // Fills covariance and rank, that of the correlations: whatever the units of delta and delta_t.
 // What rounding leaves of a direction without variance, -1e-17, is zero, its covariances, too.
-void SetCovariance(Matrix6d covariance, PoseHypothesis* hypothesis);
+// `free_directions` are filled already: they add nothing to the rank, whatever rounding has left of
+// their variances. `num_variables` is 5 where t is a direction.
+void SetCovariance(Matrix6d covariance, PoseHypothesis* hypothesis, int num_variables = 6);
 
 // Rotation vector <-> matrix (Rodrigues), and the angle between two rotations, radians.
 Eigen::Matrix3d ExpRotation(const Eigen::Vector3d& delta);

@@ -254,8 +254,8 @@ Status FillRefined(const JointProblem& problem, State state, Refined* refined) {
   h->cam_from_world.translation = h->metric ? pose.translation : pose.translation.normalized();
   const Eigen::MatrixXd T = PoseFromCore(problem, state, at);
   const Matrix6d covariance = T * at.covariance() * T.transpose();
-  SetCovariance(covariance, h);
   FillFreeDirections(problem, T, at, h);
+  SetCovariance(covariance, h, h->metric ? 6 : 5);
   FillCircles(problem, state, refined);
   FillPencils(problem, state, at, h);
   FillFocal(problem, state, at, T, refined);

@@ -1,5 +1,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -38,15 +39,32 @@ bool AreHumpsOfOne(const PoseHypothesis& a, const PoseHypothesis& b) {
          scale * scale <= kApart2 * (a.focal_sigma * a.focal_sigma + b.focal_sigma * b.focal_sigma);
 }
 
+// Leaves out what has no variance in the covariance of a hypothesis: free directions, and the
+// length of t where that is a direction.
+Matrix6d OntoKnown(const PoseHypothesis& h) {
+  Matrix6d onto = Matrix6d::Identity();
+  const auto leave_out = [&onto](const Vector6d& v) { onto -= v * (v.transpose() * onto).eval(); };
+  for (const std::array<double, 6>& direction : h.free_directions)
+    leave_out(Eigen::Map<const Vector6d>(direction.data()));
+  Vector6d length = Vector6d::Zero();
+  length.tail<3>() = h.cam_from_world.translation;
+  if (!h.metric) leave_out(length);
+  return onto;
+}
+
 // The covariances of `one`, about it, where `other` is the truth with a probability of `share`.
 void Mix(double share, const PoseHypothesis& other, PoseHypothesis* one) {
   const Vector6d step = StepBetween(*one, other);
   const double scale = other.focal_scale - one->focal_scale;
   const auto mixed = [&](const auto& a, const auto& b) { return (1.0 - share) * a + share * b; };
-  SetCovariance(mixed(one->Covariance(), Matrix6d(other.Covariance() + step * step.transpose())),
-                one);
+  // What is free, or no variable, of the one need not be of the other, whose axes are turned.
+  const Matrix6d onto = OntoKnown(*one);
+  const Matrix6d covariance =
+      mixed(one->Covariance(), Matrix6d(other.Covariance() + step * step.transpose()));
+  SetCovariance(onto * covariance * onto.transpose(), one, one->metric ? 6 : 5);
   Eigen::Map<Vector6d> across(one->focal_covariance.data());
   across =
+      onto *
       mixed(Vector6d(across),
             Vector6d(Eigen::Map<const Vector6d>(other.focal_covariance.data()) + scale * step));
   one->focal_sigma = std::sqrt(mixed(one->focal_sigma * one->focal_sigma,

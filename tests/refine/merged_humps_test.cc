@@ -65,6 +65,44 @@ TEST(MergeHumps, OneRidgeOfTheFocalLengthIsOne) {
   EXPECT_EQ(far.size(), 2U);
 }
 
+// What the one says is free, or is no variable, has no variance after either, though the other's
+// free turn is about another axis.
+TEST(MergeHumps, WhatIsFreeStaysSo) {
+  std::vector<PoseHypothesis> all = {Turned(0.0, 0.6), Turned(1.0, 0.4)};
+  for (PoseHypothesis& h : all) {
+    const Vector3d normal = h.cam_from_world.rotation.col(2);
+    h.cam_from_world.translation = h.cam_from_world.rotation * Vector3d(0.6, 0.0, 0.8);
+    Matrix6d onto = Matrix6d::Identity();
+    onto.topLeftCorner<3, 3>() -= normal * normal.transpose();
+    const Vector3d t = h.cam_from_world.translation;
+    onto.bottomRightCorner<3, 3>() -= t * t.transpose();
+    h.free_directions = {{normal.x(), normal.y(), normal.z(), 0.0, 0.0, 0.0}};
+    h.circles.resize(2);
+    SetCovariance(kSigma * kSigma * onto, &h, 5);
+    EXPECT_EQ(h.rank, 4);
+  }
+  MergeHumps(&all);
+  ASSERT_EQ(all.size(), 1U);
+  EXPECT_EQ(all[0].rank, 4);
+  const Vector3d t = all[0].cam_from_world.translation;
+  const Matrix6d covariance = all[0].Covariance();
+  EXPECT_LT(std::abs(covariance(2, 2)), 1e-18);
+  EXPECT_LT(std::abs(t.dot(covariance.bottomRightCorner<3, 3>() * t)), 1e-18);
+  EXPECT_GT(covariance(1, 1), kSigma * kSigma);
+}
+
+// What rounding leaves where all is free, or is no variable, is no knowledge.
+TEST(SetCovariance, RankIsThatOfWhatIsNotFree) {
+  PoseHypothesis h;
+  Matrix6d covariance = 1e-21 * Matrix6d::Identity();
+  covariance(0, 0) = covariance(1, 1) = 6e-4;
+  h.free_directions = {{0.0, 0.0, 1.0, 0.0, 0.0, 0.0},
+                       {0.0, 0.0, 0.0, 1.0, 0.0, 0.0},
+                       {0.0, 0.0, 0.0, 0.0, 1.0, 0.0}};
+  SetCovariance(covariance, &h, 5);
+  EXPECT_EQ(h.rank, 2);
+}
+
 // One circle has two poses, also where it is seen from ahead.
 TEST(MergeHumps, TheTwoPosesOfACircleStay) {
   std::vector<PoseHypothesis> all = {Turned(0.0, 0.5), Turned(1.0, 0.5)};
