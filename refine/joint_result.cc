@@ -164,6 +164,23 @@ void CountPlaceholder(const CameraSigma& sigma, PoseHypothesis* h) {
   h->focal_sigma = std::sqrt(variance);
 }
 
+// What the evidence says of the focal length that was given.
+struct FocalVerdict {
+  double off = 0.0;            // Logarithm of what was found over what was given.
+  bool is_doubted = false;     // It may be a placeholder, and is.
+  bool is_told = false;        // By the evidence, and not by the prior.
+  bool prior_decides = false;  // Neither told nor contradicted.
+
+  FocalVerdict(const JointProblem& problem, const PoseHypothesis& h)
+      : off(std::log(h.focal_scale) - StatedLogFocal(problem.observations())) {
+    const CameraSigma& sigma = problem.camera_sigma();
+    is_doubted = sigma.doubtful_log_focal > 0.0 && std::abs(off) > kInlierSigmas * sigma.log_focal;
+    const double prior = is_doubted ? sigma.doubtful_log_focal : sigma.log_focal;
+    is_told = h.focal_sigma < kPriorDecides * prior * h.focal_scale;
+    prior_decides = !is_told && std::abs(off) < prior;
+  }
+};
+
 void FillFocal(const JointProblem& problem, const State& state, const Linearization& at,
                const Eigen::MatrixXd& T, Refined* refined) {
   if (!problem.camera_is_estimated()) return;
@@ -177,21 +194,9 @@ void FillFocal(const JointProblem& problem, const State& state, const Linearizat
   Eigen::Map<Vector6d>(h->focal_covariance.data()) =
       h->focal_scale * T * at.covariance().col(column);
   const CameraSigma& sigma = problem.camera_sigma();
-  const double off = shifts[0] - StatedLogFocal(problem.observations());
-  const bool is_doubted =
-      sigma.doubtful_log_focal > 0.0 && std::abs(off) > kInlierSigmas * sigma.log_focal;
-  const double prior = is_doubted ? sigma.doubtful_log_focal : sigma.log_focal;
-  const char* remark = is_doubted ? "; the figure given is a placeholder" : "";
-  if (!(h->focal_sigma < kPriorDecides * prior * h->focal_scale)) {
-    remark = std::abs(off) < prior ? "; the evidence cannot tell, the prior alone decides"
-                                   : "; the evidence contradicts the prior but does not fix it";
-    if (sigma.doubtful_log_focal > 0.0 && !is_doubted && std::abs(off) < prior)
-      CountPlaceholder(sigma, h);
-  }
-  char text[160];
-  std::snprintf(text, sizeof(text), "focal length: %.4f times the camera's, +- %.4f%s",
-                std::exp(off), std::exp(off) * h->focal_sigma / h->focal_scale, remark);
-  refined->notes.push_back(text);
+  const FocalVerdict verdict(problem, *h);
+  if (sigma.doubtful_log_focal > 0.0 && verdict.prior_decides && !verdict.is_doubted)
+    CountPlaceholder(sigma, h);
   NoteWhatStays(problem, state, at, refined);
   NoteDoubtedAxes(problem.observations(), refined);
 }
@@ -236,6 +241,21 @@ void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double uni
   estimate->radius = unit * std::abs(circle.radius);
   estimate->center_px.setZero();
   CameraToPixel(camera, in_camera, &estimate->center_px);
+}
+
+std::string FocalNote(const JointProblem& problem, const PoseHypothesis& h) {
+  if (!problem.camera_is_estimated()) return "";
+  const FocalVerdict verdict(problem, h);
+  const char* remark = verdict.prior_decides ? "; the evidence cannot tell, the prior alone decides"
+                       : !verdict.is_told
+                           ? "; the evidence contradicts the prior but does not fix it"
+                       : verdict.is_doubted ? "; the figure given is a placeholder"
+                                            : "";
+  const double scale = std::exp(verdict.off);
+  char text[160];
+  std::snprintf(text, sizeof(text), "focal length: %.4f times the camera's, +- %.4f%s", scale,
+                scale * h.focal_sigma / h.focal_scale, remark);
+  return text;
 }
 
 Status FillRefined(const JointProblem& problem, State state, Refined* refined) {

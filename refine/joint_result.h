@@ -33,6 +33,10 @@ void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double uni
 // number is not finite.
 Status FillRefined(const JointProblem& problem, State state, Refined* refined);
 
+// What was found of the focal length, in words; none where it is not estimated. Other notes are of
+// a minimum; this one is of what is returned, which may be several merged.
+std::string FocalNote(const JointProblem& problem, const PoseHypothesis& h);
+
 // --- joint_inliers.cc
 
 // Counts and rms of the inliers. Returns how much wider the estimate scatters than least squares on

@@ -149,6 +149,8 @@ Status RankReadings(const JointProblem& problem, const std::vector<State>& minim
   const auto notes_of = std::find_if(all.begin(), all.end(), [&](const Refined& r) {
     return r.hypothesis.cost == best.cost && r.hypothesis.structure == best.structure;
   });
+  const std::string focal = FocalNote(problem, best);
+  if (!focal.empty()) estimate->notes.push_back(focal);
   if (notes_of != all.end())
     estimate->notes.insert(estimate->notes.end(), notes_of->notes.begin(), notes_of->notes.end());
   for (const std::size_t i : read_again) {

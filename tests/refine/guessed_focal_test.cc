@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -79,6 +80,27 @@ TEST(GuessedFocalLength, IsKnownAsWellAsShortEdgesTellIt) {
               rms, within, kScenes);
   EXPECT_GE(within, 54);
   EXPECT_GT(rms, 0.5);
+}
+
+// Of several poses that are humps of one, too.
+TEST(GuessedFocalLength, IsStatedInWordsAsItIsReturned) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    PlaneScene scene(0.7, 2.0, seed);
+    scene.camera.distortion = {};
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", 0.3, 0.2, 0.8)};
+    observations.pencils = {scene.Pencil("x", PencilDirection::kX, Eigen::Vector3d::UnitX())};
+    const PoseEstimate estimate = EstimatePose(observations, Guessed());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& best = estimate.hypotheses.front();
+    char expected[80];
+    std::snprintf(expected, sizeof(expected), "focal length: %.4f times the camera's, +- %.4f",
+                  best.focal_scale, best.focal_sigma);
+    const bool is_said =
+        std::any_of(estimate.notes.begin(), estimate.notes.end(),
+                    [&](const std::string& note) { return note.find(expected) == 0; });
+    EXPECT_TRUE(is_said) << seed << ": " << expected;
+  }
 }
 
 // Nothing but the prior is left where the axes may be none.
