@@ -135,6 +135,15 @@ std::vector<std::size_t> AddSecondReadings(const JointProblem& problem, std::vec
   return circles;
 }
 
+// In words, where most points are outliers of a pose; else empty.
+std::string FewInliers(const PoseHypothesis& h) {
+  if (2 * h.num_inliers >= h.num_observations) return "";
+  return "only " + std::to_string(h.num_inliers) + " of " + std::to_string(h.num_observations) +
+         " points agree with the pose to three standard deviations: a noise that is stated "
+         "(sigma_px) "
+         "may be too small";
+}
+
 }  // namespace
 
 Status RankReadings(const JointProblem& problem, const std::vector<State>& minima,
@@ -149,8 +158,8 @@ Status RankReadings(const JointProblem& problem, const std::vector<State>& minim
   const auto notes_of = std::find_if(all.begin(), all.end(), [&](const Refined& r) {
     return r.hypothesis.cost == best.cost && r.hypothesis.structure == best.structure;
   });
-  const std::string focal = FocalNote(problem, best);
-  if (!focal.empty()) estimate->notes.push_back(focal);
+  for (const std::string& note : {FocalNote(problem, best), FewInliers(best)})
+    if (!note.empty()) estimate->notes.push_back(note);
   if (notes_of != all.end())
     estimate->notes.insert(estimate->notes.end(), notes_of->notes.begin(), notes_of->notes.end());
   for (const std::size_t i : read_again) {

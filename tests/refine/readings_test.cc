@@ -256,6 +256,20 @@ TEST(ReadingsTest, AShortArcAndAPencilHaveAllTheirPlanes) {
   EXPECT_LE(sure_and_wrong, kScenes / 100);
 }
 
+// Stated noise is believed; that most points then are outliers is said.
+TEST(ReadingsTest, ASmallShareOfInliersIsNamed) {
+  for (const bool is_small : {false, true}) {
+    PlaneScene scene(0.7, 0.5, 3);
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0, 100)};
+    observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX(), 4, 30)};
+    observations.circles[0].sigma_px = observations.pencils[0].sigma_px = is_small ? 0.03 : 0.5;
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    EXPECT_EQ(HasNote(estimate, "of 220 points agree with the pose"), is_small);
+  }
+}
+
 TEST(ReadingsTest, NothingIsLeftOutOfWhatAgrees) {
   constexpr int kScenes = Trials(150);
   int left_out = 0;
