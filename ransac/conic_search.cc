@@ -79,7 +79,22 @@ std::vector<ConicCandidate> ConicSearch::Run() const {
   return candidates;
 }
 
-ConicSupport ConicSearch::Support(const ConicModel::Value& value) const {
+Status ConicSearch::Best(ConicFit* fit, std::vector<std::uint8_t>* mask) const {
+  Status status = NoEllipse();
+  for (const ConicCandidate& candidate : Run()) {
+    status = Finish(candidate, fit, mask);
+    if (status.ok()) break;
+  }
+  return status;
+}
+
+ConicSupport ConicSearch::Support(const Eigen::Matrix3d& conic) const {
+  ConicModel::Value value;
+  if (model_.FromConic(conic, &value)) return SupportOf(value);
+  return {0, model_.NumData(), std::numeric_limits<double>::max()};
+}
+
+ConicSupport ConicSearch::SupportOf(const ConicModel::Value& value) const {
   const double threshold = options_.ransac.threshold;
   ConicSupport support;
   for (int i = 0; i < model_.NumData(); ++i) {
@@ -107,7 +122,7 @@ std::optional<ConicCandidate> ConicSearch::RunShort() const {
   ConicCandidate candidate = Polished(report.model);
   if (!IsGood(candidate, report.num_inliers)) return {};
   constexpr double kMaxFalseAlarms = 0.01;
-  if (Support(candidate.value).log_false_alarms > std::log(kMaxFalseAlarms)) return {};
+  if (SupportOf(candidate.value).log_false_alarms > std::log(kMaxFalseAlarms)) return {};
   return candidate;
 }
 
@@ -195,7 +210,7 @@ Status CheckConicInput(const std::vector<CalibratedPoint>& points, const RobustF
 Status FindConic(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                  const Eigen::Matrix3d* initial, ConicFit* fit, std::vector<std::uint8_t>* mask,
                  const EdgeDirections& directions) {
-  Status status = CheckConicInput(points, options, directions);
+  const Status status = CheckConicInput(points, options, directions);
   if (!status.ok()) return status;
   const ConicSearch search(points, directions, options);
   if (initial != nullptr) {
@@ -203,21 +218,7 @@ Status FindConic(const std::vector<CalibratedPoint>& points, const RobustFitOpti
     if (!search.model().FromConic(*initial, &value)) return NoEllipse();
     return search.Finish(search.Polished(value), fit, mask);
   }
-  status = NoEllipse();
-  for (const ConicCandidate& candidate : search.Run()) {
-    status = search.Finish(candidate, fit, mask);
-    if (status.ok()) break;
-  }
-  return status;
-}
-
-ConicSupport SupportOfConic(const std::vector<CalibratedPoint>& points,
-                            const RobustFitOptions& options, const Eigen::Matrix3d& conic,
-                            const EdgeDirections& directions) {
-  const ConicSearch search(points, directions, options);
-  ConicModel::Value value;
-  if (search.model().FromConic(conic, &value)) return search.Support(value);
-  return {0, search.model().NumData(), std::numeric_limits<double>::max()};
+  return search.Best(fit, mask);
 }
 
 }  // namespace circline

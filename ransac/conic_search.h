@@ -71,9 +71,11 @@ class ConicSearch {
 
   // What a few searches found, the likeliest first.
   std::vector<ConicCandidate> Run() const;
-  // What speaks for an ellipse. Clutter is taken to be as dense near it as elsewhere in the box of
-  // the points.
-  ConicSupport Support(const ConicModel::Value& value) const;
+  // The likeliest that is an ellipse after Finish.
+  Status Best(ConicFit* fit, std::vector<std::uint8_t>* mask) const;
+  // What speaks for a conic; nothing but strays where it is no ellipse. Clutter is taken to be as
+  // dense near it as elsewhere in the box of the points.
+  ConicSupport Support(const Eigen::Matrix3d& conic) const;
   // What a short search found, if less than one as good is expected in a hundred sets.
   std::optional<ConicCandidate> RunShort() const;
   // The ellipse after reweighted steps.
@@ -95,6 +97,7 @@ class ConicSearch {
   std::vector<int> OutsideClusters() const;
   void SearchAmong(const std::vector<int>& indices, const RansacOptions& options, int num_inliers,
                    std::vector<ConicCandidate>* candidates) const;
+  ConicSupport SupportOf(const ConicModel::Value& value) const;
 
   const std::vector<CalibratedPoint>& points_;
   const EdgeDirections& directions_;
@@ -111,11 +114,6 @@ Status CheckConicInput(const std::vector<CalibratedPoint>& points, const RobustF
 Status FindConic(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                  const Eigen::Matrix3d* initial, ConicFit* fit, std::vector<std::uint8_t>* mask,
                  const EdgeDirections& directions);
-
-// What speaks for a conic; with nothing else than strays where it is no ellipse.
-ConicSupport SupportOfConic(const std::vector<CalibratedPoint>& points,
-                            const RobustFitOptions& options, const Eigen::Matrix3d& conic,
-                            const EdgeDirections& directions);
 
 }  // namespace circline
 

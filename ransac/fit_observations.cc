@@ -206,8 +206,10 @@ class PointFitter {
   // Takes back what chance explains, now that the noise is known.
   void JudgeCircle(FittedFeature* f, CircleObservation* circle) {
     if (!circle->fit) return;
+    const RobustFitOptions options = NextOptions(*f);
+    const EdgeDirections directions = Directions(*f, *circle);
     const ConicSupport support =
-        SupportOfConic(f->points, NextOptions(*f), circle->fit->conic, Directions(*f, *circle));
+        ConicSearch(f->points, directions, options).Support(circle->fit->conic);
     if (!support.MayBeChance()) return;
     if (!support.IsRefused()) {
       run_.Report("circle '" + circle->id + "'",

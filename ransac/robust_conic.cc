@@ -10,11 +10,14 @@ namespace circline {
 Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                       ConicFit* fit, std::vector<std::uint8_t>* mask,
                       const EdgeDirections& directions) {
+  Status status = CheckConicInput(points, options, directions);
+  if (!status.ok()) return status;
+  const ConicSearch search(points, directions, options);
   ConicFit found;
   std::vector<std::uint8_t> found_mask;
-  const Status status = FindConic(points, options, nullptr, &found, &found_mask, directions);
+  status = search.Best(&found, &found_mask);
   if (!status.ok()) return status;
-  const ConicSupport support = SupportOfConic(points, options, found.conic, directions);
+  const ConicSupport support = search.Support(found.conic);
   if (support.IsRefused()) return support.Refusal();
   *fit = found;
   if (mask != nullptr) mask->swap(found_mask);
