@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <optional>
 
 #include "circline/estimators/circle_pose.h"
@@ -25,7 +26,7 @@ void Add(const Seed& added, std::vector<Seed>* seeds) {
 // Whether the ellipse of an arc leaves its planes open: whether one standard deviation of it turns
 // them by much, or leads beyond the ellipses. Where they lie then is no matter of small errors.
 bool PlanesAreOpen(const ConicFit& fit) {
-  constexpr double kOpen = 0.1;  // Radians; 0.05 and 0.2 do as well (scenes "lone_arcs").
+  constexpr double kOpen = 0.1;  // Radians; of 0.02 to 0.2, on drawn scenes ("lone_arcs").
   std::array<CirclePose, 2> poses, moved;
   const int count = CirclePoses(fit.conic, &poses);
   const Eigen::SelfAdjointEigenSolver<Matrix6d> spread(fit.Covariance());
@@ -64,18 +65,17 @@ std::optional<Eigen::Vector3d> OnlyDirection(const Observations& resolved) {
 void AddSweep(const Observations& resolved, const CircleObservation& arc,
               const Eigen::Vector3d& direction, const Seed& like, std::vector<Seed>* seeds) {
   constexpr int kPlanes = 12;
-  constexpr double kSteepest = 3.3;  // A tilt of 85.8 degrees.
+  constexpr double kSteepest = 3.3;       // A tilt of 85.8 degrees.
+  std::size_t i = arc.points.size() / 2;  // The inlier in the middle, or the next one.
+  while (i < arc.inliers.size() && arc.inliers[i] == 0) ++i;
   CalibratedPoint middle;
-  if (arc.points.empty() ||
-      !PixelToCalibrated(resolved.camera, arc.points[arc.points.size() / 2], &middle)) {
-    return;
-  }
+  if (i >= arc.points.size() || !PixelToCalibrated(resolved.camera, arc.points[i], &middle)) return;
   Seed seed = like;
   seed.pose.translation = middle.Homogeneous().normalized();
   const Eigen::Vector3d across = direction.cross(seed.pose.translation).normalized(),
                         facing = direction.cross(across);
-  for (int i = 0; i < kPlanes; ++i) {
-    const double tilt = kSteepest * ((2.0 * i + 1.0) / kPlanes - 1.0);
+  for (int k = 0; k < kPlanes; ++k) {
+    const double tilt = kSteepest * ((2.0 * k + 1.0) / kPlanes - 1.0);
     const Eigen::Vector3d normal = facing / std::cosh(tilt) + std::tanh(tilt) * across;
     if (WorldRotation(resolved, normal, seed.pose.translation, kAnySigmaPx, &seed.pose.rotation))
       Add(seed, seeds);

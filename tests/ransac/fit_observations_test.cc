@@ -131,42 +131,6 @@ TEST(FitObservations, NamesWhatCannotBeFitted) {
   EXPECT_FALSE(observations.pencils[0].fit.has_value());
 }
 
-// Of scattered points some lie near some ellipse. Refused, or named where it has all of them.
-TEST(FitObservations, FindsNoEllipseInClutter) {
-  const int trials = Trials(50);
-  for (const double stated_px : {0.0, 0.5}) {
-    for (const double width_px : {30.0, 300.0}) {
-      for (const int num_points : {12, 50, 200}) {
-        int fits = 0, silent = 0;
-        for (int trial = 0; trial < trials; ++trial) {
-          Random random(static_cast<std::uint64_t>(trial));
-          Observations observations;
-          observations.camera = TestCamera();
-          CircleObservation circle;
-          circle.id = "clutter";
-          circle.sigma_px = stated_px;
-          for (int i = 0; i < num_points; ++i) {
-            const double x = random.Uniform(), y = random.Uniform();
-            circle.points.emplace_back(320.0 + width_px * x, 240.0 + 0.75 * width_px * y);
-          }
-          observations.circles.push_back(circle);
-          std::vector<std::string> problems;
-          ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
-          fits += observations.circles[0].fit.has_value() ? 1 : 0;
-          silent += problems.empty() ? 1 : 0;
-          for (const std::string& problem : problems)
-            EXPECT_NE(problem.find("'clutter'"), std::string::npos) << problem;
-        }
-        if (kSanitized) continue;
-        EXPECT_LE(silent, 0.02 * trials) << stated_px << ' ' << width_px << ' ' << num_points;
-        if (width_px > 100.0) {
-          EXPECT_LE(fits, 0.04 * trials) << stated_px << ' ' << num_points;
-        }
-      }
-    }
-  }
-}
-
 // A barrel distortion ends somewhere, and with a focal length guessed too short that is within the
 // photo: features out there lose all of their points.
 TEST(FitObservations, NamesWhatTheLensLeavesNoPointOf) {

@@ -1,0 +1,151 @@
+// A direction of gravity that is known beside the photo: evidence like any other.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "circline/refine/estimate_pose.h"
+#include "tests/plane_scene.h"
+#include "tests/refine/round_scene.h"
+#include "tests/refine/simulated_options.h"
+#include "tests/trials.h"
+
+namespace circline {
+namespace {
+
+using Eigen::Vector3d;
+
+GravityPrior Measured(const Vector3d& in_world, double sigma_rad, PlaneScene* scene) {
+  GravityPrior gravity;
+  gravity.in_world = in_world;
+  const Vector3d exact = scene->pose.rotation * in_world, a = exact.unitOrthogonal();
+  const double along_a = scene->random.Normal(), along_b = scene->random.Normal();
+  gravity.in_camera = (exact + sigma_rad * (along_a * a + along_b * exact.cross(a))).normalized();
+  gravity.sigma_rad = sigma_rad;
+  return gravity;
+}
+
+// A round thing on the ground: gravity tells which of its two planes is level.
+TEST(GravityPriorTest, DecidesBetweenThePosesOfACircle) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlaneScene scene(0.6, 0.3, seed);
+    const Observations observations = OneCircle(&scene);
+    EstimationOptions options = LeastSquares();
+    options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.02, &scene);
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_GT(h.probability, 0.999) << seed;
+    EXPECT_LT(NormalError(h, scene), 0.06) << seed;
+    EXPECT_TRUE(h.RotationIsFree());  // Along the normal it does not tell the spin.
+    // One that is known no better than by the hand says little.
+    options.gravity_prior->sigma_rad = 1.5;
+    const PoseEstimate vague = EstimatePose(observations, options);
+    ASSERT_EQ(vague.hypotheses.size(), 2U) << seed;
+    EXPECT_LT(vague.hypotheses[0].probability, 0.8) << seed;
+  }
+}
+
+TEST(GravityPriorTest, CannotDecideWhereBothPosesAgreeWithIt) {
+  PlaneScene scene(0.6, 0.2);
+  const Observations observations = OneCircle(&scene);
+  const PoseEstimate both = EstimatePose(observations, LeastSquares());
+  ASSERT_EQ(both.hypotheses.size(), 2U);
+  EstimationOptions options = LeastSquares();
+  options.gravity_prior = GravityPrior{};
+  options.gravity_prior->in_world = Vector3d::UnitZ();
+  options.gravity_prior->in_camera = (both.hypotheses[0].cam_from_world.rotation.col(2) +
+                                      both.hypotheses[1].cam_from_world.rotation.col(2))
+                                         .normalized();
+  options.gravity_prior->sigma_rad = 0.3;
+  const PoseEstimate estimate = EstimatePose(observations, options);
+  ASSERT_EQ(estimate.hypotheses.size(), 2U) << estimate.status.message;
+  EXPECT_NEAR(estimate.hypotheses[0].probability, 0.5, 0.05);
+}
+
+// The normal from a circle and from gravity: honest together.
+TEST(GravityPriorTest, EntersTheCovariance) {
+  constexpr int kTrials = Trials(400);
+  double nees = 0.0, with = 0.0, without = 0.0;
+  for (int i = 0; i < kTrials; ++i) {
+    PlaneScene scene(0.6, 0.4, static_cast<std::uint64_t>(i + 1));
+    const Observations observations = OneCircle(&scene);
+    EstimationOptions options = LeastSquares();
+    const PoseEstimate alone = EstimatePose(observations, options);
+    options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.003, &scene);
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const NormalErrors normal(estimate.hypotheses[0], scene.pose);
+    nees += normal.Nees() / kTrials;
+    with += normal.covariance.trace() / kTrials;
+    without += alone.hypotheses[0].Covariance().topLeftCorner<3, 3>().trace() / kTrials;
+  }
+  if (kSanitized) return;
+  EXPECT_NEAR(nees, 2.0, 0.4);  // 400 trials: +- 0.1.
+  EXPECT_LT(with, 0.8 * without);
+  EXPECT_LT(with, 2.0 * 0.003 * 0.003);
+}
+
+// A circle on a wall: gravity lies in its plane and tells the spin, whichever way the axes point in
+// the photo.
+TEST(GravityPriorTest, TellsTheSpinOfACircleOnAWall) {
+  for (const double turn : {0.0, 1.5, 3.1, -2.0}) {
+    PlaneScene scene(0.7, 0.2);
+    scene.pose.rotation = scene.pose.rotation * ExpRotation({0.0, 0.0, turn});
+    Observations observations = OneCircle(&scene);
+    observations.circles[0].center = scene.Pixel(0.0, 0.0);
+    EstimationOptions options = LeastSquares();
+    options.gravity_prior = Measured(-Vector3d::UnitY(), 0.01, &scene);
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_FALSE(h.RotationIsFree());
+    EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.05) << turn;
+    EXPECT_LT(h.SigmaRotation().maxCoeff(), 0.02) << turn;
+  }
+}
+
+// What the photo contradicts, an accelerometer in a braking car, is left out and named; what agrees
+// is not.
+TEST(GravityPriorTest, IsLeftOutWhereThePhotoContradictsIt) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlaneScene scene(0.6, 0.3, seed);
+    Observations observations = CircleAndAxes(&scene);
+    for (const double off : {0.0, 0.15, 0.6}) {
+      EstimationOptions options = LeastSquares();
+      options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.01, &scene);
+      options.gravity_prior->in_camera =
+          ExpRotation(off * Vector3d::UnitX()) * options.gravity_prior->in_camera;
+      const PoseEstimate estimate = EstimatePose(observations, options);
+      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      const PoseHypothesis& h = estimate.hypotheses[0];
+      EXPECT_EQ(h.left_out,
+                off > 0.0 ? std::vector<std::string>{"gravity_prior"} : std::vector<std::string>());
+      EXPECT_LT(NormalError(h, scene), 0.02) << seed;
+      EXPECT_GT(h.probability, 0.99);
+    }
+  }
+}
+
+// It has a sense: of lines alone it tells which way an axis points.
+TEST(GravityPriorTest, TellsTheSenseOfAnAxis) {
+  for (const double turn : {0.0, 3.1}) {
+    PlaneScene scene(0.7, 0.2);
+    scene.pose.rotation = scene.pose.rotation * ExpRotation({0.0, 0.0, turn});
+    Observations observations = scene.Empty();
+    observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX()),
+                            scene.Pencil("L2", PencilDirection::kY, Vector3d::UnitY())};
+    EstimationOptions options = LeastSquares();
+    options.gravity_prior = Measured(-Vector3d::UnitY(), 0.01, &scene);
+    const PoseEstimate estimate = EstimatePose(observations, options);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.05) << turn;
+  }
+}
+
+}  // namespace
+}  // namespace circline
