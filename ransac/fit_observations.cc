@@ -63,6 +63,11 @@ class PointFitter {
       FitSecond(circles_[i], &circle);
       ShareNoise(circles_[i], circle.points, circle.inliers, &*circle.fit);
     }
+    for (const PencilObservation& pencil : run_.observations.pencils) {
+      const std::string problem =
+          StatedNoiseProblem(run_.options, run_.observations.camera, pencil);
+      if (!problem.empty()) run_.Report("pencil '" + pencil.id + "'", problem);
+    }
     FitDirections(&lines_, &run_);
   }
 

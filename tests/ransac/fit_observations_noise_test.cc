@@ -200,6 +200,33 @@ TEST(FitObservationsNoise, AStatedNoiseThatIsFarTooSmallIsNamed) {
   }
 }
 
+TEST(FitObservationsNoise, AStatedNoiseThatIsFarTooSmallForLinesIsNamed) {
+  for (const double stated_px : {0.01, 0.05, 0.5}) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      Random random(seed);
+      Observations observations;
+      observations.camera = TestCamera();
+      PencilObservation pencil;
+      pencil.id = "L1";
+      pencil.sigma_px = stated_px;
+      for (int i = 0; i < 5; ++i) {
+        LineObservation line;
+        for (int k = 0; k < 50; ++k)
+          line.points.push_back(Pixel(-0.3 + 0.012 * k, 0.1 * i - 0.15, &random, 0.5));
+        pencil.lines.push_back(line);
+      }
+      observations.pencils.push_back(pencil);
+      std::vector<std::string> problems;
+      ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+      const auto is_named =
+          std::count_if(problems.begin(), problems.end(), [](const std::string& problem) {
+            return problem.find("pencil 'L1': its points lie") == 0;
+          });
+      EXPECT_EQ(is_named, stated_px < 0.1 ? 1 : 0) << stated_px << ' ' << seed;
+    }
+  }
+}
+
 // A manhole's rim and, over 40 % of it, that of its frame.
 TEST(FitObservationsNoise, ASecondRimIsASecondReadingAndNamed) {
   Random random(5);
