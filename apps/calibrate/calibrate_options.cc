@@ -8,6 +8,7 @@
 
 #include "apps/common/camera_file.h"
 #include "apps/common/flags_util.h"
+#include "apps/common/in_parallel.h"
 
 DECLARE_string(camera);
 
@@ -103,8 +104,7 @@ Status CalibrateOptionsFromFlags(CalibrateOptions* options) {
   options->adjust.conic_loss = estimation.conic_loss;
   options->adjust.line_loss = estimation.line_loss;
   options->adjust.noise_model = estimation.noise_model;
-  if (options->compare.threads > 0)
-    cv::setNumThreads(std::min(options->compare.threads, cv::getNumberOfCPUs()));
+  UseThreads(options->compare.threads);
   options->adjust.num_threads = std::max(1, cv::getNumThreads());
   return status;
 }

@@ -1,5 +1,6 @@
 #include "apps/common/in_parallel.h"
 
+#include <algorithm>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 
@@ -28,6 +29,10 @@ class Body : public cv::ParallelLoopBody {
 };
 
 }  // namespace
+
+void UseThreads(int count) {
+  if (count > 0) cv::setNumThreads(std::min(count, cv::getNumberOfCPUs()));
+}
 
 void InParallel(int count, const std::function<void(int)>& work) {
   const Body body(work);

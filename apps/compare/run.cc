@@ -2,13 +2,13 @@
 
 #include <glog/logging.h>
 
-#include <algorithm>
 #include <exception>
 #include <memory>
 #include <opencv2/core/utility.hpp>
 #include <utility>
 
 #include "apps/common/flags_util.h"
+#include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
 #include "apps/common/progress.h"
 #include "apps/compare/image_run.h"
@@ -144,8 +144,7 @@ Status MergeComparison(const CompareOptions& options, ComparisonResult* result) 
 
 Status RunComparison(const ImageSet& images, const CompareOptions& options, const Ranks& ranks,
                      ComparisonResult* result) {
-  // More threads than cores gain nothing, and TBB would print that it has none.
-  if (options.threads > 0) cv::setNumThreads(std::min(options.threads, cv::getNumberOfCPUs()));
+  UseThreads(options.threads);
   LOG(INFO) << images.size() << " images, " << cv::getNumThreads() << " threads";
   const SolverSet solvers(options);
   FolderLock lock;

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "apps/common/flags_util.h"
+#include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
 #include "apps/compare/encode.h"
@@ -261,6 +262,7 @@ int Reconstruct() {
   if (!status.ok())
     return Refuse("circline_reconstruct", Status::Invalid(image.path + ": " + status.message));
   if (options.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.inputs.guess));
+  UseThreads(options.threads);
   options.overlays = true;  // The photo is needed.
   const SolverSet solvers(options);
   ImageRun run = RunImage(options, &solvers, &image);

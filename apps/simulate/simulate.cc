@@ -8,7 +8,6 @@
 #include <iomanip>
 #include <limits>
 #include <mutex>
-#include <opencv2/core/utility.hpp>
 #include <sstream>
 
 #include "apps/common/in_parallel.h"
@@ -237,7 +236,7 @@ const std::vector<Method>& Methods() {
 }
 
 std::vector<SimulationRow> Simulate(const SimulationOptions& options) {
-  if (options.threads > 0) cv::setNumThreads(options.threads);
+  UseThreads(options.threads);
   const PaperScene scene(options.focal_px, options.translation);
   const Solvers clean(options.loss), robust(options.outlier_loss);
   const std::size_t num_cells = options.noise_px.size() * options.outlier_ratios.size();

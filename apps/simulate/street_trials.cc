@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <opencv2/core/utility.hpp>
 
 #include "apps/common/in_parallel.h"
 #include "apps/common/progress.h"
@@ -219,7 +218,7 @@ std::vector<std::string> Cells(const StreetAnswer& answer) {
 
 std::vector<StreetTrial> SimulateStreets(int num_trials, double focal_sigma, std::uint64_t seed,
                                          int threads) {
-  if (threads > 0) cv::setNumThreads(threads);
+  UseThreads(threads);
   Progress progress("photos", num_trials);
   std::mutex mutex;
   std::vector<StreetTrial> trials(static_cast<std::size_t>(num_trials));

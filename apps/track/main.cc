@@ -1,11 +1,11 @@
 // circline_track: the pose of a moving camera, frame after frame.
-#include <algorithm>
 #include <iostream>
 #include <memory>
-#include <opencv2/core/utility.hpp>
+#include <utility>
 #include <vector>
 
 #include "apps/common/flags_util.h"
+#include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
 #include "apps/track/track_options.h"
 #include "apps/track/track_report.h"
@@ -68,8 +68,7 @@ int TrackFrames() {
   if (status.ok()) status = OpenSource(options, &images, &source);
   if (!status.ok()) return Refuse("circline_track", status);
   if (options.compare.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.compare.inputs.guess));
-  if (options.compare.threads > 0)
-    cv::setNumThreads(std::min(options.compare.threads, cv::getNumberOfCPUs()));
+  UseThreads(options.compare.threads);
   const std::string& output = options.compare.output;
   FolderLock lock;
   status = CreateFolder(options.compare.overlays ? output + "/overlays" : output);
