@@ -1,4 +1,5 @@
 // detect, fit, estimate and adjust. The interpreter is let go while they compute.
+#include <exception>
 #include <map>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -94,11 +95,27 @@ PoseEstimate Estimate(const py::handle& given, const EstimationOptions& options)
   return estimate;
 }
 
-AdjustedPhotos Adjust(const py::iterable& given, const AdjustOptions& options) {
+// `progress` is called as AdjustOptions::progress is, until it raises: what it raises first is
+// raised here in the end.
+AdjustedPhotos Adjust(const py::iterable& given, const std::optional<py::function>& progress,
+                      AdjustOptions options) {
   std::vector<Observations> photos;
   for (const py::handle photo : given) photos.push_back(ObservationsFromPython(photo));
   ThrowUnlessOk(options.Validate());
+  std::exception_ptr raised;
+  if (progress) {
+    options.progress = [&progress, &raised](const char* what, int done, int total) {
+      if (raised) return;
+      const py::gil_scoped_acquire locked;
+      try {
+        (*progress)(what, done, total);
+      } catch (const py::error_already_set&) {
+        raised = std::current_exception();
+      }
+    };
+  }
   AdjustedPhotos adjusted = Unlocked([&] { return AdjustPhotos(photos, options); });
+  if (raised) std::rethrow_exception(raised);
   ThrowUnlessOk(adjusted.status);
   return adjusted;
 }
@@ -230,7 +247,7 @@ void BindAdjustCall(py::module_* module) {
          double tangential_sigma, const std::string& rigid, bool square_grids, double nearly_equal,
          std::vector<std::optional<CameraPose>> given_poses, double given_rotation_sigma,
          double given_translation_sigma, int max_iterations, int num_threads,
-         int num_solver_threads) {
+         int num_solver_threads, const std::optional<py::function>& progress) {
         AdjustOptions options;
         options.conic_loss = Loss(conic_loss, conic_scale, "conic_loss");
         options.line_loss = Loss(line_loss, line_scale, "line_loss");
@@ -248,7 +265,7 @@ void BindAdjustCall(py::module_* module) {
         options.max_iterations = max_iterations;
         options.num_threads = num_threads;
         options.num_solver_threads = num_solver_threads;
-        return Adjust(photos, options);
+        return Adjust(photos, progress, std::move(options));
       },
       py::arg("observations_list"), py::kw_only(),
       py::arg("conic_loss") = LossName(d.conic_loss.type),
@@ -263,11 +280,12 @@ void BindAdjustCall(py::module_* module) {
       py::arg("given_rotation_sigma") = d.given_rotation_sigma,
       py::arg("given_translation_sigma") = d.given_translation_sigma,
       py::arg("max_iterations") = d.max_iterations, py::arg("num_threads") = d.num_threads,
-      py::arg("num_solver_threads") = d.num_solver_threads,
+      py::arg("num_solver_threads") = d.num_solver_threads, py::arg("progress") = py::none(),
       "The camera (or several), the pose of every photo and what is seen: AdjustedPhotos.\n\n"
       "observations_list: one Observations a photo. camera_sigma: by Camera.id; without, nothing\n"
       "is known of a camera. given_poses: none, or of each photo a CameraPose from elsewhere, or\n"
-      "None. Options: refine/adjust_photos.h. Refused, with the reason.");
+      "None. progress: called with a word and how many of how many are done. Options:\n"
+      "refine/adjust_photos.h. Refused, with the reason.");
 }
 
 }  // namespace

@@ -99,6 +99,16 @@ void BindEstimate(py::module_* module) {
       .def_readonly("notes", &PoseEstimate::notes, "Evidence left out, and why.");
 }
 
+py::array_t<double> Residuals(const AdjustedPhoto& photo) {
+  py::array_t<double> rows({static_cast<py::ssize_t>(photo.residuals.size()), py::ssize_t{4}});
+  double* out = rows.mutable_data();
+  for (const AdjustedResidual& r : photo.residuals) {
+    for (const double value : {r.pixel.x(), r.pixel.y(), r.offset.x(), r.offset.y()})
+      *out++ = value;
+  }
+  return rows;
+}
+
 void BindAdjusted(py::module_* module) {
   using C = AdjustedCamera;
   py::class_<C>(*module, "AdjustedCamera", "A camera as many photos tell it.")
@@ -130,7 +140,10 @@ void BindAdjusted(py::module_* module) {
       .def_readonly("misfit", &P::misfit, "Median chi^2 of its features by residual.")
       .def_readonly("num_grid_lines", &P::num_grid_lines,
                     "Lines on a grid of equal squares, its world where there are any.")
-      .def_readonly("left_out", &P::left_out, "Features that contradict the rest.");
+      .def_readonly("left_out", &P::left_out, "Features that contradict the rest.")
+      .def_property_readonly("residuals", &Residuals,
+                             "(N, 4), of the points that count: where each lies and how far it is "
+                             "from where it should be, pixels.");
   using A = AdjustedCircle;
   py::class_<A>(*module, "AdjustedCircle", "A circle of a world.")
       .def_readonly("id", &A::id)

@@ -258,10 +258,17 @@ def test_adjusts_many_photos():
     ]
     for photo in photos:  # A guess of the camera, 5 % off.
         photo.camera.fx = photo.camera.fy = 1050.0
+    steps = []
     adjusted = circline.adjust(
         map(circline.fit, photos),
         camera_sigma={"cam0": circline.CameraSigma(log_focal=0.25, principal_point_px=20)},
+        progress=lambda *step: steps.append(step),
     )
+    assert steps[-1] == ("poses", 5, 5)
+    for photo in adjusted.photos:
+        assert photo.residuals.shape[1] == 4 and len(photo.residuals) > 100
+        sums = (photo.residuals[:, 2:] ** 2).sum()
+        assert abs(np.sqrt(sums / len(photo.residuals)) - photo.rms_px) < 0.2 * photo.rms_px
     assert all(photo.ok for photo in adjusted.photos) and len(adjusted.photos) == 5
     assert adjusted.photos[0].covariance.shape == (6, 6)
     (camera,) = adjusted.cameras
@@ -291,6 +298,15 @@ def test_adjusts_photos_of_given_poses():
     assert np.allclose(rotation, seen.rotation, atol=0.01)
     translation = frame.scale * world.translation - rotation @ frame.translation
     assert np.allclose(translation, seen.translation, atol=0.02 * frame.scale)
+
+
+def test_what_progress_raises_ends_adjust():
+    def interrupt(what, done, total):
+        raise KeyboardInterrupt(what)
+
+    with pytest.raises(KeyboardInterrupt):
+        circline.adjust([circline.fit(scenes.observations(seed=k)) for k in range(3)],
+                        num_threads=2, progress=interrupt)
 
 
 def test_adjust_names_wrong_input():

@@ -1,5 +1,5 @@
 import os
-from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterable, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -253,6 +253,8 @@ class AdjustedPhoto:
     def num_grid_lines(self) -> int: ...
     @property
     def left_out(self) -> List[str]: ...
+    @property
+    def residuals(self) -> Array: ...
 
 class AdjustedCircle:
     @property
@@ -394,6 +396,7 @@ def adjust(
     max_iterations: int = ...,
     num_threads: int = ...,
     num_solver_threads: int = ...,
+    progress: Optional[Callable[[str, int, int], None]] = ...,
 ) -> AdjustedPhotos: ...
 def load_scene(path: Path) -> List[SceneImage]: ...
 def load_cameras(path: Path) -> List[Camera]: ...
