@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "circline/ransac/detection/box_edge.h"
 #include "circline/ransac/detection/choose_plane.h"
 #include "circline/ransac/detection/circle_grid.h"
 #include "circline/ransac/detection/find_box.h"
@@ -109,6 +110,7 @@ class Assembler {
       if (!pencil.of_grid) axes.push_back(pencil.along.direction);
     }
     std::optional<FoundBox> box = FindFreeBox(AllLines(), axes, options_.diagonal_px);
+    if (!box && !is_of_pencils) box = FindAnyBox(AllLines(), options_.diagonal_px);
     if (!box || (is_of_pencils && !Contradicts(*box, *plane))) return false;
     *plane = Plane();
     plane->normal.direction = box->axes.col(2);

@@ -2,9 +2,9 @@
 // meet in corners.
 //
 // The few edges of a box hardly stand out among the lines of a photo: each of its directions has
-// two or three. What gives it away is that lines of all three end in common points. One axis
-// comes from elsewhere (a circle leaves two normals, a pencil has a direction); what is left to
-// search is one angle.
+// two or three. What gives it away is that lines of all three end in common points. Where one axis
+// comes from elsewhere (a circle leaves two normals, a pencil has a direction), what is left to
+// search is one angle; where none does, three edges in a row say all axes.
 #ifndef CIRCLINE_RANSAC_DETECTION_FIND_BOX_H_
 #define CIRCLINE_RANSAC_DETECTION_FIND_BOX_H_
 
@@ -42,14 +42,10 @@ std::optional<FoundBox> FindFreeBox(const std::vector<DetectedLine>& lines,
                                     const std::vector<Eigen::Vector3d>& axes,
                                     double diagonal_px = kUsualDiagonalPx);
 
-// The line's fit as that of an edge that may be worn, and bulge: with what all of its points share,
-// and what lens and calibration leave.
-LineFit WornEdge(const DetectedLine& line);
-
-// Logarithm of how much likelier lines[members] are along the direction than along any, with the
-// errors and the prior odds of a box's edges.
-double LogOddsOfDirection(const std::vector<DetectedLine>& lines, const std::vector<int>& members,
-                          const Eigen::Vector3d& direction);
+// The same of all boxes with two edges or more along each axis, from any three of them that are in
+// a row and along one axis each. `given` is 0.
+std::optional<FoundBox> FindAnyBox(const std::vector<DetectedLine>& lines,
+                                   double diagonal_px = kUsualDiagonalPx);
 
 }  // namespace circline
 

@@ -7,7 +7,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/vanishing_point.h"
-#include "circline/ransac/detection/find_box.h"
+#include "circline/ransac/detection/box_edge.h"
 #include "circline/ransac/detection/segment_meetings.h"
 #include "circline/ransac/detection/uncertain_direction.h"
 

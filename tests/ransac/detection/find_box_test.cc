@@ -149,6 +149,39 @@ TEST(FindFreeBox, NeedsNoMoreThanADirectionNearOneOfItsAxes) {
   EXPECT_GE(found, 18);
 }
 
+// Its corners say where its axes are.
+TEST(FindAnyBox, NeedsNoDirection) {
+  const Camera camera = TestCamera();
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed);
+    std::vector<DetectedLine> lines = BoxEdges(camera, &random);
+    const std::vector<DetectedLine> clutter = Clutter(camera, 60, &random);
+    lines.insert(lines.end(), clutter.begin(), clutter.end());
+    const auto box = FindAnyBox(lines);
+    if (!box) continue;
+    ++found;
+    for (int k = 0; k < 3; ++k) {
+      double nearest = 90.0;
+      for (int axis = 0; axis < 3; ++axis)
+        nearest = std::min(nearest, AxisDeg(box->axes.col(k), kAxes.col(axis)));
+      // Of three worn edges along each axis, at times with one of something else.
+      EXPECT_LT(nearest, 2.5) << seed;
+    }
+  }
+  EXPECT_GE(found, 18);
+}
+
+TEST(FindAnyBox, IsRareByAccident) {
+  const Camera camera = TestCamera();
+  Random random(7);
+  int found = 0;
+  constexpr int kTrials = 300;
+  for (int trial = 0; trial < kTrials; ++trial)
+    found += FindAnyBox(Clutter(camera, 100, &random)).has_value() ? 1 : 0;
+  EXPECT_LE(found, 3);
+}
+
 TEST(FindFreeBox, IsRareByAccident) {
   const Camera camera = TestCamera();
   Random random(7);
@@ -166,6 +199,7 @@ TEST(FindFreeBox, IsRareByAccident) {
 }
 
 TEST(FindBox, NothingInNothingOut) {
+  EXPECT_FALSE(FindAnyBox({}).has_value());
   EXPECT_FALSE(FindFreeBox({}, {Vector3d::UnitZ()}).has_value());
   EXPECT_FALSE(FindBox({}, {Vector3d::UnitZ()}).has_value());
   Random random(1);
