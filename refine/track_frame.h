@@ -105,7 +105,8 @@ class TrackFrame {
   bool Score(TrackFit* fit) const;
   void MoveOthers(const Scratch::Vector& step, TrackState* state) const;
   bool UpdateOthers(const TrackState& before, const Scratch::Matrix& posterior,
-                    const Scratch::Matrix& turn, TrackFit* fit);
+                    const Scratch::Matrix& turn, const Scratch::Vector& moved_by, TrackFit* fit);
+  void PriorParameters(TrackFit* fit);
   bool ResetPrior(const TrackState& before, const TrackFit& fit);
   bool Update(const TrackState& before, TrackFit* fit);
   bool Minimize(const TrackState& prior, TrackFit* fit);

@@ -7,7 +7,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "circline/refine/scratch.h"
@@ -21,39 +20,39 @@ namespace circline {
 // phi(t) = (f tx / tz, f ty / tz, log(tz / f)), f the focal length's share; a Gaussian of t itself
 // would claim to know what its curved ridge only happens to cross. A camera that is only considered
 // stays at its mean: L L^T is then the covariance of the others given that.
-class TrackPrior {
+class TrackPrior final : public ceres::CostFunction {
  public:
-  TrackPrior();
-  ~TrackPrior();
-
   // Makes it that of a state, in the memory of the one before. `used`: by block of the map. False
   // where the covariance is not positive definite.
   bool Reset(const TrackMap& map, const TrackState& state, const std::vector<std::uint8_t>& used);
 
-  // |z|^2; not finite where phi is not.
-  double TwiceCost(const TrackMap& map, const Eigen::VectorXd& x) const;
-  // How far the unknowns are from the mean, as tangents there; and its derivatives by them.
-  void Moved(const TrackMap& map, const Eigen::VectorXd& x, Scratch::Vector* moved) const;
-  void ChartsAt(const TrackMap& map, const Eigen::VectorXd& x, Scratch::Matrix* out) const;
+  // z at these values of `blocks`, and its derivatives by them, one block after the other, unless
+  // `J` is null. False where phi is not defined. Keeps its memory: for one thread.
+  bool Residuals(const double* const* parameters, double* z, Scratch::Matrix* J) const;
+  // The same, as ceres asks for it.
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override;
 
-  // Residuals of `blocks`. Keeps its memory: for one thread.
-  ceres::CostFunction* cost() const;
+  Eigen::Index num_values() const { return A_.cols(); }  // Of `blocks`.
 
   std::vector<int> blocks;                     // Of the unknowns, in the map; constants left out.
   std::vector<Eigen::Index> rows, considered;  // In the state's covariance: theirs, the camera's.
-  Scratch::Matrix charts{nullptr, 0, 0};       // M.
   Scratch::Matrix root{nullptr, 0, 0};         // L.
   Scratch::Matrix follow{nullptr, 0, 0};       // By how much the mean follows what is considered.
   Scratch::Matrix considered_covariance{nullptr, 0, 0};
 
  private:
-  class ChartedCost;
+  bool Chart(Scratch::Vector* x) const;
+  Eigen::Matrix<double, 3, 4> Slope(const Scratch::Vector& x) const;
+  void TurnTranslation(const Eigen::Matrix3d& by, Scratch::Matrix* J) const;
 
-  // phi(x) - phi(mean) of the unknowns, one after the other.
-  void Difference(const TrackMap& map, const Eigen::VectorXd& x, Scratch::Vector* out) const;
-
-  std::unique_ptr<ChartedCost> cost_;
-  mutable Scratch scratch_;
+  // Where phi has the translation and the focal length; -1: not charted, not an unknown.
+  Eigen::Index translation_ = -1, camera_ = -1;
+  Scratch::Matrix A_{nullptr, 0, 0};
+  Scratch::Vector mean_{nullptr, 0};
+  mutable Scratch::Matrix J_{nullptr, 0, 0};
+  mutable Scratch::Vector x_{nullptr, 0}, phi_{nullptr, 0};
+  Scratch scratch_;
 };
 
 }  // namespace circline

@@ -28,18 +28,24 @@ bool TrackFrame::ResetPrior(const TrackState& before, const TrackFit& fit) {
   return prior_.Reset(map_, before, used_);
 }
 
-// Returns the number of evaluations.
+// The values of the prior's blocks, as parameters_.
+void TrackFrame::PriorParameters(TrackFit* fit) {
+  parameters_.clear();
+  for (const int b : prior_.blocks)
+    parameters_.push_back(fit->state.x.data() + map_.block(b).offset);
+}
+
+// Sets the fit's cost, too, of terms and prior. Returns the number of evaluations.
 int TrackFrame::Solve(int max_evaluations, TrackFit* fit) {
   ceres::Problem problem(OwnsNothing());
   double* x = fit->state.x.data();
   int unknowns = static_cast<int>(prior_.rows.size());
-  parameters_.clear();
-  for (const int b : prior_.blocks) {
-    const Block& block = map_.block(b);
-    problem.AddParameterBlock(x + block.offset, block.size, block.manifold.get());
-    parameters_.push_back(x + block.offset);
+  PriorParameters(fit);
+  for (std::size_t k = 0; k < parameters_.size(); ++k) {
+    const Block& block = map_.block(prior_.blocks[k]);
+    problem.AddParameterBlock(parameters_[k], block.size, block.manifold.get());
   }
-  problem.AddResidualBlock(prior_.cost(), nullptr, parameters_);
+  problem.AddResidualBlock(&prior_, nullptr, parameters_);
   for (std::size_t i = 0; i < terms_.size(); ++i) {
     if (fit->active[i] == 0) continue;
     parameters_.clear();
@@ -58,6 +64,8 @@ int TrackFrame::Solve(int max_evaluations, TrackFit* fit) {
   }
   // Ceres evaluates once before the first iteration.
   ceres::Solve(NearbyOptions(unknowns, std::max(1, max_evaluations - 1), 1.0), &problem, &summary_);
+  fit->cost =
+      summary_.IsSolutionUsable() ? summary_.final_cost : std::numeric_limits<double>::infinity();
   return static_cast<int>(summary_.iterations.size());
 }
 
@@ -161,9 +169,8 @@ bool TrackFrame::Score(TrackFit* fit) const {
       left_out += 0.5 * (term.free_twice_cost + ChiSquareLimit(term.dof, GateProbability()));
     }
   }
-  const double cost = TermsCost(*fit) + 0.5 * prior_.TwiceCost(map_, fit->state.x);
-  fit->misfit = 2.0 * cost - free;
-  fit->cost = cost + left_out;
+  fit->misfit = 2.0 * fit->cost - free;
+  fit->cost += left_out;
   return std::isfinite(fit->cost);
 }
 

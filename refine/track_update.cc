@@ -18,35 +18,37 @@ using CurveJacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eige
 // own unknowns are eliminated; `log_det` grows by theirs.
 class TrackFrame::Information {
  public:
-  Information(TrackFrame* frame, const TrackFit& fit)
+  Information(TrackFrame* frame, TrackFit* fit)
       : H(frame->scratch_.NewMatrix(Size(*frame), Size(*frame))),
         turn(frame->scratch_.NewMatrix(frame->prior_.root.rows(), frame->prior_.root.rows())),
+        moved(frame->scratch_.NewVector(turn.rows())),
         frame_(*frame),
-        fit_(fit) {
+        fit_(*fit) {
     const TrackPrior& prior = frame_.prior_;
     const TrackMap& map = frame_.map_;
     const Eigen::Index n = turn.rows(), c = H.rows() - n;
     frame_.columns_.assign(map.blocks().size(), -1);
     frame_.plus_.clear();
     frame_.plus_.resize(map.blocks().size(), Scratch::Matrix(nullptr, 0, 0));
-    Scratch::Matrix plus = frame_.scratch_.NewMatrix(prior.charts.cols(), n),
-                    charts = frame_.scratch_.NewMatrix(n, prior.charts.cols()),
+    Scratch::Matrix by_values = frame_.scratch_.NewMatrix(n, prior.num_values()),
                     J = frame_.scratch_.NewMatrix(n, n + c);
-    plus.setZero();
-    Eigen::Index column = 0, ambient = 0;
+    Scratch::Vector z = frame_.scratch_.NewVector(n);
+    frame_.PriorParameters(fit);
+    prior.Residuals(frame_.parameters_.data(), z.data(), &by_values);
+    Eigen::Index column = 0, first = 0;
     for (const int b : prior.blocks) {
-      const Block& block = map.block(b);
-      plus.block(ambient, column, block.size, block.tangent_size()) = AddBlock(b, column);
-      column += block.tangent_size();
-      ambient += block.size;
+      const Scratch::Matrix& plus = AddBlock(b, column);
+      J.middleCols(column, plus.cols()).noalias() = by_values.middleCols(first, plus.rows()) * plus;
+      column += plus.cols();
+      first += plus.rows();
     }
     if (c > 0) AddBlock(TrackMap::kCamera, column);
-    prior.ChartsAt(map, fit.state.x, &charts);
-    turn.noalias() = charts * plus;
-    // The prior's residual, and how it follows what is considered.
-    J.leftCols(n) = turn;
+    // The prior's residuals are L^-1 times how far the unknowns are from the mean.
+    turn.noalias() = prior.root.triangularView<Eigen::Lower>() * J.leftCols(n);
+    moved.noalias() = prior.root.triangularView<Eigen::Lower>() * z;
+    // The mean follows what is considered.
     J.rightCols(c) = -prior.follow;
-    HalfSolveInPlace(prior.root, J);
+    HalfSolveInPlace(prior.root, J.rightCols(c));
     H.noalias() = J.transpose() * J;
   }
 
@@ -92,7 +94,8 @@ class TrackFrame::Information {
   }
 
   Scratch::Matrix H;
-  Scratch::Matrix turn;  // The unknowns' tangents at the minimum, in the prior's charts.
+  Scratch::Matrix turn;   // The unknowns' tangents at the minimum, in the prior's charts.
+  Scratch::Vector moved;  // How far they are from the mean, in these.
   double log_det = 0.0;
 
  private:
@@ -118,7 +121,7 @@ class TrackFrame::Information {
 // (Schmidt 1966). The unknowns that no term has to do with follow as they are correlated.
 bool TrackFrame::Update(const TrackState& before, TrackFit* fit) {
   const Scratch::Scope scope(&scratch_);
-  Information information(this, *fit);
+  Information information(this, fit);
   // As a covariance of this library is: of the inliers, and no better than the losses are tuned to.
   const bool is_trivial = options_.conic_loss.type == LossType::kTrivial &&
                           options_.line_loss.type == LossType::kTrivial;
@@ -149,7 +152,7 @@ bool TrackFrame::Update(const TrackState& before, TrackFit* fit) {
   rows_.insert(rows_.end(), prior_.considered.begin(), prior_.considered.end());
   Eigen::MatrixXd& P = fit->state.covariance;
   Scatter(posterior, rows_, rows_, &P);
-  if (!UpdateOthers(before, posterior, turn, fit)) return false;
+  if (!UpdateOthers(before, posterior, turn, information.moved, fit)) return false;
   Symmetrize(&P);
   fit->state.log_weight = before.log_weight - fit->cost - 0.5 * log_det;
   return fit->state.x.allFinite() && P.allFinite() && std::isfinite(fit->state.log_weight);
@@ -157,13 +160,14 @@ bool TrackFrame::Update(const TrackState& before, TrackFit* fit) {
 
 // The unknowns that the frame has nothing to do with.
 bool TrackFrame::UpdateOthers(const TrackState& before, const Scratch::Matrix& posterior,
-                              const Scratch::Matrix& turn, TrackFit* fit) {
+                              const Scratch::Matrix& turn, const Scratch::Vector& moved_by,
+                              TrackFit* fit) {
   others_.clear();
   for (Eigen::Index r = 0; r < map_.tangent_size(); ++r) {
     if (std::find(rows_.begin(), rows_.end(), r) == rows_.end()) others_.push_back(r);
   }
   const auto m = static_cast<Eigen::Index>(rows_.size()),
-             o = static_cast<Eigen::Index>(others_.size()), n = prior_.root.rows();
+             o = static_cast<Eigen::Index>(others_.size());
   if (o == 0) return true;
   // All transposed.
   Scratch::Matrix root = scratch_.NewMatrix(m, m), across = scratch_.NewMatrix(m, o),
@@ -183,9 +187,8 @@ bool TrackFrame::UpdateOthers(const TrackState& before, const Scratch::Matrix& p
   Scatter(others, others_, others_, &P);
   Scatter(with, rows_, others_, &P);
   Scatter(with.transpose(), others_, rows_, &P);
-  Scratch::Vector by = scratch_.NewVector(n), step = scratch_.NewVector(o);
-  prior_.Moved(map_, fit->state.x, &by);
-  step.noalias() = gain.topRows(n).transpose() * by;
+  Scratch::Vector step = scratch_.NewVector(o);
+  step.noalias() = gain.topRows(moved_by.size()).transpose() * moved_by;
   MoveOthers(step, &fit->state);
   return true;
 }
