@@ -103,7 +103,6 @@ class TrackFrame {
   int LeastOdd(TrackFit* fit) const;
   bool LeaveOutWorst(TrackFit* fit);
   bool Score(TrackFit* fit) const;
-  void MoveOthers(const Scratch::Vector& step, TrackState* state) const;
   bool UpdateOthers(const TrackState& before, const Scratch::Matrix& posterior,
                     const Scratch::Matrix& turn, const Scratch::Vector& moved_by, TrackFit* fit);
   void PriorParameters(TrackFit* fit);

@@ -50,11 +50,9 @@ void KalmanUpdate(const TrackMap& map, const BlockMatrix& J, const BlockVector& 
   state->log_weight -= 0.5 * (z.dot(weighed.col(0)) + LogDetOfRoot(root));
   P.noalias() -= JP.transpose() * gain;
   Symmetrize(&P);
-  for (int i = 0; i < map.size(); ++i) {
-    const Block& block = map.block(i);
-    const BlockVector step = gain.middleCols(map.tangent(i), block.tangent_size()).transpose() * z;
-    Plus(block, step, state->x.data() + block.offset);
-  }
+  Scratch::Vector step = scratch->NewVector(P.cols());
+  step.noalias() = gain.transpose() * z;
+  state->Move(map, step);
 }
 
 }  // namespace
@@ -126,16 +124,22 @@ double SquaredDistance(const CameraPose& from, const CameraPose& to, BlockMatrix
   return e.squaredNorm();
 }
 
-void Plus(const Block& block, const BlockVector& step, double* values) {
-  if (block.tangent_size() == 0) return;
-  Eigen::Map<Eigen::VectorXd> all(values, block.size);
-  if (block.manifold == nullptr) {
-    all += step;
-    return;
+void TrackState::Move(const TrackMap& map, const Scratch::Vector& step) {
+  BlockVector moved;
+  for (int i = 0; i < map.size(); ++i) {
+    const Block& block = map.block(i);
+    if (block.tangent_size() == 0) continue;
+    double* values = x.data() + block.offset;
+    Eigen::Map<Eigen::VectorXd> all(values, block.size);
+    const double* by = step.data() + map.tangent(i);
+    if (block.manifold == nullptr) {
+      all += Eigen::Map<const Eigen::VectorXd>(by, block.size);
+      continue;
+    }
+    moved.resize(block.size);
+    block.manifold->Plus(values, by, moved.data());
+    all = moved;
   }
-  BlockVector moved(block.size);
-  block.manifold->Plus(values, step.data(), moved.data());
-  all = moved;
 }
 
 // X_cam moves as R' = exp([w dt]x) R, t' = exp([w dt]x) t + V v dt: a constant twist (w, v). Its

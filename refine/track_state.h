@@ -80,6 +80,7 @@ struct TrackState {
     const int size = map.tangent(TrackMap::kTurnRate);
     return covariance.topLeftCorner(size, size);
   }
+  void Move(const TrackMap& map, const Scratch::Vector& step);  // By a tangent of all blocks.
   bool IsInRange() const;  // Squares of all numbers, and their sums, are finite.
   // Takes in a block that has been added to the map, its numbers independent or not.
   void Append(const TrackMap& map, int block, const Eigen::VectorXd& values,
@@ -91,9 +92,6 @@ struct TrackState {
 // Squared distance of a pose from another under a covariance of tangents there (PoseCovariance);
 // infinite where that is not positive definite.
 double SquaredDistance(const CameraPose& from, const CameraPose& to, BlockMatrix covariance);
-
-// Moves a block by a tangent.
-void Plus(const Block& block, const BlockVector& step, double* values);
 
 // Moves a hypothesis on by dt seconds at its own velocity, with the noise of the options.
 void MoveOn(const TrackMap& map, const TrackerOptions& options, double dt, TrackState* state);

@@ -187,21 +187,12 @@ bool TrackFrame::UpdateOthers(const TrackState& before, const Scratch::Matrix& p
   Scatter(others, others_, others_, &P);
   Scatter(with, rows_, others_, &P);
   Scatter(with.transpose(), others_, rows_, &P);
-  Scratch::Vector step = scratch_.NewVector(o);
+  Scratch::Vector step = scratch_.NewVector(o), all = scratch_.NewVector(map_.tangent_size());
   step.noalias() = gain.topRows(moved_by.size()).transpose() * moved_by;
-  MoveOthers(step, &fit->state);
+  all.setZero();
+  for (Eigen::Index k = 0; k < o; ++k) all[others_[static_cast<std::size_t>(k)]] = step[k];
+  fit->state.Move(map_, all);
   return true;
-}
-
-// `step`: of others_, whole blocks.
-void TrackFrame::MoveOthers(const Scratch::Vector& step, TrackState* state) const {
-  for (int b = 0; b < map_.size(); ++b) {
-    const Block& block = map_.block(b);
-    const auto first = std::lower_bound(others_.begin(), others_.end(), map_.tangent(b));
-    if (block.tangent_size() == 0 || first == others_.end() || *first != map_.tangent(b)) continue;
-    const BlockVector own = step.segment(first - others_.begin(), block.tangent_size());
-    Plus(block, own, state->x.data() + block.offset);
-  }
 }
 
 }  // namespace circline
