@@ -75,29 +75,15 @@ double LogDetOfRoot(const Root& L) {
   return 2.0 * L.diagonal().array().log().sum();
 }
 
-// out = M(rows, cols), and M(rows, cols) = in.
-template <typename Out>
-void Gather(const Eigen::MatrixXd& M, const std::vector<Eigen::Index>& rows,
-            const std::vector<Eigen::Index>& cols, Out* out) {
-  for (std::size_t j = 0; j < cols.size(); ++j) {
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      (*out)(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = M(rows[i], cols[j]);
-  }
-}
-template <typename In>
-void Scatter(const In& in, const std::vector<Eigen::Index>& rows,
-             const std::vector<Eigen::Index>& cols, Eigen::MatrixXd* M) {
-  for (std::size_t j = 0; j < cols.size(); ++j) {
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      (*M)(rows[i], cols[j]) = in(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-  }
+// Of rows or columns, as Eigen takes them without a copy of their memory.
+inline Eigen::Map<const Eigen::Matrix<Eigen::Index, Eigen::Dynamic, 1>> Indices(
+    const std::vector<Eigen::Index>& indices) {
+  return {indices.data(), static_cast<Eigen::Index>(indices.size())};
 }
 
-// M = (M + M^T) / 2.
+// The upper half as the lower one.
 inline void Symmetrize(Eigen::MatrixXd* M) {
-  for (Eigen::Index j = 0; j < M->cols(); ++j) {
-    for (Eigen::Index i = 0; i < j; ++i) (*M)(i, j) = (*M)(j, i) = 0.5 * ((*M)(i, j) + (*M)(j, i));
-  }
+  M->triangularView<Eigen::StrictlyUpper>() = M->transpose();
 }
 
 // A vector that keeps what it no longer has, for the memory in it.

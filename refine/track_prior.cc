@@ -115,13 +115,14 @@ bool TrackPrior::Reset(const TrackMap& map, const TrackState& state,
     row += block.tangent_size();
     column += block.size;
   }
-  Gather(state.covariance, rows, rows, &root);
-  Gather(state.covariance, considered, considered, &considered_covariance);
+  const auto unknown = Indices(rows), counted = Indices(considered);
+  root = state.covariance(unknown, unknown);
+  considered_covariance = state.covariance(counted, counted);
   if (c > 0) {
     const Scratch::Scope scope(&scratch_);
     Scratch::Matrix across = scratch_.NewMatrix(c, n), gain = scratch_.NewMatrix(c, n),
                     camera = scratch_.NewMatrix(c, c);
-    Gather(state.covariance, considered, rows, &across);
+    across = state.covariance(counted, unknown);
     camera = considered_covariance;
     if (!FactorInPlace(camera)) return false;
     gain = across;

@@ -151,7 +151,7 @@ bool TrackFrame::Update(const TrackState& before, TrackFit* fit) {
   rows_ = prior_.rows;
   rows_.insert(rows_.end(), prior_.considered.begin(), prior_.considered.end());
   Eigen::MatrixXd& P = fit->state.covariance;
-  Scatter(posterior, rows_, rows_, &P);
+  P(Indices(rows_), Indices(rows_)) = posterior;
   if (!UpdateOthers(before, posterior, turn, information.moved, fit)) return false;
   Symmetrize(&P);
   fit->state.log_weight = before.log_weight - fit->cost - 0.5 * log_det;
@@ -173,24 +173,25 @@ bool TrackFrame::UpdateOthers(const TrackState& before, const Scratch::Matrix& p
   Scratch::Matrix root = scratch_.NewMatrix(m, m), across = scratch_.NewMatrix(m, o),
                   gain = scratch_.NewMatrix(m, o), moved = scratch_.NewMatrix(m, o),
                   with = scratch_.NewMatrix(m, o), others = scratch_.NewMatrix(o, o);
-  Gather(before.covariance, rows_, rows_, &root);
+  const auto mine = Indices(rows_), theirs = Indices(others_);
+  root = before.covariance(mine, mine);
   if (!FactorInPlace(root)) return false;
-  Gather(before.covariance, rows_, others_, &across);
+  across = before.covariance(mine, theirs);
   gain = across;
   SolveInPlace(root, gain);
   moved.noalias() = turn.transpose() * gain;
   with.noalias() = posterior * moved;
-  Gather(before.covariance, others_, others_, &others);
+  others = before.covariance(theirs, theirs);
   others.noalias() -= gain.transpose() * across;
   others.noalias() += with.transpose() * moved;
   Eigen::MatrixXd& P = fit->state.covariance;
-  Scatter(others, others_, others_, &P);
-  Scatter(with, rows_, others_, &P);
-  Scatter(with.transpose(), others_, rows_, &P);
+  P(theirs, theirs) = others;
+  P(mine, theirs) = with;
+  P(theirs, mine) = with.transpose();
   Scratch::Vector step = scratch_.NewVector(o), all = scratch_.NewVector(map_.tangent_size());
   step.noalias() = gain.topRows(moved_by.size()).transpose() * moved_by;
   all.setZero();
-  for (Eigen::Index k = 0; k < o; ++k) all[others_[static_cast<std::size_t>(k)]] = step[k];
+  all(theirs) = step;
   fit->state.Move(map_, all);
   return true;
 }
