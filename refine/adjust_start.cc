@@ -5,9 +5,9 @@
 #include <atomic>
 #include <cmath>
 #include <exception>
+#include <future>
 #include <limits>
-#include <mutex>
-#include <thread>
+#include <vector>
 
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/joint_problem.h"
@@ -18,25 +18,22 @@ namespace circline {
 
 void ParallelFor(int count, int num_threads, const std::function<void(int)>& work) {
   std::atomic<int> next{0};
-  std::mutex mutex;
-  std::exception_ptr thrown;
   const auto run = [&] {
     try {
       for (int i = next++; i < count; i = next++) work(i);
     } catch (...) {  // No memory left, or a cost function of the user's.
       next = count;
-      const std::lock_guard<std::mutex> lock(mutex);
-      if (!thrown) thrown = std::current_exception();
+      throw;
     }
   };
-  std::vector<std::thread> others;
+  std::vector<std::future<void>> others;
   try {
-    for (int k = 1; k < std::min(num_threads, count); ++k) others.emplace_back(run);
+    for (int k = 1; k < std::min(num_threads, count); ++k)
+      others.push_back(std::async(std::launch::async, run));
   } catch (const std::exception&) {  // No more threads can be had: fewer do the work.
   }
   run();
-  for (std::thread& thread : others) thread.join();
-  if (thrown) std::rethrow_exception(thrown);
+  for (std::future<void>& other : others) other.get();
 }
 
 Observations Prepare(const Observations& given, const Camera& camera,
