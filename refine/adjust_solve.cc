@@ -60,29 +60,25 @@ Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
 }
 
 void AdjustProblem::Judge() {
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const double* parameters[kMostBlocks];
   for (Feature& feature : features_) {
     const Term& term = this->term(feature.term);
-    const auto rows = static_cast<std::size_t>(term.cost->num_residuals());
-    std::vector<double> residuals(rows);
-    std::vector<std::vector<double>> jacobians;
+    const int rows = term.cost->num_residuals();
+    Eigen::VectorXd residuals(rows);
+    std::vector<RowMajor> jacobians;
     std::vector<double*> pointers;
     for (const int size : term.cost->parameter_block_sizes())
-      pointers.push_back(jacobians.emplace_back(rows * static_cast<std::size_t>(size)).data());
+      pointers.push_back(jacobians.emplace_back(rows, size).data());
     feature.chi2 = 0.0;
     feature.rows = 0;
     Parameters(term, values().data(), parameters);
     if (!term.cost->Evaluate(parameters, residuals.data(), pointers.data())) continue;
-    // The row without derivative is what no curve explains: the noise of the points.
-    for (std::size_t row = 0; row < rows; ++row) {
-      bool is_rest = true;
-      for (std::size_t b = 0; b < jacobians.size() && is_rest; ++b) {
-        const std::size_t size = jacobians[b].size() / rows;
-        is_rest = std::all_of(jacobians[b].begin() + static_cast<std::ptrdiff_t>(row * size),
-                              jacobians[b].begin() + static_cast<std::ptrdiff_t>((row + 1) * size),
-                              [](double d) { return d == 0.0; });
-      }
-      if (is_rest) continue;
+    for (int row = 0; row < rows; ++row) {
+      // The row without derivative is what no curve explains: the noise of the points.
+      if (std::all_of(jacobians.begin(), jacobians.end(),
+                      [row](const RowMajor& J) { return J.row(row).isZero(0.0); }))
+        continue;
       feature.chi2 += residuals[row] * residuals[row];
       ++feature.rows;
     }
