@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,8 +18,18 @@
 namespace circline {
 namespace {
 
-constexpr double kExactAngle = 1e-6;   // Radians: stands for an angle that is known exactly.
-constexpr double kExactLength = 1e-6;  // Relative: the same for a length.
+// What is known exactly has this share of the standard deviation that its own pixels give it, which
+// adds a hundredth to variances. With less the cost has a bent valley, so narrow that the solver
+// stops half-way along it.
+constexpr double kExactShare = 0.1;
+
+// Standard deviation of the better known component of a direction, radians.
+double LeastSigma(const VanishingPointFit& fit) {
+  constexpr double kLeast = 1e-5;  // Where the fit states none.
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(fit.covariance,
+                                                              Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(kLeast * kLeast, spread.eigenvalues()[1]));  // [0]: along itself, 0.
+}
 
 // Features of a kind, the first few by name.
 std::string Names(const char* kind, const std::vector<std::string>& ids) {
@@ -125,19 +136,23 @@ void JointProblemBuilder::AddAngle(std::size_t index) {
   const std::string name =
       "the known angle between '" + known.pencils[0] + "' and '" + known.pencils[1] + "'";
   int blocks[2];
+  double told = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < 2; ++k) {
-    blocks[k] = p_.directions_[static_cast<std::size_t>(FindPencil(obs_, known.pencils[k]))];
+    const auto pencil = static_cast<std::size_t>(FindPencil(obs_, known.pencils[k]));
+    blocks[k] = p_.directions_[pencil];
     if (blocks[k] < 0) {
       p_.unused_.push_back(name + ": not used, '" + known.pencils[k] +
                            "' is no pencil of the world's plane");
       return;
     }
+    if (obs_.pencils[pencil].fit) told = std::min(told, LeastSigma(*obs_.pencils[pencil].fit));
   }
   if (p_.block(blocks[0]).is_constant && p_.block(blocks[1]).is_constant) {
     p_.unused_.push_back(name + ": not used, both run along axes, which are orthogonal");
     return;
   }
-  p_.AddTerm(NewAngleCost(known.value, std::max(known.sigma, kExactAngle)), {blocks[0], blocks[1]});
+  p_.AddTerm(NewAngleCost(known.value, std::max(known.sigma, kExactShare * told)),
+             {blocks[0], blocks[1]});
 }
 
 void JointProblemBuilder::AddLength(std::size_t index) {
@@ -160,7 +175,8 @@ void JointProblemBuilder::AddLength(std::size_t index) {
   AddPoint(known.points[0], DrawnSigma(), a, f);
   AddPoint(known.points[1], DrawnSigma(), b, f);
   const double sigma = known.sigma > 0.0 ? known.sigma : model_.length;
-  p_.AddTerm(NewLengthCost(known.value, std::max(sigma, kExactLength)), {a, b}, f);
+  const double told = DrawnSigma() / (known.points[0] - known.points[1]).norm();
+  p_.AddTerm(NewLengthCost(known.value, std::max(sigma, kExactShare * told)), {a, b}, f);
   p_.lengths_.push_back({a, b, f});
   is_metric_ = true;
 }
