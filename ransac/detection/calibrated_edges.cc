@@ -1,19 +1,11 @@
 #include "circline/ransac/detection/calibrated_edges.h"
 
-#include <array>
-
 namespace circline {
 namespace {
-
-using Eigen::Vector2d;
 
 // Reach of the linear approximation, pixels: its error is 0.005 px at 2.5 px in the strongest
 // distortion, and grows with the square.
 constexpr float kReachPx = 2.5f;
-// From an anchor this near the next one is found in a step or two of Newton's method, pixels.
-constexpr double kNearPx = 30.0;
-// A step of this length leaves 1e-6 px, as convergence is quadratic.
-constexpr double kSmallStepPx = 0.02;
 
 }  // namespace
 
@@ -46,37 +38,9 @@ void CalibratedEdges::Group() {
 }
 
 void CalibratedEdges::Calibrate(Anchor* anchor) {
-  const bool known = (last_ != nullptr && ContinueFrom(*last_, anchor)) ||
-                     PixelToCalibrated(camera_, Vector2d(anchor->u, anchor->v), &anchor->point);
+  const bool known =
+      PixelToCalibrated(camera_, Eigen::Vector2d(anchor->u, anchor->v), &anchor->point);
   anchor->state = known ? State::kKnown : State::kNone;
-  if (known) last_ = anchor;
-}
-
-// From a known anchor nearby by Newton's method; false where it does not settle at once.
-bool CalibratedEdges::ContinueFrom(const Anchor& known, Anchor* anchor) const {
-  if (camera_.model != CameraModel::kOpenCV) return false;
-  const Vector2d target(anchor->u, anchor->v);
-  Vector2d miss = target - Vector2d(known.u, known.v);
-  if (!(miss.squaredNorm() < kNearPx * kNearPx)) return false;
-  CalibratedPoint at = known.point;
-  constexpr int kMaxSteps = 3;
-  for (int k = 0; k <= kMaxSteps; ++k) {
-    const std::array<double, 4>& step = at.x_from_pixel;
-    at.x +=
-        Vector2d(step[0] * miss.x() + step[1] * miss.y(), step[2] * miss.x() + step[3] * miss.y());
-    if (k > 0 && miss.squaredNorm() < kSmallStepPx * kSmallStepPx) {
-      anchor->point = at;
-      return true;
-    }
-    Vector2d pixel;
-    std::array<double, 4> j;
-    DistortWithJacobian(camera_, at.x, &pixel, &j);
-    const double det = j[0] * j[3] - j[1] * j[2];
-    if (!(det > 0.0)) return false;
-    at.x_from_pixel = {j[3] / det, -j[1] / det, -j[2] / det, j[0] / det};
-    miss = target - pixel;
-  }
-  return false;
 }
 
 }  // namespace circline

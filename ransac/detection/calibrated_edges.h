@@ -44,13 +44,11 @@ class CalibratedEdges {
 
   void Group();
   void Calibrate(Anchor* anchor);
-  bool ContinueFrom(const Anchor& known, Anchor* anchor) const;
 
   const EdgeMap& map_;
   const Camera& camera_;
   std::vector<Anchor> anchors_;
   std::vector<std::int32_t> anchor_of_;  // For each point of the map.
-  const Anchor* last_ = nullptr;         // The last one that became known.
 };
 
 }  // namespace circline
