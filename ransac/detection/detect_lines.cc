@@ -80,9 +80,8 @@ class LineJoiner {
   }
 
   void JoinPieces() {
-    PieceBeginnings free;
-    for (const LinePiece& piece : pieces_) free.Add(edges_.X(piece.begin), kMaxAlternatingPx);
-    for (std::size_t k = 0; k < pieces_.size(); ++k) {
+    PieceBeginnings free(edges_, pieces_, kMaxAlternatingPx);
+    for (Eigen::Index k = 0; k < free.size(); ++k) {
       if (!free.Has(k)) continue;
       free.Remove(k);
       Joined joined = Start(static_cast<int>(k));
@@ -90,8 +89,8 @@ class LineJoiner {
       bool again = true;
       while (again) {
         again = false;
-        for (std::size_t j = k + 1; (j = free.NextNear(joined.line, j)) < free.size(); ++j) {
-          if (!Continues(joined, pieces_[j])) continue;
+        for (Eigen::Index j = k + 1; (j = free.NextNear(joined.line, j)) < free.size(); ++j) {
+          if (!Continues(joined, pieces_[static_cast<std::size_t>(j)])) continue;
           free.Remove(j);
           again = true;
           Append(static_cast<int>(j), &joined);

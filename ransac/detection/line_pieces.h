@@ -95,51 +95,40 @@ class LineEdges {
 };
 
 // Where pieces begin, calibrated: all are compared with all lines, in blocks of single precision,
-// which the compiler turns into vectors.
+// which Eigen turns into vectors.
 class PieceBeginnings {
  public:
-  void Add(const CalibratedPoint& first, double reach_px) {
-    const std::array<double, 4>& j = first.x_from_pixel;
-    const double scale = std::sqrt(j[0] * j[0] + j[1] * j[1] + j[2] * j[2] + j[3] * j[3]);
-    const double rounding = 1e-5 * (1.0 + first.x.cwiseAbs().sum());
-    x_.push_back(static_cast<float>(first.x.x()));
-    y_.push_back(static_cast<float>(first.x.y()));
-    reach_.push_back(static_cast<float>(1.001 * reach_px * scale + rounding));
+  PieceBeginnings(const LineEdges& edges, const std::vector<LinePiece>& pieces, double reach_px)
+      : x_(pieces.size()), y_(pieces.size()), reach_(pieces.size()) {
+    for (Eigen::Index i = 0; i < reach_.size(); ++i) {
+      const CalibratedPoint first = edges.X(pieces[static_cast<std::size_t>(i)].begin);
+      const double scale = Eigen::Map<const Eigen::Vector4d>(first.x_from_pixel.data()).norm();
+      const double rounding = 1e-5 * (1.0 + first.x.cwiseAbs().sum());
+      x_[i] = static_cast<float>(first.x.x());
+      y_[i] = static_cast<float>(first.x.y());
+      reach_[i] = static_cast<float>(1.001 * reach_px * scale + rounding);
+    }
   }
 
-  std::size_t size() const { return x_.size(); }
-  bool Has(std::size_t i) const { return reach_[i] != kNone; }
-  void Remove(std::size_t i) { reach_[i] = kNone; }
+  Eigen::Index size() const { return reach_.size(); }
+  bool Has(Eigen::Index i) const { return reach_[i] != kNone; }
+  void Remove(Eigen::Index i) { reach_[i] = kNone; }
 
   // The first, from i on, within its reach of a line of unit normal, or all but: rounding
   // leaves none out. size() if there is none.
-  std::size_t NextNear(const Eigen::Vector3d& line, std::size_t i) const {
-    constexpr std::size_t kBlock = 32;
+  Eigen::Index NextNear(const Eigen::Vector3d& line, Eigen::Index i) const {
+    constexpr Eigen::Index kBlock = 32;
     const Eigen::Vector3f l = line.cast<float>();
-    const auto is_near = [&](std::size_t k) {
-      return std::abs(l.x() * x_[k] + l.y() * y_[k] + l.z()) <= reach_[k];
-    };
-    const auto any_near = [&](std::size_t begin) {
-      int near = 0;
-      for (std::size_t k = begin; k < begin + kBlock; ++k) near |= is_near(k) ? 1 : 0;
-      return near != 0;
-    };
-    while (i < size()) {
-      if (i % kBlock == 0 && i + kBlock <= size() && !any_near(i)) {
-        i += kBlock;
-      } else if (is_near(i)) {
-        break;
-      } else {
-        ++i;
-      }
-    }
+    const auto beyond = (l.x() * x_ + l.y() * y_ + l.z()).abs() - reach_;
+    while (i + kBlock <= size() && beyond.segment<kBlock>(i).minCoeff() > 0.0F) i += kBlock;
+    while (i < size() && beyond[i] > 0.0F) ++i;
     return i;
   }
 
  private:
   static constexpr float kNone = -1.0F;  // Nothing is that near.
 
-  std::vector<float> x_, y_, reach_;
+  Eigen::ArrayXf x_, y_, reach_;
 };
 
 // Cuts all chains into pieces that are straight, and some that are all but straight (`bent`).
