@@ -22,17 +22,6 @@ constexpr int kMaxMisses = 2;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// (cos t, sin t) for cos 2t and sin 2t given up to a factor; cos t is not negative.
-Vector2d MainAxis(double cosine, double sine) {
-  const double length = std::sqrt(cosine * cosine + sine * sine);
-  if (!(length > 0.0)) return {1.0, 0.0};
-  const double side = sine < 0.0 ? -1.0 : 1.0;
-  // Of the two forms of the half angle the one in which nothing cancels.
-  const Vector2d axis = cosine >= 0.0 ? Vector2d(length + cosine, sine)
-                                      : Vector2d(side * sine, side * (length - cosine));
-  return axis.normalized();
-}
-
 class PieceCutter {
  public:
   PieceCutter(const LineEdges& edges, std::vector<LinePiece>* straight,
@@ -136,7 +125,8 @@ Vector3d LineMoments::Line(Vector2d* along) const {
   const double a = xx_ / n_ - mean.x() * mean.x();
   const double b = xy_ / n_ - mean.x() * mean.y();
   const double c = yy_ / n_ - mean.y() * mean.y();
-  *along = MainAxis(a - c, 2.0 * b);
+  const double angle = 0.5 * std::atan2(2.0 * b, a - c);
+  *along = Vector2d(std::cos(angle), std::sin(angle));
   const Vector2d normal(-along->y(), along->x());
   return {normal.x(), normal.y(), -normal.dot(mean + shift_)};
 }
