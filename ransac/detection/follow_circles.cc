@@ -1,5 +1,3 @@
-#include "circline/ransac/detection/follow_circles.h"
-
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include "circline/ransac/detection/calibrated_edges.h"
 #include "circline/ransac/detection/contour_support.h"
 #include "circline/ransac/detection/ellipse_fitter.h"
+#include "circline/ransac/detection/follow_observations.h"
 #include "circline/ransac/robust_conic.h"
 
 namespace circline {

@@ -1,5 +1,3 @@
-#include "circline/ransac/detection/follow_lines.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include <utility>
 
 #include "circline/estimators/conic.h"
+#include "circline/ransac/detection/follow_observations.h"
 #include "circline/ransac/detection/pencil_fitter.h"
 
 namespace circline {

@@ -11,8 +11,6 @@
 #include "circline/ransac/detection/contour_support.h"
 #include "circline/ransac/detection/edge_shift.h"
 #include "circline/ransac/detection/ellipse_evidence.h"
-#include "circline/ransac/detection/follow_circles.h"
-#include "circline/ransac/detection/follow_lines.h"
 #include "circline/ransac/detection/observe_evidence.h"
 
 namespace circline {

@@ -1,16 +1,61 @@
-// The steps of FeatureFollower (those of move_observations.cc and keep_names.cc, too). Internal:
-// not installed.
+// The steps of FeatureFollower (those of follow_circles.cc, follow_lines.cc, move_observations.cc
+// and keep_names.cc, too). Internal: not installed.
 #ifndef CIRCLINE_RANSAC_DETECTION_FOLLOW_OBSERVATIONS_H_
 #define CIRCLINE_RANSAC_DETECTION_FOLLOW_OBSERVATIONS_H_
 
+#include <cstddef>
 #include <opencv2/core.hpp>
+#include <string>
+#include <vector>
 
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/status.h"
+#include "circline/ransac/detection/detect_ellipses.h"
+#include "circline/ransac/detection/detect_lines.h"
 #include "circline/ransac/detection/feature_follower.h"
 
 namespace circline {
+
+// No circle changes its size by more than this factor from a frame to the next.
+constexpr double kMaxGrowth = 1.5;
+
+// For each predicted circle the ellipse that the edges follow within `search_px` of it, by the same
+// fit and the same verdict as DetectEllipses; without points where there is none. A predicted
+// circle has a fit, and a few points with normals if its bright side is known.
+std::vector<DetectedEllipse> FollowCircles(const EdgeMap& edges, const Camera& camera,
+                                           const std::vector<CircleObservation>& predicted,
+                                           const EllipseOptions& options, double search_px);
+
+// Gives a circle what is known of the predicted one that it continues, whatever the photo.
+void Continue(const CircleObservation& predicted, CircleObservation* circle);
+
+// What may be one feature in two photos.
+struct FeaturePair {
+  double cost;
+  std::size_t first, second;
+};
+
+// For each of the first features the second one that it is, or -1: the cheapest pairs first, each
+// feature once.
+std::vector<int> CheapestPairs(std::vector<FeaturePair> pairs, std::size_t num_first,
+                               std::size_t num_second);
+
+// For each predicted pencil the detected lines that continue its own, none in two pencils: within
+// `search_px` at both ends, over half of the shorter one. -1 for a line that none continues.
+std::vector<std::vector<int>> MatchLines(const std::vector<PencilObservation>& predicted,
+                                         const std::vector<DetectedLine>& lines, double search_px);
+
+// A pencil of the lines found for it: fits, noise and outliers as those of the cold detector. Empty
+// where none were found.
+PencilObservation FollowPencil(const PencilObservation& predicted,
+                               const std::vector<DetectedLine>& lines,
+                               const std::vector<int>& matches, double diagonal_px);
+
+// Whether the lines of a pencil pass through the centres of circles (see circle_grid.h), and then,
+// for each line, of which.
+std::vector<std::vector<int>> LinesOfCentres(const Observations& predicted,
+                                             const PencilObservation& pencil);
 
 // Circles and lines of edges.
 int CountFeatures(const Observations& observations);

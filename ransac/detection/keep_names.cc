@@ -8,8 +8,6 @@
 #include <vector>
 
 #include "circline/estimators/conic.h"
-#include "circline/ransac/detection/follow_circles.h"
-#include "circline/ransac/detection/follow_lines.h"
 #include "circline/ransac/detection/follow_observations.h"
 
 namespace circline {
