@@ -43,8 +43,9 @@ Status FollowOptions::Validate() const {
 }
 
 FeatureFollower::FeatureFollower(const Camera& camera, const FollowOptions& options)
-    : camera_(camera), options_(options) {
-  held_.camera = camera;
+    : options_(options) {
+  nothing_.camera = camera;
+  held_ = nothing_;
 }
 
 Status FeatureFollower::Next(const cv::Mat& image, Observations* observations) {
@@ -80,16 +81,16 @@ Status FeatureFollower::Cold(const cv::Mat& image, Observations* found, Observat
     sigma.log_focal = std::min(sigma.log_focal, kSettled);
     sigma.doubtful_log_focal = 0.0;
   }
-  const Status status = DetectObservations(image, camera_, detection, found);
+  const Status status = DetectObservations(image, nothing_.camera, detection, found);
   if (!status.ok()) return status;
   if (!is_settled_ && CountFeatures(*found) > 0) {
-    camera_ = found->camera;
-    stated_focal_px_ = found->stated_focal_px;
-    found_k1_ = found->found_k1;
+    nothing_.camera = found->camera;
+    nothing_.stated_focal_px = found->stated_focal_px;
+    nothing_.found_k1 = found->found_k1;
     is_settled_ = true;
   }
-  found->stated_focal_px = stated_focal_px_;
-  found->found_k1 = found_k1_;
+  found->stated_focal_px = nothing_.stated_focal_px;
+  found->found_k1 = nothing_.found_k1;
   const NextNames before = next_;
   const int kept = KeepNames(held_, SearchPx(), &next_, found);
   was_cold_ = true;
@@ -104,10 +105,7 @@ Status FeatureFollower::Cold(const cv::Mat& image, Observations* found, Observat
       !(CountFeatures(*found) > 0 && (HasEnough(*found) || frames_lost_ + 1 >= kFramesOfCut))) {
     // A blurred frame, or something before the lens: it passes.
     next_ = before;
-    *found = Observations();
-    found->camera = camera_;
-    found->stated_focal_px = stated_focal_px_;
-    found->found_k1 = found_k1_;
+    *found = nothing_;
     found->message = "nothing of the frames before was found in this one";
     *expect = held_;
     return status;
@@ -154,8 +152,7 @@ void FeatureFollower::Move(const PoseHypothesis& last, const CameraPose& next) {
 }
 
 void FeatureFollower::Reset() {
-  held_ = Observations();
-  held_.camera = camera_;
+  held_ = nothing_;
   is_given_ = false;
   num_at_look_ = num_circles_at_look_ = frames_lost_ = 0;
 }

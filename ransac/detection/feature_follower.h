@@ -86,9 +86,7 @@ class FeatureFollower {
   bool HasEnough(const Observations& found) const;
   double SearchPx() const;
 
-  Camera camera_;
-  double stated_focal_px_ = 0.0;  // Observations::stated_focal_px of the frame that settled it,
-  double found_k1_ = 0.0;         // and its found_k1.
+  Observations nothing_;  // Through the camera, as the frame that settled it has it.
   bool is_settled_ = false;
   FollowOptions options_;
   Observations held_;  // Where the features are expected.

@@ -197,11 +197,7 @@ void Settle(const Observations& predicted, Observations* found) {
                    });
   found->frame = FrameOf(predicted);
   if (FindCircle(*found, found->frame.origin_is_center) < 0) found->frame.origin_is_center.clear();
-  const auto has_plane = [&](const auto& features) {
-    return std::any_of(features.begin(), features.end(),
-                       [&](const auto& f) { return f.plane == found->frame.plane; });
-  };
-  if (!has_plane(found->circles) && !has_plane(found->pencils)) found->frame.plane.clear();
+  if (!HasPlane(*found, found->frame.plane)) found->frame.plane.clear();
   for (const KnownAngle& angle : predicted.known_angles) {
     if (FindPencil(*found, angle.pencils[0]) >= 0 && FindPencil(*found, angle.pencils[1]) >= 0)
       found->known_angles.push_back(angle);
@@ -209,6 +205,12 @@ void Settle(const Observations& predicted, Observations* found) {
 }
 
 }  // namespace
+
+bool HasPlane(const Observations& observations, const std::string& plane) {
+  const auto is_on = [&](const auto& feature) { return feature.plane == plane; };
+  return std::any_of(observations.circles.begin(), observations.circles.end(), is_on) ||
+         std::any_of(observations.pencils.begin(), observations.pencils.end(), is_on);
+}
 
 int CountFeatures(const Observations& observations) {
   std::size_t count = observations.circles.size();

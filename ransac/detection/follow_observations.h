@@ -57,6 +57,9 @@ PencilObservation FollowPencil(const PencilObservation& predicted,
 std::vector<std::vector<int>> LinesOfCentres(const Observations& predicted,
                                              const PencilObservation& pencil);
 
+// Whether a circle or pencil lies in the plane.
+bool HasPlane(const Observations& observations, const std::string& plane);
+
 // Circles and lines of edges.
 int CountFeatures(const Observations& observations);
 

@@ -198,11 +198,7 @@ int KeepNames(const Observations& predicted, double search_px, NextNames* next,
   OldOnesFirst([&](const std::string& id) { return FindPencil(predicted, id); },
                &detected->pencils);
   const std::string& plane = predicted.frame.plane;
-  const auto is_on_plane = [&](const auto& f) { return f.plane == plane; };
-  const bool has_plane =
-      !plane.empty() &&
-      (std::any_of(detected->circles.begin(), detected->circles.end(), is_on_plane) ||
-       std::any_of(detected->pencils.begin(), detected->pencils.end(), is_on_plane));
+  const bool has_plane = !plane.empty() && HasPlane(*detected, plane);
   detected->frame.plane = has_plane ? plane : planes.Name(detected->frame.plane);
   return static_cast<int>(kept);
 }
