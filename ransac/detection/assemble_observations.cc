@@ -39,7 +39,7 @@ class Assembler {
             const std::vector<DetectedLine>& bent, std::vector<CircleEvidence>* circles,
             std::vector<DetectedPencil>* pencils)
       : options_(options), lines_(lines), bent_(bent), circles_(*circles) {
-    Place(pencils);
+    for (DetectedPencil& pencil : *pencils) pencils_.emplace_back(std::move(pencil));
   }
 
   void Assemble(Observations* observations) {
@@ -60,20 +60,14 @@ class Assembler {
   }
 
  private:
-  void Place(std::vector<DetectedPencil>* pencils) {
-    for (DetectedPencil& pencil : *pencils) pencils_.emplace_back(std::move(pencil));
-  }
-
   // Rows and columns of the circles' centres are pencils too.
   void AddGrid(const Camera& camera, const Plane& of_circles) {
     if (of_circles.circles.empty()) return;
     // All circles: on small ones the normal is too uncertain to tell who belongs to the plane.
     std::vector<Matrix3d> conics;
     for (const CircleEvidence& circle : circles_) conics.push_back(circle.observation.fit->conic);
-    std::vector<DetectedPencil> rows = FindGridPencils(camera, conics, of_circles.normal.direction);
-    const std::size_t before = pencils_.size();
-    Place(&rows);
-    for (std::size_t i = before; i < pencils_.size(); ++i) pencils_[i].of_grid = true;
+    for (DetectedPencil& row : FindGridPencils(camera, conics, of_circles.normal.direction))
+      pencils_.emplace_back(std::move(row)).of_grid = true;
   }
 
   std::vector<DetectedLine> AllLines() const {
