@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <utility>
 
 #include "apps/reconstruct/box_geometry.h"
 #include "circline/ransac/detection/segment_meetings.h"
@@ -29,7 +28,7 @@ std::optional<ConvexRegion> SeenFace(const BoxFit& fit, int axis, bool far) {
     const Eigen::Vector3d at = fit.InCamera(BoxCorner(fit.length, corner));
     if (!CameraToPixel(fit.camera, at, &corners.back())) return std::nullopt;
   }
-  return ConvexRegion(std::move(corners), kWithinFace);
+  return ConvexRegion(corners, kWithinFace);
 }
 
 }  // namespace

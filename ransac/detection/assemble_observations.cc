@@ -208,7 +208,7 @@ class Assembler {
       const auto& contour = circles_[static_cast<std::size_t>(i)].observation.points;
       points.insert(points.end(), contour.begin(), contour.end());
     }
-    const ConvexRegion region(std::move(points), kCirclesGrowth);
+    const ConvexRegion region(points, kCirclesGrowth);
     double inside = 0.0, total = 0.0;
     for (const Segment& s : pencil.ends) {
       const double length = (s[1] - s[0]).norm();

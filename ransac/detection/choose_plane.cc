@@ -132,7 +132,7 @@ std::vector<int> LinesWhereTheyMeet(const std::vector<DetectedLine>& lines,
       points.insert(points.end(), s.begin(), s.end());
     }
   }
-  const ConvexRegion region(std::move(points), kRegionGrowth);
+  const ConvexRegion region(points, kRegionGrowth);
   std::vector<int> inside;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     if (region.Contains(lines[i].ends)) inside.push_back(static_cast<int>(i));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "circline/estimators/basics.h"
@@ -40,6 +41,10 @@ bool FarApart(const Segment& s, const Segment& t, double px) {
 
 bool AreWithin(double px, const Segment& s, const Segment& t) {
   return !FarApart(s, t, px) && SegmentDistance(s, t) < px;
+}
+
+cv::Point2f ToPoint(const Vector2d& p) {
+  return {static_cast<float>(p.x()), static_cast<float>(p.y())};
 }
 
 double Length(const Segment& s) { return (s[1] - s[0]).norm(); }
@@ -144,36 +149,17 @@ std::array<std::vector<int>, 2> ConnectedCore(const std::vector<Segment>& a,
   return largest;
 }
 
-// Andrew's monotone chain (Information Processing Letters 1979).
-ConvexRegion::ConvexRegion(std::vector<Vector2d> points, double grow) {
-  std::sort(points.begin(), points.end(), [](const Vector2d& p, const Vector2d& q) {
-    return p.x() < q.x() || (p.x() == q.x() && p.y() < q.y());
-  });
-  for (int half = 0; half < 2; ++half) {
-    const std::size_t floor = corners_.size();
-    for (const Vector2d& p : points) {
-      while (corners_.size() >= floor + 2 &&
-             Cross(corners_.back() - corners_[corners_.size() - 2], p - corners_.back()) <= 0.0) {
-        corners_.pop_back();
-      }
-      corners_.push_back(p);
-    }
-    if (!corners_.empty()) corners_.pop_back();  // The other half starts with it.
-    std::reverse(points.begin(), points.end());
-  }
-  Vector2d centre = Vector2d::Zero();
-  for (const Vector2d& p : corners_) centre += p / static_cast<double>(corners_.size());
-  for (Vector2d& p : corners_) p = centre + grow * (p - centre);
+ConvexRegion::ConvexRegion(const std::vector<Vector2d>& points, double grow) {
+  std::vector<cv::Point2f> cloud;
+  for (const Vector2d& p : points) cloud.push_back(ToPoint(p));
+  if (!cloud.empty()) cv::convexHull(cloud, corners_);
+  cv::Point2f centre(0.0F, 0.0F);
+  for (const cv::Point2f& p : corners_) centre += p / static_cast<float>(corners_.size());
+  for (cv::Point2f& p : corners_) p = centre + static_cast<float>(grow) * (p - centre);
 }
 
 bool ConvexRegion::Contains(const Vector2d& point) const {
-  if (corners_.size() < 3) return false;
-  for (std::size_t k = 0; k < corners_.size(); ++k) {
-    const Vector2d& from = corners_[k];
-    const Vector2d& to = corners_[(k + 1) % corners_.size()];
-    if (Cross(to - from, point - from) < 0.0) return false;
-  }
-  return true;
+  return corners_.size() >= 3 && cv::pointPolygonTest(corners_, ToPoint(point), false) >= 0.0;
 }
 
 }  // namespace circline

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <opencv2/core.hpp>
 #include <vector>
 
 #include "circline/estimators/observations.h"
@@ -49,13 +50,13 @@ std::array<std::vector<int>, 2> ConnectedCore(const std::vector<Segment>& a,
 class ConvexRegion {
  public:
   // The convex hull of the points, widened about its centre by the factor `grow`.
-  ConvexRegion(std::vector<Eigen::Vector2d> points, double grow);
+  ConvexRegion(const std::vector<Eigen::Vector2d>& points, double grow);
 
   bool Contains(const Eigen::Vector2d& point) const;
   bool Contains(const Segment& s) const { return Contains(s[0]) && Contains(s[1]); }
 
  private:
-  std::vector<Eigen::Vector2d> corners_;  // In order.
+  std::vector<cv::Point2f> corners_;  // In order.
 };
 
 }  // namespace circline
