@@ -33,9 +33,6 @@ constexpr double kMinLogMargin = 2.0;
 // one direction of nothing in five hundred has as much, on box-camprodon, chessboard-opencv and
 // turntable-teabox.
 constexpr double kLogOddsOfNoneFree = 2.0;
-// Where nothing says where an axis is. Of the 140 photographs with truth, at half their size, at
-// theirs and at twice, none has an axis by it that is 3 degrees off; with 1.5 less, two have.
-constexpr double kLogOddsOfNoneAtAll = 3.5;
 // A pencil with a few lines of other things is half a degree off.
 constexpr double kPencilSigmaRad = 0.01;
 // Axes nearer than this, each to each, are those of one box: a cosine, 3 degrees.
@@ -90,8 +87,8 @@ class BoxSearch {
   }
 
   // The same about no axis that is given, from every three edges in a row that may be along one
-  // axis each. All three axes stand on two edges or more.
-  std::optional<FoundBox> BestOfAll(double log_odds_of_none) {
+  // axis each.
+  std::optional<FoundBox> BestOfAll() {
     constexpr std::size_t kMostStarts = 12;  // As many as boxes may be in a photo, and more.
     variance_ = std::numeric_limits<double>::infinity();
     std::vector<BoxHypothesis> starts = StartsFromCorners(), boxes;
@@ -104,7 +101,13 @@ class BoxSearch {
       boxes.push_back(Climb(start));
       if (tried.size() == kMostStarts) break;
     }
-    return Choose(std::move(boxes), log_odds_of_none);
+    std::optional<FoundBox> best = Choose(std::move(boxes), kLogOddsOfNoneFree);
+    if (!best) return best;
+    // Any pencil gives its axis odds: those of the two others are what makes it a box.
+    std::array<double, 3> odds = best->log_odds_along;
+    std::sort(odds.begin(), odds.end());
+    if (odds[0] + odds[1] < kLogCorners * std::log(num_corners_)) best.reset();
+    return best;
   }
 
  private:
@@ -231,7 +234,6 @@ class BoxSearch {
     Assign(axes, off_variance);
     const double off = (axes.col(2) - normal_).squaredNorm();
     const double log_prior = variance_ > 0.0 ? -0.5 * off / variance_ : 0.0;
-    const std::size_t least_edges = std::isfinite(variance_) ? 1 : 2;  // Along each axis.
     std::fill(seen_.begin(), seen_.end(), char{0});
     for (std::size_t start = 0; start < edges_.size(); ++start) {
       if (seen_[start] || gain_[start] <= 0.0) continue;
@@ -254,10 +256,7 @@ class BoxSearch {
           queue_.push_back(j);
         }
       }
-      const bool is_box = have_corner[0] && have_corner[1] && have_corner[2] &&
-                          std::all_of(box.edges.begin(), box.edges.end(), [&](const auto& edges) {
-                            return edges.size() >= least_edges;
-                          });
+      const bool is_box = have_corner[0] && have_corner[1] && have_corner[2];
       if (is_box && box.log_odds > best->log_odds) *best = std::move(box);
     }
   }
@@ -334,7 +333,7 @@ std::optional<FoundBox> FindFreeBox(const std::vector<DetectedLine>& lines,
 }
 
 std::optional<FoundBox> FindAnyBox(const std::vector<DetectedLine>& lines, double diagonal_px) {
-  std::optional<FoundBox> box = BoxSearch(lines, diagonal_px).BestOfAll(kLogOddsOfNoneAtAll);
+  std::optional<FoundBox> box = BoxSearch(lines, diagonal_px).BestOfAll();
   if (box) PutLongestFirst(3, &*box);
   return box;
 }
