@@ -24,17 +24,6 @@ constexpr double kMaxLineShare = 0.75;
 // Keeps 0 / 0 out of the centre of a conic; far below any squared gradient per pixel that matters.
 constexpr float kTiny = 1e-30f;
 
-Eigen::Matrix3d ToMatrix(const ConicModel::Value& value) {
-  const auto [a, b, c, d, e, f] = value;
-  Eigen::Matrix3d conic;
-  conic << a, b, d, b, c, e, d, e, f;
-  return conic;
-}
-
-ConicModel::Value ToValue(const Eigen::Matrix3d& conic) {
-  return {conic(0, 0), conic(0, 1), conic(1, 1), conic(0, 2), conic(1, 2), conic(2, 2)};
-}
-
 // Whether `width` neighbouring sectors hold four fifths of the counts: the rest may be clutter.
 bool HoldMost(const std::array<int, kConicSectors>& counts, int width) {
   int total = 0, sum = 0;
@@ -144,6 +133,17 @@ void ConicModel::ReadDirections(const EdgeDirections& directions) {
   }
 }
 
+Eigen::Matrix3d ConicModel::ToMatrix(const Value& value) {
+  const auto [a, b, c, d, e, f] = value;
+  Eigen::Matrix3d conic;
+  conic << a, b, d, b, c, e, d, e, f;
+  return conic;
+}
+
+ConicModel::Value ConicModel::ToValue(const Eigen::Matrix3d& conic) {
+  return {conic(0, 0), conic(0, 1), conic(1, 1), conic(0, 2), conic(1, 2), conic(2, 2)};
+}
+
 Eigen::Matrix3d ConicModel::ToConic(const Value& value) const {
   Eigen::Matrix3d T;
   T << 1.0 / scale_, 0.0, -center_.x() / scale_, 0.0, 1.0 / scale_, -center_.y() / scale_, 0.0, 0.0,
@@ -187,8 +187,12 @@ bool ConicModel::Fit(const int* sample, Value* value) const {
   return Normalize(value);
 }
 
+void ConicModel::SquaredDistances(const Value& value, int begin, int end, float* r2) const {
+  Residuals<false>(value, begin, end, r2);
+}
+
 void ConicModel::SquaredResiduals(const Value& value, int begin, int end, float* r2) const {
-  if (normals_.empty()) return Residuals<false>(value, begin, end, r2);
+  if (normals_.empty()) return SquaredDistances(value, begin, end, r2);
   Residuals<true>(value, begin, end, r2);
 }
 
@@ -244,20 +248,20 @@ bool ConicModel::Accept(const Value& value, double threshold) const {
 double ConicModel::BandShare(const Value& value, double threshold) const {
   Ellipse ellipse;
   if (!(box_area_ > 0.0) || !ConicToEllipse(ToMatrix(value), &ellipse)) return 1.0;
-  // The length of what of the ellipse lies in the box.
-  constexpr int kSteps = 60;  // To a hundredth or two; 4 us.
+  // The length of what of the ellipse lies in the box, by steps of its eccentric anomaly.
+  constexpr int kSteps = 60;  // To a hundredth or two.
+  const double step = 2.0 * kPi / kSteps;
+  const Eigen::Matrix2d axes = Eigen::Rotation2Dd(ellipse.angle).toRotationMatrix() *
+                               Eigen::Vector2d(ellipse.a, ellipse.b).asDiagonal();
+  const Eigen::Matrix2d next = Eigen::Rotation2Dd(step).toRotationMatrix();
   double length = 0.0;
-  for (int i = 0; i < kSteps; ++i) {
-    const double t = 2.0 * kPi * i / kSteps;
-    const Eigen::Vector2d x = EllipsePoint(ellipse, t);
+  Eigen::Vector2d on_circle = Eigen::Vector2d::UnitX();
+  for (int i = 0; i < kSteps; ++i, on_circle = next * on_circle) {
+    const Eigen::Vector2d x = ellipse.center + axes * on_circle;
     if ((x.cwiseAbs().array() > half_box_.array()).any()) continue;
-    length += std::hypot(ellipse.a * std::sin(t), ellipse.b * std::cos(t)) * 2.0 * kPi / kSteps;
+    length += step * (axes * Eigen::Vector2d(-on_circle.y(), on_circle.x())).norm();
   }
   return std::min(1.0, length * 2.0 * threshold * pixel_ / box_area_);
-}
-
-double ConicModel::Distance(const Value& value, int i) const {
-  return ConicDistancePx(Point(i), ToMatrix(value));
 }
 
 double ConicModel::DirectionMiss(const Value& value, int i) const {

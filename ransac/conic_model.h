@@ -67,8 +67,8 @@ class ConicModel {
   // the box: the chance that a stray point is an inlier.
   double BandShare(const Value& value, double threshold) const;
 
-  // Signed distance of datum i, pixels, in double precision.
-  double Distance(const Value& value, int i) const;
+  // Squared distances of the data begin..end-1 whatever their directions, squared pixels.
+  void SquaredDistances(const Value& value, int begin, int end, float* r2) const;
   // Position of datum i in the model's coordinates.
   const Eigen::Vector2d& Position(int i) const { return Point(i).x; }
   // Standard deviation of the directions, radians; 0 where none are given.
@@ -89,6 +89,8 @@ class ConicModel {
   template <bool kOriented>
   void Residuals(const Value& value, int begin, int end, float* r2) const;
   void ReadDirections(const EdgeDirections& directions);
+  static Eigen::Matrix3d ToMatrix(const Value& value);
+  static Value ToValue(const Eigen::Matrix3d& conic);
   // Whether it is an ellipse as FromConic gives them; makes it negative inside, of unit norm.
   bool Normalize(Value* value) const;
 

@@ -97,8 +97,10 @@ ConicSupport ConicSearch::Support(const Eigen::Matrix3d& conic) const {
 ConicSupport ConicSearch::SupportOf(const ConicModel::Value& value) const {
   const double threshold = options_.ransac.threshold;
   ConicSupport support;
+  std::vector<float> r2(points_.size());
+  model_.SquaredDistances(value, 0, model_.NumData(), r2.data());
   for (int i = 0; i < model_.NumData(); ++i) {
-    const bool is_inlier = std::abs(model_.Distance(value, i)) <= threshold &&
+    const bool is_inlier = r2[static_cast<std::size_t>(i)] <= threshold * threshold &&
                            model_.DirectionMiss(value, i) < kInlierSigmas * kInlierSigmas;
     ++(is_inlier ? support.num_inliers : support.num_stray);
   }

@@ -39,17 +39,17 @@ SectorCounts CountSectors(const ConicModel& model, const ConicModel::Value& valu
   const std::size_t n = static_cast<std::size_t>(model.NumData());
   const ConicSectors sector_of(value);
   SectorCounts counts;
-  result->residuals.resize(n);
+  result->squared_distances.resize(n);
+  model.SquaredDistances(value, 0, model.NumData(), result->squared_distances.data());
   result->direction_residuals.resize(n);
   result->sectors.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     const int datum = static_cast<int>(i);
-    result->residuals[i] = model.Distance(value, datum);
-    const double size = std::abs(result->residuals[i]);
-    if (!(size <= 3.0 * threshold)) continue;
+    const double r2 = static_cast<double>(result->squared_distances[i]);
+    if (!(r2 <= 9.0 * threshold * threshold)) continue;
     const std::size_t k = sector_of(model.Position(datum));
     result->sectors[i] = static_cast<std::uint8_t>(k);
-    if (size > threshold) {
+    if (r2 > threshold * threshold) {
       counts.beside[k] += 1.0;
       continue;
     }
@@ -104,17 +104,17 @@ void WeighConic(const ConicModel& model, const ConicModel::Value& value, double 
   result->weights.assign(n, 0.0f);
   double sum = 0.0, sum_squares = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
-    const double r = result->residuals[i];
-    if (!(std::abs(r) <= threshold)) continue;
+    const double r2 = static_cast<double>(result->squared_distances[i]);
+    if (!(r2 <= threshold * threshold)) continue;
     const std::size_t k = result->sectors[i];
-    double density = densities.curve[k] * std::exp(-0.5 * r * r / (s * s));
+    double density = densities.curve[k] * std::exp(-0.5 * r2 / (s * s));
     if (model.HasDirection(static_cast<int>(i))) {
       density *= sharpness * std::exp(-0.5 * result->direction_residuals[i]);
     }
     const double w = density / (density + densities.background[k]);
     result->weights[i] = static_cast<float>(w);
     sum += w;
-    sum_squares += w * r * r;
+    sum_squares += w * r2;
   }
   if (sum > ConicModel::kMinSamples + 1.0) {
     result->sigma = std::clamp(std::sqrt(sum_squares / (sum - ConicModel::kMinSamples)),

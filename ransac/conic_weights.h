@@ -59,7 +59,7 @@ class ConicSectors {
 struct ConicWeights {
   std::vector<float> weights;               // By the model's order.
   double sigma = 0.0;                       // Of the noise, pixels: in (0 = not known) and out.
-  std::vector<double> residuals;            // Workspace, as are those below.
+  std::vector<float> squared_distances;     // Workspace, as are those below.
   std::vector<double> direction_residuals;  // Squared, in standard deviations.
   std::vector<std::uint8_t> sectors;
 

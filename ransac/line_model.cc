@@ -102,12 +102,14 @@ Status FitFinal(const std::vector<CalibratedPoint>& points, const LineModel& mod
   const auto point = [&](std::size_t i) -> const CalibratedPoint& {
     return points[static_cast<std::size_t>(model.PointIndex(static_cast<int>(i)))];
   };
+  std::vector<float> squares(points.size());
   std::vector<double> residuals(points.size()), weights, chosen_weights;
   double sigma = 0.0;
   constexpr int kPasses = 3;
   for (int pass = 0; pass < kPasses; ++pass) {
-    const Eigen::Vector3d line = model.ToLine(value);
-    for (std::size_t i = 0; i < points.size(); ++i) residuals[i] = LineDistancePx(point(i), line);
+    model.SquaredResiduals(value, 0, model.NumData(), squares.data());
+    for (std::size_t i = 0; i < points.size(); ++i)
+      residuals[i] = std::sqrt(static_cast<double>(squares[i]));
     InlierWeights(residuals, threshold, 2, &sigma, &weights);
     const std::vector<float> steps(weights.begin(), weights.end());
     if (pass + 1 < kPasses && !model.Refine(steps.data(), &value)) break;
