@@ -85,7 +85,7 @@ lay_out() {
   cp "apps/demo/$set.yaml" "$dir/scene.yaml"
   sed -nE 's/.*file: "([^"]+)".*/\1/p' "$dir/scene.yaml" | while read -r file; do
     # Of ViSP's images each kind has a folder of its own.
-    for from in "$found" "$found/mire-2" "$found/mbt/cube" "$found/calibration"; do
+    for from in "$found" "$found/mire-2" "$found/mbt/cube" "$found/calibration" "$found/mbt-depth/Castle-simu/Images"; do
       [ ! -f "$from/$file" ] || { cp "$from/$file" "$dir/$file"; break; }
       [ ! -f "$from/$file.gz" ] || { gunzip -c "$from/$file.gz" > "$dir/$file"; break; }
     done

@@ -59,6 +59,7 @@ TABLE = [
     ('the same photographs: a box with a disc on it | nothing, all detected | normal', 'box', 'joint', 'normal_error_deg'),
     ('the same | nothing, all detected | rotation, where the box was found', 'box', 'joint', FOUND),
     ('11 of a cube and a tube on a table', 'cube', 'joint', SURELY),
+    ('10 renderings of a toy castle', 'castle', 'joint', SURELY),
     ('4 of a sheet of 6 x 6 dots', 'dots', 'joint', 'normal_error_deg'),
     ('13 wide-angle ones of 4 x 3 discs', ('circles-discocal-rgb', AUTO), 'joint', 'rotation_error_deg'),
     ('the same | one disc, its centre', ('circles-discocal-rgb', ['--centre']), 'circle_center', 'normal_error_deg'),
