@@ -53,9 +53,10 @@ inline double ConicDistance(const CalibratedPoint& p, const Eigen::Matrix3d& C,
 }
 
 // The same, orthogonally, to an ellipse C of positive diagonal; `level` = EllipseLevel(C). The
-// jacobian may be null.
+// jacobian may be null; `normal` (optional) receives the ellipse's outward one at the nearest
+// point, in the photo: d distance / d pixel.
 inline double OrthogonalDistance(const CalibratedPoint& p, const Eigen::Matrix3d& C, double level,
-                                 Vector6d* jacobian) {
+                                 Vector6d* jacobian, Eigen::Vector2d* normal = nullptr) {
   using Lane = FootPoints<1>::Lanes;
   const auto lane = [](double value) { return Lane::Constant(value); };
   const FootPoints<1> foot =
@@ -66,6 +67,10 @@ inline double OrthogonalDistance(const CalibratedPoint& p, const Eigen::Matrix3d
     const double x = foot.x[0], y = foot.y[0];
     *jacobian << x * x, y * y, 1.0, kSqrt2 * x * y, kSqrt2 * x, kSqrt2 * y;
     *jacobian *= foot.inverse_gradient[0];
+  }
+  if (normal != nullptr) {
+    const Eigen::Vector3d x(foot.x[0], foot.y[0], 1.0);
+    *normal = p.GradientPerPixel((C * x).head<2>()).normalized();
   }
   return foot.distance[0];
 }

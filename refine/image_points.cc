@@ -135,14 +135,14 @@ class ImagePoints::View {
   }
 
   // Distance r to a curve that stays while the camera shifts: the same as if the pixel moved the
-  // other way (`by_pixel`, d r / d pixel), but for the size of a pixel, by which r itself changes.
-  // That a lens is bent between the point and the curve is left out.
+  // other way (`by_pixel`, d r / d pixel), but for the size of a pixel, by which r itself changes,
+  // along the normal `across`. That a lens is bent between the point and the curve is left out.
   template <typename Row>
   void FillCameraColumns(std::size_t i, const CalibratedPoint& p, double r,
-                         const Eigen::Vector2d& by_pixel, Row* row, int first) const {
+                         const Eigen::Vector2d& by_pixel, const Eigen::Vector2d& across, Row* row,
+                         int first) const {
     const Camera& camera = is_shifted_ ? *shifted_ : points_.camera_;
     const Eigen::Vector2d offset = points_.pixels_[i] - Eigen::Vector2d(camera.cx, camera.cy);
-    const Eigen::Vector2d across = by_pixel.normalized();
     row->tail(row->size() - first).setZero();
     (*row)[first] = r - by_pixel.dot(offset);
     (*row)[first + 1] = r * across.y() * across.y() - by_pixel.y() * offset.y();
@@ -233,21 +233,22 @@ class ImagePoints::ToConic {
                                   p.GradientPerPixel((C * p.Homogeneous()).head<2>()).norm();
     }
     Vector6d by_conic;
-    const double d = is_orthogonal_ ? OrthogonalDistance(p, C, level_, &by_conic)
+    Eigen::Vector2d normal;
+    const double d = is_orthogonal_ ? OrthogonalDistance(p, C, level_, &by_conic, &normal)
                                     : ConicDistance(p, C, &by_conic);
     row->template head<6>() = by_conic;
     if constexpr (Row::RowsAtCompileTime > 6) {
-      const Eigen::Vector2d g = (C * p.Homogeneous()).head<2>();
-      const Eigen::Vector2d G = p.GradientPerPixel(g);
-      Eigen::Vector2d by_pixel = G.normalized();
+      Eigen::Vector2d by_pixel = normal;
       if (!is_orthogonal_) {  // Sampson's denominator moves with the point, too.
+        const Eigen::Vector2d g = (C * p.Homogeneous()).head<2>(), G = p.GradientPerPixel(g);
+        normal = G.normalized();
         const Eigen::Vector2d by_x =
-            (g - d * C.topLeftCorner<2, 2>() * NormGradient(p, by_pixel)) / G.norm();
+            (g - d * C.topLeftCorner<2, 2>() * NormGradient(p, normal)) / G.norm();
         by_pixel = p.GradientPerPixel(by_x);
       }
       if (offset_is_variable_) (*row)[6] = by_pixel.dot(inwards);
       if constexpr (Row::RowsAtCompileTime > 7)
-        view_.FillCameraColumns(i, seen, d, by_pixel, row, offset_is_variable_ ? 7 : 6);
+        view_.FillCameraColumns(i, seen, d, by_pixel, normal, row, offset_is_variable_ ? 7 : 6);
     }
     return d;
   }
@@ -280,8 +281,10 @@ double ImagePoints::SumLine(const Eigen::Vector3d& line, const double* camera,
     Eigen::Vector3d by_line;
     const double d = LineDistance(p, line, &by_line);
     row->template head<3>() = by_line;
-    if constexpr (std::remove_pointer_t<decltype(row)>::RowsAtCompileTime > 3)
-      view.FillCameraColumns(i, p, d, p.GradientPerPixel(line.head<2>()).normalized(), row, 3);
+    if constexpr (std::remove_pointer_t<decltype(row)>::RowsAtCompileTime > 3) {
+      const Eigen::Vector2d normal = p.GradientPerPixel(line.head<2>()).normalized();
+      view.FillCameraColumns(i, p, d, normal, normal, row, 3);
+    }
     return d;
   };
   if (model == nullptr || !camera_variable)

@@ -195,6 +195,36 @@ TEST(CostFunctionsTest, GaussNewtonHessianIsThatOfThePoints) {
   EXPECT_LT((H - expected).norm(), 1e-5 * expected.norm());
 }
 
+// Whatever its focal length, aspect and principal point, a camera without distortion sees some
+// conic exactly as any other one does: a contour alone tells nothing of them, however small it is
+// against the noise. What its derivatives did tell would be taken for evidence once the lens has
+// unknowns.
+TEST(CostFunctionsTest, AContourTellsNothingOfACameraWithoutDistortion) {
+  Camera camera = LensCamera();
+  camera.distortion = {};
+  for (const auto distance : {ConicDistanceType::kSampson, ConicDistanceType::kOrthogonal}) {
+    const Ellipse ellipse{{700.0, 300.0}, 20.0, 6.0, 0.3};
+    Random random(5);
+    std::vector<Eigen::Vector2d> pixels;
+    for (int i = 0; i < 60; ++i) {
+      const double dx = random.Normal(), dy = random.Normal();
+      pixels.push_back(EllipsePoint(ellipse, 0.1 * i) + Eigen::Vector2d(dx, dy));
+    }
+    ImagePoints::Options options;
+    options.distance = distance;
+    const ImagePoints points(camera, pixels, {}, options);
+    Eigen::Matrix3d K;
+    K << camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0;
+    CurveModel model;
+    points.SumConic(TransformConic(EllipseToConic(ellipse), K), 0.0, nullptr, Weighing(),
+                    {false, true}, &model);
+    const Eigen::MatrixXd H = model.h, A = H.topLeftCorner(6, 6), B = H.block(0, 6, 6, 4);
+    const Eigen::MatrixXd left =
+        H.block(6, 6, 4, 4) - B.transpose() * A.completeOrthogonalDecomposition().solve(B);
+    for (int k = 0; k < 4; ++k) EXPECT_LT(std::abs(left(k, k)), 1e-9 * H(6 + k, 6 + k)) << k;
+  }
+}
+
 // A contour of which no point is left, here as none is an inlier, says nothing.
 TEST(CostFunctionsTest, NoPointsSayNothing) {
   const auto pixels = Contour({0.4, -0.3, 0.0}, Eigen::Vector3d::UnitZ(), 1.2, 6.0, 0);
