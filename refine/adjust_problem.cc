@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "circline/refine/evidence_points.h"
@@ -270,9 +271,14 @@ int AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   return made.block;
 }
 
-double AdjustProblem::GridSigma(const SquareGrid& grid) const {
-  constexpr double kExact = 1e-5;
-  return std::max(options_.noise_model.grid_line * grid.width, kExact);
+double AdjustProblem::GridSigma(const AdjustInput& photo) const {
+  double told = std::numeric_limits<double>::infinity();
+  for (const auto& [key, place] : photo.grid->places) {
+    const LineObservation& line = photo.observations->pencils[key.first].lines[key.second];
+    told = std::min(told, LeastSigma(line.fit->covariance));
+  }
+  told *= photo.grid->cam_from_board.translation.norm();
+  return std::max(options_.noise_model.grid_line * photo.grid->width, kExactShare * told);
 }
 
 // All pieces of a line of the board are off their place by the same.
@@ -284,7 +290,7 @@ int AdjustProblem::AddGridPlace(int photo, std::size_t pencil, std::size_t line,
   if (found == input.grid->places.end()) return -1;
   const PencilObservation& observed = input.observations->pencils[pencil];
   const int axis = AxisAcross(observed);
-  const double sigma = GridSigma(*input.grid);
+  const double sigma = GridSigma(input);
   int& off = OneOf({photo, axis, found->second}, &grid_lines_);
   if (off < 0) {
     off = AddBlock(1, {});

@@ -4,6 +4,7 @@
 #define CIRCLINE_REFINE_EVIDENCE_POINTS_H_
 
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -36,6 +37,19 @@ inline bool FillEvidencePoints(const Camera& camera, const std::vector<Eigen::Ve
                                    : noise.LineWeight(sigma_px, pixels, inliers);
   points->set_weight(weight * (sigma * sigma) / (sigma_px * sigma_px));
   return true;
+}
+
+// What is known exactly has this share of the standard deviation that its own pixels give it, which
+// adds a hundredth to variances. With less the cost has a bent valley, so narrow that the solver
+// stops half-way along it.
+inline constexpr double kExactShare = 0.1;
+
+// Standard deviation of the better known component of a unit vector, that of a fitted direction or
+// line.
+inline double LeastSigma(const Eigen::Matrix3d& covariance) {
+  constexpr double kLeast = 1e-5;  // Where the fit states none.
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(kLeast * kLeast, spread.eigenvalues()[1]));  // [0]: along itself, 0.
 }
 
 // Of a circle's tilt and height (PlaneCircleContourCost); zeros where both are exact.

@@ -18,19 +18,6 @@
 namespace circline {
 namespace {
 
-// What is known exactly has this share of the standard deviation that its own pixels give it, which
-// adds a hundredth to variances. With less the cost has a bent valley, so narrow that the solver
-// stops half-way along it.
-constexpr double kExactShare = 0.1;
-
-// Standard deviation of the better known component of a direction, radians.
-double LeastSigma(const VanishingPointFit& fit) {
-  constexpr double kLeast = 1e-5;  // Where the fit states none.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(fit.covariance,
-                                                              Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(kLeast * kLeast, spread.eigenvalues()[1]));  // [0]: along itself, 0.
-}
-
 // Features of a kind, the first few by name.
 std::string Names(const char* kind, const std::vector<std::string>& ids) {
   constexpr std::size_t kMost = 3;
@@ -145,7 +132,8 @@ void JointProblemBuilder::AddAngle(std::size_t index) {
                            "' is no pencil of the world's plane");
       return;
     }
-    if (obs_.pencils[pencil].fit) told = std::min(told, LeastSigma(*obs_.pencils[pencil].fit));
+    if (obs_.pencils[pencil].fit)
+      told = std::min(told, LeastSigma(obs_.pencils[pencil].fit->covariance));
   }
   if (p_.block(blocks[0]).is_constant && p_.block(blocks[1]).is_constant) {
     p_.unused_.push_back(name + ": not used, both run along axes, which are orthogonal");
