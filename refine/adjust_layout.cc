@@ -80,7 +80,7 @@ class Aligner {
 };
 
 void Aligner::Align(Candidate* candidate) const {
-  constexpr double kFar = 0.5;  // Radii: another circle, or another pose of the photo.
+  constexpr double kFar = 0.5;  // Units of Place: another circle, or another pose of the photo.
   Alignment made;
   bool found = false;
   if (by_id_ || !candidate->alignment) {

@@ -32,7 +32,7 @@ struct SharedLayout {
   std::vector<std::map<std::string, std::string>> names;  // By photo: own id to the shared one.
   // Of pencils, where photos can tell; else they are each photo's own.
   std::vector<std::map<std::string, std::string>> pencil_names;
-  double misfit = 0.0;  // Median distance of circles from their place, radii.
+  double misfit = 0.0;  // Median distance of circles from their place, units of Place.
 };
 // Circles are the same where their ids are; or, without `by_id`, where they lie alike: a pattern of
 // circles and sizes that both have, be it a lattice or not. (Of a lattice seen in part that is one
@@ -45,6 +45,10 @@ SharedLayout AlignLayouts(const std::vector<PoseEstimate>& estimates, bool by_id
 struct Place {
   const std::string* id = nullptr;  // In the layout that it was made of.
   LayoutCircle circle;
+  // In what it is measured how far another circle is from this one: its radius, or a part of how
+  // far the nearest other one of the layout is, where that is more: small circles far apart are
+  // told from each other as well as large ones.
+  double unit = 1.0;
 };
 using Places = std::vector<Place>;
 Places PlacesOf(const Layout& layout);
@@ -67,11 +71,11 @@ using Pairs = std::vector<std::array<std::size_t, 2>>;
 struct Alignment {
   Similarity to_shared;
   Pairs pairs;
-  double misfit = 0.0;  // Median distance of these after it, in place and size; radii.
+  double misfit = 0.0;  // Median distance of these after it, in place, units of Place, and size.
 };
 
-// How far two sights of one circle may lie from each other: in place, radii, and in size, the
-// logarithm of its ratio; where both are off, together no more than either.
+// How far two sights of one circle may lie from each other: in place, units of Place, and in size,
+// the logarithm of its ratio; where both are off, together no more than either.
 struct Reach {
   double place = 0.3, size = 0.3;
 };

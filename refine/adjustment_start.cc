@@ -149,7 +149,9 @@ void Adjustment::FindCamera(std::size_t c) {
   EstimationOptions pose = PoseOptions(options_);
   pose.conic_distance = ConicDistanceType::kSampson;  // Cheaper.
   CameraSweep sweep(pointers, guesses_[c], pose, options_.num_threads);
-  const bool has_radial = ShiftSigmas(cameras_[c], priors_[c], options_)[4] > 0.0;
+  // What a fisheye lens bends is in its model.
+  const bool has_radial = cameras_[c].model == CameraModel::kOpenCV &&
+                          ShiftSigmas(cameras_[c], priors_[c], options_)[4] > 0.0;
   std::vector<Camera> candidates = sweep.Candidates(priors_[c].log_focal, has_radial);
   if (candidates.empty()) return;  // No photo gives a pose at any focal length.
   if (candidates.size() > 1) {
@@ -193,7 +195,7 @@ Status Adjustment::StartHere() {
 // One world, where the photos' circles lie alike, by their ids or whatever these are; else each its
 // own.
 bool Adjustment::PlaceWorlds() {
-  constexpr double kAlike = 0.1;       // Radii.
+  constexpr double kAlike = 0.1;       // Of the units of Place.
   constexpr double kMostPhotos = 0.8;  // Of those with a pose.
   bool any = false;
   layouts_.assign(given_.size() + 1, Layout());

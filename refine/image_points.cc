@@ -136,12 +136,14 @@ class ImagePoints::View {
 
   // Distance r to a curve that stays while the camera shifts: the same as if the pixel moved the
   // other way (`by_pixel`, d r / d pixel), but for the size of a pixel, by which r itself changes,
-  // along the normal `across`. That a lens is bent between the point and the curve is left out.
+  // along the normal `across`: with the shift, and where a lens is bent with the pixel's place,
+  // too.
   template <typename Row>
   void FillCameraColumns(std::size_t i, const CalibratedPoint& p, double r,
-                         const Eigen::Vector2d& by_pixel, const Eigen::Vector2d& across, Row* row,
+                         Eigen::Vector2d by_pixel, const Eigen::Vector2d& across, Row* row,
                          int first) const {
     const Camera& camera = is_shifted_ ? *shifted_ : points_.camera_;
+    if (camera.model != CameraModel::kPinhole) by_pixel += r * Bend(camera, p, across);
     const Eigen::Vector2d offset = points_.pixels_[i] - Eigen::Vector2d(camera.cx, camera.cy);
     row->tail(row->size() - first).setZero();
     (*row)[first] = r - by_pixel.dot(offset);
@@ -157,7 +159,27 @@ class ImagePoints::View {
     }
   }
 
- private:
+  // By how much a length along `across` grows, in pixels, where its place in the photo moves on by
+  // one along either axis.
+  static Eigen::Vector2d Bend(const Camera& camera, const CalibratedPoint& p,
+                              const Eigen::Vector2d& across) {
+    constexpr double kStep = 1e-6;
+    const Eigen::Vector2d along = NormGradient(p, across);
+    const auto length_at = [&](const Eigen::Vector2d& x) {
+      Eigen::Vector2d pixel;
+      std::array<double, 4> J;
+      DistortWithJacobian(camera, x, &pixel, &J);
+      return across.x() * (J[0] * along.x() + J[1] * along.y()) +
+             across.y() * (J[2] * along.x() + J[3] * along.y());
+    };
+    const double here = length_at(p.x);
+    const Eigen::Vector2d by_x =
+        Eigen::Vector2d(length_at(p.x + kStep * Eigen::Vector2d::UnitX()) - here,
+                        length_at(p.x + kStep * Eigen::Vector2d::UnitY()) - here) /
+        kStep;
+    return p.GradientPerPixel(by_x);
+  }
+
   const ImagePoints& points_;
   bool is_shifted_ = false;
   std::optional<Camera> shifted_;

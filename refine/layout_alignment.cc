@@ -11,6 +11,31 @@
 
 namespace circline {
 
+namespace {
+
+// By their distances from the nearest other one; from left to right.
+void SetUnits(Places* places) {
+  constexpr double kShare = 0.3;  // A board's discs have about that radius.
+  const auto distance = [places](std::size_t a, std::size_t b) {
+    return (*places)[a].circle.center - (*places)[b].circle.center;
+  };
+  for (std::size_t k = 0; k < places->size(); ++k) {
+    double nearest = std::numeric_limits<double>::infinity();
+    const auto is_beyond = [&](std::size_t other) {
+      nearest = std::min(nearest, distance(other, k).norm());
+      return std::abs(distance(other, k).x()) >= nearest;
+    };
+    for (std::size_t other = k; other-- > 0 && !is_beyond(other);) {
+    }
+    for (std::size_t other = k + 1; other < places->size() && !is_beyond(other); ++other) {
+    }
+    const double radius = (*places)[k].circle.radius;
+    (*places)[k].unit = std::isfinite(nearest) ? std::max(radius, kShare * nearest) : radius;
+  }
+}
+
+}  // namespace
+
 Places PlacesOf(const Layout& layout) {
   Places places;
   places.reserve(layout.size());
@@ -18,6 +43,7 @@ Places PlacesOf(const Layout& layout) {
   std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
     return a.circle.center.x() < b.circle.center.x();
   });
+  SetUnits(&places);
   return places;
 }
 
@@ -48,11 +74,11 @@ bool Fit(const Places& from, const Places& to, const Pairs& pairs, Similarity* o
   return true;
 }
 
-// In place and in size, radii; or of the reach.
-double Deviation(const LayoutCircle& from, const LayoutCircle& to, const Similarity& similarity,
+// In place and in size, units; or of the reach.
+double Deviation(const LayoutCircle& from, const Place& to, const Similarity& similarity,
                  const Reach& reach = {1.0, 1.0}) {
-  const double size = std::log(similarity.scale * from.radius / to.radius);
-  return std::hypot((similarity(from.center) - to.center).norm() / (to.radius * reach.place),
+  const double size = std::log(similarity.scale * from.radius / to.circle.radius);
+  return std::hypot((similarity(from.center) - to.circle.center).norm() / (to.unit * reach.place),
                     size / reach.size);
 }
 
@@ -60,7 +86,7 @@ bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
   if (!Fit(from, to, alignment->pairs, &alignment->to_shared)) return false;
   std::vector<double> deviations;
   for (const auto& [own, shared] : alignment->pairs)
-    deviations.push_back(Deviation(from[own].circle, to[shared].circle, alignment->to_shared));
+    deviations.push_back(Deviation(from[own].circle, to[shared], alignment->to_shared));
   alignment->misfit = Median(std::move(deviations));
   return true;
 }
@@ -91,7 +117,7 @@ Pairs Matches(const Places& from, const Places& to, const Similarity& similarity
     std::size_t own, shared;
   };
   double largest = 0.0;
-  for (const Place& place : to) largest = std::max(largest, place.circle.radius);
+  for (const Place& place : to) largest = std::max(largest, place.unit);
   const double farthest = reach.place * largest;
   std::vector<Match> near;
   for (std::size_t own = 0; own < from.size(); ++own) {
@@ -101,9 +127,8 @@ Pairs Matches(const Places& from, const Places& to, const Similarity& similarity
                          [](const Place& place, double x) { return place.circle.center.x() < x; });
     for (auto k = static_cast<std::size_t>(first - to.begin());
          k < to.size() && to[k].circle.center.x() <= at.x() + farthest; ++k) {
-      const LayoutCircle& circle = to[k].circle;
-      if (std::abs(circle.center.y() - at.y()) > farthest) continue;
-      const double deviation = Deviation(from[own].circle, circle, similarity, reach);
+      if (std::abs(to[k].circle.center.y() - at.y()) > farthest) continue;
+      const double deviation = Deviation(from[own].circle, to[k], similarity, reach);
       if (deviation < 1.0) near.push_back({deviation, own, k});
     }
   }

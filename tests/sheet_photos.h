@@ -40,12 +40,12 @@ class Photos {
   }
 
   // Nine circles of the sheet, not quite in a lattice; or one about its origin.
-  Photos& WithCircles() {
+  Photos& WithCircles(double radius = 0.5) {
     for (std::size_t i = 0; i < photos.size(); ++i) {
       scene_.pose = poses[i];
       for (int k = 0; k < 9; ++k) {
         const double x = 2.0 * (k % 3 - 1) + 0.1 * (k % 2), y = 1.6 * (k / 3 - 1) - 0.07 * (k % 4);
-        photos[i].circles.push_back(scene_.Circle("c" + std::to_string(k), x, y, 0.5));
+        photos[i].circles.push_back(scene_.Circle("c" + std::to_string(k), x, y, radius));
       }
     }
     return *this;

@@ -55,6 +55,34 @@ TEST(AdjustPhotos, CameraComesOutWithinItsSigma) {
   }
 }
 
+// Of each contour the lens's unknowns together can bend what they cannot tell from noise, and no
+// more: it fits as well as is expected, and nothing is scaled.
+TEST(AdjustPhotos, AWholeLensFitsAsWellAsIsExpected) {
+  for (const CameraModel model : {CameraModel::kOpenCV, CameraModel::kFisheye}) {
+    AdjustOptions options;
+    options.noise_model = NoiseModel::Exact();
+    if (model == CameraModel::kFisheye) options.num_radial = 2;
+    const AdjustedPhotos adjusted =
+        AdjustPhotos(Photos(6, 3, 0.6, model).WithCircles().photos, options);
+    ASSERT_TRUE(adjusted.status.ok() && adjusted.rigid) << adjusted.status.message;
+    for (const AdjustedPhoto& photo : adjusted.photos) {
+      EXPECT_GT(photo.misfit, 0.3) << static_cast<int>(model);
+      EXPECT_LT(photo.misfit, 2.0) << static_cast<int>(model);
+    }
+  }
+}
+
+// Dots so small that they lie a radius and more from where each photo alone has them.
+TEST(AdjustPhotos, SmallDotsFarApartShareAWorld) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Photos sheet = Photos(6, seed).WithCircles(0.06);
+    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    EXPECT_TRUE(adjusted.rigid) << seed;
+    EXPECT_LT(std::abs(adjusted.cameras[0].camera.fx / sheet.truth().fx - 1.0), 0.02) << seed;
+  }
+}
+
 TEST(AdjustPhotos, OneWorldSaysMoreThanOneForEachPhoto) {
   const Photos sheet = Photos(6).WithCircles();
   AdjustOptions options = PointNoiseOnly();
