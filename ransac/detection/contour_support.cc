@@ -14,8 +14,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// An edge point supports a contour if its gradient is within 25 degrees of the contour's normal.
-constexpr double kMinNormalCosine = 0.906;
 // Support must come in runs of this length, pixels (a tenth of the contour for small ellipses);
 // holes of up to kMaxHolePx do not interrupt a run.
 constexpr double kMinRunPx = 6.0;

@@ -13,6 +13,9 @@
 
 namespace circline {
 
+// An edge point supports a contour if its gradient is within 25 degrees of the contour's normal.
+constexpr double kMinNormalCosine = 0.906;
+
 struct ContourSample {
   Eigen::Vector2d pixel, normal;  // On the photo; outward, unit.
   double length = 0.0;            // Of the contour that it stands for, pixels.

@@ -16,8 +16,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 
-// Gradients within 25 degrees of the contour's normal, as in contour_support.cc.
-constexpr double kMinNormalCosine = 0.906;
 // Of points of one contour about an ellipse that is only a start, pixels.
 constexpr double kInlierPx = 1.0;
 // Draws: with directions enough for a contour among four times as many strangers.
