@@ -2,9 +2,10 @@
 #ifndef CIRCLINE_TESTS_SHEET_PHOTOS_H_
 #define CIRCLINE_TESTS_SHEET_PHOTOS_H_
 
-#include <Eigen/Core>
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -111,6 +112,24 @@ inline AdjustOptions PointNoiseOnly() {
   CameraSigma& prior = options.camera_sigma["cam"] = UnknownCamera(PlaneScene().camera);
   prior.log_aspect = 0.0;
   return options;
+}
+
+// The error of log f, principal point, k1 and k2, or of the first `count` of them: in standard
+// deviations squared, over their number, so that 1 is expected.
+inline double CameraNees(const AdjustedCamera& made, const Camera& truth, int count = 5) {
+  constexpr int kShifts[] = {0, 2, 3, 4, 5};
+  Eigen::MatrixXd covariance(count, count);
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < count; ++j)
+      covariance(i, j) =
+          made.covariance[static_cast<std::size_t>(kShifts[i] * kCameraSize + kShifts[j])];
+  }
+  Eigen::Matrix<double, 5, 1> all;
+  all << std::log(made.camera.fx / truth.fx), made.camera.cx - truth.cx, made.camera.cy - truth.cy,
+      made.camera.distortion[0] - truth.distortion[0],
+      made.camera.distortion[1] - truth.distortion[1];
+  const Eigen::VectorXd error = all.head(count);
+  return error.dot(covariance.inverse() * error) / count;
 }
 
 }  // namespace circline

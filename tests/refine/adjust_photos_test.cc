@@ -17,22 +17,6 @@
 namespace circline {
 namespace {
 
-// Of log f, principal point, k1, k2: in standard deviations squared, 5 expected.
-double Nees(const AdjustedCamera& made, const Camera& truth) {
-  constexpr int kShifts[] = {0, 2, 3, 4, 5};
-  Eigen::Matrix<double, 5, 5> covariance;
-  for (int i = 0; i < 5; ++i) {
-    for (int j = 0; j < 5; ++j)
-      covariance(i, j) =
-          made.covariance[static_cast<std::size_t>(kShifts[i] * kCameraSize + kShifts[j])];
-  }
-  Eigen::Matrix<double, 5, 1> error;
-  error << std::log(made.camera.fx / truth.fx), made.camera.cx - truth.cx,
-      made.camera.cy - truth.cy, made.camera.distortion[0] - truth.distortion[0],
-      made.camera.distortion[1] - truth.distortion[1];
-  return error.dot(covariance.inverse() * error);
-}
-
 TEST(AdjustPhotos, CameraComesOutWithinItsSigma) {
   const int trials = Trials(20);
   for (const RigidWorld rigid : {RigidWorld::kAuto, RigidWorld::kNo}) {
@@ -47,7 +31,7 @@ TEST(AdjustPhotos, CameraComesOutWithinItsSigma) {
       const AdjustedCamera& made = adjusted.cameras.front();
       EXPECT_EQ(made.num_photos, 6);
       EXPECT_LT(std::abs(made.camera.fx / sheet.truth().fx - 1.0), 0.02);
-      sum += Nees(made, sheet.truth()) / 5.0;
+      sum += CameraNees(made, sheet.truth());
     }
     if (kSanitized) continue;
     EXPECT_GT(sum / trials, 0.6) << RigidWorldName(rigid);  // 0.68 to 1.38 in 95 % of runs.

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -84,20 +83,6 @@ TEST(SquareGrid, IsNoneWhereSquaresAreOblongOrLinesLieAnyhow) {
   for (std::size_t i = 0; i < anyhow.photos.size(); ++i) EXPECT_FALSE(GridOf(anyhow, i)) << i;
 }
 
-// Of log f and principal point, in standard deviations squared, over 3.
-double Nees(const AdjustedCamera& made, const Camera& truth) {
-  Eigen::Matrix3d covariance;
-  constexpr int kShifts[] = {0, 2, 3};
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j)
-      covariance(i, j) =
-          made.covariance[static_cast<std::size_t>(kShifts[i] * kCameraSize + kShifts[j])];
-  }
-  const Eigen::Vector3d error(std::log(made.camera.fx / truth.fx), made.camera.cx - truth.cx,
-                              made.camera.cy - truth.cy);
-  return error.dot(covariance.inverse() * error) / 3.0;
-}
-
 TEST(SquareGrid, TellsTheCameraWithinItsSigma) {
   const int trials = Trials(12);
   double with = 0.0, without = 0.0, nees = 0.0;
@@ -118,7 +103,7 @@ TEST(SquareGrid, TellsTheCameraWithinItsSigma) {
       EXPECT_NEAR(photo.cam_from_world.rotation.col(2).dot(photo.cam_from_world.translation),
                   sheet.poses[i].rotation.col(2).dot(sheet.poses[i].translation), 0.3);
     }
-    nees += Nees(adjusted.cameras[0], sheet.truth()) / trials;
+    nees += CameraNees(adjusted.cameras[0], sheet.truth(), 3) / trials;
     with += adjusted.cameras[0].Sigma(0);
     options.square_grids = false;
     const AdjustedPhotos as_lines = AdjustPhotos(sheet.photos, options);
@@ -140,7 +125,7 @@ TEST(SquareGrid, AnOddRowIsLeftOut) {
   const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
   ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
   for (const AdjustedPhoto& photo : adjusted.photos) EXPECT_EQ(photo.num_grid_lines, 14);
-  EXPECT_LT(Nees(adjusted.cameras[0], sheet.truth()), 4.0);
+  EXPECT_LT(CameraNees(adjusted.cameras[0], sheet.truth(), 3), 4.0);
 }
 
 }  // namespace
