@@ -18,7 +18,7 @@ namespace {
 using Circles = std::vector<CircleObservation>;
 
 // Largest extent of a contour, pixels: the larger the circle, the more it says.
-double Extent(const CircleObservation& circle) {
+double ContourExtent(const CircleObservation& circle) {
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& p : circle.points) box.extend(p);
   return circle.points.empty() ? 0.0 : box.diagonal().norm();
@@ -30,7 +30,7 @@ Circles WorldCircles(const Observations& observations, std::size_t most, const T
   std::multimap<double, const CircleObservation*, std::greater<>> by_size;
   for (const CircleObservation& circle : observations.circles) {
     if (circle.fit && circle.plane == observations.frame.plane && test(circle))
-      by_size.emplace(Extent(circle), &circle);
+      by_size.emplace(ContourExtent(circle), &circle);
   }
   Circles circles;
   for (const auto& [extent, circle] : by_size) {

@@ -40,13 +40,13 @@ bool IsSamePlane(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 
 // A world to start from: that of one sighting, in the unit that another sighting of the circle
 // gives it.
-struct Seed {
+struct WorldSeed {
   const Sighting* sighting = nullptr;
   double unit = 0.0, gap = 0.0;  // Of the given frame; between the rays, radii.
 };
 
 // Whether two sightings may be of one circle, by where their rays meet, its size and its normal.
-bool Meet(const Sighting& a, const Sighting& b, Seed* seed) {
+bool Meet(const Sighting& a, const Sighting& b, WorldSeed* seed) {
   if (!IsSamePlane(a.normal, b.normal)) return false;
   const double aa = a.ray.squaredNorm(), bb = b.ray.squaredNorm(), ab = a.ray.dot(b.ray);
   // Sine squared: rays less than 1.1 degrees apart meet anywhere.
@@ -81,10 +81,10 @@ class Placer {
   }
 
   std::optional<GivenPlacement> Run() {
-    const Seed* best = nullptr;
+    const WorldSeed* best = nullptr;
     std::size_t most = 0;
-    const std::vector<Seed> seeds = Seeds();
-    for (const Seed& seed : seeds) {
+    const std::vector<WorldSeed> seeds = Seeds();
+    for (const WorldSeed& seed : seeds) {
       const GivenFrame world = WorldOf(seed);
       const Layout layout = LayoutOf(*seed.sighting->pose);
       const Places there = PlacesOf(layout);
@@ -115,13 +115,13 @@ class Placer {
     double sigma_deg = 0.0;
   };
 
-  std::vector<Seed> Seeds() const;
-  GivenFrame WorldOf(const Seed& seed) const;
+  std::vector<WorldSeed> Seeds() const;
+  GivenFrame WorldOf(const WorldSeed& seed) const;
   Match Best(std::size_t photo, const GivenFrame& world, const Places& there) const;
   static void AddPhoto(std::size_t photo, const Match& match, GivenPlacement* out);
   static void NamePencils(std::size_t photo, const PoseHypothesis& h, std::vector<Known>* known,
                           SharedLayout* shared);
-  GivenPlacement Assemble(const Seed& seed) const;
+  GivenPlacement Assemble(const WorldSeed& seed) const;
 
   const std::vector<PoseEstimate>& estimates_;
   const std::vector<std::optional<CameraPose>>& given_;
@@ -130,7 +130,7 @@ class Placer {
 
 // The closest meetings, of photos near one another in the list first (those of a video see the
 // same), then of photos farther and farther apart until there are enough.
-std::vector<Seed> Placer::Seeds() const {
+std::vector<WorldSeed> Placer::Seeds() const {
   constexpr std::size_t kNeighbours = 8, kMostSeeds = 300;
   constexpr std::size_t kMostPairs = 5000000;  // Of sightings, where neighbours are too few.
   std::vector<std::size_t> begins;             // Of each photo with sightings, in sightings_.
@@ -139,8 +139,8 @@ std::vector<Seed> Placer::Seeds() const {
   }
   const std::size_t count = begins.size();
   begins.push_back(sightings_.size());
-  std::vector<Seed> seeds;
-  Seed seed;
+  std::vector<WorldSeed> seeds;
+  WorldSeed seed;
   std::size_t pairs = 0;
   for (std::size_t apart = 1; apart < count; ++apart) {
     if (apart > kNeighbours && (seeds.size() >= kMostSeeds || pairs > kMostPairs)) break;
@@ -155,12 +155,12 @@ std::vector<Seed> Placer::Seeds() const {
     }
   }
   std::stable_sort(seeds.begin(), seeds.end(),
-                   [](const Seed& a, const Seed& b) { return a.gap < b.gap; });
+                   [](const WorldSeed& a, const WorldSeed& b) { return a.gap < b.gap; });
   if (seeds.size() > kMostSeeds) seeds.resize(kMostSeeds);
   return seeds;
 }
 
-GivenFrame Placer::WorldOf(const Seed& seed) const {
+GivenFrame Placer::WorldOf(const WorldSeed& seed) const {
   const CameraPose& given = *given_[seed.sighting->photo];
   const CameraPose& own = seed.sighting->pose->cam_from_world;
   GivenFrame world;
@@ -248,7 +248,7 @@ void Placer::AddPhoto(std::size_t photo, const Match& match, GivenPlacement* out
   }
 }
 
-GivenPlacement Placer::Assemble(const Seed& seed) const {
+GivenPlacement Placer::Assemble(const WorldSeed& seed) const {
   GivenPlacement out;
   out.world = WorldOf(seed);
   out.by_id = true;

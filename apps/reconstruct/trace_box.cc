@@ -35,8 +35,8 @@ constexpr double kFineReachPx = 3.0;
 // From where a person has marked an edge: up to 5 px, and often a printed border (box-camprodon).
 constexpr double kMarkedReachPx = 5.0;
 constexpr double kAgreeSigmas = 2.0;  // Of lengths by the marks, and by what the photo shows there.
-constexpr double kGapWeight = 0.25;   // Of what no edge point covers.
-constexpr double kCopyPx = 1.5;       // Of a line from the same one in another channel.
+constexpr double kUncoveredWeight = 0.25;  // Of what no edge point covers.
+constexpr double kCopyPx = 1.5;            // Of a line from the same one in another channel.
 constexpr char kNoBox[] =
     "no box is sure enough in the photo: too few edges lie where its own would; mark its edges";
 constexpr char kTooSlender[] =
@@ -192,7 +192,7 @@ TracedBox Polished(const PhotoEdges& edges, const Camera& camera, const BoxOptio
     const SnappedBox seen = SnapBox(edges, fit, kFineReachPx, false);
     const double gaps_px =
         std::max(0.0, VisibleEdgesPx(fitted, camera.fx).all_px - seen.covered_px);
-    fitted.score = seen.covered_px - kGapWeight * gaps_px - seen.overrun_px;
+    fitted.score = seen.covered_px - kUncoveredWeight * gaps_px - seen.overrun_px;
     if (fitted.score > best.score) best = fitted;
   }
   return best;

@@ -26,7 +26,7 @@ constexpr std::size_t kMinPoints = 6;
 constexpr int kMinPointsOfLine = 3;
 // Steps are looked for about this many points in the middle, to neighbours up to this many times
 // the usual distance of the nearest one (sqrt(2) is the diagonal of a square).
-constexpr std::size_t kSeedPoints = 12;
+constexpr std::size_t kMiddlePoints = 12;
 constexpr double kNeighbourFactor = 1.7;
 // A point is where a step leads within this share of its length.
 constexpr double kStepTolerance = 0.2;
@@ -110,7 +110,7 @@ class LatticeFinder {
     const double n = static_cast<double>(points_.size());
     const double reach = kNeighbourFactor * UsualDistance();
     const std::vector<std::size_t> order = FromTheMiddle();
-    for (std::size_t k = 0; k < std::min(kSeedPoints, order.size()); ++k) {
+    for (std::size_t k = 0; k < std::min(kMiddlePoints, order.size()); ++k) {
       for (std::size_t j = 0; j < points_.size(); ++j) {
         const Vector2d step = points_[j] - points_[order[k]];
         if (j == order[k] || step.norm() > reach) continue;

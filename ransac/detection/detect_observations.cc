@@ -20,7 +20,7 @@ namespace {
 using Eigen::Vector2d;
 
 // A photo has no more directions worth telling apart.
-constexpr int kMaxPencils = 100;
+constexpr int kMostDirections = 100;
 
 std::vector<CircleEvidence> MakeCircles(const EdgeMap& edges,
                                         const std::vector<DetectedEllipse>& ellipses,
@@ -67,8 +67,8 @@ Status DetectionOptions::Validate() const {
     return Status::Invalid("min_segment_length_px must be positive and finite");
   }
   if (max_circles < 0) return Status::Invalid("max_circles must not be negative");
-  if (max_pencils < 0 || max_pencils > kMaxPencils) {
-    return Status::Invalid("max_pencils must be from 0 to " + std::to_string(kMaxPencils));
+  if (max_pencils < 0 || max_pencils > kMostDirections) {
+    return Status::Invalid("max_pencils must be from 0 to " + std::to_string(kMostDirections));
   }
   if (!(max_shared_plane_deg > 0.0)) {
     return Status::Invalid("max_shared_plane_deg must be positive");

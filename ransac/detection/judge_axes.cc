@@ -10,7 +10,7 @@ namespace circline {
 namespace {
 
 // The prior of the focal length is summed over so many of its standard deviations to either side.
-constexpr double kReach = 2.5;
+constexpr double kSummedSigmas = 2.5;
 // So much of the length of one of two pencils meets the other by accident; the odds that they are
 // of one thing grow with this power of the share. On box-camprodon, where rooms behind the box meet
 // it over a quarter, its own edges over two fifths and more, and chessboard-opencv, where all do;
@@ -51,7 +51,7 @@ void JudgeAxes(const AssemblyOptions& options, const PlacedPencil& x, PlacedPenc
   double of_third = 0.0, looked_at = 0.0;  // Near the focal length at which z was looked for.
   constexpr double kAnyFocal = 3.0;        // Of log f: what is known less is not known at all.
   const double focal_sigma = std::min(options.focal_sigma, kAnyFocal);
-  for (double off = -kReach; off <= kReach; off += kFocalStep / focal_sigma) {
+  for (double off = -kSummedSigmas; off <= kSummedSigmas; off += kFocalStep / focal_sigma) {
     const double log_focal = options.prior_log_focal + off * focal_sigma;
     const CameraError camera{options.camera.middle_rad * std::exp(-log_focal), 0.0};
     const UncertainDirection a = Refocus(x.along, log_focal), b = Refocus(y->along, log_focal);

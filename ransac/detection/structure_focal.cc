@@ -21,11 +21,11 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // The prior is searched over so many of its standard deviations.
-constexpr double kReach = 2.5;
+constexpr double kSearchedSigmas = 2.5;
 // Half the longer side of the photo over the focal length: tangents of 5 and 60 degrees.
 constexpr double kNarrowest = 0.0874887, kWidest = 1.7320508;
 // Circles whose normals are tried as that of the plane.
-constexpr std::size_t kMaxSeeds = 6;
+constexpr std::size_t kTriedNormals = 6;
 // Of circles that are of the plane that most are of.
 constexpr double kPlaneShare = 0.5;
 // Odds that two directions are at right angles below which a third to both is not looked for.
@@ -182,7 +182,7 @@ class StructureEvidence {
   double OnePlane(const std::vector<ConicFit>& circles) const {
     if (circles.size() < 2) return 0.0;
     double best = 0.0;
-    for (std::size_t seed = 0; seed < std::min(circles.size(), kMaxSeeds); ++seed) {
+    for (std::size_t seed = 0; seed < std::min(circles.size(), kTriedNormals); ++seed) {
       std::array<UncertainDirection, 2> normals;
       const int count = CircleNormals(circles[seed], &normals);
       for (int k = 0; k < count; ++k) {
@@ -271,7 +271,8 @@ LikelyFocal LikeliestFocal(const PhotoEvidence& evidence,
   }
   const double half = 0.5 * std::max(camera.width, camera.height) / camera.fx;
   // No lens is further from another one than that, however little is known.
-  const double reach = std::min(kReach * sigma.LargestLogFocal(), std::log(kWidest / kNarrowest));
+  const double reach =
+      std::min(kSearchedSigmas * sigma.LargestLogFocal(), std::log(kWidest / kNarrowest));
   double low = prior_log_focal - reach, high = prior_log_focal + reach;
   if (half > 0.0) {
     low = std::max(low, std::log(half / kWidest));
