@@ -17,7 +17,7 @@
 namespace circline::apps {
 namespace {
 
-using Json = nlohmann::json;
+using nlohmann::json;
 
 class CompareBadInput : public testing::Test {
  protected:
@@ -56,9 +56,9 @@ TEST_F(CompareBadInput, UnreadablePhotosAreNamedAndTheRestIsDone) {
   EXPECT_CONTAINS(outcome.err, "words.jpg: is not an image that can be read\n");
   EXPECT_CONTAINS(outcome.err, "empty.jpg: the file is empty\n");
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 3) << outcome.err;
-  for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl"))
+  for (const json& line : ReadJsonLines(folder_ / "out/results.jsonl"))
     EXPECT_EQ(line["image"], "good.png");
-  const std::vector<Json> observations = ReadJsonLines(folder_ / "out/observations.jsonl");
+  const std::vector<json> observations = ReadJsonLines(folder_ / "out/observations.jsonl");
   ASSERT_EQ(observations.size(), 4U);
   EXPECT_TRUE(observations[0].contains("error"));
   EXPECT_FALSE(observations[1].contains("error"));
@@ -176,7 +176,7 @@ TEST_F(CompareBadInput, PhotosWithoutASceneFile) {
                  "' --solvers=joint,line_pairs --output='" + folder_ / "out" + "'");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   std::set<std::string> solvers;
-  for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl"))
+  for (const json& line : ReadJsonLines(folder_ / "out/results.jsonl"))
     solvers.insert(line["solver"]);
   EXPECT_EQ(solvers, (std::set<std::string>{"joint", "line_pairs"}));
 }

@@ -16,7 +16,7 @@
 namespace circline::apps {
 namespace {
 
-using Json = nlohmann::json;
+using nlohmann::json;
 
 class CompareInputs : public testing::Test {
  protected:
@@ -28,8 +28,8 @@ class CompareInputs : public testing::Test {
   }
   std::string Results() { return ReadAll(folder_ / "out/results.jsonl"); }
   // Best answer of a solver.
-  Json Best(const std::string& solver) {
-    for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
+  json Best(const std::string& solver) {
+    for (const json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
       if (line["solver"] == solver && line["stage"] == "refined" && line["hypothesis"] == 0) {
         return line;
       }
@@ -56,10 +56,10 @@ TEST_F(CompareInputs, FocalLengthOrFieldOfViewStandInForACalibration) {
   EXPECT_EQ(Results(), calibrated);
   const double fov = 2.0 * std::atan(0.5 * kWidth / kFocal) / kDegree;
   ASSERT_EQ(Run("--focal_sigma=0.002 --fov_deg=" + std::to_string(fov)).exit_code, 0);
-  const Json guessed = Best("joint");
+  const json guessed = Best("joint");
   std::istringstream lines(calibrated);
   ASSERT_EQ(Run("--camera='" + calibration + "'").exit_code, 0);
-  const Json expected = Best("joint");
+  const json expected = Best("joint");
   for (std::size_t i = 0; i < 9; ++i) {
     EXPECT_NEAR(guessed["rotation"][i], expected["rotation"][i], 1e-6);
   }
@@ -76,7 +76,7 @@ TEST_F(CompareInputs, SaysHowWellAGuessIsKnown) {
         ReadJsonLines(folder_ / "out/observations.jsonl").at(0)["camera_from"].dump();
     EXPECT_CONTAINS(from, words);
     EXPECT_CONTAINS(ReadAll(folder_ / "out/report.html"), words);
-    const Json best = Best("single_circle");
+    const json best = Best("single_circle");
     ASSERT_TRUE(best.contains("focal_px")) << flags;
     // One circle does not tell.
     EXPECT_NEAR(best["focal_sigma"], sigma, 0.15 * sigma) << flags;
@@ -114,10 +114,10 @@ TEST_F(CompareInputs, NoiseModelCountsForAGuess) {
 // Conics and closed forms are of the camera that the photo was seen through, and say so.
 TEST_F(CompareInputs, StatesTheCameraThatAPhotoWasSeenThrough) {
   ASSERT_EQ(Run("--focal_px=420").exit_code, 0);
-  const Json photo = ReadJsonLines(folder_ / "out/observations.jsonl").at(0);
+  const json photo = ReadJsonLines(folder_ / "out/observations.jsonl").at(0);
   ASSERT_TRUE(photo.contains("calibrated_with"));
   int closed_forms = 0;
-  for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
+  for (const json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
     if (line["stage"] != "closed_form" || line["status"] != "ok") continue;
     EXPECT_EQ(line["camera"], photo["calibrated_with"]);
     EXPECT_EQ(line["focal_px"], photo["calibrated_with"]["fx"]);
@@ -157,14 +157,14 @@ TEST_F(CompareInputs, RadiusMakesTheTranslationMetric) {
   const double distance = board_.translation.norm();
   ASSERT_EQ(Run("--focal_px=300 --focal_sigma=0 --roi=40,20,230,210 --circle_radius=0.5").exit_code,
             0);
-  Json best = Best("single_circle");
+  json best = Best("single_circle");
   ASSERT_FALSE(best.is_null());
   EXPECT_EQ(best["metric"], true);
-  const auto norm = [](const Json& t) {
+  const auto norm = [](const json& t) {
     return std::hypot(t[0].get<double>(), t[1].get<double>(), t[2].get<double>());
   };
   EXPECT_NEAR(norm(best["translation"]), distance, 0.01 * distance);
-  const std::vector<Json> observations = ReadJsonLines(folder_ / "out/observations.jsonl");
+  const std::vector<json> observations = ReadJsonLines(folder_ / "out/observations.jsonl");
   EXPECT_EQ(observations.at(0)["ellipses"].size(), 1U);  // Nothing else is detected.
   EXPECT_EQ(observations.at(0)["pencils"].size(), 0U);
 

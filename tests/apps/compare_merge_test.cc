@@ -16,7 +16,7 @@
 namespace circline::apps {
 namespace {
 
-using Json = nlohmann::json;
+using nlohmann::json;
 
 class CompareMerge : public testing::Test {
  protected:
@@ -171,7 +171,7 @@ TEST_F(CompareMerge, ExportsTheRefinedFocalLength) {
   std::getline(images, line);
   std::getline(images, line);
   int num_images = 0;
-  for (const Json& result : ReadJsonLines(folder_ / "out/results.jsonl")) {
+  for (const json& result : ReadJsonLines(folder_ / "out/results.jsonl")) {
     if (result["hypothesis"] != 0) continue;
     for (int i = 0; i < 8; ++i) images >> word;  // Id, rotation, translation.
     int camera = 0;
@@ -191,14 +191,14 @@ TEST_F(CompareMerge, ExportsThePosesThatAreShown) {
   const Outcome outcome = Run("--overlays=false --export_as=colmap,gltf,tum", "out");
   ASSERT_EQ(outcome.exit_code, 1);
   EXPECT_CONTAINS(outcome.out, "exported poses: 0 of 6 have a scale");
-  std::vector<Json> shown;
-  for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
+  std::vector<json> shown;
+  for (const json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
     if (line["solver"] == "joint" && line["hypothesis"] == 0) shown.push_back(line);
   }
   ASSERT_EQ(shown.size(), 6U);
   std::istringstream colmap(ReadAll(folder_ / "out/images.txt"));
   std::istringstream tum(ReadAll(folder_ / "out/trajectory.txt"));
-  const Json gltf = Json::parse(ReadAll(folder_ / "out/cameras.gltf"));
+  const json gltf = json::parse(ReadAll(folder_ / "out/cameras.gltf"));
   EXPECT_EQ(gltf["asset"]["version"], "2.0");
   EXPECT_EQ(gltf["nodes"][0]["children"].size(), 6U);
   std::string line;
@@ -229,8 +229,8 @@ TEST_F(CompareMerge, ExportsThePosesThatAreShown) {
               1e-12);
 
     // What the glTF camera sees ahead of it (-Z) is what ours does (+Z); so with up (Y and -Y).
-    const Json& node = gltf["nodes"][i + 1];
-    const Json& q = node["rotation"];
+    const json& node = gltf["nodes"][i + 1];
+    const json& q = node["rotation"];
     const Eigen::Matrix3d turn = Eigen::Quaterniond(q[3].get<double>(), q[0].get<double>(),
                                                     q[1].get<double>(), q[2].get<double>())
                                      .toRotationMatrix();
@@ -242,7 +242,7 @@ TEST_F(CompareMerge, ExportsThePosesThatAreShown) {
   EXPECT_NEAR(gltf["cameras"][0]["perspective"]["yfov"], 2.0 * std::atan(0.5 * kHeight / kFocal),
               1e-12);
   // The root turns the plane's normal (Z) into glTF's up (Y).
-  const Json& r = gltf["nodes"][0]["rotation"];
+  const json& r = gltf["nodes"][0]["rotation"];
   const Eigen::Quaterniond root(r[3].get<double>(), r[0].get<double>(), r[1].get<double>(),
                                 r[2].get<double>());
   EXPECT_LT((root * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitY()).norm(), 1e-12);

@@ -17,7 +17,7 @@
 namespace circline::apps {
 namespace {
 
-using Json = nlohmann::json;
+using nlohmann::json;
 
 std::string Points(const Board& board) {
   std::ostringstream text;
@@ -52,11 +52,11 @@ class ComparePeers : public testing::Test {
     for (const PeerSolver& peer : PeerSolvers()) {
       peers_.insert({peer.name, SolverStageName(peer.stage)});
     }
-    for (const Json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
+    for (const json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
       if (peers_.count(RowOf(line)) != 0) lines_.push_back(line);
     }
   }
-  static Row RowOf(const Json& line) { return {line["solver"], line["stage"]}; }
+  static Row RowOf(const json& line) { return {line["solver"], line["stage"]}; }
   // The peers whose name begins so.
   std::set<Row> Rows(const std::string& prefix) const {
     std::set<Row> rows;
@@ -67,7 +67,7 @@ class ComparePeers : public testing::Test {
   }
   void ExpectPointsGiveTheTruth(const std::string& prefix) const {
     std::set<Row> solved, refused;
-    for (const Json& line : lines_) {
+    for (const json& line : lines_) {
       if (Rows(prefix).count(RowOf(line)) == 0) continue;
       if (line["status"] == "refused") {
         EXPECT_CONTAINS(line["message"].get<std::string>(), "gives 0 points");
@@ -85,7 +85,7 @@ class ComparePeers : public testing::Test {
 
   const TestFolder folder_;
   std::set<Row> peers_;
-  std::vector<Json> lines_;
+  std::vector<json> lines_;
 };
 
 TEST_F(ComparePeers, ExactPointsGiveTheTruth) {
@@ -109,7 +109,7 @@ TEST_F(ComparePeers, ExactPointsGiveTheTruthInVisp) {
 TEST_F(ComparePeers, AnExactCircleGivesTheTrueNormalInVisp) {
   if (Rows("visp_").empty()) GTEST_SKIP() << "built without CIRCLINE_WITH_VISP";
   int answers = 0, others = 0;
-  for (const Json& line : lines_) {
+  for (const json& line : lines_) {
     if (line["solver"] != "visp_circle") continue;
     ASSERT_EQ(line["num_hypotheses"], 2) << line;
     EXPECT_FALSE(line.contains("rotation_error_deg"));  // Free about the normal.
@@ -129,7 +129,7 @@ TEST_F(ComparePeers, AnExactCircleGivesTheTrueNormalInVisp) {
 
 TEST_F(ComparePeers, StateNoProbabilityAndNoCovariance) {
   if (peers_.empty()) GTEST_SKIP() << "no peers in this build";
-  for (const Json& line : lines_) {
+  for (const json& line : lines_) {
     if (line["status"] != "ok") continue;
     EXPECT_TRUE(line["probability"].is_null()) << line;
     EXPECT_TRUE(line["sigma_rotation_deg"][0].is_null()) << line;

@@ -16,7 +16,7 @@
 namespace circline::apps {
 namespace {
 
-using Json = nlohmann::json;
+using nlohmann::json;
 
 TEST(Compare, WritesWhatItPromises) {
   const TestFolder folder;
@@ -32,9 +32,9 @@ TEST(Compare, WritesWhatItPromises) {
                              "overlays/tilt40.png", "overlays/tilt40_2.png", "overlays/tilt55.png",
                              "overlays/tilt55_2.png"}));
 
-  const std::vector<Json> results = ReadJsonLines(folder / "out/results.jsonl");
+  const std::vector<json> results = ReadJsonLines(folder / "out/results.jsonl");
   int num_joint = 0;
-  for (const Json& line : results) {
+  for (const json& line : results) {
     for (const char* key :
          {"image", "solver", "stage", "loss", "loss_scale_px", "status", "message", "hypothesis",
           "num_hypotheses", "probability", "rotation", "translation", "metric", "rms_px",
@@ -52,10 +52,10 @@ TEST(Compare, WritesWhatItPromises) {
   }
   EXPECT_EQ(num_joint, 6);
 
-  const std::vector<Json> observations = ReadJsonLines(folder / "out/observations.jsonl");
+  const std::vector<json> observations = ReadJsonLines(folder / "out/observations.jsonl");
   ASSERT_EQ(observations.size(), 6U);
   for (std::size_t i = 0; i < observations.size(); i += 2) {
-    const Json& ellipse = observations[i]["ellipses"].at(0);
+    const json& ellipse = observations[i]["ellipses"].at(0);
     EXPECT_EQ(ellipse["id"], "c");
     EXPECT_EQ(ellipse["conic"].size(), 6U);
     EXPECT_NEAR(ellipse["coverage"], 1.0, 1e-9);
@@ -79,9 +79,9 @@ TEST(Compare, ExactEvidenceGivesTheTruth) {
   ASSERT_EQ(RunCompare("--scene='" + scene + "' --overlays=false --output='" + folder / "out" + "'")
                 .exit_code,
             0);
-  const std::vector<Json> results = ReadJsonLines(folder / "out/results.jsonl");
+  const std::vector<json> results = ReadJsonLines(folder / "out/results.jsonl");
   std::set<std::string> solvers;
-  for (const Json& line : results) {
+  for (const json& line : results) {
     if (line["status"] != "ok" || line["hypothesis"] != 0 ||
         !line.contains("translation_error_deg"))
       continue;
@@ -103,7 +103,7 @@ TEST(Compare, StatesTheFocalLengthItFinds) {
                 .exit_code,
             0);
   int found = 0;
-  for (const Json& line : ReadJsonLines(folder / "out/results.jsonl")) {
+  for (const json& line : ReadJsonLines(folder / "out/results.jsonl")) {
     if (line["status"] != "ok") continue;
     EXPECT_EQ(line.contains("focal_scale"), line["stage"] == "refined") << line;
     if (line["solver"] != "joint" || line["hypothesis"] != 0) continue;
@@ -130,7 +130,7 @@ TEST(Compare, TakesTheFocalSigmaOfTheSceneFile) {
                   .exit_code,
               0);
     int found = 0;
-    for (const Json& line : ReadJsonLines(folder / "out/results.jsonl"))
+    for (const json& line : ReadJsonLines(folder / "out/results.jsonl"))
       found += line["hypothesis"] == 0 && line.contains("focal_scale") ? 1 : 0;
     return found;
   };
