@@ -23,8 +23,8 @@
 namespace circline::apps {
 namespace {
 
-constexpr int kPhotoWidth = 640, kPhotoHeight = 480;
-constexpr double kPhotoFocal = 600.0;
+constexpr int kRenderedWidth = 640, kRenderedHeight = 480;
+constexpr double kRenderedFocal = 600.0;
 constexpr double kLargest = 0.25;  // Radius of the largest disc, metres.
 
 constexpr double kWall = 1.2;  // Its y.
@@ -64,14 +64,15 @@ class Room {
   void Paint(const CameraPose& pose, const std::string& path) const {
     const Eigen::Matrix3d back = pose.rotation.transpose();
     const Eigen::Vector3d eye = -back * pose.translation;
-    cv::Mat photo(kPhotoHeight, kPhotoWidth, CV_8U);
-    for (int v = 0; v < kPhotoHeight; ++v) {
-      for (int u = 0; u < kPhotoWidth; ++u) {
+    cv::Mat photo(kRenderedHeight, kRenderedWidth, CV_8U);
+    for (int v = 0; v < kRenderedHeight; ++v) {
+      for (int u = 0; u < kRenderedWidth; ++u) {
         double sum = 0.0;
         for (int k = 0; k < 4; ++k) {
-          const double x = u + (k % 2 - 0.5) / 2.0 - (kPhotoWidth - 1) / 2.0,
-                       y = v + (k / 2 - 0.5) / 2.0 - (kPhotoHeight - 1) / 2.0;
-          sum += Brightness(eye, back * Eigen::Vector3d(x / kPhotoFocal, y / kPhotoFocal, 1.0));
+          const double x = u + (k % 2 - 0.5) / 2.0 - (kRenderedWidth - 1) / 2.0,
+                       y = v + (k / 2 - 0.5) / 2.0 - (kRenderedHeight - 1) / 2.0;
+          sum +=
+              Brightness(eye, back * Eigen::Vector3d(x / kRenderedFocal, y / kRenderedFocal, 1.0));
         }
         photo.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::lround(sum / 4.0));
       }
@@ -113,8 +114,8 @@ std::string BoxAbout(const CameraPose& pose, const Eigen::Vector3d& center, doub
     const Eigen::Vector3d X =
         center + radius * (std::cos(a) * Eigen::Vector3d::UnitX() + std::sin(a) * across);
     const Eigen::Vector3d x = pose.rotation * X + pose.translation;
-    const Eigen::Vector2d pixel(kPhotoFocal * x.x() / x.z() + (kPhotoWidth - 1) / 2.0,
-                                kPhotoFocal * x.y() / x.z() + (kPhotoHeight - 1) / 2.0);
+    const Eigen::Vector2d pixel(kRenderedFocal * x.x() / x.z() + (kRenderedWidth - 1) / 2.0,
+                                kRenderedFocal * x.y() / x.z() + (kRenderedHeight - 1) / 2.0);
     low = low.cwiseMin(pixel);
     high = high.cwiseMax(pixel);
   }

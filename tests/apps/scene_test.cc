@@ -24,7 +24,7 @@ std::string Scene(const std::string& images) {
 }
 
 // The message of a scene that must be refused.
-std::string ErrorOf(const std::string& content) {
+std::string ErrorOfScene(const std::string& content) {
   const TestFolder folder;
   std::vector<SceneImage> images;
   const Status status = ReadScene(folder.Write("scene.yaml", content), {}, &images);
@@ -37,10 +37,10 @@ std::string ErrorOf(const std::string& content) {
 }
 
 std::string ErrorOfImage(const std::string& rest) {
-  return ErrorOf(Scene("  - { file: \"a.jpg\", camera: \"cam0\", " + rest + " }\n"));
+  return ErrorOfScene(Scene("  - { file: \"a.jpg\", camera: \"cam0\", " + rest + " }\n"));
 }
 
-std::vector<SceneImage> Read(const std::string& content) {
+std::vector<SceneImage> ImagesOf(const std::string& content) {
   const TestFolder folder;
   std::vector<SceneImage> images;
   const Status status = ReadScene(folder.Write("scene.yaml", content), {}, &images);
@@ -57,7 +57,7 @@ TEST(Scene, ReadsHowWellThingsAreKnown) {
       "cameras: [ { id: \"cam0\", model: \"pinhole\", camera_matrix: [500, 0, 320., 0., 500., 240, "
       "0, 0, 1], focal_sigma: 0.05, k1_sigma: 0 } ]\n";
   const std::vector<SceneImage> images =
-      Read("%YAML:1.0\n---\n" + camera + "images:\n  - { file: \"a.jpg\", " + circle + " }\n");
+      ImagesOf("%YAML:1.0\n---\n" + camera + "images:\n  - { file: \"a.jpg\", " + circle + " }\n");
   ASSERT_EQ(images.size(), 1u);
   EXPECT_EQ(images[0].observations.circles[0].radius_sigma, 0.02);
   EXPECT_EQ(images[0].observations.known_lengths[0].sigma, 0.1);
@@ -70,8 +70,9 @@ TEST(Scene, ReadsHowWellThingsAreKnown) {
   EXPECT_CONTAINS(ErrorOfImage("circles: [ { id: \"c\", radius_sigma: 0.1, " + contour + " } ]"),
                   "radius_sigma: there is no radius");
   EXPECT_CONTAINS(
-      ErrorOf("cameras: [ { id: \"a\", model: \"pinhole\", camera_matrix: [5,0,3,0,5,2,0,0,1], "
-              "principal_point_sigma_px: -1 } ]\nimages: [ { file: \"a.jpg\" } ]\n"),
+      ErrorOfScene(
+          "cameras: [ { id: \"a\", model: \"pinhole\", camera_matrix: [5,0,3,0,5,2,0,0,1], "
+          "principal_point_sigma_px: -1 } ]\nimages: [ { file: \"a.jpg\" } ]\n"),
       "principal_point_sigma_px: must be 0");
 }
 
@@ -156,13 +157,13 @@ TEST(Scene, ReadsJsonAndYamlWithoutHeader) {
       R"({ "cameras": [ { "id": "k", "model": "pinhole", "width": 64, "height": 48,
       "camera_matrix": [50, 0, 32, 0, 50, 24, 0, 0, 1] } ],
     "images": [ { "file": "a.png", "camera": "k" } ] })";
-  EXPECT_EQ(Read(json).size(), 1U);
-  EXPECT_EQ(Read(std::string(kCamera) + "images:\n  - { file: \"a.png\" }\n").size(), 1U);
-  EXPECT_EQ(Read("\xEF\xBB\xBF" + Scene("  - { file: \"a.png\" }\n")).size(), 1U);
+  EXPECT_EQ(ImagesOf(json).size(), 1U);
+  EXPECT_EQ(ImagesOf(std::string(kCamera) + "images:\n  - { file: \"a.png\" }\n").size(), 1U);
+  EXPECT_EQ(ImagesOf("\xEF\xBB\xBF" + Scene("  - { file: \"a.png\" }\n")).size(), 1U);
 }
 
 TEST(Scene, CameraMatrixMayBeAnOpenCvMatrix) {
-  const std::vector<SceneImage> images = Read(R"(%YAML:1.0
+  const std::vector<SceneImage> images = ImagesOf(R"(%YAML:1.0
 ---
 cameras:
   - id: "m"
@@ -194,9 +195,9 @@ TEST(Scene, TakesCamerasFromElsewhere) {
 }
 
 TEST(Scene, NamesUnknownKeysAndTheirPlace) {
-  EXPECT_CONTAINS(ErrorOf(Scene("  - { file: \"a.jpg\", camera: \"cam0\", cirlces: [] }\n")),
+  EXPECT_CONTAINS(ErrorOfScene(Scene("  - { file: \"a.jpg\", camera: \"cam0\", cirlces: [] }\n")),
                   "images[0] (\"a.jpg\"): unknown key 'cirlces'; did you mean 'circles'?");
-  EXPECT_CONTAINS(ErrorOf(Scene("  - { file: \"a.jpg\", camera: \"cam0\" }\n") + "extra: 1\n"),
+  EXPECT_CONTAINS(ErrorOfScene(Scene("  - { file: \"a.jpg\", camera: \"cam0\" }\n") + "extra: 1\n"),
                   "unknown key 'extra'");
   EXPECT_CONTAINS(ErrorOfImage("circles: [ { id: \"c\", contuor: [1,2,3,4,5,6,7,8,9,10] } ]"),
                   "images[0] (\"a.jpg\").circles[0]: unknown key 'contuor'");
@@ -205,9 +206,10 @@ TEST(Scene, NamesUnknownKeysAndTheirPlace) {
   EXPECT_CONTAINS(ErrorOfImage("frame: { orign: [1,2] }"), "frame: unknown key 'orign'");
   EXPECT_CONTAINS(ErrorOfImage("known: { angles: [] }"), "known: unknown key 'angles'");
   EXPECT_CONTAINS(ErrorOfImage("truth: { R: [1,0,0,0,1,0,0,0,1] }"), "truth: unknown key 'R'");
-  EXPECT_CONTAINS(ErrorOf("cameras:\n  - { id: \"c\", model: \"pinhole\", focal: 3 }\nimages:\n  - "
-                          "{ file: \"a\" }\n"),
-                  "cameras[0]: unknown key 'focal'");
+  EXPECT_CONTAINS(
+      ErrorOfScene("cameras:\n  - { id: \"c\", model: \"pinhole\", focal: 3 }\nimages:\n  - "
+                   "{ file: \"a\" }\n"),
+      "cameras[0]: unknown key 'focal'");
 }
 
 TEST(Scene, NamesWrongTypesAndCounts) {
@@ -263,40 +265,45 @@ TEST(Scene, NamesMissingAndDanglingIds) {
   EXPECT_CONTAINS(
       ErrorOfImage(pencil + "truth: { directions: [ { pencil: \"m\", value: [1,0,0] } ] }"),
       "there is no pencil 'm'");
-  EXPECT_CONTAINS(ErrorOf(Scene("  - { file: \"a.jpg\", camera: \"cam1\" }\n")),
+  EXPECT_CONTAINS(ErrorOfScene(Scene("  - { file: \"a.jpg\", camera: \"cam1\" }\n")),
                   "camera: there is no camera 'cam1'; did you mean 'cam0'?");
-  EXPECT_CONTAINS(ErrorOf(Scene("  - { camera: \"cam0\" }\n")), "images[0]: 'file' is missing");
-  EXPECT_CONTAINS(ErrorOf(std::string(kCamera)), "'images' is missing");
+  EXPECT_CONTAINS(ErrorOfScene(Scene("  - { camera: \"cam0\" }\n")),
+                  "images[0]: 'file' is missing");
+  EXPECT_CONTAINS(ErrorOfScene(std::string(kCamera)), "'images' is missing");
 }
 
 TEST(Scene, NamesBadCameras) {
   const std::string image = "images:\n  - { file: \"a\", camera: \"c\" }\n";
   EXPECT_CONTAINS(
-      ErrorOf("cameras:\n  - { id: \"c\", model: \"pinhole\", width: 4, height: 4 }\n" + image),
+      ErrorOfScene("cameras:\n  - { id: \"c\", model: \"pinhole\", width: 4, height: 4 }\n" +
+                   image),
       "cameras[0] (\"c\"): 'camera_matrix' is missing: a camera needs its focal length");
   const auto with_matrix = [&](const std::string& matrix, const std::string& rest) {
     return "cameras:\n  - { id: \"c\", model: " + rest + ", camera_matrix: [" + matrix + "] }\n" +
            image;
   };
-  EXPECT_CONTAINS(ErrorOf(with_matrix("0,0,3,0,5,3,0,0,1", "\"pinhole\"")), "must be positive");
-  EXPECT_CONTAINS(ErrorOf(with_matrix("5,1,3,0,5,3,0,0,1", "\"pinhole\"")), "skew");
-  EXPECT_CONTAINS(ErrorOf(with_matrix("5,0,0,0,5,0,3,3,1", "\"pinhole\"")), "row by row");
-  EXPECT_CONTAINS(ErrorOf(with_matrix("5,0,3,0,5,3,0,0,1", "\"fish\"")), "'fish' is not one of");
-  EXPECT_CONTAINS(ErrorOf(with_matrix("5,0,3,0,5,3,0,0,1", "\"opencv\", distortion: [0.1, 0.2]")),
-                  "4, 5 or 8 coefficients");
+  EXPECT_CONTAINS(ErrorOfScene(with_matrix("0,0,3,0,5,3,0,0,1", "\"pinhole\"")),
+                  "must be positive");
+  EXPECT_CONTAINS(ErrorOfScene(with_matrix("5,1,3,0,5,3,0,0,1", "\"pinhole\"")), "skew");
+  EXPECT_CONTAINS(ErrorOfScene(with_matrix("5,0,0,0,5,0,3,3,1", "\"pinhole\"")), "row by row");
+  EXPECT_CONTAINS(ErrorOfScene(with_matrix("5,0,3,0,5,3,0,0,1", "\"fish\"")),
+                  "'fish' is not one of");
   EXPECT_CONTAINS(
-      ErrorOf(with_matrix("5,0,3,0,5,3,0,0,1", "\"pinhole\", distortion: [0.1, 0, 0, 0]")),
+      ErrorOfScene(with_matrix("5,0,3,0,5,3,0,0,1", "\"opencv\", distortion: [0.1, 0.2]")),
+      "4, 5 or 8 coefficients");
+  EXPECT_CONTAINS(
+      ErrorOfScene(with_matrix("5,0,3,0,5,3,0,0,1", "\"pinhole\", distortion: [0.1, 0, 0, 0]")),
       "a pinhole camera has no distortion");
 }
 
 TEST(Scene, NamesMalformedFiles) {
-  EXPECT_CONTAINS(ErrorOf("images:\n  - { file: \"01.jpg }\n"), "line 3: ");
-  EXPECT_CONTAINS(ErrorOf("%YAML:1.0\n---\ncameras: [ { id: \"c\"\nimages: x\n"),
+  EXPECT_CONTAINS(ErrorOfScene("images:\n  - { file: \"01.jpg }\n"), "line 3: ");
+  EXPECT_CONTAINS(ErrorOfScene("%YAML:1.0\n---\ncameras: [ { id: \"c\"\nimages: x\n"),
                   "not valid YAML, JSON or XML");
-  EXPECT_CONTAINS(ErrorOf("{ \"images\": [ }"), "not valid YAML, JSON or XML");
-  EXPECT_CONTAINS(ErrorOf(""), "is empty");
-  EXPECT_CONTAINS(ErrorOf("just words"), "scene.yaml: ");
-  EXPECT_CONTAINS(ErrorOf(std::string(300, '\0')), "scene.yaml: ");
+  EXPECT_CONTAINS(ErrorOfScene("{ \"images\": [ }"), "not valid YAML, JSON or XML");
+  EXPECT_CONTAINS(ErrorOfScene(""), "is empty");
+  EXPECT_CONTAINS(ErrorOfScene("just words"), "scene.yaml: ");
+  EXPECT_CONTAINS(ErrorOfScene(std::string(300, '\0')), "scene.yaml: ");
   std::vector<SceneImage> images;
   EXPECT_CONTAINS(ReadScene("/nonexistent/scene.yaml", {}, &images).message,
                   "/nonexistent/scene.yaml: cannot be opened");

@@ -34,7 +34,7 @@ int RunSimulate(const std::string& arguments, std::string* err = nullptr,
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-using Row = std::map<std::string, std::string>;
+using CsvRow = std::map<std::string, std::string>;
 
 std::vector<std::string> Cells(const std::string& line) {
   std::vector<std::string> cells(1);
@@ -48,17 +48,17 @@ std::vector<std::string> Cells(const std::string& line) {
   return cells;
 }
 
-std::vector<Row> ReadCsv(const std::string& path, const std::string& header = kHeader) {
+std::vector<CsvRow> ReadCsv(const std::string& path, const std::string& header = kHeader) {
   std::istringstream text(ReadAll(path));
   std::string line;
   std::getline(text, line);
   EXPECT_EQ(line, header);
   const std::vector<std::string> names = Cells(line);
-  std::vector<Row> rows;
+  std::vector<CsvRow> rows;
   while (std::getline(text, line)) {
     const std::vector<std::string> cells = Cells(line);
     EXPECT_EQ(cells.size(), names.size()) << line;
-    Row row;
+    CsvRow row;
     for (std::size_t i = 0; i < std::min(cells.size(), names.size()); ++i) row[names[i]] = cells[i];
     rows.push_back(row);
   }
@@ -70,7 +70,7 @@ TEST(Simulate, WritesARowForEachMethodNoiseAndRatio) {
   ASSERT_EQ(RunSimulate("--trials=200 --noise_px=0,1 --outlier_ratio=0,0.3 --output='" +
                         folder / "out" + "'"),
             0);
-  const std::vector<Row> rows = ReadCsv(folder / "out/simulation.csv");
+  const std::vector<CsvRow> rows = ReadCsv(folder / "out/simulation.csv");
   ASSERT_EQ(rows.size(), 2U * 2U * 5U);
   // Bounds at 1 px without outliers, from a simulation of its own (rad).
   const std::map<std::string, double> bounds = {{"circle_frame", 0.00389},
@@ -85,7 +85,7 @@ TEST(Simulate, WritesARowForEachMethodNoiseAndRatio) {
   // 0.17: false alarms of 3.5 deviations are one in two thousand each.
   constexpr double kRmsScatter = 3.5 * 0.05, kNeesScatter = 3.5 * 0.17;
   std::map<std::string, double> clean_bounds;
-  for (Row row : rows) {
+  for (CsvRow row : rows) {
     const std::string& method = row["method"];
     ASSERT_EQ(bounds.count(method), 1U) << method;
     EXPECT_EQ(row["trials"], "200");
@@ -122,7 +122,7 @@ TEST(Simulate, JointHoldsAgainstClustersAndBands) {
                           " --noise_px=1,2,3 --outlier_ratio=0.5 --outlier_kind=" + kind +
                           " --output='" + folder / kind + "'"),
               0);
-    for (Row row : ReadCsv(folder / (kind + "/simulation.csv"))) {
+    for (CsvRow row : ReadCsv(folder / (kind + "/simulation.csv"))) {
       if (row["method"] != "joint") continue;
       const std::string where = kind + ", " + row["noise_px"] + " px";
       EXPECT_LE(std::stoi(row["failures"]), 1) << where;
@@ -160,9 +160,9 @@ constexpr char kStreetHeader[] =
     "known_focal_error,known_focal_sigma";
 
 // Area under the share of errors below a threshold, per cent of its greatest.
-double Area(const std::vector<Row>& rows, const std::string& who, double most_deg) {
+double Area(const std::vector<CsvRow>& rows, const std::string& who, double most_deg) {
   double area = 0.0;
-  for (Row row : rows) {
+  for (CsvRow row : rows) {
     if (row[who + "_failed"] == "1") continue;
     area += std::max(0.0, 1.0 - std::stod(row[who + "_error_deg"]) / most_deg);
   }
@@ -177,7 +177,7 @@ TEST(Simulate, StreetsAreFoundAboutAsWellAsIfMembershipWereKnown) {
                             folder / "out" + "'",
                         nullptr, &out),
             0);
-  const std::vector<Row> rows = ReadCsv(folder / "out/street.csv", kStreetHeader);
+  const std::vector<CsvRow> rows = ReadCsv(folder / "out/street.csv", kStreetHeader);
   ASSERT_EQ(rows.size(), static_cast<std::size_t>(kStreets));
   // The line on stdout says what the rows do.
   char areas[80];
@@ -186,7 +186,7 @@ TEST(Simulate, StreetsAreFoundAboutAsWellAsIfMembershipWereKnown) {
                 Area(rows, "known", 5.0), Area(rows, "detected", 10.0), Area(rows, "known", 10.0));
   EXPECT_CONTAINS(out.c_str(), areas);
   int orthogonal = 0, within = 0, all = 0, sure = 0, sure_and_wrong = 0;
-  for (Row row : rows) {
+  for (CsvRow row : rows) {
     orthogonal += row["orthogonal"] == "1" ? 1 : 0;
     EXPECT_GE(std::stoi(row["segments"]), 12);
     EXPECT_GE(std::stoi(row["houses"]), 1);
@@ -222,10 +222,10 @@ TEST(Simulate, SquareHousesTellTheFocalLength) {
   ASSERT_EQ(RunSimulate("--scene=street --trials=" + std::to_string(kStreets) +
                         " --focal_sigma=0.5 --output='" + folder / "out" + "'"),
             0);
-  const std::vector<Row> rows = ReadCsv(folder / "out/street.csv", kStreetHeader);
+  const std::vector<CsvRow> rows = ReadCsv(folder / "out/street.csv", kStreetHeader);
   ASSERT_EQ(rows.size(), static_cast<std::size_t>(kStreets));
   int square = 0, near = 0, within = 0, answers = 0;
-  for (Row row : rows) {
+  for (CsvRow row : rows) {
     const bool is_square = row["orthogonal"] == "1";
     square += is_square ? 1 : 0;
     if (row["detected_failed"] == "1") continue;

@@ -26,7 +26,7 @@ using Eigen::Vector3d;
 
 // A plane with a circle in it, all of which is in front of the camera; the plane's frame; two
 // directions of the plane.
-struct Scene {
+struct CircleScene {
   Matrix3d rotation;                // cam_from_world; +Z faces the camera.
   CirclePose circle;                // Lengths in units of its radius.
   Vector3d origin;                  // Of the frame, camera frame.
@@ -38,9 +38,9 @@ struct Scene {
   }
 };
 
-Scene RandomScene(Random* random) {
+CircleScene RandomScene(Random* random) {
   for (;;) {
-    Scene s;
+    CircleScene s;
     // Distances of 1.5 to 300 radii, the near ones as likely as the far ones; any direction within
     // 60 degrees of the optical axis.
     const double distance = 1.5 * std::pow(200.0, random->Uniform());
@@ -79,7 +79,7 @@ double RotationError(const Matrix3d& estimate, const Matrix3d& truth) {
 }
 
 // Errors of one method over all scenes: those that are near-degenerate for it apart.
-struct Errors {
+struct MethodErrors {
   std::vector<double> regular, near_degenerate;
   int regular_failures = 0, near_degenerate_failures = 0;
 
@@ -114,7 +114,7 @@ struct Errors {
 };
 
 // The hypothesis nearest to the truth: a single circle knows its normal only.
-bool SolveCircle(const Scene& s, const Matrix3d& conic, double* error) {
+bool SolveCircle(const CircleScene& s, const Matrix3d& conic, double* error) {
   std::array<CirclePose, 2> poses;
   const int count = CirclePoses(conic, &poses);
   *error = 4.0;
@@ -125,7 +125,7 @@ bool SolveCircle(const Scene& s, const Matrix3d& conic, double* error) {
 }
 
 // Proposition 3: the centre decides, an axis line fixes the rotation.
-bool SolveCircleCenter(const Scene& s, const Matrix3d& conic, double* error) {
+bool SolveCircleCenter(const CircleScene& s, const Matrix3d& conic, double* error) {
   std::array<CirclePose, 2> poses;
   const int count = CirclePoses(conic, &poses);
   if (count == 0) return false;
@@ -145,7 +145,7 @@ bool SolveCircleCenter(const Scene& s, const Matrix3d& conic, double* error) {
 }
 
 // Proposition 4. Where both candidates pass the test, both are hypotheses.
-bool SolveCircleFrame(const Scene& s, const Matrix3d& conic, double* error) {
+bool SolveCircleFrame(const CircleScene& s, const Matrix3d& conic, double* error) {
   std::array<FrameRotation, 2> found;
   const int count = RotationsFromCircleAndFrame(conic, s.origin.cross(s.rotation.col(0)),
                                                 s.origin.cross(s.rotation.col(1)), &found);
@@ -159,7 +159,7 @@ bool SolveCircleFrame(const Scene& s, const Matrix3d& conic, double* error) {
 }
 
 // Proposition 5: two pairs of parallel lines of any directions, the first along X.
-bool SolveLinePairs(const Scene& s, double* error) {
+bool SolveLinePairs(const CircleScene& s, double* error) {
   const auto vanishing_point = [&s](double angle) -> Vector3d {
     const Vector3d d = s.InPlane(angle), across = s.InPlane(angle + 0.5 * kPi);
     return s.origin.cross(s.origin + d).cross((s.origin + across).cross(s.origin + across + d));
@@ -176,10 +176,10 @@ bool SolveLinePairs(const Scene& s, double* error) {
 
 TEST(PropertyTest, TheTruthIsAmongTheHypotheses) {
   Random random(2024);
-  Errors circle, circle_center, circle_frame, line_pairs;
+  MethodErrors circle, circle_center, circle_frame, line_pairs;
   const int scenes = Trials("CIRCLINE_PROPERTY_SCENES", 1000000);
   for (int i = 0; i < scenes; ++i) {
-    const Scene s = RandomScene(&random);
+    const CircleScene s = RandomScene(&random);
     const Matrix3d conic = ProjectCircle(s.circle);
     const bool degenerate =
         s.tilt < 1.0 * kDegree || s.tilt > 85.0 * kDegree || s.half_angle < 0.5 * kDegree;

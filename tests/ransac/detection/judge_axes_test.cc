@@ -31,10 +31,10 @@ PlacedPencil Pencil(const Vector3d& direction, const Vector2d& from, const Vecto
 }
 
 // Rows from (100, 100), and columns that cross them, or do so elsewhere on the photo.
-struct Axes {
+struct AxisPencils {
   PlacedPencil x, y, z;
 
-  explicit Axes(const Matrix3d& R, const Vector2d& columns = {100.0, 100.0})
+  explicit AxisPencils(const Matrix3d& R, const Vector2d& columns = {100.0, 100.0})
       : x(Pencil(R.col(0), {100.0, 100.0}, {140.0, 0.0}, {0.0, 20.0})),
         y(Pencil(R.col(1), columns, {0.0, 140.0}, {20.0, 0.0})),
         z(Pencil(R.col(2), {400.0, 100.0}, {50.0, 50.0}, {20.0, 0.0})) {}
@@ -50,13 +50,13 @@ AssemblyOptions Guessed() {
 const Matrix3d kTurned = ExpRotation(Vector3d(0.5, -0.6, 0.4));
 
 TEST(JudgeAxes, RowsAndColumnsAreOfOneThing) {
-  Axes axes(kTurned);
+  AxisPencils axes(kTurned);
   JudgeAxes(Guessed(), axes.x, &axes.y, nullptr);
   EXPECT_EQ(axes.y.observation.axis_probability, 1.0);
 }
 
 TEST(JudgeAxes, LinesThatDoNotMeetAreDoubted) {
-  Axes axes(kTurned, {400.0, 300.0});
+  AxisPencils axes(kTurned, {400.0, 300.0});
   JudgeAxes(Guessed(), axes.x, &axes.y, nullptr);
   EXPECT_LT(axes.y.observation.axis_probability, 0.1);
 }
@@ -65,7 +65,7 @@ TEST(JudgeAxes, LinesThatDoNotMeetAreDoubted) {
 // that looks down as well has only one that makes it square to the uprights, too.
 TEST(JudgeAxes, AThirdDirectionIsConfirmedByTheSecond) {
   const Matrix3d level = ExpRotation(Vector3d(0.0, 0.7, 0.0));
-  Axes seen_level(level), seen_from_above(kTurned);
+  AxisPencils seen_level(level), seen_from_above(kTurned);
   JudgeAxes(Guessed(), seen_level.x, &seen_level.y, &seen_level.z);
   JudgeAxes(Guessed(), seen_from_above.x, &seen_from_above.y, &seen_from_above.z);
   EXPECT_LT(seen_level.z.observation.axis_probability, 0.9);
@@ -79,7 +79,7 @@ TEST(JudgeAxes, AThirdDirectionIsConfirmedByTheSecond) {
 TEST(JudgeAxes, WhatWasLookedForIsDoubtedAsItMayBeThereByAccident) {
   double last = 1.0, last_y = 1.0;
   for (const double ratio : {1e6, 100.0, 5.0}) {
-    Axes axes(kTurned, {240.0, 100.0});
+    AxisPencils axes(kTurned, {240.0, 100.0});
     JudgeAxes(Guessed(), axes.x, &axes.y, &axes.z, ratio);
     EXPECT_LE(axes.z.observation.axis_probability, last) << ratio;
     EXPECT_LE(axes.y.observation.axis_probability, last_y) << ratio;

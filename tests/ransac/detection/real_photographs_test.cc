@@ -54,7 +54,7 @@ Camera ReadCamera(const cv::FileNode& node, const cv::Mat& photo) {
 }
 
 // One photo of a set, its observations and its truth.
-struct Photo {
+struct DetectedPhoto {
   std::string file;
   Observations found;
   Matrix3d rotation;
@@ -88,8 +88,8 @@ Matrix3d ReadRotation(const cv::FileNode& node, const char* key) {
   return rotation;
 }
 
-std::vector<Photo> DetectSet(const std::string& set, std::size_t every) {
-  std::vector<Photo> photos;
+std::vector<DetectedPhoto> DetectSet(const std::string& set, std::size_t every) {
+  std::vector<DetectedPhoto> photos;
   VisitSet(set, every, [&](const cv::Mat& image, const Camera& camera, const cv::FileNode& node) {
     photos.push_back(
         {static_cast<std::string>(node["file"]), Detect(image, camera), ReadRotation(node, "R")});
@@ -105,7 +105,7 @@ double Median(std::vector<double> values) {
 TEST(RealPhotographs, ChessboardsGiveTheirAxes) {
   if (!HasSet("chessboard-opencv")) GTEST_SKIP() << "no photographs in " << DataFolder();
   std::vector<double> errors;
-  for (const Photo& photo : DetectSet("chessboard-opencv", 4)) {
+  for (const DetectedPhoto& photo : DetectSet("chessboard-opencv", 4)) {
     Vector3d x, y;
     const bool found = Axes(photo.found, &x, &y);
     EXPECT_TRUE(found) << photo.file;
@@ -118,7 +118,7 @@ TEST(RealPhotographs, ChessboardsGiveTheirAxes) {
 TEST(RealPhotographs, TheDiscOfTheTurntableIsFound) {
   if (!HasSet("turntable-teabox")) GTEST_SKIP() << "no photographs in " << DataFolder();
   std::vector<double> errors;
-  for (const Photo& photo : DetectSet("turntable-teabox", 2)) {
+  for (const DetectedPhoto& photo : DetectSet("turntable-teabox", 2)) {
     double best = 180.0;
     for (const CircleObservation& circle : photo.found.circles) {
       if (circle.points.size() < 150) continue;  // The rim, not a print on the box.
@@ -160,7 +160,7 @@ TEST(RealPhotographs, BoxesAreRareOnNormalsOfNothing) {
 
 TEST(RealPhotographs, LargeDiscsInStrongDistortionAreFoundAndShareAPlane) {
   if (!HasSet("circles-discocal-tir")) GTEST_SKIP() << "no photographs in " << DataFolder();
-  for (const Photo& photo : DetectSet("circles-discocal-tir", 3)) {
+  for (const DetectedPhoto& photo : DetectSet("circles-discocal-tir", 3)) {
     int good = 0, on_plane = 0;
     for (const CircleObservation& circle : photo.found.circles) {
       good += BetterNormalDeg(circle, photo.rotation.col(2)) < 3.0 ? 1 : 0;
@@ -174,7 +174,7 @@ TEST(RealPhotographs, LargeDiscsInStrongDistortionAreFoundAndShareAPlane) {
 TEST(RealPhotographs, BoardsAmongClutterGiveAxesThatKnowTheirError) {
   if (!HasSet("chessboard-charuco-robot")) GTEST_SKIP() << "no photographs in " << DataFolder();
   std::vector<double> errors;
-  for (const Photo& photo : DetectSet("chessboard-charuco-robot", 2)) {
+  for (const DetectedPhoto& photo : DetectSet("chessboard-charuco-robot", 2)) {
     Vector3d x, y;
     ASSERT_TRUE(Axes(photo.found, &x, &y)) << photo.file;
     double variance = 0.0;
@@ -192,7 +192,7 @@ TEST(RealPhotographs, BoardsAmongClutterGiveAxesThatKnowTheirError) {
 TEST(RealPhotographs, ABoxIsNotMixedWithWhatIsBehindIt) {
   if (!HasSet("box-camprodon")) GTEST_SKIP() << "no photographs in " << DataFolder();
   int spanned = 0;
-  for (Photo& photo : DetectSet("box-camprodon", 2)) {
+  for (DetectedPhoto& photo : DetectSet("box-camprodon", 2)) {
     FitDirect(1.0, &photo.found);  // A box's edges come without.
     if (photo.found.frame.plane.empty()) continue;
     ++spanned;
@@ -211,7 +211,7 @@ TEST(RealPhotographs, ABoxIsNotMixedWithWhatIsBehindIt) {
 // Streets climb and walls lean: the two directions are axes all the same, whose ties are soft.
 TEST(RealPhotographs, AStreetHasAxesThoughItsWallsLean) {
   if (!HasSet("scene-lund")) GTEST_SKIP() << "no photographs in " << DataFolder();
-  for (const Photo& photo : DetectSet("scene-lund", 3)) {
+  for (const DetectedPhoto& photo : DetectSet("scene-lund", 3)) {
     ASSERT_GE(photo.found.pencils.size(), 2U) << photo.file;
     EXPECT_EQ(photo.found.pencils[0].direction, PencilDirection::kX) << photo.file;
     EXPECT_EQ(photo.found.pencils[1].direction, PencilDirection::kY) << photo.file;
