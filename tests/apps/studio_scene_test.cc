@@ -156,7 +156,8 @@ TEST_F(StudioSceneTest, DoesNotWriteOverADraftThatItCannotRead) {
 }
 
 TEST_F(StudioSceneTest, SaysHowManyMeasurementsCannotBeHad) {
-  const auto studio = Open(nullptr);
+  const Camera camera = CameraOf(300.0);  // Through an unknown lens neither might be seen.
+  const auto studio = Open(&camera);
   Json request = {{"image", 0}, {"format", "csv"}};
   request["scene"] = SceneOfDisc(studio->Detect({{"image", 0}}));
   // Far up and far down: one of the two is beyond the plane's horizon.
