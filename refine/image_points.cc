@@ -159,6 +159,7 @@ class ImagePoints::View {
     }
   }
 
+ private:
   // By how much a length along `across` grows, in pixels, where its place in the photo moves on by
   // one along either axis.
   static Eigen::Vector2d Bend(const Camera& camera, const CalibratedPoint& p,
@@ -255,8 +256,9 @@ class ImagePoints::ToConic {
                                   p.GradientPerPixel((C * p.Homogeneous()).head<2>()).norm();
     }
     Vector6d by_conic;
-    Eigen::Vector2d normal;
-    const double d = is_orthogonal_ ? OrthogonalDistance(p, C, level_, &by_conic, &normal)
+    Eigen::Vector2d normal = Eigen::Vector2d::Zero(), *wanted = nullptr;
+    if constexpr (Row::RowsAtCompileTime > 6) wanted = &normal;
+    const double d = is_orthogonal_ ? OrthogonalDistance(p, C, level_, &by_conic, wanted)
                                     : ConicDistance(p, C, &by_conic);
     row->template head<6>() = by_conic;
     if constexpr (Row::RowsAtCompileTime > 6) {
