@@ -13,25 +13,21 @@ namespace circline {
 
 namespace {
 
-// By their distances from the nearest other one; from left to right.
-void SetUnits(Places* places) {
-  constexpr double kShare = 0.3;  // A board's discs have about that radius.
-  const auto distance = [places](std::size_t a, std::size_t b) {
-    return (*places)[a].circle.center - (*places)[b].circle.center;
-  };
-  for (std::size_t k = 0; k < places->size(); ++k) {
-    double nearest = std::numeric_limits<double>::infinity();
-    const auto is_beyond = [&](std::size_t other) {
-      nearest = std::min(nearest, distance(other, k).norm());
-      return std::abs(distance(other, k).x()) >= nearest;
-    };
-    for (std::size_t other = k; other-- > 0 && !is_beyond(other);) {
+// Each circle and the one nearest to it.
+Pairs NeighbourPairs(const Places& places) {
+  Pairs pairs;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    std::size_t nearest = k;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t other = 0; other < places.size(); ++other) {
+      const double distance = (places[other].circle.center - places[k].circle.center).squaredNorm();
+      if (other == k || !(distance < least)) continue;
+      least = distance;
+      nearest = other;
     }
-    for (std::size_t other = k + 1; other < places->size() && !is_beyond(other); ++other) {
-    }
-    const double radius = (*places)[k].circle.radius;
-    (*places)[k].unit = std::isfinite(nearest) ? std::max(radius, kShare * nearest) : radius;
+    if (nearest != k) pairs.push_back({k, nearest});
   }
+  return pairs;
 }
 
 }  // namespace
@@ -39,11 +35,15 @@ void SetUnits(Places* places) {
 Places PlacesOf(const Layout& layout) {
   Places places;
   places.reserve(layout.size());
-  for (const auto& [id, circle] : layout) places.push_back({&id, circle});
+  for (const auto& [id, circle] : layout) places.push_back({&id, circle, circle.radius});
   std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
     return a.circle.center.x() < b.circle.center.x();
   });
-  SetUnits(&places);
+  constexpr double kShare = 0.3;  // A board's discs have about that radius, of their distances.
+  for (const auto& [k, nearest] : NeighbourPairs(places)) {
+    const double gap = (places[nearest].circle.center - places[k].circle.center).norm();
+    places[k].unit = std::max(places[k].unit, kShare * gap);
+  }
   return places;
 }
 
@@ -89,23 +89,6 @@ bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
     deviations.push_back(Deviation(from[own].circle, to[shared], alignment->to_shared));
   alignment->misfit = Median(std::move(deviations));
   return true;
-}
-
-// Each circle and the one nearest to it.
-Pairs NeighbourPairs(const Places& places) {
-  Pairs pairs;
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    std::size_t nearest = k;
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t other = 0; other < places.size(); ++other) {
-      const double distance = (places[other].circle.center - places[k].circle.center).squaredNorm();
-      if (other == k || !(distance < least)) continue;
-      least = distance;
-      nearest = other;
-    }
-    if (nearest != k) pairs.push_back({k, nearest});
-  }
-  return pairs;
 }
 
 }  // namespace
