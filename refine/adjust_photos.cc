@@ -48,10 +48,15 @@ Status AdjustOptions::Validate() const {
 CameraSigma UnknownCamera(const Camera& camera) {
   constexpr double kOfDiagonal = 0.03;  // Of 5 calibrated cameras: 0.005 to 0.028.
   constexpr double kSquare = 0.001;
+  constexpr double kK1 = 0.3;  // Wide-angle lenses have -0.45 to 0.1.
+  // What the projections that lenses are built for have beside the equidistant one: from -1/6
+  // (orthographic) to 1/12 (stereographic).
+  constexpr double kFisheyeK1 = 0.1;
   // A photo of unknown size has its principal point in the middle.
   const double width = camera.width > 0 ? camera.width : 2.0 * camera.cx;
   const double height = camera.height > 0 ? camera.height : 2.0 * camera.cy;
-  return {0.7, kSquare, kOfDiagonal * std::hypot(width, height), 0.3};
+  return {0.7, kSquare, kOfDiagonal * std::hypot(width, height),
+          camera.model == CameraModel::kFisheye ? kFisheyeK1 : kK1};
 }
 
 const char* ShiftName(CameraModel model, int shift) {

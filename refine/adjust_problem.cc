@@ -271,14 +271,14 @@ int AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   return made.block;
 }
 
-double AdjustProblem::GridSigma(const AdjustInput& photo) const {
+double AdjustProblem::GridSigma(const AdjustInput& photo, double share) const {
   double told = std::numeric_limits<double>::infinity();
   for (const auto& [key, place] : photo.grid->places) {
     const LineObservation& line = photo.observations->pencils[key.first].lines[key.second];
     told = std::min(told, LeastSigma(line.fit->covariance));
   }
   told *= photo.grid->cam_from_board.translation.norm();
-  return std::max(options_.noise_model.grid_line * photo.grid->width, kExactShare * told);
+  return std::max(share * options_.noise_model.grid_line * photo.grid->width, kExactShare * told);
 }
 
 // All pieces of a line of the board are off their place by the same.
@@ -290,16 +290,15 @@ int AdjustProblem::AddGridPlace(int photo, std::size_t pencil, std::size_t line,
   if (found == input.grid->places.end()) return -1;
   const PencilObservation& observed = input.observations->pencils[pencil];
   const int axis = AxisAcross(observed);
-  const double sigma = GridSigma(input);
   int& off = OneOf({photo, axis, found->second}, &grid_lines_);
   if (off < 0) {
     off = AddBlock(1, {});
-    AddTerm(NewGaussianPrior({sigma}), {off});
+    AddTerm(NewGaussianPrior({GridSigma(input, 1.0)}), {off});
   }
   blocks.push_back(off);
   return AddTerm(NewGridLinePrior(observed.lines[line].fit->line, cost.points()->Middle(nullptr),
                                   options_.noise_model.line_direction_rad > 0.0, axis,
-                                  found->second, kPieces * sigma),
+                                  found->second, GridSigma(input, kPieces)),
                  std::move(blocks));
 }
 

@@ -128,7 +128,8 @@ class AdjustProblem : private Graph {
   void AddKnownRadius(int world, const CircleObservation& circle, int radius);
   int OffsetOf(int photo, const CircleObservation& circle);
   void AddPencil(int photo, std::size_t pencil);
-  double GridSigma(const AdjustInput& photo) const;  // Squares, of a photo that has a grid.
+  // Of a photo that has a grid, squares: this share of a line's deviation.
+  double GridSigma(const AdjustInput& photo, double share) const;
   int AddGridPlace(int photo, std::size_t pencil, std::size_t line, const CurveCost& cost,
                    std::vector<int> blocks);
   int DirectionOf(int photo, const PencilObservation& pencil);

@@ -89,7 +89,7 @@ std::vector<AdjustProblem::GridLine> AdjustProblem::GridLines() const {
   std::vector<GridLine> lines;
   for (const auto& [key, off] : grid_lines_) {
     const auto i = static_cast<std::size_t>(key[0]);
-    lines.push_back({i, key[1], key[2], *Values(off) / GridSigma(photos_[i])});
+    lines.push_back({i, key[1], key[2], *Values(off) / GridSigma(photos_[i], 1.0)});
   }
   return lines;
 }
