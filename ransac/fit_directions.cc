@@ -83,7 +83,7 @@ class DirectionFitter {
   // The vanishing point of a pencil, and which of its lines are parallel.
   Status FitDirection(const std::vector<FittedFeature>& features, PencilObservation* pencil) {
     PencilOptions options;
-    options.ransac = run_.NextRansac(kInlierSigmas);
+    run_.SetNext(kInlierSigmas, &options.ransac);
     options.model_sigma_rad = run_.options.noise_model.line_direction_rad;
     std::vector<LineFit> fits;
     std::vector<std::size_t> positions;
@@ -135,13 +135,11 @@ bool FittedFeature::FollowNoise(double measured_px) {
   return std::abs(measured_px - before) > kTolerance * before;
 }
 
-RansacOptions FitRun::NextRansac(double threshold) {
-  RansacOptions result;
-  result.threshold = threshold;
-  result.confidence = options.confidence;
-  result.max_iterations = options.max_iterations;
-  result.seed = Random(options.seed + num_fits++).Next();
-  return result;
+void FitRun::SetNext(double threshold, RansacOptions* ransac) {
+  ransac->threshold = threshold;
+  ransac->confidence = options.confidence;
+  ransac->max_iterations = options.max_iterations;
+  ransac->seed = Random(options.seed + num_fits++).Next();
 }
 
 void FitRun::Report(const std::string& what, const std::string& problem) const {

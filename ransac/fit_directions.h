@@ -40,8 +40,8 @@ struct FitRun {
   // Rounds of fits and measurements of the noise, at the most.
   static constexpr int kMaxRounds = 8;
 
-  // Each fit gets a seed of its own.
-  RansacOptions NextRansac(double threshold);
+  // What the options say, with a seed of its own for each fit.
+  void SetNext(double threshold, RansacOptions* ransac);
   void Report(const std::string& what, const std::string& problem) const;
   void Report(const PencilObservation& pencil, std::size_t line, const std::string& problem) const;
 };

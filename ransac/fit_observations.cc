@@ -88,7 +88,7 @@ class PointFitter {
 
   RobustFitOptions NextOptions(const FittedFeature& f) {
     RobustFitOptions result;
-    result.ransac = run_.NextRansac(Gate(f));
+    run_.SetNext(Gate(f), &result.ransac);
     return result;
   }
 

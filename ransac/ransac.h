@@ -61,7 +61,7 @@ struct RansacOptions {
   int max_iterations = 200000;  // Draws; 1 or more.
   std::uint64_t seed = 1;       // Same seed, same bits.
   int local_start = 30;   // Draws before the first local optimisation (Lebeda 2012); 0 or more.
-  int local_samples = 3;  // Inner samples of each local optimisation; 0 = refine the best only.
+  int local_samples = 1;  // Inner samples of each local optimisation; 0 = refine the best only.
   int local_steps = 3;    // Reweighted steps from each inner sample; 0 = no local optimisation.
 
   // Ok, or a sentence that names the field which is wrong.

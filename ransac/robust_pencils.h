@@ -30,7 +30,10 @@ struct PencilOptions {
   // unrelated lines (number of false alarms; Desolneux, Moisan, Morel, IJCV 2000); > 0.
   double max_false_alarms = 0.01;
 
-  PencilOptions() { ransac.threshold = kInlierSigmas; }
+  PencilOptions() {
+    ransac.threshold = kInlierSigmas;
+    ransac.local_samples = 3;  // Of a photo's lines those along other directions are many.
+  }
   // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };

@@ -18,7 +18,7 @@ namespace circline::apps {
 namespace {
 
 constexpr int kFramesOfMotion = 30;  // Before the best hypothesis is held to account.
-constexpr double kSure = 0.95;
+constexpr double kSureOfTrack = 0.95;
 
 struct Setting {
   std::string name;
@@ -154,7 +154,7 @@ void RunSequence(const Setting& setting, LossType loss, std::uint64_t seed, Scor
     score->restarts += is_restart ? 1 : 0;
     score->predicted += tracked.predicted_only && !frame.is_occluded ? 1 : 0;
     score->expected_wrong += 1.0 - first.probability;
-    score->sure_wrong += !is_right && first.probability >= kSure ? 1 : 0;
+    score->sure_wrong += !is_right && first.probability >= kSureOfTrack ? 1 : 0;
     ++score->frames;
     score->right += is_right ? 1 : 0;
     if (k < kFramesOfMotion) continue;
