@@ -77,7 +77,7 @@ struct AdjustOptions {
 };
 
 // A camera of which nothing is known but the size of its photos: standard deviations 0.7 of log f,
-// 3 % of the diagonal for the principal point, 0.3 for k1; pixels are square to 0.1 %.
+// 3 % of the diagonal for the principal point, 0.3 for k1 (a fisheye: 0.1); pixels square to 0.1 %.
 CameraSigma UnknownCamera(const Camera& camera);
 
 // What a shift of camera_shifts.h changes: "focal length", "aspect", "cx", "cy", then the model's
