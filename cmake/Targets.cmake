@@ -78,7 +78,7 @@ function(circline_module folder)
   add_library(${target} ${sources})
   circline_own_target(${target})
   # What GCC takes to choose among Eigen's operators grows with the square of the expressions that
-  # a unit has seen: 32 files of estimators as one take it five times as long as eight times four.
+  # a unit has seen: 32 files of estimators as one take it more than twice as long as eight times four.
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 4)
   endif()

@@ -48,7 +48,7 @@ Status AdjustOptions::Validate() const {
 CameraSigma UnknownCamera(const Camera& camera) {
   constexpr double kOfDiagonal = 0.03;  // Of 5 calibrated cameras: 0.005 to 0.028.
   constexpr double kSquare = 0.001;
-  constexpr double kK1 = 0.3;  // Wide-angle lenses have -0.45 to 0.1.
+  constexpr double kK1 = 0.3;  // Of 5 calibrated cameras the widest has -0.45.
   // What the projections that lenses are built for have beside the equidistant one: from -1/6
   // (orthographic) to 1/12 (stereographic).
   constexpr double kFisheyeK1 = 0.1;

@@ -128,7 +128,8 @@ class AdjustProblem : private Graph {
   void AddKnownRadius(int world, const CircleObservation& circle, int radius);
   int OffsetOf(int photo, const CircleObservation& circle);
   void AddPencil(int photo, std::size_t pencil);
-  // Of a photo that has a grid, squares: this share of a line's deviation.
+  // Squares, of a photo that has a grid: this share of how far its lines are off their places, or,
+  // where they are exact, a tenth of what their pixels leave.
   double GridSigma(const AdjustInput& photo, double share) const;
   int AddGridPlace(int photo, std::size_t pencil, std::size_t line, const CurveCost& cost,
                    std::vector<int> blocks);
