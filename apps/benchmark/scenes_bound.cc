@@ -1,6 +1,7 @@
 #include "apps/benchmark/scenes_bound.h"
 
 #include <Eigen/Dense>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -75,6 +76,7 @@ class Information {
         if (layout_.radius[i] >= 0) g[layout_.radius[i]] += by_world.head<2>() * arm.normalized();
         matrix_ += g * g.transpose();
       }
+      if (circle.has_center) AddCenter(circle, layout_.center[i]);
     }
   }
 
@@ -107,6 +109,16 @@ class Information {
   const Eigen::Matrix3d& basis() const { return basis_; }
 
  private:
+  void AddCenter(const WorldCircle& circle, int center) {
+    std::array<Sample, 2> samples;
+    SampleCenter(world_, circle, &samples);
+    for (const Sample& sample : samples) {
+      Eigen::VectorXd g = PoseGradient(sample);
+      g.segment<2>(center) += (sample.by_point * world_.pose.rotation).head<2>().transpose();
+      matrix_ += g * g.transpose();
+    }
+  }
+
   // R = exp([delta]x) R turns the plane about its origin.
   Eigen::VectorXd PoseGradient(const Sample& sample) const {
     Eigen::VectorXd g = Eigen::VectorXd::Zero(layout_.size);

@@ -1,12 +1,13 @@
-// The scenes of each experiment.
+#include "apps/benchmark/scenes_kinds.h"
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
-#include "apps/benchmark/scenes_experiments.h"
-#include "apps/common/text.h"
 #include "circline/estimators/basics.h"
 
 namespace circline::apps {
@@ -17,7 +18,6 @@ constexpr double kMaxLogFocal = 0.1;
 constexpr double kMinSemiMinor = 20.0;  // In standard deviations of the noise.
 constexpr double kMinDeviation = 10.0;  // Of odd features from what they should be, likewise.
 constexpr double kRadiusError = 0.05;   // Of a stated radius that is wrong, relative.
-constexpr double kLogFocalSigma = 0.5;  // Of a focal length that is not known.
 
 // Draws until all is seen and the pose is determined. `change` adds to what is drawn, or refuses
 // it.
@@ -75,6 +75,61 @@ std::string KindOf(const Scene& scene) {
   return "regular";
 }
 
+// Twelve equal discs on a lattice in place of the one circle.
+void MakeLattice(World* world) {
+  WorldCircle disc = world->circles[0];
+  const double pitch = 1.4 * disc.radius;
+  disc.radius = 0.35 * pitch;
+  world->circles.clear();
+  for (int k = 0; k < 12; ++k) {
+    const int column = k % 4, row = k / 4;
+    disc.center = pitch * Eigen::Vector2d(column - 1.5, row - 1.0);
+    world->circles.push_back(disc);
+  }
+  world->equal_radii = true;
+}
+
+// By how many standard deviations the plane or the radius by one circle alone and by all others
+// differ.
+double Contradiction(const Scene& scene, const WorldCircle& odd, const Bound& others,
+                     const Bound& alone) {
+  if (odd.tilt.isZero()) return kRadiusError / std::hypot(others.log_distance, alone.log_distance);
+  const Eigen::Matrix<double, 3, 2> in_plane = scene.world.pose.rotation.leftCols<2>();
+  const Eigen::Matrix2d covariance =
+      in_plane.transpose() * (others.covariance + alone.covariance) * in_plane;
+  return std::sqrt(odd.tilt.dot(covariance.inverse() * odd.tilt));
+}
+
+Recipe RecipeOf(FocalEvidence evidence) {
+  Recipe recipe;
+  switch (evidence) {
+    case FocalEvidence::kRings:
+      recipe = WholeCircles(2, 3);
+      recipe.ring_share = 1.0;
+      break;
+    case FocalEvidence::kCircles:
+    case FocalEvidence::kEqualCircles:
+      recipe = WholeCircles(2, 5);
+      break;
+    case FocalEvidence::kLattice:
+    case FocalEvidence::kCircleAndCenter:
+      recipe = WholeCircles(1, 1);
+      break;
+    case FocalEvidence::kCircleAndPencils:
+      recipe = CircleAndPencils(1, 2, 3, Recipe().max_lines);
+      break;
+    case FocalEvidence::kPencils:
+      recipe = CircleAndPencils(2, 2, 3, Recipe().max_lines);
+      recipe.min_circles = recipe.max_circles = 0;
+      break;
+  }
+  recipe.num_lenses = 2;
+  recipe.max_points = Recipe().max_points;
+  return recipe;
+}
+
+}  // namespace
+
 Scene DrawAnything(double noise_px, Random* random) {
   Scene scene;
   scene.request.noise_px = noise_px;
@@ -93,7 +148,6 @@ Scene DrawShortArc(double noise_px, Random* random) {
   });
 }
 
-// Arcs and a pencil of four lines; the bound says how well the plane is known.
 Scene DrawLoneArcs(int num_arcs, double arc_deg, double noise_px, Random* random) {
   constexpr double kHardlyDetermined = 20.0 * kDegree;
   Recipe recipe = CircleAndPencils(1, 1, 4, 4);
@@ -110,37 +164,14 @@ Scene DrawLoneArcs(int num_arcs, double arc_deg, double noise_px, Random* random
   return scene;
 }
 
-// Twelve equal discs on a lattice, whose print bleeds.
 Scene DrawDiscs(double bleed_px, double noise_px, Random* random) {
   return DrawScene(WholeCircles(1, 1), noise_px, random, [&](Scene* scene) {
     scene->disturbance.bleed_px = bleed_px;
-    std::vector<WorldCircle>& circles = scene->world.circles;
-    WorldCircle disc = circles[0];
-    const double pitch = 1.4 * disc.radius;
-    disc.radius = 0.35 * pitch;
-    circles.clear();
-    for (int k = 0; k < 12; ++k) {
-      const int column = k % 4, row = k / 4;
-      disc.center = pitch * Eigen::Vector2d(column - 1.5, row - 1.0);
-      circles.push_back(disc);
-    }
-    scene->world.equal_radii = true;
+    MakeLattice(&scene->world);
     return SmallestSemiMinorPx(scene->world) > 10.0;
   });
 }
 
-// By how many standard deviations the plane or the radius by one circle alone and by all others
-// differ.
-double Contradiction(const Scene& scene, const WorldCircle& odd, const Bound& others,
-                     const Bound& alone) {
-  if (odd.tilt.isZero()) return kRadiusError / std::hypot(others.log_distance, alone.log_distance);
-  const Eigen::Matrix<double, 3, 2> in_plane = scene.world.pose.rotation.leftCols<2>();
-  const Eigen::Matrix2d covariance =
-      in_plane.transpose() * (others.covariance + alone.covariance) * in_plane;
-  return std::sqrt(odd.tilt.dot(covariance.inverse() * odd.tilt));
-}
-
-// One circle has a plane of its own or, where `tilt_deg` is 0, a radius that is stated wrongly.
 Scene DrawOddCircle(int num_circles, double tilt_deg, double noise_px, Random* random) {
   return DrawScene(WholeCircles(num_circles, num_circles), noise_px, random, [&](Scene* scene) {
     std::vector<WorldCircle>& circles = scene->world.circles;
@@ -164,7 +195,6 @@ Scene DrawOddCircle(int num_circles, double tilt_deg, double noise_px, Random* r
   });
 }
 
-// A circle, and pencils of segments of which the first `num_odd` have another direction.
 Scene DrawOddLines(int num_pencils, int num_lines, int num_odd, double noise_px, Random* random) {
   Recipe recipe = CircleAndPencils(num_pencils, num_pencils, num_lines, num_lines);
   recipe.max_line_points = 2;
@@ -185,17 +215,22 @@ Scene DrawOddLines(int num_pencils, int num_lines, int num_odd, double noise_px,
   });
 }
 
-Scene DrawUnknownFocal(Recipe recipe, double factor, double noise_px, Random* random) {
-  recipe.num_lenses = 2;
-  recipe.max_points = Recipe().max_points;
-  return DrawScene(recipe, noise_px, random, [&](Scene* scene) {
-    scene->request.log_focal_sigma = kLogFocalSigma;
+Scene DrawUnknownFocal(FocalEvidence evidence, double factor, double log_focal_sigma,
+                       double noise_px, Random* random) {
+  return DrawScene(RecipeOf(evidence), noise_px, random, [&](Scene* scene) {
+    scene->request.log_focal_sigma = log_focal_sigma;
     scene->focal_factor = factor;
+    World& world = scene->world;
+    if (evidence == FocalEvidence::kLattice) MakeLattice(&world);
+    if (evidence == FocalEvidence::kEqualCircles) {
+      world.equal_radii = true;
+      for (WorldCircle& circle : world.circles) circle.radius = world.circles[0].radius;
+    }
+    if (evidence == FocalEvidence::kCircleAndCenter) world.circles[0].has_center = true;
     return true;
   });
 }
 
-// Of its points 40 % lie anywhere within 40 px.
 Scene DrawOutliers(double noise_px, Random* random) {
   constexpr double kRatio = 0.4;
   Recipe recipe = WholeCircles(2, 2);
@@ -209,140 +244,12 @@ Scene DrawOutliers(double noise_px, Random* random) {
   });
 }
 
-// Half of the circle, or more, and two lines or more along x.
 Scene DrawCircleAndPencil(double noise_px, Random* random) {
   Recipe recipe;
   recipe.min_circles = recipe.max_circles = recipe.min_pencils = recipe.max_pencils = 1;
   recipe.free_pencils = false;
   recipe.min_arc_deg = 180.0;
   return DrawScene(recipe, noise_px, random, [](Scene*) { return true; });
-}
-
-std::vector<SceneRow> LoneArcRows() {
-  std::vector<SceneRow> rows;
-  for (const int arcs : {1, 2}) {
-    for (const double deg : {60.0, 90.0, 120.0}) {
-      rows.push_back({std::to_string(arcs) + " of " + FormatPlain(deg) + " deg",
-                      [=](double noise, Random* r) { return DrawLoneArcs(arcs, deg, noise, r); }});
-    }
-  }
-  return rows;
-}
-
-std::vector<SceneRow> OddCircleRows() {
-  std::vector<SceneRow> rows;
-  for (const int n : {3, 2}) {
-    for (const double tilt : {5.0, 10.0, 15.0, 0.0}) {
-      const std::string what = tilt > 0.0 ? FormatPlain(tilt) + " deg" : "radius 5 % off";
-      rows.push_back({"one of " + std::to_string(n) + ", " + what,
-                      [=](double noise, Random* r) { return DrawOddCircle(n, tilt, noise, r); }});
-    }
-  }
-  return rows;
-}
-
-std::vector<SceneRow> UnknownFocalRows() {
-  const std::vector<std::pair<std::string, Recipe>> contents = {
-      {"rings", WholeCircles(2, 3)},
-      {"circles", WholeCircles(2, 5)},
-      {"circle, pencils", CircleAndPencils(1, 2, 3, Recipe().max_lines)}};
-  std::vector<SceneRow> rows;
-  for (auto [name, recipe] : contents) {
-    if (name == "rings") recipe.ring_share = 1.0;
-    for (const double factor : {0.63, 0.77, 0.9, 1.1, 1.3, 1.6}) {
-      rows.push_back({name + ", " + FormatPlain(factor) + " f",
-                      [recipe = recipe, factor](double noise, Random* r) {
-                        return DrawUnknownFocal(recipe, factor, noise, r);
-                      }});
-    }
-  }
-  return rows;
-}
-
-SceneRow BleedRow(const std::string& name, double bleed_px) {
-  return {name, [=](double noise, Random* r) { return DrawDiscs(bleed_px, noise, r); }};
-}
-
-SceneRow OddLinesRow(const std::string& name, int pencils, int lines, int odd) {
-  return {name,
-          [=](double noise, Random* r) { return DrawOddLines(pencils, lines, odd, noise, r); }};
-}
-
-}  // namespace
-
-std::vector<SceneExperiment> SceneExperiments() {
-  const std::vector<LossType> cauchy = {LossType::kCauchy};
-  return {
-      {"random",
-       "scenes of every kind",
-       1,
-       150,
-       {0.1, 0.5, 1.0, 2.0},
-       cauchy,
-       {{"", DrawAnything}}},
-      {"short_arcs",
-       "three whole circles and an arc of 45 to 60 deg",
-       2,
-       200,
-       {0.5, 1.0},
-       cauchy,
-       {{"", DrawShortArc}}},
-      {"lone_arcs",
-       "one or two circles, an arc of each, and a pencil of four lines; the bound 20 deg or less",
-       9,
-       100,
-       {0.5},
-       cauchy,
-       LoneArcRows()},
-      {"odd_circles",
-       "one circle has a plane of its own, or a wrong radius, by 10 sigma or more; errors are of "
-       "the pose by the others",
-       3,
-       100,
-       {0.5},
-       cauchy,
-       OddCircleRows()},
-      {"bleed",
-       "twelve equal discs, all too large, noise model of photographs",
-       4,
-       100,
-       {0.2},
-       cauchy,
-       {BleedRow("as drawn", 0.0), BleedRow("by 0.2 px", 0.2), BleedRow("by 0.3 px", 0.3)},
-       true},
-      {"focal_length",
-       "the focal length given is so many times the true one, its prior 0.5 of log f, the bound on "
-       "it 0.1 or less",
-       5,
-       15,
-       {0.5},
-       cauchy,
-       UnknownFocalRows()},
-      {"outliers",
-       "two coplanar circles, 40 % outliers within 40 px",
-       6,
-       200,
-       {0.5, 1.0},
-       {LossType::kCauchy, LossType::kTukey},
-       {{"", DrawOutliers}}},
-      {"circle_and_pencil",
-       "a circle and a pencil, no outliers",
-       7,
-       300,
-       {0.5, 2.0},
-       {LossType::kTrivial, LossType::kCauchy},
-       {{"", DrawCircleAndPencil}}},
-      {"odd_lines",
-       "a circle and segments, of which some have another direction, by 10 sigma or more",
-       8,
-       80,
-       {0.5},
-       {LossType::kTrivial, LossType::kHuber, LossType::kCauchy, LossType::kTukey,
-        LossType::kGemanMcClure},
-       {OddLinesRow("rim, 5 kerbs, none odd", 1, 5, 0), OddLinesRow("rim, 5 kerbs, 1 odd", 1, 5, 1),
-        OddLinesRow("rim, 5 kerbs, 2 odd", 1, 5, 2),
-        OddLinesRow("circle, 2 x 10 lines, 1 odd", 2, 10, 1),
-        OddLinesRow("circle, 2 x 10 lines, 3 odd", 2, 10, 3)}}};
 }
 
 }  // namespace circline::apps

@@ -16,11 +16,12 @@ namespace {
 constexpr double kSure = 0.99;
 
 struct PoseError {
-  Eigen::VectorXd error;  // Radians: 3 components of the rotation, 2 of the normal.
-  Eigen::VectorXd sigma;  // Their standard deviations, as stated.
-  double nees = 0.0;      // A component; not finite where the covariance is singular.
-
-  double Angle() const { return error.norm(); }
+  // Radians: 3 components of the rotation, 2 of the normal; then that of log f, if not known.
+  Eigen::VectorXd error;
+  Eigen::VectorXd sigma;   // Their standard deviations, as stated.
+  double nees = 0.0;       // A component; not finite where the covariance is singular.
+  double angle = 0.0;      // Radians.
+  double log_focal = 0.0;  // 0 where it is known.
 };
 
 // Directions have no sense: up to half turns about the axes of the world.
@@ -44,8 +45,23 @@ PoseError ErrorOf(const Scene& scene, const PoseHypothesis& hypothesis) {
   }
   PoseError result;
   result.error = components * delta;
-  const Eigen::MatrixXd covariance =
+  result.angle = result.error.norm();
+  Eigen::MatrixXd covariance =
       components * hypothesis.Covariance().topLeftCorner<3, 3>() * components.transpose();
+  if (scene.request.log_focal_sigma > 0.0) {
+    const double scale = hypothesis.focal_scale;
+    // As delta: truth less estimate.
+    result.log_focal = std::log(scene.world.camera.fx / hypothesis.camera.value_or(Camera()).fx);
+    const auto n = result.error.size();
+    const Eigen::VectorXd shared =
+        components * Eigen::Map<const Eigen::Vector3d>(hypothesis.focal_covariance.data()) / scale;
+    covariance.conservativeResize(n + 1, n + 1);
+    covariance.col(n).head(n) = shared;
+    covariance.row(n).head(n) = shared.transpose();
+    covariance(n, n) = std::pow(hypothesis.focal_sigma / scale, 2);
+    result.error.conservativeResize(n + 1);
+    result.error[n] = result.log_focal;
+  }
   result.sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   result.nees = result.error.dot(covariance.inverse() * result.error) /
                 static_cast<double>(result.error.size());
@@ -53,8 +69,9 @@ PoseError ErrorOf(const Scene& scene, const PoseHypothesis& hypothesis) {
 }
 
 bool IsWrong(const PoseError& error, const Bound& bound) {
-  constexpr double kSigmas = 5.0, kLeast = 2.0 * kDegree;
-  return error.Angle() > std::max(kLeast, kSigmas * bound.rotation_rad);
+  constexpr double kSigmas = 5.0, kLeast = 2.0 * kDegree, kLeastLogFocal = 0.1;
+  return error.angle > std::max(kLeast, kSigmas * bound.rotation_rad) ||
+         std::abs(error.log_focal) > std::max(kLeastLogFocal, kSigmas * bound.log_focal);
 }
 
 std::string Percent(int part, int whole) {
@@ -71,14 +88,17 @@ void Tally::Add(const Scene& scene, const PoseEstimate& estimate) {
   }
   std::vector<PoseError> errors;
   for (const PoseHypothesis& h : estimate.hypotheses) errors.push_back(ErrorOf(scene, h));
-  const PoseError& nearest = *std::min_element(
-      errors.begin(), errors.end(),
-      [](const PoseError& a, const PoseError& b) { return a.Angle() < b.Angle(); });
+  const PoseError& nearest =
+      *std::min_element(errors.begin(), errors.end(),
+                        [](const PoseError& a, const PoseError& b) { return a.angle < b.angle; });
   if (IsWrong(nearest, scene.bound)) {
     ++missing_;
   } else {
     ++right_;
-    squared_error_ += std::pow(nearest.Angle() / scene.bound.rotation_rad, 2);
+    squared_error_ += std::pow(nearest.angle / scene.bound.rotation_rad, 2);
+    if (scene.bound.log_focal > 0.0) {
+      squared_focal_error_ += std::pow(nearest.log_focal / scene.bound.log_focal, 2);
+    }
     if (std::isfinite(nearest.nees)) nees_ += nearest.nees;
     components_ += static_cast<int>(nearest.error.size());
     covered_ +=
@@ -99,21 +119,24 @@ void Tally::Add(const Scene& scene, const PoseEstimate& estimate) {
 }
 
 std::string Tally::Header() {
-  return "    n refused%  missing% rms/bound NEES/dim  cover%   wrong% expected%  sure wrong  "
+  return "    n refused%  missing% rms/bound  of f NEES/dim  cover%   wrong% expected%  sure wrong "
+         " "
          "left out: odd% others%";
 }
 
 std::string Tally::Row() const {
   const int answered = trials_ - refused_;
   char line[160];
-  std::snprintf(line, sizeof(line), "%5d %8s  %8s %9s %8s  %6s   %6s %9s %5d %5d  %14s %7s",
-                trials_, Percent(refused_, trials_).c_str(), Percent(missing_, answered).c_str(),
-                FormatFixed(std::sqrt(squared_error_ / right_), 2).c_str(),
-                FormatFixed(nees_ / right_, 2).c_str(), Percent(covered_, components_).c_str(),
-                Percent(wrong_, answered).c_str(),
-                FormatFixed(100.0 * expected_wrong_ / answered, 1).c_str(), sure_, sure_wrong_,
-                Percent(odd_left_out_, answered).c_str(),
-                Percent(others_left_out_, answered).c_str());
+  std::snprintf(
+      line, sizeof(line), "%5d %8s  %8s %9s %5s %8s  %6s   %6s %9s %5d %5d  %14s %7s", trials_,
+      Percent(refused_, trials_).c_str(), Percent(missing_, answered).c_str(),
+      FormatFixed(std::sqrt(squared_error_ / right_), 2).c_str(),
+      squared_focal_error_ > 0.0 ? FormatFixed(std::sqrt(squared_focal_error_ / right_), 2).c_str()
+                                 : "-",
+      FormatFixed(nees_ / right_, 2).c_str(), Percent(covered_, components_).c_str(),
+      Percent(wrong_, answered).c_str(), FormatFixed(100.0 * expected_wrong_ / answered, 1).c_str(),
+      sure_, sure_wrong_, Percent(odd_left_out_, answered).c_str(),
+      Percent(others_left_out_, answered).c_str());
   return line;
 }
 

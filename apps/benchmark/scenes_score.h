@@ -11,7 +11,8 @@ namespace circline::apps {
 
 // Sums over the trials of a row. The error is that of the rotation or, where nothing fixes the
 // rotation about the plane's normal, of the normal; it is wrong where it is more than 5 sigma of
-// the bound and more than 2 degrees.
+// the bound and more than 2 degrees. Where the focal length is not known its logarithm counts
+// among the components, and more than 5 sigma and 0.1 is wrong.
 class Tally {
  public:
   void Add(const Scene& scene, const PoseEstimate& estimate);
@@ -23,7 +24,7 @@ class Tally {
   int trials_ = 0, refused_ = 0;
   // Of the hypothesis nearest the truth; sums where it is not wrong.
   int missing_ = 0, right_ = 0, components_ = 0, covered_ = 0;
-  double squared_error_ = 0.0, nees_ = 0.0;
+  double squared_error_ = 0.0, squared_focal_error_ = 0.0, nees_ = 0.0;
   // Of the first hypothesis; how many wrong ones the probabilities expect.
   int wrong_ = 0, sure_ = 0, sure_wrong_ = 0;
   double expected_wrong_ = 0.0;

@@ -13,12 +13,12 @@ namespace {
 
 constexpr double kBandPx = 40.0;  // An outlier's largest distance from its curve.
 
-// Fills all of a sample but `on_plane`; `tangent` is in the world frame.
-bool SamplePoint(const World& world, const Eigen::Vector3d& X, const Eigen::Vector3d& tangent,
-                 Sample* sample) {
-  const Eigen::Matrix3d& R = world.pose.rotation;
+using Matrix23 = Eigen::Matrix<double, 2, 3>;
+
+// Fills point and pixel of a sample, and how the pixel moves with the point in the camera frame.
+bool Project(const World& world, const Eigen::Vector3d& X, Sample* sample, Matrix23* by_point) {
   const Camera& camera = world.camera;
-  const Eigen::Vector3d p = R * X + world.pose.translation;
+  const Eigen::Vector3d p = world.pose.rotation * X + world.pose.translation;
   sample->point = p;
   if (!CameraToPixel(camera, p, &sample->pixel)) return false;
   const Eigen::Vector2d& u = sample->pixel;
@@ -30,10 +30,18 @@ bool SamplePoint(const World& world, const Eigen::Vector3d& X, const Eigen::Vect
   DistortWithJacobian(camera, p.head<2>() / p.z(), &pixel, &j);
   Eigen::Matrix2d distort;
   distort << j[0], j[1], j[2], j[3];
-  Eigen::Matrix<double, 2, 3> project;
+  Matrix23 project;
   project << 1.0, 0.0, -p.x() / p.z(), 0.0, 1.0, -p.y() / p.z();
-  const Eigen::Matrix<double, 2, 3> by_point = distort * project / p.z();
-  const Eigen::Vector2d along = (by_point * (R * tangent)).normalized();
+  *by_point = distort * project / p.z();
+  return true;
+}
+
+// Fills all of a sample but `on_plane`; `tangent` is in the world frame.
+bool SamplePoint(const World& world, const Eigen::Vector3d& X, const Eigen::Vector3d& tangent,
+                 Sample* sample) {
+  Matrix23 by_point;
+  if (!Project(world, X, sample, &by_point)) return false;
+  const Eigen::Vector2d along = (by_point * (world.pose.rotation * tangent)).normalized();
   sample->normal = Eigen::Vector2d(along.y(), -along.x());
   sample->by_point = sample->normal.transpose() * by_point;
   return true;
@@ -104,6 +112,19 @@ bool SampleLine(const World& world, const WorldPencil& pencil, const WorldLine& 
   return true;
 }
 
+bool SampleCenter(const World& world, const WorldCircle& circle, std::array<Sample, 2>* samples) {
+  Sample sample;
+  Matrix23 by_point;
+  if (!Project(world, OnPlane(circle.center), &sample, &by_point)) return false;
+  sample.on_plane = circle.center;
+  for (const int axis : {0, 1}) {
+    sample.normal = Eigen::Vector2d::Unit(axis);
+    sample.by_point = by_point.row(axis);
+    (*samples)[static_cast<std::size_t>(axis)] = sample;
+  }
+  return true;
+}
+
 bool HasRole(const std::vector<WorldPencil>& pencils) {
   return std::any_of(pencils.begin(), pencils.end(), [](const WorldPencil& pencil) {
     return pencil.direction != PencilDirection::kFree;
@@ -112,8 +133,10 @@ bool HasRole(const std::vector<WorldPencil>& pencils) {
 
 bool IsVisible(const World& world) {
   std::vector<Sample> samples;
+  std::array<Sample, 2> center;
   for (const WorldCircle& circle : world.circles) {
     if (!SampleCircle(world, circle, &samples)) return false;
+    if (circle.has_center && !SampleCenter(world, circle, &center)) return false;
   }
   for (const WorldPencil& pencil : world.pencils) {
     for (const WorldLine& line : pencil.lines) {
@@ -193,6 +216,11 @@ Observations Observe(const World& world, const Disturbance& disturbance, Random*
     if (disturbance.bleed_px != 0.0) c.contrast = -1;  // Dark print that bleeds.
     SampleCircle(world, circle, &samples);
     c.points = Disturb(samples, disturbance, disturbance.bleed_px, random);
+    std::array<Sample, 2> center;
+    if (circle.has_center && SampleCenter(world, circle, &center)) {
+      const double dx = random->Normal(), dy = random->Normal();
+      c.center = center[0].pixel + disturbance.noise_px * Eigen::Vector2d(dx, dy);
+    }
   }
   for (const WorldPencil& pencil : world.pencils) {
     PencilObservation& p = observations.pencils.emplace_back();

@@ -4,6 +4,7 @@
 #define CIRCLINE_APPS_BENCHMARK_SCENES_WORLD_H_
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -28,6 +29,7 @@ struct WorldCircle {
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();
   // What is stated of the radius: nothing if 0, else the truth times this.
   double stated_radius = 0.0;
+  bool has_center = false;  // Whether the image of its centre is seen, with the noise of a point.
 };
 
 struct WorldLine {
@@ -89,6 +91,8 @@ struct Sample {
 bool SampleCircle(const World& world, const WorldCircle& circle, std::vector<Sample>* samples);
 bool SampleLine(const World& world, const WorldPencil& pencil, const WorldLine& line,
                 std::vector<Sample>* samples);
+// The centre's image, by each coordinate of it: `normal` is an axis of the photo.
+bool SampleCenter(const World& world, const WorldCircle& circle, std::array<Sample, 2>* samples);
 bool IsVisible(const World& world);
 
 // Directions of a line and across it, on the plane.
