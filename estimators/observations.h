@@ -129,7 +129,8 @@ struct KnownLength {
 struct Observations {
   Camera camera;  // The one that took the photo.
   // The focal length that is known beforehand, of fx, pixels, where `camera` has another, at which
-  // the photo's structure is likelier (DetectObservations); 0 = that of `camera`.
+  // the photo's structure is likelier (DetectObservations), or its curves (FitObservations); 0 =
+  // that of `camera`.
   double stated_focal_px = 0.0;
   // What the k1 of `camera` has beyond the one known beforehand, where the photo's lines are
   // straighter with it (DetectObservations); 0 = that is the one of `camera`.

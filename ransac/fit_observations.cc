@@ -14,6 +14,7 @@
 #include "circline/ransac/conic_search.h"
 #include "circline/ransac/dense_clusters.h"
 #include "circline/ransac/fit_directions.h"
+#include "circline/ransac/focal_of_fits.h"
 #include "circline/ransac/line_model.h"
 #include "circline/ransac/robust_conic.h"
 #include "circline/ransac/stated_noise.h"
@@ -290,8 +291,14 @@ Status FitObservations(const FitOptions& options, Observations* observations,
   Status status = options.Validate();
   if (status.ok()) status = observations->Validate();
   if (!status.ok()) return status;
-  FitRun run{options, *observations, problems};
-  PointFitter(&run).FitAll();
+  const CameraSigma& sigma = options.noise_model.camera;
+  const auto fit = [&](Observations* fitted) {
+    FitRun run{options, *fitted, fitted == observations ? problems : nullptr};
+    PointFitter(&run).FitAll();
+  };
+  if (observations->stated_focal_px == 0.0 && FocalBendsCurves(observations->camera, sigma))
+    TakeFocalOfFits(sigma, fit, observations);
+  fit(observations);
   return Status::Ok();
 }
 

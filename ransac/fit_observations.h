@@ -42,7 +42,13 @@ struct FitOptions {
 // where it has them all, because they are few or their noise is as large as it, it is named. So is
 // a stated noise that is a third of the true one or less and makes outliers of most points. A
 // contour whose outliers hold an ellipse of their own has that as its second reading, and is named
-// too: the first is the likelier one. The returned status is not ok only for invalid options or
+// too: the first is the likelier one.
+//
+// Where the focal length is a guess (NoiseModel::camera, IsWide) and the lens bends, fits are made
+// at the focal length at which they explain most: Observations::camera has that one then, and
+// stated_focal_px the one given. A fisheye takes some ten times as long for it.
+//
+// The returned status is not ok only for invalid options or
 // observations.
 Status FitObservations(const FitOptions& options, Observations* observations,
                        std::vector<std::string>* problems = nullptr);

@@ -54,6 +54,7 @@ std::string StatedNoiseProblem(const FitOptions& options, const Camera& camera,
   if (!(circle.sigma_px > 0.0) || !before.AreManyOutliers()) return "";
   Observations unstated;
   unstated.camera = camera;
+  unstated.stated_focal_px = camera.fx;  // No other is looked for.
   unstated.circles = {circle};
   unstated.circles[0].sigma_px = 0.0;
   if (!FitObservations(options, &unstated).ok() || !unstated.circles[0].fit) return "";
@@ -68,6 +69,7 @@ std::string StatedNoiseProblem(const FitOptions& options, const Camera& camera,
   std::vector<double> stated;
   Observations unstated;
   unstated.camera = camera;
+  unstated.stated_focal_px = camera.fx;  // No other is looked for.
   unstated.pencils = {pencil};
   unstated.pencils[0].sigma_px = 0.0;
   for (LineObservation& line : unstated.pencils[0].lines) {

@@ -21,6 +21,7 @@ PoseEstimate Estimate(const Scene& scene, LossType loss, bool as_photographed,
   if (scene.request.log_focal_sigma > 0.0) {
     options.camera_sigma = options.noise_model.camera;
     options.camera_sigma->log_focal = scene.request.log_focal_sigma;
+    fit.noise_model.camera = *options.camera_sigma;
   }
   observations.camera.fx *= scene.focal_factor;
   observations.camera.fy *= scene.focal_factor;

@@ -83,7 +83,9 @@ void Observe(const CompareOptions& options, ImageRun* run) {
   run->observations = run->image->observations;
   DetectInRois(options, run);
   const Stopwatch watch;
-  const Status status = FitObservations(options.fit, &run->observations, &run->problems);
+  FitOptions fit = options.fit;
+  fit.noise_model.camera = CameraSigmaOf(options.losses.front().estimation, *run->image);
+  const Status status = FitObservations(fit, &run->observations, &run->problems);
   run->stages.emplace_back("fit", watch.Microseconds());
   if (!status.ok()) run->problems.push_back(status.message);
 }
