@@ -13,10 +13,12 @@ namespace {
 // explains them.
 class Likelihood {
  public:
+  // Points that the camera cannot see, but has seen.
+  void AddUnseen(int num_points) { sum_ -= num_points * std::log(kNearPx); }
+
   template <typename Fit>
   void Add(const Fit& fit, std::size_t num_points, int num_inliers, int num_parameters) {
     constexpr int kTellingPoints = 3;  // Beyond the curve's parameters.
-    constexpr double kNearPx = 40.0;   // Where an outlier may lie.
     constexpr double kLeastPx = 0.05;  // No photo's points are better.
     const int n = static_cast<int>(num_points), free = num_inliers - num_parameters;
     if (n < num_parameters + kTellingPoints) return;
@@ -32,6 +34,7 @@ class Likelihood {
   double sum() const { return sum_; }
 
  private:
+  static constexpr double kNearPx = 40.0;  // Where an outlier may lie.
   double sum_ = 0.0;
 };
 
@@ -42,6 +45,7 @@ int NumInliers(const Feature& feature) {
 
 double LogLikelihood(const Observations& fitted) {
   Likelihood likelihood;
+  likelihood.AddUnseen(fitted.num_dropped_points);
   for (const CircleObservation& circle : fitted.circles)
     likelihood.Add(circle.fit, circle.points.size(), NumInliers(circle), 5);
   for (const PencilObservation& pencil : fitted.pencils) {
