@@ -48,8 +48,7 @@ struct FitOptions {
 // at the focal length at which they explain most: Observations::camera has that one then, and
 // stated_focal_px the one given. A fisheye takes some ten times as long for it.
 //
-// The returned status is not ok only for invalid options or
-// observations.
+// The returned status is not ok only for invalid options or observations.
 Status FitObservations(const FitOptions& options, Observations* observations,
                        std::vector<std::string>* problems = nullptr);
 

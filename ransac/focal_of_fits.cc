@@ -1,7 +1,6 @@
 #include "circline/ransac/focal_of_fits.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 

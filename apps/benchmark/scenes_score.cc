@@ -119,9 +119,8 @@ void Tally::Add(const Scene& scene, const PoseEstimate& estimate) {
 }
 
 std::string Tally::Header() {
-  return "    n refused%  missing% rms/bound  of f NEES/dim  cover%   wrong% expected%  sure wrong "
-         " "
-         "left out: odd% others%";
+  return "    n refused%  missing% rms/bound  of f NEES/dim  cover%   wrong% expected%  "
+         "sure wrong  left out: odd% others%";
 }
 
 std::string Tally::Row() const {

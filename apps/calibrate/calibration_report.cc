@@ -245,8 +245,9 @@ std::string CalibrationReport(const AdjustedPhotos& adjusted, const std::vector<
        << (adjusted.metric ? ", metric" : "") << "</p>" << Sentences("say", adjusted.notes);
   for (std::size_t c = 0; c < adjusted.cameras.size(); ++c) {
     const AdjustedCamera& made = adjusted.cameras[c];
-    html << "<h2>Camera " << EscapeHtml(made.camera.id) << "</h2><p class=\"lead\">"
-         << made.num_photos << " photos, rms " << FormatShort(made.rms_px) << " px</p>";
+    const std::string which = adjusted.cameras.size() > 1 ? " " + made.camera.id : "";
+    html << "<h2>Camera" << EscapeHtml(which) << "</h2><p class=\"lead\">" << made.num_photos
+         << " photos, rms " << FormatShort(made.rms_px) << " px</p>";
     if (!made.at_prior.empty()) {
       html << "<p class=\"failed\">The photos say next to nothing of: "
            << EscapeHtml(JoinList(made.at_prior, ", ")) << ".</p>";

@@ -12,7 +12,7 @@ constexpr char kStyle[] = R"css(
 body{margin:0 auto;max-width:1400px;padding:0 24px 80px;background:var(--bg);color:var(--fg);font:15px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif}
 nav{position:sticky;top:0;z-index:2;display:flex;flex-wrap:wrap;gap:4px 18px;padding:10px 0;background:var(--bg);border-bottom:1px solid var(--line);font-size:14px}
 a{color:var(--accent);text-decoration:none}a:hover{text-decoration:underline}
-h1{font-size:26px;margin:24px 0 4px}h2{font-size:19px;margin:40px 0 12px;scroll-margin-top:52px}h3{font-size:16px;margin:0 0 10px;overflow-wrap:anywhere}
+h1{font-size:26px;margin:24px 0 4px}h2{font-size:19px;margin:40px 0 12px;scroll-margin-top:52px}h3{font-size:16px;margin:0 0 10px;overflow-wrap:anywhere}div+h3{margin-top:28px}
 h3 small{font-weight:400;color:var(--soft);margin-left:8px}
 p.lead{margin:0 0 20px;color:var(--soft)}
 .scroll{overflow-x:auto;border:1px solid var(--line);border-radius:8px}
