@@ -123,7 +123,7 @@ Recipe RecipeOf(FocalEvidence evidence) {
       recipe.min_circles = recipe.max_circles = 0;
       break;
   }
-  recipe.num_lenses = 4;
+  recipe.num_lenses = kNumLenses;
   recipe.max_points = Recipe().max_points;
   return recipe;
 }
