@@ -26,7 +26,8 @@ class PointFitter {
  public:
   explicit PointFitter(FitRun* run) : run_(*run) {}
 
-  void FitAll() {
+  // Circles and lines, with the noise of their points; no more is needed to compare cameras.
+  void FitPoints() {
     run_.observations.num_dropped_points = 0;
     for (CircleObservation& circle : run_.observations.circles) {
       circles_.push_back(Prepare(circle.points, circle.sigma_px));
@@ -53,6 +54,10 @@ class PointFitter {
       }
     }
     for (int round = 0; round < FitRun::kMaxRounds && FollowNoise(); ++round) continue;
+  }
+
+  void FitAll() {
+    FitPoints();
     for (std::size_t i = 0; i < circles_.size(); ++i) {
       JudgeCircle(&circles_[i], &run_.observations.circles[i]);
       DoubtStatedNoise(run_.observations.circles[i], &circles_[i]);
@@ -292,13 +297,15 @@ Status FitObservations(const FitOptions& options, Observations* observations,
   if (status.ok()) status = observations->Validate();
   if (!status.ok()) return status;
   const CameraSigma& sigma = options.noise_model.camera;
-  const auto fit = [&](Observations* fitted) {
-    FitRun run{options, *fitted, fitted == observations ? problems : nullptr};
-    PointFitter(&run).FitAll();
-  };
-  if (observations->stated_focal_px == 0.0 && FocalBendsCurves(observations->camera, sigma))
-    TakeFocalOfFits(sigma, fit, observations);
-  fit(observations);
+  if (observations->stated_focal_px == 0.0 && FocalBendsCurves(observations->camera, sigma)) {
+    const auto fit_points = [&](Observations* fitted) {
+      FitRun run{options, *fitted, nullptr};
+      PointFitter(&run).FitPoints();
+    };
+    TakeFocalOfFits(sigma, fit_points, observations);
+  }
+  FitRun run{options, *observations, problems};
+  PointFitter(&run).FitAll();
   return Status::Ok();
 }
 

@@ -46,7 +46,8 @@ struct FitOptions {
 //
 // Where the focal length is a guess (NoiseModel::camera, IsWide) and the lens bends, fits are made
 // at the focal length at which they explain most: Observations::camera has that one then, and
-// stated_focal_px the one given. A fisheye takes some ten times as long for it.
+// stated_focal_px the one given (AdjustPhotos takes photos of one camera with the same: set it back
+// there). Points are fitted at up to 15 focal lengths for it.
 //
 // The returned status is not ok only for invalid options or observations.
 Status FitObservations(const FitOptions& options, Observations* observations,

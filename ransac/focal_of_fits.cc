@@ -71,7 +71,7 @@ bool FocalBendsCurves(const Camera& camera, const CameraSigma& sigma) {
                      [](double k) { return k != 0.0; });
 }
 
-void TakeFocalOfFits(const CameraSigma& sigma, const std::function<void(Observations*)>& fit,
+void TakeFocalOfFits(const CameraSigma& sigma, const std::function<void(Observations*)>& fit_points,
                      Observations* observations) {
   constexpr double kReach = 2.0;         // Standard deviations.
   constexpr double kMostLogFocal = 1.4;  // To a quarter and four times, at the most.
@@ -80,7 +80,7 @@ void TakeFocalOfFits(const CameraSigma& sigma, const std::function<void(Observat
   const double reach = std::min(kReach * prior, kMostLogFocal);
   const auto posterior = [&](double log_focal) {
     Observations fitted = At(log_focal, *observations);
-    fit(&fitted);
+    fit_points(&fitted);
     return LogLikelihood(fitted) - 0.5 * std::pow(log_focal / prior, 2);
   };
   const double given = posterior(0.0);

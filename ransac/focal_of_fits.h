@@ -15,10 +15,10 @@ namespace circline {
 // it is known, the lens is straight, or open (then it is what it bends that is known).
 bool FocalBendsCurves(const Camera& camera, const CameraSigma& sigma);
 
-// Sets the camera's focal length to the one at which `fit` fills the fits that explain most points
-// best, where that is clearly another, and `stated_focal_px` to the one given. The fits are to be
-// made again.
-void TakeFocalOfFits(const CameraSigma& sigma, const std::function<void(Observations*)>& fit,
+// Sets the camera's focal length, pixels, to the one at which the fits that `fit_points` fills, of
+// circles and lines, explain most points best, where that is clearly another, and `stated_focal_px`
+// to the one given. No fit of `observations` is touched.
+void TakeFocalOfFits(const CameraSigma& sigma, const std::function<void(Observations*)>& fit_points,
                      Observations* observations);
 
 }  // namespace circline

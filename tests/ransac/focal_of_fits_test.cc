@@ -63,8 +63,8 @@ TEST_P(GuessedFocalOfFits, LeavesNoPointsOut) {
       Guess(factor, &observations);
       const double given = observations.camera.fx;
       ASSERT_TRUE(FitObservations(FocalSigma(0.7), &observations).ok());
-      EXPECT_GE(ShareOfInliers(observations), 0.95) << factor << ", seed " << seed;
-      EXPECT_NEAR(std::log(observations.camera.fx / truth.camera.fx), 0.0, 0.15)
+      EXPECT_GE(ShareOfInliers(observations), 0.98) << factor << ", seed " << seed;
+      EXPECT_NEAR(std::log(observations.camera.fx / truth.camera.fx), 0.0, 0.06)
           << factor << ", seed " << seed;
       EXPECT_EQ(observations.stated_focal_px, given);
     }
@@ -94,8 +94,8 @@ TEST(FocalOfFits, ARightGuessStays) {
     Observations observations = SeenThrough(model, 1);
     const double given = observations.camera.fx;
     ASSERT_TRUE(FitObservations(FocalSigma(0.7), &observations).ok());
-    EXPECT_NEAR(std::log(observations.camera.fx / given), 0.0, 0.1);
-    EXPECT_GE(ShareOfInliers(observations), 0.95);
+    EXPECT_NEAR(std::log(observations.camera.fx / given), 0.0, 0.06);
+    EXPECT_GE(ShareOfInliers(observations), 0.98);
   }
 }
 
