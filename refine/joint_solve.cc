@@ -136,6 +136,8 @@ Status JointProblem::Solve(int max_iterations, State* state, double most_cost,
   const double least_cost = std::max(FreeCost(*state), kNothing / kLittleCost * state->cost);
   ceres::Solver::Options options =
       NearbyOptions(unknowns, max_iterations + losses.num_steps(), least_cost);
+  // A start that is far: what the model says of a whole step does not hold.
+  if (state->cost > most_cost) options.initial_trust_region_radius = 1e3;
   ceres::Solver::Summary summary;
   for (bool is_done = false; !is_done;) {
     Watch watch(most_cost, unknowns, losses);

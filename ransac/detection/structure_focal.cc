@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "circline/ransac/detection/line_odds.h"
 #include "circline/ransac/detection/orthogonal_evidence.h"
@@ -49,10 +50,10 @@ ConicFit Refocus(const ConicFit& fit, double log_focal) {
   const Matrix3d scale = Vector3d(s, s, 1.0).asDiagonal();
   ConicFit out = fit;
   out.conic = scale * fit.conic * scale;
-  Matrix6d J;
-  for (int k = 0; k < 6; ++k)
-    J.col(k) = ConicToVector(scale * VectorToConic(Vector6d::Unit(k)) * scale);
-  Eigen::Map<Matrix6d>(out.covariance.data()) = J * fit.Covariance() * J.transpose();
+  Vector6d entries;  // What ConicToVector's are multiplied by.
+  entries << s * s, s * s, 1.0, s * s, s, s;
+  Eigen::Map<Matrix6d>(out.covariance.data()) =
+      entries.asDiagonal() * fit.Covariance() * entries.asDiagonal();
   return out;
 }
 
@@ -183,18 +184,22 @@ class StructureEvidence {
     if (circles.size() < 2) return 0.0;
     double best = 0.0;
     for (std::size_t seed = 0; seed < std::min(circles.size(), kTriedNormals); ++seed) {
-      std::array<UncertainDirection, 2> normals;
-      const int count = CircleNormals(circles[seed], &normals);
+      std::array<CirclePose, 2> poses;
+      const int count = CirclePoses(circles[seed].conic, &poses);
       for (int k = 0; k < count; ++k) {
-        const UncertainDirection mean = MeanOfPlane(circles, normals[static_cast<std::size_t>(k)]);
+        const UncertainDirection mean = MeanOfPlane(
+            circles, circles[seed], poses[static_cast<std::size_t>(k)].normal);
         best = std::max(best, PlaneEvidence(circles, mean));
       }
     }
     return best;
   }
 
-  static UncertainDirection MeanOfPlane(const std::vector<ConicFit>& circles,
-                                        const UncertainDirection& seed) {
+  // Of the circles that can lie in a plane of one of them.
+  static UncertainDirection MeanOfPlane(const std::vector<ConicFit>& circles, const ConicFit& one,
+                                        const Vector3d& normal) {
+    const UncertainDirection seed =
+        NormalOfCircles({normal, Matrix3d::Zero()}, kSeedSigmaDeg, {&one});
     std::vector<const ConicFit*> members;
     for (const ConicFit& circle : circles) {
       if (CanLieIn(circle, seed)) members.push_back(&circle);
