@@ -3,15 +3,47 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <type_traits>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/geometric_residuals.h"
 #include "circline/estimators/line.h"
 #include "circline/refine/point_sums.h"
 
 namespace circline {
+namespace {
+
+std::array<double, 4> Inverse(const std::array<double, 4>& J) {
+  const double inverse = 1.0 / (J[0] * J[3] - J[1] * J[2]);
+  return {J[3] * inverse, -J[1] * inverse, -J[2] * inverse, J[0] * inverse};
+}
+
+// A pixel that no ray of a camera meets: beyond where its lens turns back, or at a right angle to
+// its axis. There the lens goes on as it is just before: a noisy point does not rule a camera out,
+// it is as far off as in the photo. `straight`: where the pixel would be without the lens.
+CalibratedPoint BeyondLens(const Camera& camera, const Eigen::Vector2d& straight,
+                           const Eigen::Vector2d& pixel) {
+  constexpr int kSteps = 30;
+  constexpr double kJustBefore = 0.995;  // Of the angle: 1/10 000 of the focal length before.
+  const Eigen::Vector2d direction = straight.normalized();
+  Eigen::Vector2d seen;
+  double low = 0.0, high = 0.5 * kPi;
+  for (int k = 0; k < kSteps; ++k) {
+    const double angle = 0.5 * (low + high);
+    const Eigen::Vector2d x = std::tan(angle) * direction;
+    (CameraToPixel(camera, {x.x(), x.y(), 1.0}, &seen) ? low : high) = angle;
+  }
+  CalibratedPoint p;
+  p.x = std::tan(kJustBefore * low) * direction;
+  std::array<double, 4> J;
+  DistortWithJacobian(camera, p.x, &seen, &J);
+  p.x_from_pixel = Inverse(J);
+  p.x += NormGradient(p, pixel - seen);
+  return p;
+}
+
+}  // namespace
 
 void ImagePoints::Reset(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
                         const std::vector<std::uint8_t>& inliers, const Options& options) {
@@ -90,19 +122,18 @@ CalibratedPoint ImagePoints::Undistorted(std::size_t i, const Camera& shifted) c
   constexpr int kMaxSteps = 20;
   // Pixels, before the last step, which squares the error; a lens does not change over so little.
   constexpr double kConverged = 1e-3;
-  for (int step = 0; step < kMaxSteps; ++step) {
+  double determinant = 1.0;
+  for (int step = 0; step < kMaxSteps && determinant > 0.0; ++step) {
     Eigen::Vector2d pixel;
     std::array<double, 4> J;
     DistortWithJacobian(shifted, p.x, &pixel, &J);
-    const double inverse = 1.0 / (J[0] * J[3] - J[1] * J[2]);
-    p.x_from_pixel = {J[3] * inverse, -J[1] * inverse, -J[2] * inverse, J[0] * inverse};
+    determinant = J[0] * J[3] - J[1] * J[2];
+    p.x_from_pixel = Inverse(J);
     const Eigen::Vector2d miss = pixels_[i] - pixel;
     move(miss);
-    if (miss.squaredNorm() < kConverged * kConverged) return p;
-    if (!p.x.allFinite()) break;
+    if (determinant > 0.0 && miss.squaredNorm() < kConverged * kConverged) return p;
   }
-  p.x.setConstant(std::numeric_limits<double>::quiet_NaN());  // No such camera took this photo.
-  return p;
+  return PixelToCalibrated(shifted, pixels_[i], &p) ? p : BeyondLens(shifted, straight, pixels_[i]);
 }
 
 CalibratedPoint ImagePoints::Normalize(CalibratedPoint p) const {

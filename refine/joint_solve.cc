@@ -75,7 +75,6 @@ class Watch : public ceres::IterationCallback {
   // the wider ones.
   bool has_risen() const { return has_risen_; }
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    constexpr double kMoreSteps = 5.0;
     if (was_wide_) {
       was_wide_ = losses_.is_wide();
       narrowed_cost_ = summary.cost;
@@ -86,10 +85,14 @@ class Watch : public ceres::IterationCallback {
     if (has_risen_) return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     const double rate = last_change_ > 0.0 ? summary.cost_change / last_change_ : 1.0;
     last_change_ = summary.step_is_successful ? summary.cost_change : 0.0;
+    // What the evidence tells little of goes but a part of its way in a smaller trust region.
+    constexpr double kWholeSteps = 1e5;
+    const bool is_part = summary.step_is_successful && summary.trust_region_radius < kWholeSteps;
     const bool converges = rate > 0.0 && rate < 1.0;
     const double rest = converges ? summary.cost_change * rate / (1.0 - rate) : summary.cost_change;
-    if (std::min(std::abs(summary.cost_change), std::abs(rest)) < little_)
+    if (!is_part && std::min(std::abs(summary.cost_change), std::abs(rest)) < little_)
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+    constexpr double kMoreSteps = 5.0;
     const bool is_hopeless =
         summary.step_is_successful && summary.cost - kMoreSteps * summary.cost_change > most_;
     return is_hopeless ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
