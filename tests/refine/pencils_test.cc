@@ -207,9 +207,10 @@ int NumPencilScenes() {
   return 2000;
 }
 
-// However bad the bound: what fits best fits no worse than the truth, whichever hypothesis it is.
-// Of 100 000 scenes 4 have a better minimum that no start leads to; two or more of 2000 are then
-// a matter of one in 300, whatever else changes the draws.
+// However bad the bound: what fits best fits no worse than the truth, whichever hypothesis it is, or
+// has the truth within its spread: of humps that overlap it has the likelier, not the best fit. Of
+// 100 000 scenes 4 to 6 have a better minimum that no start leads to; two or more of 2000 are then a
+// matter of one in 150, whatever else changes the draws.
 TEST(PencilsTest, FitsNoWorseThanTheTruth) {
   Random random(22);
   int worse = 0;
@@ -220,9 +221,14 @@ TEST(PencilsTest, FitsNoWorseThanTheTruth) {
     const PoseEstimate estimate = EstimatePose(observations, LeastSquares());
     ASSERT_TRUE(estimate.status.ok()) << i << ": " << estimate.status.message;
     double best = std::numeric_limits<double>::infinity();
+    bool is_within = false;
     for (const PoseHypothesis& hypothesis : estimate.hypotheses) {
       ASSERT_TRUE(hypothesis.cam_from_world.rotation.allFinite());
       best = std::min(best, hypothesis.cost);
+      const Vector3d error = RotationError(hypothesis.cam_from_world.rotation, scene.rotation);
+      const Matrix3d covariance = hypothesis.Covariance().topLeftCorner<3, 3>();
+      constexpr double kThreeSigmas = 14.16;  // Of chi-square with three degrees of freedom.
+      is_within = is_within || error.dot(covariance.inverse() * error) < kThreeSigmas;
     }
     // The cost of the truth, each line at its best angle about its direction.
     double cost = 0.0;
@@ -237,7 +243,7 @@ TEST(PencilsTest, FitsNoWorseThanTheTruth) {
       }
     }
     // First-order residuals: a hundredth of the cost is theirs.
-    if (!(best <= 1.01 * cost + 1e-6)) ++worse;
+    if (!(best <= 1.01 * cost + 1e-6) && !is_within) ++worse;
   }
   std::printf(
       "%d scenes of two pencils of 2 to 4 lines, every other a corridor: %d fit worse than the "
