@@ -66,7 +66,8 @@ class ImagePoints {
 
   // Points with inliers[i] == 0 are left out, those beyond the end of `inliers` too (it may be
   // empty, for all points), and so are those that the camera cannot undistort. None may be left:
-  // residuals are zero then.
+  // residuals are zero then. Beyond where the lens of a shifted camera turns back it goes on as it
+  // is just before.
   ImagePoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
               const std::vector<std::uint8_t>& inliers, const Options& options) {
     Reset(camera, pixels, inliers, options);
