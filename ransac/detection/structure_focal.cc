@@ -187,8 +187,8 @@ class StructureEvidence {
       std::array<CirclePose, 2> poses;
       const int count = CirclePoses(circles[seed].conic, &poses);
       for (int k = 0; k < count; ++k) {
-        const UncertainDirection mean = MeanOfPlane(
-            circles, circles[seed], poses[static_cast<std::size_t>(k)].normal);
+        const UncertainDirection mean =
+            MeanOfPlane(circles, circles[seed], poses[static_cast<std::size_t>(k)].normal);
         best = std::max(best, PlaneEvidence(circles, mean));
       }
     }

@@ -207,10 +207,10 @@ int NumPencilScenes() {
   return 2000;
 }
 
-// However bad the bound: what fits best fits no worse than the truth, whichever hypothesis it is, or
-// has the truth within its spread: of humps that overlap it has the likelier, not the best fit. Of
-// 100 000 scenes 4 to 6 have a better minimum that no start leads to; two or more of 2000 are then a
-// matter of one in 150, whatever else changes the draws.
+// However bad the bound: what fits best fits no worse than the truth, whichever hypothesis it is,
+// or has the truth within its spread: of humps that overlap it has the likelier, not the best fit.
+// Of 100 000 scenes 4 to 6 have a better minimum that no start leads to; two or more of 2000 are
+// then a matter of one in 150, whatever else changes the draws.
 TEST(PencilsTest, FitsNoWorseThanTheTruth) {
   Random random(22);
   int worse = 0;
