@@ -78,7 +78,9 @@ def main():
     with open(PAGE) as page:
         lines = page.read().split('\n')
     names = [match['name'] for match in map(ROW.match, lines) if match]
-    photos = [next(p for p in (os.path.join(f, name) for f in folders) if os.path.exists(p)) for name in names]
+    photos = [next((p for p in (os.path.join(f, name) for f in folders) if os.path.exists(p)), None) for name in names]
+    if None in photos:
+        sys.exit(f'{names[photos.index(None)]}: in none of the folders {", ".join(folders)}')
     shutil.rmtree(output, ignore_errors=True)
     subprocess.run(['build/release/bin/circline_compare', '--images=' + ','.join(photos), '--fov_deg=60', '--focal_sigma=0',
                     '--output=' + output],
