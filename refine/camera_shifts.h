@@ -19,6 +19,12 @@ using Shifts = std::array<double, kCameraSize>;
 // Standard deviations; of the coefficients of a lens, where the camera has one, only the first.
 Shifts ShiftSigmas(const Camera& camera, const CameraSigma& sigma);
 Camera ShiftedCamera(const Camera& camera, const double* shifts);
+// A pixel, undistorted by a shifted camera; `before`: by the camera `given`, which is where it is
+// looked for. A pixel that no ray of the shifted camera meets, beyond where its lens turns back or
+// at a right angle to its axis, is as far off as in the photo: the lens goes on as it is just
+// before.
+CalibratedPoint SeenThrough(const Camera& shifted, const Camera& given,
+                            const Eigen::Vector2d& pixel, const CalibratedPoint& before);
 // What one distortion coefficient does to a pixel. The models are linear in their coefficients but
 // for the rational ones of kOpenCV (k4 to k6), for which it holds at 0.
 class LensSlope {

@@ -6,44 +6,11 @@
 #include <optional>
 #include <type_traits>
 
-#include "circline/estimators/basics.h"
 #include "circline/estimators/geometric_residuals.h"
 #include "circline/estimators/line.h"
 #include "circline/refine/point_sums.h"
 
 namespace circline {
-namespace {
-
-std::array<double, 4> Inverse(const std::array<double, 4>& J) {
-  const double inverse = 1.0 / (J[0] * J[3] - J[1] * J[2]);
-  return {J[3] * inverse, -J[1] * inverse, -J[2] * inverse, J[0] * inverse};
-}
-
-// A pixel that no ray of a camera meets: beyond where its lens turns back, or at a right angle to
-// its axis. There the lens goes on as it is just before: a noisy point does not rule a camera out,
-// it is as far off as in the photo. `straight`: where the pixel would be without the lens.
-CalibratedPoint BeyondLens(const Camera& camera, const Eigen::Vector2d& straight,
-                           const Eigen::Vector2d& pixel) {
-  constexpr int kSteps = 30;
-  constexpr double kJustBefore = 0.995;  // Of the angle: 1/10 000 of the focal length before.
-  const Eigen::Vector2d direction = straight.normalized();
-  Eigen::Vector2d seen;
-  double low = 0.0, high = 0.5 * kPi;
-  for (int k = 0; k < kSteps; ++k) {
-    const double angle = 0.5 * (low + high);
-    const Eigen::Vector2d x = std::tan(angle) * direction;
-    (CameraToPixel(camera, {x.x(), x.y(), 1.0}, &seen) ? low : high) = angle;
-  }
-  CalibratedPoint p;
-  p.x = std::tan(kJustBefore * low) * direction;
-  std::array<double, 4> J;
-  DistortWithJacobian(camera, p.x, &seen, &J);
-  p.x_from_pixel = Inverse(J);
-  p.x += NormGradient(p, pixel - seen);
-  return p;
-}
-
-}  // namespace
 
 void ImagePoints::Reset(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
                         const std::vector<std::uint8_t>& inliers, const Options& options) {
@@ -106,36 +73,6 @@ void ImagePoints::RemoveCurvatureBias(const Eigen::Matrix3d& conic, double sigma
   }
 }
 
-// Newton's method, from where a camera without a lens would move the undistorted point.
-CalibratedPoint ImagePoints::Undistorted(std::size_t i, const Camera& shifted) const {
-  CalibratedPoint p = points_[i];
-  const Eigen::Vector2d focal(shifted.fx, shifted.fy), middle(shifted.cx, shifted.cy),
-      straight = (pixels_[i] - middle).cwiseQuotient(focal);
-  if (shifted.model == CameraModel::kPinhole) {
-    p.x = straight;
-    p.x_from_pixel = {1.0 / focal.x(), 0.0, 0.0, 1.0 / focal.y()};
-    return p;
-  }
-  const auto move = [&p](const Eigen::Vector2d& pixels) { p.x += NormGradient(p, pixels); };
-  const Eigen::Vector2d given(camera_.fx, camera_.fy);
-  move(given.cwiseProduct(straight) + Eigen::Vector2d(camera_.cx, camera_.cy) - pixels_[i]);
-  constexpr int kMaxSteps = 20;
-  // Pixels, before the last step, which squares the error; a lens does not change over so little.
-  constexpr double kConverged = 1e-3;
-  double determinant = 1.0;
-  for (int step = 0; step < kMaxSteps && determinant > 0.0; ++step) {
-    Eigen::Vector2d pixel;
-    std::array<double, 4> J;
-    DistortWithJacobian(shifted, p.x, &pixel, &J);
-    determinant = J[0] * J[3] - J[1] * J[2];
-    p.x_from_pixel = Inverse(J);
-    const Eigen::Vector2d miss = pixels_[i] - pixel;
-    move(miss);
-    if (determinant > 0.0 && miss.squaredNorm() < kConverged * kConverged) return p;
-  }
-  return PixelToCalibrated(shifted, pixels_[i], &p) ? p : BeyondLens(shifted, straight, pixels_[i]);
-}
-
 CalibratedPoint ImagePoints::Normalize(CalibratedPoint p) const {
   const double inverse = 1.0 / normalization_(0, 0);
   p.x = inverse * (p.x - normalization_.topRightCorner<2, 1>());
@@ -158,7 +95,9 @@ class ImagePoints::View {
   }
 
   CalibratedPoint At(std::size_t i) const {
-    return seen_ != nullptr ? seen_[i] : points_.Undistorted(i, *shifted_);
+    return seen_ != nullptr
+               ? seen_[i]
+               : SeenThrough(*shifted_, points_.camera_, points_.pixels_[i], points_.points_[i]);
   }
   // Of At(i).
   CalibratedPoint Normalized(std::size_t i, const CalibratedPoint& seen) const {

@@ -66,8 +66,7 @@ class ImagePoints {
 
   // Points with inliers[i] == 0 are left out, those beyond the end of `inliers` too (it may be
   // empty, for all points), and so are those that the camera cannot undistort. None may be left:
-  // residuals are zero then. Beyond where the lens of a shifted camera turns back it goes on as it
-  // is just before.
+  // residuals are zero then. Shifted cameras see them all (SeenThrough).
   ImagePoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
               const std::vector<std::uint8_t>& inliers, const Options& options) {
     Reset(camera, pixels, inliers, options);
@@ -130,7 +129,6 @@ class ImagePoints {
  private:
   class View;
   class ToConic;
-  CalibratedPoint Undistorted(std::size_t i, const Camera& shifted) const;
   CalibratedPoint Normalize(CalibratedPoint p) const;
   bool IsOrthogonal(const Eigen::Matrix3d& conic, double* level) const;
 
