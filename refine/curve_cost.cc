@@ -29,11 +29,14 @@ void CurveCost::ExchangePoints(ImagePoints* points) {
   set_num_residuals(Rank(camera_block_ >= 0) + 1 + num_priors_);
 }
 
-// The offset and a variable lens can do what no curve can; the camera's other shifts cannot, but
-// for what the lens bends.
+// The offset can do what no curve can, and so can every shift of a camera that has a lens: a line
+// through it is bent, by which straightness tells of the focal length, too. Those of a pinhole can
+// not.
 int CurveCost::Rank(bool camera_is_variable) const {
+  constexpr int kWithoutLens = 4;  // Shifts that are not of distortion coefficients.
+  const bool is_bent = camera_is_variable && points_.has_lens();
   return curve_rank_ + (offset_block_ >= 0 ? 1 : 0) +
-         (camera_is_variable ? points_.options().num_distortion : 0);
+         (is_bent ? kWithoutLens + points_.options().num_distortion : 0);
 }
 
 bool CurveCost::SumAbout(const Eigen::Ref<const Curve>& curve, const Weighing& weighing,

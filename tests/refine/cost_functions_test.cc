@@ -195,6 +195,55 @@ TEST(CostFunctionsTest, GaussNewtonHessianIsThatOfThePoints) {
   EXPECT_LT((H - expected).norm(), 1e-5 * expected.norm());
 }
 
+// The same by the shifts of a camera, whether its lens is an unknown or not: lines are bent by the
+// focal length, too, by which straightness tells of that.
+TEST(CostFunctionsTest, NoInformationOnACameraIsLost) {
+  const auto pixels = Line({-1.5, 0.2, 0.1}, {1.5, 0.21, 0.1}, 30, 7);
+  for (const int num_distortion : {0, 1, 2}) {
+    ImagePoints::Options how;
+    how.num_distortion = num_distortion;
+    const ImagePoints points(LensCamera(), pixels, {}, how);
+    LineFit fit;
+    ASSERT_TRUE(FitLine(points.points(), how.sigma_px, &fit).ok());
+    DirectionLineCost::Options options;
+    options.camera = true;
+    const DirectionLineCost cost(points, fit.line, options);
+    Blocks blocks;
+    blocks.AddPose({0.0, 0.0, 0.0});
+    blocks.values[1] = {3.0, 0.01, 0.0};  // The direction, in place of the translation.
+    blocks.Add({0.0});
+    blocks.Add(std::vector<double>(kCameraSize, 0.0));
+    ASSERT_TRUE(cost.Start(blocks.Pointers().data(), blocks.values[2].data()));
+    Eigen::VectorXd r;
+    Eigen::MatrixXd J;
+    Linearize(cost, blocks, &r, &J);
+    const auto distances = [&](Eigen::Index k, double step) {
+      std::vector<double> d;
+      cost.Distances(Moved(blocks, k, step).Pointers().data(), &d);
+      return Eigen::VectorXd(
+          Eigen::Map<Eigen::VectorXd>(d.data(), static_cast<Eigen::Index>(d.size())));
+    };
+    const Eigen::Index of_curve = 3 + 3 + 1, variables = of_curve + 4 + num_distortion;
+    Eigen::MatrixXd by_points(static_cast<Eigen::Index>(pixels.size()), variables);
+    for (Eigen::Index k = 0; k < variables; ++k) {
+      constexpr double kStep = 1e-6;
+      by_points.col(k) = (distances(k, kStep) - distances(k, -kStep)) / (2.0 * kStep);
+    }
+    // Of a camera's shift, what no move of the line does: its bend.
+    const auto bend = [&](const Eigen::MatrixXd& by, Eigen::Index k) {
+      constexpr double kNoise = 1e-3;  // Points off the line tell moves apart that are the same.
+      Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> moves(by.rows(), of_curve);
+      moves.setThreshold(kNoise);
+      moves.compute(by.leftCols(of_curve));
+      return (by.col(k) - by.leftCols(of_curve) * moves.solve(by.col(k))).norm();
+    };
+    for (Eigen::Index k = of_curve; k < variables; ++k) {
+      const double expected = bend(by_points, k);
+      EXPECT_NEAR(bend(J, k), expected, 0.01 * expected) << k << ", " << num_distortion;
+    }
+  }
+}
+
 // Whatever its focal length, aspect and principal point, a camera without distortion sees some
 // conic exactly as any other one does: a contour alone tells nothing of them, however small it is
 // against the noise. What its derivatives did tell would be taken for evidence once the lens has
