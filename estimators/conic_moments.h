@@ -9,8 +9,9 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/export.h"
 
-namespace circline {
+namespace CIRCLINE_EXPORT circline {
 
 // Similarity x = scale x' + center under which the points have mean 0 and mean square radius 2: the
 // normal matrices of conics need it.
