@@ -72,27 +72,19 @@ double PencilModel::Variance(const Eigen::Vector3d& direction, int i) const {
   return p * p + q * q + static_cast<double>(model_variance_);
 }
 
-// Gauss-Newton in the tangent plane of the sphere, the variances of the lines held at the current
-// direction.
+// The direction that the lines miss least, the variances of the lines held at the current one.
 bool PencilModel::Refine(const float* weights, Value* direction) const {
-  const Eigen::Vector3d v(direction->data()), e1 = v.unitOrthogonal(), e2 = v.cross(e1);
-  double a = 0.0, b = 0.0, c = 0.0, g1 = 0.0, g2 = 0.0;
+  const Eigen::Vector3d v(direction->data());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (int i = 0; i < NumData(); ++i) {
     if (!(weights[i] > 0.0f)) continue;
-    const double w = static_cast<double>(weights[i]) / Variance(v, i);
-    const double miss = Line(i).dot(v), d1 = Line(i).dot(e1), d2 = Line(i).dot(e2);
-    a += w * d1 * d1;
-    b += w * d1 * d2;
-    c += w * d2 * d2;
-    g1 += w * d1 * miss;
-    g2 += w * d2 * miss;
+    scatter += static_cast<double>(weights[i]) / Variance(v, i) * Line(i) * Line(i).transpose();
   }
-  const double det = a * c - b * b;
-  if (!(det > 1e-12 * (a + c) * (a + c))) return false;
-  const Eigen::Vector3d moved = v - (c * g1 - b * g2) / det * e1 - (a * g2 - b * g1) / det * e2;
-  const double norm = moved.norm();
-  if (!(norm < 10.0)) return false;  // Not a small step: the start was no good, or is not finite.
-  *direction = {moved.x() / norm, moved.y() / norm, moved.z() / norm};
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(scatter);
+  constexpr double kOneLine = 1e-12;  // Of the largest: the lines coincide.
+  if (!(eigen.eigenvalues()[1] > kOneLine * eigen.eigenvalues()[2])) return false;
+  Eigen::Map<Eigen::Vector3d>(direction->data()) = eigen.eigenvectors().col(0);
   return true;
 }
 

@@ -87,17 +87,6 @@ Status FitFinal(const Pool& pool, const std::vector<int>& candidates,
   return Status::Ok();
 }
 
-// What an outlier costs, as a residual: the square root of twice the logarithm of how much likelier
-// a parallel line without miss is than any line, l . v of which is uniform on [-1, 1]. At the
-// threshold's cost three lines that happen to meet beat four that are parallel.
-double OutlierCostSigmas(const Pool& pool) {
-  constexpr double kOdds = 4.0;  // Four of five lines of a pencil are parallel.
-  double sum = 0.0;
-  for (const int i : pool.all) sum += std::sqrt(0.5 * pool[i].covariance.trace());
-  const double sigma = std::max(sum / static_cast<double>(pool.all.size()), kCoincidentRad);
-  return std::sqrt(2.0 * std::log(std::max(1.0, kOdds * 2.0 * 0.3989422804014327 / sigma)));
-}
-
 // One direction among lines[indices], or a status that says why there is none.
 Status FindOne(const std::vector<LineFit>& lines, const Pool& pool, const std::vector<int>& indices,
                const PencilOptions& options, VanishingPointFit* fit, std::vector<int>* members) {
@@ -152,10 +141,10 @@ Status FitTrimmed(const Pool& pool, VanishingPointFit* fit, std::vector<int>* me
   return FitFinal(pool, pool.all, direction, fit, members);
 }
 
-double TruncatedCost(const Pool& pool, const Eigen::Vector3d& direction, double threshold) {
+double TruncatedCost(const Pool& pool, const Eigen::Vector3d& direction) {
   double cost = 0.0;
   for (const int i : pool.all) {
-    const double r = std::min(std::abs(VanishingPointResidual(pool[i], direction)), threshold);
+    const double r = std::min(std::abs(VanishingPointResidual(pool[i], direction)), pool.threshold);
     cost += r * r;
   }
   return cost;
@@ -184,16 +173,14 @@ Status FitVanishingPointRobust(const std::vector<LineFit>& lines, const PencilOp
   if (pool.all.size() == 2) {
     status = FitVanishingPoint({pool[pool.all[0]], pool[pool.all[1]]}, &result);
   } else {
-    PencilOptions search = options;
-    search.ransac.threshold = std::max(search.ransac.threshold, OutlierCostSigmas(pool));
-    status = FindOne(lines, pool, pool.all, search, &result, &members);
+    status = FindOne(lines, pool, pool.all, options, &result, &members);
     // Two of few lines may cross too far from the truth for the search to reach it.
     constexpr std::size_t kFew = 20;
     VanishingPointFit other;
     std::vector<int> of_other;
     if (pool.all.size() <= kFew && FitTrimmed(pool, &other, &of_other).ok() &&
-        (!status.ok() || TruncatedCost(pool, other.direction, search.ransac.threshold) <
-                             TruncatedCost(pool, result.direction, search.ransac.threshold))) {
+        (!status.ok() ||
+         TruncatedCost(pool, other.direction) < TruncatedCost(pool, result.direction))) {
       status = Status::Ok();
       result = other;
       members = of_other;
