@@ -10,48 +10,32 @@ namespace {
 // Logarithm of how likely the points are: those of a fit are off it by its scatter, others lie
 // anywhere near. Common terms are left out; so are features of so few points that any curve
 // explains them.
-class Likelihood {
- public:
+double LogLikelihood(const Observations& fitted) {
+  constexpr double kNearPx = 40.0;   // Where an outlier may lie.
+  constexpr double kLeastPx = 0.05;  // No photo's points are better.
+  constexpr int kTellingPoints = 3;  // Beyond the curve's parameters.
   // Points that the camera cannot see, but has seen.
-  void AddUnseen(int num_points) { sum_ -= num_points * std::log(kNearPx); }
-
-  template <typename Fit>
-  void Add(const Fit& fit, std::size_t num_points, int num_inliers, int num_parameters) {
-    constexpr int kTellingPoints = 3;  // Beyond the curve's parameters.
-    constexpr double kLeastPx = 0.05;  // No photo's points are better.
-    const int n = static_cast<int>(num_points), free = num_inliers - num_parameters;
+  double sum = -fitted.num_dropped_points * std::log(kNearPx);
+  const auto add = [&](const auto& feature, int num_parameters) {
+    const int n = static_cast<int>(feature.points.size());
     if (n < num_parameters + kTellingPoints) return;
-    if (!fit || free <= 0) {
-      sum_ -= n * std::log(kNearPx);
+    const int num_inliers =
+        static_cast<int>(std::count(feature.inliers.begin(), feature.inliers.end(), 1));
+    const int free = num_inliers - num_parameters;
+    if (!feature.fit || free <= 0) {
+      sum -= n * std::log(kNearPx);
       return;
     }
-    const double sigma = std::max(kLeastPx, fit->rms_px * std::sqrt(1.0 * num_inliers / free));
+    const double sigma =
+        std::max(kLeastPx, feature.fit->rms_px * std::sqrt(1.0 * num_inliers / free));
     // exp(-1/2) sqrt(1 / (2 pi)) / sigma, on average.
-    sum_ -= num_inliers * (std::log(sigma) + 1.42) + (n - num_inliers) * std::log(kNearPx);
-  }
-
-  double sum() const { return sum_; }
-
- private:
-  static constexpr double kNearPx = 40.0;  // Where an outlier may lie.
-  double sum_ = 0.0;
-};
-
-template <typename Feature>
-int NumInliers(const Feature& feature) {
-  return static_cast<int>(std::count(feature.inliers.begin(), feature.inliers.end(), 1));
-}
-
-double LogLikelihood(const Observations& fitted) {
-  Likelihood likelihood;
-  likelihood.AddUnseen(fitted.num_dropped_points);
-  for (const CircleObservation& circle : fitted.circles)
-    likelihood.Add(circle.fit, circle.points.size(), NumInliers(circle), 5);
+    sum -= num_inliers * (std::log(sigma) + 1.42) + (n - num_inliers) * std::log(kNearPx);
+  };
+  for (const CircleObservation& circle : fitted.circles) add(circle, 5);
   for (const PencilObservation& pencil : fitted.pencils) {
-    for (const LineObservation& line : pencil.lines)
-      likelihood.Add(line.fit, line.points.size(), NumInliers(line), 2);
+    for (const LineObservation& line : pencil.lines) add(line, 2);
   }
-  return likelihood.sum();
+  return sum;
 }
 
 Observations At(double log_focal, const Observations& observations) {
