@@ -18,19 +18,15 @@ constexpr float kMinPointSigmaPx = 0.03f;
 // one yields one.
 void GaussianKernels(double sigma, cv::Mat* smooth, cv::Mat* derivative) {
   const int radius = static_cast<int>(std::ceil(3.0 * sigma));
-  smooth->create(1, 2 * radius + 1, CV_32F);
-  derivative->create(1, 2 * radius + 1, CV_32F);
-  double sum = 0.0, moment = 0.0;
+  *smooth = cv::getGaussianKernel(2 * radius + 1, sigma, CV_32F);
+  *derivative = smooth->clone();
+  double moment = 0.0;
   for (int i = -radius; i <= radius; ++i) {
-    const double g = std::exp(-0.5 * i * i / (sigma * sigma));
-    sum += g;
-    moment += i * i * g;
+    float& value = derivative->at<float>(i + radius);
+    value *= static_cast<float>(i);
+    moment += static_cast<double>(value) * i;
   }
-  for (int i = -radius; i <= radius; ++i) {
-    const double g = std::exp(-0.5 * i * i / (sigma * sigma));
-    smooth->at<float>(0, i + radius) = static_cast<float>(g / sum);
-    derivative->at<float>(0, i + radius) = static_cast<float>(i * g / moment);
-  }
+  *derivative /= moment;
 }
 
 // The maxima of the gradient across itself, one a pixel at most, row by row.

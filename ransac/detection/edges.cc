@@ -175,33 +175,19 @@ std::vector<std::int32_t> ListChains(const Links& links, float high, EdgeMap* ma
   return places;
 }
 
-// Moves every point to its place and drops those without one, in place: fresh memory would cost
-// more than the moving.
-void Rearrange(std::vector<std::int32_t> place, std::vector<EdgePoint>* points) {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < place.size(); ++i) {
-    // Until a point comes here that belongs here or nowhere.
-    while (place[i] >= 0) {
-      const auto to = static_cast<std::size_t>(place[i]);
-      std::swap((*points)[i], (*points)[to]);
-      std::swap(place[i], place[to]);
-      ++kept;
-      place[to] = kNone;  // Done.
-    }
-  }
-  points->resize(kept);
-}
-
 // Links the points of `map`, which are in any order, point i in pixel `pixels[i]` of its index and
 // none in the outermost pixels, into chains; then points are in order chain by chain, and those of
 // none are gone.
 void ChainEdgePoints(const std::vector<std::int32_t>& pixels, double high, EdgeMap* map) {
-  std::vector<std::int32_t> place =
+  const std::vector<std::int32_t> places =
       ListChains(LinkPoints(*map, pixels), static_cast<float>(high), map);
-  for (std::size_t i = 0; i < place.size(); ++i) {
-    map->index[static_cast<std::size_t>(pixels[i])] = place[i];
+  std::vector<EdgePoint> ordered(
+      map->chains.empty() ? 0U : static_cast<std::size_t>(map->chains.back().end));
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    map->index[static_cast<std::size_t>(pixels[i])] = places[i];
+    if (places[i] >= 0) ordered[static_cast<std::size_t>(places[i])] = map->points[i];
   }
-  Rearrange(std::move(place), &map->points);
+  map->points = std::move(ordered);
 }
 
 }  // namespace
