@@ -1,7 +1,6 @@
 #include "circline/ransac/detection/detect_lines.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -42,9 +41,6 @@ struct Joined {
   bool alternates = false;  // The bright side is not the same on all pieces.
   LineMoments moments;
   Vector3d line;
-  Vector2d along;
-  // The parts that the pieces cover, along the line.
-  std::vector<std::array<double, 2>> covered;
 };
 
 class LineJoiner {
@@ -107,8 +103,7 @@ class LineJoiner {
     joined.gradient = p.gradient;
     joined.moments = LineMoments(edges_.X(p.begin).x);
     AddPoints(p, &joined.moments);
-    joined.line = joined.moments.Line(&joined.along);
-    joined.covered = {{p.from, p.to}};
+    joined.line = joined.moments.Line();
     return joined;
   }
 
@@ -123,25 +118,19 @@ class LineJoiner {
     joined->pieces.push_back(piece);
     joined->alternates = joined->alternates || joined->gradient.dot(p.gradient) < 0.0;
     AddPoints(p, &joined->moments);
-    joined->line = joined->moments.Line(&joined->along);
-    joined->covered.clear();
-    for (const int i : joined->pieces) {
-      std::array<double, 2> range;
-      edges_.SetRange(joined->along, pieces_[static_cast<std::size_t>(i)], &range[0], &range[1]);
-      joined->covered.push_back(range);
-    }
+    joined->line = joined->moments.Line();
   }
 
   bool Continues(const Joined& joined, const LinePiece& p) const {
     const CalibratedPoint first = edges_.X(p.begin), last = edges_.X(p.end - 1);
     if (std::abs(LineDistancePx(first, joined.line)) > kMaxAlternatingPx) return false;
     if (std::abs(LineDistancePx(last, joined.line)) > kMaxAlternatingPx) return false;
-    double from, to;
-    edges_.SetRange(joined.along, p, &from, &to);
+    const auto [from, to] = edges_.Range(joined.line, p);
     double gap = std::numeric_limits<double>::infinity(), length = 0.0;
-    for (const std::array<double, 2>& c : joined.covered) {
-      gap = std::min(gap, std::max(from - c[1], c[0] - to));
-      length = std::max(length, c[1] - c[0]);
+    for (const int k : joined.pieces) {
+      const auto [begin, end] = edges_.Range(joined.line, pieces_[static_cast<std::size_t>(k)]);
+      gap = std::min(gap, std::max(from - end, begin - to));
+      length = std::max(length, end - begin);
     }
     // Calibrated lengths to pixels by the piece's own scale.
     const double px = p.length_px / std::max(to - from, 1e-12);
@@ -231,7 +220,7 @@ class LineJoiner {
       if (count == 0) continue;
       CalibratedPoint point = edges_.X((begin + end) / 2);
       point.x = x / count;
-      averages->push_back({joined.along.dot(point.x), pixel / count, point});
+      averages->push_back({Along(joined.line).dot(point.x), pixel / count, point});
     }
   }
 
@@ -240,7 +229,7 @@ class LineJoiner {
     for (const int k : joined.pieces) {
       const LinePiece& p = pieces_[static_cast<std::size_t>(k)];
       for (const int i : {p.begin, p.end - 1}) {
-        const double s = joined.along.dot(edges_.X(i).x);
+        const double s = Along(joined.line).dot(edges_.X(i).x);
         if (s < from) {
           from = s;
           line->ends[0] = edges_.Pixel(i);

@@ -53,7 +53,7 @@ class PieceCutter {
     }
     piece->begin = begin;
     piece->end = begin + kSeedPoints;
-    piece->line = moments_.Line(&piece->along);
+    piece->line = moments_.Line();
     for (int i = piece->begin; i < piece->end; ++i) {
       // Seeds are stricter than growth: they carry no average yet.
       if (edges_.Distance(i, piece->line) > 0.75 * kMaxLineDistancePx) return false;
@@ -72,10 +72,10 @@ class PieceCutter {
       moments_.Add(edges_.X(i).x);
       piece->end = i + 1;
       if (moments_.count() < refit_at) continue;
-      piece->line = moments_.Line(&piece->along);
+      piece->line = moments_.Line();
       refit_at = moments_.count() + std::max(2, moments_.count() / 8);
     }
-    piece->line = moments_.Line(&piece->along);
+    piece->line = moments_.Line();
   }
 
   void Keep(LinePiece* piece) {
@@ -87,7 +87,6 @@ class PieceCutter {
     if (sagitta > std::max(kMaxSagittaPx, std::min(kMaxBentPx, kMaxBentShare * piece->length_px))) {
       return;
     }
-    edges_.SetRange(piece->along, *piece, &piece->from, &piece->to);
     (sagitta <= kMaxSagittaPx ? straight_ : bent_)->push_back(*piece);
   }
 
@@ -120,14 +119,13 @@ class PieceCutter {
 
 }  // namespace
 
-Vector3d LineMoments::Line(Vector2d* along) const {
+Vector3d LineMoments::Line() const {
   const Vector2d mean = sum_ / n_;
   const double a = xx_ / n_ - mean.x() * mean.x();
   const double b = xy_ / n_ - mean.x() * mean.y();
   const double c = yy_ / n_ - mean.y() * mean.y();
   const double angle = 0.5 * std::atan2(2.0 * b, a - c);
-  *along = Vector2d(std::cos(angle), std::sin(angle));
-  const Vector2d normal(-along->y(), along->x());
+  const Vector2d normal(-std::sin(angle), std::cos(angle));
   return {normal.x(), normal.y(), -normal.dot(mean + shift_)};
 }
 

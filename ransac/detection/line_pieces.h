@@ -4,10 +4,10 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "circline/estimators/camera.h"
@@ -36,8 +36,8 @@ class LineMoments {
 
   int count() const { return n_; }
 
-  // Total least squares line, unit normal; its direction to `along`.
-  Eigen::Vector3d Line(Eigen::Vector2d* along) const;
+  // Total least squares line, unit normal.
+  Eigen::Vector3d Line() const;
 
  private:
   Eigen::Vector2d shift_;
@@ -46,12 +46,13 @@ class LineMoments {
   double xx_ = 0.0, xy_ = 0.0, yy_ = 0.0;
 };
 
+// Unit direction of a line.
+inline Eigen::Vector2d Along(const Eigen::Vector3d& line) { return {line.y(), -line.x()}; }
+
 // A run of edge points on one line.
 struct LinePiece {
-  int begin = 0, end = 0;       // Points of the map (all usable, in order).
-  Eigen::Vector3d line;         // Calibrated; unit normal.
-  Eigen::Vector2d along;        // Its direction.
-  double from = 0.0, to = 0.0;  // Positions of its ends along it, calibrated.
+  int begin = 0, end = 0;  // Points of the map (all usable, in order).
+  Eigen::Vector3d line;    // Calibrated; unit normal.
   double length_px = 0.0;
   Eigen::Vector2d gradient;  // At its middle, unit.
 };
@@ -80,11 +81,9 @@ class LineEdges {
     return std::abs(LineDistancePx(X(i), line));
   }
   // Where a piece lies along a line.
-  void SetRange(const Eigen::Vector2d& along, const LinePiece& piece, double* from,
-                double* to) const {
-    const double a = along.dot(X(piece.begin).x), b = along.dot(X(piece.end - 1).x);
-    *from = std::min(a, b);
-    *to = std::max(a, b);
+  std::pair<double, double> Range(const Eigen::Vector3d& line, const LinePiece& piece) const {
+    const Eigen::Vector2d along = Along(line);
+    return std::minmax({along.dot(X(piece.begin).x), along.dot(X(piece.end - 1).x)});
   }
   const EdgeMap& map() const { return map_; }
 
