@@ -20,20 +20,14 @@ constexpr float kPolygonTolerancePx = 0.7f;
 // tolerance at most (chord and sagitta); far beyond that, the vertex is a corner.
 constexpr double kCornerFactor = 2.0;
 constexpr double kMaxTurn = 75.0 * kDegree;
-// Largest length of the edge between the two halves of a rounded corner, in lengths of its
-// neighbours: edges of a smooth curve change more slowly.
-constexpr double kRoundedShare = 0.3;
 // What an arc needs to take part.
 constexpr int kMinArcPoints = 6;
 constexpr double kMinArcTurn = 12.0 * kDegree;
 // What the smoothing rounds on either side of a corner, points.
 constexpr int kCornerReach = 2;
-// How far the ends of two arcs may lie from the conic through their middles, or beyond each other's
-// tangents, pixels: tangents are good to a few degrees.
+// How far an arc may lie beyond another's tangents and chord, pixels: tangents are good to a few
+// degrees.
 constexpr double kEndSlackPx = 2.0;
-constexpr double kEndSlackShare = 0.03;
-// ... and how far their tangents there may be from its own, a sine (20 degrees).
-constexpr double kEndTangentSine = 0.34;
 
 // Point farther than the tolerance from the chord a-b (or from a, where both coincide), or -1.
 int Farthest(const std::vector<EdgePoint>& points, int a, int b) {
@@ -91,9 +85,6 @@ Arc MakeArc(const std::vector<EdgePoint>& points, int begin, int end, bool brigh
   arc.last = p(end - 1);
   arc.first_tangent = (p(begin + reach) - p(begin)).normalized();
   arc.last_tangent = (p(end - 1) - p(end - 1 - reach)).normalized();
-  // A chord about the middle is parallel to the tangent there, to second order in its length.
-  const int half = std::clamp((end - begin) / 4, 1, 8);
-  arc.middle_tangent = (p((begin + end) / 2 + half) - p((begin + end) / 2 - half)).normalized();
   return arc;
 }
 
@@ -136,10 +127,8 @@ class ArcFinder {
     for (std::size_t k = 1; k + 1 < v.size(); ++k) {
       const Vector2d a = P(v[k]) - P(v[k - 1]), b = P(v[k + 1]) - P(v[k]);
       const double theta = std::atan2(Cross(a, b), a.dot(b));
-      const bool rounded = IsRoundedCorner(v, k);
-      if (rounded || std::abs(theta) > kMaxTurn || IsCorner(a, b)) {
+      if (std::abs(theta) > kMaxTurn || IsCorner(a, b)) {
         Emit(begin, v[k] + 1, turn);
-        if (rounded) ++k;  // The other half of the corner.
         begin = v[k];
         sign = turn = 0.0;
         continue;
@@ -160,14 +149,6 @@ class ArcFinder {
   static bool IsCorner(const Vector2d& a, const Vector2d& b) {
     const double theta = std::abs(std::atan2(Cross(a, b), a.dot(b)));
     return std::min(a.norm(), b.norm()) * theta / 8.0 > kCornerFactor * kPolygonTolerancePx;
-  }
-
-  // The smoothing rounds a corner into two bends with a short edge between: v[k] is the first.
-  bool IsRoundedCorner(const std::vector<int>& v, std::size_t k) const {
-    if (k + 2 >= v.size()) return false;
-    const Vector2d a = P(v[k]) - P(v[k - 1]), b = P(v[k + 2]) - P(v[k + 1]);
-    const double between = (P(v[k + 1]) - P(v[k])).norm();
-    return kRoundedShare * std::min(a.norm(), b.norm()) > between && IsCorner(a, b);
   }
 
   void Emit(int begin, int end, double turn) {
@@ -193,40 +174,6 @@ bool InnerSide(const Arc& arc, const Vector2d& p) {
 
 bool OnInnerSide(const Arc& arc, const Arc& other) {
   return InnerSide(arc, other.first) && InnerSide(arc, other.middle) && InnerSide(arc, other.last);
-}
-
-// The conics through two points with given tangents are T1 T2 + m L^2 = 0, with the two tangents
-// and the line that joins the points; a third point settles m. Here the points are the middles of
-// the arcs, m is fitted to their four ends, and these must then lie on the conic and run along it.
-// In pixels, so that strong distortion needs the slack; it is a filter before the true fit, and a
-// hundred times faster.
-bool EndsAgree(const Arc& a, const Arc& b) {
-  const Vector2d along = (b.middle - a.middle).normalized();
-  const std::array<Vector2d, 4> ends = {a.first, a.last, b.first, b.last};
-  const std::array<Vector2d, 4> tangents = {a.first_tangent, a.last_tangent, b.first_tangent,
-                                            b.last_tangent};
-  std::array<double, 4> t1, t2, line;
-  double numerator = 0.0, denominator = 0.0;
-  for (std::size_t k = 0; k < 4; ++k) {
-    t1[k] = Cross(a.middle_tangent, ends[k] - a.middle);
-    t2[k] = Cross(b.middle_tangent, ends[k] - b.middle);
-    line[k] = Cross(along, ends[k] - a.middle);
-    numerator -= t1[k] * t2[k] * line[k] * line[k];
-    denominator += line[k] * line[k] * line[k] * line[k];
-  }
-  if (!(denominator > 0.0)) return false;
-  const double m = numerator / denominator;
-  const auto normal = [](const Vector2d& tangent) { return Vector2d(-tangent.y(), tangent.x()); };
-  const Vector2d n1 = normal(a.middle_tangent), n2 = normal(b.middle_tangent), n = normal(along);
-  for (std::size_t k = 0; k < 4; ++k) {
-    const double value = t1[k] * t2[k] + m * line[k] * line[k];
-    const Vector2d gradient = t1[k] * n2 + t2[k] * n1 + 2.0 * m * line[k] * n;
-    const double slack = kEndSlackPx + kEndSlackShare * std::abs(line[k]);
-    const double length = gradient.norm();
-    if (!(std::abs(value) <= slack * length)) return false;
-    if (!(std::abs(tangents[k].dot(gradient)) <= kEndTangentSine * length)) return false;
-  }
-  return true;
 }
 
 // Turn of the gradients over points[begin, end), in steps of four points, towards the darker side.
@@ -258,8 +205,6 @@ std::vector<Arc> SplitArc(const EdgeMap& map, const Arc& arc) {
   return parts;
 }
 
-bool CanShareEllipse(const Arc& a, const Arc& b) {
-  return OnInnerSide(a, b) && OnInnerSide(b, a) && EndsAgree(a, b);
-}
+bool CanShareEllipse(const Arc& a, const Arc& b) { return OnInnerSide(a, b) && OnInnerSide(b, a); }
 
 }  // namespace circline

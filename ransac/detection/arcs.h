@@ -13,10 +13,10 @@ namespace circline {
 // points[begin] .. points[end - 1] of an edge map, in order, bending to one side only.
 struct Arc {
   int begin = 0, end = 0;
-  bool bright_inside = false;           // It bends towards the brighter side.
-  double turn = 0.0;                    // Of its tangent from end to end, radians.
-  Eigen::Vector2d first, middle, last;  // Pixels.
-  Eigen::Vector2d first_tangent, middle_tangent, last_tangent;  // Unit, along the walk.
+  bool bright_inside = false;                   // It bends towards the brighter side.
+  double turn = 0.0;                            // Of its tangent from end to end, radians.
+  Eigen::Vector2d first, middle, last;          // Pixels.
+  Eigen::Vector2d first_tangent, last_tangent;  // Unit, along the walk.
 
   int size() const { return end - begin; }
 };
@@ -29,8 +29,8 @@ std::vector<Arc> FindArcs(const EdgeMap& map);
 // rounded by the smoothing. Parts that are no arcs are left out.
 std::vector<Arc> SplitArc(const EdgeMap& map, const Arc& arc);
 
-// Whether one ellipse can contain both: same side bright, each on the inner side of the other, and
-// their ends near the conic through their middles. A quick filter, 0.1 us; no promise.
+// Whether one ellipse can contain both: each is on the inner side of the other. A quick filter; no
+// promise.
 bool CanShareEllipse(const Arc& a, const Arc& b);
 
 }  // namespace circline

@@ -111,57 +111,20 @@ bool Contour::SampleCount(int n, std::vector<ContourSample>* samples) const {
   return true;
 }
 
-// A pinhole's projection is spelt out: sampling contours is what the detection of ellipses does
-// most.
 bool Contour::ToPixel(const Vector2d& x, Vector2d* pixel) const {
-  if (camera_.model != CameraModel::kPinhole) {
-    return CameraToPixel(camera_, Vector3d(x.x(), x.y(), 1.0), pixel);
-  }
-  *pixel = Vector2d(camera_.fx * x.x() + camera_.cx, camera_.fy * x.y() + camera_.cy);
-  return true;
+  return CameraToPixel(camera_, Vector3d(x.x(), x.y(), 1.0), pixel);
 }
 
 void EdgeCollector::Take(const std::vector<int>& points) {
   for (const int i : points) taken_[static_cast<std::size_t>(i)] = 1;
 }
 
-// The edge points in the pixels within `steps` of a sample along its normal, in order. Gathered
-// before they are looked at: the photo is large, and so all its pixels are fetched at once.
-int EdgeCollector::PointsAcross(const ContourSample& s, int steps,
-                                std::array<int, 16>* points) const {
-  std::size_t count = 0;
-  double x = s.pixel.x() - steps * s.normal.x(), y = s.pixel.y() - steps * s.normal.y();
-  for (int step = -steps; step <= steps; ++step) {
-    const int i = map_.PointAt(Round(x), Round(y));
-    (*points)[count] = i;
-    count += i >= 0 ? 1U : 0U;
-    x += s.normal.x();
-    y += s.normal.y();
-  }
-  return static_cast<int>(count);
-}
-
-std::array<double, 3> EdgeCollector::QuickLook(const std::vector<ContourSample>& samples,
-                                               double reach) const {
-  const int steps = std::min(static_cast<int>(reach + 0.5), kMaxSteps);
-  std::array<double, 3> shares{};
-  std::array<int, 16> points;
-  for (const ContourSample& s : samples) {
-    bool outside = false, inside = false;
-    const int count = PointsAcross(s, steps, &points);
-    for (int k = 0; k < count; ++k) {
-      const auto i = static_cast<std::size_t>(points[static_cast<std::size_t>(k)]);
-      if (taken_[i]) continue;
-      const double cosine = s.normal.dot(map_.points[i].Normal());
-      outside = outside || cosine > kMinNormalCosine;
-      inside = inside || cosine < -kMinNormalCosine;
-    }
-    shares[0] += outside ? 1.0 : 0.0;
-    shares[1] += inside ? 1.0 : 0.0;
-    shares[2] += outside || inside ? 1.0 : 0.0;
-  }
-  for (double& share : shares) share /= static_cast<double>(samples.size());
-  return shares;
+double EdgeCollector::QuickLook(const std::vector<ContourSample>& samples, BrightSide bright,
+                                double reach) const {
+  const auto hits = std::count_if(samples.begin(), samples.end(), [&](const ContourSample& s) {
+    return Strongest(s, bright, reach) >= 0;
+  });
+  return static_cast<double>(hits) / static_cast<double>(samples.size());
 }
 
 void EdgeCollector::Collect(const std::vector<ContourSample>& samples, BrightSide bright,
@@ -192,20 +155,37 @@ void EdgeCollector::Collect(const std::vector<ContourSample>& samples, BrightSid
     if (is_in == 0) support->points.push_back(i);
     is_in = 1;
   }
-  for (const int i : support->points) in_support_[static_cast<std::size_t>(i)] = 0;
+  std::vector<double> sigmas;
+  support->gradient = 0.0;
+  for (const int i : support->points) {
+    in_support_[static_cast<std::size_t>(i)] = 0;
+    const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
+    support->gradient += static_cast<double>(p.gradient);
+    sigmas.push_back(static_cast<double>(p.sigma_px));
+  }
+  support->gradient /= std::max(1.0, static_cast<double>(support->points.size()));
+  support->sigma_px = UpperMedian(std::move(sigmas));
   support->normal_median = UpperMedian(std::move(deviations));
 }
 
 // The free edge point near the contour at a sample with the right direction: of several the
-// strongest, with allowance for distance, as shadows and fringes run beside rims; or -1.
+// strongest, with allowance for distance, as shadows and fringes run beside rims; or -1. Points are
+// gathered before they are looked at: the photo is large, and so all its pixels are fetched at
+// once.
 int EdgeCollector::Strongest(const ContourSample& s, BrightSide bright, double reach) const {
-  std::array<int, 16> points;
-  const int count =
-      PointsAcross(s, std::min(static_cast<int>(std::ceil(reach)), kMaxSteps), &points);
+  constexpr int kMaxSteps = 7;
+  const int steps = std::min(static_cast<int>(std::ceil(reach)), kMaxSteps);
+  std::array<int, 2 * kMaxSteps + 2> points;
+  std::size_t count = 0;
+  for (int step = -steps; step <= steps; ++step) {
+    const Vector2d p = s.pixel + step * s.normal;
+    points[count] = map_.PointAt(Round(p.x()), Round(p.y()));
+    count += points[count] >= 0 ? 1U : 0U;
+  }
   int best = -1;
   double best_weight = 0.0;
-  for (int k = 0; k < count; ++k) {
-    const int i = points[static_cast<std::size_t>(k)];
+  for (std::size_t k = 0; k < count; ++k) {
+    const int i = points[k];
     if (taken_[static_cast<std::size_t>(i)]) continue;
     const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
     const double cosine = s.normal.dot(p.Normal());  // 1: bright outside, -1: inside.
@@ -220,18 +200,6 @@ int EdgeCollector::Strongest(const ContourSample& s, BrightSide bright, double r
     }
   }
   return best;
-}
-
-void EdgeCollector::AverageStrength(Support* support) const {
-  support->gradient = 0.0;
-  std::vector<double> sigmas;
-  for (const int i : support->points) {
-    const EdgePoint& p = map_.points[static_cast<std::size_t>(i)];
-    support->gradient += static_cast<double>(p.gradient);
-    sigmas.push_back(static_cast<double>(p.sigma_px));
-  }
-  support->gradient /= std::max(1.0, static_cast<double>(support->points.size()));
-  support->sigma_px = UpperMedian(std::move(sigmas));
 }
 
 double UpperMedian(std::vector<double> values) {

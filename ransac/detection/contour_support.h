@@ -3,7 +3,6 @@
 #define CIRCLINE_RANSAC_DETECTION_CONTOUR_SUPPORT_H_
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -55,9 +54,8 @@ struct Support {
   double length_px = 0.0;      // Of the parts of the contour that edges support.
   double turn = 0.0;           // Of the contour over those parts, radians.
   double normal_median = 0.0;  // Angle between the gradients and the contour's normal, radians.
-  // By AverageStrength only:
-  double gradient = 0.0;  // Mean over the points, grey levels per pixel.
-  double sigma_px = 0.0;  // Of the points, expected from the noise alone; median.
+  double gradient = 0.0;       // Mean over the points, grey levels per pixel.
+  double sigma_px = 0.0;       // Of the points, expected from the noise alone; median.
 
   // Share of the contour.
   double Coverage() const { return perimeter_px > 0.0 ? length_px / perimeter_px : 0.0; }
@@ -74,20 +72,16 @@ class EdgeCollector {
   void Take(const std::vector<int>& points);
   bool IsTaken(int i) const { return taken_[static_cast<std::size_t>(i)] != 0; }
 
-  // A first look with few samples: the shares of them near which there are edge points with the
-  // gradient across the contour, by BrightSide. (Here and below a reach over kMaxSteps pixels is
-  // cut to that.)
-  std::array<double, 3> QuickLook(const std::vector<ContourSample>& samples, double reach) const;
+  // A first look with few samples: the share of them near which there are edge points with the
+  // gradient across the contour. (Here and below a reach over 7 pixels is cut to that.)
+  double QuickLook(const std::vector<ContourSample>& samples, BrightSide bright,
+                   double reach) const;
 
   // The strongest points along the contour with the right bright side, as far as they come in runs.
   void Collect(const std::vector<ContourSample>& samples, BrightSide bright, double reach,
                Support* support);
-  void AverageStrength(Support* support) const;
 
  private:
-  static constexpr int kMaxSteps = 7;
-
-  int PointsAcross(const ContourSample& s, int steps, std::array<int, 16>* points) const;
   int Strongest(const ContourSample& s, BrightSide bright, double reach) const;
 
   const EdgeMap& map_;

@@ -21,14 +21,10 @@ constexpr std::size_t kMaxPairCandidates = 500;
 // Parts of an arc that are tried where the whole is no ellipse, in sixths.
 constexpr std::array<std::array<int, 2>, 4> kArcParts = {{{0, 5}, {1, 6}, {0, 3}, {3, 6}}};
 constexpr int kMinPartPoints = 12;
-// A candidate with this much of its contour is accepted before pairs are looked at.
-constexpr double kSureCoverage = 0.7;
 // Rims about the centre of one that is known are looked for up to this many times larger and
-// smaller, in steps of this share; in both planes that it can have unless these put its centre
-// within so many pixels.
+// smaller, in steps of this share, in both planes that it can have.
 constexpr double kMaxRimRatio = 2.7;
 constexpr double kRimStep = 0.05;
-constexpr double kSameCenterPx = 1.0;
 // Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
 constexpr double kDuplicatePx = 2.5;
 
@@ -60,21 +56,19 @@ class EllipseDetector {
 
   std::vector<DetectedEllipse> Detect() {
     arcs_ = FindArcs(map_);
-    // Whole contours first: they need no partner, and what they explain need not be looked at
-    // again. (By index: arcs are split, and the parts appended, as they are looked at.)
+    // (By index: arcs are split, and the parts appended, as they are looked at.)
     for (std::size_t k = 0; k < arcs_.size(); ++k) {
       const Arc arc = arcs_[k];
       if (arc.turn < kMinSingleTurn || AddCandidate({&arc})) continue;
       AddPart(arc);
       Split(k);
     }
-    AcceptBest(kSureCoverage);
     AddPairs();
-    AcceptBest(0.0);
+    AcceptBest();
     // (By index: what is found is looked around as well.)
     for (std::size_t k = 0; k < accepted_.size(); ++k) {
       AddRims(accepted_[k].fit.conic);
-      AcceptBest(0.0);
+      AcceptBest();
     }
     Rank();
     return std::move(accepted_);
@@ -114,7 +108,7 @@ class EllipseDetector {
   void AddPairs() {
     std::vector<const Arc*> arcs;
     for (const Arc& arc : arcs_) {
-      if (arc.turn > 0.0 && !Explained(arc)) arcs.push_back(&arc);
+      if (arc.turn > 0.0) arcs.push_back(&arc);
     }
     const auto weight = [](const Arc* a) { return a->turn * a->size(); };
     std::stable_sort(arcs.begin(), arcs.end(),
@@ -134,13 +128,7 @@ class EllipseDetector {
   // Where one rim is known, circles about its centre in its plane need no arc that determines them:
   // those that edges lie along.
   void AddRims(const Matrix3d& rim) {
-    const std::vector<SeenPose> seen = SeenPoses(rim, camera_);
-    for (const SeenPose& pose : seen) {
-      // Where perspective is weak both planes show the same rims.
-      const bool is_same =
-          &pose != &seen[0] && (pose.center - seen[0].center).norm() < kSameCenterPx;
-      if (!is_same) AddRimsOf(pose.pose);
-    }
+    for (const SeenPose& seen : SeenPoses(rim, camera_)) AddRimsOf(seen.pose);
   }
 
   void AddRimsOf(const CirclePose& pose) {
@@ -152,30 +140,15 @@ class EllipseDetector {
     }
   }
 
-  // Whether accepted ellipses took most of the arc.
-  bool Explained(const Arc& arc) const {
-    int taken = 0;
-    for (int i = arc.begin; i < arc.end; ++i) taken += fitter_.IsTaken(i) ? 1 : 0;
-    return 2 * taken > arc.size();
-  }
-
-  // Accepts candidates with at least `min_coverage`, best first; the others wait.
-  void AcceptBest(double min_coverage) {
+  // Accepts candidates, best first, as far as points that others took meanwhile do not count.
+  void AcceptBest() {
     std::stable_sort(
         candidates_.begin(), candidates_.end(),
         [](const EllipseCandidate& a, const EllipseCandidate& b) { return a.score > b.score; });
-    std::vector<EllipseCandidate> waiting;
     for (const EllipseCandidate& candidate : candidates_) {
-      // Points taken meanwhile no longer count.
-      const double coverage = fitter_.Coverage(candidate);
-      if (!(coverage > 0.0)) continue;
-      if (coverage < min_coverage) {
-        waiting.push_back(candidate);
-      } else {
-        Accept(candidate);
-      }
+      if (fitter_.IsSupported(candidate)) Accept(candidate);
     }
-    candidates_ = std::move(waiting);
+    candidates_.clear();
   }
 
   void Accept(const EllipseCandidate& candidate) {

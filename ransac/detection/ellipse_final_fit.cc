@@ -109,7 +109,8 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
     return kNone;
   const double reach = std::clamp(6.0 * Rms(trimmed_, candidate->conic), 0.8, kGatherPx.back());
   // What is gathered about a fit to all that is as near depends less on where the first started.
-  if (!GatherUnbiased(*candidate, reach, e) || !FitTrimmed(&candidate->conic, 1)) return kNone;
+  if (!GatherUnbiased(*candidate, reach, e) || !FitTrimmed(fit_points_, 1, &candidate->conic))
+    return kNone;
   if (!GatherUnbiased(*candidate, reach, e) || !FitUnbiased(candidate->conic, e)) return kNone;
   candidate->conic = e->fit.conic;
   if (!Plausible(candidate->bright) || contour_.minor_px() < options_.min_axis_px ||
@@ -127,8 +128,7 @@ double EllipseFitter::FinalFit(EllipseCandidate* candidate, DetectedEllipse* e) 
 // else agrees: what hides a part of a rim often runs beside it, and a fit to all lies between the
 // two. The one that the points are likeliest for, each of the rim or anywhere within reach.
 bool EllipseFitter::FitLikeliest(Matrix3d* conic) {
-  if (!FitTrimmed(conic, kMaxTrims)) return false;
-  collector_.AverageStrength(&support_);
+  if (!FitTrimmed(fit_points_, kMaxTrims, conic)) return false;
   const double sigma_px = std::hypot(kRimSigmaPx, support_.sigma_px);
   if (Rms(fit_points_, *conic) < sigma_px) return true;
   const std::size_t step = 1 + fit_points_.size() / kStretchPoints;
@@ -141,8 +141,7 @@ bool EllipseFitter::FitLikeliest(Matrix3d* conic) {
     for (std::size_t i = 0; i < stretch_.size(); ++i)
       stretch_[i] = fit_points_[(i + n * k / kStretches) % n];
     Matrix3d other;
-    if (stretch_.size() < 6 || !FitConicDirect(stretch_, &other).ok()) continue;
-    Concentrate(kStretchTrims, &other);
+    if (!FitTrimmed(stretch_, kStretchTrims, &other)) continue;
     const double cost = TruncatedCost(other, sigma_px);
     if (!(cost < least)) continue;
     least = cost;

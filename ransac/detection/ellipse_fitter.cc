@@ -73,31 +73,22 @@ bool EllipseFitter::FitArcs(std::initializer_list<const Arc*> arcs, EllipseCandi
 bool EllipseFitter::FindAlong(const Matrix3d& conic, EllipseCandidate* candidate) {
   if (!contour_.Project(conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
   if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
-  const std::array<double, 3> across = collector_.QuickLook(samples_, kQuickPx);
-  if (across[static_cast<std::size_t>(BrightSide::kEither)] < kQuickShare) return false;
-  constexpr auto kIn = static_cast<std::size_t>(BrightSide::kInside),
-                 kOut = static_cast<std::size_t>(BrightSide::kOutside);
+  const double inside = collector_.QuickLook(samples_, BrightSide::kInside, kQuickPx);
+  const double outside = collector_.QuickLook(samples_, BrightSide::kOutside, kQuickPx);
   candidate->conic = conic;
-  candidate->bright = across[kIn] > across[kOut] ? BrightSide::kInside : BrightSide::kOutside;
-  return Improve(candidate);
+  candidate->bright = inside > outside ? BrightSide::kInside : BrightSide::kOutside;
+  return std::max(inside, outside) >= kQuickShare && Refit(candidate);
 }
 
 bool EllipseFitter::Improve(EllipseCandidate* candidate) {
   if (!contour_.Project(candidate->conic, 0.5 * options_.min_axis_px, max_axis_px_)) return false;
   if (!contour_.SampleCount(kQuickSamples, &samples_)) return false;
-  const std::array<double, 3> across = collector_.QuickLook(samples_, kQuickPx);
-  return across[static_cast<std::size_t>(candidate->bright)] >= kQuickShare && Refit(candidate);
+  return collector_.QuickLook(samples_, candidate->bright, kQuickPx) >= kQuickShare &&
+         Refit(candidate);
 }
 
-double EllipseFitter::Coverage(const EllipseCandidate& candidate) {
-  const bool plausible = Gather(candidate, 1.5, kGatherPx.back()) && Plausible(candidate.bright);
-  return plausible ? support_.Coverage() : 0.0;
-}
-
-void EllipseFitter::Take(const DetectedEllipse& e) {
-  // What a wider gathering finds belongs to it as well.
-  if (Gather({e.fit.conic, e.bright, 0.0}, 0.7, kGatherPx[1])) collector_.Take(support_.points);
-  collector_.Take(e.points);
+bool EllipseFitter::IsSupported(const EllipseCandidate& candidate) {
+  return Gather(candidate, 1.5, kGatherPx.back()) && Plausible(candidate.bright);
 }
 
 bool EllipseFitter::LiesOn(const DetectedEllipse& e, const Matrix3d& conic, double reach_px) {
@@ -121,17 +112,12 @@ void EllipseFitter::AppendPoints(const Arc& arc) {
   }
 }
 
-// Direct fit to the points at hand, and to those that agree.
-bool EllipseFitter::FitTrimmed(Matrix3d* conic, int max_trims) {
-  if (!FitConicDirect(fit_points_, conic).ok()) return false;
-  Concentrate(max_trims, conic);
-  return true;
-}
-
-// Fits again without the points that stand out until these stay the same: the ends of an arc often
-// follow a neighbour's edge, a shadow runs beside a rim, and a few such points spoil a
-// least-squares fit.
-void EllipseFitter::Concentrate(int max_trims, Matrix3d* conic) {
+// Direct fit to `start`, and then to the points at hand without those that stand out, until these
+// stay the same: the ends of an arc often follow a neighbour's edge, a shadow runs beside a rim,
+// and a few such points spoil a least-squares fit.
+bool EllipseFitter::FitTrimmed(const std::vector<CalibratedPoint>& start, int max_trims,
+                               Matrix3d* conic) {
+  if (!FitConicDirect(start, conic).ok()) return false;
   std::size_t before = fit_points_.size();
   for (int round = 0; round < max_trims; ++round) {
     Trim(*conic);
@@ -141,6 +127,7 @@ void EllipseFitter::Concentrate(int max_trims, Matrix3d* conic) {
     if (!FitConicDirect(trimmed_, &better).ok()) break;
     *conic = better;
   }
+  return true;
 }
 
 void EllipseFitter::Trim(const Matrix3d& conic) {
@@ -210,7 +197,7 @@ bool EllipseFitter::Refit(EllipseCandidate* candidate) {
   for (std::size_t round = 0; round + 1 < kGatherPx.size(); ++round) {
     if (!Gather(*candidate, 1.5, kGatherPx[round], kRoughSamples)) return false;
     CalibrateSupport(kRoughSamples);
-    if (!FitTrimmed(&candidate->conic, 1)) return false;
+    if (!FitTrimmed(fit_points_, 1, &candidate->conic)) return false;
   }
   if (!Gather(*candidate, 1.5, kGatherPx.back(), 2 * kRoughSamples)) return false;
   if (!Plausible(candidate->bright)) return false;
@@ -225,7 +212,6 @@ bool EllipseFitter::Refit(EllipseCandidate* candidate) {
 // The ShapeDeviation of a contour; `points` are edge points near it.
 double EllipseFitter::MeasureShape(double rms_px, const Matrix3d& conic,
                                    const std::vector<int>& points) {
-  collector_.AverageStrength(&support_);
   return ShapeDeviation(support_, rms_px, SlopeDeg(map_, conic, points, &calibrated_),
                         std::sqrt(contour_.major_px() * contour_.minor_px()), map_.gradient_noise);
 }

@@ -42,14 +42,14 @@ class EllipseFitter {
   // ellipse.
   bool Improve(EllipseCandidate* candidate);
 
-  // Share of the contour that edges support which no ellipse took; 0 where that is too little.
-  double Coverage(const EllipseCandidate& candidate);
+  // Whether edges which no ellipse took support enough of the contour.
+  bool IsSupported(const EllipseCandidate& candidate);
 
   // The final fit; false if what the edges follow is no ellipse.
   bool Fit(EllipseCandidate candidate, DetectedEllipse* e);
 
   // Marks the ellipse's points: they support no other.
-  void Take(const DetectedEllipse& e);
+  void Take(const DetectedEllipse& e) { collector_.Take(e.points); }
   bool IsTaken(int i) const { return collector_.IsTaken(i); }
 
   // Whether a conic passes within `reach_px` of the ellipse's points. (A dozen of them are looked
@@ -64,10 +64,9 @@ class EllipseFitter {
   static constexpr double kMaxRmsPx = 0.6;
 
   void AppendPoints(const Arc& arc);
-  bool FitTrimmed(Eigen::Matrix3d* conic, int max_trims);
+  bool FitTrimmed(const std::vector<CalibratedPoint>& start, int max_trims, Eigen::Matrix3d* conic);
   bool FitLikeliest(Eigen::Matrix3d* conic);
   double TruncatedCost(const Eigen::Matrix3d& conic, double sigma_px);
-  void Concentrate(int max_trims, Eigen::Matrix3d* conic);
   void Trim(const Eigen::Matrix3d& conic);
   void MeasureDistances(const Eigen::Matrix3d& conic);
   double RobustSigma(const Eigen::Matrix3d& conic);

@@ -34,7 +34,6 @@ TEST(FindArcs, ADiscIsOneArcThatTurnsOnceAround) {
     ASSERT_EQ(arcs.size(), 1U);
     EXPECT_EQ(arcs[0].bright_inside, inside > 110.0);
     EXPECT_NEAR(arcs[0].turn, 2.0 * kPi, 0.6);  // Less the chord across its ends.
-    EXPECT_NEAR(arcs[0].middle_tangent.norm(), 1.0, 1e-12);
   }
 }
 
@@ -102,7 +101,6 @@ Arc Part(const EdgeMap& map, const Arc& arc, double from, double to) {
   part.middle = at(middle);
   part.last = at(part.end - 1);
   part.first_tangent = (at(part.begin + 4) - part.first).normalized();
-  part.middle_tangent = (at(middle + 4) - at(middle - 4)).normalized();
   part.last_tangent = (part.last - at(part.end - 5)).normalized();
   return part;
 }

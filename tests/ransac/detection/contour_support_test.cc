@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 
 #include "circline/estimators/basics.h"
@@ -88,13 +87,12 @@ TEST(EdgeCollector, MeasuresCoverageAndRemembersWhatIsTaken) {
   std::vector<ContourSample> samples;
   ASSERT_TRUE(contour.SampleEvery(1.0, &samples));
   EdgeCollector collector(map);
-  const std::array<double, 3> across = collector.QuickLook(samples, 2.0);
-  EXPECT_NEAR(across[0], 2.0 / 3.0, 0.08);
-  EXPECT_LT(across[1], 0.05);  // The wrong side bright.
-  EXPECT_NEAR(across[2], across[0], 0.05);
+  const double across = collector.QuickLook(samples, BrightSide::kOutside, 2.0);
+  EXPECT_NEAR(across, 2.0 / 3.0, 0.08);
+  EXPECT_LT(collector.QuickLook(samples, BrightSide::kInside, 2.0), 0.05);
+  EXPECT_NEAR(collector.QuickLook(samples, BrightSide::kEither, 2.0), across, 0.05);
   Support support;
   collector.Collect(samples, BrightSide::kOutside, 2.0, &support);
-  collector.AverageStrength(&support);
   EXPECT_NEAR(support.Coverage(), 2.0 / 3.0, 0.04);
   EXPECT_NEAR(support.turn, 4.0 * kPi / 3.0, 0.25);
   EXPECT_LT(support.normal_median, 0.03);
