@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "circline/ransac/detection/detect_pencils.h"
+#include "circline/ransac/detection/segment_meetings.h"
 
 namespace circline {
 namespace {
@@ -34,6 +35,23 @@ double LogOddsOfDirection(const std::vector<DetectedLine>& lines, const std::vec
   for (const int i : members)
     sum += LogOddsOfEdge(LineOdds(WornEdge(lines[static_cast<std::size_t>(i)])), direction, 0.0);
   return sum;
+}
+
+std::vector<std::vector<std::size_t>> FindCorners(const std::vector<DetectedLine>& lines,
+                                                  double diagonal_px, double min_length_px) {
+  const std::vector<int> twin_of = FindTwins(lines, diagonal_px);
+  const auto counts = [&](std::size_t i) {
+    return twin_of[i] < 0 && lines[i].length_px >= min_length_px;
+  };
+  std::vector<std::vector<std::size_t>> corners(lines.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    for (std::size_t j = i + 1; j < lines.size() && counts(i); ++j) {
+      if (!counts(j) || !FormCorner(lines[i].ends, lines[j].ends, diagonal_px)) continue;
+      corners[i].push_back(j);
+      corners[j].push_back(i);
+    }
+  }
+  return corners;
 }
 
 }  // namespace circline

@@ -3,6 +3,7 @@
 #define CIRCLINE_RANSAC_DETECTION_BOX_EDGE_H_
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <vector>
 
 #include "circline/ransac/detection/detect_lines.h"
@@ -22,6 +23,11 @@ double LogOddsOfEdge(const LineOdds& line, const Eigen::Vector3d& axis, double o
 // errors and the prior odds of a box's edges.
 double LogOddsOfDirection(const std::vector<DetectedLine>& lines, const std::vector<int>& members,
                           const Eigen::Vector3d& direction);
+
+// Of each line those that it forms a corner with, indices, ascending. Twins and lines shorter than
+// that have none.
+std::vector<std::vector<std::size_t>> FindCorners(const std::vector<DetectedLine>& lines,
+                                                  double diagonal_px, double min_length_px = 0.0);
 
 }  // namespace circline
 

@@ -61,7 +61,13 @@ class BoxSearch {
  public:
   // `lines` must outlive it.
   BoxSearch(const std::vector<DetectedLine>& lines, double diagonal_px) : lines_(lines) {
-    FindCorners(diagonal_px);
+    std::vector<std::vector<std::size_t>> corners = FindCorners(lines, diagonal_px);
+    std::size_t num_ends = 0;  // Of lines, in corners.
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      num_ends += corners[i].size();
+      edges_.push_back({LineOdds(WornEdge(lines[i])), std::move(corners[i])});
+    }
+    num_corners_ = static_cast<int>(num_ends / 2);
     axis_.resize(edges_.size());
     gain_.resize(edges_.size());
     seen_.resize(edges_.size());
@@ -76,11 +82,7 @@ class BoxSearch {
     std::vector<BoxHypothesis> boxes;
     for (std::size_t k = 0; k < axes.size(); ++k) {
       normal_ = axes[k];
-      boxes.push_back(FindOnNormal(0.0));
-      if (variance_ > 0.0) {
-        BoxHypothesis near = FindOnNormal(variance_);
-        if (near.log_odds > boxes.back().log_odds) boxes.back() = std::move(near);
-      }
+      boxes.push_back(FindOnNormal());
       boxes.back().given = k;
     }
     return Choose(std::move(boxes), log_odds_of_none);
@@ -151,19 +153,6 @@ class BoxSearch {
     return found;
   }
 
-  void FindCorners(double diagonal_px) {
-    const std::vector<int> twin_of = FindTwins(lines_, diagonal_px);
-    for (const DetectedLine& line : lines_) edges_.push_back({LineOdds(WornEdge(line)), {}});
-    for (std::size_t i = 0; i < lines_.size(); ++i) {
-      for (std::size_t j = i + 1; j < lines_.size() && twin_of[i] < 0; ++j) {
-        if (twin_of[j] >= 0 || !FormCorner(lines_[i].ends, lines_[j].ends, diagonal_px)) continue;
-        edges_[i].corners.push_back(j);
-        edges_[j].corners.push_back(i);
-        ++num_corners_;
-      }
-    }
-  }
-
   std::vector<BoxHypothesis> StartsFromCorners() {
     std::vector<BoxHypothesis> starts;
     const auto line = [this](std::size_t i) { return edges_[i].odds.fit().line; };
@@ -183,16 +172,14 @@ class BoxSearch {
     return starts;
   }
 
-  // At any angle about normal_, of which edges may be off by so much; and from there to where its
-  // edges agree best. No odds where there is none.
-  BoxHypothesis FindOnNormal(double off_variance) {
+  // At any angle about normal_, and from there to where its edges agree best. No odds where there
+  // is none.
+  BoxHypothesis FindOnNormal() {
     constexpr int kAngles = 180;  // Of a quarter turn: one in half a degree.
-    BoxHypothesis start, best;
+    BoxHypothesis start;
     const Matrix3d axes = AxesOf(normal_.unitOrthogonal(), normal_);
-    for (int k = 0; k < kAngles; ++k)
-      Consider(Rotated(axes, 0.5 * kPi * k / kAngles), off_variance, &start);
-    if (!std::isfinite(start.log_odds)) return best;
-    return Climb(start);
+    for (int k = 0; k < kAngles; ++k) Consider(Rotated(axes, 0.5 * kPi * k / kAngles), 0.0, &start);
+    return std::isfinite(start.log_odds) ? Climb(start) : start;
   }
 
   // From there to where its edges agree best.

@@ -34,16 +34,17 @@ constexpr int kFocalSteps = 50;
 
 // Four lines in a ring: each forms a corner with the next one.
 struct Ring {
-  std::array<int, 4> sides;
+  std::array<std::size_t, 4> sides;
   double perimeter = 0.0, log_odds = 0.0;
 };
 
 class RectangleSearch {
  public:
   RectangleSearch(const AssemblyOptions& options, const std::vector<DetectedLine>& lines)
-      : options_(options), lines_(lines), corners_(lines.size()) {
-    FindCorners();
-  }
+      : options_(options),
+        lines_(lines),
+        corners_(
+            FindCorners(lines, options.diagonal_px, kMinSeen * kMinSide * options.diagonal_px)) {}
 
   std::optional<std::array<DetectedPencil, 2>> Largest() {
     std::vector<Ring> rings = Rings();
@@ -63,33 +64,15 @@ class RectangleSearch {
   }
 
  private:
-  const DetectedLine& line(int i) const { return lines_[static_cast<std::size_t>(i)]; }
-  const std::vector<int>& corners(int i) const { return corners_[static_cast<std::size_t>(i)]; }
-
-  void FindCorners() {
-    const std::vector<int> twin_of = FindTwins(lines_, options_.diagonal_px);
-    const auto is_side = [&](std::size_t i) {
-      return twin_of[i] < 0 && lines_[i].length_px >= kMinSeen * kMinSide * options_.diagonal_px;
-    };
-    for (std::size_t i = 0; i < lines_.size(); ++i) {
-      for (std::size_t j = i + 1; j < lines_.size() && is_side(i); ++j) {
-        if (!is_side(j) || !FormCorner(lines_[i].ends, lines_[j].ends, options_.diagonal_px))
-          continue;
-        corners_[i].push_back(static_cast<int>(j));
-        corners_[j].push_back(static_cast<int>(i));
-      }
-    }
-  }
-
   // All, each once: it starts with the line of the lowest index, and the second is before the last.
   std::vector<Ring> Rings() const {
     std::vector<Ring> rings;
-    for (int i = 0; i < static_cast<int>(lines_.size()); ++i) {
-      for (const int j : corners(i)) {
-        for (const int k : corners(j)) {
+    for (std::size_t i = 0; i < lines_.size(); ++i) {
+      for (const std::size_t j : corners_[i]) {
+        for (const std::size_t k : corners_[j]) {
           if (j < i || k <= i) continue;
-          for (const int l : corners(k)) {
-            const auto& of_l = corners(l);
+          for (const std::size_t l : corners_[k]) {
+            const auto& of_l = corners_[l];
             if (l <= j || std::find(of_l.begin(), of_l.end(), i) == of_l.end()) continue;
             Ring ring{{i, j, k, l}};
             if (Judge(&ring)) rings.push_back(ring);
@@ -104,7 +87,7 @@ class RectangleSearch {
   bool Judge(Ring* ring) const {
     std::array<Vector2d, 4> at;  // Where each side ends, and the next one begins.
     for (std::size_t k = 0; k < 4; ++k)
-      at[k] = Crossing(line(ring->sides[k]).ends, line(ring->sides[(k + 1) % 4]).ends);
+      at[k] = Crossing(lines_[ring->sides[k]].ends, lines_[ring->sides[(k + 1) % 4]].ends);
     const double unit = kMeanGap * options_.diagonal_px;
     double turn = 0.0;
     for (std::size_t k = 0; k < 4; ++k) {
@@ -112,7 +95,7 @@ class RectangleSearch {
       const double cross = Cross(to - from, next - to), length = (to - from).norm();
       if (cross * turn < 0.0 || !(length >= kMinSide * options_.diagonal_px)) return false;
       turn = cross;
-      const DetectedLine& side = line(ring->sides[k]);
+      const DetectedLine& side = lines_[ring->sides[k]];
       if (side.length_px < kMinSeen * length) return false;
       ring->perimeter += length;
       for (const Vector2d& corner : {from, to}) {
@@ -125,10 +108,13 @@ class RectangleSearch {
 
   // Two opposite sides.
   bool Pair(const Ring& ring, std::size_t first, DetectedPencil* pencil) const {
-    const std::vector<int> members = {std::min(ring.sides[first], ring.sides[first + 2]),
-                                      std::max(ring.sides[first], ring.sides[first + 2])};
+    std::vector<int> members;
     std::vector<LineFit> fits;
-    for (const int i : members) fits.push_back(WornEdge(line(i)));
+    for (const std::size_t i : {std::min(ring.sides[first], ring.sides[first + 2]),
+                                std::max(ring.sides[first], ring.sides[first + 2])}) {
+      members.push_back(static_cast<int>(i));
+      fits.push_back(WornEdge(lines_[i]));
+    }
     VanishingPointFit fit;
     if (!FitVanishingPoint(fits, &fit).ok()) return false;
     *pencil = MakePencil(lines_, members, fits, fit.direction);
@@ -152,7 +138,8 @@ class RectangleSearch {
 
   const AssemblyOptions& options_;
   const std::vector<DetectedLine>& lines_;
-  std::vector<std::vector<int>> corners_;  // Of each line: those that it forms one with.
+  const std::vector<std::vector<std::size_t>>
+      corners_;  // Of each line: those that it forms one with.
 };
 
 }  // namespace
