@@ -147,22 +147,8 @@ bool IsKnown(const DetectedPencil& pencil, const std::vector<DetectedPencil>& ot
 
 std::vector<DetectedPencil> DetectPencilsApart(const std::vector<DetectedLine>& lines,
                                                int max_pencils, std::uint64_t seed,
-                                               double diagonal_px,
-                                               const std::vector<Vector3d>& known) {
-  const LineSet set(lines, diagonal_px);
-  std::vector<DetectedPencil> pencils = Search(set, max_pencils, seed);
-  std::vector<int> all(lines.size());
-  std::iota(all.begin(), all.end(), 0);
-  for (const Vector3d& direction : known) {
-    const auto is_it = [&](const DetectedPencil& pencil) {
-      return AreAlike(pencil.observation.fit->direction, direction);
-    };
-    if (std::any_of(pencils.begin(), pencils.end(), is_it)) continue;
-    auto pencil = FitPencil(set, all, direction, kParallelSigmaRad, PencilOptions().min_lines);
-    if (pencil && !IsKnown(*pencil, pencils)) pencils.push_back(std::move(*pencil));
-  }
-  LongestFirst(&pencils);
-  return pencils;
+                                               double diagonal_px) {
+  return Search(LineSet(lines, diagonal_px), max_pencils, seed);
 }
 
 std::vector<DetectedPencil> DetectPencils(const std::vector<DetectedLine>& lines, int max_pencils,

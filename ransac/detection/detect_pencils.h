@@ -34,11 +34,9 @@ std::vector<DetectedPencil> DetectPencils(const std::vector<DetectedLine>& lines
                                           double diagonal_px = kUsualDiagonalPx);
 
 // The first half of that: without those around the longest, which are looked for at right angles.
-// `known`: directions that other looks at the photo have found; their pencils are among the result.
 std::vector<DetectedPencil> DetectPencilsApart(const std::vector<DetectedLine>& lines,
                                                int max_pencils, std::uint64_t seed,
-                                               double diagonal_px = kUsualDiagonalPx,
-                                               const std::vector<Eigen::Vector3d>& known = {});
+                                               double diagonal_px = kUsualDiagonalPx);
 
 // Fits, as those of pencils, of the lines that come near those of some pencils and are of none of
 // them, one of each edge, longest first.

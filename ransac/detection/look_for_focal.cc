@@ -8,13 +8,11 @@
 #include "circline/ransac/detection/detect_pencils.h"
 #include "circline/ransac/detection/straight_lens.h"
 #include "circline/ransac/detection/structure_focal.h"
-#include "circline/ransac/detection/uncertain_direction.h"
 
 namespace circline {
 namespace {
 
 using Eigen::Vector2d;
-using Eigen::Vector3d;
 
 // What is seen of a photo through a camera whose focal length is a guess.
 struct Look {
@@ -27,10 +25,6 @@ double LengthOfLines(const PhotoEvidence& evidence) {
   double length = 0.0;
   for (const DetectedLine& line : evidence.lines) length += line.length_px;
   return length;
-}
-
-Vector3d SeenThrough(double log_focal, const Vector3d& direction) {
-  return Refocus({direction, Eigen::Matrix3d::Zero()}, log_focal).direction;
 }
 
 // The same focal lengths whatever the guess.
@@ -97,7 +91,6 @@ PhotoEvidence LookForFocal(const CollectEvidenceFn& collect, const DetectionOpti
   };
   double next = OnSteps(FirstLogFocal(camera, sigma));
   std::vector<Look> looks;
-  std::vector<Vector3d> rays;  // Of all looks' pencils, as a camera of focal length 1 has them.
   const auto is_next = [&next](const Look& look) {
     return std::abs(look.log_focal - next) < 0.5 * kFocalStep;
   };
@@ -108,13 +101,8 @@ PhotoEvidence LookForFocal(const CollectEvidenceFn& collect, const DetectionOpti
     look_through(next);
     look.evidence = is_first ? LookForLens(collect, options, &camera) : collect(camera);
     observations->found_k1 = camera.distortion[0] - stated_k1;
-    // A pencil that one look finds and another does not would tell their focal lengths apart.
-    std::vector<Vector3d> known;
-    for (const Vector3d& ray : rays) known.push_back(SeenThrough(std::log(camera.fx), ray));
-    const std::vector<DetectedPencil> pencils = DetectPencilsApart(
-        look.evidence.lines, options.max_pencils, options.seed, diagonal_px, known);
-    for (const DetectedPencil& pencil : pencils)
-      rays.push_back(SeenThrough(-std::log(camera.fx), pencil.observation.fit->direction));
+    const std::vector<DetectedPencil> pencils =
+        DetectPencilsApart(look.evidence.lines, options.max_pencils, options.seed, diagonal_px);
     look.likeliest =
         LikeliestFocal(look.evidence, pencils, camera, sigma, StatedLogFocal(*observations),
                        diagonal_px, observations->found_k1);

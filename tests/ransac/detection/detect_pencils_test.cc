@@ -49,29 +49,6 @@ TEST(DetectPencils, FindsTheDirectionsLongestFirst) {
   EXPECT_NEAR(pencils[0].observation.sigma_px, 0.15, 0.06);
 }
 
-// Four short lines among many others are no pencil by themselves; where another look has found
-// their direction they are one, and what is found anyway is not found twice.
-TEST(DetectPencils, TakesDirectionsThatAreKnown) {
-  std::vector<DetectedLine> lines = MakePencil(kFirst, 30, 0.0, 1);
-  Random random(4);
-  for (int k = 0; k < 4; ++k)
-    lines.push_back(MakeLine(detection_test::TestCamera(), 100.0 + 90.0 * k, 150.0 + 20.0 * k,
-                             kSecond, 25.0, 0.0, 0.15, &random));
-  for (int k = 0; k < 40; ++k) {
-    const double u = random.Uniform(60.0, 420.0), v = random.Uniform(60.0, 300.0);
-    const double angle = random.Uniform(0.0, kPi);
-    lines.push_back(MakeLine(detection_test::TestCamera(), u, v,
-                             Vector3d(std::cos(angle), std::sin(angle), 0.0), 25.0, 0.0, 0.15,
-                             &random));
-  }
-  ASSERT_EQ(DetectPencilsApart(lines, 3, 1).size(), 1U);
-  const auto pencils =
-      DetectPencilsApart(lines, 3, 1, kUsualDiagonalPx, {kSecond, -kSecond, kFirst});
-  ASSERT_EQ(pencils.size(), 2U);
-  EXPECT_LT(AxisDeg(pencils[1].observation.fit->direction, kSecond), 3.0);
-  for (const int i : {30, 31, 32, 33}) EXPECT_TRUE(pencils[1].Has(i)) << i;
-}
-
 TEST(DetectPencils, KnowsTheScatterOfLinesThatAreNotQuiteParallel) {
   // A quarter of a degree each: the covariance must cover it, though every line is known far
   // better.
