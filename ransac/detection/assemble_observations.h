@@ -28,17 +28,11 @@ struct AssemblyOptions {
   double prior_log_focal = 0.0, focal_sigma = 0.0;
 };
 
-// Chooses the plane with most support, "p0": that of two pencils and the circles that agree with
-// it, or of circles alone. Agreement is a test with the propagated covariances. Two pencils in it
-// that are likelier at right angles than at any become x and y, a third orthogonal to both z;
-// others stay free. Appends circles ("c0", ...) and pencils ("L0", ...) to `observations`, those of
-// the plane first. `circles` and `pencils` are ordered by support; they are moved from. `lines` are
-// those that the pencils' members index; the two pencils that span the plane are fitted again to
-// all that lie where the two meet. Where circles are all that a plane has, a box that stands on it
-// (of `lines` and `bent` ones) gives it x and y, and tells which of a lone circle's two normals it
-// has. A box with an axis along a pencil is taken where there is no plane, and instead of two
-// pencils one of which is along none of its axes and has less evidence than they. Where there is no
-// plane, or that of one circle which can lie in it, the sides of a rectangle are x and y.
+// What DetectObservations says of planes, axes and ids. Appends circles ("c0", ...) and pencils
+// ("L0", ...) to `observations`, those of the plane "p0" first. `circles` and `pencils` are ordered
+// by support; they are moved from. `lines` are those that the pencils' members index. A box, of
+// `lines` and `bent` ones, is also taken instead of two pencils one of which is along none of its
+// axes and has less evidence than they.
 void AssembleObservations(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
                           const std::vector<DetectedLine>& bent,
                           std::vector<CircleEvidence>* circles,

@@ -1,10 +1,9 @@
 // A box on a plane: three directions at right angles, one of them the plane's normal, whose lines
 // meet in corners.
 //
-// The few edges of a box hardly stand out among the lines of a photo: each of its directions has
-// two or three. What gives it away is that lines of all three end in common points. Where one axis
-// comes from elsewhere (a circle leaves two normals, a pencil has a direction), what is left to
-// search is one angle; where none does, three edges in a row say all axes.
+// Each direction of a box has two or three edges, too few to be found as a pencil; but lines of all
+// three end in common corners. Where one axis is known (a circle's normal, a pencil's direction),
+// one angle is searched; where none is, any three edges in a row give all axes.
 #ifndef CIRCLINE_RANSAC_DETECTION_FIND_BOX_H_
 #define CIRCLINE_RANSAC_DETECTION_FIND_BOX_H_
 

@@ -1,14 +1,10 @@
 // The focal length at which the structure of a photo is likeliest, where it is not known.
 // Internal: not installed.
 //
-// Right angles and common planes are judged in calibrated coordinates: at a wrong focal length the
-// discs of one sheet lie in different planes and the walls of a house are oblique. So the evidence
-// for structure is compared over the focal lengths that are possible beforehand: how likely the
-// directions of the longest pencils are at right angles in pairs, and whether the circles have one
-// plane; each part as the odds of a mixture, so that what has no part in a structure costs its
-// share and no more. Where there is one pencil and nothing else, the edges around it tell at which
-// focal length they are at right angles to it: a box has too few of them for a second pencil. Where
-// there are more, other lines tell at which they have the third direction of a thing.
+// At a wrong focal length the discs of one sheet lie in different planes and the walls of a house
+// are oblique. Compared over the focal lengths that are possible beforehand: the odds that the
+// longest pencils are at right angles in pairs, that the circles have one plane, and that other
+// lines are at right angles to the only pencil, or along the third direction of two.
 #ifndef CIRCLINE_RANSAC_DETECTION_STRUCTURE_FOCAL_H_
 #define CIRCLINE_RANSAC_DETECTION_STRUCTURE_FOCAL_H_
 
