@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "circline/estimators/basics.h"
-
 namespace circline {
 namespace {
 
@@ -35,26 +33,6 @@ RadialFactor KannalaBrandtRadial(const std::array<double, 8>& k, double s) {
   // d(theta_d)/dr = dpoly / (1 + s) and theta_d = r f, hence 2 s f' = d(theta_d)/dr - f.
   const double df = s < 1e-8 ? k[0] - 1.0 / 3.0 : (dpoly / (1.0 + s) - f) / (2.0 * s);
   return {f, df};
-}
-
-// Angle off the axis whose distorted radius is theta_d; false where that is 89 degrees or more.
-bool FisheyeAngle(const std::array<double, 8>& k, double theta_d, double* theta) {
-  constexpr double kMaxAngle = 89.0 * kDegree;
-  const auto distort = [&k](double t) {
-    const double q = t * t;
-    return t * (1.0 + q * (k[0] + q * (k[1] + q * (k[2] + q * k[3]))));
-  };
-  // Bisection: a fisheye's radius grows with the angle, or the camera is refused later
-  // (IsOneToOne).
-  double low = 0.0, high = kMaxAngle;
-  if (!(theta_d < distort(high))) return false;
-  constexpr int kSteps = 40;
-  for (int i = 0; i < kSteps; ++i) {
-    const double middle = 0.5 * (low + high);
-    (distort(middle) < theta_d ? low : high) = middle;
-  }
-  *theta = 0.5 * (low + high);
-  return true;
 }
 
 RadialFactor Radial(const Camera& camera, double s) {
@@ -146,11 +124,10 @@ bool PixelToCalibrated(const Camera& camera, const Eigen::Vector2d& pixel, Calib
   Eigen::Vector2d x = target;
   Distorted d = Distort(camera, x);
   if (camera.model == CameraModel::kFisheye) {
-    // tan is steep: solve for the angle first, then polish with the others.
+    // tan is steep: start where an equidistant lens would have the pixel, not near the edge.
+    constexpr double kMaxStart = 1.0;  // Radians.
     const double distorted = target.norm();
-    double theta;
-    if (!FisheyeAngle(camera.distortion, distorted, &theta)) return false;
-    if (distorted > 1e-8) x = target * (std::tan(theta) / distorted);
+    if (distorted > 1e-8) x = target * (std::tan(std::min(distorted, kMaxStart)) / distorted);
     d = Distort(camera, x);
   }
   if (camera.model != CameraModel::kPinhole) {
