@@ -18,16 +18,9 @@ using Eigen::Vector4d;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// A Gauss-Newton step, no longer than what the linearisation is good for; with the focal length as
-// it is where `hold_focal`.
-bool TakeStep(PlaneEquations equations, bool hold_focal, PlaneState* state, double* length) {
+// A Gauss-Newton step, no longer than what the linearisation is good for.
+bool TakeStep(const PlaneEquations& equations, PlaneState* state, double* length) {
   constexpr double kLongest = 0.2;  // Radians; of logarithms.
-  if (hold_focal) {
-    equations.information.row(0).setZero();
-    equations.information.col(0).setZero();
-    equations.information(0, 0) = 1.0;
-    equations.gradient[0] = 0.0;
-  }
   Vector4d step = -equations.information.ldlt().solve(equations.gradient);
   *length = step.head<3>().cwiseAbs().maxCoeff();
   if (!step.allFinite()) return false;
@@ -36,25 +29,12 @@ bool TakeStep(PlaneEquations equations, bool hold_focal, PlaneState* state, doub
   return true;
 }
 
-// The other unknowns at a focal length, roughly, and chi2 there.
-double Profile(const PlaneEvidence& evidence, PlaneState* state) {
-  constexpr int kSteps = 2;
-  PlaneEquations equations;
-  for (int i = 0; i < kSteps; ++i) {
-    double length;
-    if (!equations.Set(evidence, *state) || !TakeStep(equations, true, state, &length)) {
-      return kInfinity;
-    }
-  }
-  return equations.Set(evidence, *state) ? equations.chi2 : kInfinity;
-}
-
 // All unknowns together, to 1e-12.
 bool Polish(const PlaneEvidence& evidence, PlaneState* state, PlaneEquations* equations) {
   constexpr int kMaxSteps = 50;
   double length = kInfinity;
   for (int i = 0; i < kMaxSteps && length > 1e-12; ++i) {
-    if (!equations->Set(evidence, *state) || !TakeStep(*equations, false, state, &length)) {
+    if (!equations->Set(evidence, *state) || !TakeStep(*equations, state, &length)) {
       return false;
     }
   }
@@ -82,30 +62,29 @@ bool StartStates(const PlaneEvidence& evidence, double log_focal,
 
 constexpr std::size_t kStarts = 40;
 
-struct Profiled {
+struct Start {
   PlaneState state;
   double chi2 = kInfinity;
 };
-using Branch = std::array<Profiled, kStarts>;
+using Branch = std::array<Start, kStarts>;
 
 // Both branches, each continuous in the first circle's normal.
-bool ProfileBranches(const PlaneEvidence& evidence, double low, double high,
-                     std::array<Branch, 2>* branches) {
-  std::array<PlaneState, 2> last;
+bool FillBranches(const PlaneEvidence& evidence, double low, double high,
+                  std::array<Branch, 2>* branches) {
   for (std::size_t i = 0; i < kStarts; ++i) {
     const double part = static_cast<double>(i) / (kStarts - 1);
     std::array<PlaneState, 2> states;
     if (!StartStates(evidence, low + part * (high - low), &states)) return false;
     const auto agree = [&](std::size_t before, std::size_t now) {
-      return last[before].basis.col(2).dot(states[now].basis.col(2));
+      return (*branches)[before][i - 1].state.basis.col(2).dot(states[now].basis.col(2));
     };
     if (i > 0 && agree(0, 1) + agree(1, 0) > agree(0, 0) + agree(1, 1)) {
       std::swap(states[0], states[1]);
     }
-    last = states;
     for (std::size_t k = 0; k < 2; ++k) {
-      (*branches)[k][i] = {states[k], 0.0};
-      (*branches)[k][i].chi2 = Profile(evidence, &(*branches)[k][i].state);
+      PlaneEquations equations;
+      const bool valid = equations.Set(evidence, states[k]);
+      (*branches)[k][i] = {states[k], valid ? equations.chi2 : kInfinity};
     }
   }
   return true;
@@ -189,7 +168,7 @@ int FocalFromPlane(const PlaneEvidence& evidence, double min_focal, double max_f
   if (reason != FocalRefusal::kNone) return RefuseFocal(reason, why);
   const double low = std::log(min_focal), high = std::log(max_focal);
   std::array<Branch, 2> branches;
-  if (!ProfileBranches(evidence, low, high, &branches)) {
+  if (!FillBranches(evidence, low, high, &branches)) {
     return RefuseFocal(FocalRefusal::kNoEllipse, why);
   }
   reason = FocalRefusal::kOutOfRange;

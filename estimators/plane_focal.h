@@ -26,10 +26,10 @@ struct PlaneEvidence {
 
 // For a focal length and a normal every circle, taken back to the plane, has a shape (two numbers,
 // 0 for a circle) and a size, and every pencil an angle with the plane: their least squares,
-// weighted by the covariances, over focal length, normal and unit of the radii. Searched in one
-// dimension: at 40 focal lengths from `min_focal` to `max_focal` (those of fields of view of 120
-// and 10 degrees are usual), from both poses of the first circle, the others of the unknowns are
-// solved for; then all together from every minimum, to 1e-12.
+// weighted by the covariances, over focal length, normal and unit of the radii. Compared at 40
+// focal lengths from `min_focal` to `max_focal` (those of fields of view of 120 and 10 degrees are
+// usual) on both planes of the first circle, then minimised over all unknowns from every minimum of
+// these, to 1e-12.
 //
 // Writes up to four solutions, the lowest chi2 first, without those that chi2 excludes (by more
 // than 60, where a unit is chi2 per degree of freedom if that is above 1). Refuses one circle
