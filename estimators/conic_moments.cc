@@ -43,41 +43,10 @@ Eigen::Matrix3d SolveHyper(const Matrix6d& M, const Matrix6d& N) {
   return VectorToConic(v.normalized());
 }
 
-// Unit eigenvector of the largest eigenvalue of a matrix whose eigenvalues are real: that
-// eigenvalue by Viete's formula for the roots of the characteristic polynomial, polished by
-// Newton's method.
-Eigen::Vector3d LargestEigenvector(const Eigen::Matrix3d& A) {
-  const double third = A.trace() / 3.0;
-  const double minors = A(0, 0) * A(1, 1) - A(0, 1) * A(1, 0) + A(0, 0) * A(2, 2) -
-                        A(0, 2) * A(2, 0) + A(1, 1) * A(2, 2) - A(1, 2) * A(2, 1);
-  const double determinant = A.determinant();
-  const double radius = std::sqrt(std::max(0.0, third * third - minors / 3.0));
-  const double height = third * third * third - 0.5 * (third * minors - determinant);
-  const double cosine = height / (radius * radius * radius);
-  double root = third;
-  if (std::isfinite(cosine)) {
-    root += 2.0 * radius * std::cos(std::acos(std::clamp(cosine, -1.0, 1.0)) / 3.0);
-  }
-  for (int i = 0; i < 2; ++i) {
-    const double value = ((root - 3.0 * third) * root + minors) * root - determinant;
-    const double slope = (3.0 * root - 6.0 * third) * root + minors;
-    if (std::abs(slope) > 0.0) root -= value / slope;
-  }
-  // Orthogonal to two rows of A - root I, those that determine it best.
-  const Eigen::Matrix3d B = A - root * Eigen::Matrix3d::Identity();
-  const Eigen::Vector3d r0 = B.row(0), r1 = B.row(1), r2 = B.row(2);
-  Eigen::Vector3d best = r0.cross(r1);
-  for (const Eigen::Vector3d& v : {r1.cross(r2).eval(), r2.cross(r0).eval()}) {
-    if (v.squaredNorm() > best.squaredNorm()) best = v;
-  }
-  return best.normalized();
-}
-
-// Halir and Flusser's numerically stable form of Fitzgibbon's ellipse-constrained fit; M is the
-// scatter of the monomials, any order of which splits into quadratic and linear parts.
+// Halir and Flusser's numerically stable form of Fitzgibbon's ellipse-constrained fit; M is
+// Moments::Scatter.
 bool SolveHalirFlusser(const Matrix6d& M, Eigen::Matrix3d* conic) {
-  // Quadratic (x^2, sqrt2 xy, y^2) and linear (sqrt2 x, sqrt2 y, 1) parts in the order of
-  // Monomials.
+  // Where M has the monomials (x^2, sqrt2 xy, y^2) and (sqrt2 x, sqrt2 y, 1).
   constexpr int kQuadratic[3] = {0, 3, 1}, kLinear[3] = {4, 5, 2};
   Eigen::Matrix3d S1, S2, S3;
   for (int i = 0; i < 3; ++i) {
@@ -95,7 +64,10 @@ bool SolveHalirFlusser(const Matrix6d& M, Eigen::Matrix3d* conic) {
   Eigen::Matrix3d inverse_constraint;
   inverse_constraint << 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.0;
   // One eigenvalue is positive, that of an ellipse, as the constraint's signature is (1, 2).
-  const Eigen::Vector3d q = LargestEigenvector(inverse_constraint * reduced);
+  const Eigen::EigenSolver<Eigen::Matrix3d> eigen(inverse_constraint * reduced);
+  Eigen::Index largest;
+  eigen.eigenvalues().real().maxCoeff(&largest);
+  const Eigen::Vector3d q = eigen.eigenvectors().col(largest).real();
   if (!(q[0] * q[2] - 0.5 * q[1] * q[1] > 0.0)) return false;
   const Eigen::Vector3d l = T * q;
   Vector6d v;
