@@ -105,32 +105,27 @@ Eigen::Matrix3d OvalEllipse(const Eigen::Matrix3d& conic, bool along_axes, doubl
   return out / out.norm();
 }
 
-// Of one candidate or more.
-const Candidate& Nearest(const std::vector<Candidate>& candidates, const Candidate& reference) {
-  const auto angle = [&reference](const Candidate& c) {
-    return RotationAngle(c.pose.rotation, reference.pose.rotation);
-  };
-  return *std::min_element(
-      candidates.begin(), candidates.end(),
-      [&angle](const Candidate& a, const Candidate& b) { return angle(a) < angle(b); });
-}
+const Eigen::Matrix3d& RotationOf(const Candidate& candidate) { return candidate.pose.rotation; }
+const Eigen::Matrix3d& RotationOf(const Eigen::Matrix3d& rotation) { return rotation; }
 
-// A perturbation may tip the convention that settles the senses of the axes; that is no error.
-Eigen::Matrix3d SameSenses(const Candidate& perturbed, const Candidate& reference) {
-  const std::array<Eigen::Matrix3d, 4> choices = SignChoices(perturbed.pose.rotation);
-  const auto angle = [&reference](const Eigen::Matrix3d& R) {
-    return RotationAngle(R, reference.pose.rotation);
+// The one of one or more whose rotation is nearest to the reference's.
+template <typename Range>
+auto Nearest(const Range& range, const Candidate& reference) {
+  const auto angle = [&](const auto& x) {
+    return RotationAngle(RotationOf(x), reference.pose.rotation);
   };
-  return *std::min_element(choices.begin(), choices.end(),
-                           [&angle](const auto& a, const auto& b) { return angle(a) < angle(b); });
+  return *std::min_element(range.begin(), range.end(),
+                           [&](const auto& a, const auto& b) { return angle(a) < angle(b); });
 }
 
 // Half the difference of two perturbed candidates, in rows [delta, delta_t, contradiction].
 Eigen::VectorXd HalfDifference(const Candidate& plus, const Candidate& minus,
                                const Candidate& reference) {
+  // A perturbation may tip the convention that settles the senses of the axes; that is no error.
+  const Eigen::Matrix3d high = Nearest(SignChoices(plus.pose.rotation), reference),
+                        low = Nearest(SignChoices(minus.pose.rotation), reference);
   Eigen::VectorXd half(6 + reference.contradiction.size());
-  half.head<3>() =
-      0.5 * LogRotation(SameSenses(plus, reference) * SameSenses(minus, reference).transpose());
+  half.head<3>() = 0.5 * LogRotation(high * low.transpose());
   half.segment<3>(3) = 0.5 * (plus.pose.translation - minus.pose.translation);
   half.tail(half.size() - 6) = 0.5 * (plus.contradiction - minus.contradiction);
   return half;
