@@ -25,12 +25,6 @@ Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& v) {
 // Of pose and velocities, which come first.
 using MotionMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 12, 12>;
 
-// The rows and columns of one block's tangent; none for a constant one.
-Eigen::Block<MotionMatrix> Corner(const TrackMap& map, int a, int b, MotionMatrix* M) {
-  return M->block(map.tangent(a), map.tangent(b), map.block(a).tangent_size(),
-                  map.block(b).tangent_size());
-}
-
 // Kalman's update by a measurement z = J x + noise of the pose, whose tangents come first: x moves
 // by K z.
 void KalmanUpdate(const TrackMap& map, const BlockMatrix& J, const BlockVector& z,
@@ -156,37 +150,28 @@ void MoveOn(const TrackMap& map, const TrackerOptions& options, double dt, Track
   }
   state->SetPose(map, moved);
 
-  // F of the first rows; it is the identity for all that follows.
-  const int n = map.tangent(M::kCamera);
-  MotionMatrix F = MotionMatrix::Identity(n, n), Q = MotionMatrix::Zero(n, n);
-  const Eigen::Matrix3d back = moved.rotation.transpose();
-  Corner(map, M::kRotation, M::kTurnRate, &F) = dt * back * V;
-  const double w2 = options.turn_rate_sigma * options.turn_rate_sigma * dt;
-  const Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
-  Corner(map, M::kRotation, M::kRotation, &Q) = w2 * dt * dt / 3.0 * unit;
-  Corner(map, M::kRotation, M::kTurnRate, &Q) = 0.5 * w2 * dt * back;
-  Corner(map, M::kTurnRate, M::kRotation, &Q) = 0.5 * w2 * dt * back.transpose();
-  Corner(map, M::kTurnRate, M::kTurnRate, &Q) = w2 * unit;
-  if (map.has_position()) {
-    // The shift is turned half as far as what it starts from.
-    const Eigen::Vector3d turned = E * pose.translation;
-    const Eigen::Matrix3d across = -CrossMatrix(0.5 * (turned + moved.translation));
-    Corner(map, M::kTranslation, M::kTranslation, &F) = E;
-    Corner(map, M::kTranslation, M::kTurnRate, &F) = dt * across * V;
-    Corner(map, M::kTranslation, M::kVelocity, &F) = dt * V;
-    const double sigma = options.velocity_sigma * pose.translation.norm();
-    const double v2 = sigma * sigma * dt;
-    // The turn's noise moves the translation, too.
-    Corner(map, M::kTranslation, M::kTranslation, &Q) =
-        v2 * dt * dt / 3.0 * unit + w2 * dt * dt / 3.0 * across * across.transpose();
-    Corner(map, M::kTranslation, M::kRotation, &Q) = w2 * dt * dt / 3.0 * across * back.transpose();
-    Corner(map, M::kRotation, M::kTranslation, &Q) = w2 * dt * dt / 3.0 * back * across.transpose();
-    Corner(map, M::kTranslation, M::kTurnRate, &Q) = 0.5 * w2 * dt * across;
-    Corner(map, M::kTurnRate, M::kTranslation, &Q) = 0.5 * w2 * dt * across.transpose();
-    Corner(map, M::kTranslation, M::kVelocity, &Q) = 0.5 * v2 * dt * unit;
-    Corner(map, M::kVelocity, M::kTranslation, &Q) = 0.5 * v2 * dt * unit;
-    Corner(map, M::kVelocity, M::kVelocity, &Q) = v2 * unit;
-  }
+  // d pose = dt B d(w, v), and V of each. The shift is turned half as far as what it starts from.
+  Matrix6d B = Matrix6d::Identity(), VV = Matrix6d::Zero();
+  B.topLeftCorner<3, 3>() = moved.rotation.transpose();
+  B.bottomLeftCorner<3, 3>() = -CrossMatrix(0.5 * (E * pose.translation + moved.translation));
+  VV.topLeftCorner<3, 3>() = VV.bottomRightCorner<3, 3>() = V;
+  Vector6d variances;  // Of the change of (w, v).
+  const double velocity_sigma = options.velocity_sigma * pose.translation.norm();
+  variances << Eigen::Vector3d::Constant(options.turn_rate_sigma * options.turn_rate_sigma * dt),
+      Eigen::Vector3d::Constant(velocity_sigma * velocity_sigma * dt);
+  const Matrix6d BV = dt * B * VV, BW = B * variances.asDiagonal();
+  const Matrix6d BWB = BW * B.transpose();
+
+  // F of the pose, its first rows, and the velocities; it is the identity for all that follows.
+  // Without a position the turns alone are there.
+  const int m = map.tangent(M::kTurnRate), n = map.tangent(M::kCamera);
+  MotionMatrix F = MotionMatrix::Identity(n, n), Q(n, n);
+  if (map.has_position()) F.block<3, 3>(3, 3) = E;
+  F.topRightCorner(m, m) = BV.topLeftCorner(m, m);
+  Q.topLeftCorner(m, m) = dt * dt / 3.0 * BWB.topLeftCorner(m, m);
+  Q.topRightCorner(m, m) = 0.5 * dt * BW.topLeftCorner(m, m);
+  Q.bottomLeftCorner(m, m) = Q.topRightCorner(m, m).transpose();
+  Q.bottomRightCorner(m, m) = variances.head(m).asDiagonal();
   Eigen::MatrixXd& P = state->covariance;
   for (Eigen::Index k = 0; k < P.cols(); ++k) {
     const BlockVector column = P.col(k).head(n);
