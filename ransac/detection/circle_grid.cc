@@ -304,12 +304,6 @@ std::vector<DetectedPencil> FindGridPencils(const Camera& camera,
       for (int& i : line) i = centres.circles[static_cast<std::size_t>(i)];
     }
   }
-  return MakeGridPencils(camera, circles, lattice, normal);
-}
-
-std::vector<DetectedPencil> MakeGridPencils(const Camera& camera,
-                                            const std::vector<Matrix3d>& circles,
-                                            const PointLattice& lattice, const Vector3d& normal) {
   std::vector<DetectedPencil> pencils;
   // The centres' images depend a little on the normal, and their lines know it better.
   Vector3d n = normal;

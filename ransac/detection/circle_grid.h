@@ -32,13 +32,6 @@ std::vector<DetectedPencil> FindGridPencils(const Camera& camera,
                                             const std::vector<Eigen::Matrix3d>& circles,
                                             const Eigen::Vector3d& normal);
 
-// The same of a lattice of circles that is known, as indices into `circles`: followed from another
-// photo.
-std::vector<DetectedPencil> MakeGridPencils(const Camera& camera,
-                                            const std::vector<Eigen::Matrix3d>& circles,
-                                            const PointLattice& lattice,
-                                            const Eigen::Vector3d& normal);
-
 }  // namespace circline
 
 #endif  // CIRCLINE_RANSAC_DETECTION_CIRCLE_GRID_H_

@@ -123,27 +123,24 @@ PencilObservation FollowPencil(const PencilObservation& predicted,
   return std::move(pencil.observation);
 }
 
-std::vector<std::vector<int>> LinesOfCentres(const Observations& predicted,
-                                             const PencilObservation& pencil) {
+bool IsOfCentres(const Observations& predicted, const PencilObservation& pencil) {
   std::vector<Ellipse> ellipses(predicted.circles.size());
   for (std::size_t i = 0; i < ellipses.size(); ++i) {
     const CircleObservation& circle = predicted.circles[i];
     if (circle.fit) ConicToEllipse(circle.fit->conic, &ellipses[i]);
   }
-  std::vector<std::vector<int>> members;
-  for (const LineObservation& line : pencil.lines) {
-    std::vector<int>& circles = members.emplace_back();
-    for (const Vector2d& pixel : line.points) {
-      CalibratedPoint p;
-      if (!PixelToCalibrated(predicted.camera, pixel, &p)) return {};
-      const auto at = std::find_if(ellipses.begin(), ellipses.end(), [&](const Ellipse& e) {
-        return (p.x - e.center).norm() < kMaxCentreShare * e.b;
-      });
-      if (at == ellipses.end()) return {};
-      circles.push_back(static_cast<int>(at - ellipses.begin()));
-    }
-  }
-  return members;
+  const auto is_centre = [&](const Vector2d& pixel) {
+    CalibratedPoint p;
+    return PixelToCalibrated(predicted.camera, pixel, &p) &&
+           std::any_of(ellipses.begin(), ellipses.end(), [&](const Ellipse& e) {
+             return (p.x - e.center).norm() < kMaxCentreShare * e.b;
+           });
+  };
+  const auto is_of_centres = [&](const LineObservation& line) {
+    return std::all_of(line.points.begin(), line.points.end(), is_centre);
+  };
+  return !pencil.lines.empty() &&
+         std::all_of(pencil.lines.begin(), pencil.lines.end(), is_of_centres);
 }
 
 }  // namespace circline

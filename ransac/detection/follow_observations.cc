@@ -83,10 +83,8 @@ class SearchBands {
   cv::Mat1b tiles_;
 };
 
-// Lines through the centres of circles, by pencil; empty for pencils of edges.
-using CentreLines = std::vector<std::vector<std::vector<int>>>;
-
-std::vector<cv::Rect> BandsOf(const Observations& predicted, const CentreLines& of_centres,
+std::vector<cv::Rect> BandsOf(const Observations& predicted,
+                              const std::vector<PencilObservation>& edge_pencils,
                               const cv::Size& photo, double search_px) {
   SearchBands bands(photo, search_px + kBandMarginPx);
   Contour contour(predicted.camera);
@@ -97,9 +95,8 @@ std::vector<cv::Rect> BandsOf(const Observations& predicted, const CentreLines& 
     if (!contour.SampleEvery(search_px, &samples)) continue;
     for (const ContourSample& sample : samples) bands.Add(sample.pixel);
   }
-  for (std::size_t p = 0; p < predicted.pencils.size(); ++p) {
-    if (!of_centres[p].empty()) continue;
-    for (const LineObservation& line : predicted.pencils[p].lines) {
+  for (const PencilObservation& pencil : edge_pencils) {
+    for (const LineObservation& line : pencil.lines) {
       for (std::size_t k = 1; k < line.points.size(); ++k)
         bands.AddSegment({line.points[k - 1], line.points[k]});
     }
@@ -107,40 +104,28 @@ std::vector<cv::Rect> BandsOf(const Observations& predicted, const CentreLines& 
   return bands.Rectangles();
 }
 
-// The rows and columns of a sheet of circles, of those that were found.
-void FollowGrid(const Observations& predicted, const CentreLines& of_centres, Observations* found,
+// The rows and columns of a sheet of circles, of those that were found: each goes on from the one
+// of the two predicted pencils that it is nearer to.
+void FollowGrid(const std::vector<PencilObservation>& predicted, Observations* found,
                 Observations* expect) {
+  // One direction does not tell where the centres are.
+  if (predicted.size() < 2 || !predicted[0].fit || !predicted[1].fit) return;
+  const Vector3d &x = predicted[0].fit->direction, &y = predicted[1].fit->direction;
   std::vector<Matrix3d> conics;
-  std::vector<int> place(predicted.circles.size(), -1);  // Of the predicted circles, in `conics`.
-  for (std::size_t i = 0; i < predicted.circles.size(); ++i) {
-    const int k = FindCircle(*found, predicted.circles[i].id);
-    if (k < 0) continue;
-    place[i] = static_cast<int>(conics.size());
-    conics.push_back(found->circles[static_cast<std::size_t>(k)].fit->conic);
-  }
-  PointLattice lattice;
-  std::vector<const PencilObservation*> grid;
-  for (std::size_t p = 0; p < of_centres.size() && grid.size() < 2; ++p) {
-    if (of_centres[p].empty() || !predicted.pencils[p].fit) continue;
-    std::vector<std::vector<int>>& lines = lattice.lines[grid.size()];
-    for (const std::vector<int>& line : of_centres[p]) {
-      std::vector<int>& members = lines.emplace_back();
-      for (const int i : line) {
-        if (place[static_cast<std::size_t>(i)] >= 0)
-          members.push_back(place[static_cast<std::size_t>(i)]);
-      }
-    }
-    grid.push_back(&predicted.pencils[p]);
-  }
-  if (grid.size() < 2) return;  // One direction does not tell where the centres are.
-  const Vector3d normal = grid[0]->fit->direction.cross(grid[1]->fit->direction).stableNormalized();
-  std::vector<DetectedPencil> pencils = MakeGridPencils(predicted.camera, conics, lattice, normal);
+  for (const CircleObservation& circle : found->circles) conics.push_back(circle.fit->conic);
+  std::vector<DetectedPencil> pencils =
+      FindGridPencils(found->camera, conics, x.cross(y).stableNormalized());
   if (pencils.size() < 2) return;
+  const auto along = [&](const DetectedPencil& pencil, const Vector3d& axis) {
+    return std::abs(pencil.observation.fit->direction.dot(axis));
+  };
+  if (along(pencils[0], x) + along(pencils[1], y) < along(pencils[0], y) + along(pencils[1], x))
+    std::swap(pencils[0], pencils[1]);
   for (std::size_t k = 0; k < 2; ++k) {
     PencilObservation& pencil = pencils[k].observation;
-    pencil.id = grid[k]->id;
-    pencil.direction = grid[k]->direction;
-    pencil.plane = grid[k]->plane;
+    pencil.id = predicted[k].id;
+    pencil.direction = predicted[k].direction;
+    pencil.plane = predicted[k].plane;
     expect->pencils[static_cast<std::size_t>(FindPencil(*expect, pencil.id))] = pencil;
     found->pencils.push_back(std::move(pencil));
   }
@@ -160,18 +145,13 @@ void ExpectPencil(const PencilObservation& pencil, const std::vector<int>& match
   place = std::move(next);
 }
 
-void FollowEdgeLines(const Observations& predicted, const CentreLines& of_centres,
-                     const EdgeMap& edges, const std::vector<std::uint8_t>& on_ellipses,
-                     double search_px, const DetectionOptions& options, Observations* found,
-                     Observations* expect) {
-  std::vector<PencilObservation> pencils;
-  for (std::size_t p = 0; p < predicted.pencils.size(); ++p) {
-    if (of_centres[p].empty()) pencils.push_back(predicted.pencils[p]);
-  }
+void FollowEdgeLines(const std::vector<PencilObservation>& pencils, const EdgeMap& edges,
+                     const std::vector<std::uint8_t>& on_ellipses, double search_px,
+                     const DetectionOptions& options, Observations* found, Observations* expect) {
   if (pencils.empty()) return;
   std::vector<DetectedLine> lines =
-      DetectLines(edges, predicted.camera, options.min_segment_length_px, &on_ellipses);
-  UndoEdgeShift(edges, predicted.camera, &lines);
+      DetectLines(edges, found->camera, options.min_segment_length_px, &on_ellipses);
+  UndoEdgeShift(edges, found->camera, &lines);
   const std::vector<std::vector<int>> matches = MatchLines(pencils, lines, search_px);
   for (std::size_t p = 0; p < pencils.size(); ++p) {
     PencilObservation pencil =
@@ -181,23 +161,17 @@ void FollowEdgeLines(const Observations& predicted, const CentreLines& of_centre
   }
 }
 
-// The frame that the features carry; pixels of it were those of another photo.
-FrameObservation FrameOf(const Observations& predicted) {
-  FrameObservation frame;
-  frame.plane = predicted.frame.plane;
-  frame.origin_is_center = predicted.frame.origin_is_center;
-  return frame;
-}
-
 // Pencils in the order of the prediction; the frame and the angles that still have what they name.
 void Settle(const Observations& predicted, Observations* found) {
   std::stable_sort(found->pencils.begin(), found->pencils.end(),
                    [&](const PencilObservation& a, const PencilObservation& b) {
                      return FindPencil(predicted, a.id) < FindPencil(predicted, b.id);
                    });
-  found->frame = FrameOf(predicted);
-  if (FindCircle(*found, found->frame.origin_is_center) < 0) found->frame.origin_is_center.clear();
-  if (!HasPlane(*found, found->frame.plane)) found->frame.plane.clear();
+  // Of the frame only what names features: its pixels were those of another photo.
+  const FrameObservation& frame = predicted.frame;
+  if (FindCircle(*found, frame.origin_is_center) >= 0)
+    found->frame.origin_is_center = frame.origin_is_center;
+  if (HasPlane(*found, frame.plane)) found->frame.plane = frame.plane;
   for (const KnownAngle& angle : predicted.known_angles) {
     if (FindPencil(*found, angle.pencils[0]) >= 0 && FindPencil(*found, angle.pencils[1]) >= 0)
       found->known_angles.push_back(angle);
@@ -230,10 +204,10 @@ Status FollowObservations(const cv::Mat& image, const Observations& predicted, d
   Status status = CheckDetectionInput(image, predicted.camera, options);
   if (status.ok()) status = ToGray(image, &gray);
   if (!status.ok()) return status;
-  CentreLines of_centres;
+  std::vector<PencilObservation> of_centres, of_edges;
   for (const PencilObservation& pencil : predicted.pencils)
-    of_centres.push_back(LinesOfCentres(predicted, pencil));
-  const std::vector<cv::Rect> bands = BandsOf(predicted, of_centres, gray.size(), search_px);
+    (IsOfCentres(predicted, pencil) ? of_centres : of_edges).push_back(pencil);
+  const std::vector<cv::Rect> bands = BandsOf(predicted, of_edges, gray.size(), search_px);
   const EdgeMap edges = DetectEdges(gray, kEdgeSmoothingPx, &bands);
   const std::vector<DetectedEllipse> ellipses =
       FollowCircles(edges, predicted.camera, predicted.circles,
@@ -247,9 +221,9 @@ Status FollowObservations(const cv::Mat& image, const Observations& predicted, d
     expect->circles[k] = circle;
     found->circles.push_back(std::move(circle));
   }
-  FollowEdgeLines(predicted, of_centres, edges, EllipsePoints(edges, ellipses), search_px, options,
-                  found, expect);
-  FollowGrid(predicted, of_centres, found, expect);
+  FollowEdgeLines(of_edges, edges, EllipsePoints(edges, ellipses), search_px, options, found,
+                  expect);
+  FollowGrid(of_centres, found, expect);
   Settle(predicted, found);
   return status;
 }

@@ -52,10 +52,8 @@ PencilObservation FollowPencil(const PencilObservation& predicted,
                                const std::vector<DetectedLine>& lines,
                                const std::vector<int>& matches, double diagonal_px);
 
-// Whether the lines of a pencil pass through the centres of circles (see circle_grid.h), and then,
-// for each line, of which.
-std::vector<std::vector<int>> LinesOfCentres(const Observations& predicted,
-                                             const PencilObservation& pencil);
+// Whether the points of a pencil's lines are the centres of circles (see circle_grid.h).
+bool IsOfCentres(const Observations& predicted, const PencilObservation& pencil);
 
 // Whether a circle or pencil lies in the plane.
 bool HasPlane(const Observations& observations, const std::string& plane);
