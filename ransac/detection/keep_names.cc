@@ -43,10 +43,9 @@ std::vector<int> AssignCircles(const Observations& predicted, const Observations
   return CheapestPairs(std::move(pairs), detected.circles.size(), predicted.circles.size());
 }
 
-// How many lines of each detected pencil continue those of each predicted one,
-// [predicted][detected].
-std::vector<std::vector<int>> CountSharedLines(const Observations& predicted,
-                                               const Observations& detected, double search_px) {
+// The same of pencils, by the lines that they share: at least half of those of the smaller one.
+std::vector<int> AssignPencils(const Observations& predicted, const Observations& detected,
+                               double search_px) {
   std::vector<DetectedLine> lines;
   std::vector<std::size_t> owner;
   for (std::size_t k = 0; k < detected.pencils.size(); ++k) {
@@ -55,60 +54,41 @@ std::vector<std::vector<int>> CountSharedLines(const Observations& predicted,
       owner.push_back(k);
     }
   }
-  std::vector<std::vector<int>> shared;
-  for (const std::vector<int>& matches : MatchLines(predicted.pencils, lines, search_px)) {
-    std::vector<int>& counts = shared.emplace_back(detected.pencils.size(), 0);
-    for (const int i : matches) {
-      if (i >= 0) ++counts[owner[static_cast<std::size_t>(i)]];
-    }
-  }
-  return shared;
-}
-
-// The same of pencils, by the lines that they share: at least half of those of the smaller one.
-std::vector<int> AssignPencils(const Observations& predicted, const Observations& detected,
-                               double search_px) {
-  const std::vector<std::vector<int>> shared = CountSharedLines(predicted, detected, search_px);
+  const std::vector<std::vector<int>> matches = MatchLines(predicted.pencils, lines, search_px);
   std::vector<FeaturePair> pairs;
   for (std::size_t i = 0; i < predicted.pencils.size(); ++i) {
     for (std::size_t k = 0; k < detected.pencils.size(); ++k) {
       const auto &before = predicted.pencils[i].fit, &now = detected.pencils[k].fit;
       if (before && now && before->direction.cross(now->direction).norm() > kMaxTurnSine) continue;
-      const std::size_t fewer =
+      const auto fewer =
           std::min(predicted.pencils[i].lines.size(), detected.pencils[k].lines.size());
-      if (shared[i][k] > 0 && 2 * static_cast<std::size_t>(shared[i][k]) >= fewer)
-        pairs.push_back({-1.0 * shared[i][k], k, i});
+      const auto shared = static_cast<std::size_t>(std::count_if(
+          matches[i].begin(), matches[i].end(),
+          [&](int line) { return line >= 0 && owner[static_cast<std::size_t>(line)] == k; }));
+      if (shared > 0 && 2 * shared >= fewer) pairs.push_back({-static_cast<double>(shared), k, i});
     }
   }
   return CheapestPairs(std::move(pairs), detected.pencils.size(), predicted.pencils.size());
 }
 
-// What the planes of the detection are called in the prediction: as most features say that are in
-// both.
+// What the planes of the detection are called in the prediction: as the first feature says that is
+// in both.
 class PlaneNames {
  public:
   explicit PlaneNames(NextNames* next) : next_(*next) {}
 
-  void Vote(const std::string& detected, const std::string& predicted) {
-    if (!detected.empty() && !predicted.empty()) ++votes_[detected][predicted];
+  void Continue(const std::string& detected, const std::string& predicted) {
+    if (!detected.empty() && !predicted.empty()) names_.emplace(detected, predicted);
   }
   std::string Name(const std::string& detected) {
     if (detected.empty()) return detected;
-    std::string& name = names_[detected];
-    if (!name.empty()) return name;
-    int most = 0;
-    for (const auto& [candidate, count] : votes_[detected]) {
-      if (count <= most) continue;
-      most = count;
-      name = candidate;
-    }
-    if (name.empty()) name = "p" + std::to_string(next_.plane++);
-    return name;
+    const auto [place, is_new] = names_.try_emplace(detected);
+    if (is_new) place->second = "p" + std::to_string(next_.plane++);
+    return place->second;
   }
 
  private:
   NextNames& next_;
-  std::map<std::string, std::map<std::string, int>> votes_;
   std::map<std::string, std::string> names_;
 };
 
@@ -123,8 +103,8 @@ void NameFeatures(const std::vector<Feature>& predicted, const std::vector<int>&
                   const char* letter, int* number, PlaneNames* planes,
                   std::vector<Feature>* features) {
   for (std::size_t k = 0; k < features->size(); ++k) {
-    if (continued[k] >= 0)
-      planes->Vote((*features)[k].plane, predicted[static_cast<std::size_t>(continued[k])].plane);
+    if (continued[k] < 0) continue;
+    planes->Continue((*features)[k].plane, predicted[static_cast<std::size_t>(continued[k])].plane);
   }
   for (std::size_t k = 0; k < features->size(); ++k) {
     Feature& feature = (*features)[k];
