@@ -59,8 +59,8 @@ bool CurveCost::SumAbout(const Eigen::Ref<const Curve>& curve, const Weighing& w
     return true;
   }
   const int curve_size = curve_rank_ + 1;  // Its scale has no meaning.
-  const auto root =
-      SquareRootOf<CurveModel::kMaxSize>(model, Rank(variables.camera), curve_size, curve_rank_);
+  const SquareRoot<CurveModel::kMaxSize> root(model.h, model.g, model.twice_cost,
+                                              Rank(variables.camera));
   std::fill(residuals, residuals + rows, 0.0);
   Eigen::Map<Eigen::VectorXd>(residuals, root.f.size()) = root.f;
   residuals[rows - 1] = root.rest;

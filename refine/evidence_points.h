@@ -64,14 +64,14 @@ inline std::array<double, 3> TiltSigmas(const NoiseModel& noise) {
 inline double FreeTwiceCost(const ImagePoints& points, const Eigen::Matrix3d& conic) {
   CurveModel model;
   points.SumConic(conic, 0.0, nullptr, Weighing(), {}, &model);
-  const SquareRoot<6> root = SquareRootOf<6>(model, 5, 6, 5);
+  const SquareRoot<6> root(model.h, model.g, model.twice_cost, 5);
   return std::max(0.0, model.twice_cost - root.f.squaredNorm());
 }
 
 inline double FreeTwiceCost(const ImagePoints& points, const Eigen::Vector3d& line) {
   CurveModel model;
   points.SumLine(line, nullptr, Weighing(), false, &model);
-  const SquareRoot<3> root = SquareRootOf<3>(model, 2, 3, 2);
+  const SquareRoot<3> root(model.h, model.g, model.twice_cost, 2);
   return std::max(0.0, model.twice_cost - root.f.squaredNorm());
 }
 

@@ -233,8 +233,7 @@ bool PlanePointCost::EvaluateWith(const Weighing& weighing, const double* const*
     const double along = std::max(loss.first + 2.0 * s * loss.second, kLeastCurvature * loss.first);
     W += (along - loss.first) / r.squaredNorm() * r * r.transpose();
   }
-  const SquareRoot<2> root(weighing.scale * W, weighing.scale * loss.first * r, twice_cost, 2, 2,
-                           2);
+  const SquareRoot<2> root(weighing.scale * W, weighing.scale * loss.first * r, twice_cost, 2);
   residuals[0] = root.f[0];
   residuals[1] = root.f[1];
   residuals[2] = root.rest;

@@ -5,9 +5,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
-
-#include "circline/refine/image_points.h"
 
 namespace circline {
 
@@ -22,11 +19,9 @@ struct SquareRoot {
 
   // Cholesky's factors with pivots, of h scaled to a unit diagonal. At most `max_rank` rows: what
   // is known to be without information (the scale of a conic) would else be rounding. Rows without
-  // information are zero. Of the first `lead` columns, which have a rank of `lead_rank`, nothing is
-  // lost, whatever the others would need.
+  // information are zero.
   template <typename Matrix, typename Vector>
-  SquareRoot(const Matrix& h, const Vector& g, double twice_cost, int max_rank, int lead,
-             int lead_rank) {
+  SquareRoot(const Matrix& h, const Vector& g, double twice_cost, int max_rank) {
     constexpr double kNoInformation = 1e-13;
     const Eigen::Index n = h.rows();
     U.setZero(max_rank, n);
@@ -41,9 +36,7 @@ struct SquareRoot {
     b = scale.cwiseProduct(g);
     for (Eigen::Index k = 0; k < max_rank; ++k) {
       Eigen::Index pivot;
-      if (k >= lead_rank || !(A.diagonal().head(lead).maxCoeff(&pivot) > kNoInformation)) {
-        if (!(A.diagonal().maxCoeff(&pivot) > kNoInformation)) break;
-      }
+      if (!(A.diagonal().maxCoeff(&pivot) > kNoInformation)) break;
       const double inverse = 1.0 / std::sqrt(A(pivot, pivot));
       const Column u = inverse * A.col(pivot);
       f[k] = inverse * b[pivot];
@@ -66,27 +59,6 @@ struct SquareRoot {
     rest = std::sqrt(std::max(0.0, twice_cost - f.squaredNorm()));
   }
 };
-
-// Of a curve's model; most have no more variables than their curve.
-template <int kMax>
-SquareRoot<kMax> SquareRootOf(const CurveModel& model, int max_rank, int lead, int lead_rank) {
-  const auto of_size = [&](const auto& size) {
-    constexpr int kSize = std::decay_t<decltype(size)>::value;
-    return SquareRoot<kMax>(Eigen::Matrix<double, kSize, kSize>(model.h),
-                            Eigen::Matrix<double, kSize, 1>(model.g), model.twice_cost, max_rank,
-                            lead, lead_rank);
-  };
-  switch (model.g.size()) {
-    case 3:
-      return of_size(std::integral_constant<int, 3>());
-    case 6:
-      return of_size(std::integral_constant<int, 6>());
-    case 7:
-      return of_size(std::integral_constant<int, 7>());
-    default:
-      return SquareRoot<kMax>(model.h, model.g, model.twice_cost, max_rank, lead, lead_rank);
-  }
-}
 
 }  // namespace circline
 
