@@ -140,7 +140,7 @@ class PoseTracker::Implementation {
       }
     }
     if (fits_.empty()) return false;
-    Merge(map_, MergedWeight::kLarger, &fits_);
+    Merge(map_, &fits_);
     TakeFits();
     tracked->relocalized = true;
     Use(tracked);
@@ -213,16 +213,13 @@ class PoseTracker::Implementation {
     is_blank_ = frame_.empty();
     if (is_blank_) return false;
     for (const TrackFit& hypothesis : hypotheses_) {
-      own_fits_.Shorten(0);
-      frame_.Refine(hypothesis.state, &own_fits_);
-      Merge(map_, MergedWeight::kLarger, &own_fits_);
-      for (TrackFit& fit : own_fits_) std::swap(fits_.Add(), fit);
+      frame_.Refine(hypothesis.state, &fits_);
     }
     if (std::none_of(fits_.begin(), fits_.end(),
                      [&](const TrackFit& fit) { return Agrees(fit); })) {
       return false;
     }
-    Merge(map_, MergedWeight::kSum, &fits_);
+    Merge(map_, &fits_);
     TakeFits();
     return true;
   }
@@ -279,7 +276,7 @@ class PoseTracker::Implementation {
   PointNoise noise_;
   std::vector<std::string> problems_;
   TrackFrame frame_;
-  Kept<TrackFit> fits_, own_fits_;  // The latter of one hypothesis.
+  Kept<TrackFit> fits_;
   bool is_blank_ = false;
   Scratch scratch_;
   std::vector<double> distances_;

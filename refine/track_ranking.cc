@@ -17,20 +17,17 @@ bool IsSame(const TrackMap& map, const TrackState& a, const TrackState& b) {
          kSame;
 }
 
-double LogAdd(double a, double b) {
-  if (std::isinf(a)) return b;
-  return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
-}
-
+// Log weights to log probabilities.
 void Normalize(Kept<TrackFit>* fits) {
-  double sum = -std::numeric_limits<double>::infinity();
-  for (const TrackFit& fit : *fits) sum = LogAdd(sum, fit.state.log_weight);
-  for (TrackFit& fit : *fits) fit.state.log_weight -= sum;
+  double most = -std::numeric_limits<double>::infinity(), sum = 0.0;
+  for (const TrackFit& fit : *fits) most = std::max(most, fit.state.log_weight);
+  for (const TrackFit& fit : *fits) sum += std::exp(fit.state.log_weight - most);
+  for (TrackFit& fit : *fits) fit.state.log_weight -= most + std::log(sum);
 }
 
 }  // namespace
 
-void Merge(const TrackMap& map, MergedWeight weight, Kept<TrackFit>* fits) {
+void Merge(const TrackMap& map, Kept<TrackFit>* fits) {
   std::size_t merged = 0;  // The first ones are different.
   for (TrackFit& fit : *fits) {
     std::size_t same = 0;
@@ -40,9 +37,7 @@ void Merge(const TrackMap& map, MergedWeight weight, Kept<TrackFit>* fits) {
       continue;
     }
     TrackFit& other = (*fits)[same];
-    const double a = other.state.log_weight, b = fit.state.log_weight;
-    if (b > a) std::swap(other, fit);
-    other.state.log_weight = weight == MergedWeight::kSum ? LogAdd(a, b) : std::max(a, b);
+    if (fit.state.log_weight > other.state.log_weight) std::swap(other, fit);
   }
   fits->Shorten(merged);
 }

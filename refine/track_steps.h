@@ -44,10 +44,8 @@ std::vector<TrackState> Relocated(const TrackMap& map, const Kept<TrackFit>& sta
 
 // --- track_ranking.cc: hypotheses against one another. ---
 
-// Minima that several starts lead to are one, its weight the larger one of two starts of a
-// hypothesis, or the sum of the probabilities of two hypotheses.
-enum class MergedWeight { kLarger, kSum };
-void Merge(const TrackMap& map, MergedWeight weight, Kept<TrackFit>* fits);
+// Minima that several starts lead to are one, the most probable.
+void Merge(const TrackMap& map, Kept<TrackFit>* fits);
 
 // Log weights to log probabilities; drops what is improbable and orders the rest. The first stays
 // first unless another one is clearly more probable.
