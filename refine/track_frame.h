@@ -128,7 +128,6 @@ class TrackFrame {
   std::vector<std::pair<double, std::size_t>> odd_;  // Terms by how much they contradict.
   std::vector<Eigen::Index> rows_, others_;          // Of the covariance: that a frame has, or not.
   std::vector<Eigen::Index> columns_;                // Of the information, by block; -1: none.
-  std::vector<Scratch::Matrix> plus_;                // Manifolds' derivatives, by block.
 };
 
 }  // namespace circline

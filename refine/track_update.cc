@@ -28,8 +28,6 @@ class TrackFrame::Information {
     const TrackMap& map = frame_.map_;
     const Eigen::Index n = turn.rows(), c = H.rows() - n;
     frame_.columns_.assign(map.blocks().size(), -1);
-    frame_.plus_.clear();
-    frame_.plus_.resize(map.blocks().size(), Scratch::Matrix(nullptr, 0, 0));
     Scratch::Matrix by_values = frame_.scratch_.NewMatrix(n, prior.num_values()),
                     J = frame_.scratch_.NewMatrix(n, n + c);
     Scratch::Vector z = frame_.scratch_.NewVector(n);
@@ -37,12 +35,13 @@ class TrackFrame::Information {
     prior.Residuals(frame_.parameters_.data(), z.data(), &by_values);
     Eigen::Index column = 0, first = 0;
     for (const int b : prior.blocks) {
-      const Scratch::Matrix& plus = AddBlock(b, column);
+      const BlockMatrix plus = PlusJacobian(b);
+      frame_.columns_[static_cast<std::size_t>(b)] = column;
       J.middleCols(column, plus.cols()).noalias() = by_values.middleCols(first, plus.rows()) * plus;
       column += plus.cols();
       first += plus.rows();
     }
-    if (c > 0) AddBlock(TrackMap::kCamera, column);
+    if (c > 0) frame_.columns_[TrackMap::kCamera] = column;
     // The prior's residuals are L^-1 times how far the unknowns are from the mean.
     turn.noalias() = prior.root.triangularView<Eigen::Lower>() * J.leftCols(n);
     moved.noalias() = prior.root.triangularView<Eigen::Lower>() * z;
@@ -74,9 +73,9 @@ class TrackFrame::Information {
     J.setZero();
     for (std::size_t k = 0; k < term.blocks.size(); ++k) {
       if (jacobians[k] == nullptr || term.blocks[k] == kOwn) continue;
-      const auto b = static_cast<std::size_t>(term.blocks[k]);
-      const Scratch::Matrix& plus = frame_.plus_[b];
-      J.middleCols(frame_.columns_[b], plus.cols()).noalias() = ambient[k] * plus;
+      const BlockMatrix plus = PlusJacobian(term.blocks[k]);
+      J.middleCols(frame_.columns_[static_cast<std::size_t>(term.blocks[k])], plus.cols())
+          .noalias() = ambient[k] * plus;
     }
     if (term.own > 0) {
       const auto at = std::find(term.blocks.begin(), term.blocks.end(), kOwn);
@@ -103,13 +102,9 @@ class TrackFrame::Information {
     return static_cast<Eigen::Index>(frame.prior_.rows.size() + frame.prior_.considered.size());
   }
 
-  const Scratch::Matrix& AddBlock(int index, Eigen::Index column) {
-    const auto b = static_cast<std::size_t>(index);
-    const Block& block = frame_.map_.block(index);
-    frame_.columns_[b] = column;
-    Rebind(frame_.scratch_.NewMatrix(block.size, block.tangent_size()), &frame_.plus_[b]);
-    frame_.plus_[b] = block.PlusJacobian(fit_.state.x.data() + block.offset);
-    return frame_.plus_[b];
+  BlockMatrix PlusJacobian(int b) const {
+    const Block& block = frame_.map_.block(b);
+    return block.PlusJacobian(fit_.state.x.data() + block.offset);
   }
 
   TrackFrame& frame_;
