@@ -46,35 +46,22 @@ std::vector<Setting> Settings() {
 }
 
 TrackerOptions OptionsFor(const Setting& setting, LossType loss) {
-  TrackerOptions options;
-  options.estimation.noise_model = NoiseModel::Exact();
+  TrackerOptions options = ExactOptions(setting.trajectory);
   options.estimation.conic_loss.type = options.estimation.line_loss.type = loss;
-  options.turn_rate_sigma = setting.trajectory.turn_rate_sigma;
-  options.velocity_sigma = setting.trajectory.velocity_sigma;
   options.initial_turn_rate_sigma =
-      std::max(setting.trajectory.initial_turn_rate_sigma, setting.trajectory.speed);
+      std::max(options.initial_turn_rate_sigma, setting.trajectory.speed);
   options.initial_velocity_sigma =
-      std::max(setting.trajectory.initial_velocity_sigma, setting.trajectory.speed);
+      std::max(options.initial_velocity_sigma, setting.trajectory.speed);
   return options;
 }
 
 // The turn between two frames as a gyroscope has it.
 MotionPrior Odometry(const CameraPose& before, const CameraPose& now, Random* random) {
-  constexpr double kSigma = 0.001;  // Radians of each component.
-  MotionPrior motion;
-  motion.relative.emplace();
+  MotionPrior motion = Gyroscope(before, now);
   const double x = random->Normal(), y = random->Normal(), z = random->Normal();
-  motion.relative->now_from_before.rotation =
-      ExpRotation(kSigma * Eigen::Vector3d(x, y, z)) * now.rotation * before.rotation.transpose();
-  motion.relative->has_translation = false;
-  for (std::size_t k = 0; k < 6; ++k)
-    motion.relative->covariance[7 * k] = k < 3 ? kSigma * kSigma : 1.0;
+  Eigen::Matrix3d& turn = motion.relative->now_from_before.rotation;
+  turn = ExpRotation(kGyroscopeSigma * Eigen::Vector3d(x, y, z)) * turn;
   return motion;
-}
-
-double NormalError(const CameraPose& truth, const PoseHypothesis& h) {
-  return std::acos(
-      std::clamp(truth.rotation.col(2).dot(h.cam_from_world.rotation.col(2)), -1.0, 1.0));
 }
 
 // The circle's other pose has its normal mirrored at the line of sight, about.

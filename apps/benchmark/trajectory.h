@@ -5,7 +5,9 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -13,6 +15,7 @@
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
+#include "circline/refine/pose_tracker.h"
 
 namespace circline {
 
@@ -177,6 +180,40 @@ class Trajectory {
   TrajectoryOptions options_;
   Random random_;
 };
+
+// --- What trackers of such sequences are asked, and how far off they are. ---
+
+inline TrackerOptions ExactOptions(const TrajectoryOptions& trajectory) {
+  TrackerOptions options;
+  options.estimation.noise_model = NoiseModel::Exact();
+  options.estimation.conic_loss.type = options.estimation.line_loss.type = LossType::kTrivial;
+  options.turn_rate_sigma = trajectory.turn_rate_sigma;
+  options.velocity_sigma = trajectory.velocity_sigma;
+  options.initial_turn_rate_sigma = trajectory.initial_turn_rate_sigma;
+  options.initial_velocity_sigma = trajectory.initial_velocity_sigma;
+  return options;
+}
+
+inline double NormalError(const CameraPose& truth, const PoseHypothesis& h) {
+  return std::acos(
+      std::clamp(truth.rotation.col(2).dot(h.cam_from_world.rotation.col(2)), -1.0, 1.0));
+}
+
+inline double RotationError(const CameraPose& truth, const PoseHypothesis& h) {
+  return LogRotation(truth.rotation * h.cam_from_world.rotation.transpose()).norm();
+}
+
+// The turn between two frames, as a gyroscope without error has it, that says how well it knows it.
+constexpr double kGyroscopeSigma = 0.001;  // Radians of each component.
+inline MotionPrior Gyroscope(const CameraPose& before, const CameraPose& now) {
+  MotionPrior motion;
+  motion.relative.emplace();
+  motion.relative->now_from_before.rotation = now.rotation * before.rotation.transpose();
+  motion.relative->has_translation = false;
+  for (std::size_t k = 0; k < 6; ++k)
+    motion.relative->covariance[7 * k] = kGyroscopeSigma * kGyroscopeSigma;
+  return motion;
+}
 
 }  // namespace circline
 

@@ -27,7 +27,6 @@
 #include "circline/refine/cost_functions.h"
 #include "circline/refine/pose_tracker.h"
 #include "tests/plane_scene.h"
-#include "tests/refine/track_sequences.h"
 
 namespace circline {
 namespace {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <string>
 
-#include "tests/refine/track_sequences.h"
+#include "apps/benchmark/trajectory.h"
 #include "tests/trials.h"
 
 namespace circline {

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "tests/refine/track_sequences.h"
+#include "apps/benchmark/trajectory.h"
 
 namespace circline {
 namespace {
