@@ -53,39 +53,33 @@ class CircleFollower {
         fitter_(map, camera, options),
         calibrated_(map, camera) {}
 
-  // Where the circle is to within the reach of the cold detector's own refits.
-  bool FollowNear(const CircleObservation& circle, DetectedEllipse* e) {
-    return Finish({circle.fit->conic, SideOf(circle, camera_), 0.0}, circle, e);
+  // Where the circle is to within the reach of the cold detector's own refits, or `far`: anywhere
+  // in the band, as the ellipse that most of its free edges support. Nothing where there is none.
+  void Follow(const CircleObservation& circle, bool far, DetectedEllipse* e) {
+    EllipseCandidate candidate{circle.fit->conic, SideOf(circle, camera_), 0.0};
+    if (far && !FindInBand(&candidate)) return;
+    DetectedEllipse found;
+    if (!fitter_.Improve(&candidate) || !fitter_.Fit(candidate, &found)) return;
+    if (!fitter_.LiesOn(found, circle.fit->conic, search_px_)) return;
+    Ellipse before, now;
+    if (!ConicToEllipse(circle.fit->conic, &before) || !ConicToEllipse(found.fit.conic, &now)) {
+      return;
+    }
+    const double growth = now.a / before.a;
+    if (!(growth < kMaxGrowth && growth > 1.0 / kMaxGrowth)) return;
+    fitter_.Take(found);
+    *e = std::move(found);
   }
 
-  // Anywhere in the band: the ellipse that most of its free edges support.
-  bool FollowFar(const CircleObservation& circle, DetectedEllipse* e) {
-    EllipseCandidate candidate{circle.fit->conic, SideOf(circle, camera_), 0.0};
-    CollectBand(candidate);
+ private:
+  bool FindInBand(EllipseCandidate* candidate) {
+    CollectBand(*candidate);
     RobustFitOptions options;
     options.ransac.threshold = kInlierPx;
     options.ransac.max_iterations = kMaxDraws;
     ConicFit fit;
-    if (!FitConicRobust(band_, options, &fit, nullptr, directions_).ok()) {
-      return false;
-    }
-    candidate.conic = fit.conic;
-    return Finish(candidate, circle, e);
-  }
-
- private:
-  bool Finish(EllipseCandidate candidate, const CircleObservation& circle, DetectedEllipse* e) {
-    DetectedEllipse found;
-    if (!fitter_.Improve(&candidate) || !fitter_.Fit(candidate, &found)) return false;
-    if (!fitter_.LiesOn(found, circle.fit->conic, search_px_)) return false;
-    Ellipse before, now;
-    if (!ConicToEllipse(circle.fit->conic, &before) || !ConicToEllipse(found.fit.conic, &now)) {
-      return false;
-    }
-    const double growth = now.a / before.a;
-    if (!(growth < kMaxGrowth && growth > 1.0 / kMaxGrowth)) return false;
-    fitter_.Take(found);
-    *e = std::move(found);
+    if (!FitConicRobust(band_, options, &fit, nullptr, directions_).ok()) return false;
+    candidate->conic = fit.conic;
     return true;
   }
 
@@ -143,11 +137,7 @@ std::vector<DetectedEllipse> FollowCircles(const EdgeMap& edges, const Camera& c
   for (const bool far : {false, true}) {
     for (std::size_t k = 0; k < predicted.size(); ++k) {
       if (!predicted[k].fit || !found[k].points.empty()) continue;
-      if (far) {
-        follower.FollowFar(predicted[k], &found[k]);
-      } else {
-        follower.FollowNear(predicted[k], &found[k]);
-      }
+      follower.Follow(predicted[k], far, &found[k]);
     }
   }
   return found;

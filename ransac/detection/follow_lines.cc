@@ -117,10 +117,14 @@ PencilObservation FollowPencil(const PencilObservation& predicted,
       pencil = MakePencil(own, all, fits, direction);
     }
   }
-  pencil.observation.id = predicted.id;
-  pencil.observation.direction = predicted.direction;
-  pencil.observation.plane = predicted.plane;
+  Continue(predicted, &pencil.observation);
   return std::move(pencil.observation);
+}
+
+void Continue(const PencilObservation& predicted, PencilObservation* pencil) {
+  pencil->id = predicted.id;
+  if (!predicted.plane.empty()) pencil->plane = predicted.plane;
+  if (predicted.direction != PencilDirection::kFree) pencil->direction = predicted.direction;
 }
 
 bool IsOfCentres(const Observations& predicted, const PencilObservation& pencil) {

@@ -123,9 +123,7 @@ void FollowGrid(const std::vector<PencilObservation>& predicted, Observations* f
     std::swap(pencils[0], pencils[1]);
   for (std::size_t k = 0; k < 2; ++k) {
     PencilObservation& pencil = pencils[k].observation;
-    pencil.id = predicted[k].id;
-    pencil.direction = predicted[k].direction;
-    pencil.plane = predicted[k].plane;
+    Continue(predicted[k], &pencil);
     expect->pencils[static_cast<std::size_t>(FindPencil(*expect, pencil.id))] = pencil;
     found->pencils.push_back(std::move(pencil));
   }

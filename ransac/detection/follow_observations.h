@@ -27,8 +27,9 @@ std::vector<DetectedEllipse> FollowCircles(const EdgeMap& edges, const Camera& c
                                            const std::vector<CircleObservation>& predicted,
                                            const EllipseOptions& options, double search_px);
 
-// Gives a circle what is known of the predicted one that it continues, whatever the photo.
+// Gives a feature what is known of the predicted one that it continues, whatever the photo.
 void Continue(const CircleObservation& predicted, CircleObservation* circle);
+void Continue(const PencilObservation& predicted, PencilObservation* pencil);
 
 // What may be one feature in two photos.
 struct FeaturePair {

@@ -92,12 +92,6 @@ class PlaneNames {
   std::map<std::string, std::string> names_;
 };
 
-void Continue(const PencilObservation& predicted, PencilObservation* pencil) {
-  pencil->id = predicted.id;
-  if (!predicted.plane.empty()) pencil->plane = predicted.plane;
-  if (predicted.direction != PencilDirection::kFree) pencil->direction = predicted.direction;
-}
-
 template <typename Feature>
 void NameFeatures(const std::vector<Feature>& predicted, const std::vector<int>& continued,
                   const char* letter, int* number, PlaneNames* planes,
