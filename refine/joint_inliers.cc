@@ -95,14 +95,4 @@ bool DropOutliers(const JointProblem& problem, State* state) {
   return !dropped.empty();
 }
 
-double JointProblem::InlierShare(const State& state) const {
-  std::size_t inliers = 0, points = 0;
-  ForEachCurve(*this, state,
-               [&](int, const ImagePoints& set, const std::vector<double>& distances) {
-                 points += distances.size();
-                 for (const double d : distances) inliers += IsInlier(d, set) ? 1 : 0;
-               });
-  return points > 0 ? static_cast<double>(inliers) / static_cast<double>(points) : 0.0;
-}
-
 }  // namespace circline

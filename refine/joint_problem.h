@@ -81,8 +81,6 @@ class JointProblem : public Graph {
   double Cost(const State& state) const;
   CameraPose PoseAt(const State& state) const;
   double LogFocalAt(const State& state) const { return *At(kCamera, state); }
-  // Share of the contours' and lines' points within their gate.
-  double InlierShare(const State& state) const;
 
   const Observations& observations() const { return observations_; }
   const EstimationOptions& options() const { return options_; }

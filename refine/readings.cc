@@ -55,9 +55,12 @@ std::vector<Seed> SeedsFromPrior(const JointProblem& problem, const Observations
   std::vector<Seed> seeds = {{*problem.options().prior, 0.0, 0}};
   State state;
   if (!problem.Start(seeds[0].pose, 0.0, problem.FirstReading(), &state).ok() ||
-      !problem.Solve(kIterations, &state).ok() || !(problem.InlierShare(state) >= kExplained)) {
+      !problem.Solve(kIterations, &state).ok())
     return {};
-  }
+  PoseHypothesis reached;
+  CountInliers(problem, state, &reached);
+  if (reached.num_inliers == 0 || reached.num_inliers < kExplained * reached.num_observations)
+    return {};
   seeds[0].pose = problem.PoseAt(state);
   seeds[0].log_focal = problem.LogFocalAt(state);
   AddCircleSeeds(resolved, 0.0, &seeds);
