@@ -1,6 +1,6 @@
 #include "apps/calibrate/import_model.h"
 
-#include <algorithm>
+#include <Eigen/Geometry>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -31,17 +31,9 @@ const ColmapImage* Find(const ColmapModel& model, const std::string& path) {
 
 Json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-// Of the world in units of the model, the other way round: X = scale * rotation * X_model + t.
-struct Inverse {
-  double scale;
-  Eigen::Matrix3d rotation;
-  Eigen::Vector3d translation;
-
-  explicit Inverse(const GivenFrame& given)
-      : scale(1.0 / given.scale),
-        rotation(given.rotation.transpose()),
-        translation(-scale * (rotation * given.translation)) {}
-};
+Eigen::Affine3d ModelFromWorld(const GivenFrame& given) {
+  return Eigen::Translation3d(given.translation) * given.rotation * Eigen::Scaling(given.scale);
+}
 
 }  // namespace
 
@@ -93,7 +85,7 @@ std::vector<WorldPlane> PlanesOf(const std::vector<Observations>& photos,
   std::vector<WorldPlane> planes(1);
   planes.front().id = ResolveWorld(photos.front()).frame.plane;
   planes.front().circles = adjusted.circles;
-  const Inverse world(*adjusted.given);
+  const Eigen::Affine3d world_from_model = ModelFromWorld(*adjusted.given).inverse();
   std::vector<Observations> seen = photos;
   for (const std::string& id : others) {
     for (Observations& photo : seen) {
@@ -105,18 +97,15 @@ std::vector<WorldPlane> PlanesOf(const std::vector<Observations>& photos,
       notes->push_back("plane '" + id + "': left out: " + own.status.message);
       continue;
     }
-    const Eigen::Matrix3d R = world.rotation * own.given->rotation;
-    const double scale = world.scale * own.given->scale;
-    const auto moved = [&](const Eigen::Vector3d& X) -> Eigen::Vector3d {
-      return scale * (R * X) + world.scale * (world.rotation * own.given->translation) +
-             world.translation;
-    };
+    const Eigen::Affine3d world_from_other = world_from_model * ModelFromWorld(*own.given);
+    const double scale = own.given->scale / adjusted.given->scale;
+    const Eigen::Matrix3d R = world_from_other.linear() / scale;
     WorldPlane plane;
     plane.id = id;
-    plane.origin = moved(Eigen::Vector3d::Zero());
+    plane.origin = world_from_other.translation();
     plane.normal = R.col(2);
     for (AdjustedCircle circle : own.circles) {
-      circle.center = moved(circle.center);
+      circle.center = world_from_other * circle.center;
       circle.normal = R * circle.normal;
       circle.radius *= scale;
       plane.circles.push_back(std::move(circle));
@@ -128,17 +117,17 @@ std::vector<WorldPlane> PlanesOf(const std::vector<Observations>& photos,
 
 Status WriteLandmarks(const AdjustedPhotos& adjusted, const std::vector<WorldPlane>& planes,
                       const std::string& folder) {
-  const Inverse world(*adjusted.given);
-  const Eigen::Matrix3d by_rows = world.rotation.transpose();
-  Json json = {
-      {"metric", adjusted.metric},
-      {"world_from_model",
-       {{"scale", world.scale},
-        {"scale_sigma", adjusted.metric ? world.scale * adjusted.given->log_scale_sigma : 0.0},
-        {"rotation", std::vector<double>(by_rows.data(), by_rows.data() + 9)},
-        {"translation", Vector(world.translation)}}},
-      {"planes", Json::array()},
-      {"directions", Json::array()}};
+  const Eigen::Affine3d world_from_model = ModelFromWorld(*adjusted.given).inverse();
+  const double scale = 1.0 / adjusted.given->scale;
+  const Eigen::Matrix3d& by_columns = adjusted.given->rotation;  // Those of the inverse by rows.
+  Json json = {{"metric", adjusted.metric},
+               {"world_from_model",
+                {{"scale", scale},
+                 {"scale_sigma", adjusted.metric ? scale * adjusted.given->log_scale_sigma : 0.0},
+                 {"rotation", std::vector<double>(by_columns.data(), by_columns.data() + 9)},
+                 {"translation", Vector(world_from_model.translation())}}},
+               {"planes", Json::array()},
+               {"directions", Json::array()}};
   for (const WorldPlane& plane : planes) {
     Json circles = Json::array();
     for (const AdjustedCircle& circle : plane.circles) {
@@ -158,12 +147,7 @@ Status WriteLandmarks(const AdjustedPhotos& adjusted, const std::vector<WorldPla
   const Status status = WriteFile(folder + "/landmarks.json", DocumentText(json));
   if (!status.ok()) return status;
   std::ostringstream text;
-  text.precision(17);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) text << world.scale * world.rotation(i, j) << " ";
-    text << world.translation[i] << "\n";
-  }
-  text << "0 0 0 1\n";
+  text << world_from_model.matrix().format({17, Eigen::DontAlignCols}) << "\n";
   return WriteFile(folder + "/transform.txt", text.str());
 }
 
