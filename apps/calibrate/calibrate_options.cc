@@ -83,19 +83,14 @@ Status CalibrateOptionsFromFlags(CalibrateOptions* options) {
     status = Status::Invalid("--rigid=" + FLAGS_rigid + ": must be auto, yes or no");
   if (!status.ok()) return status;
   const CameraGuess& guess = options->compare.inputs.guess;
-  if (!FLAGS_import.empty() && (!FLAGS_camera.empty() || !FLAGS_model.empty() ||
-                                guess.focal_px > 0.0 || guess.fov_deg > 0.0)) {
+  if (!FLAGS_import.empty() &&
+      (!FLAGS_camera.empty() || !FLAGS_model.empty() || guess.focal_px > 0.0 ||
+       guess.fov_deg > 0.0 || !FLAGS_fix.empty() || !FLAGS_free.empty() ||
+       options->adjust.rigid != RigidWorld::kAuto)) {
     return Status::Invalid(
-        "--import brings its own cameras: leave out --camera, --model, --focal_px and --fov_deg");
-  }
-  if (!FLAGS_import.empty() && (!FLAGS_fix.empty() || !FLAGS_free.empty())) {
-    return Status::Invalid(
-        "--import brings its own cameras: leave out --fix and --free; --noise_model and "
-        "--focal_sigma say how sure they are");
-  }
-  if (!FLAGS_import.empty() && options->adjust.rigid != RigidWorld::kAuto) {
-    return Status::Invalid("--import brings its own poses, of one world: leave out --rigid=" +
-                           FLAGS_rigid);
+        "--import brings its own cameras, and poses of one world: leave out --camera, --model, "
+        "--focal_px, --fov_deg, --fix, --free and --rigid; --noise_model and --focal_sigma say how "
+        "sure the cameras are");
   }
   options->import = FLAGS_import;
   options->compare.inputs.guess.is_exact = false;  // The camera is what is to be found.
