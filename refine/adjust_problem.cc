@@ -37,18 +37,15 @@ int& OneOf(const Key& key, std::map<Key, int>* blocks) {
 }  // namespace
 
 AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
-                             const std::vector<CameraPrior>& priors, const AdjustOptions& options,
+                             std::vector<CameraPrior> priors, const AdjustOptions& options,
                              const GivenFrame* given)
-    : photos_(photos), options_(options), pose_options_(PoseOptions(options)) {
-  for (const CameraPrior& prior : priors) {
-    for (int k = 4; k < kCameraSize; ++k) {
-      if (prior.sigma[static_cast<std::size_t>(k)] > 0.0)
-        num_distortion_ = std::max(num_distortion_, k - 3);
-    }
-  }
+    : photos_(photos),
+      priors_(std::move(priors)),
+      options_(options),
+      pose_options_(PoseOptions(options)) {
   rotations_.assign(photos.size(), -1);
   translations_.assign(photos.size(), -1);
-  AddCameras(priors);
+  AddCameras();
   for (std::size_t i = 0; i < photos.size(); ++i) {
     if (photos[i].takes_part) AddPhoto(static_cast<int>(i));
   }
@@ -63,27 +60,18 @@ void AdjustProblem::AddFeature(int photo, const std::string& id, std::unique_ptr
   features_.push_back({photo, id, term, active});
 }
 
-void AdjustProblem::AddCameras(const std::vector<CameraPrior>& priors) {
-  for (const CameraPrior& prior : priors) {
-    cameras_.push_back(AddBlock(kCameraSize, {}));
-    camera_sigmas_.push_back(prior.sigma);
+void AdjustProblem::AddCameras() {
+  for (const CameraPrior& prior : priors_) {
+    auto manifold = ShiftManifold(prior.sigma);
+    const bool is_held = manifold == nullptr;
+    cameras_.push_back(AddBlock(kCameraSize, {}, std::move(manifold), is_held));
     AddTerm(NewGaussianPrior({prior.sigma.begin(), prior.sigma.end()},
                              {prior.mean.begin(), prior.mean.end()}),
             {cameras_.back()});
-  }
-  FreeCameras(false);
-}
-
-// Of what has a prior width all, or the focal length and the first distortion coefficient only.
-void AdjustProblem::FreeCameras(bool coarse) {
-  constexpr std::size_t kFocal = 0, kFirstRadial = 4;
-  for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    Shifts sigmas = camera_sigmas_[c];
-    for (std::size_t k = 0; coarse && k < sigmas.size(); ++k) {
-      if (k != kFocal && k != kFirstRadial) sigmas[k] = 0.0;
+    for (int k = 4; k < kCameraSize; ++k) {
+      if (prior.sigma[static_cast<std::size_t>(k)] > 0.0)
+        num_distortion_ = std::max(num_distortion_, k - 3);
     }
-    SetManifold(cameras_[c], ShiftManifold(sigmas));
-    block(cameras_[c]).is_constant = block(cameras_[c]).manifold == nullptr;
   }
 }
 

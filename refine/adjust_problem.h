@@ -48,7 +48,7 @@ struct AdjustInput {
 
 // Of a camera's shifts (camera_shifts.h) against the one that its points were made with.
 struct CameraPrior {
-  std::array<double, kCameraSize> mean{}, sigma{};  // 0 = held.
+  Shifts mean{}, sigma{};  // 0 = held.
 };
 
 // How each photo's own pose is estimated.
@@ -58,12 +58,11 @@ class AdjustProblem : private Graph {
  public:
   // `priors`: by camera. `given`: where the world lies in the frame of given poses; null: there are
   // none.
-  AdjustProblem(const std::vector<AdjustInput>& photos, const std::vector<CameraPrior>& priors,
+  AdjustProblem(const std::vector<AdjustInput>& photos, std::vector<CameraPrior> priors,
                 const AdjustOptions& options, const GivenFrame* given);
 
-  // Runs ceres with the losses `stretch` times as wide; of the cameras only the first distortion
-  // coefficient and the focal length are free where `coarse`.
-  Status Solve(double stretch, bool coarse, int max_iterations);
+  // Runs ceres with the losses `stretch` times as wide.
+  Status Solve(double stretch, int max_iterations);
   // Root mean square over the points of the worst feature, standard deviations.
   double LargestRms() const { return Graph::LargestRms(ActiveTerms(), values().data()); }
 
@@ -119,7 +118,7 @@ class AdjustProblem : private Graph {
     int block = -1;
   };
 
-  void AddCameras(const std::vector<CameraPrior>& priors);
+  void AddCameras();
   void AddPhoto(int photo);
   void SetGauge();
   void AddGivenPoses(const GivenFrame& given);
@@ -136,24 +135,22 @@ class AdjustProblem : private Graph {
   int DirectionOf(int photo, const PencilObservation& pencil);
   void AddFeature(int photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
                   std::vector<int> blocks);
-  void FreeCameras(bool coarse);
   int AddRotation(const Eigen::Matrix3d& rotation);
   // Of the features in force of photos before `end`, and of the priors of what these have.
   std::vector<const Term*> ActiveTerms(int end) const;
   std::vector<const Term*> ActiveTerms() const {
     return ActiveTerms(static_cast<int>(photos_.size()));
   }
-  Covariances OfPriors() const;
   Matrix6d PoseCovariance(std::size_t photo, const Linearization& at) const;
 
   const std::vector<AdjustInput>& photos_;
+  const std::vector<CameraPrior> priors_;  // By camera.
   const AdjustOptions& options_;
   const EstimationOptions pose_options_;
   int num_distortion_ = 0;
   std::vector<int> cameras_, rotations_, translations_;  // Blocks, -1: the photo takes no part.
   // Where poses are given, GivenFrame: rotation, translation, log scale.
   std::vector<int> given_;
-  std::vector<std::array<double, kCameraSize>> camera_sigmas_;  // Of the priors.
   std::map<std::pair<int, std::string>, Circle> circles_;
   std::map<std::pair<int, std::string>, Direction> directions_;
   std::map<std::pair<int, std::string>, int> radius_groups_, centers_;

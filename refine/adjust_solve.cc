@@ -32,13 +32,12 @@ std::vector<const Term*> AdjustProblem::ActiveTerms(int end) const {
   return active;
 }
 
-Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
+Status AdjustProblem::Solve(double stretch, int max_iterations) {
   Weighing weighing;
   weighing.stretch = stretch;
   const std::vector<const Term*> active = ActiveTerms();
   if (active.empty()) return Status::Refused("no photo has evidence in its plane");
   SetWeighing(weighing);
-  FreeCameras(coarse);
   ceres::Problem problem(OwnsNothing());
   Fill(active, Values(0), &problem);
   ceres::Solver::Options options;
@@ -53,7 +52,6 @@ Status AdjustProblem::Solve(double stretch, bool coarse, int max_iterations) {
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   SetWeighing(Weighing());
-  FreeCameras(false);
   return summary.IsSolutionUsable()
              ? Status::Ok()
              : Status::Failed("the photos cannot be evaluated at where they start");
@@ -134,16 +132,6 @@ CameraPose AdjustProblem::PoseAt(int photo) const {
   return {RotationFromBlock(Values(rotations_[i])), Eigen::Vector3d(Values(translations_[i]))};
 }
 
-AdjustProblem::Covariances AdjustProblem::OfPriors() const {
-  Covariances out;
-  for (const std::array<double, kCameraSize>& prior : camera_sigmas_) {
-    const Eigen::Map<const Eigen::Array<double, kCameraSize, 1>> sigma(prior.data());
-    out.cameras.emplace_back(sigma.square().matrix().asDiagonal());
-  }
-  out.poses.assign(photos_.size(), Matrix6d::Zero());
-  return out;
-}
-
 Matrix6d AdjustProblem::PoseCovariance(std::size_t photo, const Linearization& at) const {
   // d [delta, delta_t] / d (the tangents of both blocks).
   Eigen::Matrix<double, 6, Eigen::Dynamic> slopes = Eigen::Matrix<double, 6, 6>::Zero();
@@ -169,7 +157,12 @@ AdjustProblem::Covariances AdjustProblem::Covariance(int end, bool at_minimum) c
   options.floor = kTiny;
   options.at_minimum = at_minimum;
   Linearization at(*this, ActiveTerms(end), values().data(), inliers, options);
-  Covariances out = OfPriors();
+  Covariances out;
+  for (const CameraPrior& prior : priors_) {
+    const Eigen::Map<const Eigen::Array<double, kCameraSize, 1>> sigma(prior.sigma.data());
+    out.cameras.emplace_back(sigma.square().matrix().asDiagonal());
+  }
+  out.poses.assign(photos_.size(), Matrix6d::Zero());
   if (!at.ComputeCovariance()) return out;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const std::vector<int> columns = at.Columns(cameras_[c]);

@@ -12,7 +12,7 @@
 
 namespace circline {
 
-// From wide losses to narrow ones, the camera's coarse parameters first.
+// From wide losses to narrow ones.
 void Adjustment::SolveOnce() {
   constexpr double kWidest = 300.0, kNear = 3.0, kNarrower = 0.25;
   constexpr int kIterations = 8;
@@ -24,9 +24,9 @@ void Adjustment::SolveOnce() {
   problem_ = std::make_unique<AdjustProblem>(inputs_, priors, options_,
                                              given_frame_ ? &*given_frame_ : nullptr);
   double width = std::min(problem_->LargestRms(), kWidest);
-  for (bool first = true; width > kNear && out_.status.ok(); width *= kNarrower, first = false)
-    out_.status = problem_->Solve(width, first, kIterations);
-  if (out_.status.ok()) out_.status = problem_->Solve(1.0, false, options_.max_iterations);
+  for (; width > kNear && out_.status.ok(); width *= kNarrower)
+    out_.status = problem_->Solve(width, kIterations);
+  if (out_.status.ok()) out_.status = problem_->Solve(1.0, options_.max_iterations);
 }
 
 // Fills the photos' misfits; returns their median.
