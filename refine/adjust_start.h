@@ -4,7 +4,6 @@
 #define CIRCLINE_REFINE_ADJUST_START_H_
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -14,12 +13,6 @@
 #include "circline/refine/adjust_photos.h"
 
 namespace circline {
-
-// For each photo the first one of the same camera that shows nearly the same: four fifths of the
-// features of each lie within `distance`, of the photo's diagonal, of one of the other; -1 where
-// there is none. Photos that take no part are equal to none. Ids mean nothing here.
-std::vector<int> NearlyEqualViews(const std::vector<Observations>& photos,
-                                  const std::vector<std::uint8_t>& takes_part, double distance);
 
 // Calls work(0) .. work(count - 1) on so many threads. What one of them throws ends the rest, and
 // is thrown again.

@@ -4,7 +4,6 @@
 #define CIRCLINE_REFINE_ADJUSTMENT_H_
 
 #include <array>
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -26,7 +25,6 @@ class Adjustment {
   Adjustment(const std::vector<Observations>& photos, const AdjustOptions& options)
       : options_(options),
         given_(photos),
-        is_valid_(photos.size(), 0),
         prepared_(photos.size()),
         inputs_(photos.size()),
         grids_(photos.size()) {
@@ -46,6 +44,9 @@ class Adjustment {
  private:
   Status FindCameras();
   Status CheckGivenPoses();
+  // equal_views.cc: of those photos of a camera that show nearly the same the first one takes part.
+  // Four fifths of the features of each lie within nearly_equal of one of the other, whatever the
+  // ids.
   void SetAsideEqualViews();
   void Estimate();
   void FindCamera(std::size_t camera);
@@ -75,8 +76,7 @@ class Adjustment {
   const Camera* start_ = nullptr;  // Not null: of the only camera, which is not searched.
   std::vector<Camera> cameras_;    // As they stand.
   std::vector<CameraSigma> priors_;
-  std::vector<Camera> guesses_;         // As given.
-  std::vector<std::uint8_t> is_valid_;  // By photo.
+  std::vector<Camera> guesses_;  // As given.
   std::vector<Observations> prepared_;
   std::vector<AdjustInput> inputs_;
   std::vector<std::optional<SquareGrid>> grids_;

@@ -64,7 +64,6 @@ Status Adjustment::FindCameras() {
     }
     out_.photos[i].camera = known->second;
     out_.photos[i].status = given_[i].Validate();
-    is_valid_[i] = out_.photos[i].status.ok() ? 1 : 0;
   }
   guesses_ = cameras_;
   return CheckGivenPoses();
@@ -78,7 +77,6 @@ Status Adjustment::CheckGivenPoses() {
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (!poses[i]) {
       out_.photos[i].status = Status::Refused("no pose is given for it");
-      is_valid_[i] = 0;
       continue;
     }
     if (!IsRotation(poses[i]->rotation) || !poses[i]->translation.allFinite()) {
@@ -90,24 +88,6 @@ Status Adjustment::CheckGivenPoses() {
   return Status::Ok();
 }
 
-void Adjustment::SetAsideEqualViews() {
-  if (!(options_.nearly_equal > 0.0)) return;
-  const std::vector<int> equal = NearlyEqualViews(given_, is_valid_, options_.nearly_equal);
-  const auto count =
-      std::count_if(equal.begin(), equal.end(), [](int other) { return other >= 0; });
-  for (std::size_t i = 0; i < equal.size(); ++i) {
-    if (equal[i] < 0) continue;
-    is_valid_[i] = 0;
-    out_.photos[i].same_as = equal[i];
-    out_.photos[i].status =
-        Status::Refused("it shows nearly the same as another photo, whose errors it shares");
-  }
-  if (count > 0) {
-    out_.notes.push_back(std::to_string(count) + " of " + std::to_string(equal.size()) +
-                         " photos show nearly the same as another one, and are set aside");
-  }
-}
-
 // Every photo through the cameras as they stand.
 void Adjustment::Estimate() {
   const int count = static_cast<int>(given_.size());
@@ -116,7 +96,7 @@ void Adjustment::Estimate() {
   estimates_.assign(given_.size(), {});
   ParallelFor(count, options_.num_threads, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
-    if (is_valid_[i]) {
+    if (out_.photos[i].status.ok()) {
       prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions(options_));
       inputs_[i].observations = &prepared_[i];
       if (start_ != nullptr) {
@@ -138,7 +118,7 @@ void Adjustment::FindCamera(std::size_t c) {
   constexpr double kMostPhotos = 12.0;  // So many tell a start.
   std::vector<Observations> members;
   for (std::size_t i = 0; i < given_.size(); ++i) {
-    if (CameraOf(i) == c && is_valid_[i]) members.push_back(given_[i]);
+    if (CameraOf(i) == c && out_.photos[i].status.ok()) members.push_back(given_[i]);
   }
   const double step = std::max(1.0, static_cast<double>(members.size()) / kMostPhotos);
   std::vector<Observations> used;

@@ -1,9 +1,10 @@
+// Photos that show nearly the same as another one.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 
-#include "circline/refine/adjust_start.h"
+#include "circline/refine/adjustment.h"
 
 namespace circline {
 namespace {
@@ -63,23 +64,30 @@ bool IsIn(const View& a, const View& b, double distance) {
 
 }  // namespace
 
-std::vector<int> NearlyEqualViews(const std::vector<Observations>& photos,
-                                  const std::vector<std::uint8_t>& takes_part, double distance) {
-  std::vector<int> equal(photos.size(), -1);
-  std::vector<View> views;  // That of a photo that takes no part is like none.
-  for (std::size_t i = 0; i < photos.size(); ++i)
-    views.push_back(takes_part[i] != 0 ? ViewOf(photos[i]) : View());
-  for (std::size_t i = 0; i < photos.size(); ++i) {
-    const Camera& camera = photos[i].camera;
-    const double pixels = distance * std::hypot(camera.width, camera.height);
-    for (std::size_t j = 0; j < i && equal[i] < 0; ++j) {
-      if (equal[j] < 0 && photos[j].camera.id == camera.id && IsIn(views[i], views[j], pixels) &&
-          IsIn(views[j], views[i], pixels)) {
-        equal[i] = static_cast<int>(j);
+void Adjustment::SetAsideEqualViews() {
+  if (!(options_.nearly_equal > 0.0)) return;
+  std::vector<View> views;
+  for (const Observations& photo : given_) views.push_back(ViewOf(photo));
+  int count = 0;
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    const Camera& camera = given_[i].camera;
+    const double pixels = options_.nearly_equal * std::hypot(camera.width, camera.height);
+    AdjustedPhoto& photo = out_.photos[i];
+    for (std::size_t j = 0; j < i && photo.status.ok(); ++j) {
+      if (!out_.photos[j].status.ok() || CameraOf(j) != CameraOf(i) ||
+          !IsIn(views[i], views[j], pixels) || !IsIn(views[j], views[i], pixels)) {
+        continue;
       }
+      photo.same_as = static_cast<int>(j);
+      photo.status =
+          Status::Refused("it shows nearly the same as another photo, whose errors it shares");
+      ++count;
     }
   }
-  return equal;
+  if (count > 0) {
+    out_.notes.push_back(std::to_string(count) + " of " + std::to_string(given_.size()) +
+                         " photos show nearly the same as another one, and are set aside");
+  }
 }
 
 }  // namespace circline
