@@ -31,6 +31,27 @@ CameraPose MovedPose(const CameraPose& own, const Similarity& to_shared) {
   return pose;
 }
 
+void SharedLayout::Add(std::size_t photo, const CameraPose& pose, const Layout& own,
+                       std::map<std::string, std::string> matched) {
+  placed[photo] = true;
+  poses[photo] = pose;
+  names[photo] = std::move(matched);
+  for (const auto& [id, circle] : own) {
+    if (names[photo].count(id) > 0) continue;
+    const bool is_free = circles.count(id) == 0;
+    const std::string name = is_free ? id : std::to_string(photo) + ":" + id;
+    names[photo][id] = name;
+    circles[name] = circle;
+  }
+}
+
+bool SharedLayout::IsById() const {
+  return std::all_of(names.begin(), names.end(), [](const auto& of_photo) {
+    return std::all_of(of_photo.begin(), of_photo.end(),
+                       [](const auto& name) { return name.first == name.second; });
+  });
+}
+
 namespace {
 
 // A hypothesis of a photo against the layout so far.
@@ -46,10 +67,8 @@ struct Candidate {
 // Candidates of layouts that are aligned one by one.
 class Aligner {
  public:
-  Aligner(const std::vector<PoseEstimate>& estimates, bool by_id) : by_id_(by_id) {
-    out_.poses.resize(estimates.size());
-    out_.names.resize(estimates.size());
-    out_.placed.assign(estimates.size(), false);
+  Aligner(const std::vector<PoseEstimate>& estimates, bool by_id)
+      : by_id_(by_id), out_(estimates.size()) {
     for (std::size_t i = 0; i < estimates.size(); ++i) {
       for (const PoseHypothesis& h : estimates[i].hypotheses) {
         Candidate& made = candidates_.emplace_back();
@@ -62,6 +81,10 @@ class Aligner {
   }
 
   SharedLayout Run() {
+    const auto first = std::max_element(
+        candidates_.begin(), candidates_.end(),
+        [](const Candidate& a, const Candidate& b) { return a.own.size() < b.own.size(); });
+    if (first != candidates_.end() && !first->own.empty()) Place(*first);
     while (const Candidate* next = Next()) Place(*next);
     out_.misfit = Median(std::move(misfits_));
     return std::move(out_);
@@ -94,53 +117,43 @@ void Aligner::Align(Candidate* candidate) const {
   if (found && made.misfit <= kFar) candidate->alignment = std::move(made);
 }
 
+// More circles, or of one photo as many that lie closer.
+bool IsBetter(const Candidate& a, const Candidate& b) {
+  const std::size_t more = a.alignment->pairs.size(), fewer = b.alignment->pairs.size();
+  return more > fewer ||
+         (more == fewer && a.photo == b.photo && a.alignment->misfit < b.alignment->misfit);
+}
+
 // The photo that shares most with what is placed. What shared too little is looked at again only
 // when all others are placed: the layout may have grown towards it.
 const Candidate* Aligner::Next() {
-  const bool is_first = shared_.empty();
   for (const bool again : {false, true}) {
     const Candidate* best = nullptr;
-    std::size_t most = 0;
     for (Candidate& candidate : candidates_) {
       if (out_.placed[candidate.photo]) continue;
-      if (!is_first && candidate.seen != shared_.size() &&
+      if (candidate.seen != shared_.size() &&
           (again || candidate.alignment || candidate.seen == 0)) {
         Align(&candidate);
       }
-      if (!is_first && !candidate.alignment) continue;
-      const std::size_t count = is_first ? candidate.own.size() : candidate.alignment->pairs.size();
-      const bool is_better =
-          count > most ||
-          (count == most && best != nullptr && !is_first && best->photo == candidate.photo &&
-           candidate.alignment->misfit < best->alignment->misfit);
-      if (!is_better) continue;
-      most = count;
-      best = &candidate;
+      if (candidate.alignment && (best == nullptr || IsBetter(candidate, *best))) best = &candidate;
     }
-    if (best != nullptr || is_first) return best;
+    if (best != nullptr) return best;
   }
   return nullptr;
 }
 
-// Circles that nobody else has seen join the layout, under a name of their own.
 void Aligner::Place(const Candidate& candidate) {
   const Alignment alignment = candidate.alignment.value_or(Alignment());
-  const std::size_t i = candidate.photo;
   if (candidate.alignment) misfits_.push_back(alignment.misfit);
-  out_.placed[i] = true;
-  out_.poses[i] = MovedPose(candidate.hypothesis->cam_from_world, alignment.to_shared);
-  std::map<std::string, std::string>& names = out_.names[i];
+  std::map<std::string, std::string> matched;
   for (const auto& [own, shared] : alignment.pairs)
-    names[*candidate.own[own].id] = *shared_[shared].id;
-  const std::size_t before = out_.circles.size();
-  for (const auto& [id, circle] : candidate.layout) {
-    if (names.count(id) > 0) continue;
-    const std::string name = by_id_ ? id : std::to_string(i) + ":" + id;
-    names[id] = name;
-    out_.circles[name] = {alignment.to_shared(circle.center),
-                          alignment.to_shared.scale * circle.radius};
-  }
-  if (out_.circles.size() > before) shared_ = PlacesOf(out_.circles);
+    matched[*candidate.own[own].id] = *shared_[shared].id;
+  Layout moved;
+  for (const auto& [id, circle] : candidate.layout)
+    moved[id] = {alignment.to_shared(circle.center), alignment.to_shared.scale * circle.radius};
+  out_.Add(candidate.photo, MovedPose(candidate.hypothesis->cam_from_world, alignment.to_shared),
+           moved, std::move(matched));
+  if (out_.circles.size() > shared_.size()) shared_ = PlacesOf(out_.circles);
 }
 
 }  // namespace

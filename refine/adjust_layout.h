@@ -23,9 +23,11 @@ using Layout = std::map<std::string, LayoutCircle>;  // By id.
 // A hypothesis' circles in its own plane.
 Layout LayoutOf(const PoseHypothesis& hypothesis);
 
-// The layout that photos share, in the frame and unit of the photo that sees most of it, and the
-// pose of each in that frame.
+// The layout that photos share, and the pose of each in its frame.
 struct SharedLayout {
+  explicit SharedLayout(std::size_t num_photos = 0)
+      : poses(num_photos), placed(num_photos), names(num_photos), pencil_names(num_photos) {}
+
   Layout circles;
   std::vector<CameraPose> poses;
   std::vector<bool> placed;  // False: shares too few circles with the others, or contradicts them.
@@ -33,7 +35,15 @@ struct SharedLayout {
   // Of pencils, where photos can tell; else they are each photo's own.
   std::vector<std::map<std::string, std::string>> pencil_names;
   double misfit = 0.0;  // Median distance of circles from their place, units of Place.
+
+  // Adds a photo whose circles lie so in the shared frame. `matched`: what the layout calls those
+  // that it has; the others join it, under their own id where that is free.
+  void Add(std::size_t photo, const CameraPose& pose, const Layout& own,
+           std::map<std::string, std::string> matched);
+  // Whether circles are the same where their ids are.
+  bool IsById() const;
 };
+// The frame and unit are those of the photo that sees most.
 // Circles are the same where their ids are; or, without `by_id`, where they lie alike: a pattern of
 // circles and sizes that both have, be it a lattice or not. (Of a lattice seen in part that is one
 // of several ways, which fit alike.)

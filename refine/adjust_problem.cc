@@ -37,9 +37,10 @@ int& OneOf(const Key& key, std::map<Key, int>* blocks) {
 }  // namespace
 
 AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
-                             std::vector<CameraPrior> priors, const AdjustOptions& options,
-                             const GivenFrame* given)
+                             const std::vector<Layout>& layouts, std::vector<CameraPrior> priors,
+                             const AdjustOptions& options, const GivenFrame* given)
     : photos_(photos),
+      layouts_(layouts),
       priors_(std::move(priors)),
       options_(options),
       pose_options_(PoseOptions(options)) {
@@ -154,8 +155,9 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservatio
     AddKnownRadius(world, circle, known->second.radius);
     return &known->second;
   }
-  const auto start = input.layout->find(id);
-  if (start == input.layout->end()) return nullptr;
+  const Layout& layout = layouts_[static_cast<std::size_t>(world)];
+  const auto start = layout.find(id);
+  if (start == layout.end()) return nullptr;
   const NoiseModel& model = options_.noise_model;
   // Where circles were matched by how they lie, ids of groups are a photo's own.
   const std::string own = input.names.empty() ? "" : std::to_string(photo) + ":";

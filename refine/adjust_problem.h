@@ -29,9 +29,8 @@ class Linearization;
 struct AdjustInput {
   const Observations* observations = nullptr;  // As of Prepare, through the camera at start.
   int camera = 0;
-  int world = 0;                   // Photos of one world share circles and pencils of one id.
-  CameraPose pose;                 // To start from, of that world.
-  const Layout* layout = nullptr;  // Circles of that world.
+  int world = 0;    // Photos of one world share circles and pencils of one id.
+  CameraPose pose;  // To start from, of that world.
   // What the world calls its circles, by own id; empty: the same. What it calls its pencils; where
   // it does not say and circles have other names, or poses are given, each photo has its own.
   std::map<std::string, std::string> names, pencil_names;
@@ -56,10 +55,11 @@ EstimationOptions PoseOptions(const AdjustOptions& options);
 
 class AdjustProblem : private Graph {
  public:
-  // `priors`: by camera. `given`: where the world lies in the frame of given poses; null: there are
-  // none.
-  AdjustProblem(const std::vector<AdjustInput>& photos, std::vector<CameraPrior> priors,
-                const AdjustOptions& options, const GivenFrame* given);
+  // `layouts`: of the circles, by world. `priors`: by camera. `given`: where the world lies in the
+  // frame of given poses; null: there are none.
+  AdjustProblem(const std::vector<AdjustInput>& photos, const std::vector<Layout>& layouts,
+                std::vector<CameraPrior> priors, const AdjustOptions& options,
+                const GivenFrame* given);
 
   // Runs ceres with the losses `stretch` times as wide.
   Status Solve(double stretch, int max_iterations);
@@ -144,6 +144,7 @@ class AdjustProblem : private Graph {
   Matrix6d PoseCovariance(std::size_t photo, const Linearization& at) const;
 
   const std::vector<AdjustInput>& photos_;
+  const std::vector<Layout>& layouts_;
   const std::vector<CameraPrior> priors_;  // By camera.
   const AdjustOptions& options_;
   const EstimationOptions pose_options_;

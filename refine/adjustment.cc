@@ -21,7 +21,7 @@ void Adjustment::SolveOnce() {
     priors.push_back(
         {ShiftsBetween(cameras_[c], guesses_[c]), ShiftSigmas(cameras_[c], priors_[c], options_)});
   }
-  problem_ = std::make_unique<AdjustProblem>(inputs_, priors, options_,
+  problem_ = std::make_unique<AdjustProblem>(inputs_, layouts_, priors, options_,
                                              given_frame_ ? &*given_frame_ : nullptr);
   double width = std::min(problem_->LargestRms(), kWidest);
   for (; width > kNear && out_.status.ok(); width *= kNarrower)
@@ -150,7 +150,6 @@ void Adjustment::PrepareAnew() {
     if (!inputs_[i].takes_part) return;
     prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions(options_));
     inputs_[i].pose = problem_->PoseAt(index);
-    inputs_[i].layout = &layouts_[static_cast<std::size_t>(inputs_[i].world)];
   });
 }
 
@@ -177,7 +176,8 @@ bool Adjustment::FindGrids() {
   ParallelFor(static_cast<int>(given_.size()), options_.num_threads, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     const AdjustInput& input = inputs_[i];
-    if (input.takes_part && input.layout->empty() && input.given == nullptr)
+    if (input.takes_part && layouts_[static_cast<std::size_t>(input.world)].empty() &&
+        input.given == nullptr)
       grids_[i] = FindSquareGrid(prepared_[i], problem_->PoseAt(index).rotation);
   });
   return std::any_of(grids_.begin(), grids_.end(),

@@ -51,10 +51,8 @@ class Adjustment {
   void Estimate();
   void FindCamera(std::size_t camera);
   Status Start();
-  Status StartHere();
-  bool PlaceWorlds();
-  bool PlaceByPoses();
-  void ShareWorld(const SharedLayout& shared, bool by_id);
+  Status PlaceWorlds();
+  void ShareWorld(const SharedLayout& shared);
   void ScaleWorlds();
   void SolveWithoutOutliers();
   bool FindGrids();

@@ -158,70 +158,55 @@ Status Adjustment::Start() {
       options_.progress("cameras", static_cast<int>(c), static_cast<int>(cameras_.size()));
     if (priors_[c].IsWide()) FindCamera(c);
   }
-  return StartHere();
-}
-
-Status Adjustment::StartHere() {
   Estimate();
-  if (!PlaceWorlds()) {
-    if (std::any_of(inputs_.begin(), inputs_.end(), [](const auto& in) { return in.takes_part; }))
-      return Status::Refused("no circle is found in two photos where their given poses have it");
-    return Status::Refused("no photo gives a pose: " + estimates_.front().status.message);
-  }
-  ScaleWorlds();
-  return Status::Ok();
+  const Status status = PlaceWorlds();
+  if (status.ok()) ScaleWorlds();
+  return status;
 }
 
 // One world, where the photos' circles lie alike, by their ids or whatever these are; else each its
 // own.
-bool Adjustment::PlaceWorlds() {
+Status Adjustment::PlaceWorlds() {
   constexpr double kAlike = 0.1;       // Of the units of Place.
   constexpr double kMostPhotos = 0.8;  // Of those with a pose.
-  bool any = false;
+  int with_pose = 0;
   layouts_.assign(given_.size() + 1, Layout());
   for (std::size_t i = 0; i < given_.size(); ++i) {
     AdjustedPhoto& photo = out_.photos[i];
     photo.status = estimates_[i].status;
     inputs_[i].takes_part = photo.status.ok() && !estimates_[i].hypotheses.empty();
     if (!inputs_[i].takes_part) continue;
-    any = true;
+    ++with_pose;
     inputs_[i].world = static_cast<int>(i) + 1;
     inputs_[i].pose = estimates_[i].hypotheses.front().cam_from_world;
     layouts_[i + 1] = LayoutOf(estimates_[i].hypotheses.front());
-    inputs_[i].layout = &layouts_[i + 1];
   }
-  if (any && !options_.given_poses.empty()) return PlaceByPoses();
-  if (!any || options_.rigid == RigidWorld::kNo) return any;
-  const auto with_pose = std::count_if(inputs_.begin(), inputs_.end(),
-                                       [](const AdjustInput& input) { return input.takes_part; });
-  SharedLayout by_ids;
+  if (with_pose == 0)
+    return Status::Refused("no photo gives a pose: " + estimates_.front().status.message);
+  SharedLayout shared;
+  if (!options_.given_poses.empty()) {
+    given_frame_ = PlaceByGivenPoses(estimates_, options_.given_poses, &shared);
+    if (!given_frame_)
+      return Status::Refused("no circle is found in two photos where their given poses have it");
+    ShareWorld(shared);
+    return Status::Ok();
+  }
+  if (options_.rigid == RigidWorld::kNo) return Status::Ok();
   for (const bool by_id : {true, false}) {
-    const SharedLayout shared = AlignLayouts(estimates_, by_id);
-    const auto placed = std::count(shared.placed.begin(), shared.placed.end(), true);
-    out_.rigid = placed > 1 && shared.misfit < kAlike &&
-                 static_cast<double>(placed) >= kMostPhotos * static_cast<double>(with_pose);
-    if (out_.rigid) {
-      ShareWorld(shared, by_id);
-      return true;
-    }
-    if (by_id) by_ids = shared;
+    SharedLayout found = AlignLayouts(estimates_, by_id);
+    const auto placed =
+        static_cast<int>(std::count(found.placed.begin(), found.placed.end(), true));
+    const bool is_alike = placed > 1 && found.misfit < kAlike && placed >= kMostPhotos * with_pose;
+    if (is_alike || (by_id && placed > 1 && options_.rigid == RigidWorld::kYes))
+      shared = std::move(found);
+    if (is_alike) break;
   }
-  if (options_.rigid == RigidWorld::kYes) {
-    out_.rigid = std::count(by_ids.placed.begin(), by_ids.placed.end(), true) > 1;
-    if (out_.rigid) ShareWorld(by_ids, true);
-    if (!out_.rigid)
-      out_.notes.emplace_back("the photos share no circles: each has a world of its own");
+  if (!shared.circles.empty()) {
+    ShareWorld(shared);
+  } else if (options_.rigid == RigidWorld::kYes) {
+    out_.notes.emplace_back("the photos share no circles: each has a world of its own");
   }
-  return true;
-}
-
-bool Adjustment::PlaceByPoses() {
-  std::optional<GivenPlacement> placement = PlaceByGivenPoses(estimates_, options_.given_poses);
-  if (!placement) return false;
-  out_.rigid = true;
-  given_frame_ = placement->world;
-  ShareWorld(placement->shared, placement->by_id);
-  return true;
+  return Status::Ok();
 }
 
 // Every world in the unit of the radii that are known in it.
@@ -230,8 +215,9 @@ void Adjustment::ScaleWorlds() {
   for (const AdjustInput& input : inputs_) {
     if (!input.takes_part) continue;
     for (const CircleObservation& circle : input.observations->circles) {
-      const auto at = input.layout->find(input.NameOf(circle.id));
-      if (circle.radius > 0.0 && at != input.layout->end())
+      const Layout& layout = layouts_[static_cast<std::size_t>(input.world)];
+      const auto at = layout.find(input.NameOf(circle.id));
+      if (circle.radius > 0.0 && at != layout.end())
         ratios[input.world].push_back(circle.radius / at->second.radius);
     }
   }
@@ -246,8 +232,10 @@ void Adjustment::ScaleWorlds() {
   }
 }
 
-void Adjustment::ShareWorld(const SharedLayout& shared, bool by_id) {
+void Adjustment::ShareWorld(const SharedLayout& shared) {
+  out_.rigid = true;
   layouts_[0] = shared.circles;
+  const bool by_id = shared.IsById();
   for (std::size_t i = 0; i < given_.size(); ++i) {
     AdjustInput& input = inputs_[i];
     if (!input.takes_part) continue;
@@ -259,9 +247,8 @@ void Adjustment::ShareWorld(const SharedLayout& shared, bool by_id) {
     }
     input.world = 0;
     input.pose = shared.poses[i];
-    input.layout = &layouts_[0];
-    input.names = by_id ? std::map<std::string, std::string>() : shared.names[i];
-    if (!shared.pencil_names.empty()) input.pencil_names = shared.pencil_names[i];
+    if (!by_id) input.names = shared.names[i];
+    input.pencil_names = shared.pencil_names[i];
   }
 }
 

@@ -48,17 +48,17 @@ struct WorldSeed {
 // Whether two sightings may be of one circle, by where their rays meet, its size and its normal.
 bool Meet(const Sighting& a, const Sighting& b, WorldSeed* seed) {
   if (!IsSamePlane(a.normal, b.normal)) return false;
-  const double aa = a.ray.squaredNorm(), bb = b.ray.squaredNorm(), ab = a.ray.dot(b.ray);
+  Eigen::Matrix<double, 3, 2> rays;
+  rays << a.ray, -b.ray;
+  const Eigen::Matrix2d normal = rays.transpose() * rays;
   // Sine squared: rays less than 1.1 degrees apart meet anywhere.
   constexpr double kParallax = 4e-4;
-  const double det = aa * bb - ab * ab;
-  if (!(det > kParallax * aa * bb)) return false;
+  if (!(normal.determinant() > kParallax * normal(0, 0) * normal(1, 1))) return false;
   const Eigen::Vector3d between = b.from - a.from;
-  const double u = (bb * a.ray.dot(between) - ab * b.ray.dot(between)) / det,
-               v = (ab * a.ray.dot(between) - aa * b.ray.dot(between)) / det;
-  if (!(u > 0.0 && v > 0.0)) return false;
-  const double larger = u * a.radius / (v * b.radius);
-  *seed = {&a, u, (u * a.ray - v * b.ray - between).norm() / (u * a.radius)};
+  const Eigen::Vector2d along = normal.inverse() * (rays.transpose() * between);
+  if (!(along.minCoeff() > 0.0)) return false;
+  const double radius = along[0] * a.radius, larger = radius / (along[1] * b.radius);
+  *seed = {&a, along[0], (rays * along - between).norm() / radius};
   return larger < kLarger && larger > 1.0 / kLarger && seed->gap < kApart;
 }
 
@@ -80,7 +80,7 @@ class Placer {
     }
   }
 
-  std::optional<GivenPlacement> Run() {
+  std::optional<GivenFrame> Run(SharedLayout* shared) {
     const WorldSeed* best = nullptr;
     std::size_t most = 0;
     const std::vector<WorldSeed> seeds = Seeds();
@@ -97,7 +97,9 @@ class Placer {
       best = &seed;
     }
     if (best == nullptr) return std::nullopt;
-    return Assemble(*best);
+    const GivenFrame world = WorldOf(*best);
+    Assemble(world, LayoutOf(*best->sighting->pose), shared);
+    return world;
   }
 
  private:
@@ -118,10 +120,9 @@ class Placer {
   std::vector<WorldSeed> Seeds() const;
   GivenFrame WorldOf(const WorldSeed& seed) const;
   Match Best(std::size_t photo, const GivenFrame& world, const Places& there) const;
-  static void AddPhoto(std::size_t photo, const Match& match, GivenPlacement* out);
   static void NamePencils(std::size_t photo, const PoseHypothesis& h, std::vector<Known>* known,
                           SharedLayout* shared);
-  GivenPlacement Assemble(const WorldSeed& seed) const;
+  void Assemble(const GivenFrame& world, const Layout& start, SharedLayout* shared) const;
 
   const std::vector<PoseEstimate>& estimates_;
   const std::vector<std::optional<CameraPose>>& given_;
@@ -230,49 +231,22 @@ void Placer::NamePencils(std::size_t photo, const PoseHypothesis& h, std::vector
   }
 }
 
-// A photo, and those of its circles that are new.
-void Placer::AddPhoto(std::size_t photo, const Match& match, GivenPlacement* out) {
-  SharedLayout& shared = out->shared;
-  shared.placed[photo] = true;
-  shared.names[photo] = match.names;
-  for (const auto& [id, circle] : match.own) {
-    if (match.names.count(id) > 0) {
-      out->by_id = out->by_id && match.names.at(id) == id;
-      continue;
-    }
-    const bool is_free = shared.circles.count(id) == 0;
-    const std::string name = is_free ? id : std::to_string(photo) + ":" + id;
-    out->by_id = out->by_id && is_free;
-    shared.names[photo][id] = name;
-    shared.circles[name] = circle;
-  }
-}
-
-GivenPlacement Placer::Assemble(const WorldSeed& seed) const {
-  GivenPlacement out;
-  out.world = WorldOf(seed);
-  out.by_id = true;
-  SharedLayout& shared = out.shared;
-  shared.circles = LayoutOf(*seed.sighting->pose);
-  shared.poses.resize(given_.size());
-  shared.placed.assign(given_.size(), false);
-  shared.names.resize(given_.size());
-  shared.pencil_names.resize(given_.size());
+void Placer::Assemble(const GivenFrame& world, const Layout& start, SharedLayout* shared) const {
+  *shared = SharedLayout(given_.size());
+  shared->circles = start;
   std::vector<Known> pencils;
   // What shared nothing is looked at again: the layout may have grown towards it.
   for (bool has_grown = true; has_grown;) {
     has_grown = false;
     for (std::size_t k = 0; k < given_.size(); ++k) {
-      if (shared.placed[k]) continue;
-      const Match match = Best(k, out.world, PlacesOf(shared.circles));
+      if (shared->placed[k]) continue;
+      const Match match = Best(k, world, PlacesOf(shared->circles));
       if (match.names.empty()) continue;
       has_grown = true;
-      shared.poses[k] = PoseInWorld(out.world, *given_[k]);
-      AddPhoto(k, match, &out);
-      NamePencils(k, *match.pose, &pencils, &shared);
+      shared->Add(k, PoseInWorld(world, *given_[k]), match.own, match.names);
+      NamePencils(k, *match.pose, &pencils, shared);
     }
   }
-  return out;
 }
 
 }  // namespace
@@ -282,10 +256,10 @@ CameraPose PoseInWorld(const GivenFrame& world, const CameraPose& given) {
           (given.rotation * world.translation + given.translation) / world.scale};
 }
 
-std::optional<GivenPlacement> PlaceByGivenPoses(
-    const std::vector<PoseEstimate>& estimates,
-    const std::vector<std::optional<CameraPose>>& given) {
-  return Placer(estimates, given).Run();
+std::optional<GivenFrame> PlaceByGivenPoses(const std::vector<PoseEstimate>& estimates,
+                                            const std::vector<std::optional<CameraPose>>& given,
+                                            SharedLayout* shared) {
+  return Placer(estimates, given).Run(shared);
 }
 
 }  // namespace circline

@@ -24,17 +24,11 @@ ceres::CostFunction* NewGivenPosePrior(const Eigen::Matrix3d& rotation,
 // The pose in the world of a photo that has the given one.
 CameraPose PoseInWorld(const GivenFrame& world, const CameraPose& given);
 
-struct GivenPlacement {
-  SharedLayout shared;
-  GivenFrame world;
-  bool by_id = false;  // Circles of one id are the same.
-};
-
-// `estimates`: each photo's own, the unit of each another one. None where no circle is found in two
-// of them.
-std::optional<GivenPlacement> PlaceByGivenPoses(
-    const std::vector<PoseEstimate>& estimates,
-    const std::vector<std::optional<CameraPose>>& given);
+// Where the world lies, and the photos' circles and directions in it. `estimates`: each photo's
+// own, the unit of each another one. None where no circle is found in two of them.
+std::optional<GivenFrame> PlaceByGivenPoses(const std::vector<PoseEstimate>& estimates,
+                                            const std::vector<std::optional<CameraPose>>& given,
+                                            SharedLayout* shared);
 
 }  // namespace circline
 
