@@ -84,15 +84,8 @@ struct Alignment {
   double misfit = 0.0;  // Median distance of these after it, in place, units of Place, and size.
 };
 
-// How far two sights of one circle may lie from each other: in place, units of Place, and in size,
-// the logarithm of its ratio; where both are off, together no more than either.
-struct Reach {
-  double place = 0.3, size = 0.3;
-};
-
 // The circles of `from` that lie on one of `to`, each on another: the nearest pairs first.
-Pairs Matches(const Places& from, const Places& to, const Similarity& similarity,
-              const Reach& reach = {});
+Pairs Matches(const Places& from, const Places& to, const Similarity& similarity);
 
 // All false where too few circles, or none, are those of the other. By their ids:
 bool AlignById(const Places& from, const Places& to, Alignment* alignment);

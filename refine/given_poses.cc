@@ -129,12 +129,11 @@ class Placer {
   std::vector<Sighting> sightings_;  // By photo.
 };
 
-// The closest meetings, of photos near one another in the list first (those of a video see the
-// same), then of photos farther and farther apart until there are enough.
+// The closest meetings, of photos farther and farther apart in the list (those of a video see the
+// same) until there are enough.
 std::vector<WorldSeed> Placer::Seeds() const {
-  constexpr std::size_t kNeighbours = 8, kMostSeeds = 300;
-  constexpr std::size_t kMostPairs = 5000000;  // Of sightings, where neighbours are too few.
-  std::vector<std::size_t> begins;             // Of each photo with sightings, in sightings_.
+  constexpr std::size_t kMostSeeds = 300, kMostPairs = 5000000;  // The latter of sightings.
+  std::vector<std::size_t> begins;  // Of each photo with sightings, in sightings_.
   for (std::size_t k = 0; k < sightings_.size(); ++k) {
     if (k == 0 || sightings_[k].photo != sightings_[k - 1].photo) begins.push_back(k);
   }
@@ -143,8 +142,8 @@ std::vector<WorldSeed> Placer::Seeds() const {
   std::vector<WorldSeed> seeds;
   WorldSeed seed;
   std::size_t pairs = 0;
-  for (std::size_t apart = 1; apart < count; ++apart) {
-    if (apart > kNeighbours && (seeds.size() >= kMostSeeds || pairs > kMostPairs)) break;
+  for (std::size_t apart = 1; apart < count && seeds.size() < kMostSeeds && pairs <= kMostPairs;
+       ++apart) {
     for (std::size_t p = 0; p + apart < count; ++p) {
       const std::size_t q = p + apart;
       for (std::size_t a = begins[p]; a < begins[p + 1]; ++a) {
@@ -190,8 +189,7 @@ Placer::Match Placer::Best(std::size_t photo, const GivenFrame& world, const Pla
       match.own[circle.id] = {(eye + along * ray).head<2>(), along * circle.radius};
     }
     const Places own = PlacesOf(match.own);
-    for (const auto& [mine, shared] :
-         Matches(own, there, Similarity(), {kApart, std::log(kLarger)}))
+    for (const auto& [mine, shared] : Matches(own, there, Similarity()))
       match.names[*own[mine].id] = *there[shared].id;
     if (best.pose == nullptr || match.names.size() > best.names.size()) best = std::move(match);
   }

@@ -74,12 +74,10 @@ bool Fit(const Places& from, const Places& to, const Pairs& pairs, Similarity* o
   return true;
 }
 
-// In place and in size, units; or of the reach.
-double Deviation(const LayoutCircle& from, const Place& to, const Similarity& similarity,
-                 const Reach& reach = {1.0, 1.0}) {
-  const double size = std::log(similarity.scale * from.radius / to.circle.radius);
-  return std::hypot((similarity(from.center) - to.circle.center).norm() / (to.unit * reach.place),
-                    size / reach.size);
+// In place, units of Place, and in size, the logarithm of its ratio.
+double Deviation(const LayoutCircle& from, const Place& to, const Similarity& similarity) {
+  return std::hypot((similarity(from.center) - to.circle.center).norm() / to.unit,
+                    std::log(similarity.scale * from.radius / to.circle.radius));
 }
 
 bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
@@ -93,15 +91,15 @@ bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
 
 }  // namespace
 
-Pairs Matches(const Places& from, const Places& to, const Similarity& similarity,
-              const Reach& reach) {
+Pairs Matches(const Places& from, const Places& to, const Similarity& similarity) {
+  constexpr double kReach = 0.3;  // Deviation of two sights of one circle.
   struct Match {
     double deviation;
     std::size_t own, shared;
   };
   double largest = 0.0;
   for (const Place& place : to) largest = std::max(largest, place.unit);
-  const double farthest = reach.place * largest;
+  const double farthest = kReach * largest;
   std::vector<Match> near;
   for (std::size_t own = 0; own < from.size(); ++own) {
     const Eigen::Vector2d at = similarity(from[own].circle.center);
@@ -111,8 +109,8 @@ Pairs Matches(const Places& from, const Places& to, const Similarity& similarity
     for (auto k = static_cast<std::size_t>(first - to.begin());
          k < to.size() && to[k].circle.center.x() <= at.x() + farthest; ++k) {
       if (std::abs(to[k].circle.center.y() - at.y()) > farthest) continue;
-      const double deviation = Deviation(from[own].circle, to[k], similarity, reach);
-      if (deviation < 1.0) near.push_back({deviation, own, k});
+      const double deviation = Deviation(from[own].circle, to[k], similarity);
+      if (deviation < kReach) near.push_back({deviation, own, k});
     }
   }
   std::stable_sort(near.begin(), near.end(),
@@ -169,12 +167,10 @@ bool AlignByPattern(const Places& from, const Places& to, Alignment* alignment) 
   constexpr double kMost = 0.6;  // Of the circles of the photo that has fewer.
   constexpr std::size_t kFewest = 4;
   if (alignment->pairs.size() < kFewest ||
-      static_cast<double>(alignment->pairs.size()) < kMost * static_cast<double>(fewer) ||
-      !FitAndJudge(from, to, alignment)) {
+      static_cast<double>(alignment->pairs.size()) < kMost * static_cast<double>(fewer)) {
     return false;
   }
-  const Similarity from_all_pairs = alignment->to_shared;
-  return AlignFrom(from, to, from_all_pairs, alignment);
+  return FitAndJudge(from, to, alignment);
 }
 
 }  // namespace circline
