@@ -49,21 +49,13 @@ bool OffsetOf(const Observations& photo, const LineObservation& line, const Eige
   return std::isfinite(out->offset) && out->variance > 0.0;
 }
 
-bool RunsInBoard(const PencilObservation& pencil) {
-  return pencil.fit &&
-         (pencil.direction == PencilDirection::kX || pencil.direction == PencilDirection::kY);
-}
-
 // Of the lines across an axis of the world: those that run along the other one. Sorted.
 Offsets OffsetsAlong(const Observations& photo, const Eigen::Matrix3d& R, int axis) {
-  constexpr double kAlong = 0.98;  // Cosine.
   Offsets offsets;
   for (std::size_t i = 0; i < photo.pencils.size(); ++i) {
     const PencilObservation& pencil = photo.pencils[i];
-    if (!RunsInBoard(pencil) || AxisAcross(pencil) != axis ||
-        std::abs(pencil.fit->direction.dot(R.col(1 - axis))) < kAlong) {
-      continue;
-    }
+    const PencilDirection along = axis == 1 ? PencilDirection::kX : PencilDirection::kY;
+    if (!pencil.fit || pencil.direction != along) continue;
     for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
       PlaneOffset made{i, j, 0.0, 0.0};
       if (pencil.lines[j].fit && OffsetOf(photo, pencil.lines[j], R, axis, &made))
@@ -116,14 +108,18 @@ double LogOdds(const Offsets& offsets, double first, double square) {
   return odds;
 }
 
-// Least squares of the lines near their places: (first, square) along an axis. False of too few.
-bool Refit(const Offsets& offsets, double reach, double* first, double* square) {
+// offset = first + place * square.
+struct Found {
+  double log_odds = 0.0, square = 0.0;
+  std::array<double, 2> first{};  // By axis.
+};
+
+// Least squares of lines at their places along an axis. False where these are too few.
+bool Refit(const Offsets& offsets, double* first, double* square) {
   Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
   Eigen::Vector2d b = Eigen::Vector2d::Zero();
   for (const PlaneOffset& o : offsets) {
-    const double place = NearestPlace(o, *first, *square);
-    if (std::abs(o.offset - *first - place * *square) > reach * *square) continue;
-    const Eigen::Vector2d row(1.0, place);
+    const Eigen::Vector2d row(1.0, NearestPlace(o, *first, *square));
     const double weight = 1.0 / (o.variance + kLoose * kLoose * *square * *square);
     A += weight * row * row.transpose();
     b += weight * o.offset * row;
@@ -138,7 +134,7 @@ bool Refit(const Offsets& offsets, double reach, double* first, double* square) 
 
 // The grid that two neighbours start, taken on from line to line, the nearest first.
 bool Grow(const Offsets& offsets, double* first, double* square) {
-  constexpr double kReach = 0.12, kNarrower[] = {0.08, 0.05};  // Squares.
+  constexpr double kReach = 0.12;  // Squares.
   Offsets by_distance = offsets, taken;
   const double start = *first;
   std::sort(by_distance.begin(), by_distance.end(), [&](const auto& a, const auto& b) {
@@ -148,49 +144,39 @@ bool Grow(const Offsets& offsets, double* first, double* square) {
     if (std::abs(o.offset - *first - NearestPlace(o, *first, *square) * *square) > kReach * *square)
       continue;
     taken.push_back(o);
-    if (taken.size() > 2 && !Refit(taken, kReach, first, square)) return false;
-  }
-  for (const double reach : kNarrower) {
-    if (!Refit(offsets, reach, first, square)) return false;
+    if (taken.size() > 2 && !Refit(taken, first, square)) return false;
   }
   return true;
 }
 
-// offset = first + place * square.
-struct Found {
-  double log_odds = 0.0, square = 0.0;
-  std::array<double, 2> first{};  // By axis.
-};
-
-// The best grid along one axis, and how many were tried. Along the other one the same square.
-Found Search(const Offsets& along, const Offsets& other, int axis) {
+// The best grid that two neighbours across the X axis start, and lines across the Y axis in squares
+// of that size.
+Found Search(const Offsets& x, const Offsets& y) {
   constexpr std::size_t kNeighbours = 3;
   constexpr double kMostSquares = 100.0;  // Of all lines; boards have fewer.
   Found best;
   int tried = 1;
-  for (std::size_t i = 0; i < along.size(); ++i) {
-    for (std::size_t j = i + 1; j < std::min(along.size(), i + 1 + kNeighbours); ++j) {
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    for (std::size_t j = i + 1; j < std::min(x.size(), i + 1 + kNeighbours); ++j) {
       Found made;
-      double& first = made.first[static_cast<std::size_t>(axis)];
-      double& square = made.square;
-      first = along[i].offset;
-      square = along[j].offset - along[i].offset;
+      made.first[0] = x[i].offset;
+      made.square = x[j].offset - x[i].offset;
       ++tried;
-      const double finest = (along.back().offset - along.front().offset) / kMostSquares;
-      if (square < finest || !Grow(along, &first, &square) || square < finest) continue;
+      const double finest = (x.back().offset - x.front().offset) / kMostSquares;
+      if (made.square < finest || !Grow(x, &made.first[0], &made.square) || made.square < finest)
+        continue;
       double most = -1.0;
-      for (const PlaneOffset& o : other) {
-        const double odds = LogOdds(other, o.offset, square);
-        if (odds > most) {
-          most = odds;
-          made.first[static_cast<std::size_t>(1 - axis)] = o.offset;
-        }
+      for (const PlaneOffset& o : y) {
+        const double odds = LogOdds(y, o.offset, made.square);
+        if (odds <= most) continue;
+        most = odds;
+        made.first[1] = o.offset;
       }
-      made.log_odds = LogOdds(along, first, square) + most;
+      made.log_odds = LogOdds(x, made.first[0], made.square) + most;
       if (made.log_odds > best.log_odds) best = made;
     }
   }
-  best.log_odds -= std::log(static_cast<double>(tried) * static_cast<double>(other.size() + 1));
+  best.log_odds -= std::log(static_cast<double>(tried) * static_cast<double>(y.size() + 1));
   return best;
 }
 
@@ -242,9 +228,7 @@ std::optional<SquareGrid> FindSquareGrid(const Observations& photo,
   constexpr double kSure = 15.0;  // Of log odds.
   const std::array<Offsets, 2> offsets = {OffsetsAlong(photo, rotation, 0),
                                           OffsetsAlong(photo, rotation, 1)};
-  const Offsets x = Merged(offsets[0]), y = Merged(offsets[1]);
-  const Found from_x = Search(x, y, 0), from_y = Search(y, x, 1);
-  const Found& best = from_y.log_odds > from_x.log_odds ? from_y : from_x;
+  const Found best = Search(Merged(offsets[0]), Merged(offsets[1]));
   if (best.log_odds < kSure) return std::nullopt;
   SquareGrid grid;
   Eigen::Vector3d origin = -rotation.col(2);

@@ -35,8 +35,8 @@ int AxisAcross(const PencilObservation& pencil);
 // The grid of the pencils along X and Y of a fitted photo (Prepare), at this rotation
 // cam_from_world and with the camera as it is: the distance that explains most lines as whole
 // numbers of it, along either axis the same, all others as anywhere. Z faces the camera, as
-// ResolveWorld has it. None where that might be
-// chance, or the lines along one axis are a distance of their own apart.
+// ResolveWorld has it. None where that might be chance, or the lines along one axis are a distance
+// of their own apart.
 std::optional<SquareGrid> FindSquareGrid(const Observations& photo,
                                          const Eigen::Matrix3d& rotation);
 
