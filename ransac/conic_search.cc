@@ -6,6 +6,7 @@
 #include <string>
 
 #include "circline/estimators/random.h"
+#include "circline/ransac/dense_clusters.h"
 #include "circline/ransac/false_alarms.h"
 #include "circline/ransac/inlier_weights.h"
 
@@ -134,26 +135,13 @@ bool ConicSearch::IsGood(const ConicCandidate& candidate, int num_inliers) const
          model_.Accept(candidate.value, options_.ransac.threshold);
 }
 
-// The points without far more neighbours than the loneliest fifth has: those of a contour are
-// spread along it, while outliers in a dense cluster may look like a piece of a curve.
 std::vector<int> ConicSearch::OutsideClusters() const {
-  constexpr int kSome = 300;           // Points, in random order, that stand for all.
-  constexpr double kThresholds = 3.0;  // Radius of the neighbourhood.
-  const int n = model_.NumData();
-  std::vector<int> neighbors;
-  for (int i = 0; i < n; ++i) {
-    int count = 0;
-    for (int j = 0; j < std::min(n, kSome); ++j)
-      count += model_.PixelsBetween(i, j) < kThresholds * options_.ransac.threshold ? 1 : 0;
-    neighbors.push_back(count);
-  }
-  std::vector<int> sorted = neighbors;
-  std::nth_element(sorted.begin(), sorted.begin() + n / 5, sorted.end());
-  const int limit = 4 * (sorted[static_cast<std::size_t>(n / 5)] + 1);
-  std::vector<int> indices;
-  for (int i = 0; i < n; ++i) {
-    if (neighbors[static_cast<std::size_t>(i)] <= limit) indices.push_back(model_.PointIndex(i));
-  }
+  constexpr int kSome = 300;  // Points, in random order, that stand for all.
+  std::vector<int> indices =
+      circline::OutsideClusters(model_.NumData(), kSome, [this](int i, int j) {
+        return model_.PixelsBetween(i, j) < kClusterThresholds * options_.ransac.threshold;
+      });
+  for (int& i : indices) i = model_.PointIndex(i);
   return indices;
 }
 

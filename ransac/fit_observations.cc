@@ -12,6 +12,7 @@
 #include "circline/estimators/line.h"
 #include "circline/estimators/point_noise.h"
 #include "circline/ransac/conic_search.h"
+#include "circline/ransac/dense_clusters.h"
 #include "circline/ransac/fit_directions.h"
 #include "circline/ransac/focal_of_fits.h"
 #include "circline/ransac/line_model.h"
@@ -34,6 +35,8 @@ class PointFitter {
       circle.inliers.clear();
       circle.second.reset();
       circles_.back().status = FitCircle(circles_.back(), nullptr, &circle);
+      if (LeaveClustersOut(circle.points, circle.inliers, &circles_.back()))
+        circles_.back().status = FitCircle(circles_.back(), nullptr, &circle);
     }
     for (PencilObservation& pencil : run_.observations.pencils) {
       pencil.fit.reset();
@@ -46,6 +49,8 @@ class PointFitter {
         line.inliers.clear();
         line.is_parallel = true;
         features.back().status = FitLine(features.back(), &line);
+        if (LeaveClustersOut(line.points, line.inliers, &features.back()))
+          features.back().status = FitLine(features.back(), &line);
       }
     }
     for (int round = 0; round < FitRun::kMaxRounds && FollowNoise(); ++round) continue;
@@ -65,10 +70,8 @@ class PointFitter {
       ShareNoise(circles_[i], circle.points, circle.inliers, &*circle.fit);
     }
     for (const PencilObservation& pencil : run_.observations.pencils) {
-      Observations alone;
-      alone.camera = run_.observations.camera;
-      alone.pencils = {pencil};
-      const std::string problem = StatedNoiseProblem(run_.options, "the best lines", alone);
+      const std::string problem =
+          StatedNoiseProblem(run_.options, run_.observations.camera, pencil);
       if (!problem.empty()) run_.Report("pencil '" + pencil.id + "'", problem);
     }
     FitDirections(&lines_, &run_);
@@ -108,6 +111,32 @@ class PointFitter {
     constexpr double kMany = 0.15;  // Of all points.
     return static_cast<double>(std::count(inliers.begin(), inliers.end(), 0)) >
            kMany * static_cast<double>(inliers.size());
+  }
+
+  // Where a fit has found many outliers, it may itself have followed some, or have found nothing:
+  // leaves dense clusters out. False where there are none.
+  bool LeaveClustersOut(const std::vector<Eigen::Vector2d>& pixels,
+                        const std::vector<std::uint8_t>& inliers, FittedFeature* f) const {
+    if (!inliers.empty() && !HasManyOutliers(inliers)) return false;
+    const auto pixel = [&](int i) -> const Eigen::Vector2d& {
+      return pixels[static_cast<std::size_t>(f->indices[static_cast<std::size_t>(i)])];
+    };
+    const double radius = kClusterThresholds * Gate(*f);
+    constexpr int kMost = 4000;  // Points, evenly taken, that stand for all.
+    const int n = static_cast<int>(f->points.size()), step = n / kMost + 1;
+    const std::vector<int> spread = OutsideClusters(n, (n - 1) / step + 1, [&](int i, int j) {
+      return (pixel(i) - pixel(j * step)).squaredNorm() < radius * radius;
+    });
+    if (spread.size() == f->points.size()) return false;
+    FittedFeature rest = *f;
+    rest.points.clear();
+    rest.indices.clear();
+    for (const int i : spread) {
+      rest.points.push_back(f->points[static_cast<std::size_t>(i)]);
+      rest.indices.push_back(f->indices[static_cast<std::size_t>(i)]);
+    }
+    *f = std::move(rest);
+    return true;
   }
 
   // Those of the points; none where the contour has none.
@@ -206,10 +235,7 @@ class PointFitter {
 
   // Where that is what makes outliers of most points, it is to blame, and not they.
   void DoubtStatedNoise(const CircleObservation& circle, FittedFeature* f) const {
-    Observations alone;
-    alone.camera = run_.observations.camera;
-    alone.circles = {circle};
-    const std::string problem = StatedNoiseProblem(run_.options, "the best ellipse", alone);
+    const std::string problem = StatedNoiseProblem(run_.options, run_.observations.camera, circle);
     if (problem.empty()) return;
     f->status = Status::Refused(problem);
     if (circle.fit) run_.Report("circle '" + circle.id + "'", problem);
