@@ -51,7 +51,7 @@ bool Adjustment::LeaveOut() {
   // A photo, of the median one's misfit or what is expected. Photographs of discs, dots and
   // chessboards here have 0 to 0.5; one squeezed by a fifth has more than 100.
   constexpr double kGross = 10.0;
-  constexpr double kByChance = 1e-7;  // A feature: the probability of such a misfit.
+  constexpr double kGrossFeature = 30.0;  // A feature: p = 1e-7 for one degree of freedom.
   const double median = JudgePhotos(), common = std::max(1.0, median);
   bool any = false;
   std::vector<int> left(given_.size(), 0), all(given_.size(), 0);
@@ -60,8 +60,7 @@ bool Adjustment::LeaveOut() {
     ++all[i];
     if (!feature.active) continue;
     ++left[i];
-    if (out_.photos[i].misfit > kGross * common ||
-        !(feature.chi2 > ChiSquareLimit(feature.rows, kByChance) * common))
+    if (out_.photos[i].misfit > kGross * common || !(feature.chi2 > kGrossFeature * common))
       continue;
     any = true;
     --left[i];
