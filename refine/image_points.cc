@@ -107,15 +107,13 @@ class ImagePoints::View {
   // Distance r to a curve that stays while the camera shifts: the same as if the pixel moved the
   // other way (`by_pixel`, d r / d pixel), but for the size of a pixel, by which r itself changes,
   // along the normal `across`: with the shift, and where a lens is bent with the pixel's place,
-  // too; for covariances the latter does not count, or a point just before a lens turns back would
-  // seem to know the camera exactly.
+  // too.
   template <typename Row>
   void FillCameraColumns(std::size_t i, const CalibratedPoint& p, double r,
-                         Eigen::Vector2d by_pixel, const Eigen::Vector2d& across,
-                         bool for_covariance, Row* row, int first) const {
+                         Eigen::Vector2d by_pixel, const Eigen::Vector2d& across, Row* row,
+                         int first) const {
     const Camera& camera = is_shifted_ ? *shifted_ : points_.camera_;
-    if (camera.model != CameraModel::kPinhole && !for_covariance)
-      by_pixel += r * Bend(camera, p, across);
+    if (camera.model != CameraModel::kPinhole) by_pixel += Bounded(r * Bend(camera, p, across));
     const Eigen::Vector2d offset = points_.pixels_[i] - Eigen::Vector2d(camera.cx, camera.cy);
     row->tail(row->size() - first).setZero();
     (*row)[first] = r - by_pixel.dot(offset);
@@ -132,6 +130,14 @@ class ImagePoints::View {
   }
 
  private:
+  // The expansion holds where the lens hardly changes within the distance. Just before a lens turns
+  // back it does, and a point there would seem to know the camera exactly.
+  static Eigen::Vector2d Bounded(const Eigen::Vector2d& change) {
+    constexpr double kMost = 0.3;  // Relative to a pixel's size.
+    const double size = change.norm();
+    return size > kMost ? kMost / size * change : change;
+  }
+
   // By how much a length along `across` grows, in pixels, where its place in the photo moves on by
   // one along either axis.
   static Eigen::Vector2d Bend(const Camera& camera, const CalibratedPoint& p,
@@ -207,12 +213,11 @@ bool ImagePoints::IsOrthogonal(const Eigen::Matrix3d& conic, double* level) cons
 class ImagePoints::ToConic {
  public:
   ToConic(const ImagePoints& points, const Eigen::Matrix3d& conic, double offset_px,
-          const double* camera, bool offset_is_variable, bool for_covariance)
+          const double* camera, bool offset_is_variable)
       : view_(points, camera),
         C_(points.Normalized(conic)),
         offset_px_(offset_px),
         offset_is_variable_(offset_is_variable),
-        for_covariance_(for_covariance),
         is_orthogonal_(points.IsOrthogonal(C_, &level_)) {}
 
   template <typename Row>
@@ -245,8 +250,7 @@ class ImagePoints::ToConic {
       }
       if (offset_is_variable_) (*row)[6] = by_pixel.dot(inwards);
       if constexpr (Row::RowsAtCompileTime > 7)
-        view_.FillCameraColumns(i, seen, d, by_pixel, normal, for_covariance_, row,
-                                offset_is_variable_ ? 7 : 6);
+        view_.FillCameraColumns(i, seen, d, by_pixel, normal, row, offset_is_variable_ ? 7 : 6);
     }
     return d;
   }
@@ -255,13 +259,13 @@ class ImagePoints::ToConic {
   View view_;
   Eigen::Matrix3d C_;
   double offset_px_, level_ = 0.0;
-  bool offset_is_variable_, for_covariance_, is_orthogonal_;
+  bool offset_is_variable_, is_orthogonal_;
 };
 
 double ImagePoints::SumConic(const Eigen::Matrix3d& conic, double offset_px, const double* camera,
                              const Weighing& weighing, const Variables& variables,
                              CurveModel* model) const {
-  const ToConic distance(*this, conic, offset_px, camera, variables.offset, weighing.inliers_only);
+  const ToConic distance(*this, conic, offset_px, camera, variables.offset);
   if (model == nullptr || (!variables.offset && !variables.camera))
     return SumPoints<6>(size(), options_, weighing, distance, model);
   if (!variables.camera) return SumPoints<7>(size(), options_, weighing, distance, model);
@@ -281,7 +285,7 @@ double ImagePoints::SumLine(const Eigen::Vector3d& line, const double* camera,
     row->template head<3>() = by_line;
     if constexpr (std::remove_pointer_t<decltype(row)>::RowsAtCompileTime > 3) {
       const Eigen::Vector2d normal = p.GradientPerPixel(line.head<2>()).normalized();
-      view.FillCameraColumns(i, p, d, normal, normal, weighing.inliers_only, row, 3);
+      view.FillCameraColumns(i, p, d, normal, normal, row, 3);
     }
     return d;
   };
@@ -292,7 +296,7 @@ double ImagePoints::SumLine(const Eigen::Vector3d& line, const double* camera,
 
 void ImagePoints::ConicDistances(const Eigen::Matrix3d& conic, double offset_px,
                                  const double* camera, std::vector<double>* distances) const {
-  const ToConic distance(*this, conic, offset_px, camera, false, false);
+  const ToConic distance(*this, conic, offset_px, camera, false);
   distances->clear();
   for (std::size_t i = 0; i < size(); ++i)
     distances->push_back(distance(i, static_cast<Vector6d*>(nullptr)));

@@ -87,6 +87,7 @@ class ImagePoints {
   const std::vector<CalibratedPoint>& points() const { return points_; }  // Undistorted.
   const std::vector<Eigen::Vector2d>& pixels() const { return pixels_; }  // Of the same points.
   const Options& options() const { return options_; }  // As given; no distortion of a pinhole.
+  // Whether lines in space are bent in the photo, so that they tell of the focal length.
   bool has_lens() const { return camera_.model != CameraModel::kPinhole; }
   void set_weight(double weight) { options_.weight = weight; }  // Options::weight.
   // Undistorts the points once, as the camera with these kCameraSize shifts has them, for all that
