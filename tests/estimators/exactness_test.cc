@@ -7,6 +7,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/observations.h"
 #include "circline/estimators/random.h"
 #include "tests/pinhole_camera.h"
 
