@@ -33,7 +33,7 @@ struct Plane {
 // The lines of pencils come from the whole photo, and are those that are exactly parallel. The
 // region in which two pencils form corners may be one thing: then all its lines count, bent or not,
 // and no others. Fits both pencils to the lines of that region. False, and nothing changed, where
-// less than half of either pencil is left: two directions of a street, say.
+// less than 70 % of either pencil is left: two directions of a street, say.
 bool RefitWhereTheyMeet(const std::vector<DetectedLine>& lines, std::array<DetectedPencil, 2>* pair,
                         double diagonal_px = kUsualDiagonalPx);
 

@@ -88,11 +88,14 @@ TEST(LocalPencils, TakeTheLinesOfTheBoardAndNoOthers) {
 }
 
 TEST(LocalPencils, LeaveDirectionsOfTheWholePhotoAlone) {
-  // Little of either pencil is where they meet.
-  Scene scene = MakeScene(0.001, 1, 5);
-  const std::vector<int> before = scene.pair[0].members;
-  EXPECT_FALSE(RefitWhereTheyMeet(scene.lines, &scene.pair));
-  EXPECT_EQ(scene.pair[0].members, before);
+  // Little of either pencil is where they meet; or most of it, as of a street one side's fronts.
+  for (const auto& [num_rows, num_others] : {std::pair{1, 5}, std::pair{5, 7}}) {
+    Scene scene = MakeScene(0.001, num_rows, num_others);
+    const std::vector<int> before = scene.pair[0].members;
+    EXPECT_FALSE(RefitWhereTheyMeet(scene.lines, &scene.pair)) << num_rows;
+    EXPECT_EQ(scene.pair[0].members, before) << num_rows;
+  }
+  Scene scene = MakeScene(0.001, 5, 4);
   EXPECT_FALSE(RefitWhereTheyMeet({}, &scene.pair));
 }
 
