@@ -83,7 +83,9 @@ function(circline_module folder)
     set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 4)
   endif()
   circline_shared_library(${target})
-  if(CIRCLINE_HIDE)
+  # Clang hides a function whose definition stands in a namespace without the attribute, whatever its
+  # header says: there the linker's script alone hides, and internal headers show.
+  if(CIRCLINE_HIDE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden
                                                VISIBILITY_INLINES_HIDDEN ON)
   endif()
