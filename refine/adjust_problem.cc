@@ -285,8 +285,9 @@ int AdjustProblem::AddGridPlace(int photo, std::size_t pencil, std::size_t line,
     off = AddBlock(1, {});
     AddTerm(NewGaussianPrior({GridSigma(input, 1.0)}), {off});
   }
-  blocks.push_back(off);
-  return AddTerm(NewGridLinePrior(observed.lines[line].fit->line, cost.points()->Middle(nullptr),
+  blocks.insert(blocks.end(), {off, cameras_[static_cast<std::size_t>(input.camera)]});
+  return AddTerm(NewGridLinePrior(input.observations->camera, observed.lines[line].fit->line,
+                                  cost.points()->Middle(nullptr).head<2>(),
                                   options_.noise_model.line_direction_rad > 0.0, axis,
                                   found->second, GridSigma(input, kPieces)),
                  std::move(blocks));

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/export.h"
@@ -19,6 +20,22 @@ using Shifts = std::array<double, kCameraSize>;
 // Standard deviations; of the coefficients of a lens, where the camera has one, only the first.
 Shifts ShiftSigmas(const Camera& camera, const CameraSigma& sigma);
 Camera ShiftedCamera(const Camera& camera, const double* shifts);
+// A line and a point of calibrated coordinates of the camera as given, in those of the shifted one,
+// lenses left out: x_given = exp(s0) x + s2 / fx, y_given = exp(s0 + s1) y + s3 / fy.
+template <typename T>
+Eigen::Matrix<T, 3, 1> ShiftedLine(const Camera& camera, const T* shifts,
+                                   const Eigen::Vector3d& line) {
+  using std::exp;
+  return {exp(shifts[0]) * line.x(), exp(shifts[0] + shifts[1]) * line.y(),
+          line.z() + line.x() * shifts[2] / camera.fx + line.y() * shifts[3] / camera.fy};
+}
+template <typename T>
+Eigen::Matrix<T, 3, 1> ShiftedPoint(const Camera& camera, const T* shifts,
+                                    const Eigen::Vector2d& point) {
+  using std::exp;
+  return {(point.x() - shifts[2] / camera.fx) * exp(-shifts[0]),
+          (point.y() - shifts[3] / camera.fy) * exp(-shifts[0] - shifts[1]), T(1.0)};
+}
 // A pixel, undistorted by a shifted camera; `before`: by the camera `given`, which is where it is
 // looked for. A pixel that no ray of the shifted camera meets, beyond where its lens turns back or
 // at a right angle to its axis, is as far off as in the photo: the lens goes on as it is just

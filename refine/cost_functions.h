@@ -170,7 +170,8 @@ class DirectionLineCost : public CurveCost {
     double direction_sigma = 0.0;  // Of a line's own direction, radians; 0 = exact.
     bool camera = false;           // Whether there is a block of the camera.
   };
-  // `fit`: any line near, calibrated coordinates of the camera of the points (FitLine).
+  // `fit`: any line near, calibrated coordinates of the camera of the points (FitLine); where the
+  // camera is a block, its shifts move it as they move what is seen there.
   DirectionLineCost(ImagePoints points, const Eigen::Vector3d& fit, Options options);
   // As PlaneCircleContourCost's.
   void Exchange(ImagePoints* points, const Eigen::Vector3d& fit);
@@ -185,7 +186,7 @@ class DirectionLineCost : public CurveCost {
 
  private:
   struct Placed;
-  bool Place(const double* const* parameters, Placed* placed) const;
+  bool Place(const double* const* parameters, const double* camera, Placed* placed) const;
 
   Eigen::Vector3d fit_;  // Unit.
   Options options_;

@@ -86,6 +86,7 @@ class ImagePoints {
   std::size_t size() const { return points_.size(); }  // Of those that were not left out.
   const std::vector<CalibratedPoint>& points() const { return points_; }  // Undistorted.
   const std::vector<Eigen::Vector2d>& pixels() const { return pixels_; }  // Of the same points.
+  const Camera& camera() const { return camera_; }                        // As given.
   const Options& options() const { return options_; }  // As given; no distortion of a pinhole.
   // Whether lines in space are bent in the photo, so that they tell of the focal length.
   bool has_lens() const { return camera_.model != CameraModel::kPinhole; }

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "circline/refine/block_chain.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/nearby_solve.h"
+#include "circline/refine/seen_points.h"
 
 namespace circline {
 namespace {
@@ -130,8 +132,11 @@ Status JointProblem::Solve(int max_iterations, State* state, double most_cost,
   Narrowing losses(*this, *state, widths, HasBoundedLoss(options_) ? 2 : 1);
   ceres::Problem::Options of_problem = OwnsNothing();
   if (losses.is_wide() || camera_is_estimated_) of_problem.evaluation_callback = &losses;
+  std::optional<SeenPoints> seen;
+  if (camera_is_estimated_) seen.emplace(*this, state);
   ceres::Problem problem(of_problem);
-  const int unknowns = Fill(ActiveTerms(*state), state->x.data(), &problem);
+  const int unknowns =
+      seen ? seen->Fill(&problem) : Fill(ActiveTerms(*state), state->x.data(), &problem);
   if (unknowns == 0) return Status::Refused("nothing of the evidence ties the pose");
 
   // Ceres asks for a share of the cost, of which the free fits' is the most that is known; it falls
@@ -149,6 +154,7 @@ Status JointProblem::Solve(int max_iterations, State* state, double most_cost,
     is_done = !summary.IsSolutionUsable() || (!losses.is_wide() && !watch.has_risen());
     if (losses.is_wide()) losses.Narrow();  // A minimum of the wider ones.
   }
+  seen.reset();
   if (summary.termination_type == ceres::USER_FAILURE)
     return Status::Refused("another pose explains the evidence far better");
   if (!summary.IsSolutionUsable() && summary.termination_type != ceres::NO_CONVERGENCE)

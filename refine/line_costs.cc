@@ -36,18 +36,29 @@ struct AsSquare {
 // --- A line of a direction ---
 
 // In the camera frame, with d the direction, the line is m + e d: m is what of the fit lies across
-// d, a unit vector, turned about d by the angle.
+// d, a unit vector, turned about d by the angle. The fit is where it is seen: a camera that shifts
+// takes it along.
 struct DirectionLineCost::Placed {
   Eigen::Matrix3d R;
-  Eigen::Vector3d in_world, d, m, turned, line, by_angle;
+  Eigen::Vector3d in_world, fit, d, m, turned, line, by_angle;
   double c, s, e, along, norm;
 
-  // d line / d d.
-  Eigen::Matrix3d ByDirection(const Eigen::Vector3d& fit) const {
+  Eigen::Matrix3d ByAcross() const {
     const Eigen::Matrix3d by_m = c * Eigen::Matrix3d::Identity() + s * CrossMatrix(d);
-    const Eigen::Matrix3d m_by_across = (Eigen::Matrix3d::Identity() - m * m.transpose()) / norm;
+    return by_m * (Eigen::Matrix3d::Identity() - m * m.transpose()) / norm;
+  }
+  Eigen::Matrix3d ByDirection() const {
     const Eigen::Matrix3d across_by_d = -d * fit.transpose() - along * Eigen::Matrix3d::Identity();
-    return by_m * m_by_across * across_by_d - s * CrossMatrix(m) + e * Eigen::Matrix3d::Identity();
+    return ByAcross() * across_by_d - s * CrossMatrix(m) + e * Eigen::Matrix3d::Identity();
+  }
+  // By the shifts that are not of the lens.
+  Eigen::Matrix<double, 3, 4> ByCamera(const Camera& camera, const Eigen::Vector3d& given) const {
+    Eigen::Matrix<double, 3, 4> fit_by_shifts = Eigen::Matrix<double, 3, 4>::Zero();
+    fit_by_shifts.block<2, 1>(0, 0) = fit.head<2>();
+    fit_by_shifts(1, 1) = fit.y();
+    fit_by_shifts(2, 2) = given.x() / camera.fx;
+    fit_by_shifts(2, 3) = given.y() / camera.fy;
+    return ByAcross() * (Eigen::Matrix3d::Identity() - d * d.transpose()) * fit_by_shifts;
   }
 };
 
@@ -63,14 +74,16 @@ void DirectionLineCost::Exchange(ImagePoints* points, const Eigen::Vector3d& fit
   fit_ = fit.normalized();
 }
 
-bool DirectionLineCost::Place(const double* const* parameters, Placed* placed) const {
+bool DirectionLineCost::Place(const double* const* parameters, const double* camera,
+                              Placed* placed) const {
   Placed& p = *placed;
+  p.fit = camera != nullptr ? ShiftedLine(points()->camera(), camera, fit_) : fit_;
   p.R = RotationFromBlock(parameters[0]);
   p.in_world = Eigen::Vector3d(parameters[1]).normalized();
   p.d = p.R * p.in_world;
   p.e = options_.direction_sigma > 0.0 ? parameters[2][1] : 0.0;
-  p.along = p.d.dot(fit_);
-  p.m = fit_ - p.along * p.d;
+  p.along = p.d.dot(p.fit);
+  p.m = p.fit - p.along * p.d;
   p.norm = p.m.norm();
   constexpr double kAcross = 1e-6;  // The fit runs straight across the direction.
   if (!(p.norm > kAcross)) return false;
@@ -87,16 +100,16 @@ void DirectionLineCost::Distances(const double* const* parameters,
                                   std::vector<double>* distances) const {
   Placed placed;
   distances->clear();
-  if (Place(parameters, &placed))
+  if (Place(parameters, CameraShifts(parameters), &placed))
     points()->LineDistances(placed.line, CameraShifts(parameters), distances);
 }
 
 // The line through the vanishing point and the middle of the points.
 bool DirectionLineCost::Start(const double* const* parameters, double* line) const {
   std::fill(line, line + parameter_block_sizes()[2], 0.0);
-  const double* with[4] = {parameters[0], parameters[1], line, nullptr};
+  const double* with[3] = {parameters[0], parameters[1], line};
   Placed placed;
-  if (!Place(with, &placed)) return false;
+  if (!Place(with, CameraShifts(parameters), &placed)) return false;
   const Eigen::Vector3d middle = points()->Middle(CameraShifts(parameters));
   const double along = placed.line.dot(middle), across = placed.by_angle.dot(middle);
   if (!(std::hypot(along, across) > 0.0)) return false;
@@ -107,7 +120,8 @@ bool DirectionLineCost::Start(const double* const* parameters, double* line) con
 bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* const* parameters,
                                      double* residuals, double** jacobians) const {
   Placed p;
-  if (!Place(parameters, &p)) return false;
+  const double* camera = CameraShifts(parameters);
+  if (!Place(parameters, camera, &p)) return false;
   const bool soft = options_.direction_sigma > 0.0;
   const int rows = num_residuals(), line_rows = num_curve_residuals();
   Rows U;
@@ -117,7 +131,7 @@ bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* con
   if (soft) residuals[line_rows] = weighing.inliers_only ? deviation : prior.value;
   if (jacobians == nullptr) return true;
   const int own_size = soft ? 2 : 1;
-  const Eigen::Matrix3d by_world = p.ByDirection(fit_) * p.R;
+  const Eigen::Matrix3d by_world = p.ByDirection() * p.R;
   Eigen::Matrix<double, 3, 2> by_own;
   by_own << p.by_angle, p.d;
   WriteJacobian(U * (by_world * -CrossMatrix(p.in_world)) * DeltaFromQuaternion(parameters[0]),
@@ -127,6 +141,11 @@ bool DirectionLineCost::EvaluateWith(const Weighing& weighing, const double* con
   if (soft && jacobians[2] != nullptr) {
     jacobians[2][own_size * line_rows + 1] =
         (weighing.inliers_only ? 1.0 : prior.slope) / options_.direction_sigma;
+  }
+  if (camera != nullptr && jacobians[3] != nullptr) {
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, kCameraSize, Eigen::RowMajor>;
+    Eigen::Map<RowMajor>(jacobians[3], rows, kCameraSize).topLeftCorner(U.rows(), 4) +=
+        U * p.ByCamera(points()->camera(), fit_);
   }
   return true;
 }

@@ -15,6 +15,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/noise_model.h"
+#include "circline/refine/camera_shifts.h"
 
 namespace circline {
 namespace {
@@ -244,14 +245,16 @@ std::optional<SquareGrid> FindSquareGrid(const Observations& photo,
 namespace {
 
 struct GridLineResidual {
-  Eigen::Vector3d fit, middle;
+  Camera camera;
+  Eigen::Vector3d fit;
+  Eigen::Vector2d middle;
   bool line_deviates;
   int axis;
   double place, sigma;
 
   template <typename T>
   bool operator()(const T* q, const T* t, const T* direction, const T* line, const T* off,
-                  T* residual) const {
+                  const T* shifts, T* residual) const {
     using std::cos;
     using std::isfinite;
     using std::sin;
@@ -261,11 +264,13 @@ struct GridLineResidual {
         Eigen::Map<const Eigen::Quaternion<T>>(q).normalized().toRotationMatrix();
     // As DirectionLineCost has it.
     const Vector d = R * Block(direction).normalized();
-    Vector m = fit.cast<T>() - d.dot(fit.cast<T>()) * d;
+    const Vector seen = ShiftedLine(camera, shifts, fit),
+                 point = ShiftedPoint(camera, shifts, middle);
+    Vector m = seen - d.dot(seen) * d;
     m.normalize();
     Vector l = cos(line[0]) * m + sin(line[0]) * d.cross(m);
     if (line_deviates) l += line[1] * d;
-    const Vector ray = middle.cast<T>() - (l.dot(middle.cast<T>()) / l.squaredNorm()) * l;
+    const Vector ray = point - (l.dot(point) / l.squaredNorm()) * l;
     const Vector n = R.col(2);
     const Vector in_camera = (n.dot(Block(t)) / n.dot(ray)) * ray;
     residual[0] = (R.col(axis).dot(in_camera - Block(t)) - place - off[0]) / sigma;
@@ -275,13 +280,15 @@ struct GridLineResidual {
 
 }  // namespace
 
-ceres::CostFunction* NewGridLinePrior(const Eigen::Vector3d& fit, const Eigen::Vector3d& middle,
-                                      bool line_deviates, int axis, int place, double sigma) {
-  auto* residual =
-      new GridLineResidual{fit, middle, line_deviates, axis, static_cast<double>(place), sigma};
+ceres::CostFunction* NewGridLinePrior(const Camera& camera, const Eigen::Vector3d& fit,
+                                      const Eigen::Vector2d& middle, bool line_deviates, int axis,
+                                      int place, double sigma) {
+  auto* residual = new GridLineResidual{camera, fit.normalized(),           middle, line_deviates,
+                                        axis,   static_cast<double>(place), sigma};
   if (line_deviates)
-    return new ceres::AutoDiffCostFunction<GridLineResidual, 1, 4, 3, 3, 2, 1>(residual);
-  return new ceres::AutoDiffCostFunction<GridLineResidual, 1, 4, 3, 3, 1, 1>(residual);
+    return new ceres::AutoDiffCostFunction<GridLineResidual, 1, 4, 3, 3, 2, 1, kCameraSize>(
+        residual);
+  return new ceres::AutoDiffCostFunction<GridLineResidual, 1, 4, 3, 3, 1, 1, kCameraSize>(residual);
 }
 
 }  // namespace circline

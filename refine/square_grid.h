@@ -41,11 +41,12 @@ std::optional<SquareGrid> FindSquareGrid(const Observations& photo,
                                          const Eigen::Matrix3d& rotation);
 
 // The middle of a line of the world's plane against its place on the grid: rotation, translation,
-// direction, line as those of its DirectionLineCost, and by how much the board is off there (1,
-// squares). `fit`: as given to that cost; `middle`: of its points, calibrated; `place` squares
-// along `axis` (0: X, 1: Y), with this standard deviation.
-ceres::CostFunction* NewGridLinePrior(const Eigen::Vector3d& fit, const Eigen::Vector3d& middle,
-                                      bool line_deviates, int axis, int place, double sigma);
+// direction, line as those of its DirectionLineCost, by how much the board is off there (1,
+// squares), and the camera. `camera`, `fit`: as given to that cost; `middle`: of its points,
+// calibrated; `place` squares along `axis` (0: X, 1: Y), with this standard deviation.
+ceres::CostFunction* NewGridLinePrior(const Camera& camera, const Eigen::Vector3d& fit,
+                                      const Eigen::Vector2d& middle, bool line_deviates, int axis,
+                                      int place, double sigma);
 
 }  // namespace circline
 
