@@ -34,7 +34,7 @@ Eigen::Matrix<T, 3, 1> ShiftedPoint(const Camera& camera, const T* shifts,
                                     const Eigen::Vector2d& point) {
   using std::exp;
   return {(point.x() - shifts[2] / camera.fx) * exp(-shifts[0]),
-          (point.y() - shifts[3] / camera.fy) * exp(-shifts[0] - shifts[1]), T(1.0)};
+          (point.y() - shifts[3] / camera.fy) * exp(-shifts[0] - shifts[1]), static_cast<T>(1.0)};
 }
 // A pixel, undistorted by a shifted camera; `before`: by the camera `given`, which is where it is
 // looked for. A pixel that no ray of the shifted camera meets, beyond where its lens turns back or

@@ -40,8 +40,8 @@ constexpr double kMostBeyond = 0.1;
 constexpr double kGrazing = 0.15;
 // Lines that miss a direction by up to this are alike, radians.
 constexpr double kAlikeRad = 0.05;
-// It is one thing if its lines are this share of either pencil's length: of boards they are 0.78 and
-// more, of a street's one side and of a box before a wall up to 0.6.
+// It is one thing if its lines are this share of either pencil's length: of boards they are 0.78
+// and more, of a street's one side and of a box before a wall up to 0.6.
 constexpr double kMinLocalShare = 0.7;
 
 // Old houses have verticals a degree apart: the longest pencil stands for all that are nearly
