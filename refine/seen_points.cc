@@ -23,15 +23,17 @@ using CameraJacobian = Eigen::Matrix<double, 3, 4>;  // By the shifts that are n
 class Pinhole {
  public:
   Pinhole(const Camera& camera, const double* shifts)
-      : shrink_(std::exp(-shifts[0]), std::exp(-shifts[0] - shifts[1])),
-        focal_(camera.fx, camera.fy),
-        middle_(shifts[2] / camera.fx, shifts[3] / camera.fy) {}
+      : camera_(camera),
+        shifts_(shifts),
+        shrink_(std::exp(-shifts[0]), std::exp(-shifts[0] - shifts[1])),
+        focal_(camera.fx, camera.fy) {}
 
   Vector2d Image(const Vector3d& point) const {
-    return middle_ + (point.head<2>() / point.z()).cwiseQuotient(shrink_);
+    return (point.head<2>() / point.z()).cwiseQuotient(shrink_) +
+           Vector2d(shifts_[2], shifts_[3]).cwiseQuotient(focal_);
   }
   Vector3d Ray(const double* image) const {
-    return (Vector2d(image[0], image[1]) - middle_).cwiseProduct(shrink_).homogeneous();
+    return ShiftedPoint(camera_, shifts_, Vector2d(image[0], image[1]));
   }
   Eigen::Matrix<double, 3, 2> RayByImage() const {
     Eigen::Matrix<double, 3, 2> J = Eigen::Matrix<double, 3, 2>::Zero();
@@ -47,7 +49,9 @@ class Pinhole {
   }
 
  private:
-  Vector2d shrink_, focal_, middle_;
+  const Camera& camera_;
+  const double* shifts_;
+  Vector2d shrink_, focal_;
 };
 
 // A translation of this image and length.

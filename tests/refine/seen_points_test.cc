@@ -5,28 +5,37 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
+#include "circline/estimators/pose.h"
 #include "circline/refine/nearby_solve.h"
 #include "tests/plane_scene.h"
 
 namespace circline {
 namespace {
 
-// Three circles, one of them with its centre marked, seen by a camera of which nothing is known.
+// Three circles of one known size, the last one with its centre marked, and a prior of the pose,
+// through a camera of which little is known.
 class SeenPointsTest : public ::testing::Test {
  protected:
   SeenPointsTest() : scene_(0.7, 0.3), observations_(scene_.Empty()) {
     observations_.frame.plane = "p0";
     for (const double x : {-1.5, 0.4, 2.0})
       observations_.circles.push_back(scene_.Circle("c" + std::to_string(x), x, 0.3 * x, 0.8));
+    for (CircleObservation& circle : observations_.circles) circle.radius = 0.8;
+    observations_.circles.back().center = scene_.Pixel(2.0, 0.6);
     FitDirect(scene_.sigma(), &observations_);
     observations_ = ResolveWorld(observations_);
     CameraSigma& camera = options_.camera_sigma.emplace();
     camera.log_focal = 0.5;
     camera.log_aspect = 0.01;
     camera.principal_point_px = 20.0;
+    PosePrior& prior = options_.pose_prior.emplace();
+    prior.mean = {scene_.pose.rotation * ExpRotation({0.05, -0.03, 0.02}),
+                  scene_.pose.translation + Eigen::Vector3d(0.1, -0.05, 0.2)};
+    Eigen::Map<Eigen::Matrix<double, 6, 6>>(prior.covariance.data()).diagonal().setConstant(0.04);
   }
   // Off the minimum.
   State Start(const JointProblem& problem) const {
@@ -102,8 +111,7 @@ TEST_F(SeenPointsTest, CostAndDerivativesAreThoseOfThePlaces) {
   EXPECT_EQ(at, gradient.size());
 }
 
-// What is seen of the three tells the focal length from half of it or twice as much, and the
-// minimum is one: whichever way they are moved.
+// The three tell the focal length, whether two thirds of it or half as much again is guessed.
 TEST_F(SeenPointsTest, LeadToOneMinimum) {
   const JointProblem problem(observations_, options_);
   std::vector<State> found;
