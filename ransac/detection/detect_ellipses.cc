@@ -1,7 +1,10 @@
 #include "circline/ransac/detection/detect_ellipses.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <bitset>
+#include <cmath>
 #include <utility>
 
 #include "circline/estimators/basics.h"
@@ -14,6 +17,9 @@ namespace {
 
 // An arc alone determines an ellipse from this turn on.
 constexpr double kMinSingleTurn = 50.0 * kDegree;
+// A contour that goes so far round is a thing's. Of 180 to 300 degrees, on renderings (seeds 201 to
+// 225) and photographs: from 240 down photographs of other things gain ellipses that are none.
+constexpr double kMostOfAContour = 240.0 * kDegree;
 // Arcs that take part in pairs: the most bent and longest ones. Bounds the quadratic step.
 constexpr std::size_t kMaxPairedArcs = 256;
 // Pairs tried, the most promising ones: what comes after them has not added an ellipse.
@@ -25,6 +31,10 @@ constexpr int kMinPartPoints = 12;
 // smaller, in steps of this share, in both planes that it can have.
 constexpr double kMaxRimRatio = 2.7;
 constexpr double kRimStep = 0.05;
+// What hides up to half of a rim runs beside it within this ratio of its size, but for a tenth of
+// its edges, and where the rim has edges on no more than a quarter of the way. Of renderings.
+constexpr double kMostHidden = 0.5, kBesideRatio = 1.25, kStraysBeside = 0.1, kMostShared = 0.25;
+constexpr std::size_t kSectors = 72;  // Of the way round a rim.
 // Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
 constexpr double kDuplicatePx = 2.5;
 
@@ -70,17 +80,21 @@ class EllipseDetector {
       AddRims(accepted_[k].fit.conic);
       AcceptBest();
     }
+    DropWhatHides();
     Rank();
     return std::move(accepted_);
   }
 
  private:
   // Fits an ellipse to the arcs and keeps it for later if edges elsewhere support it too. False if
-  // the arcs themselves are not on one ellipse.
+  // the arcs themselves are not on one ellipse, or are most of a contour that is none: something
+  // may hide a part of it.
   bool AddCandidate(std::initializer_list<const Arc*> arcs) {
     EllipseCandidate candidate;
     if (!fitter_.FitArcs(arcs, &candidate)) return false;
-    if (fitter_.Improve(&candidate)) candidates_.push_back(candidate);
+    if (!fitter_.Improve(&candidate))
+      return arcs.size() > 1 || (*arcs.begin())->turn < kMostOfAContour;
+    candidates_.push_back(candidate);
     return true;
   }
 
@@ -166,6 +180,48 @@ class EllipseDetector {
       if (same_side && fitter_.LiesOn(e, other.fit.conic, kDuplicatePx)) return true;
     }
     return false;
+  }
+
+  void DropWhatHides() {
+    std::vector<DetectedEllipse> kept;
+    for (const DetectedEllipse& arc : accepted_) {
+      const bool hides = std::any_of(accepted_.begin(), accepted_.end(), [&](const auto& rim) {
+        return rim.coverage_deg > arc.coverage_deg && Hides(arc, rim);
+      });
+      if (!hides) kept.push_back(arc);
+    }
+    accepted_ = std::move(kept);
+  }
+
+  // Whether an arc is the edge of what hides a part of a rim: it runs beside that, where it has no
+  // edges of its own.
+  bool Hides(const DetectedEllipse& arc, const DetectedEllipse& rim) {
+    Ellipse about;
+    if (arc.coverage_deg > 360.0 * kMostHidden || !ConicToEllipse(rim.fit.conic, &about))
+      return false;
+    double strays = 0.0, unused = 0.0;
+    const std::bitset<kSectors> of_arc = SectorsOf(arc, about, &strays),
+                                of_rim = SectorsOf(rim, about, &unused);
+    return strays <= kStraysBeside * static_cast<double>(arc.points.size()) &&
+           static_cast<double>((of_arc & of_rim).count()) <=
+               kMostShared * static_cast<double>(of_arc.count());
+  }
+
+  // Those of the way round an ellipse where edges of another one are; `strays`: how many of these
+  // are not beside it.
+  std::bitset<kSectors> SectorsOf(const DetectedEllipse& e, const Ellipse& about, double* strays) {
+    std::bitset<kSectors> sectors;
+    const Eigen::Rotation2Dd onto_axes(-about.angle);
+    for (const int i : e.points) {
+      CalibratedPoint p;
+      if (!fitter_.Calibrate(i, &p)) continue;
+      const Vector2d unit =
+          (onto_axes * (p.x - about.center)).cwiseQuotient(Vector2d(about.a, about.b));
+      const double ratio = unit.norm(), turn = std::atan2(unit.y(), unit.x()) / (2.0 * kPi) + 0.5;
+      *strays += std::max(ratio, 1.0 / ratio) > kBesideRatio ? 1.0 : 0.0;
+      sectors.set(static_cast<std::size_t>(turn * kSectors) % kSectors);
+    }
+    return sectors;
   }
 
   void Rank() {

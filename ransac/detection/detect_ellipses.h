@@ -8,7 +8,8 @@
 // final fit is to edge points from which the bias of a bent edge has been taken (CurvatureBias). A
 // contour too ragged for an ellipse gets a second look through a wider Gaussian. Around each
 // ellipse found, other rims about its centre are looked for, whose arcs may be too short to tell an
-// ellipse.
+// ellipse. What hides a part of a rim may have a round edge of its own, an arc where the rim has
+// none: that is not told as an ellipse.
 #ifndef CIRCLINE_RANSAC_DETECTION_DETECT_ELLIPSES_H_
 #define CIRCLINE_RANSAC_DETECTION_DETECT_ELLIPSES_H_
 

@@ -52,6 +52,9 @@ class EllipseFitter {
   void Take(const DetectedEllipse& e) { collector_.Take(e.points); }
   bool IsTaken(int i) const { return collector_.IsTaken(i); }
 
+  // An edge point; false where the camera cannot undistort it.
+  bool Calibrate(int i, CalibratedPoint* point) { return calibrated_.Get(i, point); }
+
   // Whether a conic passes within `reach_px` of the ellipse's points. (A dozen of them are looked
   // at.)
   bool LiesOn(const DetectedEllipse& e, const Eigen::Matrix3d& conic, double reach_px);

@@ -185,6 +185,45 @@ TEST(DetectEllipses, KeepsClearOfWhatRunsBesideTheRim) {
   EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3);
 }
 
+// The same, but brighter, and 6 to 8 px beside the rim: an arc of 108 degrees, of a rim of its own
+// were the disc not there.
+TEST(DetectEllipses, TakesTheEdgeOfWhatHidesARimForNone) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(35.0, 20.0, 0.0, 6.0);
+  const auto found = [&](double disc) {
+    return EllipsesOf(Develop(RenderPlane(camera, pose, 200.0,
+                                          [disc](double x, double y) {
+                                            const double r = std::hypot(x, y);
+                                            if (r < 1.1 && x > 0.58 * r && x > 0.58) return 120.0;
+                                            return r < 1.0 ? disc : 200.0;
+                                          }),
+                              0.7, 2.0),
+                      camera);
+  };
+  const std::vector<DetectedEllipse> hidden = found(40.0), alone = found(200.0);
+  ASSERT_EQ(hidden.size(), 1U);
+  EXPECT_GT(hidden[0].coverage_deg, 220.0);
+  EXPECT_LT(BetterNormalDeg(hidden[0], pose.rotation.col(2)), 0.3);
+  ASSERT_EQ(alone.size(), 1U);
+  EXPECT_LT(alone[0].coverage_deg, 120.0);
+}
+
+// Small discs, each with a piece cut off that is too small to make their contours no ellipses at
+// first sight.
+TEST(DetectEllipses, FindsDiscsWithAPieceCutOff) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(30.0, 5.0, 10.0, 14.0);
+  const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [](double x, double y) {
+    if (std::abs(x) > 3.7 || std::abs(y) > 2.2) return 200.0;
+    const double u = x - 1.5 * std::round(x / 1.5), v = y - 1.5 * std::round(y / 1.5);
+    const double turn = std::round(x / 1.5) + 5.0 * std::round(y / 1.5);
+    const bool is_cut = std::cos(turn) * u + std::sin(turn) * v > 0.3;
+    return std::hypot(u, v) < 0.4 && !is_cut ? 30.0 : 200.0;
+  }));
+  // Of 5 x 3: where a contour begins, and so is divided, is chance.
+  EXPECT_GE(EllipsesOf(image, camera).size(), 14U);
+}
+
 TEST(DetectEllipses, FindsAGreyDiscBeforeBlackAndWhite) {
   const Camera camera = TestCamera();
   const CameraPose pose = LookAt(40.0, 10.0, 0.0, 6.0);
