@@ -18,7 +18,7 @@ namespace {
 // An arc alone determines an ellipse from this turn on.
 constexpr double kMinSingleTurn = 50.0 * kDegree;
 // A contour that goes so far round is a thing's. Of 180 to 300 degrees, on renderings (seeds 201 to
-// 225) and photographs: from 240 down photographs of other things gain ellipses that are none.
+// 225) and all photographs: with less, cluttered ones gain ellipses that are none.
 constexpr double kMostOfAContour = 240.0 * kDegree;
 // Arcs that take part in pairs: the most bent and longest ones. Bounds the quadratic step.
 constexpr std::size_t kMaxPairedArcs = 256;
@@ -199,15 +199,14 @@ class EllipseDetector {
     Ellipse about;
     if (arc.coverage_deg > 360.0 * kMostHidden || !ConicToEllipse(rim.fit.conic, &about))
       return false;
-    double strays = 0.0, unused = 0.0;
-    const std::bitset<kSectors> of_arc = SectorsOf(arc, about, &strays),
-                                of_rim = SectorsOf(rim, about, &unused);
-    return strays <= kStraysBeside * static_cast<double>(arc.points.size()) &&
-           static_cast<double>((of_arc & of_rim).count()) <=
-               kMostShared * static_cast<double>(of_arc.count());
+    double strays = 0.0;
+    const std::bitset<kSectors> of_arc = SectorsOf(arc, about, &strays);
+    if (strays > kStraysBeside * static_cast<double>(arc.points.size())) return false;
+    const std::bitset<kSectors> shared = of_arc & SectorsOf(rim, about, &strays);
+    return static_cast<double>(shared.count()) <= kMostShared * static_cast<double>(of_arc.count());
   }
 
-  // Those of the way round an ellipse where edges of another one are; `strays`: how many of these
+  // Those of the way round an ellipse where edges of one are; adds to `strays` how many of these
   // are not beside it.
   std::bitset<kSectors> SectorsOf(const DetectedEllipse& e, const Ellipse& about, double* strays) {
     std::bitset<kSectors> sectors;
