@@ -53,6 +53,19 @@ cv::Mat Disc(const Camera& camera, const CameraPose& pose, double outer = 0.0, d
                  0.7, noise);
 }
 
+// 5 x 3 dark discs of radius 0.4. Of each what lies beyond `cut` from its middle, in a direction of
+// its own, is cut off.
+cv::Mat FifteenDiscs(double cut) {
+  return Develop(
+      RenderPlane(TestCamera(), LookAt(30.0, 5.0, 10.0, 14.0), 200.0, [cut](double x, double y) {
+        if (std::abs(x) > 3.7 || std::abs(y) > 2.2) return 200.0;
+        const double column = std::round(x / 1.5), row = std::round(y / 1.5);
+        const double u = x - 1.5 * column, v = y - 1.5 * row, turn = column + 5.0 * row;
+        const bool is_cut = std::cos(turn) * u + std::sin(turn) * v > cut;
+        return std::hypot(u, v) < 0.4 && !is_cut ? 30.0 : 200.0;
+      }));
+}
+
 double BetterNormalDeg(const DetectedEllipse& e, const Vector3d& normal) {
   std::array<CirclePose, 2> poses;
   const int n = CirclePoses(e.fit.conic, &poses);
@@ -140,15 +153,8 @@ TEST(DetectEllipses, LeavesTheEdgesOfOneRimApart) {
 }
 
 TEST(DetectEllipses, KeepsNeighboursApart) {
-  const Camera camera = TestCamera();
-  const CameraPose pose = LookAt(30.0, 5.0, 10.0, 14.0);
-  const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [](double x, double y) {
-    if (std::abs(x) > 3.7 || std::abs(y) > 2.2) return 200.0;
-    const double u = x - 1.5 * std::round(x / 1.5), v = y - 1.5 * std::round(y / 1.5);
-    return std::hypot(u, v) < 0.4 ? 30.0 : 200.0;
-  }));
-  const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
-  EXPECT_EQ(found.size(), 15U);  // 5 x 3.
+  const std::vector<DetectedEllipse> found = EllipsesOf(FifteenDiscs(0.4), TestCamera());
+  EXPECT_EQ(found.size(), 15U);
   for (const DetectedEllipse& e : found) EXPECT_EQ(e.concentric, -1);
 }
 
@@ -211,17 +217,8 @@ TEST(DetectEllipses, TakesTheEdgeOfWhatHidesARimForNone) {
 // Small discs, each with a piece cut off that is too small to make their contours no ellipses at
 // first sight.
 TEST(DetectEllipses, FindsDiscsWithAPieceCutOff) {
-  const Camera camera = TestCamera();
-  const CameraPose pose = LookAt(30.0, 5.0, 10.0, 14.0);
-  const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [](double x, double y) {
-    if (std::abs(x) > 3.7 || std::abs(y) > 2.2) return 200.0;
-    const double u = x - 1.5 * std::round(x / 1.5), v = y - 1.5 * std::round(y / 1.5);
-    const double turn = std::round(x / 1.5) + 5.0 * std::round(y / 1.5);
-    const bool is_cut = std::cos(turn) * u + std::sin(turn) * v > 0.3;
-    return std::hypot(u, v) < 0.4 && !is_cut ? 30.0 : 200.0;
-  }));
-  // Of 5 x 3: where a contour begins, and so is divided, is chance.
-  EXPECT_GE(EllipsesOf(image, camera).size(), 14U);
+  // Where a contour begins, and so is divided, is chance.
+  EXPECT_GE(EllipsesOf(FifteenDiscs(0.3), TestCamera()).size(), 14U);
 }
 
 TEST(DetectEllipses, FindsAGreyDiscBeforeBlackAndWhite) {
