@@ -59,11 +59,15 @@ struct Place {
   // far the nearest other one of the layout is, where that is more: small circles far apart are
   // told from each other as well as large ones.
   double unit = 1.0;
+  // What a match with it counts: 1 for circles of the commonest size, more by the logarithm of how
+  // rare its size is. A board's dots match wherever the lattice does, its mark at one place.
+  double weight = 1.0;
 };
 using Places = std::vector<Place>;
 Places PlacesOf(const Layout& layout);
 
-// x_to = turn * x_from + shift, where turn is a rotation times scale.
+// x_to = turn * x_from + shift, where turn is a rotation times scale; or, where said, any map of
+// positive determinant, of which scale is the root.
 struct Similarity {
   double scale = 1.0;
   Eigen::Matrix2d turn = Eigen::Matrix2d::Identity();
@@ -84,13 +88,14 @@ struct Alignment {
   double misfit = 0.0;  // Median distance of these after it, in place, units of Place, and size.
 };
 
-// The circles of `from` that lie on one of `to`, each on another: the nearest pairs first.
+// The circles of `from` that lie on one of `to`, each on another: the nearest pairs first. The
+// similarity may be affine.
 Pairs Matches(const Places& from, const Places& to, const Similarity& similarity);
 
 // All false where too few circles, or none, are those of the other. By their ids:
 bool AlignById(const Places& from, const Places& to, Alignment* alignment);
-// The similarity under which most circles coincide, of those that a few pairs of neighbours ask
-// for.
+// The similarity under which the circles that coincide say most (Place::weight), of those that a
+// few pairs of neighbours ask for.
 bool AlignByPattern(const Places& from, const Places& to, Alignment* alignment);
 // From one to start from: all circles that coincide under it.
 bool AlignFrom(const Places& from, const Places& to, const Similarity& start, Alignment* alignment);

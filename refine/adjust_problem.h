@@ -48,7 +48,13 @@ struct AdjustInput {
 // Of a camera's shifts (camera_shifts.h) against the one that its points were made with.
 struct CameraPrior {
   Shifts mean{}, sigma{};  // 0 = held.
+  CameraModel model = CameraModel::kOpenCV;
 };
+
+// p1, p2 of these shifts.
+inline bool IsTangential(CameraModel model, int shift) {
+  return model == CameraModel::kOpenCV && (shift == 6 || shift == 7);
+}
 
 // How each photo's own pose is estimated.
 EstimationOptions PoseOptions(const AdjustOptions& options);
@@ -119,6 +125,7 @@ class AdjustProblem : private Graph {
   };
 
   void AddCameras();
+  void AddCameraPrior(const CameraPrior& prior);
   void AddPhoto(int photo);
   void SetGauge();
   void AddGivenPoses(const GivenFrame& given);

@@ -18,8 +18,8 @@ void Adjustment::SolveOnce() {
   constexpr int kIterations = 8;
   std::vector<CameraPrior> priors;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    priors.push_back(
-        {ShiftsBetween(cameras_[c], guesses_[c]), ShiftSigmas(cameras_[c], priors_[c], options_)});
+    priors.push_back({ShiftsBetween(cameras_[c], guesses_[c]),
+                      ShiftSigmas(cameras_[c], priors_[c], options_), cameras_[c].model});
   }
   problem_ = std::make_unique<AdjustProblem>(inputs_, layouts_, priors, options_,
                                              given_frame_ ? &*given_frame_ : nullptr);
@@ -236,8 +236,8 @@ void Adjustment::Report() {
     constexpr double kNextToNothing = 0.7;  // Of the prior's standard deviation.
     for (int k = 0; k < kCameraSize; ++k) {
       const double sigma = prior[static_cast<std::size_t>(k)];
-      const bool is_tangential = made.camera.model == CameraModel::kOpenCV && (k == 6 || k == 7);
-      if (k == 1 || is_tangential) continue;  // Their priors are meant to hold them.
+      if (k == 1 || IsTangential(made.camera.model, k))
+        continue;  // Their priors are meant to hold them.
       if (sigma > 0.0 && made.Sigma(k) > kNextToNothing * sigma)
         made.at_prior.emplace_back(ShiftName(made.camera.model, k));
     }

@@ -167,7 +167,9 @@ Status Adjustment::Start() {
 // One world, where the photos' circles lie alike, by their ids or whatever these are; else each its
 // own.
 Status Adjustment::PlaceWorlds() {
-  constexpr double kAlike = 0.1;       // Of the units of Place.
+  // Of the units of Place. What matches by its pattern lies farther off where the camera to start
+  // from is rough.
+  constexpr double kAlikePattern = 0.15, kAlikeById = 0.1;
   constexpr double kMostPhotos = 0.8;  // Of those with a pose.
   int with_pose = 0;
   layouts_.assign(given_.size() + 1, Layout());
@@ -196,7 +198,8 @@ Status Adjustment::PlaceWorlds() {
     SharedLayout found = AlignLayouts(estimates_, by_id);
     const auto placed =
         static_cast<int>(std::count(found.placed.begin(), found.placed.end(), true));
-    const bool is_alike = placed > 1 && found.misfit < kAlike && placed >= kMostPhotos * with_pose;
+    const bool is_alike = placed > 1 && found.misfit < (by_id ? kAlikeById : kAlikePattern) &&
+                          placed >= kMostPhotos * with_pose;
     if (is_alike || (by_id && placed > 1 && options_.rigid == RigidWorld::kYes))
       shared = std::move(found);
     if (is_alike) break;

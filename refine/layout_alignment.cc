@@ -1,4 +1,5 @@
 // Pairs of circles, and the similarity that maps them onto each other.
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -13,19 +14,31 @@ namespace circline {
 
 namespace {
 
-// Each circle and the one nearest to it.
+constexpr double kReach = 0.3;  // Deviation of two sights of one circle.
+
+// How far each circle's nearest other one is; infinity where there is none.
+std::vector<double> Gaps(const Places& places) {
+  std::vector<double> gaps(places.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    for (std::size_t other = 0; other < k; ++other) {
+      const double gap = (places[other].circle.center - places[k].circle.center).norm();
+      gaps[k] = std::min(gaps[k], gap);
+      gaps[other] = std::min(gaps[other], gap);
+    }
+  }
+  return gaps;
+}
+
+// Each circle and those next to it: the nearest one, and what is about as near, as on a lattice.
 Pairs NeighbourPairs(const Places& places) {
+  constexpr double kAsNear = 1.25;
+  const std::vector<double> gaps = Gaps(places);
   Pairs pairs;
   for (std::size_t k = 0; k < places.size(); ++k) {
-    std::size_t nearest = k;
-    double least = std::numeric_limits<double>::infinity();
     for (std::size_t other = 0; other < places.size(); ++other) {
-      const double distance = (places[other].circle.center - places[k].circle.center).squaredNorm();
-      if (other == k || !(distance < least)) continue;
-      least = distance;
-      nearest = other;
+      const double gap = (places[other].circle.center - places[k].circle.center).norm();
+      if (other != k && gap < kAsNear * std::max(gaps[k], gaps[other])) pairs.push_back({k, other});
     }
-    if (nearest != k) pairs.push_back({k, nearest});
   }
   return pairs;
 }
@@ -40,9 +53,15 @@ Places PlacesOf(const Layout& layout) {
     return a.circle.center.x() < b.circle.center.x();
   });
   constexpr double kShare = 0.3;  // A board's discs have about that radius, of their distances.
-  for (const auto& [k, nearest] : NeighbourPairs(places)) {
-    const double gap = (places[nearest].circle.center - places[k].circle.center).norm();
-    places[k].unit = std::max(places[k].unit, kShare * gap);
+  const std::vector<double> gaps = Gaps(places);
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    if (std::isfinite(gaps[k])) places[k].unit = std::max(places[k].unit, kShare * gaps[k]);
+  }
+  for (Place& place : places) {
+    const auto alike = std::count_if(places.begin(), places.end(), [&place](const Place& other) {
+      return std::abs(std::log(other.circle.radius / place.circle.radius)) < kReach;
+    });
+    place.weight = 1.0 + std::log(static_cast<double>(places.size()) / static_cast<double>(alike));
   }
   return places;
 }
@@ -92,7 +111,6 @@ bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
 }  // namespace
 
 Pairs Matches(const Places& from, const Places& to, const Similarity& similarity) {
-  constexpr double kReach = 0.3;  // Deviation of two sights of one circle.
   struct Match {
     double deviation;
     std::size_t own, shared;
@@ -125,6 +143,41 @@ Pairs Matches(const Places& from, const Places& to, const Similarity& similarity
   return pairs;
 }
 
+namespace {
+
+// The affine map of least squares. False for points in line, or seen from behind.
+bool FitAffine(const Places& from, const Places& to, const Pairs& pairs, Similarity* out) {
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, 2> b = Eigen::Matrix<double, 3, 2>::Zero();
+  for (const auto& [own, shared] : pairs) {
+    const Eigen::Vector3d x = from[own].circle.center.homogeneous();
+    A += x * x.transpose();
+    b += x * to[shared].circle.center.transpose();
+  }
+  const Eigen::Matrix<double, 3, 2> map = A.ldlt().solve(b);
+  out->turn = map.topRows<2>().transpose();
+  out->shift = map.row(2);
+  out->scale = std::sqrt(out->turn.determinant());
+  return map.allFinite() && out->scale > 0.0;
+}
+
+// More of them: a pose that is a little off shears and stretches its plane, and two neighbours tell
+// little of what is far from them.
+Pairs GrownMatches(const Places& from, const Places& to, Pairs pairs) {
+  constexpr int kRounds = 6;
+  constexpr std::size_t kFewest = 4;
+  Similarity affine;
+  for (int k = 0; k < kRounds && pairs.size() >= kFewest; ++k) {
+    if (!FitAffine(from, to, pairs, &affine)) break;
+    Pairs more = Matches(from, to, affine);
+    if (more.size() <= pairs.size()) break;
+    pairs = std::move(more);
+  }
+  return pairs;
+}
+
+}  // namespace
+
 bool AlignById(const Places& from, const Places& to, Alignment* alignment) {
   std::map<std::string, std::size_t> shared;
   for (std::size_t k = 0; k < to.size(); ++k) shared[*to[k].id] = k;
@@ -137,19 +190,18 @@ bool AlignById(const Places& from, const Places& to, Alignment* alignment) {
 
 bool AlignFrom(const Places& from, const Places& to, const Similarity& start,
                Alignment* alignment) {
-  alignment->pairs = Matches(from, to, start);
+  alignment->pairs = GrownMatches(from, to, Matches(from, to, start));
   return FitAndJudge(from, to, alignment);
 }
 
 bool AlignByPattern(const Places& from, const Places& to, Alignment* alignment) {
   constexpr std::size_t kBases = 6;
-  constexpr double kSize = 0.2;  // Two circles alike in size and distance, relative.
-  const Pairs own_pairs = NeighbourPairs(from);
-  Pairs shared_pairs = NeighbourPairs(to);
-  const std::size_t count = shared_pairs.size(), fewer = std::min(from.size(), to.size());
-  for (std::size_t k = 0; k < count; ++k)
-    shared_pairs.push_back({shared_pairs[k][1], shared_pairs[k][0]});
+  constexpr double kSize = 0.2;     // Two circles alike in size and distance, relative.
+  constexpr double kHopeful = 0.2;  // Of the best so far: so many matches may grow to as many.
+  const Pairs own_pairs = NeighbourPairs(from), shared_pairs = NeighbourPairs(to);
+  const std::size_t fewer = std::min(from.size(), to.size());
   const std::size_t step = std::max<std::size_t>(1, own_pairs.size() / kBases);
+  double most = 0.0;
   for (std::size_t base = 0; base < own_pairs.size(); base += step) {
     const auto& [a, b] = own_pairs[base];
     for (const auto& [c, d] : shared_pairs) {
@@ -161,7 +213,16 @@ bool AlignByPattern(const Places& from, const Places& to, Alignment* alignment) 
         continue;
       }
       Pairs pairs = Matches(from, to, similarity);
-      if (pairs.size() > alignment->pairs.size()) alignment->pairs = std::move(pairs);
+      if (static_cast<double>(pairs.size()) <
+          kHopeful * static_cast<double>(alignment->pairs.size())) {
+        continue;
+      }
+      pairs = GrownMatches(from, to, std::move(pairs));
+      double sum = 0.0;
+      for (const auto& [own, shared] : pairs) sum += to[shared].weight;
+      if (sum <= most) continue;
+      most = sum;
+      alignment->pairs = std::move(pairs);
     }
   }
   constexpr double kMost = 0.6;  // Of the circles of the photo that has fewer.

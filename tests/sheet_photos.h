@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/random.h"
 #include "circline/refine/adjust_photos.h"
 #include "tests/plane_scene.h"
 
@@ -56,6 +57,28 @@ class Photos {
       scene_.pose = poses[i];
       photos[i].circles.push_back(scene_.Circle(id, 0.0, 0.0, radius));
     }
+    return *this;
+  }
+  // Eight rows of eight dots, the one at a corner twice as large. Each photo misses one in eight of
+  // the others, and numbers what it has.
+  Photos& WithMarkedBoard(std::uint64_t seed) {
+    constexpr int kSide = 8;
+    constexpr double kStep = 0.6, kMissed = 0.125;
+    Random random(seed);
+    for (std::size_t i = 0; i < photos.size(); ++i) {
+      scene_.pose = poses[i];
+      for (int k = 0; k < kSide * kSide; ++k) {
+        if (k > 0 && random.Uniform() < kMissed) continue;
+        const double x = kStep * (k % kSide - 3.5), y = kStep * (k / kSide - 3.5);
+        const std::string id = "c" + std::to_string(photos[i].circles.size());
+        photos[i].circles.push_back(scene_.Circle(id, x, y, k == 0 ? 0.2 : 0.1));
+      }
+    }
+    return *this;
+  }
+  // A lens that is not centred; before anything is seen.
+  Photos& OffCentre(double p1) {
+    scene_.camera.distortion[2] = p1;
     return *this;
   }
   Photos& WithPencils() {

@@ -82,6 +82,42 @@ TEST(AdjustHard, PhotosThatOverlapInPartAreOfOneWorld) {
   EXPECT_EQ(adjusted.cameras[0].num_photos, 6);
 }
 
+// Its dots match wherever the lattice does, turned or shifted, and as many as are found in both:
+// its mark says where.
+TEST(AdjustHard, AMarkSaysHowABoardLies) {
+  for (const std::uint64_t seed : {4, 5, 6}) {
+    const Photos sheet = Photos(6, seed).WithMarkedBoard(seed);
+    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    EXPECT_TRUE(adjusted.rigid);
+    EXPECT_EQ(adjusted.circles.size(), 64U) << seed;
+    for (std::size_t i = 0; i < sheet.poses.size(); ++i) {
+      const auto turned_by = [&](const CameraPose& pose, const CameraPose& first) {
+        return Eigen::Matrix3d(pose.rotation * first.rotation.transpose());
+      };
+      const Eigen::Matrix3d off =
+          turned_by(adjusted.photos[i].cam_from_world, adjusted.photos[0].cam_from_world) *
+          turned_by(sheet.poses[i], sheet.poses[0]).transpose();
+      EXPECT_LT(Eigen::AngleAxisd(off).angle(), 0.02) << seed << " " << i;
+    }
+  }
+}
+
+// Cheap cameras have lenses that are glued in beside the middle.
+TEST(AdjustHard, ALensFarOffCentreKeepsThePrincipalPoint) {
+  for (const double p1 : {0.0, 0.01}) {
+    Photos sheet = Photos(8).OffCentre(p1).WithCircles();
+    AdjustOptions options = PointNoiseOnly();
+    options.tangential_sigma = AdjustOptions().tangential_sigma;
+    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
+    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedCamera& made = adjusted.cameras[0];
+    EXPECT_LT(std::abs(made.camera.distortion[2] - p1), 3.0 * made.Sigma(6)) << p1;
+    EXPECT_LT(made.Sigma(6), p1 > 0.0 ? 2e-3 : 5e-4) << p1;
+    EXPECT_LT(CameraNees(made, sheet.truth()), 3.0) << p1;  // 1 expected; 99.5 % below 3.35.
+  }
+}
+
 // What is known of a circle's tilt beforehand counts once, however many photos measure it: one does
 // to about 4 mrad, all of them to 1.2, so that three quarters of it are believed; a fifth were, if
 // it counted for each.
