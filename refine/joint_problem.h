@@ -59,7 +59,8 @@ class JointProblem : public Graph {
 
   // All unknowns at a seed: its rotation and plane, circles by their points in that plane, the rest
   // by its own fits. Features that cannot lie in that plane in front of the camera are made
-  // inactive. Refused where no circle of several can, or the origin lies beyond the horizon.
+  // inactive. Refused where no circle can that the reading keeps, or the origin lies beyond the
+  // horizon.
   Status Start(const CameraPose& seed, double log_focal, const std::vector<std::uint8_t>& reading,
                State* state) const;
   // Makes an inactive line, circle or prior active, at the state's pose. False for other features,
@@ -146,6 +147,7 @@ class JointProblem : public Graph {
   };
   bool PlaceCircle(const CircleBlocks& circle, State* state, Eigen::Vector3d* in_plane) const;
   Placed PlaceCircles(State* state) const;
+  bool LinesSuffice(const std::vector<std::uint8_t>& reading) const;
   bool OriginRay(const State& state, Eigen::Vector3d* ray) const;
   bool PlaceOrigin(const Placed& placed, State* state) const;
   void PlaceScale(Placed placed, State* state) const;

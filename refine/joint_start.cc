@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 #include <vector>
 
@@ -229,6 +230,20 @@ Eigen::Matrix3d JointProblem::SenseOfPriors(const CameraPose& seed) const {
   return best;
 }
 
+// Whether a reading leaves all circles out, and lines of two directions tell the plane.
+bool JointProblem::LinesSuffice(const std::vector<std::uint8_t>& reading) const {
+  const bool has_circle = std::any_of(circles_.begin(), circles_.end(), [&](const auto& circle) {
+    return reading[static_cast<std::size_t>(circle.feature)] != 0;
+  });
+  std::map<int, int> lines;  // By pencil.
+  for (const LineBlocks& l : lines_) {
+    if (reading[static_cast<std::size_t>(l.feature)] != 0) ++lines[feature(l.feature).observation];
+  }
+  const auto told = std::count_if(lines.begin(), lines.end(),
+                                  [](const auto& pencil) { return pencil.second > 1; });
+  return !has_circle && told > 1;
+}
+
 Status JointProblem::Start(const CameraPose& given, double log_focal,
                            const std::vector<std::uint8_t>& reading, State* state) const {
   CameraPose seed = given;
@@ -248,7 +263,7 @@ Status JointProblem::Start(const CameraPose& given, double log_focal,
   Eigen::Map<Eigen::Vector3d>(At(kTranslation, state)) = seed.translation;
   SeeThrough(*state);
   const Placed placed = PlaceCircles(state);
-  if (!circles_.empty() && placed.num_circles == 0) {
+  if (!circles_.empty() && placed.num_circles == 0 && !LinesSuffice(reading)) {
     return Status::Refused(
         "no circle can lie in the plane: each crosses its horizon or lies beyond");
   }

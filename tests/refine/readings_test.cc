@@ -83,6 +83,28 @@ TEST_P(TiltedCircleTest, OneOfThreeIsNamedAndTheOthersKeepTheirPose) {
 INSTANTIATE_TEST_SUITE_P(Tilts, TiltedCircleTest,
                          ::testing::Values(5.0 * kDegree, 10.0 * kDegree, 15.0 * kDegree));
 
+// The lines tell the plane without it.
+TEST(ReadingsTest, ThePlanesOnlyCircleIsLeftOut) {
+  constexpr int kScenes = Trials(60);
+  int named = 0, right = 0;
+  for (int i = 0; i < kScenes; ++i) {
+    PlaneScene scene(0.7, 0.2, static_cast<std::uint64_t>(i + 1));
+    Observations observations = scene.Empty();
+    observations.circles = {
+        Tilted(&scene, "c0", {0.5, 0.2}, 1.0, 20.0 * kDegree, scene.random.Uniform(0.0, 6.28))};
+    observations.pencils = {scene.Pencil("rows", PencilDirection::kX, Vector3d::UnitX(), 4, 20),
+                            scene.Pencil("columns", PencilDirection::kY, Vector3d::UnitY(), 4, 20)};
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    right += NormalError(h, scene) < 3.5 * SigmaNormal(h) ? 1 : 0;
+    named += h.left_out == Ids{"c0"} && HasNote(estimate, "circle 'c0'") ? 1 : 0;
+  }
+  std::printf("named in %d of %d, the pose right in %d\n", named, kScenes, right);
+  EXPECT_GE(named, 0.95 * kScenes);
+  EXPECT_GE(right, 0.95 * kScenes);
+}
+
 // More of them than readings are looked at one by one: all at once, and what agrees comes back.
 TEST(ReadingsTest, ManyTiltedCirclesAmongManyAreNamed) {
   constexpr double kNoise = 0.3;
