@@ -124,6 +124,8 @@ Status GatherPencils(const Observations& evidence, double sigma_px, bool axes_ar
 Observations KeepFrame(const Observations& observations, const FrameObservation& frame) {
   Observations evidence;
   evidence.camera = observations.camera;
+  evidence.stated_focal_px = observations.stated_focal_px;
+  evidence.found_k1 = observations.found_k1;
   evidence.frame = frame;
   for (const KnownLength& known : observations.known_lengths) {
     if (IsInWorldPlane(known, evidence)) evidence.known_lengths.push_back(known);

@@ -281,6 +281,7 @@ Status FillRefined(const JointProblem& problem, State state, Refined* refined) {
   FillFocal(problem, state, at, T, refined);
   FillLeftOut(problem, state, refined);
   h->log_det = LogDet(problem, at);
+  refined->circle_volumes = CircleVolumes(problem, state, at);
   const bool is_finite = covariance.allFinite() && pose.rotation.allFinite() &&
                          pose.translation.allFinite() && std::isfinite(h->log_det);
   refined->state = std::move(state);

@@ -11,16 +11,20 @@
 #include "circline/estimators/status.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/joint_problem.h"
+#include "circline/refine/linearization.h"
 
 namespace circline {
 
 // A hypothesis without probability. Its log_det is that of the covariance of the rotation (and of
-// the focal length, where that is estimated): volumes of all else, measured on the photo, are alike
-// whatever the pose, and what a feature left out would have said of the rotation is in its
-// LeftOutCost.
+// the focal length, where that is estimated), until CountCircleVolumes: volumes of all else,
+// measured on the photo, are alike whatever the pose, and what a feature left out would have said
+// of the rotation is in its LeftOutCost.
 struct Refined {
   PoseHypothesis hypothesis;
   State state;
+  // By circle of the problem: log determinant of the covariance of where and how large it is seen,
+  // the rotation given; NaN where it takes no part.
+  std::vector<double> circle_volumes;
   std::vector<std::string> notes;  // What was left out, and why.
 };
 
@@ -36,6 +40,15 @@ Status FillRefined(const JointProblem& problem, State state, Refined* refined);
 // What was found of the focal length, in words; none where it is not estimated. Other notes are of
 // a minimum; this one is of what is returned, which may be several merged.
 std::string FocalNote(const JointProblem& problem, const PoseHypothesis& h);
+
+// --- circle_volumes.cc
+
+std::vector<double> CircleVolumes(const JointProblem& problem, const State& state,
+                                  const Linearization& at);
+
+// Adds to each log_det by how much its circles have more room than under the others. A whole circle
+// has the same under all; an arc leaves the one pose its tilt open, and the other its size.
+void CountCircleVolumes(std::vector<Refined>* all);
 
 // --- joint_inliers.cc
 

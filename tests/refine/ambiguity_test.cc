@@ -203,5 +203,31 @@ TEST(AmbiguityTest, ProbabilitiesAreCalibrated) {
   EXPECT_GE(sure.right, 0.997 * sure.scenes - 1.0);
 }
 
+// Part of a contour is an ellipse seen from two sides, as the whole is, though it knows the one
+// pose's tilt by far better than the other's.
+TEST(AmbiguityTest, AnArcHasTwoPosesOfOneHalf) {
+  const Camera camera = PinholeCamera();
+  Random random(7);
+  int told = 0;
+  constexpr int kScenes = Trials(100);
+  for (int i = 0; i < kScenes; ++i) {
+    const CirclePose truth =
+        RandomCircle(random.Uniform(1.5, 5.0), random.Uniform(0.4, 1.2), &random);
+    CircleObservation arc = Observe(camera, truth, 1.0, 200, 0.2, &random);
+    arc.points.resize(i % 2 == 0 ? 50 : 80);
+    if (i % 4 < 2) arc.radius = 1.0;
+    Observations observations;
+    observations.camera = camera;
+    observations.circles = {arc};
+    const PoseEstimate estimate = EstimatePose(observations, LeastSquares());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    if (estimate.hypotheses.size() != 2) continue;
+    const PoseHypothesis &a = estimate.hypotheses[0], &b = estimate.hypotheses[1];
+    ++told;
+    EXPECT_NEAR(a.probability, 0.5, 0.02) << i;
+  }
+  EXPECT_GE(told, 0.9 * kScenes);
+}
+
 }  // namespace
 }  // namespace circline

@@ -1,6 +1,9 @@
+// A camera that was found on the way is no prior.
 #include <gtest/gtest.h>
 
+#include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/estimate_pose.h"
+#include "circline/refine/refined_solvers.h"
 #include "tests/plane_scene.h"
 
 namespace circline {
@@ -24,6 +27,25 @@ TEST(FoundLens, IsNoPrior) {
     ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
     ASSERT_TRUE(estimate.hypotheses[0].camera.has_value());
     EXPECT_NEAR(estimate.hypotheses[0].camera->distortion[0], 0.0, 0.02) << found;
+  }
+}
+
+// The prior is about the focal length that was stated, for a solver on its own evidence, too.
+TEST(FoundFocal, IsNoPrior) {
+  PlaneScene scene(0.7, 0.1);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 0.3)};
+  observations.stated_focal_px = 0.7 * observations.camera.fx;
+  EstimationOptions options;
+  options.camera_sigma = CameraSigma::Exact();
+  options.camera_sigma->log_focal = 0.1;
+  SolverRegistry registry;
+  AddClosedFormSolvers(&registry);
+  AddRefinedSolvers(&registry, options);
+  for (const char* name : {"single_circle", "joint"}) {
+    const PoseEstimate estimate = registry.Find(name, SolverStage::kRefined)->Solve(observations);
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    EXPECT_NEAR(estimate.hypotheses[0].focal_scale, 0.7, 0.02) << name;
   }
 }
 
