@@ -59,7 +59,7 @@ struct PoseHypothesis {
   // The camera that it sees through, where that was refined; see CameraOf.
   std::optional<Camera> camera;
   // Features that contradict the rest and have no part in it: "c1", "kerbs[3]" for the fourth line
-  // of a pencil, "c1.center", "length[0]"; a pencil's id: its tie to its axis.
+  // of a pencil, "c1.center", "length[0]", "angle[0]"; a pencil's id: its tie to its axis.
   std::vector<std::string> left_out;
   std::string structure;  // Which plane and reading of the evidence; equal where two share it.
   double rms_px = 0.0;    // Of the inlier residuals of all evidence, pixels of the photo.

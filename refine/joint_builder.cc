@@ -139,8 +139,10 @@ void JointProblemBuilder::AddAngle(std::size_t index) {
     p_.unused_.push_back(name + ": not used, both run along axes, which are orthogonal");
     return;
   }
-  p_.AddTerm(NewAngleCost(known.value, std::max(known.sigma, kExactShare * told)),
-             {blocks[0], blocks[1]});
+  const double sigma = std::max(known.sigma, kExactShare * told);
+  Feature feature{Feature::Kind::kAngle, "angle[" + std::to_string(index) + "]", name};
+  feature.covariance = sigma * sigma * Eigen::Matrix3d::Identity();
+  p_.AddTerm(NewAngleCost(known.value, sigma), {blocks[0], blocks[1]}, AddFeature(feature));
 }
 
 void JointProblemBuilder::AddLength(std::size_t index) {

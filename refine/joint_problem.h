@@ -27,7 +27,17 @@ namespace circline {
 
 // What can be left out as a whole.
 struct Feature {
-  enum class Kind { kCircle, kCenterMark, kLine, kPlaneLine, kPoint, kLength, kAxis, kPrior };
+  enum class Kind {
+    kCircle,
+    kCenterMark,
+    kLine,
+    kPlaneLine,
+    kPoint,
+    kLength,
+    kAngle,
+    kAxis,
+    kPrior
+  };
   Kind kind;
   std::string id;                   // PoseHypothesis::left_out: "c1", "kerbs[3]", "length[0]".
   std::string name;                 // For people: "circle 'c1'".
@@ -36,7 +46,7 @@ struct Feature {
   int observation = -1, line = -1;  // Index of circle, pencil or length; line within its pencil.
   // Twice the cost of its own free fit, under the loss.
   double free_twice_cost = 0.0;
-  // Of the fit of a line, or of the turn [delta] that a prior knows.
+  // Of the fit of a line, of an angle (a multiple of I), or of the turn [delta] that a prior knows.
   std::optional<Eigen::Matrix3d> covariance = std::nullopt;
 };
 
@@ -63,8 +73,8 @@ class JointProblem : public Graph {
   // horizon.
   Status Start(const CameraPose& seed, double log_focal, const std::vector<std::uint8_t>& reading,
                State* state) const;
-  // Makes an inactive line, circle or prior active, at the state's pose. False for other features,
-  // and where it cannot lie there.
+  // Makes an inactive line, circle, centre, angle or prior active, at the state's pose. False for
+  // other features, and where it cannot lie there.
   bool Admit(std::size_t feature, State* state) const;
   // Runs ceres on it, under losses of these `widths`, one after the other, before their own. Not ok
   // where the evidence cannot be evaluated, or at the pace of a step that would not lead to a cost

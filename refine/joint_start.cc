@@ -149,7 +149,10 @@ bool JointProblem::Admit(std::size_t feature, State* state) const {
     return blocks.feature == static_cast<int>(feature);
   };
   state->active[feature] = 1;
-  if (features_[feature].kind == Feature::Kind::kPrior) return true;
+  using Kind = Feature::Kind;
+  const Kind kind = features_[feature].kind;
+  if (kind == Kind::kPrior || kind == Kind::kAngle) return true;
+  if (kind == Kind::kCenterMark) return state->Has(features_[feature].parent);
   const auto line = std::find_if(lines_.begin(), lines_.end(), is_it);
   if (line != lines_.end()) return PlaceLine(*line, state);
   const auto circle = std::find_if(circles_.begin(), circles_.end(), is_it);

@@ -56,6 +56,7 @@ double ClutterCost(const JointProblem& problem, const Feature& f) {
       break;
     case Feature::Kind::kLine:
     case Feature::Kind::kPlaneLine:
+    case Feature::Kind::kAngle:
     case Feature::Kind::kPrior:
       if (f.covariance) log_information = LogTurnInformation(*f.covariance, dimensions);
       break;
@@ -106,13 +107,18 @@ bool AdmitWhatFits(const JointProblem& problem, State* state) {
     if (state->active[i] != 0) continue;
     State with = *state;
     if (!problem.Admit(i, &with)) continue;
-    State alone = with, none = with, without = with;
-    none.active.assign(with.active.size(), 0);
+    // It alone, with what it is a part of and what is a part of it.
+    const int own = static_cast<int>(i), parent = problem.feature(own).parent;
+    State alone = with, without = with;
     without.active.assign(with.active.size(), 1);
     without.active[i] = 0;
     for (std::size_t k = 0; k < with.active.size(); ++k) {
-      if (k != i && problem.features()[k].parent != static_cast<int>(i)) alone.active[k] = 0;
+      if (k != i && problem.features()[k].parent != own && static_cast<int>(k) != parent)
+        alone.active[k] = 0;
     }
+    State none = alone;
+    none.active.assign(none.active.size(), 0);
+    if (parent >= 0) none.active[static_cast<std::size_t>(parent)] = state->Has(parent) ? 1 : 0;
     if (DropOutliers(problem, &alone)) continue;
     const double cost = problem.Cost(alone) - problem.Cost(none);
     if (!(cost < LeftOutCost(problem, without))) continue;

@@ -222,9 +222,8 @@ TEST(AmbiguityTest, AnArcHasTwoPosesOfOneHalf) {
     const PoseEstimate estimate = EstimatePose(observations, LeastSquares());
     ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
     if (estimate.hypotheses.size() != 2) continue;
-    const PoseHypothesis &a = estimate.hypotheses[0], &b = estimate.hypotheses[1];
     ++told;
-    EXPECT_NEAR(a.probability, 0.5, 0.02) << i;
+    EXPECT_NEAR(estimate.hypotheses[0].probability, 0.5, 0.02) << i;
   }
   EXPECT_GE(told, 0.9 * kScenes);
 }

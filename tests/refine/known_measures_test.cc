@@ -59,6 +59,24 @@ TEST(KnownMeasuresTest, KnownAngleSharpensTheRotation) {
   EXPECT_NEAR(cosine, 0.6, 1e-4);
 }
 
+// A circle and its centre tell the plane; what is said of two of its pencils contradicts it.
+TEST(KnownMeasuresTest, AWrongAngleIsLeftOut) {
+  PlaneScene scene(0.7, 0.2);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.5)};
+  observations.circles[0].center = scene.Pixel(0.5, 0.2);
+  observations.pencils = {
+      scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX(), 6, 20),
+      scene.Pencil("L2", PencilDirection::kFree, Eigen::Vector3d(0.6, 0.8, 0.0), 6, 20)};
+  observations.known_angles = {KnownAngle{{"L1", "L2"}, std::acos(0.6) + 0.3, 0.0}};
+  const PoseEstimate estimate = EstimatePose(observations, Exact());
+  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  const PoseHypothesis& h = estimate.hypotheses[0];
+  EXPECT_EQ(h.left_out, std::vector<std::string>{"angle[0]"});
+  EXPECT_TRUE(HasNote(estimate, "the known angle between 'L1' and 'L2'"));
+  EXPECT_LT(NormalError(h, scene), 4.0 * SigmaNormal(h));
+}
+
 // The least cost of a photo whose focal length is told by what is known exactly, from a camera that
 // has so many times it.
 double LeastCost(Observations observations, double guess) {
