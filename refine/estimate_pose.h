@@ -33,8 +33,8 @@ bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type);
 
 // A pose that is known from elsewhere (odometry, the filter's prediction), in the same world frame:
 // evidence like any other, in the estimate, in its covariance and in the ranking. One that
-// contradicts the photo is left out ("pose_prior"), but where nothing else tells the turn about the
-// normal.
+// contradicts the photo is left out ("pose_prior"), and where nothing else tells the turn about the
+// normal that is free.
 struct PosePrior {
   CameraPose mean;  // cam_from_world.
   // Of [delta, delta_t], 6x6 row-major, as PoseHypothesis::covariance; positive definite. Where the

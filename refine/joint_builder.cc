@@ -183,13 +183,11 @@ void JointProblemBuilder::AddTranslation() {
   }
 }
 
-// What is known of the pose is evidence, which may contradict the photo: a feature to leave out,
-// but where nothing else tells the spin.
+// What is known of the pose is evidence, which may contradict the photo: a feature to leave out.
 void JointProblemBuilder::AddPrior(ceres::CostFunction* cost, std::vector<int> blocks,
                                    bool tells_spin, Feature feature) {
-  const bool can_go = p_.x_is_seen_ || !tells_spin;
-  p_.pose_priors_.push_back(
-      p_.AddTerm(cost, std::move(blocks), can_go ? AddFeature(std::move(feature)) : -1));
+  const int term = p_.AddTerm(cost, std::move(blocks), AddFeature(std::move(feature)));
+  p_.pose_priors_.push_back({term, tells_spin});
   p_.x_is_fixed_ = p_.x_is_fixed_ || tells_spin;
 }
 

@@ -58,6 +58,12 @@ bool JointProblem::OriginIsPlaced(const State& state) const {
          });
 }
 
+bool JointProblem::SpinIsFree(const State& state) const {
+  return !x_is_seen_ && std::none_of(pose_priors_.begin(), pose_priors_.end(), [&](const auto& p) {
+    return p.tells_spin && IsActive(term(p.term), state);
+  });
+}
+
 double JointProblem::FreeCost(const State& state) const {
   double twice_cost = 0.0;
   for (std::size_t i = 0; i < features_.size(); ++i)

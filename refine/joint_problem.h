@@ -119,7 +119,8 @@ class JointProblem : public Graph {
   // Whether anything that takes part says where the origin is.
   bool OriginIsPlaced(const State& state) const;
   bool origin_observed() const { return origin_observed_; }
-  bool spin_is_free() const { return !x_is_fixed_; }
+  // Whether nothing that takes part says how the world is turned about its normal.
+  bool SpinIsFree(const State& state) const;
   bool camera_is_estimated() const { return camera_is_estimated_; }
   const CameraSigma& camera_sigma() const { return camera_sigma_; }
 
@@ -148,7 +149,7 @@ class JointProblem : public Graph {
  private:
   friend class JointProblemBuilder;
 
-  Eigen::Matrix3d SenseOfPriors(const CameraPose& seed) const;
+  Eigen::Matrix3d SenseOfPriors(const CameraPose& seed, const State& state) const;
   // What Start has found of the circles.
   struct Placed {
     int num_circles = 0;
@@ -174,8 +175,12 @@ class JointProblem : public Graph {
   std::vector<PlaneLineBlocks> plane_lines_;
   std::vector<LengthBlocks> lengths_;
   std::vector<std::string> unused_;
-  std::vector<int> pose_priors_;  // Terms.
-  int center_at_origin_ = -1;     // Circle (index in circles_) whose centre the origin is, or -1.
+  struct PriorTerm {
+    int term;
+    bool tells_spin;
+  };
+  std::vector<PriorTerm> pose_priors_;
+  int center_at_origin_ = -1;  // Circle (index in circles_) whose centre the origin is, or -1.
   CameraSigma camera_sigma_;
   bool origin_observed_ = false, x_is_fixed_ = false, camera_is_estimated_ = false;
   bool x_is_seen_ = false;  // Fixed by lines, up to its sense, not by a prior alone.

@@ -38,13 +38,13 @@ Eigen::MatrixXd PoseFromCore(const JointProblem& problem, const State& state,
 
 // Orthonormal basis of the free directions among [delta, delta_t]; a spin about the normal is one
 // about the origin, wherever that is.
-void FillFreeDirections(const JointProblem& problem, const Eigen::MatrixXd& T,
+void FillFreeDirections(const JointProblem& problem, const State& state, const Eigen::MatrixXd& T,
                         const Linearization& at, PoseHypothesis* h) {
   const Eigen::MatrixXd& nulls = at.null_space();
-  Eigen::MatrixXd free(6, nulls.cols() + (problem.spin_is_free() ? 1 : 0));
+  const bool spin_is_free = problem.SpinIsFree(state);
+  Eigen::MatrixXd free(6, nulls.cols() + (spin_is_free ? 1 : 0));
   free.leftCols(nulls.cols()) = T.leftCols(nulls.rows()) * nulls;
-  if (problem.spin_is_free())
-    free.rightCols(1) << h->cam_from_world.rotation.col(2), Eigen::Vector3d::Zero();
+  if (spin_is_free) free.rightCols(1) << h->cam_from_world.rotation.col(2), Eigen::Vector3d::Zero();
   if (free.cols() == 0) return;
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(free);
   qr.setThreshold(1e-6);
@@ -274,7 +274,7 @@ Status FillRefined(const JointProblem& problem, State state, Refined* refined) {
   h->cam_from_world.translation = h->metric ? pose.translation : pose.translation.normalized();
   const Eigen::MatrixXd T = PoseFromCore(problem, state, at);
   const Matrix6d covariance = T * at.covariance() * T.transpose();
-  FillFreeDirections(problem, T, at, h);
+  FillFreeDirections(problem, state, T, at, h);
   SetCovariance(covariance, h, h->metric ? 6 : 5);
   FillCircles(problem, state, refined);
   FillPencils(problem, state, at, h);

@@ -203,7 +203,7 @@ void JointProblem::PlaceLines(State* state) const {
 
 // Lines and circles do not tell the senses of the axes, and circles alone no axes: seeds take them
 // by convention. What a prior says of them is more than that.
-Eigen::Matrix3d JointProblem::SenseOfPriors(const CameraPose& seed) const {
+Eigen::Matrix3d JointProblem::SenseOfPriors(const CameraPose& seed, const State& state) const {
   const FrameObservation& frame = observations_.frame;
   if (pose_priors_.empty() || frame.x_axis || frame.y_axis) return seed.rotation;
   constexpr int kSpins = 16;
@@ -218,8 +218,9 @@ Eigen::Matrix3d JointProblem::SenseOfPriors(const CameraPose& seed) const {
       const Eigen::Quaterniond q(R);
       const double* parameters[2] = {q.coeffs().data(), seed.translation.data()};
       double cost = 0.0, r[6];
-      for (const int index : pose_priors_) {
-        const ceres::CostFunction& prior = *term(index).cost;
+      for (const PriorTerm& known : pose_priors_) {
+        if (!IsActive(term(known.term), state)) continue;
+        const ceres::CostFunction& prior = *term(known.term).cost;
         if (!prior.Evaluate(parameters, r, nullptr)) return seed.rotation;
         cost += Eigen::Map<const Eigen::VectorXd>(r, prior.num_residuals()).squaredNorm();
       }
@@ -249,10 +250,10 @@ bool JointProblem::LinesSuffice(const std::vector<std::uint8_t>& reading) const 
 
 Status JointProblem::Start(const CameraPose& given, double log_focal,
                            const std::vector<std::uint8_t>& reading, State* state) const {
-  CameraPose seed = given;
-  seed.rotation = SenseOfPriors(given);
   state->x = values();
   state->active = reading;
+  CameraPose seed = given;
+  seed.rotation = SenseOfPriors(given, *state);
   if (camera_is_estimated_) {
     double* shifts = At(kCamera, state);
     shifts[0] = log_focal;

@@ -63,8 +63,12 @@ std::vector<int> Linearization::CoreColumns() const {
 // have where it is given next to none; with some, v v^T is what the inverse has too much.
 bool Linearization::Invert(Sparse information) {
   const Eigen::Index n = core_size_;
-  const Eigen::VectorXd scale = information.diagonal().head(n).unaryExpr(
-      [](double d) { return d > 0.0 ? 1.0 / std::sqrt(d) : 1.0; });
+  // Less of the largest is rounding: of a turn that nothing at all speaks of.
+  constexpr double kRounding = 1e-24;
+  const Eigen::VectorXd diagonal = information.diagonal().head(n);
+  const double least = n > 0 ? kRounding * diagonal.maxCoeff() : 0.0;
+  const Eigen::VectorXd scale =
+      diagonal.unaryExpr([least](double d) { return d > least ? 1.0 / std::sqrt(d) : 1.0; });
   Sparse raised = information;
   for (Eigen::Index k = 0; k < n; ++k)
     raised.coeffRef(k, k) += kNoInformation / (scale[k] * scale[k]);

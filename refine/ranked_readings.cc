@@ -46,7 +46,7 @@ Status FillHypotheses(const JointProblem& problem, const std::vector<State>& min
     all.push_back(std::move(refined));
     CameraPose& pose = all.back().hypothesis.cam_from_world;
     // A spin that nothing fixes is settled by convention, whatever the seed's was.
-    if (problem.spin_is_free()) {
+    if (problem.SpinIsFree(all.back().state)) {
       WorldRotation(problem.observations(), pose.rotation.col(2), pose.translation, kAnySigmaPx,
                     &pose.rotation);
     }

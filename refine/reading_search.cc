@@ -270,7 +270,7 @@ bool IsSamePose(const JointProblem& problem, const State& a, const State& b, dou
   if (problem.OriginIsPlaced(a) && s.cross(t).norm() > tolerance * s.norm() * t.norm())
     return false;
   if (A.col(2).cross(B.col(2)).norm() > tolerance) return false;
-  return problem.spin_is_free() || A.col(0).cross(B.col(0)).norm() < tolerance;
+  return problem.SpinIsFree(a) || A.col(0).cross(B.col(0)).norm() < tolerance;
 }
 
 std::vector<SeedStart> StartsOf(const JointProblem& problem, const std::vector<Seed>& seeds,

@@ -227,5 +227,29 @@ TEST(PosePriorTest, IsLeftOutWhereThePhotoContradictsIt) {
   }
 }
 
+// Nothing but the prior tells the turn of circles: where it contradicts them that is free, and they
+// say what they say without it.
+TEST(PosePriorTest, IsLeftOutWhereItAloneTellsTheTurn) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    PlaneScene scene(0.6, 0.3, seed);
+    Observations one = OneCircle(&scene), many = one;
+    for (const auto& [id, x] : {std::pair("c1", -2.2), {"c2", 2.3}})
+      many.circles.push_back(scene.Circle(id, x, 0.5, 0.8));
+    EstimationOptions options = LeastSquares();
+    options.pose_prior = Around(scene.pose, 0.01, 0.02);
+    Eigen::Matrix3d& turned = options.pose_prior->mean.rotation;
+    turned = ExpRotation(0.4 * Vector3d(0.0, 1.0, 0.0)) * turned;
+    for (const Observations& observations : {one, many}) {
+      const PoseEstimate estimate = EstimatePose(observations, options);
+      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      const PoseHypothesis& h = Nearest(estimate, scene.pose.rotation.col(2));
+      EXPECT_EQ(h.left_out, std::vector<std::string>{"pose_prior"}) << seed;
+      EXPECT_EQ(h.free_directions.size(), 1U) << seed;
+      EXPECT_LT(NormalError(h, scene), 0.02) << seed;
+      EXPECT_NEAR(h.probability, observations.circles.size() > 1 ? 1.0 : 0.5, 0.01) << seed;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace circline
