@@ -11,10 +11,12 @@
 #include "apps/calibrate/calibrate_options.h"
 #include "apps/calibrate/calibration_files.h"
 #include "apps/calibrate/import_model.h"
+#include "apps/common/colmap_file.h"
 #include "apps/common/flags_util.h"
 #include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
 #include "apps/common/progress.h"
+#include "apps/common/written_files.h"
 #include "apps/compare/encode.h"
 #include "apps/compare/image_run.h"
 #include "apps/compare/overlay.h"
@@ -237,6 +239,19 @@ std::vector<std::string> CalibrationPictures(const CompareOptions& options,
   return pictures;
 }
 
+// Nothing that is read is written over.
+Status CheckKept(const CalibrateOptions& options, const ImageSet& images) {
+  const std::vector<std::string> written = {
+      "calibration.yml", "calibration_*.yml", "calibration.json", "cameras.txt",
+      "images.txt",      "points3D.txt",      "scene.yaml",       "report.html",
+      "landmarks.json",  "transform.txt"};
+  const std::string& output = options.compare.output;
+  Status status = CheckInputsKept(images, output, written);
+  if (status.ok() && !options.import.empty())
+    status = WrittenFiles(output, written).CheckKept(FilesOfColmapModel(options.import));
+  return status;
+}
+
 int Calibrate() {
   CalibrateOptions options;
   ImageSet set;
@@ -244,6 +259,8 @@ int Calibrate() {
   if (status.ok()) status = ImagesFromFlags(options.compare.inputs, &set);
   if (!status.ok()) return Refuse("circline_calibrate", status);
   if (!set.rigid().empty()) RigidWorldFromName(set.rigid(), &options.adjust.rigid);
+  status = CheckKept(options, set);
+  if (!status.ok()) return Refuse("circline_calibrate", status);
   std::vector<SceneImage> images;
   for (std::size_t i = 0; i < set.size(); ++i) images.push_back(set.At(i));
   GivenPoses poses;

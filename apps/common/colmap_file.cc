@@ -208,4 +208,15 @@ Status ReadColmapModel(const std::string& folder, ColmapModel* model) {
   return status;
 }
 
+std::vector<std::string> FilesOfColmapModel(const std::string& folder) {
+  std::vector<std::string> files;
+  for (const char* name : {"cameras", "images", "points3D"}) {
+    for (const char* extension : {".bin", ".txt"}) {
+      const std::string path = folder + "/" + name + extension;
+      if (IsFile(path)) files.push_back(path);
+    }
+  }
+  return files;
+}
+
 }  // namespace circline::apps

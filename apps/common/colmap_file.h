@@ -38,6 +38,9 @@ struct ColmapModel {
 // passed over.
 Status ReadColmapModel(const std::string& folder, ColmapModel* model);
 
+// The files that make up the model in that folder, its points among them.
+std::vector<std::string> FilesOfColmapModel(const std::string& folder);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMMON_COLMAP_FILE_H_

@@ -29,6 +29,12 @@ bool IsAppFlag(const gflags::CommandLineFlagInfo& flag) {
   return flag.filename.find("apps/") != std::string::npos;
 }
 
+// As the flags themselves, of the process.
+std::vector<std::string>& FlagFilesRead() {
+  static auto* const files = new std::vector<std::string>;
+  return *files;
+}
+
 std::vector<gflags::CommandLineFlagInfo> AppFlags() {
   std::vector<gflags::CommandLineFlagInfo> all, flags;
   gflags::GetAllFlags(&all);
@@ -111,6 +117,7 @@ class Parser {
     if (depth >= kMaxFlagFileDepth) {
       return Status::Invalid("--flagfile=" + path + ": flag files name one another");
     }
+    FlagFilesRead().push_back(path);
     std::string text;
     Status status = ReadTextFile(path, &text);
     if (!status.ok()) return Status::Invalid("--flagfile: " + status.message);
@@ -143,6 +150,8 @@ bool OccupyStandardStreams() {
 Status ParseCommandLine(int argc, const char* const* argv, CommandLine* command_line) {
   return Parser(command_line).Parse({argv + std::min(argc, 1), argv + argc}, 0);
 }
+
+const std::vector<std::string>& FlagFiles() { return FlagFilesRead(); }
 
 std::string HelpText(const std::string& usage) {
   std::ostringstream text;

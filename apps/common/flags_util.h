@@ -26,6 +26,9 @@ struct CommandLine {
 // line that names the argument.
 Status ParseCommandLine(int argc, const char* const* argv, CommandLine* command_line);
 
+// Those that --flagfile has named, in the order in which they were read.
+const std::vector<std::string>& FlagFiles();
+
 // Usage and every flag defined under apps/, with its default.
 std::string HelpText(const std::string& usage);
 

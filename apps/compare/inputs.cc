@@ -8,6 +8,7 @@
 #include "apps/common/camera_file.h"
 #include "apps/common/photo_list.h"
 #include "apps/common/text.h"
+#include "apps/common/written_files.h"
 
 DEFINE_string(scene, "", "Scene file (YAML or JSON): photos and what is known of them.");
 DEFINE_string(
@@ -143,6 +144,15 @@ Status ImagesFromFlags(const InputOptions& options, ImageSet* images) {
   if (!status.ok()) return status;
   return FLAGS_scene.empty() ? ListImages(options, cameras, images)
                              : ReadScenes(options, cameras, images);
+}
+
+Status CheckInputsKept(const ImageSet& images, const std::string& output,
+                       const std::vector<std::string>& written) {
+  WrittenFiles files(output, written);
+  Status status = files.CheckKept(FilesOfFlags());
+  for (std::size_t i = 0; status.ok() && i < images.size(); ++i)
+    status = files.CheckKept({images.path(i)});
+  return status;
 }
 
 }  // namespace circline::apps

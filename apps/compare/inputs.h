@@ -30,6 +30,11 @@ Status InputsFromFlags(InputOptions* options);
 // file.
 Status ImagesFromFlags(const InputOptions& options, ImageSet* images);
 
+// Not ok: one line that names a photo, or a file of a flag, which the run would write over.
+// `written`: as WrittenFiles takes them.
+Status CheckInputsKept(const ImageSet& images, const std::string& output,
+                       const std::vector<std::string>& written);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMPARE_INPUTS_H_

@@ -1,9 +1,14 @@
 // circline_compare: photos through every solver; a table, a picture for each photo, a report.
+#include <algorithm>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <string>
+#include <vector>
 
 #include "apps/common/flags_util.h"
+#include "apps/compare/export.h"
+#include "apps/compare/inputs.h"
 #include "apps/compare/options.h"
 #include "apps/compare/ranks.h"
 #include "apps/compare/run.h"
@@ -24,6 +29,23 @@ constexpr char kUsage[] =
     "(named,\n"
     "the rest is done); 2: unusable flags or scene file (nothing is written).";
 
+// What a run writes into its output folder, or, as an absolute path, beside it.
+std::vector<std::string> FilesWritten(const CompareOptions& options) {
+  std::vector<std::string> names = {"results.jsonl", "observations.jsonl", "timings.jsonl",
+                                    "summary.csv", "report.html"};
+  // With --resume it has the same flags as before, and may be the file that they are read from.
+  if (!options.resume) names.emplace_back("unfinished.flags");
+  if (options.overlays) names.emplace_back("overlays/*.png");
+  for (const ExportFormat& format : ExportFormats()) {
+    const std::vector<std::string>& asked = options.finish.exports;
+    if (std::find(asked.begin(), asked.end(), format.name) != asked.end())
+      names.insert(names.end(), format.files.begin(), format.files.end());
+  }
+  const std::string& best = options.finish.save_options;
+  if (!best.empty()) names.push_back(std::filesystem::absolute(best).string());
+  return names;
+}
+
 // Only the first of several ranks speaks.
 int RefuseOnce(const Status& status, const Ranks& ranks) {
   if (ranks.is_first()) SayOnStderr("circline_compare: " + status.message);
@@ -34,14 +56,16 @@ int Compare(const Ranks& ranks) {
   CompareOptions options;
   Status status = OptionsFromFlags(&options);
   if (!status.ok()) return RefuseOnce(status, ranks);
+  ImageSet images;
   ComparisonResult result;
   if (!options.inputs.merge.empty()) {
-    if (ranks.is_first()) status = MergeComparison(options, &result);
+    status = CheckInputsKept(images, options.output, FilesWritten(options));
+    if (status.ok() && ranks.is_first()) status = MergeComparison(options, &result);
   } else {
-    ImageSet images;
     status = ImagesFromFlags(options.inputs, &images);
     if (status.ok() && options.inputs.guess.wanted && ranks.is_first())
       SayOnStderr(DescribeGuess(options.inputs.guess));
+    if (status.ok()) status = CheckInputsKept(images, options.output, FilesWritten(options));
     if (status.ok()) status = RunComparison(images, options, ranks, &result);
   }
   if (status.code == StatusCode::kInvalidArgument) return RefuseOnce(status, ranks);

@@ -10,6 +10,7 @@
 #include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
+#include "apps/common/written_files.h"
 #include "apps/compare/encode.h"
 #include "apps/compare/image_run.h"
 #include "apps/compare/options.h"
@@ -244,6 +245,15 @@ Status CheckSolids(const Solids& solids) {
   return Status::Ok();
 }
 
+// Nothing that is read is written over.
+Status CheckKept(const SceneImage& image, const std::string& output) {
+  std::vector<std::string> read = FilesOfFlags();
+  read.push_back(image.path);
+  return WrittenFiles(output, {"model.glb", "model.obj", "model.mtl", "texture.png",
+                               "texture_*.png", "measurements.csv", "views.png"})
+      .CheckKept(read);
+}
+
 int Reconstruct() {
   CompareOptions options;
   ModelOptions model_options;
@@ -261,6 +271,8 @@ int Reconstruct() {
   status = CheckSolids(image.solids);
   if (!status.ok())
     return Refuse("circline_reconstruct", Status::Invalid(image.path + ": " + status.message));
+  status = CheckKept(image, options.output);
+  if (!status.ok()) return Refuse("circline_reconstruct", status);
   if (options.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.inputs.guess));
   UseThreads(options.threads);
   options.overlays = true;  // The photo is needed.

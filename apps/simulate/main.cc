@@ -6,6 +6,7 @@
 #include "apps/common/flags_util.h"
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
+#include "apps/common/written_files.h"
 #include "apps/simulate/plot.h"
 #include "apps/simulate/simulate.h"
 #include "apps/simulate/street_trials.h"
@@ -144,6 +145,9 @@ int Run() {
   SimulationOptions options;
   std::string output;
   Status status = SimulationFromFlags(&options, &output);
+  if (status.ok())
+    status = WrittenFiles(output, {"simulation.csv", "simulation.svg", "street.csv"})
+                 .CheckKept(FilesOfFlags());
   if (status.ok()) status = CreateFolder(output);
   if (status.ok())
     status = options.scene == SimulatedScene::kStreet ? SimulateStreet(options, output)

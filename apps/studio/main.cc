@@ -9,9 +9,12 @@
 #include <iostream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "apps/common/flags_util.h"
 #include "apps/common/output_file.h"
+#include "apps/common/written_files.h"
+#include "apps/compare/export.h"
 #include "apps/compare/options.h"
 #include "apps/studio/server.h"
 #include "apps/studio/studio.h"
@@ -67,6 +70,18 @@ Status ReadCamera(const CompareOptions& options, Camera* camera) {
   return status;
 }
 
+// What is read is not written over; photos have other names.
+Status CheckKept(const PhotoFolder& folder) {
+  std::vector<std::string> written = {Studio::kSceneFile, Studio::kDraftFile};
+  for (std::size_t n = 0; n < folder.size(); ++n) {
+    const std::string below = std::string(Studio::kExportFolder) + "/" + folder.name(n) + "/";
+    for (const ExportFormat& format : ExportFormats()) {
+      for (const std::string& file : format.files) written.push_back(below + file);
+    }
+  }
+  return WrittenFiles(folder.path(), written).CheckKept(FilesOfFlags());
+}
+
 // Until SIGINT or SIGTERM, for which this thread alone waits.
 int ServeUntilSignal(const sigset_t& signals, StudioServer* server) {
   std::atomic<bool> asked{false}, ended{false};
@@ -98,6 +113,7 @@ int Serve() {
   if (status.ok()) status = lock.Acquire(folder.path());
   if (status.ok()) status = ReadOptions(&options);
   if (status.ok()) status = ReadCamera(options, &camera);
+  if (status.ok()) status = CheckKept(folder);
   if (!status.ok()) return Refuse("circline_studio", status);
   const bool guess = options.inputs.guess.wanted;
   options.inputs.guess.wanted = false;  // The studio has a camera for each photo.

@@ -1,12 +1,14 @@
 // circline_track: the pose of a moving camera, frame after frame.
 #include <iostream>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "apps/common/flags_util.h"
 #include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
+#include "apps/compare/inputs.h"
 #include "apps/track/track_options.h"
 #include "apps/track/track_report.h"
 #include "apps/track/track_run.h"
@@ -60,12 +62,21 @@ Status OpenSource(const TrackOptions& options, ImageSet* images,
   return status;
 }
 
+std::vector<std::string> FilesWritten(const TrackOptions& options) {
+  std::vector<std::string> names = {"results.jsonl", "observations.jsonl", "timings.jsonl",
+                                    "trajectory.txt", "report.html"};
+  if (options.compare.overlays) names.emplace_back("overlays/*.png");
+  if (!options.video_out.empty()) names.push_back(options.video_out);
+  return names;
+}
+
 int TrackFrames() {
   TrackOptions options;
   ImageSet images;
   std::unique_ptr<FrameSource> source;
   Status status = TrackOptionsFromFlags(&options);
   if (status.ok()) status = OpenSource(options, &images, &source);
+  if (status.ok()) status = CheckInputsKept(images, options.compare.output, FilesWritten(options));
   if (!status.ok()) return Refuse("circline_track", status);
   if (options.compare.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.compare.inputs.guess));
   UseThreads(options.compare.threads);
