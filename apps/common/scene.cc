@@ -251,7 +251,12 @@ Status ParseScene(const std::string& name, const std::string& text, const std::s
   if (rigid != nullptr) *rigid = choice;
   std::vector<SceneCamera> all;
   for (const Camera& camera : cameras) all.push_back({camera, {}});
-  for (const StorageNode& item : root.Get("cameras").Items()) {
+  const std::vector<StorageNode> own = root.Get("cameras").Items();
+  if (status.ok() && !cameras.empty() && !own.empty()) {
+    return Status::Invalid("--camera goes with --images, or a scene file without cameras; " + name +
+                           " has cameras of its own");
+  }
+  for (const StorageNode& item : own) {
     SceneCamera read;
     read.camera = ReadSceneCamera(item, &read.sigma);
     const std::string& id = read.camera.id;

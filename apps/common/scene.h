@@ -70,9 +70,9 @@ struct SceneImage {
   Solids solids;  // To be modelled; no evidence of the pose.
 };
 
-// Reads and checks a scene file. Cameras of the file come beside `cameras` (from a camera file; may
-// be empty); an image that names no camera takes the only one there is. Not ok: one line that names
-// the file, the place in it (images[3] ("a.jpg").circles[0].contour) and what is wrong there.
+// Reads and checks a scene file. `cameras`, from a camera file, are for one that has none of its
+// own, else empty; an image that names no camera takes the only one there is. Not ok: one line that
+// names the file, the place in it (images[3] ("a.jpg").circles[0].contour) and what is wrong there.
 // `rigid`, which may be null: auto, yes or no, as the file says it; empty where it does not.
 Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
                  std::vector<SceneImage>* images, std::string* rigid = nullptr);

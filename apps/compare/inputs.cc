@@ -19,7 +19,7 @@ DEFINE_string(
 DEFINE_string(
     camera, "",
     "Camera: an OpenCV calibration file (camera_matrix, distortion_coefficients, image_width, "
-    "image_height) or a COLMAP cameras.txt.");
+    "image_height) or a COLMAP cameras.txt; of --images, or of a scene file without cameras.");
 DEFINE_string(roi, "",
               "With --images: x,y,width,height, pixels; detect one circle inside it and nothing "
               "else.");

@@ -192,6 +192,10 @@ TEST(Scene, TakesCamerasFromElsewhere) {
   ASSERT_TRUE(ReadScene(path, {camera}, &images).ok());
   EXPECT_EQ(images[0].observations.camera.id, "given");
   EXPECT_CONTAINS(ReadScene(path, {}, &images).message, "there is no camera");
+  const std::string own =
+      folder.Write("own.yaml", Scene("  - { file: \"a.jpg\", camera: \"cam0\" }\n"));
+  EXPECT_TRUE(ReadScene(own, {}, &images).ok());
+  EXPECT_CONTAINS(ReadScene(own, {camera}, &images).message, "own.yaml has cameras of its own");
 }
 
 TEST(Scene, NamesUnknownKeysAndTheirPlace) {
