@@ -84,6 +84,21 @@ StorageNode GetAny(const StorageNode& node, const std::vector<std::string>& name
   return node.Get(names.front());
 }
 
+// OpenCV's samples say fisheye_model: 1, ROS and Kalibr name the distortion.
+CameraModel ReadDistortionModel(const StorageNode& root) {
+  const StorageNode fisheye = root.Get("fisheye_model"), stated = root.Get("distortion_model");
+  const bool is_fisheye = fisheye.Exists() && fisheye.Integer() != 0;
+  const std::string name = stated.Exists() ? stated.Text() : "";
+  const bool names_fisheye = name == "equidistant" || name == "fisheye";
+  const std::vector<std::string> known = {"plumb_bob", "radtan", "rational_polynomial",
+                                          "equidistant", "fisheye"};
+  if (!name.empty() && std::find(known.begin(), known.end(), name) == known.end())
+    stated.Fail(NotOneOf(name, known));
+  if (!name.empty() && is_fisheye && !names_fisheye)
+    stated.Fail("'" + name + "' is not the fisheye model that 'fisheye_model' states");
+  return is_fisheye || names_fisheye ? CameraModel::kFisheye : CameraModel::kOpenCV;
+}
+
 Status ParseOpenCvCalibration(const std::string& path, const std::string& text,
                               std::vector<Camera>* cameras) {
   StorageDocument document;
@@ -97,9 +112,7 @@ Status ParseOpenCvCalibration(const std::string& path, const std::string& text,
   }
   Camera camera;
   camera.id = "camera";
-  const StorageNode fisheye = root.Get("fisheye_model");
-  camera.model =
-      fisheye.Exists() && fisheye.Integer() != 0 ? CameraModel::kFisheye : CameraModel::kOpenCV;
+  camera.model = ReadDistortionModel(root);
   camera.width = ReadSize(GetAny(root, {"image_width", "image_Width"}));
   camera.height = ReadSize(GetAny(root, {"image_height", "image_Height"}));
   SetIntrinsics(matrix, &camera);

@@ -25,7 +25,9 @@ std::vector<double> Distortion(const Camera& camera);
 
 // Every camera of the file; which kind of file it is shows in its content. COLMAP's pixel centres
 // lie at half integers, ours at integers: the principal point moves by half a pixel. An OpenCV file
-// gives one camera, with the id "camera"; `fisheye_model: 1` there means the fisheye model. Not ok:
+// gives one camera, with the id "camera"; `fisheye_model: 1` there means the fisheye model, as does
+// a `distortion_model` of equidistant or fisheye, those of ROS and Kalibr; one that is not known is
+// refused. Not ok:
 // one line that names the file and what is wrong in it.
 Status ReadCameraFile(const std::string& path, std::vector<Camera>* cameras);
 

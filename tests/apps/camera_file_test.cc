@@ -81,6 +81,24 @@ TEST(CameraFile, ReadsAFisheyeCalibration) {
   EXPECT_EQ(cameras[0].distortion[3], 0.4);
 }
 
+// As ROS and Kalibr name it.
+TEST(CameraFile, TheDistortionHasAName) {
+  const auto text = [](const std::string& model) {
+    return "distortion_model: " + model +
+           "\ncamera_matrix: [300, 0, 320, 0, 300, 240, 0, 0, 1]\n"
+           "distortion_coefficients: [0.1, 0.2, 0.3, 0.4]\n";
+  };
+  for (const char* model : {"equidistant", "fisheye"})
+    EXPECT_EQ(Read(text(model)).at(0).model, CameraModel::kFisheye) << model;
+  for (const char* model : {"plumb_bob", "radtan", "rational_polynomial", "\"\""})
+    EXPECT_EQ(Read(text(model)).at(0).model, CameraModel::kOpenCV) << model;
+  EXPECT_EQ(Read("fisheye_model: 1\n" + text("equidistant")).at(0).model, CameraModel::kFisheye);
+  EXPECT_CONTAINS(ErrorOf(text("equidistent")),
+                  "distortion_model: 'equidistent' is not one of plumb_bob, radtan");
+  EXPECT_CONTAINS(ErrorOf("fisheye_model: 1\n" + text("radtan")),
+                  "'radtan' is not the fisheye model");
+}
+
 TEST(CameraFile, ReadsColmapCamerasWithTheirPixelCentres) {
   const std::vector<Camera> cameras = Read(
       "# Camera list with one line of data per camera:\n"
