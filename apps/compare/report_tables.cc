@@ -40,7 +40,7 @@ std::string Cell(const std::string& text, const char* css) {
 std::string SummaryTable(const Summary& summary) {
   std::vector<SummaryColumn> columns = summary.Columns();
   columns.push_back(
-      {"time ms", "median time of a call", false, [](const SummaryRow& row) {
+      {"time ms", "median time of an answer", false, [](const SummaryRow& row) {
          return FormatShort(1e-3 * Median({row.microseconds.begin(), row.microseconds.end()}));
        }});
   std::string html = "<div class='scroll'><table class='sortable named brief'><thead><tr>";

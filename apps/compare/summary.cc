@@ -54,14 +54,15 @@ void AddErrors(const std::vector<HypothesisRecord>& hypotheses, SummaryRow* row)
 
 void AddSolver(const SolverRecord& solver, SummaryRow* row) {
   ++row->images;
-  if (std::isfinite(solver.microseconds)) {
-    row->microseconds.push_back(static_cast<float>(solver.microseconds));
-  }
   if (!solver.HasAnswer()) {
     ++(solver.status == "refused" ? row->refused : row->failed);
     return;
   }
   ++row->ok;
+  // Of answers only: a refusal takes next to no time.
+  if (std::isfinite(solver.microseconds)) {
+    row->microseconds.push_back(static_cast<float>(solver.microseconds));
+  }
   const HypothesisRecord& best = solver.hypotheses.front();
   if (std::isfinite(best.rms_px)) row->rms_px.push_back(best.rms_px);
   if (best.num_observations > 0) {

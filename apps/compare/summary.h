@@ -23,7 +23,7 @@ struct SummaryRow {
   std::vector<double> direction_errors;  // The same, one for each direction of the truth.
   std::vector<double> inlier_shares;
   std::vector<double> better_normal_errors;  // Of the hypothesis nearest to the truth.
-  std::vector<float> microseconds;
+  std::vector<float> microseconds;           // Of answers.
 };
 
 // A column of the table for people.

@@ -292,6 +292,18 @@ SolverRecord Refined(const std::string& loss, double scale, double error_deg, in
   return record;
 }
 
+TEST(Summary, TimesAreThoseOfAnswers) {
+  Summary summary;
+  for (const double microseconds : {1.0, 1.0, 100.0, 300.0}) {
+    ImageRecord record;
+    record.solvers = {Refined("huber", 0.5, 0.3, 90)};
+    record.solvers[0].microseconds = microseconds;
+    if (microseconds < 2.0) record.solvers[0].hypotheses.clear();
+    summary.Add(record);
+  }
+  EXPECT_EQ(summary.rows().at(0).microseconds, (std::vector<float>{100.0F, 300.0F}));
+}
+
 TEST(Sweep, BestHasTheSmallestErrorOfThoseThatAnswer) {
   Summary summary;
   for (int i = 0; i < 10; ++i) {
