@@ -83,11 +83,17 @@ class PhotoSource : public FrameSource {
 
 }  // namespace
 
-Status OpenVideo(const std::string& path, const SceneImage& pattern, double fps,
-                 std::unique_ptr<FrameSource>* source) {
+Status CheckVideoFile(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error))
     return Status::Invalid("--video=" + path + ": the file does not exist");
+  return std::filesystem::is_directory(path, error)
+             ? Status::Invalid("--video=" + path + ": is a folder, not a video")
+             : Status::Ok();
+}
+
+Status OpenVideo(const std::string& path, const SceneImage& pattern, double fps,
+                 std::unique_ptr<FrameSource>* source) {
   cv::VideoCapture capture;
   bool is_open = false;
   try {

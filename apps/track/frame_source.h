@@ -42,7 +42,10 @@ class FrameSource {
   std::vector<double> times_s_;
 };
 
-// fps 0: that of the video, for photos 25. Not ok: a video that cannot be opened.
+// Not ok: --video names no file.
+Status CheckVideoFile(const std::string& path);
+
+// Of such a file. fps 0: that of the video, for photos 25. Not ok: a video that cannot be opened.
 Status OpenVideo(const std::string& path, const SceneImage& pattern, double fps,
                  std::unique_ptr<FrameSource>* source);
 // `images` outlives the source. Only photos that something is to be found in are read, or all.

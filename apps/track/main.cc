@@ -38,7 +38,8 @@ constexpr char kUsage[] =
 // The images of the flags; a video is one of them, which all of its frames are like.
 Status OpenSource(const TrackOptions& options, ImageSet* images,
                   std::unique_ptr<FrameSource>* source) {
-  Status status = ImagesFromFlags(options.compare.inputs, images);
+  Status status = options.video.empty() ? Status::Ok() : CheckVideoFile(options.video);
+  if (status.ok()) status = ImagesFromFlags(options.compare.inputs, images);
   if (!status.ok()) return status;
   for (std::size_t i = 1; i < images->size(); ++i) {
     if (images->At(i).observations.camera.id != images->At(0).observations.camera.id)

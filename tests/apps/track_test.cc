@@ -175,6 +175,11 @@ TEST_F(TrackTest, ACutBeginsAnew) {
   EXPECT_TRUE(results[0]["reinitialized"].get<bool>());
 }
 
+TEST_F(TrackTest, NamesTheFlagOfAVideoThatIsNone) {
+  EXPECT_CONTAINS(Track("--video=none.mp4").err, "--video=none.mp4: the file does not exist");
+  EXPECT_CONTAINS(Track("--video=" + folder_.path()).err, ": is a folder, not a video");
+}
+
 TEST_F(TrackTest, UnusableInputWritesNothing) {
   PaintFrames(2);
   const std::string text = folder_.Write("notes.mp4", "no video");
