@@ -113,10 +113,19 @@ Json AskedMeasurements(const Json& request) {
   return asked;
 }
 
+const Json& Required(const Json& request, const char* key) {
+  const auto value = request.find(key);
+  if (value == request.end()) throw RequestError(400, std::string("'") + key + "' is missing");
+  return *value;
+}
+
 std::size_t ChosenHypothesis(const Json& request, std::size_t count) {
   const auto chosen = request.find("hypothesis");
-  const bool said = chosen != request.end() && chosen->is_number_integer() && *chosen >= 0;
-  return said ? std::min(chosen->get<std::size_t>(), count - 1) : 0;
+  if (chosen == request.end()) return 0;
+  if (chosen->is_number_integer() && *chosen >= 0 && *chosen < count)
+    return chosen->get<std::size_t>();
+  throw RequestError(400, "'hypothesis' must be a whole number, 0 to " + std::to_string(count - 1) +
+                              ": there are " + std::to_string(count));
 }
 
 Json Measured(const Json& asked, const PoseHypothesis& hypothesis, const Camera& camera) {

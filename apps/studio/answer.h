@@ -25,7 +25,10 @@ Json EstimateJson(const ImageRun& run, const Json& request);
 // A request's `measure`, checked: a list, and not too long a one; empty where there is none.
 Json AskedMeasurements(const Json& request);
 
-// Which hypothesis a request speaks of: the first unless it says so.
+// What a request must have.
+const Json& Required(const Json& request, const char* key);
+
+// Which hypothesis of so many a request speaks of: the first unless it says so.
 std::size_t ChosenHypothesis(const Json& request, std::size_t count);
 
 // One measurement; null with the reason in `error` where it cannot be had.

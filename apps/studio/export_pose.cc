@@ -49,7 +49,7 @@ Json ExportPose(const ImageRun& run, const Json& request, const std::string& fol
   Camera camera = CameraOf(hypothesis, run.observations.camera);
   camera.width = run.photo.cols;
   camera.height = run.photo.rows;
-  const std::string format = request.at("format");
+  const std::string format = Required(request, "format");
   std::string note;
   Status status;
   if (format == "csv") {

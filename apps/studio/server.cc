@@ -38,9 +38,8 @@ void Guarded(Response* response, const std::function<void()>& work) {
     work();
   } catch (const RequestError& error) {
     SetError(error.status(), error.what(), response);
-  } catch (const nlohmann::json::exception& error) {
-    SetError(400, std::string("the request is not as the studio takes it: ") + error.what(),
-             response);
+  } catch (const nlohmann::json::exception&) {  // What it says is of its own inside.
+    SetError(400, "the request is not as the studio takes it: a value has another type", response);
   } catch (const std::exception& error) {  // Such as no memory left.
     SetError(500, std::string("the studio could not do it: ") + error.what(), response);
   }

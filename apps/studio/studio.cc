@@ -241,7 +241,7 @@ Json Studio::Estimate(const Json& request) {
 
 Json Studio::Save(const Json& request) {
   const auto photo = LoadPhoto(Index(request));
-  const Json document = Document(request.at("scene"), *photo);
+  const Json document = Document(Required(request, "scene"), *photo);
   ReadDocument(document, folder_.path());
   const std::lock_guard<std::mutex> lock(mutex_);
   FollowScene();
@@ -260,7 +260,7 @@ Json Studio::Save(const Json& request) {
 
 Json Studio::Draft(const Json& request) {
   const std::string name = TextAsWritten(folder_.name(Index(request)));
-  const Json& state = request.at("state");
+  const Json& state = Required(request, "state");
   if (!state.is_object() && !state.is_null()) throw RequestError(400, "'state' must be an object");
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!draft_error_.empty()) {
@@ -281,12 +281,12 @@ Json Studio::Draft(const Json& request) {
 
 Json Studio::Export(const Json& request) {
   const auto photo = LoadPhoto(Index(request));
-  const auto made = Run(request.at("scene"), photo);
+  const auto made = Run(Required(request, "scene"), photo);
   const std::string below = std::string(kExportFolder) + "/" + folder_.name(photo->index);
   std::string path;
   Status status = folder_.OwnPath(below, &path);
   if (status.ok()) status = CreateFolder(path);
-  for (const std::string& name : ExportedFiles(request.at("format").get<std::string>())) {
+  for (const std::string& name : ExportedFiles(Required(request, "format").get<std::string>())) {
     std::string unused;
     if (status.ok()) status = folder_.OwnPath(below + "/" + name, &unused);
   }

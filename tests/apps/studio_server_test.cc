@@ -239,6 +239,36 @@ TEST_F(StudioServerTest, SurvivesMalformedAndHugeRequests) {
   EXPECT_TRUE(IsAlive());
 }
 
+TEST_F(StudioServerTest, RefusesAHypothesisThatIsNotThere) {
+  Start();
+  const Json scene = DiscScene();
+  const std::size_t count =
+      Ask("/api/estimate", {{"image", 0}, {"scene", scene}})["hypotheses"].size();
+  ASSERT_GE(count, 2U);
+  for (const char* address : {"/api/estimate", "/api/export"}) {
+    Json request = {{"image", 0}, {"scene", scene}, {"format", "tum"}, {"hypothesis", count - 1}};
+    Ask(address, request);
+    for (const Json& none : {Json(count), Json(99), Json(-1), Json("x"), Json(0.5), Json()}) {
+      request["hypothesis"] = none;
+      EXPECT_CONTAINS(Ask(address, request, 400)["error"].get<std::string>(),
+                      "'hypothesis' must be a whole number, 0 to ");
+    }
+  }
+}
+
+TEST_F(StudioServerTest, NamesWhatIsMissing) {
+  Start();
+  const auto error = [&](const std::string& address, const Json& request) {
+    return Ask(address, request, 400)["error"].get<std::string>();
+  };
+  EXPECT_EQ(error("/api/draft", {{"image", 0}}), "'state' is missing");
+  EXPECT_EQ(error("/api/save", {{"image", 0}}), "'scene' is missing");
+  EXPECT_EQ(error("/api/export", {{"image", 0}, {"scene", Json::object()}}), "'format' is missing");
+  EXPECT_EQ(
+      error("/api/export", {{"image", 0}, {"scene", DiscScene()}, {"format", 7}}).find("json"),
+      std::string::npos);
+}
+
 TEST_F(StudioServerTest, GivesOneRangeOfAPhoto) {
   Start();
   const auto get = [&](const std::string& ranges) {

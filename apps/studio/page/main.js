@@ -39,6 +39,18 @@ function toast(text, bad = false) {
 
 let asking = false, askAgain = false;
 
+// The pose that was chosen may be gone with what was said since: then the most probable one counts.
+async function estimateOf(request) {
+  try {
+    return await api.estimate(request);
+  } catch (error) {
+    if (!request.hypothesis) throw error;
+    const estimate = await api.estimate({...request, hypothesis: 0});
+    if (request.image === app.image) app.doc.hypothesis = 0;
+    return estimate;
+  }
+}
+
 async function askEstimate() {
   if (!app.photo) return;
   if (asking) { askAgain = true; return; }
@@ -46,8 +58,8 @@ async function askEstimate() {
   const image = app.image, started = performance.now(), entry = entryOf(app.doc);
   const scene = isDragging() ? thinned(entry, DRAG_POINTS) : entry;
   try {
-    const estimate = await api.estimate({image, scene, hypothesis: app.doc.hypothesis,
-                                         measure: app.doc.measure});
+    const estimate = await estimateOf({image, scene, hypothesis: app.doc.hypothesis,
+                                       measure: app.doc.measure});
     if (image === app.image) Object.assign(app, {estimate, estimateError: ''});
   } catch (error) {
     if (image === app.image) Object.assign(app, {estimate: null, estimateError: error.message});
