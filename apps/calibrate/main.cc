@@ -52,20 +52,25 @@ void SetModel(const CalibrateOptions& options, Camera* camera) {
   camera->model = model;
 }
 
-// The photos, each read and observed, on all threads.
+// The photos, each read, unless nothing is to be detected in it or drawn, and observed, on all
+// threads.
 std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<SceneImage>* images) {
   std::vector<ImageRun> runs(images->size());
   Progress progress("photos", static_cast<int>(images->size()), 0);
   std::mutex mutex;
   InParallel(static_cast<int>(images->size()), [&](int i) {
     const auto index = static_cast<std::size_t>(i);
-    runs[index] = RunImage(options, nullptr, &(*images)[index]);
+    SceneImage& image = (*images)[index];
+    runs[index] = RunImage(options, nullptr, &image);
     Camera& camera = runs[index].observations.camera;
     // Not the one that the photo alone makes likeliest: the prior is about the one given.
-    camera = (*images)[index].observations.camera;
+    camera = image.observations.camera;
     runs[index].observations.stated_focal_px = runs[index].observations.found_k1 = 0.0;
-    if (camera.width == 0) camera.width = runs[index].photo.cols;
-    if (camera.height == 0) camera.height = runs[index].photo.rows;
+    // With or without pictures the same comes out: of given evidence no photo need be read.
+    if (image.detect_everything || !image.rois.empty()) {
+      if (camera.width == 0) camera.width = runs[index].photo.cols;
+      if (camera.height == 0) camera.height = runs[index].photo.rows;
+    }
     runs[index].photo.release();
     const std::lock_guard<std::mutex> lock(mutex);
     progress.Advance();
@@ -267,8 +272,6 @@ int Calibrate() {
   if (!options.import.empty()) status = Import(&options, &images, &poses);
   if (!status.ok()) return Refuse("circline_calibrate", status);
   if (options.compare.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.compare.inputs.guess));
-  const bool with_pictures = options.compare.overlays;
-  options.compare.overlays = false;  // Photos are read for detection only.
   for (SceneImage& image : images) SetModel(options, &image.observations.camera);
   Calibration calibration;
   status = CalibrateInPasses(&options, poses, &images, &calibration);
@@ -278,7 +281,7 @@ int Calibrate() {
   status = CreateFolder(options.compare.output);
   if (status.ok()) {
     std::vector<std::string> pictures;
-    if (with_pictures)
+    if (options.compare.overlays)
       pictures = CalibrationPictures(options.compare, calibration.adjusted, calibration.images);
     status = WriteCalibration(calibration.adjusted, calibration.photos, calibration.names, pictures,
                               options.compare.output, &note);

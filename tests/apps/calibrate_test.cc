@@ -95,7 +95,8 @@ std::string SheetScene(const TestFolder& folder, int count, int gross) {
                      Eigen::AngleAxisd(0.3 * i, Eigen::Vector3d::UnitZ());
     board.translation.x() += 0.3 * std::sin(2.0 * turn);
     const std::string name = "view" + std::to_string(i) + ".png";
-    scene += SheetPhoto(board, folder.Write(name, ""), i == gross ? 0.8 : 1.0);
+    cv::imwrite(folder / name, cv::Mat::zeros(kHeight, kWidth, CV_8U));
+    scene += SheetPhoto(board, folder / name, i == gross ? 0.8 : 1.0);
   }
   return folder.Write("scene.yaml", scene);
 }
@@ -231,6 +232,22 @@ TEST_F(CalibrateTest, PhotosOfAnotherSizeAreAnotherCameras) {
       Calibrate(Photos() + " --camera=" + given + " --output=" + folder_.path() + "/stated");
   EXPECT_EQ(stated.exit_code, 1);
   EXPECT_CONTAINS(stated.err, "board4.png: the photo has 240 x 180 pixels");
+}
+
+// As circline_compare does: where pictures are drawn each photo is read.
+TEST_F(CalibrateTest, NamesPhotosOfGivenEvidenceThatCannotBeUsed) {
+  const std::string scene = SheetScene(folder_, 6, -1);
+  std::filesystem::remove(folder_ / "view1.png");
+  cv::imwrite(folder_ / "view3.png", cv::Mat::zeros(20, 30, CV_8U));
+  const Outcome run = Calibrate("--scene=" + scene + " --output=" + Output());
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_CONTAINS(run.err, "view1.png: the file does not exist");
+  EXPECT_CONTAINS(run.err, "view3.png: the photo has 30 x 20 pixels");
+  EXPECT_EQ(ReadJson(Output() + "/calibration.json")["images"].size(), 4U);
+  // Else nobody looks at them.
+  const Outcome unseen = Calibrate("--scene=" + scene + " --overlays=false --output=" + Output());
+  EXPECT_EQ(unseen.exit_code, 0) << unseen.err;
+  EXPECT_EQ(ReadJson(Output() + "/calibration.json")["images"].size(), 6U);
 }
 
 TEST_F(CalibrateTest, NamesWhatCannotBeRead) {
