@@ -73,11 +73,7 @@ Status ParametersFromFlags(CalibrateOptions* options) {
 }  // namespace
 
 Status CalibrateOptionsFromFlags(CalibrateOptions* options) {
-  // All photos count, in one adjustment of its own.
-  Status status = CheckNotGiven("circline_calibrate",
-                                {"merge", "plugin", "resume", "solvers", "peers", "export_as",
-                                 "save_options", "list_solvers", "conic_distance"});
-  if (status.ok()) status = OptionsFromFlags(&options->compare);
+  Status status = OptionsFromFlags(&options->compare);
   if (status.ok()) status = CheckOneLoss(options->compare);
   if (status.ok()) status = ModelFromFlag(&options->model);
   if (status.ok()) status = ParametersFromFlags(options);

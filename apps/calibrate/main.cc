@@ -300,6 +300,9 @@ int Calibrate() {
 }  // namespace circline::apps
 
 int main(int argc, char** argv) {
+  // All photos count, in one adjustment of its own.
   return circline::apps::RunApp(argc, argv, "circline_calibrate", circline::apps::kUsage,
-                                circline::apps::Calibrate);
+                                circline::apps::Calibrate,
+                                {"merge", "plugin", "resume", "solvers", "peers", "export_as",
+                                 "save_options", "list_solvers", "conic_distance"});
 }

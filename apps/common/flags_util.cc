@@ -42,6 +42,15 @@ std::vector<gflags::CommandLineFlagInfo> AppFlags() {
   return flags;
 }
 
+// As a person writes it: gflags gives a number all its digits, 0.29999999999999999.
+std::string DefaultText(const gflags::CommandLineFlagInfo& flag) {
+  if (flag.type == "string") return "\"" + flag.default_value + "\"";
+  double value = 0.0, read_back = 0.0;
+  if (flag.type != "double" || !ParseDouble(flag.default_value, &value)) return flag.default_value;
+  const std::string plain = FormatPlain(value);
+  return ParseDouble(plain, &read_back) && read_back == value ? plain : flag.default_value;
+}
+
 Status UnknownFlag(const std::string& name) {
   std::vector<std::string> names = {"help", "version", "flagfile"};
   for (const auto& flag : AppFlags()) names.push_back(flag.name);
@@ -153,13 +162,13 @@ Status ParseCommandLine(int argc, const char* const* argv, CommandLine* command_
 
 const std::vector<std::string>& FlagFiles() { return FlagFilesRead(); }
 
-std::string HelpText(const std::string& usage) {
+std::string HelpText(const std::string& usage, const std::vector<std::string>& others) {
   std::ostringstream text;
   text << usage << "\n\nFlags:\n";
   for (const auto& flag : AppFlags()) {
-    const bool quoted = flag.type == "string";
-    text << "  --" << flag.name << " (" << (quoted ? "\"" : "") << flag.default_value
-         << (quoted ? "\"" : "") << ")\n      " << flag.description << "\n";
+    if (std::find(others.begin(), others.end(), flag.name) != others.end()) continue;
+    text << "  --" << flag.name << " (" << DefaultText(flag) << ")\n      " << flag.description
+         << "\n";
   }
   text << "  --flagfile\n      Reads flags from a file, one a line.\n"
        << "  --help, --version\n      Say this, or the version, and do nothing else.\n";
@@ -184,16 +193,6 @@ Status NamesFromFlag(const std::string& flag, const std::string& list,
   return Status::Ok();
 }
 
-Status CheckNotGiven(const std::string& app, const std::vector<std::string>& flags) {
-  for (const std::string& name : flags) {
-    gflags::CommandLineFlagInfo info;
-    if (gflags::GetCommandLineFlagInfo(name.c_str(), &info) &&
-        info.current_value != info.default_value)
-      return Status::Invalid("--" + name + ": is not a flag of " + app);
-  }
-  return Status::Ok();
-}
-
 int Refuse(const std::string& app, const Status& status) {
   SayOnStderr(app + ": " + status.message);
   return status.code == StatusCode::kInvalidArgument ? kExitUsage : kExitUnreadable;
@@ -212,17 +211,29 @@ void InitAppLogging(const char* app) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
 }
 
+// Not ok where one of another program's flags was given: `app` does not have it.
+Status CheckNotGiven(const std::string& app, const std::vector<std::string>& flags) {
+  for (const std::string& name : flags) {
+    gflags::CommandLineFlagInfo info;
+    if (gflags::GetCommandLineFlagInfo(name.c_str(), &info) &&
+        info.current_value != info.default_value)
+      return Status::Invalid("--" + name + ": is not a flag of " + app);
+  }
+  return Status::Ok();
+}
+
 int ParseAndRun(int argc, char** argv, const std::string& app, const std::string& usage,
-                int (*run)()) {
+                int (*run)(), const std::vector<std::string>& others) {
   CommandLine command_line;
   const Status status = ParseCommandLine(argc, argv, &command_line);
   if (!status.ok()) return Refuse(app, status);
   if (command_line.help) {
-    std::cout << HelpText(usage);
+    std::cout << HelpText(usage, others);
   } else if (command_line.version) {
     std::cout << VersionText(app) << "\n";
   } else {
-    return run();
+    const Status own = CheckNotGiven(app, others);
+    return own.ok() ? run() : Refuse(app, own);
   }
   return kExitOk;
 }
@@ -257,8 +268,9 @@ int RunGuarded(const char* program, const std::string& app, const std::function<
   return std::max(code, kExitUnreadable);
 }
 
-int RunApp(int argc, char** argv, const std::string& app, const std::string& usage, int (*run)()) {
-  return RunGuarded(argv[0], app, [&] { return ParseAndRun(argc, argv, app, usage, run); });
+int RunApp(int argc, char** argv, const std::string& app, const std::string& usage, int (*run)(),
+           const std::vector<std::string>& others) {
+  return RunGuarded(argv[0], app, [&] { return ParseAndRun(argc, argv, app, usage, run, others); });
 }
 
 }  // namespace circline::apps

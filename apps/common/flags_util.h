@@ -29,8 +29,8 @@ Status ParseCommandLine(int argc, const char* const* argv, CommandLine* command_
 // Those that --flagfile has named, in the order in which they were read.
 const std::vector<std::string>& FlagFiles();
 
-// Usage and every flag defined under apps/, with its default.
-std::string HelpText(const std::string& usage);
+// Usage and every flag defined under apps/ but the `others`, with its default.
+std::string HelpText(const std::string& usage, const std::vector<std::string>& others = {});
 
 // "circline_compare 0.1.0".
 std::string VersionText(const std::string& app);
@@ -39,15 +39,14 @@ std::string VersionText(const std::string& app);
 // cannot be written, is a sentence and exit code 1. `run` returns the exit code.
 int RunGuarded(const char* program, const std::string& app, const std::function<int()>& run);
 
-// All of an app's main but what it does: the above, the command line, --help, --version.
-int RunApp(int argc, char** argv, const std::string& app, const std::string& usage, int (*run)());
+// All of an app's main but what it does: the above, the command line, --help, --version. `others`:
+// flags of other programs that come with what it shares with them; it neither takes nor lists them.
+int RunApp(int argc, char** argv, const std::string& app, const std::string& usage, int (*run)(),
+           const std::vector<std::string>& others = {});
 
 // The names in the comma-separated list of a flag, all of `known`. Not ok: one line that names it.
 Status NamesFromFlag(const std::string& flag, const std::string& list,
                      const std::vector<std::string>& known, std::vector<std::string>* names);
-
-// Not ok where one of another program's flags was given: `app` does not have it.
-Status CheckNotGiven(const std::string& app, const std::vector<std::string>& flags);
 
 // Says why an app does not go on; returns the exit code for that.
 int Refuse(const std::string& app, const Status& status);

@@ -259,10 +259,7 @@ int Reconstruct() {
   ModelOptions model_options;
   ImageSet images;
   SceneImage image;
-  Status status =
-      CheckNotGiven("circline_reconstruct",
-                    {"merge", "resume", "export_as", "save_options", "list_solvers", "overlays"});
-  if (status.ok()) status = OptionsFromFlags(&options);
+  Status status = OptionsFromFlags(&options);
   if (status.ok()) status = CheckOneLoss(options);
   if (status.ok()) status = ModelFromFlags(&model_options);
   if (status.ok()) status = ImagesFromFlags(options.inputs, &images);
@@ -292,6 +289,7 @@ int Reconstruct() {
 }  // namespace circline::apps
 
 int main(int argc, char** argv) {
-  return circline::apps::RunApp(argc, argv, "circline_reconstruct", circline::apps::kUsage,
-                                circline::apps::Reconstruct);
+  return circline::apps::RunApp(
+      argc, argv, "circline_reconstruct", circline::apps::kUsage, circline::apps::Reconstruct,
+      {"merge", "resume", "export_as", "save_options", "list_solvers", "overlays"});
 }

@@ -40,13 +40,7 @@ constexpr char kUsage[] =
     "camera, detection and losses are those of circline_compare.\n"
     "Exit code 0: interrupted; 1: the server stopped by itself; 2: unusable flags, folder or port.";
 
-// One folder, one solver, one loss.
 Status CheckFlags() {
-  const Status status =
-      CheckNotGiven("circline_studio", {"scene", "output", "merge", "resume", "shard", "solvers",
-                                        "peers", "export_as", "roi", "plugin", "save_options",
-                                        "list_solvers", "circle_radius", "overlays", "threads"});
-  if (!status.ok()) return status;
   if (FLAGS_images.empty()) return Status::Invalid("--images is missing: a folder with photos");
   return FLAGS_port >= 0 && FLAGS_port <= 65535 ? Status::Ok()
                                                 : Status::Invalid("--port must be 0 to 65535");
@@ -137,6 +131,9 @@ int Serve() {
 }  // namespace circline::apps
 
 int main(int argc, char** argv) {
-  return circline::apps::RunApp(argc, argv, "circline_studio", circline::apps::kUsage,
-                                circline::apps::Serve);
+  // One folder, one solver, one loss.
+  return circline::apps::RunApp(
+      argc, argv, "circline_studio", circline::apps::kUsage, circline::apps::Serve,
+      {"scene", "output", "merge", "resume", "shard", "solvers", "peers", "export_as", "roi",
+       "plugin", "save_options", "list_solvers", "circle_radius", "overlays", "threads"});
 }

@@ -99,6 +99,9 @@ int TrackFrames() {
 }  // namespace circline::apps
 
 int main(int argc, char** argv) {
+  // A track is made in one go, from its first frame, and by one solver.
   return circline::apps::RunApp(argc, argv, "circline_track", circline::apps::kUsage,
-                                circline::apps::TrackFrames);
+                                circline::apps::TrackFrames,
+                                {"merge", "plugin", "resume", "shard", "solvers", "peers",
+                                 "export_as", "save_options", "list_solvers"});
 }

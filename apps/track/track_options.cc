@@ -5,8 +5,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "apps/common/flags_util.h"
-
 DECLARE_string(images);
 DECLARE_string(scene);
 
@@ -34,12 +32,8 @@ DEFINE_int32(lost_after, circline::TrackerOptions().lost_after,
 namespace circline::apps {
 namespace {
 
-// A track is made in one go, from its first frame, and by one solver.
 Status CheckSource() {
-  const Status status =
-      CheckNotGiven("circline_track", {"merge", "plugin", "resume", "shard", "solvers", "peers",
-                                       "export_as", "save_options", "list_solvers"});
-  if (!status.ok() || FLAGS_video.empty()) return status;
+  if (FLAGS_video.empty()) return Status::Ok();
   if (!FLAGS_images.empty() || !FLAGS_scene.empty())
     return Status::Invalid("give one of --video, --images and --scene");
   FLAGS_images = FLAGS_video;  // Camera and regions of interest are said of it as of photos.
