@@ -145,6 +145,7 @@ Status CopyOverlays(const std::string& from, const std::string& to) {
 Status MergeFolders(const std::vector<std::string>& folders, const std::string& output) {
   Status status = CheckFolders(folders, output);
   if (status.ok()) status = CheckImages(folders);
+  if (status.ok()) status = CheckResultFiles(output);
   if (status.ok()) status = CreateFolder(output);
   FolderLock lock;
   if (status.ok()) status = lock.Acquire(output);

@@ -15,6 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kResults[] = {"results.jsonl", "observations.jsonl", "timings.jsonl",
+                                    "summary.csv", "report.html"};
+
 // Lies in the folder while photos are missing, and says with which flags the run was begun.
 std::string MarkerPath(const std::string& folder) { return folder + "/unfinished.flags"; }
 
@@ -89,20 +92,30 @@ void RemoveParts(const std::string& folder) {
 
 }  // namespace
 
+Status CheckResultFiles(const std::string& folder) {
+  for (const char* name : kResults) {
+    std::error_code error;
+    const std::string path = folder + "/" + name;
+    const fs::file_status status = fs::status(path, error);
+    if (fs::exists(status) && !fs::is_regular_file(status))
+      return Status::Invalid(path + ": is no file, and is not replaced by one");
+  }
+  return Status::Ok();
+}
+
 Status PrepareFolder(const CompareOptions& options, const ImageSet& images,
                      const std::vector<SolverKey>& solvers, DonePart* done) {
   const std::string& folder = options.output;
   *done = {};
-  if (options.resume) {
-    Status status = CheckFlags(folder, options.result_flags);
+  Status status = CheckResultFiles(folder);
+  if (status.ok() && options.resume) {
+    status = CheckFlags(folder, options.result_flags);
     if (status.ok()) status = FindDone(options, images, solvers, done);
-    if (!status.ok()) return status;
-  } else {
-    for (const char* name :
-         {"results.jsonl", "observations.jsonl", "timings.jsonl", "summary.csv", "report.html"}) {
-      std::error_code error;
-      fs::remove(folder + "/" + name, error);
-    }
+  }
+  if (!status.ok()) return status;
+  if (!options.resume) {
+    std::error_code error;
+    for (const char* name : kResults) fs::remove(folder + "/" + name, error);
   }
   RemoveParts(folder);
   return WriteFile(MarkerPath(folder), options.result_flags);

@@ -21,9 +21,12 @@ struct DonePart {
   std::array<std::uint64_t, 3> bytes{};
 };
 
+// What has the name of a file of results must be one, to be replaced. Not ok: names what is none.
+Status CheckResultFiles(const std::string& folder);
+
 // Clears a folder of the results of an earlier run, or, with `resume`, finds what of them stands.
-// Not ok: they are those of other images, cameras, solvers or flags. Photos that could not be read
-// are named on stderr again.
+// Not ok: CheckResultFiles, or they are those of other images, cameras, solvers or flags. Photos
+// that could not be read are named on stderr again.
 Status PrepareFolder(const CompareOptions& options, const ImageSet& images,
                      const std::vector<SolverKey>& solvers, DonePart* done);
 

@@ -9,6 +9,7 @@
 #include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
 #include "apps/compare/inputs.h"
+#include "apps/compare/resume.h"
 #include "apps/track/track_options.h"
 #include "apps/track/track_report.h"
 #include "apps/track/track_run.h"
@@ -85,6 +86,7 @@ int TrackFrames() {
   FolderLock lock;
   status = CreateFolder(options.compare.overlays ? output + "/overlays" : output);
   if (status.ok()) status = lock.Acquire(output);
+  if (status.ok()) status = CheckResultFiles(output);
   std::vector<TrackedFrame> frames;
   if (status.ok()) status = RunTrack(options, source.get(), &frames);
   if (status.ok()) status = WriteTrackReport(output, frames);

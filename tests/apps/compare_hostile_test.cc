@@ -101,6 +101,19 @@ TEST_F(CompareHostile, ADeviceIsWrittenToAndALinkFollowed) {
   EXPECT_TRUE(fs::is_character_file("/dev/full"));
 }
 
+TEST_F(CompareHostile, AFolderWithTheNameOfAFileStays) {
+  PaintLast();
+  ASSERT_EQ(Run("").exit_code, 0);
+  const std::string results = ReadAll(folder_ / "out/results.jsonl");
+  fs::remove(folder_ / "out/summary.csv");
+  fs::create_directory(folder_ / "out/summary.csv");
+  const Outcome outcome = Run("");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_CONTAINS(outcome.err, "out/summary.csv: is no file, and is not replaced by one");
+  EXPECT_TRUE(fs::is_directory(folder_ / "out/summary.csv"));
+  EXPECT_EQ(ReadAll(folder_ / "out/results.jsonl"), results);
+}
+
 TEST_F(CompareHostile, ALostStandardOutputIsAnError) {
   for (const std::string where : {">/dev/full", ">&-"}) {
     const Outcome outcome =
