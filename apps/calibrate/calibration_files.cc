@@ -13,6 +13,7 @@
 #include "apps/common/output_file.h"
 #include "apps/common/storage_node.h"
 #include "apps/common/text.h"
+#include "apps/common/written_files.h"
 #include "apps/compare/export.h"
 
 namespace circline::apps {
@@ -106,7 +107,29 @@ Json SceneEntry(const AdjustedCamera& made) {
   return CameraEntry(made.camera, sigma);
 }
 
+// Of the cameras, by their ids.
+std::vector<std::string> CalibrationNames(const std::vector<std::string>& ids) {
+  std::vector<std::string> names = UniqueStems(ids);
+  for (std::size_t c = 0; c < names.size(); ++c)
+    names[c] = c == 0 ? "calibration.yml" : "calibration_" + names[c] + ".yml";
+  return names;
+}
+
 }  // namespace
+
+void RemoveEarlierCalibration(const std::string& folder) {
+  std::string text;
+  if (!ReadTextFile(folder + "/calibration.json", &text).ok()) return;
+  const Json earlier = Json::parse(text, nullptr, false);
+  if (!earlier.is_object() || !earlier.contains("cameras")) return;
+  std::vector<std::string> ids;
+  for (const Json& camera : earlier["cameras"])
+    if (camera.contains("id") && camera["id"].is_string()) ids.push_back(camera["id"]);
+  RemoveFiles(folder, CalibrationNames(ids));
+  const bool imported = ReadTextFile(folder + "/landmarks.json", &text).ok() &&
+                        text.find("world_from_model") != std::string::npos;
+  if (imported) RemoveFiles(folder, {"landmarks.json", "transform.txt"});
+}
 
 Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observations>& photos,
                         const std::vector<std::string>& names,
@@ -116,11 +139,10 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
   Status status;
   std::vector<std::string> ids;
   for (const AdjustedCamera& camera : adjusted.cameras) ids.push_back(camera.camera.id);
-  const std::vector<std::string> stems = UniqueStems(ids);
+  const std::vector<std::string> files = CalibrationNames(ids);
   for (std::size_t c = 0; c < adjusted.cameras.size() && status.ok(); ++c) {
     json["cameras"].push_back(CameraJson(adjusted.cameras[c]));
-    const std::string name = c == 0 ? "calibration.yml" : "calibration_" + stems[c] + ".yml";
-    status = WriteFile(folder + "/" + name, CalibrationYaml(adjusted.cameras[c]));
+    status = WriteFile(folder + "/" + files[c], CalibrationYaml(adjusted.cameras[c]));
   }
   std::vector<ExportedPose> poses;
   json["images"] = Json::array();

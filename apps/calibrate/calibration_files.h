@@ -20,6 +20,10 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
                         const std::vector<std::string>& pictures, const std::string& folder,
                         std::string* note);
 
+// Removes what an earlier run wrote into that folder and this one may not write over: the files of
+// its further cameras, and those of --import.
+void RemoveEarlierCalibration(const std::string& folder);
+
 // The scene file with the estimated cameras, which state how well they are known. `source`: the
 // scene file that the images come from; empty: there was none. Photos are named with their whole
 // path.

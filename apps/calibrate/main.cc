@@ -280,6 +280,7 @@ int Calibrate() {
   std::string note;
   status = CreateFolder(options.compare.output);
   if (status.ok()) {
+    RemoveEarlierCalibration(options.compare.output);
     std::vector<std::string> pictures;
     if (options.compare.overlays)
       pictures = CalibrationPictures(options.compare, calibration.adjusted, calibration.images);

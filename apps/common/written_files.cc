@@ -62,4 +62,15 @@ std::vector<std::string> FilesOfFlags() {
   return files;
 }
 
+void RemoveFiles(const std::string& folder, const std::vector<std::string>& names) {
+  const std::vector<std::string> read = FilesOfFlags();
+  for (const std::string& name : names) {
+    std::error_code error;
+    const fs::path path = fs::path(folder) / name;
+    const fs::file_status status = fs::symlink_status(path, error);
+    if (!fs::is_regular_file(status) && !fs::is_symlink(status)) continue;
+    if (WrittenFiles(folder, {name}).CheckKept(read).ok()) fs::remove(path, error);
+  }
+}
+
 }  // namespace circline::apps

@@ -36,6 +36,10 @@ class WrittenFiles {
 // The files, beside photos, that the command line has named: flag files, scene, camera and others.
 std::vector<std::string> FilesOfFlags();
 
+// Removes files of an earlier run, by their names in that folder: no folders, and none of those
+// that flags of this run have named.
+void RemoveFiles(const std::string& folder, const std::vector<std::string>& names);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMMON_WRITTEN_FILES_H_

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -16,6 +17,9 @@ namespace circline::apps {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr char kNoPoints[] = "# no points\n", kTumHeader[] = "# time tx ty tz qx qy qz qw\n",
+               kGenerator[] = "circline_compare";
 
 // COLMAP's model and its parameters; its pixel centres lie at half integers.
 std::string ColmapCamera(const Camera& camera) {
@@ -67,7 +71,7 @@ Status ExportColmap(const std::vector<ExportedPose>& poses, const std::string& f
   }
   Status status = WriteFile(folder + "/images.txt", images.str());
   if (status.ok()) status = WriteFile(folder + "/cameras.txt", cameras.str());
-  return status.ok() ? WriteFile(folder + "/points3D.txt", "# no points\n") : status;
+  return status.ok() ? WriteFile(folder + "/points3D.txt", kNoPoints) : status;
 }
 
 Status ExportGltf(const std::vector<ExportedPose>& poses, const std::string& folder) {
@@ -92,7 +96,7 @@ Status ExportGltf(const std::vector<ExportedPose>& poses, const std::string& fol
                      {"rotation", node.rotation}});
   }
   if (!children.empty()) nodes[0]["children"] = children;
-  gltf["asset"] = {{"version", "2.0"}, {"generator", "circline_compare"}};
+  gltf["asset"] = {{"version", "2.0"}, {"generator", kGenerator}};
   gltf["scene"] = 0;
   gltf["scenes"] = Json::array({{{"nodes", {0}}}});
   gltf["nodes"] = nodes;
@@ -104,7 +108,7 @@ Status ExportGltf(const std::vector<ExportedPose>& poses, const std::string& fol
 Status ExportTum(const std::vector<ExportedPose>& poses, const std::string& folder) {
   std::ostringstream lines;
   lines.precision(17);
-  lines << "# time tx ty tz qx qy qz qw\n";
+  lines << kTumHeader;
   for (const ExportedPose& pose : poses) {
     const std::string stem = std::filesystem::path(pose.name).stem().string();
     double time = 0.0;
@@ -118,6 +122,11 @@ Status ExportTum(const std::vector<ExportedPose>& poses, const std::string& fold
           << q.y() << " " << q.z() << " " << q.w() << "\n";
   }
   return WriteFile(folder + "/trajectory.txt", lines.str());
+}
+
+// What stands near the beginning of its last file, and in no other program's.
+const char* MarkOf(const std::string& format) {
+  return format == "colmap" ? kNoPoints : format == "gltf" ? kGenerator : kTumHeader;
 }
 
 // Programs take all poses of a file for one world of one unit.
@@ -136,6 +145,19 @@ const std::vector<ExportFormat>& ExportFormats() {
                                     {"gltf", {"cameras.gltf"}},
                                     {"tum", {"trajectory.txt"}}};
   return *formats;
+}
+
+std::vector<std::string> ExportedFilesIn(const std::string& folder) {
+  constexpr std::size_t kHead = 256;
+  std::vector<std::string> names;
+  for (const ExportFormat& format : ExportFormats()) {
+    std::ifstream file(folder + "/" + format.files.back(), std::ios::binary);
+    std::string head(kHead, '\0');
+    file.read(head.data(), kHead);
+    if (head.find(MarkOf(format.name)) != std::string::npos)
+      names.insert(names.end(), format.files.begin(), format.files.end());
+  }
+  return names;
 }
 
 Status ExportPoses(const std::string& format, const std::vector<ExportedPose>& poses,

@@ -39,6 +39,9 @@ const std::vector<ExportFormat>& ExportFormats();
 Status ExportPoses(const std::string& format, const std::vector<ExportedPose>& poses,
                    const std::string& folder, std::string* note);
 
+// Those of the files in that folder that ExportPoses has written, by what stands in them.
+std::vector<std::string> ExportedFilesIn(const std::string& folder);
+
 // Writes the answer to show of every photo that has one. `notes`: sentences, a line each, on what a
 // reader of the files could not know.
 Status WriteExports(const std::string& folder, const std::vector<std::string>& formats,

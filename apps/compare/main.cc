@@ -35,7 +35,8 @@ std::vector<std::string> FilesWritten(const CompareOptions& options) {
                                     "summary.csv", "report.html"};
   // With --resume it has the same flags as before, and may be the file that they are read from.
   if (!options.resume) names.emplace_back("unfinished.flags");
-  if (options.overlays) names.emplace_back("overlays/*.png");
+  // Without --resume those of an earlier run are removed.
+  if (options.overlays || !options.resume) names.emplace_back("overlays/*.png");
   for (const ExportFormat& format : ExportFormats()) {
     const std::vector<std::string>& asked = options.finish.exports;
     if (std::find(asked.begin(), asked.end(), format.name) != asked.end())

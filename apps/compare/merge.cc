@@ -150,6 +150,7 @@ Status MergeFolders(const std::vector<std::string>& folders, const std::string& 
   FolderLock lock;
   if (status.ok()) status = lock.Acquire(output);
   if (!status.ok()) return status;
+  RemoveEarlierRun(output);
   RecordWriter writer(output, {});
   Merger merger(folders);
   while (const Source* source = merger.Next()) {

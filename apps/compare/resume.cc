@@ -1,12 +1,17 @@
 #include "apps/compare/resume.h"
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "apps/common/document.h"
 #include "apps/common/flags_util.h"
 #include "apps/common/output_file.h"
 #include "apps/common/storage_node.h"
+#include "apps/common/written_files.h"
+#include "apps/compare/export.h"
 #include "apps/compare/record_files.h"
 #include "apps/compare/results.h"
 
@@ -79,6 +84,20 @@ Status FindDone(const CompareOptions& options, const ImageSet& images,
   return Status::Ok();
 }
 
+// Pictures in overlays/, and nothing elsewhere whatever the file says.
+std::vector<std::string> OverlaysOfRun(const std::string& folder) {
+  std::vector<std::string> names;
+  std::ifstream file(folder + "/observations.jsonl", std::ios::binary);
+  for (std::string line; std::getline(file, line);) {
+    const auto json = nlohmann::json::parse(line, nullptr, false);
+    if (!json.is_object() || !json.contains("overlay") || !json["overlay"].is_string()) continue;
+    const auto name = json["overlay"].get<std::string>();
+    const fs::path path = name;
+    if (path.parent_path() == "overlays" && path.extension() == ".png") names.push_back(name);
+  }
+  return names;
+}
+
 // What was being written when the run was stopped; nothing that is not its own.
 void RemoveParts(const std::string& folder) {
   std::error_code error;
@@ -91,6 +110,20 @@ void RemoveParts(const std::string& folder) {
 }
 
 }  // namespace
+
+void RemoveEarlierRun(const std::string& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  // Else what poses there are may be of circline_calibrate.
+  if (fs::exists(folder + "/observations.jsonl", error) &&
+      !fs::exists(folder + "/calibration.json", error)) {
+    names = ExportedFilesIn(folder);
+  }
+  const std::vector<std::string> overlays = OverlaysOfRun(folder);
+  names.insert(names.end(), overlays.begin(), overlays.end());
+  names.insert(names.end(), std::begin(kResults), std::end(kResults));
+  RemoveFiles(folder, names);
+}
 
 Status CheckResultFiles(const std::string& folder) {
   for (const char* name : kResults) {
@@ -113,10 +146,7 @@ Status PrepareFolder(const CompareOptions& options, const ImageSet& images,
     if (status.ok()) status = FindDone(options, images, solvers, done);
   }
   if (!status.ok()) return status;
-  if (!options.resume) {
-    std::error_code error;
-    for (const char* name : kResults) fs::remove(folder + "/" + name, error);
-  }
+  if (!options.resume) RemoveEarlierRun(folder);
   RemoveParts(folder);
   return WriteFile(MarkerPath(folder), options.result_flags);
 }

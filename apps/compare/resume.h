@@ -21,6 +21,10 @@ struct DonePart {
   std::array<std::uint64_t, 3> bytes{};
 };
 
+// Removes what an earlier run of circline_compare or circline_track wrote into that folder, by its
+// names: results, report, exported poses and the overlays that its observations.jsonl names.
+void RemoveEarlierRun(const std::string& folder);
+
 // What has the name of a file of results must be one, to be replaced. Not ok: names what is none.
 Status CheckResultFiles(const std::string& folder);
 

@@ -65,9 +65,8 @@ Status OpenSource(const TrackOptions& options, ImageSet* images,
 }
 
 std::vector<std::string> FilesWritten(const TrackOptions& options) {
-  std::vector<std::string> names = {"results.jsonl", "observations.jsonl", "timings.jsonl",
-                                    "trajectory.txt", "report.html"};
-  if (options.compare.overlays) names.emplace_back("overlays/*.png");
+  std::vector<std::string> names = {"results.jsonl",  "observations.jsonl", "timings.jsonl",
+                                    "trajectory.txt", "report.html",        "overlays/*.png"};
   if (!options.video_out.empty()) names.push_back(options.video_out);
   return names;
 }
@@ -87,6 +86,7 @@ int TrackFrames() {
   status = CreateFolder(options.compare.overlays ? output + "/overlays" : output);
   if (status.ok()) status = lock.Acquire(output);
   if (status.ok()) status = CheckResultFiles(output);
+  if (status.ok()) RemoveEarlierRun(output);
   std::vector<TrackedFrame> frames;
   if (status.ok()) status = RunTrack(options, source.get(), &frames);
   if (status.ok()) status = WriteTrackReport(output, frames);

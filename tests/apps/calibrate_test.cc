@@ -221,6 +221,11 @@ TEST_F(CalibrateTest, PhotosOfAnotherSizeAreAnotherCameras) {
   EXPECT_EQ(cameras[0]["num_images"], 3);
   EXPECT_EQ(cameras[1]["num_images"], 2);
   EXPECT_TRUE(std::filesystem::exists(Output() + "/calibration_guessed_240x180.yml"));
+  // Those of an earlier run into that folder go, and nothing else does.
+  const std::string kept = folder_.Write("out/calibration_mine.yml", "mine");
+  ASSERT_EQ(Calibrate("--images=" + folder_ / "board0.png" + " --output=" + Output()).exit_code, 0);
+  EXPECT_FALSE(std::filesystem::exists(Output() + "/calibration_guessed_240x180.yml"));
+  EXPECT_EQ(ReadAll(kept), "mine");
   // A camera that is given has a size.
   const std::string given = folder_.Write("camera.yml",
                                           "%YAML:1.0\n---\nimage_width: 320\n"

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -170,6 +171,35 @@ TEST(CompareResume, RefusesTheResultsOfAnotherCamera) {
   }
   EXPECT_EQ(RunCompare(arguments + camera("300")).exit_code, 0);
   EXPECT_EQ(ReadAll(folder / "out/results.jsonl"), before);
+}
+
+// ---- Begun anew ----
+
+TEST(CompareAnew, RemovesWhatAnEarlierRunWroteAndNothingElse) {
+  const TestFolder folder;
+  for (const char* name : {"a.png", "b.png"}) Board(35.0).Paint(folder / name);
+  const auto run = [&](const std::string& photo, const std::string& flags) {
+    return RunCompare("--images='" + folder / photo + "' --focal_px=300 --solvers=joint " + flags +
+                      " --output='" + folder / "out" + "'");
+  };
+  ASSERT_EQ(run("?.png", "--export_as=colmap,gltf,tum").exit_code, 0);
+  for (const char* name : {"mine.png", "overlays/mine.png", "notes.txt"})
+    folder.Write(std::string("out/") + name, "mine");
+  const Outcome anew = run("a.png", "");
+  ASSERT_EQ(anew.exit_code, 0) << anew.err;
+  EXPECT_EQ(FilesIn(folder / "out"),
+            (std::set<std::string>{"mine.png", "notes.txt", "observations.jsonl", "overlays/a.png",
+                                   "overlays/mine.png", "report.html", "results.jsonl",
+                                   "summary.csv", "timings.jsonl"}));
+  // A model of somebody else's.
+  const std::set<std::string> before = FilesIn(folder / "out");
+  std::set<std::string> after = before;
+  for (const char* name : {"images.txt", "cameras.txt", "points3D.txt", "trajectory.txt"}) {
+    folder.Write(std::string("out/") + name, "# Of another program\n");
+    after.insert(name);
+  }
+  ASSERT_EQ(run("a.png", "").exit_code, 0);
+  EXPECT_EQ(FilesIn(folder / "out"), after);
 }
 
 // ---- Many images ----

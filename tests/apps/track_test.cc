@@ -175,6 +175,15 @@ TEST_F(TrackTest, ACutBeginsAnew) {
   EXPECT_TRUE(results[0]["reinitialized"].get<bool>());
 }
 
+TEST_F(TrackTest, BeginsAFolderAnew) {
+  PaintFrames(3);
+  ASSERT_EQ(Track(Frames()).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/overlays/002.png"));
+  ASSERT_EQ(Track("--images='" + FramePath(0) + "," + FramePath(1) + "'").exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/overlays/001.png"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/overlays/002.png"));
+}
+
 TEST_F(TrackTest, NamesTheFlagOfAVideoThatIsNone) {
   EXPECT_CONTAINS(Track("--video=none.mp4").err, "--video=none.mp4: the file does not exist");
   EXPECT_CONTAINS(Track("--video=" + folder_.path()).err, ": is a folder, not a video");
