@@ -4,8 +4,10 @@
 #include <gflags/gflags.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "apps/common/flags_util.h"
+#include "apps/common/text.h"
 
 namespace circline::apps {
 
@@ -45,8 +47,10 @@ Status WrittenFiles::CheckKept(const std::vector<std::string>& read) {
 fs::path WrittenFiles::Canonical(const fs::path& path) {
   std::error_code error;
   const fs::path absolute = fs::absolute(path, error);
-  if (!absolute.has_filename() || fs::is_symlink(absolute, error))
-    return fs::weakly_canonical(absolute, error);
+  if (!absolute.has_filename() || fs::is_symlink(absolute, error)) {
+    const fs::path canonical = fs::weakly_canonical(absolute, error);
+    return error ? absolute : canonical;  // Such as of a pipe, which has no name.
+  }
   const auto [folder, is_new] = folders_.try_emplace(absolute.parent_path());
   if (is_new) folder->second = fs::weakly_canonical(absolute.parent_path(), error);
   return folder->second / absolute.filename();
@@ -59,17 +63,20 @@ std::vector<std::string> FilesOfFlags() {
     // Not every app has them all.
     if (gflags::GetCommandLineOption(flag, &value) && !value.empty()) files.push_back(value);
   }
+  if (gflags::GetCommandLineOption("plugin", &value) && !value.empty()) {
+    for (std::string& library : SplitList(value)) files.push_back(std::move(library));
+  }
   return files;
 }
 
 void RemoveFiles(const std::string& folder, const std::vector<std::string>& names) {
-  const std::vector<std::string> read = FilesOfFlags();
+  WrittenFiles read("", FilesOfFlags());
   for (const std::string& name : names) {
     std::error_code error;
     const fs::path path = fs::path(folder) / name;
     const fs::file_status status = fs::symlink_status(path, error);
     if (!fs::is_regular_file(status) && !fs::is_symlink(status)) continue;
-    if (WrittenFiles(folder, {name}).CheckKept(read).ok()) fs::remove(path, error);
+    if (!read.Has(path.string())) fs::remove(path, error);
   }
 }
 

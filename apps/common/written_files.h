@@ -13,7 +13,7 @@
 
 namespace circline::apps {
 
-// The files that a run is about to write, wherever links lead.
+// The files that a run is about to write, or others, by any of their names, wherever links lead.
 class WrittenFiles {
  public:
   // `names`: in that folder, which need not exist; a * in the last part stands for anything

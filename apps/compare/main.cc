@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/common/flags_util.h"
+#include "apps/common/written_files.h"
 #include "apps/compare/export.h"
 #include "apps/compare/inputs.h"
 #include "apps/compare/options.h"
@@ -47,6 +48,17 @@ std::vector<std::string> FilesWritten(const CompareOptions& options) {
   return names;
 }
 
+// The same for the shards that are joined; that none of them is the output folder is checked there.
+Status CheckShardsKept(const CompareOptions& options) {
+  if (options.finish.save_options.empty()) return Status::Ok();
+  std::vector<std::string> read;
+  for (const std::string& folder : options.inputs.merge) {
+    for (const char* name : {"/results.jsonl", "/observations.jsonl", "/timings.jsonl"})
+      read.push_back(folder + name);
+  }
+  return WrittenFiles("", {options.finish.save_options}).CheckKept(read);
+}
+
 // Only the first of several ranks speaks.
 int RefuseOnce(const Status& status, const Ranks& ranks) {
   if (ranks.is_first()) SayOnStderr("circline_compare: " + status.message);
@@ -61,6 +73,7 @@ int Compare(const Ranks& ranks) {
   ComparisonResult result;
   if (!options.inputs.merge.empty()) {
     status = CheckInputsKept(images, options.output, FilesWritten(options));
+    if (status.ok()) status = CheckShardsKept(options);
     if (status.ok() && ranks.is_first()) status = MergeComparison(options, &result);
   } else {
     status = ImagesFromFlags(options.inputs, &images);

@@ -2,7 +2,9 @@
 #include "apps/common/written_files.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -40,6 +42,18 @@ TEST(WrittenFiles, InAFolderThatIsNotThere) {
   EXPECT_TRUE(written.CheckKept({folder / "none/report.html"}).ok());
   EXPECT_CONTAINS(written.CheckKept({"a", folder / "none/yet/overlays/b.png"}).message,
                   "overlays/b.png: is read, and would be written over");
+}
+
+// As of --camera=<(...) and --save_options=/dev/stdout.
+TEST(WrittenFiles, PipesAreNotAllTheSame) {
+  std::array<int, 2> one{}, other{};
+  ASSERT_EQ(pipe(one.data()), 0);
+  ASSERT_EQ(pipe(other.data()), 0);
+  const auto path = [](int descriptor) { return "/proc/self/fd/" + std::to_string(descriptor); };
+  WrittenFiles written("", {path(one[1])});
+  EXPECT_TRUE(written.Has(path(one[1])));
+  EXPECT_FALSE(written.Has(path(other[0])));
+  for (const int descriptor : {one[0], one[1], other[0], other[1]}) close(descriptor);
 }
 
 class KeptInputs : public testing::Test {
@@ -90,6 +104,11 @@ TEST_F(KeptInputs, AreKeptByEveryProgram) {
   ExpectKept(CIRCLINE_COMPARE, photo + Flag("flagfile", "report.html"), "report.html");
   ExpectKept(CIRCLINE_TRACK, Flag("images", "overlays"), "overlays/photo.png");
   ExpectKept(CIRCLINE_TRACK, photo + Flag("timestamps", "trajectory.txt"), "trajectory.txt");
+  folder_.Write("own/results.jsonl", "{}\n");
+  const Outcome merged = RunCompare("--merge='" + folder_ / "own" + "' --output='" +
+                                    folder_ / "none" + "'" + Flag("save_options", "results.jsonl"));
+  EXPECT_EQ(merged.exit_code, 2);
+  EXPECT_CONTAINS(merged.err, "own/results.jsonl: is read, and would be written over");
   folder_.Write("own/simulation.csv", "--trials=1\n");
   ExpectKept(CIRCLINE_SIMULATE, Flag("flagfile", "simulation.csv"), "simulation.csv");
 }
