@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Shows circline on real photographs, on Debian 12: installs the packages that are missing, builds in
 # build/release, fetches the photographs (they come with two Debian packages), runs circline_compare
-# on the four sets described in apps/demo/*.yaml, circline_reconstruct on one photograph,
+# on the six sets described in apps/demo/*.yaml, circline_reconstruct on one photograph,
 # circline_track on a hundred frames of a video and circline_calibrate on photographs of which nothing
 # is known. The results are in build/demo.
 set -euo pipefail
