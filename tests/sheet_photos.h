@@ -22,8 +22,8 @@ namespace circline {
 class Photos {
  public:
   explicit Photos(int count, std::uint64_t seed = 1, double tilt = 0.6,
-                  CameraModel model = CameraModel::kOpenCV)
-      : scene_(0.0, 0.2, seed) {
+                  CameraModel model = CameraModel::kOpenCV, double sigma_px = 0.2)
+      : scene_(0.0, sigma_px, seed) {
     scene_.camera.id = "cam";
     scene_.camera.model = model;
     scene_.camera.fy = scene_.camera.fx;

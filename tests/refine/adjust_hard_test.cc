@@ -103,6 +103,20 @@ TEST(AdjustHard, AMarkSaysHowABoardLies) {
   }
 }
 
+// Through a camera that is a little off exact contours of one plane contradict each other by far.
+TEST(AdjustHard, ExactContoursKeepTheirCircles) {
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const int count = 2 + static_cast<int>(seed % 3);
+    const Photos sheet =
+        Photos(count, seed, 0.3 + 0.03 * static_cast<double>(seed), CameraModel::kOpenCV, 0.002)
+            .WithCircles();
+    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
+    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    EXPECT_EQ(adjusted.circles.size(), 9U) << seed;
+    EXPECT_NEAR(adjusted.cameras[0].camera.fx / sheet.truth().fx, 1.0, 0.01) << seed;
+  }
+}
+
 // Cheap cameras have lenses that are glued in beside the middle.
 TEST(AdjustHard, ALensFarOffCentreKeepsThePrincipalPoint) {
   for (const double p1 : {0.0, 0.01}) {
