@@ -85,7 +85,7 @@ TEST(AdjustHard, PhotosThatOverlapInPartAreOfOneWorld) {
 // Its dots match wherever the lattice does, turned or shifted, and as many as are found in both:
 // its mark says where.
 TEST(AdjustHard, AMarkSaysHowABoardLies) {
-  for (const std::uint64_t seed : {4, 5, 6}) {
+  for (std::uint64_t seed = 4; seed <= 6; ++seed) {
     const Photos sheet = Photos(6, seed).WithMarkedBoard(seed);
     const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
     ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
