@@ -88,10 +88,12 @@ Status Adjustment::CheckGivenPoses() {
   return Status::Ok();
 }
 
+namespace {
+
 // Through a camera that is a little off the most exact contours of one plane contradict each other:
 // to start from, none is more exact than this.
 Observations LessExact(Observations observations) {
-  constexpr double kLeastPx = 0.3;  // Of 0.02 to 0.5 px of simulated noise; not chosen on photos.
+  constexpr double kLeastPx = 0.3;  // Serves simulated noise of 0.02 to 0.4; no photo chose it.
   for (CircleObservation& circle : observations.circles) {
     if (circle.sigma_px > 0.0) circle.sigma_px = std::max(circle.sigma_px, kLeastPx);
   }
@@ -103,6 +105,8 @@ Observations LessExact(Observations observations) {
   }
   return observations;
 }
+
+}  // namespace
 
 // Every photo through the cameras as they stand.
 void Adjustment::Estimate() {

@@ -43,6 +43,7 @@ std::string FocalNote(const JointProblem& problem, const PoseHypothesis& h);
 
 // --- circle_volumes.cc
 
+// As Refined has them.
 std::vector<double> CircleVolumes(const JointProblem& problem, const State& state,
                                   const Linearization& at);
 
