@@ -44,7 +44,9 @@ struct PoseHypothesis {
   bool metric = false;        // Else the translation has unit norm.
   double probability = 1.0;   // Posterior among the hypotheses of the estimate; they sum to 1.
   double cost = 0.0;          // 1/2 sum rho(r^2), residuals in standard deviations.
-  double log_det = 0.0;  // Log determinant of the covariance of all parameters (Laplace's term).
+  // Log determinant of the covariance of all parameters, but for what is alike among the hypotheses
+  // of the estimate (Laplace's term): to compare them, not those of another photo.
+  double log_det = 0.0;
   // Of [delta, delta_t], 6x6 row-major; rotation = exp([delta]x) * estimate, delta in the camera
   // frame, radians. Directions listed in `free_directions` are left out (they carry no variance
   // here, but are unbounded), and so is the length of t where it is a unit vector.

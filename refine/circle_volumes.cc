@@ -11,15 +11,6 @@
 namespace circline {
 namespace {
 
-// Of a symmetric matrix: what is not known at all, or by a prior alone, has no part in it.
-double LogDeterminant(const Eigen::Matrix3d& covariance) {
-  constexpr double kNone = 1e-20;
-  double log_det = 0.0;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-  for (const double v : eigen.eigenvalues()) log_det += v > kNone && v < 1.0 ? std::log(v) : 0.0;
-  return log_det;
-}
-
 // Log determinant of the covariance of where a circle's centre is seen (two angles, radians) and of
 // how large it is there (the logarithm of radius over distance), rotation and focal length given.
 double LogVolume(const JointProblem& problem, const State& state, const Linearization& at,
@@ -51,9 +42,9 @@ double LogVolume(const JointProblem& problem, const State& state, const Lineariz
   add(circle.radius, Eigen::Vector3d(0.0, 0.0, 1.0 / radius));
   const Eigen::MatrixXd C = at.Covariance(columns), by_given = seen * C.leftCols(num_given);
   const Eigen::MatrixXd C_given = C.topLeftCorner(num_given, num_given);
-  return LogDeterminant(seen * C * seen.transpose() -
-                        by_given *
-                            C_given.completeOrthogonalDecomposition().solve(by_given.transpose()));
+  return LogDetOfKnown(seen * C * seen.transpose() -
+                       by_given *
+                           C_given.completeOrthogonalDecomposition().solve(by_given.transpose()));
 }
 
 }  // namespace

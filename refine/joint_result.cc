@@ -223,14 +223,18 @@ double LogDet(const JointProblem& problem, const Linearization& at) {
   Eigen::MatrixXd covariance = at.covariance()(columns, columns);
   const Eigen::MatrixXd nulls = at.null_space()(columns, Eigen::all);
   covariance += nulls * nulls.transpose();
+  return LogDetOfKnown(covariance);
+}
+
+}  // namespace
+
+double LogDetOfKnown(const Eigen::MatrixXd& covariance) {
   double log_det = 0.0;
   constexpr double kNone = 1e-20;  // Rounding: nothing is known, or all is a prior's.
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance, Eigen::EigenvaluesOnly);
   for (const double v : eigen.eigenvalues()) log_det += v > kNone && v < 1.0 ? std::log(v) : 0.0;
   return log_det;
 }
-
-}  // namespace
 
 void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double unit,
                    const Camera& camera, CircleEstimate* estimate) {

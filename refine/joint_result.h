@@ -33,6 +33,10 @@ struct Refined {
 void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double unit,
                    const Camera& camera, CircleEstimate* estimate);
 
+// Log determinant of a covariance, angles and logarithms: over its principal axes, but for those of
+// which nothing is known, which count as 1.
+double LogDetOfKnown(const Eigen::MatrixXd& covariance);
+
 // Fills everything but the probability from a minimum. Not ok: no feature has inliers, or some
 // number is not finite.
 Status FillRefined(const JointProblem& problem, State state, Refined* refined);

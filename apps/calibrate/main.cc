@@ -52,25 +52,20 @@ void SetModel(const CalibrateOptions& options, Camera* camera) {
   camera->model = model;
 }
 
-// The photos, each read, unless nothing is to be detected in it or drawn, and observed, on all
-// threads.
+// The photos, each read and observed, on all threads.
 std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<SceneImage>* images) {
   std::vector<ImageRun> runs(images->size());
   Progress progress("photos", static_cast<int>(images->size()), 0);
   std::mutex mutex;
   InParallel(static_cast<int>(images->size()), [&](int i) {
     const auto index = static_cast<std::size_t>(i);
-    SceneImage& image = (*images)[index];
-    runs[index] = RunImage(options, nullptr, &image);
+    runs[index] = RunImage(options, nullptr, &(*images)[index]);
     Camera& camera = runs[index].observations.camera;
     // Not the one that the photo alone makes likeliest: the prior is about the one given.
-    camera = image.observations.camera;
+    camera = (*images)[index].observations.camera;
     runs[index].observations.stated_focal_px = runs[index].observations.found_k1 = 0.0;
-    // With or without pictures the same comes out: of given evidence no photo need be read.
-    if (image.detect_everything || !image.rois.empty()) {
-      if (camera.width == 0) camera.width = runs[index].photo.cols;
-      if (camera.height == 0) camera.height = runs[index].photo.rows;
-    }
+    if (camera.width == 0) camera.width = runs[index].photo.cols;
+    if (camera.height == 0) camera.height = runs[index].photo.rows;
     runs[index].photo.release();
     const std::lock_guard<std::mutex> lock(mutex);
     progress.Advance();
@@ -213,8 +208,8 @@ std::vector<std::size_t> ChoosePhotos(const AdjustedPhotos& adjusted) {
 }
 
 // JPEG, by photo: those left out and as many others as a page bears, seen anew through the camera
-// that was estimated; empty for the others, and where there is nothing to look at. `images`: of the
-// photos.
+// that was estimated; empty for the others, and where there is nothing to look at, which is said on
+// stderr. `images`: of the photos.
 std::vector<std::string> CalibrationPictures(const CompareOptions& options,
                                              const AdjustedPhotos& adjusted,
                                              const std::vector<SceneImage>& images) {
@@ -229,7 +224,7 @@ std::vector<std::string> CalibrationPictures(const CompareOptions& options,
     loss.estimation.camera_sigma = loss.estimation.noise_model.camera = CameraSigma();
   const SolverSet solvers(joint);
   const std::vector<std::size_t> chosen = ChoosePhotos(adjusted);
-  std::vector<std::string> pictures(images.size());
+  std::vector<std::string> pictures(images.size()), errors(images.size());
   InParallel(static_cast<int>(chosen.size()), [&](int k) {
     const std::size_t i = chosen[static_cast<std::size_t>(k)];
     SceneImage image = images[i];
@@ -239,8 +234,13 @@ std::vector<std::string> CalibrationPictures(const CompareOptions& options,
     image.camera_sigma = StatedCameraSigma();
     image.guessed_sigma.reset();
     const ImageRun run = RunImage(joint, &solvers, &image);
+    errors[i] = run.read_error;
     if (!run.photo.empty()) pictures[i] = EncodeJpeg(DrawOverlay(run), kWidth);
   });
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (errors[i].empty()) continue;
+    SayOnStderr(images[i].path + ": " + errors[i] + "; no picture of it, its evidence counts");
+  }
   return pictures;
 }
 
@@ -272,6 +272,8 @@ int Calibrate() {
   if (!options.import.empty()) status = Import(&options, &images, &poses);
   if (!status.ok()) return Refuse("circline_calibrate", status);
   if (options.compare.inputs.guess.wanted) SayOnStderr(DescribeGuess(options.compare.inputs.guess));
+  const bool with_pictures = options.compare.overlays;
+  options.compare.overlays = false;  // Photos are read for detection only.
   for (SceneImage& image : images) SetModel(options, &image.observations.camera);
   Calibration calibration;
   status = CalibrateInPasses(&options, poses, &images, &calibration);
@@ -282,7 +284,7 @@ int Calibrate() {
   if (status.ok()) {
     RemoveEarlierCalibration(options.compare.output);
     std::vector<std::string> pictures;
-    if (options.compare.overlays)
+    if (with_pictures)
       pictures = CalibrationPictures(options.compare, calibration.adjusted, calibration.images);
     status = WriteCalibration(calibration.adjusted, calibration.photos, calibration.names, pictures,
                               options.compare.output, &note);

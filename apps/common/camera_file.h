@@ -27,8 +27,7 @@ std::vector<double> Distortion(const Camera& camera);
 // lie at half integers, ours at integers: the principal point moves by half a pixel. An OpenCV file
 // gives one camera, with the id "camera"; `fisheye_model: 1` there means the fisheye model, as does
 // a `distortion_model` of equidistant or fisheye, those of ROS and Kalibr; one that is not known is
-// refused. Not ok:
-// one line that names the file and what is wrong in it.
+// refused. Not ok: one line that names the file and what is wrong in it.
 Status ReadCameraFile(const std::string& path, std::vector<Camera>* cameras);
 
 // How well a scene file says that a camera is known; what it does not say is left to others.
