@@ -253,7 +253,8 @@ TEST_F(CalibrateTest, NamesPhotosOfGivenEvidenceThatCannotBeShown) {
   const Outcome run = Calibrate("--scene=" + scene + " --output=" + Output());
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_CONTAINS(run.err, "view1.png: the file does not exist; no picture of it");
-  for (const auto& image : ReadJson(Output() + "/calibration.json")["images"])
+  const nlohmann::json calibration = ReadJson(Output() + "/calibration.json");
+  for (const auto& image : calibration["images"])
     EXPECT_EQ(image["status"], "ok") << image["file"];
 }
 
