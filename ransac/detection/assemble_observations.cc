@@ -228,7 +228,7 @@ class Assembler {
         if (!grid && !(RightAngle(x.along, y.along, options_.camera).LogOdds() > 0.0)) continue;
         x.observation.direction = PencilDirection::kX;
         y.observation.direction = PencilDirection::kY;
-        if (plane.circles.empty()) ReadAgain(&x, &y);
+        if (plane.circles.empty() && !x.of_grid && !y.of_grid) ReadAgain(&x, &y);
         Judge(x, &y, SetNormalRole(x.along, y.along));
         return;
       }
@@ -237,16 +237,17 @@ class Assembler {
 
   // How else the less well known of two pencils may run: what lines are its own is not certain.
   void ReadAgain(PlacedPencil* x, PlacedPencil* y) const {
-    if (x->of_grid || y->of_grid) return;
-    const auto variance = [](const PlacedPencil& p) { return p.along.covariance.trace(); };
-    if (variance(*x) > variance(*y)) std::swap(x, y);
+    if (x->along.covariance.trace() > y->along.covariance.trace()) std::swap(x, y);
     const LineSet set(lines_, options_.diagonal_px);
     std::vector<LineFit> others;
+    int num_own = 0;  // Of these: a line may be in both.
     for (int i = 0; i < static_cast<int>(lines_.size()); ++i) {
-      if (!set.IsTwin(i) && !x->Has(i)) others.push_back(set.fits[static_cast<std::size_t>(i)]);
+      if (set.IsTwin(i) || x->Has(i)) continue;
+      others.push_back(set.fits[static_cast<std::size_t>(i)]);
+      num_own += y->Has(i) ? 1 : 0;
     }
     y->observation.readings =
-        ReadDirection(others, x->along.direction, y->along.direction, set.Count(y->members));
+        ReadDirection(others, x->along.direction, y->along.direction, num_own);
   }
 
   // Pencils of the plane: those that span it, then the others by support, but for repetitions.

@@ -101,6 +101,30 @@ TEST(AssembleObservations, OrthogonalPencilsBecomeAxes) {
   EXPECT_EQ(found.frame.plane, "p0");
 }
 
+// Most lines of a thin pencil may be those of a strong one as well: what is its own is counted
+// without them, and how it may run is a probability.
+TEST(AssembleObservations, ReadsAPencilAgainWithoutTheLinesOfAnother) {
+  Random random(1);
+  const Camera camera = detection_test::TestCamera();
+  std::vector<DetectedLine> lines;
+  for (int i = 0; i < 5; ++i) {
+    lines.push_back(detection_test::MakeLine(camera, 100.0 + 90.0 * i, 80.0 + 70.0 * i,
+                                             kFrame.col(1), 90.0, 0.0, 0.2, &random));
+  }
+  std::vector<DetectedPencil> pencils = {Pencil(kFrame.col(0), 900.0),
+                                         Pencil(kFrame.col(1), 700.0)};
+  pencils[1].observation.fit->covariance *= 2.0;
+  pencils[0].members = {0, 1, 2, 3};
+  pencils[1].members = {0, 1, 2, 3, 4};
+  std::vector<CircleEvidence> circles;
+  Observations found;
+  AssembleObservations({}, lines, {}, &circles, &pencils, &found);
+  ASSERT_EQ(found.pencils.size(), 2U);
+  double sum = 0.0;
+  for (const DirectionReading& reading : found.pencils[1].readings) sum += reading.probability;
+  EXPECT_NEAR(sum, 1.0, 1e-9);
+}
+
 // Walls lean by a degree; what is farther off is no wall.
 TEST(AssembleObservations, ARightAngleIsATestNotAWish) {
   for (const double off_deg : {0.3, 1.6, 5.0}) {
