@@ -60,6 +60,11 @@ Status ValidatePencil(const PencilObservation& pencil) {
   if (!NonNegative(pencil.sigma_px)) return wrong("sigma_px must be 0 or more");
   if (!NonNegative(pencil.axis_probability) || pencil.axis_probability > 1.0)
     return wrong("axis_probability must be from 0 to 1");
+  for (const DirectionReading& reading : pencil.readings) {
+    if (!reading.direction.allFinite()) return wrong("the direction of a reading is not finite");
+    if (!NonNegative(reading.probability) || reading.probability > 1.0)
+      return wrong("the probability of a reading must be from 0 to 1");
+  }
   for (const LineObservation& line : pencil.lines) {
     if (!Finite(line.points)) return wrong("a segment is not finite");
     if (!NonNegative(line.sigma_px)) {

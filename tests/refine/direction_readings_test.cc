@@ -56,6 +56,17 @@ TEST(DirectionReadings, CirclesTurnWithThePose) {
   }
 }
 
+// No probability leaves the library that is none.
+TEST(DirectionReadings, MustBeProbabilities) {
+  PlaneScene scene(0.7, 0.1);
+  Observations observations = TwoPencils(&scene);
+  for (const double probability : {std::nan(""), -0.1, 1.1}) {
+    observations.pencils[1].readings = {{TurnedY(scene, 8.0), probability}};
+    const Status status = EstimatePose(observations).status;
+    EXPECT_EQ(status.code, StatusCode::kInvalidArgument) << probability << status.message;
+  }
+}
+
 TEST(DirectionReadings, WhatIsNearIsTheSamePose) {
   PlaneScene scene(0.7, 0.1);
   Observations observations = TwoPencils(&scene);
