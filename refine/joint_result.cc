@@ -170,6 +170,7 @@ struct FocalVerdict {
   bool is_doubted = false;     // It may be a placeholder, and is.
   bool is_told = false;        // By the evidence, and not by the prior.
   bool prior_decides = false;  // Neither told nor contradicted.
+  bool is_odd = false;         // Told, and beyond what the prior allows.
 
   FocalVerdict(const JointProblem& problem, const PoseHypothesis& h)
       : off(std::log(h.focal_scale) - StatedLogFocal(problem.observations())) {
@@ -178,6 +179,7 @@ struct FocalVerdict {
     const double prior = is_doubted ? sigma.doubtful_log_focal : sigma.log_focal;
     is_told = h.focal_sigma < kPriorDecides * prior * h.focal_scale;
     prior_decides = !is_told && std::abs(off) < prior;
+    is_odd = is_told && std::abs(off) > kInlierSigmas * prior;
   }
 };
 
@@ -250,11 +252,12 @@ void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double uni
 std::string FocalNote(const JointProblem& problem, const PoseHypothesis& h) {
   if (!problem.camera_is_estimated()) return "";
   const FocalVerdict verdict(problem, h);
-  const char* remark = verdict.prior_decides ? "; the evidence cannot tell, the prior alone decides"
-                       : !verdict.is_told
-                           ? "; the evidence contradicts the prior but does not fix it"
-                       : verdict.is_doubted ? "; the figure given is a placeholder"
-                                            : "";
+  const char* remark =
+      verdict.prior_decides ? "; the evidence cannot tell, the prior alone decides"
+      : !verdict.is_told    ? "; the evidence contradicts the prior but does not fix it"
+      : verdict.is_odd      ? "; the camera given, or the evidence, is not what it seems"
+      : verdict.is_doubted  ? "; the figure given is a placeholder"
+                            : "";
   const double scale = std::exp(verdict.off);
   char text[160];
   std::snprintf(text, sizeof(text), "focal length: %.4f times the camera's, +- %.4f%s", scale,

@@ -82,6 +82,24 @@ TEST(GuessedFocalLength, IsKnownAsWellAsShortEdgesTellIt) {
   EXPECT_GT(rms, 0.5);
 }
 
+// Evidence that knows the focal length of another camera than the one given says so.
+TEST(GuessedFocalLength, FarFromWhatWasGivenIsSaid) {
+  for (const bool is_far : {false, true}) {
+    PlaneScene scene(0.7, 0.1);
+    scene.camera.distortion = {};
+    Observations observations = Front(&scene);
+    if (is_far) observations.camera.fx = observations.camera.fy = 8.0 * scene.camera.fx;
+    const PoseEstimate estimate = EstimatePose(observations, Guessed());
+    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const std::string& note = estimate.notes.front();
+    EXPECT_EQ(note.find("focal length: "), 0U) << note;
+    EXPECT_EQ(
+        note.find("the camera given, or the evidence, is not what it seems") != std::string::npos,
+        is_far)
+        << note;
+  }
+}
+
 // Of several poses that are humps of one, too.
 TEST(GuessedFocalLength, IsStatedInWordsAsItIsReturned) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
