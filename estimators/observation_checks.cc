@@ -62,7 +62,8 @@ Status ValidatePencil(const PencilObservation& pencil) {
     return wrong("axis_probability must be from 0 to 1");
   for (const DirectionReading& reading : pencil.readings) {
     if (!reading.direction.allFinite()) return wrong("the direction of a reading is not finite");
-    if (!NonNegative(reading.probability) || reading.probability > 1.0)
+    constexpr double kRounding = 1e-9;
+    if (!NonNegative(reading.probability) || reading.probability > 1.0 + kRounding)
       return wrong("the probability of a reading must be from 0 to 1");
   }
   for (const LineObservation& line : pencil.lines) {

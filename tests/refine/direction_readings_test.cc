@@ -65,6 +65,9 @@ TEST(DirectionReadings, MustBeProbabilities) {
     const Status status = EstimatePose(observations).status;
     EXPECT_EQ(status.code, StatusCode::kInvalidArgument) << probability << status.message;
   }
+  // But for rounding, of a sum of them say.
+  observations.pencils[1].readings = {{TurnedY(scene, 8.0), 1.0 + 1e-15}};
+  EXPECT_TRUE(EstimatePose(observations).status.ok());
 }
 
 TEST(DirectionReadings, WhatIsNearIsTheSamePose) {
