@@ -233,6 +233,7 @@ void Adjustment::Report() {
     Eigen::Map<Eigen::Matrix<double, kCameraSize, kCameraSize, Eigen::RowMajor>>(
         made.covariance.data()) = scale * covariances.cameras[c];
     const Shifts prior = ShiftSigmas(cameras_[c], priors_[c], options_);
+    const Shifts off = ShiftsBetween(guesses_[c], made.camera);
     constexpr double kNextToNothing = 0.7;  // Of the prior's standard deviation.
     for (int k = 0; k < kCameraSize; ++k) {
       const double sigma = prior[static_cast<std::size_t>(k)];
@@ -240,6 +241,14 @@ void Adjustment::Report() {
         continue;  // Their priors are meant to hold them.
       if (sigma > 0.0 && made.Sigma(k) > kNextToNothing * sigma)
         made.at_prior.emplace_back(ShiftName(made.camera.model, k));
+      const double most =
+          kInlierSigmas * std::max(sigma, k == 0 ? priors_[c].LargestLogFocal() : 0.0);
+      if (sigma > 0.0 && std::abs(off[static_cast<std::size_t>(k)]) > most) {
+        out_.notes.push_back("camera '" + made.camera.id + "': its " +
+                             ShiftName(made.camera.model, k) +
+                             " is so far from the one given that this camera, or the evidence, "
+                             "is not what it seems");
+      }
     }
     out_.cameras.push_back(std::move(made));
   }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstddef>
@@ -114,6 +115,28 @@ TEST(AdjustHard, ExactContoursKeepTheirCircles) {
     ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
     EXPECT_EQ(adjusted.circles.size(), 9U) << seed;
     EXPECT_NEAR(adjusted.cameras[0].camera.fx / sheet.truth().fx, 1.0, 0.01) << seed;
+  }
+}
+
+// A camera that photos contradict is named.
+TEST(AdjustHard, ACameraFarFromTheOneGivenIsNamed) {
+  for (const double wrong : {1.0, 1.2}) {
+    Photos sheet = Photos(8).WithCircles();
+    AdjustOptions options = PointNoiseOnly();
+    CameraSigma stated;
+    stated.log_focal = 0.02;
+    options.camera_sigma[sheet.photos[0].camera.id] = stated;
+    for (Observations& photo : sheet.photos) {
+      photo.camera.fx = wrong * sheet.truth().fx;
+      photo.camera.fy = wrong * sheet.truth().fy;
+    }
+    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
+    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const bool is_named =
+        std::any_of(adjusted.notes.begin(), adjusted.notes.end(), [](const std::string& note) {
+          return note.find("its focal length is so far from the one given") != std::string::npos;
+        });
+    EXPECT_EQ(is_named, wrong > 1.0) << wrong;
   }
 }
 
