@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "circline/estimators/point_noise.h"
+#include "circline/refine/frame_news.h"
 #include "circline/refine/scratch.h"
 #include "circline/refine/statistics.h"
 #include "circline/refine/track_frame.h"
@@ -94,6 +95,7 @@ class PoseTracker::Implementation {
               &fit_memory_);
     noise_meter_.Measure(fitted_, options_.estimation.noise_model, &noise_);
     StateNoise(noise_, options_.estimation.conic_loss.scale_px, scale, &fitted_);
+    news_ = frame_news_.Next(fitted_, options_.estimation.noise_model);
   }
 
   // Begins a track with the poses of a single frame; the track before ends where there are any.
@@ -209,7 +211,7 @@ class PoseTracker::Implementation {
   // False, the hypotheses as they were, where the frame says nothing or contradicts all of them.
   bool Refine() {
     fits_.Shorten(0);
-    frame_.Reset(fitted_);
+    frame_.Reset(fitted_, news_);
     is_blank_ = frame_.empty();
     if (is_blank_) return false;
     for (const TrackFit& hypothesis : hypotheses_) {
@@ -274,6 +276,8 @@ class PoseTracker::Implementation {
   FitMemory fit_memory_;
   PointNoiseMeter noise_meter_;
   PointNoise noise_;
+  FrameNews frame_news_;
+  double news_ = 1.0;
   std::vector<std::string> problems_;
   TrackFrame frame_;
   Kept<TrackFit> fits_;

@@ -13,10 +13,12 @@
 // and so does not average out: the error of the camera, and the offset of each contour. One frame's
 // posterior is the next one's prior. Each hypothesis is moved on (constant velocity, or what
 // the caller knows of the motion), then refined on the frame's points by ceres, and its probability
-// multiplied by what the frame says of it (Laplace's approximation of its evidence). Of a circle's
-// two poses the wrong one dies once perspective, other features or known motion contradict it;
-// where nothing does (one circle, weak perspective, unknown motion) both stay, at their
-// probabilities, and the first stays first (TrackerOptions::flip_odds).
+// multiplied by what the frame says of it (Laplace's approximation of its evidence), and the frame
+// before has not said: the errors that points of a contour share stay where the image stays, and a
+// camera at rest learns nothing from frame to frame. Of a circle's two poses the wrong one dies
+// once perspective, other features or known motion contradict it; where nothing does (one circle,
+// weak perspective, unknown motion) both stay, at their probabilities, and the first stays first
+// (TrackerOptions::flip_odds).
 //
 // Features are known again by their ids: a circle or pencil with the id of an earlier frame is the
 // same thing in the world. A feature without a part in the map yet is added to it. Circles of other

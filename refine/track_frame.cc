@@ -34,8 +34,9 @@ std::string TrackFrame::Term::Name() const {
   return "line '" + id + "'";
 }
 
-void TrackFrame::Reset(const Observations& fitted) {
+void TrackFrame::Reset(const Observations& fitted, double news) {
   observations_ = &fitted;
+  news_ = news;
   terms_.Shorten(0);
   best_circle_ = best_observation_ = -1;
   for (const TrackMap::Circle& circle : map_.circles) {

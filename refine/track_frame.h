@@ -42,8 +42,9 @@ class TrackFrame {
       : tracker_options_(options), options_(options.estimation), map_(map) {}
 
   // Takes a frame's features in place of those before. `fitted`: with fits and noise; it is used
-  // until the next call. Features that the map does not have take no part.
-  void Reset(const Observations& fitted);
+  // until the next call. Features that the map does not have take no part. `news`: the power of its
+  // evidence (FrameNews).
+  void Reset(const Observations& fitted, double news = 1.0);
 
   bool empty() const { return terms_.empty(); }
   // Refines a hypothesis that has been moved on, from all starts that may lead to minima of its
@@ -108,12 +109,14 @@ class TrackFrame {
   void PriorParameters(TrackFit* fit);
   bool ResetPrior(const TrackState& before, const TrackFit& fit);
   bool Update(const TrackState& before, TrackFit* fit);
+  void HoldCamera(const TrackState& before, TrackState* state);
   bool Minimize(const TrackState& prior, TrackFit* fit);
 
   const TrackerOptions& tracker_options_;
   const EstimationOptions& options_;  // Of the same.
   const TrackMap& map_;
   const Observations* observations_ = nullptr;
+  double news_ = 1.0;
   Kept<Term> terms_;
   int best_circle_ = -1, best_observation_ = -1;  // In the map, in the observations.
 

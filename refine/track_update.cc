@@ -149,8 +149,45 @@ bool TrackFrame::Update(const TrackState& before, TrackFit* fit) {
   P(Indices(rows_), Indices(rows_)) = posterior;
   if (!UpdateOthers(before, posterior, turn, information.moved, fit)) return false;
   Symmetrize(&P);
-  fit->state.log_weight = before.log_weight - fit->cost - 0.5 * log_det;
+  fit->state.log_weight = before.log_weight - news_ * (fit->cost + 0.5 * log_det);
+  HoldCamera(before, &fit->state);
   return fit->state.x.allFinite() && P.allFinite() && std::isfinite(fit->state.log_weight);
+}
+
+// A frame that says little new says little of the camera, which stays the same: its information
+// counts to the power of the news, and all else follows the camera as it is correlated with it.
+void TrackFrame::HoldCamera(const TrackState& before, TrackState* state) {
+  const Block& camera = map_.block(TrackMap::kCamera);
+  const Eigen::Index c = camera.tangent_size(), first = map_.tangent(TrackMap::kCamera);
+  if (map_.camera_is_considered || c == 0 || !(news_ < 1.0)) return;
+  const Scratch::Scope scope(&scratch_);
+  Eigen::MatrixXd& P = state->covariance;
+  const auto inverse = [&](BlockMatrix root, BlockMatrix* information) {
+    information->setIdentity(c, c);
+    if (!FactorInPlace(root)) return false;
+    SolveInPlace(root, *information);
+    return true;
+  };
+  const BlockMatrix found = P.block(first, first, c, c);
+  BlockMatrix old_information, new_information, covariance;
+  if (!inverse(before.covariance.block(first, first, c, c), &old_information) ||
+      !inverse(found, &new_information)) {
+    return;
+  }
+  old_information *= 1.0 - news_;
+  if (!inverse(old_information + news_ * new_information, &covariance)) return;
+  BlockVector moved(c);
+  camera.manifold->Minus(before.x.data() + camera.offset, state->x.data() + camera.offset,
+                         moved.data());
+  const BlockVector back = new_information * (covariance * (old_information * moved));
+  const BlockMatrix change = new_information * (covariance - found) * new_information;
+  Scratch::Matrix across = scratch_.NewMatrix(P.rows(), c), along = scratch_.NewMatrix(P.rows(), c);
+  Scratch::Vector step = scratch_.NewVector(P.rows());
+  across = P.middleCols(first, c);
+  step.noalias() = across * back;
+  along.noalias() = across * change;
+  P.noalias() += along * across.transpose();
+  state->Move(map_, step);
 }
 
 // The unknowns that the frame has nothing to do with.

@@ -94,6 +94,45 @@ TEST(PoseTrackerTest, OneCircleThatDoesNotMoveKeepsBothPosesInOrder) {
   }
 }
 
+// The errors that the points of a contour share stay where it stays: of frames in which it does not
+// move the second says nothing more of the two poses, nor of the focal length. One in which it
+// moves does.
+TEST(PoseTrackerTest, ACameraAtRestTakesOnePhoto) {
+  TrajectoryOptions trajectory;
+  trajectory.noise_px = 0.1;
+  trajectory.occluded = 0.0;
+  TrackerOptions options = ExactOptions(trajectory);
+  options.estimation.noise_model = NoiseModel();
+  options.estimation.camera_sigma = CameraSigma();
+  options.estimation.camera_sigma->log_focal = 0.25;
+  const Trajectory sequence(trajectory, 3);
+  const auto& frames = sequence.frames;
+  double moved = 0.0;
+  for (const bool is_at_rest : {true, false}) {
+    PoseTracker tracker(options);
+    double began = 0.0, sigma = 0.0;
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      Random noise(is_at_rest ? 7 : 7 + k);
+      const TrackedPose tracked = tracker.Update(
+          sequence.Observe(frames[is_at_rest ? 0 : k], &noise), static_cast<double>(k) / 30.0);
+      ASSERT_FALSE(tracked.estimate.hypotheses.empty());
+      const PoseHypothesis& first = tracked.estimate.hypotheses[0];
+      const double probability = first.probability;
+      if (k == 0) began = probability;
+      if (k == 1) sigma = first.focal_sigma;
+      if (is_at_rest) {
+        EXPECT_NEAR(probability, began, 0.01) << k;
+        if (k > 0) {
+          EXPECT_NEAR(first.focal_sigma, sigma, 0.02 * sigma) << k;
+        }
+      } else {
+        moved = std::max(moved, std::abs(probability - began));
+      }
+    }
+  }
+  EXPECT_GT(moved, 0.1);
+}
+
 TEST(PoseTrackerTest, RecoversFromAWrongFirstGuess) {
   TrajectoryOptions trajectory;
   trajectory.occluded = 0.0;
