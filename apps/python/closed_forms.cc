@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "apps/python/bindings.h"
+#include "apps/python/pickled.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/circular_points.h"
 #include "circline/estimators/line_pose.h"
@@ -63,6 +64,7 @@ void BindClosedForms(py::module_* module) {
              return CirclePose{normal, center};
            }),
            py::arg("normal"), py::arg("center"))
+      .def(Pickled(&CirclePose::normal, &CirclePose::center))
       .def_readonly("normal", &CirclePose::normal, "(3,), unit, facing the camera.")
       .def_readonly("center", &CirclePose::center, "(3,), in radii.");
   module->def("circle_poses", &PosesOf, py::arg("conic"),

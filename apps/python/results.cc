@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "apps/python/bindings.h"
+#include "apps/python/pickled.h"
 #include "circline/estimators/pose.h"
 #include "circline/refine/adjust_photos.h"
 
@@ -41,6 +42,11 @@ std::string Describe(const PoseHypothesis& hypothesis) {
 void BindHypothesis(py::module_* module) {
   using H = PoseHypothesis;
   py::class_<H>(*module, "PoseHypothesis", "One pose that the evidence admits.")
+      .def(Pickled(&H::cam_from_world, &H::metric, &H::probability, &H::cost, &H::log_det,
+                   &H::covariance, &H::rank, &H::free_directions, &H::focal_scale, &H::focal_sigma,
+                   &H::focal_covariance, &H::camera, &H::left_out, &H::structure, &H::rms_px,
+                   &H::num_inliers, &H::num_observations, &H::origin_observed, &H::circles,
+                   &H::pencils))
       .def_readonly("cam_from_world", &H::cam_from_world)
       .def_readonly("metric", &H::metric, "Else the translation has unit norm.")
       .def_readonly("probability", &H::probability, "Among the hypotheses of the estimate.")
@@ -81,17 +87,22 @@ void BindHypothesis(py::module_* module) {
 
 void BindEstimate(py::module_* module) {
   py::class_<CircleEstimate>(*module, "CircleEstimate", "A circle as a hypothesis places it.")
+      .def(Pickled(&CircleEstimate::id, &CircleEstimate::normal, &CircleEstimate::center,
+                   &CircleEstimate::center_px, &CircleEstimate::radius))
       .def_readonly("id", &CircleEstimate::id)
       .def_readonly("normal", &CircleEstimate::normal, "(3,), unit, camera frame, facing it.")
       .def_readonly("center", &CircleEstimate::center, "(3,), camera frame.")
       .def_readonly("center_px", &CircleEstimate::center_px, "(2,), its image, pixels.")
       .def_readonly("radius", &CircleEstimate::radius, "In the unit of the translation.");
   py::class_<PencilEstimate>(*module, "PencilEstimate", "A pencil as a hypothesis sees it.")
+      .def(Pickled(&PencilEstimate::id, &PencilEstimate::direction, &PencilEstimate::sigma_deg))
       .def_readonly("id", &PencilEstimate::id)
       .def_readonly("direction", &PencilEstimate::direction, "(3,), unit, camera frame.")
       .def_readonly("sigma_deg", &PencilEstimate::sigma_deg, "Of the direction, degrees.");
   BindHypothesis(module);
   py::class_<PoseEstimate>(*module, "PoseEstimate", "Every pose that the evidence admits.")
+      .def(Pickled(&PoseEstimate::status, &PoseEstimate::solver, &PoseEstimate::hypotheses,
+                   &PoseEstimate::decided_by, &PoseEstimate::notes))
       .def_readonly("solver", &PoseEstimate::solver)
       .def_readonly("hypotheses", &PoseEstimate::hypotheses, "Best first; one or more.")
       .def_readonly("decided_by", &PoseEstimate::decided_by,
@@ -112,6 +123,8 @@ py::array_t<double> Residuals(const AdjustedPhoto& photo) {
 void BindAdjusted(py::module_* module) {
   using C = AdjustedCamera;
   py::class_<C>(*module, "AdjustedCamera", "A camera as many photos tell it.")
+      .def(Pickled(&C::camera, &C::covariance, &C::at_prior, &C::num_photos, &C::rms_px,
+                   &C::sigma_by_photos))
       .def_property_readonly(
           "camera", [](const C& c) { return c.camera; }, "A copy.")
       .def_property_readonly(
@@ -126,6 +139,8 @@ void BindAdjusted(py::module_* module) {
       .def_property_readonly("sigma_focal_px", &C::SigmaFocalPx, "Of fx, pixels.");
   using P = AdjustedPhoto;
   py::class_<P>(*module, "AdjustedPhoto", "One photo's part.")
+      .def(Pickled(&P::status, &P::same_as, &P::camera, &P::cam_from_world, &P::covariance,
+                   &P::rms_px, &P::misfit, &P::num_grid_lines, &P::left_out, &P::residuals))
       .def_property_readonly(
           "ok", [](const P& p) { return p.status.ok(); },
           "Whether it takes part; else `message` says why not.")
@@ -146,6 +161,7 @@ void BindAdjusted(py::module_* module) {
                              "from where it should be, pixels.");
   using A = AdjustedCircle;
   py::class_<A>(*module, "AdjustedCircle", "A circle of a world.")
+      .def(Pickled(&A::id, &A::photo, &A::center, &A::normal, &A::radius))
       .def_readonly("id", &A::id)
       .def_readonly("photo", &A::photo, "Of whose world; -1: that of all photos.")
       .def_readonly("center", &A::center, "(3,), world frame.")
@@ -153,12 +169,14 @@ void BindAdjusted(py::module_* module) {
       .def_readonly("radius", &A::radius);
   using D = AdjustedDirection;
   py::class_<D>(*module, "AdjustedDirection", "A pencil's direction in a world, without sense.")
+      .def(Pickled(&D::id, &D::photo, &D::direction))
       .def_readonly("id", &D::id)
       .def_readonly("photo", &D::photo, "Of whose world; -1: that of all photos.")
       .def_readonly("direction", &D::direction, "(3,), unit, world frame.");
   using G = GivenFrame;
   py::class_<G>(*module, "GivenFrame",
                 "Of given poses: X_given = scale * rotation @ X_world + translation.")
+      .def(Pickled(&G::scale, &G::rotation, &G::translation, &G::log_scale_sigma))
       .def_readonly("scale", &G::scale)
       .def_readonly("rotation", &G::rotation, "(3, 3).")
       .def_readonly("translation", &G::translation, "(3,), in the unit of the given poses.")
@@ -166,6 +184,9 @@ void BindAdjusted(py::module_* module) {
                     "Meaningful where the world is metric.");
   py::class_<AdjustedPhotos>(*module, "AdjustedPhotos",
                              "Cameras, poses, circles and directions of many photos.")
+      .def(Pickled(&AdjustedPhotos::status, &AdjustedPhotos::cameras, &AdjustedPhotos::photos,
+                   &AdjustedPhotos::circles, &AdjustedPhotos::directions, &AdjustedPhotos::given,
+                   &AdjustedPhotos::rigid, &AdjustedPhotos::metric, &AdjustedPhotos::notes))
       .def_readonly("cameras", &AdjustedPhotos::cameras)
       .def_readonly("photos", &AdjustedPhotos::photos, "One for each of the input.")
       .def_readonly("circles", &AdjustedPhotos::circles)

@@ -9,6 +9,7 @@
 
 #include "apps/common/camera_file.h"
 #include "apps/python/bindings.h"
+#include "apps/python/pickled.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/pose.h"
 #include "circline/refine/estimate_pose.h"
@@ -64,18 +65,6 @@ auto PickledAsKeywords() {
       [](const py::dict& state) {
         return FromKeywords<T>(py::reinterpret_borrow<py::kwargs>(state));
       });
-}
-
-// The same, as a tuple of these fields.
-template <typename T, typename... Field>
-auto Pickled(Field T::*... fields) {
-  return py::pickle([=](const T& value) { return py::make_tuple(value.*fields...); },
-                    [=](const py::tuple& state) {
-                      T value;
-                      std::size_t i = 0;
-                      ((value.*fields = state[i++].template cast<Field>()), ...);
-                      return value;
-                    });
 }
 
 // Of N x 3 points, camera frame: N x 2 pixels, NaN where the camera does not see them.
@@ -207,6 +196,7 @@ void BindPose(py::module_* module) {
 
 void BindPriors(py::module_* module) {
   py::class_<PosePrior>(*module, "PosePrior", "A pose known from elsewhere, with its covariance.")
+      .def(Pickled(&PosePrior::mean, &PosePrior::covariance))
       .def(py::init([](const CameraPose& mean, const Eigen::Matrix<double, 6, 6>& covariance) {
              PosePrior prior;
              prior.mean = mean;
@@ -217,6 +207,7 @@ void BindPriors(py::module_* module) {
            py::arg("mean"), py::arg("covariance"), "covariance: (6, 6), of [delta, delta_t].");
   py::class_<GravityPrior>(*module, "GravityPrior",
                            "A world direction that is known in the camera.")
+      .def(Pickled(&GravityPrior::in_world, &GravityPrior::in_camera, &GravityPrior::sigma_rad))
       .def(py::init([](const Eigen::Vector3d& in_world, const Eigen::Vector3d& in_camera,
                        double sigma_rad) {
              GravityPrior prior;
