@@ -38,7 +38,7 @@ struct AdjustOptions {
   LossOptions conic_loss, line_loss;  // As in EstimationOptions.
   NoiseModel noise_model;             // Its camera is not used here: see camera_sigma.
   // Prior of a camera about the one that its photos come with, by Camera::id; UnknownCamera() where
-  // there is none.
+  // there is none. Every id must be a photo's.
   std::map<std::string, CameraSigma> camera_sigma;
   // Distortion coefficients that are estimated, about those of the camera: so many radial ones, the
   // first of the model (0 to 3; fisheye 0 to 4), each with the prior k1 has; none of them where

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <map>
 #include <mutex>
+#include <string>
 
 #include "circline/refine/adjust_start.h"
 #include "circline/refine/adjustment.h"
@@ -16,6 +17,20 @@ namespace {
 bool IsSameCamera(const Camera& a, const Camera& b) {
   return a.model == b.model && a.width == b.width && a.height == b.height && a.fx == b.fx &&
          a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion;
+}
+
+// A sigma of a camera that no photo has is a slip of its name: the camera meant would count as
+// unknown.
+Status CheckNames(const std::map<std::string, CameraSigma>& sigmas,
+                  const std::map<std::string, int>& cameras) {
+  std::string known;
+  for (const auto& [id, index] : cameras) known += (known.empty() ? "'" : ", '") + id + "'";
+  for (const auto& [id, sigma] : sigmas) {
+    if (cameras.count(id) == 0) {
+      return Status::Invalid("camera_sigma: no photo has a camera '" + id + "', only " + known);
+    }
+  }
+  return Status::Ok();
 }
 
 }  // namespace
@@ -66,7 +81,8 @@ Status Adjustment::FindCameras() {
     out_.photos[i].status = given_[i].Validate();
   }
   guesses_ = cameras_;
-  return CheckGivenPoses();
+  const Status status = CheckNames(options_.camera_sigma, index);
+  return status.ok() ? CheckGivenPoses() : status;
 }
 
 Status Adjustment::CheckGivenPoses() {

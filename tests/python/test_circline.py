@@ -297,6 +297,8 @@ def test_adjust_names_wrong_input():
         circline.adjust([])
     with pytest.raises(ValueError, match="rigid"):
         circline.adjust([scenes.observations()], rigid="perhaps")
+    with pytest.raises(ValueError, match="no photo has a camera 'cam1', only 'cam0'"):
+        circline.adjust([scenes.observations()], camera_sigma={"cam1": circline.CameraSigma()})
 
 
 def test_simulates_the_paper():

@@ -226,6 +226,11 @@ TEST(AdjustPhotos, RefusesInWords) {
   AdjustOptions options;
   options.num_threads = 0;
   EXPECT_EQ(AdjustPhotos(empty, options).status.code, StatusCode::kInvalidArgument);
+  options = AdjustOptions();
+  options.camera_sigma["cam1"] = CameraSigma();
+  const Status unknown = AdjustPhotos(Photos(3).WithCircles().photos, options).status;
+  EXPECT_EQ(unknown.code, StatusCode::kInvalidArgument);
+  EXPECT_EQ(unknown.message, "camera_sigma: no photo has a camera 'cam1', only 'cam'");
 }
 
 TEST(AdjustPhotos, EveryCameraModelComesOutWithinItsSigma) {
