@@ -159,4 +159,12 @@ Eigen::Matrix3d ProjectCircle(const CirclePose& pose) {
   return C / C.norm();
 }
 
+bool IsInView(const CirclePose& pose) {
+  const Eigen::Vector3d& c = pose.center;
+  const Eigen::Vector3d n = pose.normal.normalized();
+  // Z varies along the circle by the sine of the angle between its normal and the optical axis.
+  const double nearest = c.z() - std::hypot(n.x(), n.y());
+  return nearest > 0.0 && std::abs(n.dot(c)) > kEpsilon * c.norm();
+}
+
 }  // namespace circline

@@ -24,8 +24,13 @@ struct CirclePose {
 int CirclePoses(const Eigen::Matrix3d& conic, std::array<CirclePose, 2>* poses);
 
 // The reverse: image of the circle of radius 1 at `pose`, calibrated, unit Frobenius norm, negative
-// inside. Valid for every circle whose plane misses the camera centre.
+// inside. Of a circle without IsInView it is the conic of the rays through the circle in both
+// senses, which no camera sees.
 Eigen::Matrix3d ProjectCircle(const CirclePose& pose);
+
+// Whether the camera sees an ellipse: all of the circle lies in front of it (Z > 0), and the plane
+// misses the camera centre. The normal need not be a unit vector.
+bool IsInView(const CirclePose& pose);
 
 }  // namespace circline
 

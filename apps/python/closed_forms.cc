@@ -1,6 +1,7 @@
 // The mathematics by itself: free functions on calibrated coordinates.
 #include <Eigen/Geometry>
 #include <array>
+#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -23,9 +24,13 @@ std::vector<CirclePose> PosesOf(const Eigen::Matrix3d& conic) {
 }
 
 Eigen::Matrix3d ImageOf(const CirclePose& pose) {
-  const Eigen::Matrix3d conic = ProjectCircle(pose);
-  if (!conic.allFinite()) throw Refused("the circle's normal or center is zero or not finite");
-  return conic;
+  if (IsInView(pose)) return ProjectCircle(pose);
+  const Eigen::IOFormat row(6, Eigen::DontAlignCols, ", ", ", ", "", "", "(", ")");
+  std::ostringstream said;
+  said << "the circle about " << pose.center.format(row) << " with normal "
+       << pose.normal.format(row)
+       << " has no ellipse as image: it must be finite, all in front of the camera and not edge-on";
+  throw py::value_error(said.str());
 }
 
 std::vector<std::pair<Eigen::Matrix3d, double>> FrameRotations(const Eigen::Matrix3d& conic,
@@ -71,8 +76,8 @@ void BindClosedForms(py::module_* module) {
               "The one or two circles whose image is the ellipse `conic` (3, 3), calibrated\n"
               "coordinates, any scale. Their order has no meaning. Refused: no proper ellipse.");
   module->def("project_circle", &ImageOf, py::arg("pose"),
-              "Image of a circle of radius 1: a conic (3, 3), calibrated, unit norm, negative "
-              "inside. Refused: there is none.");
+              "Image of a circle of radius 1: a conic (3, 3), calibrated, unit norm, negative\n"
+              "inside. ValueError: there is none, some of the circle is behind the camera.");
   module->def("rotation_from_circle_and_frame", &FrameRotations, py::arg("conic"),
               py::arg("x_line"), py::arg("y_line"),
               "Rotations (3, 3) of the world frame, each with the cosine by which its axes miss a\n"

@@ -56,6 +56,30 @@ TEST(CirclePoseTest, TruthIsAmongTheTwo) {
   EXPECT_LT(*std::max_element(errors.begin(), errors.end()), 1e-6);
 }
 
+TEST(CirclePoseTest, ACircleIsInViewWhereAllOfItsPointsAre) {
+  Random random(6);
+  int seen = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const CirclePose pose =
+        RandomCircle(random.Uniform(0.0, 1.5), random.Uniform(0.1, 2.0), &random);
+    const Eigen::Vector3d a = pose.normal.unitOrthogonal(), b = pose.normal.cross(a);
+    double nearest = pose.center.z();
+    for (int k = 0; k < 3600; ++k) {
+      const double t = k * kPi / 1800.0;
+      nearest = std::min(nearest, (pose.center + std::cos(t) * a + std::sin(t) * b).z());
+    }
+    if (std::abs(nearest) < 1e-6) continue;  // As far as 3600 points tell.
+    EXPECT_EQ(IsInView(pose), nearest > 0.0);
+    seen += IsInView(pose) ? 1 : 0;
+  }
+  EXPECT_GT(seen, 500);
+  EXPECT_LT(seen, 1500);
+  EXPECT_FALSE(IsInView({-Eigen::Vector3d::UnitZ(), {0.0, 0.0, -5.0}}));
+  EXPECT_TRUE(IsInView({{0.0, 0.0, -3.0}, {0.0, 0.0, 5.0}}));
+  EXPECT_FALSE(IsInView({Eigen::Vector3d::UnitX(), {0.0, 0.0, 5.0}}));  // Seen edge-on.
+  EXPECT_FALSE(IsInView({Eigen::Vector3d::Zero(), {0.0, 0.0, 5.0}}));
+}
+
 TEST(CirclePoseTest, CentersAreInUnitsOfTheRadius) {
   Random random(2);
   for (int i = 0; i < 1000; ++i) {
