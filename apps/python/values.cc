@@ -13,6 +13,7 @@
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/pose.h"
 #include "circline/refine/estimate_pose.h"
+#include "circline/refine/known_pose.h"
 
 namespace circline::python {
 namespace {
@@ -186,6 +187,11 @@ void BindNoise(py::module_* module) {
 void BindPose(py::module_* module) {
   py::class_<CameraPose>(*module, "CameraPose", "X_cam = rotation @ X_world + translation.")
       .def(py::init([](const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
+             if (!IsRotation(rotation) || !translation.allFinite()) {
+               throw py::value_error(
+                   "CameraPose: rotation must be a rotation (R @ R.T = 1, det R = 1) and "
+                   "translation finite");
+             }
              return CameraPose{rotation, translation};
            }),
            py::arg("rotation"), py::arg("translation"))

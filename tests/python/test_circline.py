@@ -106,6 +106,16 @@ def test_wrong_options_are_named():
         circline.Camera(focal=3.0)
 
 
+def test_a_pose_without_a_rotation_is_refused():
+    turned = scenes.rotation()
+    circline.CameraPose(turned.astype(np.float32), [0, 0, 1])
+    for wrong in (turned @ np.diag([1, 1, -1]), 1.01 * turned, np.full((3, 3), np.nan)):
+        with pytest.raises(ValueError, match="rotation must be a rotation"):
+            circline.CameraPose(wrong, [0, 0, 1])
+    with pytest.raises(ValueError, match="translation finite"):
+        circline.CameraPose(turned, [0, 0, np.inf])
+
+
 def test_results_are_views_that_keep_their_owner():
     observations = circline.fit(scenes.observations())
     best = circline.estimate(observations).hypotheses[0]
