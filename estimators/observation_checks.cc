@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/observations.h"
 
 namespace circline {
@@ -130,9 +131,10 @@ Status ValidateKnown(const Observations& observations) {
     if (angle.pencils[0] == angle.pencils[1]) {
       return Status::Invalid("known angle: pencil '" + angle.pencils[0] + "' is named twice");
     }
-    if (!std::isfinite(angle.value) || !NonNegative(angle.sigma)) {
+    if (!NonNegative(angle.value) || angle.value > kPi || !NonNegative(angle.sigma)) {
       return Status::Invalid("known angle between '" + angle.pencils[0] + "' and '" +
-                             angle.pencils[1] + "': value must be finite and sigma 0 or more");
+                             angle.pencils[1] +
+                             "': value must be from 0 to pi and sigma 0 or more, both in radians");
     }
   }
   for (const KnownLength& length : observations.known_lengths) {

@@ -267,6 +267,11 @@ TEST(Scene, NamesMissingAndDanglingIds) {
       ErrorOfImage(pencil + "known: { angle_deg: [ { pencils: [\"l\",\"m\"], value: 90 } ] }"),
       "known.angle_deg[0].pencils[1]: there is no pencil 'm'");
   EXPECT_CONTAINS(
+      ErrorOfImage(
+          "pencils: [ { id: \"l\", segments: [0,0,1,1] }, { id: \"m\", segments: "
+          "[0,0,1,2] } ], known: { angle_deg: [ { pencils: [\"l\",\"m\"], value: 270 } ] }"),
+      "known.angle_deg[0].value: must be from 0 to 180 degrees");
+  EXPECT_CONTAINS(
       ErrorOfImage(pencil + "truth: { directions: [ { pencil: \"m\", value: [1,0,0] } ] }"),
       "there is no pencil 'm'");
   EXPECT_CONTAINS(ErrorOfScene(Scene("  - { file: \"a.jpg\", camera: \"cam1\" }\n")),

@@ -85,6 +85,10 @@ def test_says_what_is_missing():
         (lambda o: setattr(o.pencils[0], "direction", "up"), "x, y, z or free"),
         (lambda o: setattr(o.camera, "fx", -1.0), "focal"),
         (lambda o: setattr(o.pencils[1], "id", "x"), "'x'"),
+        (
+            lambda o: setattr(o, "known_angles", [circline.KnownAngle(("x", "y"), 90.0)]),
+            "radians",
+        ),
     ],
 )
 def test_wrong_input_is_a_value_error(spoil, said):

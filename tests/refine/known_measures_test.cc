@@ -159,6 +159,26 @@ TEST(KnownMeasuresTest, KnowledgeThatHasNoPartIsNamed) {
   EXPECT_TRUE(HasNote(estimate, "circle 'c1': not used, not in the world's plane 'p0'"));
 }
 
+// Degrees, above all.
+TEST(KnownMeasuresTest, AnAngleOutsideHalfATurnIsRefused) {
+  PlaneScene scene(1.1, 0.1);
+  Observations observations = scene.Empty();
+  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
+                          scene.Pencil("L2", PencilDirection::kFree, Eigen::Vector3d::UnitY())};
+  for (const double wrong : {90.0, 3.15, -0.1}) {
+    observations.known_angles = {KnownAngle{{"L1", "L2"}, wrong, 0.0}};
+    const PoseEstimate estimate = EstimatePose(observations, Exact());
+    EXPECT_EQ(estimate.status.code, StatusCode::kInvalidArgument) << wrong;
+    EXPECT_NE(estimate.status.message.find("'L1' and 'L2': value must be from 0 to pi"),
+              std::string::npos)
+        << estimate.status.message;
+  }
+  for (const double right : {0.0, kPi, 180.0 * kDegree}) {
+    observations.known_angles = {KnownAngle{{"L1", "L2"}, right, 0.0}};
+    EXPECT_TRUE(observations.Validate().ok()) << right;
+  }
+}
+
 // A circle that names no plane lies in none of the world, and nothing does in one misspelt.
 TEST(KnownMeasuresTest, WhatIsOutsideTheWorldsPlaneIsNamed) {
   PlaneScene scene(1.1, 0.1);

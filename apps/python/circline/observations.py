@@ -112,7 +112,7 @@ class KnownAngle:
 
     pencils: Tuple[str, str] = ("", "")
     value: float = 0.0
-    """Radians."""
+    """Radians, 0 to pi."""
     sigma: float = 0.0
     """Radians; 0: exact."""
 
