@@ -102,4 +102,12 @@ std::string ReadPhoto(const std::string& path, cv::Mat* photo, double max_megapi
   return "has more than " + FormatPlain(max_megapixels) + " megapixels";
 }
 
+FileState StateOf(const std::string& path) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+  if (error) return {};
+  const auto written = std::filesystem::last_write_time(path, error).time_since_epoch().count();
+  return {bytes, error ? 0 : written};
+}
+
 }  // namespace circline::apps

@@ -18,6 +18,18 @@ constexpr double kMaxMegapixels = 100.0;
 std::string ReadPhoto(const std::string& path, cv::Mat* photo,
                       double max_megapixels = kMaxMegapixels);
 
+// Of a file as it lies there, to tell whether it has changed: its size and when it was last
+// written, in ticks of the file clock. Both 0 where there is none.
+struct FileState {
+  std::uint64_t bytes = 0;
+  std::int64_t written = 0;
+
+  bool operator==(const FileState& other) const {
+    return bytes == other.bytes && written == other.written;
+  }
+};
+FileState StateOf(const std::string& path);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_APPS_COMMON_PHOTO_FILE_H_

@@ -141,6 +141,7 @@ void ReadAndObserve(const CompareOptions& options, const cv::Mat* photo, SceneIm
     run->photo = *photo;
   } else if (options.overlays || image->detect_everything || !image->rois.empty()) {
     const Stopwatch watch;
+    run->photo_file = StateOf(image->path);  // Before it is read: what is written later is news.
     run->read_error = ReadPhoto(image->path, &run->photo, options.max_megapixels);
     run->stages.emplace_back("read", watch.Microseconds());
   }

@@ -64,6 +64,7 @@ struct ImageRun {
   const SceneImage* image = nullptr;
   std::string read_error;  // Not empty: the photo could not be used, and nothing else is filled.
   cv::Mat photo;           // May be empty where nothing needed it.
+  FileState photo_file;    // As it was read.
   Observations observations;
   std::vector<std::string> problems;  // What could not be fitted or detected, a sentence each.
   std::vector<SolverRun> solvers;

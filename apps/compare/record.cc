@@ -115,6 +115,11 @@ void ReadTimings(const std::string& text, ImageRecord* record) {
     const double microseconds = json.at("microseconds").get<double>();
     if (!json.contains("solver")) {
       record->stages.emplace_back(json.at("stage").get<std::string>(), microseconds);
+      const Json file = Get<Json>(json, "file");
+      if (file.is_object()) {
+        record->photo_file = {file.at("bytes").get<std::uint64_t>(),
+                              file.at("written").get<std::int64_t>()};
+      }
     } else if (next < record->solvers.size()) {
       record->solvers[next++].microseconds = microseconds;
     }

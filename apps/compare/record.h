@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/common/photo_file.h"
 #include "apps/common/pose_error.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/status.h"
@@ -71,6 +72,7 @@ struct ImageRecord {
   std::vector<std::string> problems;
   std::vector<std::string> flags;                      // CompareOptions::unusual_flags.
   std::vector<std::pair<std::string, double>> stages;  // "read", "detect", "fit"; microseconds.
+  std::optional<FileState> photo_file;                 // Where the photo was read.
   std::vector<SolverRecord> solvers;
 };
 

@@ -203,6 +203,8 @@ std::string TimingLines(const ImageRun& run) {
     line["image"] = run.image->name;
     line["stage"] = stage;
     line["microseconds"] = whole(microseconds);
+    if (stage == "read")
+      line["file"] = {{"bytes", run.photo_file.bytes}, {"written", run.photo_file.written}};
     lines += Line(line);
   }
   for (const SolverRun& solver : run.solvers) {

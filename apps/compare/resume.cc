@@ -9,6 +9,7 @@
 #include "apps/common/document.h"
 #include "apps/common/flags_util.h"
 #include "apps/common/output_file.h"
+#include "apps/common/photo_file.h"
 #include "apps/common/storage_node.h"
 #include "apps/common/written_files.h"
 #include "apps/compare/export.h"
@@ -76,6 +77,12 @@ Status FindDone(const CompareOptions& options, const ImageSet& images,
     if (record.flags != options.unusual_flags) {
       return OtherRun(folder, "it was made with " + FlagText(record.flags) + ", not with " +
                                   FlagText(options.unusual_flags));
+    }
+    // The lines stand in the order of the images: what follows is done again, too.
+    if (record.photo_file && !(*record.photo_file == StateOf(images.path(done->images)))) {
+      SayOnStderr(images.path(done->images) +
+                  ": has changed, and is done again with what follows it");
+      return Status::Ok();
     }
     if (!record.error.empty()) SayOnStderr(images.path(done->images) + ": " + record.error);
     ++done->images;

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -128,6 +129,41 @@ TEST(CompareResume, SkipsWhatIsDone) {
   const std::string times = ReadAll(folder / "out/timings.jsonl");
   ASSERT_EQ(RunCompare(arguments).exit_code, 0);
   EXPECT_EQ(ReadAll(folder / "out/timings.jsonl"), times);  // Measured again, they would differ.
+}
+
+TEST(CompareResume, DoesAgainWhatHasChanged) {
+  const TestFolder folder;
+  const std::array<std::string, 3> photos = {folder / "a.png", folder / "b.png", folder / "c.png"};
+  for (const std::string& photo : {photos[0], photos[2]}) Board(35.0).Paint(photo);
+  const std::string scene = folder.Write(
+      "scene.yaml", "%YAML:1.0\n---\n" + BoardCamera() + "images:\n" +
+                        DetectedImage(Board(35.0), "a.png") + DetectedImage(Board(35.0), "b.png") +
+                        DetectedImage(Board(35.0), "c.png"));
+  const auto run = [&scene](const std::string& out) {
+    return RunCompare("--resume --threads=1 --scene='" + scene + "' --output='" + out + "'");
+  };
+  const std::string out = folder / "out";
+  EXPECT_CONTAINS(run(out).err, "b.png: the file does not exist");
+  const auto first_times = [&out] {  // Of a.png, measured anew if it is done anew.
+    const std::string times = ReadAll(out + "/timings.jsonl");
+    return times.substr(0, times.find("b.png"));
+  };
+  const std::string before = first_times();
+  Board(50.0).Paint(photos[1]);  // It is there now.
+  EXPECT_CONTAINS(run(out).err, "b.png: has changed");
+  EXPECT_EQ(run(folder / "anew").exit_code, 0);
+  ExpectSameFiles(folder / "anew", out);
+  const auto written = fs::last_write_time(photos[2]);
+  Board(20.0).Paint(photos[2]);  // Whether its size or its time tells.
+  fs::last_write_time(photos[2], written + std::chrono::seconds(1));
+  const Outcome outcome = run(out);
+  EXPECT_CONTAINS(outcome.err, "c.png: has changed");
+  EXPECT_EQ(outcome.err.find("b.png"), std::string::npos);
+  fs::remove_all(folder / "anew");
+  EXPECT_EQ(run(folder / "anew").exit_code, 0);
+  ExpectSameFiles(folder / "anew", out);
+  EXPECT_EQ(first_times(), before);
+  EXPECT_EQ(run(out).err.find("changed"), std::string::npos);
 }
 
 TEST(CompareResume, RefusesTheResultsOfAnotherRun) {
