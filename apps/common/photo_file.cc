@@ -70,6 +70,16 @@ std::string JpegDamage(const std::vector<std::uint8_t>& bytes, double max_megapi
   return sentence.empty() ? "" : "is damaged or cut off: " + sentence;
 }
 
+// A picture of 16 bits as one of 8. Cameras of 10 or 12 bits leave the upper ones empty: white is
+// taken to be the largest number of as many bits as the brightest pixel has.
+void ToEightBits(cv::Mat* photo) {
+  double brightest = 0.0;
+  cv::minMaxLoc(photo->reshape(1), nullptr, &brightest);
+  double white = 255.0;
+  while (white < brightest) white = 2.0 * white + 1.0;
+  photo->convertTo(*photo, CV_8U, 255.0 / white);
+}
+
 }  // namespace
 
 std::string ReadPhoto(const std::string& path, cv::Mat* photo, double max_megapixels) {
@@ -92,7 +102,12 @@ std::string ReadPhoto(const std::string& path, cv::Mat* photo, double max_megapi
   const std::string damage = IsJpeg(bytes) ? JpegDamage(bytes, max_megapixels) : "";
   if (!damage.empty()) return damage;
   try {
-    *photo = cv::imdecode(bytes, cv::IMREAD_ANYCOLOR);
+    *photo = cv::imdecode(bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH);
+    if (photo->depth() == CV_16U) {
+      ToEightBits(photo);
+    } else if (photo->depth() != CV_8U) {
+      *photo = cv::imdecode(bytes, cv::IMREAD_ANYCOLOR);
+    }
   } catch (const std::exception&) {
     photo->release();
   }

@@ -70,6 +70,15 @@ TEST_F(PhotoFile, ReadsWhateverDepthAndChannels) {
   EXPECT_EQ(Read(Encoded(".png", deep)), "");
   EXPECT_EQ(photo_.depth(), CV_8U);
   EXPECT_EQ(cv::norm(photo_, grey, cv::NORM_INF), 0.0);
+  // Of 12 bits, or of 8, in 16.
+  for (const double scale : {16.0, 1.0}) {
+    grey.convertTo(deep, CV_16U, scale);
+    for (const char* extension : {".png", ".tiff"}) {
+      EXPECT_EQ(Read(Encoded(extension, deep)), "");
+      EXPECT_EQ(photo_.type(), CV_8UC1) << extension;
+      EXPECT_LE(cv::norm(photo_, grey, cv::NORM_INF), 1.0) << extension << " " << scale;
+    }
+  }
   cv::merge(std::vector<cv::Mat>{grey, grey, grey, grey}, with_alpha);
   EXPECT_EQ(Read(Encoded(".png", with_alpha)), "");
   EXPECT_EQ(photo_.type(), CV_8UC3);
