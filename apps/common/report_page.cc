@@ -14,6 +14,7 @@ nav{position:sticky;top:0;z-index:2;display:flex;flex-wrap:wrap;gap:4px 18px;pad
 a{color:var(--accent);text-decoration:none}a:hover{text-decoration:underline}
 h1{font-size:26px;margin:24px 0 4px}h2{font-size:19px;margin:40px 0 12px;scroll-margin-top:52px}h3{font-size:16px;margin:0 0 10px;overflow-wrap:anywhere}div+h3{margin-top:28px}
 h3 small{font-weight:400;color:var(--soft);margin-left:8px}
+p,li{overflow-wrap:anywhere}
 p.lead{margin:0 0 20px;color:var(--soft)}
 .scroll{overflow-x:auto;border:1px solid var(--line);border-radius:8px}
 table{border-collapse:collapse;width:100%;font-size:13px;font-variant-numeric:tabular-nums}
