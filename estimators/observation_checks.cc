@@ -131,10 +131,11 @@ Status ValidateKnown(const Observations& observations) {
     if (angle.pencils[0] == angle.pencils[1]) {
       return Status::Invalid("known angle: pencil '" + angle.pencils[0] + "' is named twice");
     }
-    if (!NonNegative(angle.value) || angle.value > kPi || !NonNegative(angle.sigma)) {
+    // More than a turn is no angle in radians but one in degrees.
+    if (!(std::abs(angle.value) <= 2.0 * kPi) || !NonNegative(angle.sigma)) {
       return Status::Invalid("known angle between '" + angle.pencils[0] + "' and '" +
                              angle.pencils[1] +
-                             "': value must be from 0 to pi and sigma 0 or more, both in radians");
+                             "': value must be within 2 pi and sigma 0 or more, both in radians");
     }
   }
   for (const KnownLength& length : observations.known_lengths) {

@@ -113,7 +113,7 @@ struct FrameObservation {
 // the same.
 struct KnownAngle {
   std::array<std::string, 2> pencils;  // Ids.
-  double value = 0.0;                  // Radians, 0 to pi.
+  double value = 0.0;                  // Radians, within 2 pi.
   double sigma = 0.0;                  // Radians; 0 = exact.
 };
 

@@ -81,7 +81,8 @@ Status Adjustment::FindCameras() {
     out_.photos[i].status = given_[i].Validate();
   }
   guesses_ = cameras_;
-  const Status status = CheckNames(options_.camera_sigma, index);
+  // From a start it is the photos of one camera of several.
+  const Status status = start_ == nullptr ? CheckNames(options_.camera_sigma, index) : Status::Ok();
   return status.ok() ? CheckGivenPoses() : status;
 }
 

@@ -106,7 +106,7 @@ void ReadKnownAngle(const StorageNode& node, const Ids& pencil_ids, Observations
   if (angle.pencils[0] == angle.pencils[1]) pencils.Fail("names the same pencil twice");
   const StorageNode value = node.Require("value");
   angle.value = value.Number() * kDegree;
-  if (angle.value < 0.0 || angle.value > kPi) value.Fail("must be from 0 to 180 degrees");
+  if (std::abs(angle.value) > 2.0 * kPi) value.Fail("must be within 360 degrees");
   const StorageNode sigma = node.Get("sigma");
   if (sigma.Exists()) angle.sigma = sigma.Number() * kDegree;
   if (angle.sigma < 0.0) sigma.Fail("must be 0 or positive");

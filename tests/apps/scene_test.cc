@@ -269,8 +269,8 @@ TEST(Scene, NamesMissingAndDanglingIds) {
   EXPECT_CONTAINS(
       ErrorOfImage(
           "pencils: [ { id: \"l\", segments: [0,0,1,1] }, { id: \"m\", segments: "
-          "[0,0,1,2] } ], known: { angle_deg: [ { pencils: [\"l\",\"m\"], value: 270 } ] }"),
-      "known.angle_deg[0].value: must be from 0 to 180 degrees");
+          "[0,0,1,2] } ], known: { angle_deg: [ { pencils: [\"l\",\"m\"], value: 450 } ] }"),
+      "known.angle_deg[0].value: must be within 360 degrees");
   EXPECT_CONTAINS(
       ErrorOfImage(pencil + "truth: { directions: [ { pencil: \"m\", value: [1,0,0] } ] }"),
       "there is no pencil 'm'");

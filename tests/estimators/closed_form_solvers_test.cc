@@ -221,7 +221,7 @@ TEST(ClosedFormSolversTest, MoreNoiseIsNeverMoreCertain) {
   }
 }
 
-// Directions have no sense: 70 degrees are 110.
+// Directions have no sense: 70 degrees are 110, -70 and 250.
 TEST(ClosedFormSolversTest, KnownAnglesHaveNoSense) {
   const Eigen::Vector3d oblique(std::cos(1.2), std::sin(1.2), 0.0);
   PlaneScene scene(0.7, 0.3);
@@ -229,7 +229,7 @@ TEST(ClosedFormSolversTest, KnownAnglesHaveNoSense) {
   observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX(), 4),
                           scene.Pencil("L2", PencilDirection::kFree, oblique, 4)};
   std::vector<Eigen::Matrix3d> rotations;
-  for (const double angle : {1.2, kPi - 1.2}) {
+  for (const double angle : {1.2, -1.2, kPi - 1.2, kPi + 1.2, 2.0 * kPi - 1.2}) {
     observations.known_angles = {KnownAngle{{"L1", "L2"}, angle, 0.0}};
     const PoseEstimate estimate = SolveClosedForm("line_pairs", observations);
     ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;

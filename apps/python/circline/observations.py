@@ -112,7 +112,7 @@ class KnownAngle:
 
     pencils: Tuple[str, str] = ("", "")
     value: float = 0.0
-    """Radians, 0 to pi."""
+    """Radians, within 2 pi; lines have no sense: as well its negative, or pi less it."""
     sigma: float = 0.0
     """Radians; 0: exact."""
 
