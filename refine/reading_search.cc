@@ -37,8 +37,11 @@ class ReadingSearch {
     std::vector<Candidate> queue = {{problem_.FirstReading(), seeds_, kNoRival}};
     const Reading everything(problem_.features().size(), 1);
     if (queue.front().reading != everything) queue.push_back({everything, seeds_, kNoRival});
+    // What lines agree on is not where the fits of their pencils lead.
+    for (AgreeingLines& lines : FindAgreeingPencils(problem_, seeds_))
+      queue.push_back({std::move(lines.reading), std::move(lines.seeds), kNoRival});
     bool has_sampled = false;
-    std::size_t most = kMaxReadings;
+    std::size_t most = kMaxReadings + queue.size() - 1;
     for (std::size_t next = 0; next < queue.size() && next < most; ++next) {
       const Candidate candidate = queue[next];
       std::vector<State> minima = RefineAll(candidate);

@@ -80,6 +80,13 @@ std::vector<AgreeingLines> FindAgreeingLines(const JointProblem& problem,
                                              const std::vector<Seed>& seeds,
                                              std::size_t max_readings);
 
+// --- agreeing_pencils.cc
+
+// The same of pencils that alone tell the plane: for each set of lines of one pencil that meet, and
+// each of another's. None where all lines of each pencil meet, or there are circles.
+std::vector<AgreeingLines> FindAgreeingPencils(const JointProblem& problem,
+                                               const std::vector<Seed>& seeds);
+
 // --- ranked_readings.cc, merged_humps.cc ---
 
 // Fills the hypotheses of all minima that compete, of the second ellipses of circles that these
