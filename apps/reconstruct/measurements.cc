@@ -21,7 +21,7 @@ bool Length(const CameraPose& pose, const Rays& rays, double* value) {
 bool Height(const CameraPose& pose, const Rays& rays, double* value) {
   return HeightOverPlane(pose, rays[0], rays[1], value);
 }
-bool CameraHeight(const CameraPose& pose, const Rays& /*rays*/, double* value) {
+bool Distance(const CameraPose& pose, const Rays& /*rays*/, double* value) {
   *value = std::abs(pose.rotation.col(2).dot(pose.translation));
   return true;
 }
@@ -80,7 +80,7 @@ std::vector<MeasuredValue> Measure(const Observations& observations,
     if (MeasureOnPlane(function, hypothesis, camera, pixels, sigma_px, &m))
       all.push_back({what, id, m.value, m.sigma, unit, 0.0});
   };
-  add("height", "camera", CameraHeight, {}, 0.0);
+  add("distance", "camera", Distance, {}, 0.0);
   for (std::size_t i = 0; i < resolved.known_lengths.size(); ++i) {
     const KnownLength& known = resolved.known_lengths[i];
     if (!IsInWorldPlane(known, resolved)) continue;

@@ -24,9 +24,9 @@ struct MeasuredValue {
 
 // Of the plane: the segments of its pencils, the pairs of points of `known.length`, the angles
 // between pencils, each by its own lines alone, the circles' radii; the heights of the upright
-// edges, of cylinders and of the camera. Standard deviations are first-order, of the pose and of
-// the points, taken as independent: `point_sigma_px` is that of each coordinate where a line and
-// its pencil state none.
+// edges and of cylinders; the distance of the camera from the plane. Standard deviations are
+// first-order, of the pose and of the points, taken as independent: `point_sigma_px` is that of
+// each coordinate where a line and its pencil state none.
 std::vector<MeasuredValue> Measure(const Observations& observations,
                                    const PoseHypothesis& hypothesis, const Model& model,
                                    double point_sigma_px);

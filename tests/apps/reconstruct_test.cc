@@ -145,10 +145,12 @@ TEST_F(Reconstruct, MeasuresTheBox) {
   const std::map<std::string, MeasuredRow> measured =
       ReadMeasurements(folder_ / "out/measurements.csv");
   const std::map<std::string, double> truth = {
-      {"length x_0", 2 * kHalfX}, {"length x_1", 2 * kHalfX}, {"length y_0", 2 * kHalfY},
-      {"length y_1", 2 * kHalfY}, {"height z_0", -kDepth},    {"height z_1", -kDepth},
-      {"height z_2", -kDepth},    {"radius disc", kRadius},   {"angle x y", 90.0},
-      {"angle x z", 90.0},        {"angle y z", 90.0},        {"height camera", box_.Center().z()}};
+      {"length x_0", 2 * kHalfX}, {"length x_1", 2 * kHalfX},
+      {"length y_0", 2 * kHalfY}, {"length y_1", 2 * kHalfY},
+      {"height z_0", -kDepth},    {"height z_1", -kDepth},
+      {"height z_2", -kDepth},    {"radius disc", kRadius},
+      {"angle x y", 90.0},        {"angle x z", 90.0},
+      {"angle y z", 90.0},        {"distance camera", box_.Center().z()}};
   ASSERT_EQ(measured.size(), truth.size());
   for (const auto& [key, value] : truth) {
     ASSERT_EQ(measured.count(key), 1U) << key;
