@@ -26,7 +26,14 @@ double FrameNews::Shape::Distance2(const CalibratedPoint& p) const {
 double FrameNews::Coefficient(const Camera& camera, const std::vector<Eigen::Vector2d>& points,
                               const std::vector<std::uint8_t>& inliers) {
   const Shape& now = now_[now_.size() - 1];
-  CalibrateInliers(camera, points, inliers, &points_);
+  const std::size_t enough = now.is_circle ? 16 : 4;  // Points; every line meets all of its pencil.
+  points_.clear();
+  CalibratedPoint point;
+  for (std::size_t i = 0; i < points.size();
+       i += std::max<std::size_t>(1, points.size() / enough)) {
+    if ((inliers.empty() || inliers[i] != 0) && PixelToCalibrated(camera, points[i], &point))
+      points_.push_back(point);
+  }
   if (points_.empty()) return 0.0;
   // Farther from what it was than from what it is; of lines, than from the nearest of the pencil.
   double moved2 = std::numeric_limits<double>::infinity();
