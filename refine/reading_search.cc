@@ -40,6 +40,8 @@ class ReadingSearch {
     // What lines agree on is not where the fits of their pencils lead.
     for (AgreeingLines& lines : FindAgreeingPencils(problem_, seeds_))
       queue.push_back({std::move(lines.reading), std::move(lines.seeds), kNoRival});
+    for (Reading& reading : WithoutAngles())
+      queue.push_back({std::move(reading), seeds_, kNoRival});
     bool has_sampled = false;
     std::size_t most = kMaxReadings + queue.size() - 1;
     for (std::size_t next = 0; next < queue.size() && next < most; ++next) {
@@ -81,6 +83,18 @@ class ReadingSearch {
     std::vector<Seed> seeds;
     double parent_cost;  // Of the minimum that it leaves something out of.
   };
+
+  // Readings without one of the known angles: seeds make little use of these, and lie where a wrong
+  // one does not mislead.
+  std::vector<Reading> WithoutAngles() const {
+    std::vector<Reading> readings;
+    for (std::size_t i = 0; i < problem_.features().size(); ++i) {
+      if (problem_.features()[i].kind != Feature::Kind::kAngle) continue;
+      if (readings.size() == kMostSamples) break;
+      readings.emplace_back(problem_.features().size(), 1)[i] = 0;
+    }
+    return readings;
+  }
 
   std::vector<Seed> SeedsAt(const std::vector<State>& minima) const {
     std::vector<Seed> seeds;

@@ -143,7 +143,13 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
 // the seed then starts there.
 NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* seeds) {
   Status unused;
-  std::vector<SeedStart> starts = StartsOf(problem, *seeds, problem.FirstReading(), &unused);
+  // What is told of angles is no feature's error, and where it is wrong all would seem to have
+  // some.
+  std::vector<std::uint8_t> reading = problem.FirstReading();
+  for (std::size_t i = 0; i < reading.size(); ++i) {
+    if (problem.features()[i].kind == Feature::Kind::kAngle) reading[i] = 0;
+  }
+  std::vector<SeedStart> starts = StartsOf(problem, *seeds, reading, &unused);
   for (const AgreeingLines& lines : FindAgreeingPencils(problem, *seeds)) {
     for (SeedStart& start : StartsOf(problem, lines.seeds, lines.reading, &unused)) {
       seeds->push_back(lines.seeds[start.seed]);
