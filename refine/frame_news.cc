@@ -8,23 +8,16 @@
 #include "circline/estimators/geometric_residuals.h"
 
 namespace circline {
-namespace {
-
-// Of a feature, by how much of its variance is new in every frame (`weight` of NoiseModel, less
-// than 1), and the coefficient of the rest.
-double News(double weight, double r) {
-  return 1.0 / (weight + (1.0 - weight) * (1.0 + r) / (1.0 - r));
-}
-
-}  // namespace
 
 double FrameNews::Shape::Distance2(const CalibratedPoint& p) const {
   const double distance = is_circle ? ConicDistancePx(p, conic) : LineDistancePx(p, line);
   return distance * distance;
 }
 
-double FrameNews::Coefficient(const Camera& camera, const std::vector<Eigen::Vector2d>& points,
-                              const std::vector<std::uint8_t>& inliers) {
+double FrameNews::OfLast(double weight, const Camera& camera,
+                         const std::vector<Eigen::Vector2d>& points,
+                         const std::vector<std::uint8_t>& inliers) {
+  if (!(weight < 1.0)) return 1.0;
   const Shape& now = now_[now_.size() - 1];
   const std::size_t enough = now.is_circle ? 16 : 4;  // Points; every line meets all of its pencil.
   points_.clear();
@@ -34,7 +27,7 @@ double FrameNews::Coefficient(const Camera& camera, const std::vector<Eigen::Vec
     if ((inliers.empty() || inliers[i] != 0) && PixelToCalibrated(camera, points[i], &point))
       points_.push_back(point);
   }
-  if (points_.empty()) return 0.0;
+  if (points_.empty()) return 1.0;
   // Farther from what it was than from what it is; of lines, than from the nearest of the pencil.
   double moved2 = std::numeric_limits<double>::infinity();
   for (const Shape& before : before_) {
@@ -43,22 +36,22 @@ double FrameNews::Coefficient(const Camera& camera, const std::vector<Eigen::Vec
     for (const CalibratedPoint& p : points_) sum += before.Distance2(p) - now.Distance2(p);
     moved2 = std::min(moved2, std::max(0.0, sum / static_cast<double>(points_.size())));
   }
-  return std::exp(-0.5 * moved2);
+  const double r = std::exp(-0.5 * moved2);
+  return 1.0 / (weight + (1.0 - weight) * (1.0 + r) / (1.0 - r));
 }
 
 double FrameNews::Next(const Observations& fitted, const NoiseModel& noise) {
   std::swap(before_, now_);
   now_.Shorten(0);
   double news = 0.0;
-  for (const CircleObservation& circle : fitted.circles) {
-    if (!circle.fit) continue;
+  for (const CircleObservation& c : fitted.circles) {
+    if (!c.fit) continue;
     Shape& shape = now_.Add();
-    shape.id = circle.id;
+    shape.id = c.id;
     shape.is_circle = true;
-    shape.conic = circle.fit->conic;
-    const double weight = noise.ContourWeight(circle.sigma_px, circle.points, circle.inliers);
-    news += weight < 1.0 ? News(weight, Coefficient(fitted.camera, circle.points, circle.inliers))
-                         : 1.0;
+    shape.conic = c.fit->conic;
+    const double weight = noise.ContourWeight(c.sigma_px, c.points, c.inliers);
+    news += OfLast(weight, fitted.camera, c.points, c.inliers);
   }
   for (const PencilObservation& pencil : fitted.pencils) {
     for (const LineObservation& line : pencil.lines) {
@@ -67,9 +60,8 @@ double FrameNews::Next(const Observations& fitted, const NoiseModel& noise) {
       shape.id = pencil.id;
       shape.is_circle = false;
       shape.line = line.fit->line;
-      const double weight = noise.LineWeight(LineSigma(pencil, line), line.points, line.inliers);
-      news +=
-          weight < 1.0 ? News(weight, Coefficient(fitted.camera, line.points, line.inliers)) : 1.0;
+      news += OfLast(noise.LineWeight(LineSigma(pencil, line), line.points, line.inliers),
+                     fitted.camera, line.points, line.inliers);
     }
   }
   return now_.empty() ? 1.0 : news / static_cast<double>(now_.size());

@@ -3,6 +3,7 @@
 #define CIRCLINE_REFINE_FRAME_NEWS_H_
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -33,9 +34,10 @@ class FrameNews {
 
     double Distance2(const CalibratedPoint& p) const;  // Squared, pixels.
   };
-  // r of the shape that came last, of these points.
-  double Coefficient(const Camera& camera, const std::vector<Eigen::Vector2d>& points,
-                     const std::vector<std::uint8_t>& inliers);
+  // What the shape that came last, of these points, says. `weight`: how much of its variance is new
+  // in every frame (NoiseModel).
+  double OfLast(double weight, const Camera& camera, const std::vector<Eigen::Vector2d>& points,
+                const std::vector<std::uint8_t>& inliers);
 
   Kept<Shape> before_, now_;
   std::vector<CalibratedPoint> points_;

@@ -254,8 +254,7 @@ TEST_F(CalibrateTest, NamesPhotosOfGivenEvidenceThatCannotBeShown) {
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_CONTAINS(run.err, "view1.png: the file does not exist; no picture of it");
   const nlohmann::json calibration = ReadJson(Output() + "/calibration.json");
-  for (const auto& image : calibration["images"])
-    EXPECT_EQ(image["status"], "ok") << image["file"];
+  for (const auto& image : calibration["images"]) EXPECT_EQ(image["status"], "ok") << image["file"];
 }
 
 // Counted among the readable photos or not, the other one has a name; and COLMAP is told of less.
