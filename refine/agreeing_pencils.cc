@@ -2,15 +2,74 @@
 // others do.
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
 #include "circline/estimators/closed_form_solvers.h"
-#include "circline/refine/meeting_lines.h"
+#include "circline/estimators/line.h"
+#include "circline/estimators/noise_model.h"
+#include "circline/estimators/vanishing_point.h"
 #include "circline/refine/readings.h"
+#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {
+
+// Lines of a pencil, by their number in it.
+struct MeetingLines {
+  std::vector<std::size_t> odd;  // The others.
+  VanishingPointFit fit;         // Of those that meet.
+};
+
+// Those that meet where two do; a fit of zeros where these meet nowhere.
+MeetingLines MeetingAt(const std::vector<LineFit>& lines, std::size_t i, std::size_t j) {
+  MeetingLines meeting;
+  const VanishingPointFit& at = meeting.fit;
+  if (!FitVanishingPoint({lines[i], lines[j]}, &meeting.fit).ok()) return meeting;
+  std::vector<LineFit> agreeing;
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    const LineFit& l = lines[k];
+    const double of_line = at.direction.dot(l.covariance * at.direction),
+                 of_fit = l.line.dot(at.covariance * l.line), sigma = std::sqrt(of_line + of_fit);
+    if (k == i || k == j || std::abs(l.line.dot(at.direction)) <= kInlierSigmas * sigma) {
+      agreeing.push_back(l);
+    } else {
+      meeting.odd.push_back(k);
+    }
+  }
+  if (agreeing.size() > 2) FitVanishingPoint(agreeing, &meeting.fit);
+  return meeting;
+}
+
+// Sets of lines that meet where two of them do, as far as these and they themselves are known, each
+// once, those of most lines first: of three lines any two may be right. All lines are one set, with
+// the fit of `all`, where they agree with it, or are many.
+std::vector<MeetingLines> FindMeetingLines(const std::vector<LineFit>& lines,
+                                           const VanishingPointFit& all) {
+  constexpr std::size_t kMost = 12;    // Of more, the fit of all tells; for time, not tuned.
+  constexpr double kByChance = 0.002;  // Pencils of parallel lines that are looked at for nothing.
+  const std::size_t n = lines.size();
+  double squares = 0.0;
+  for (const LineFit& line : lines)
+    squares += std::pow(VanishingPointResidual(line, all.direction), 2.0);
+  if (n < 3 || n > kMost || squares <= ChiSquareLimit(static_cast<int>(n) - 2, kByChance))
+    return {{{}, all}};
+  std::vector<MeetingLines> found;
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = i + 1; j < n; ++j) {
+      MeetingLines meeting = MeetingAt(lines, i, j);
+      const bool is_known = std::any_of(found.begin(), found.end(), [&](const MeetingLines& other) {
+        return other.odd == meeting.odd;
+      });
+      if (!is_known && !meeting.fit.direction.isZero()) found.push_back(std::move(meeting));
+    }
+  }
+  std::stable_sort(found.begin(), found.end(), [](const MeetingLines& a, const MeetingLines& b) {
+    return a.odd.size() < b.odd.size();
+  });
+  return found;
+}
 
 struct Pencil {
   bool is_across = false;             // Along Z.

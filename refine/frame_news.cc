@@ -37,7 +37,7 @@ double FrameNews::OfLast(double weight, const Camera& camera,
     moved2 = std::min(moved2, std::max(0.0, sum / static_cast<double>(points_.size())));
   }
   const double r = std::exp(-0.5 * moved2);
-  return 1.0 / (weight + (1.0 - weight) * (1.0 + r) / (1.0 - r));
+  return (1.0 - r) / (weight * (1.0 - r) + (1.0 - weight) * (1.0 + r));
 }
 
 double FrameNews::Next(const Observations& fitted, const NoiseModel& noise) {

@@ -14,8 +14,7 @@ namespace circline::apps {
 constexpr double kMaxMegapixels = 100.0;
 
 // Grey or colour, 8 bits a channel, turned as its EXIF data say; of 16 bits, those that the photo
-// uses are scaled to 8. Returns what is wrong with the
-// file, in words; empty: nothing.
+// uses are scaled to 8. Returns what is wrong with the file, in words; empty: nothing.
 std::string ReadPhoto(const std::string& path, cv::Mat* photo,
                       double max_megapixels = kMaxMegapixels);
 

@@ -1,6 +1,7 @@
 #include "apps/common/scene.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <set>
 

@@ -287,9 +287,8 @@ class Assembler {
     for (PlacedPencil& pencil : pencils_) {
       if (!pencil.observation.plane.empty()) continue;
       if (!(RightAngle(pencil.along, x, options_.camera).LogOdds() > 0.0) ||
-          !(RightAngle(pencil.along, y, options_.camera).LogOdds() > 0.0)) {
+          !(RightAngle(pencil.along, y, options_.camera).LogOdds() > 0.0))
         continue;
-      }
       pencil.observation.direction = PencilDirection::kZ;
       return &pencil;
     }

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "circline/estimators/basics.h"
-#include "circline/estimators/circle_pose.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
@@ -39,14 +38,7 @@ DetectedPencil Pencil(const Vector3d& direction, double support) {
 // A circle of the plane with this normal, its conic known as a rim of 100 px radius would be.
 CircleEvidence Circle(const Vector3d& normal, double support,
                       const Vector3d& center = Vector3d(0.5, 0.2, 6.0), double variance = 1e-10) {
-  CirclePose pose;
-  pose.normal = normal.z() > 0.0 ? Vector3d(-normal.normalized()) : normal.normalized();
-  pose.center = center;
-  ConicFit fit;
-  fit.conic = ProjectCircle(pose);
-  const Vector6d v = ConicToVector(fit.conic);
-  const Matrix6d c = variance * (Matrix6d::Identity() - v * v.transpose());
-  for (int i = 0; i < 36; ++i) fit.covariance[static_cast<std::size_t>(i)] = c(i / 6, i % 6);
+  const ConicFit fit = detection_test::FitOfCircle(normal, center, variance);
   CircleEvidence circle;
   circle.observation.fit = fit;
   circle.num_normals = CircleNormals(fit, &circle.normals);
@@ -66,25 +58,6 @@ Observations Assemble(std::vector<CircleEvidence> circles, std::vector<DetectedP
 }
 
 const Matrix3d kFrame = ExpRotation(Vector3d(0.5, -0.3, 0.4));
-
-TEST(CircleNormals, BothAndTheirSpread) {
-  const Vector3d normal = Vector3d(0.3, 0.5, -1.0).normalized();
-  const CircleEvidence circle = Circle(normal, 100.0);
-  ASSERT_EQ(circle.num_normals, 2);
-  EXPECT_LT(std::min(AxisDeg(circle.normals[0].direction, normal),
-                     AxisDeg(circle.normals[1].direction, normal)),
-            1e-6);
-  for (const UncertainDirection& n : circle.normals) {
-    EXPECT_GT(n.covariance.trace(), 0.0);
-    EXPECT_NEAR(n.direction.dot(n.covariance * n.direction), 0.0, 0.01 * n.covariance.trace());
-  }
-  ConicFit worse = *circle.observation.fit;
-  worse.ScaleCovariance(4.0);
-  std::array<UncertainDirection, 2> normals;
-  CircleNormals(worse, &normals);
-  EXPECT_NEAR(normals[0].covariance.trace(), 4.0 * circle.normals[0].covariance.trace(),
-              1e-3 * normals[0].covariance.trace());
-}
 
 TEST(AssembleObservations, OrthogonalPencilsBecomeAxes) {
   const Observations found = Assemble(

@@ -15,6 +15,8 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/camera.h"
+#include "circline/estimators/circle_pose.h"
+#include "circline/estimators/conic_fit.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
 #include "tests/pinhole_camera.h"
@@ -146,6 +148,20 @@ inline std::string DataFolder() {
 
 inline bool HasSet(const std::string& name) {
   return std::ifstream(DataFolder() + "/" + name + "/groundtruth.yml").good();
+}
+
+// Of a circle of the plane with this normal, of radius 1; each number of its conic has `variance`.
+inline ConicFit FitOfCircle(const Eigen::Vector3d& normal, const Eigen::Vector3d& center,
+                            double variance) {
+  CirclePose pose;
+  pose.normal = normal.z() > 0.0 ? Eigen::Vector3d(-normal.normalized()) : normal.normalized();
+  pose.center = center;
+  ConicFit fit;
+  fit.conic = ProjectCircle(pose);
+  const Vector6d v = ConicToVector(fit.conic);
+  const Matrix6d c = variance * (Matrix6d::Identity() - v * v.transpose());
+  for (int i = 0; i < 36; ++i) fit.covariance[static_cast<std::size_t>(i)] = c(i / 6, i % 6);
+  return fit;
 }
 
 }  // namespace circline::detection_test

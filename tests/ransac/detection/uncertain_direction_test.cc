@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -162,6 +164,23 @@ TEST(UncertainDirection, DiscsTellTheirPlaneAsWellAsTheyState) {
     EXPECT_LT(nees, 2.4) << tilt_deg;
     EXPECT_GT(nees, 0.5) << tilt_deg;
   }
+}
+
+TEST(CircleNormals, BothAndTheirSpread) {
+  const Vector3d normal = Vector3d(0.3, 0.5, -1.0).normalized();
+  ConicFit fit = detection_test::FitOfCircle(normal, Vector3d(0.5, 0.2, 6.0), 1e-10);
+  std::array<UncertainDirection, 2> normals, worse;
+  ASSERT_EQ(CircleNormals(fit, &normals), 2);
+  EXPECT_LT(std::min(AxisDeg(normals[0].direction, normal), AxisDeg(normals[1].direction, normal)),
+            1e-6);
+  for (const UncertainDirection& n : normals) {
+    EXPECT_GT(n.covariance.trace(), 0.0);
+    EXPECT_NEAR(n.direction.dot(n.covariance * n.direction), 0.0, 0.01 * n.covariance.trace());
+  }
+  fit.ScaleCovariance(4.0);
+  CircleNormals(fit, &worse);
+  EXPECT_NEAR(worse[0].covariance.trace(), 4.0 * normals[0].covariance.trace(),
+              1e-3 * worse[0].covariance.trace());
 }
 
 }  // namespace
