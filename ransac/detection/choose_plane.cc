@@ -5,10 +5,10 @@
 #include <cmath>
 #include <utility>
 
-#include "circline/estimators/conic.h"
 #include "circline/ransac/detection/line_odds.h"
 #include "circline/ransac/detection/pencil_fitter.h"
 #include "circline/ransac/detection/segment_meetings.h"
+#include "circline/ransac/detection/solid_rims.h"
 
 namespace circline {
 namespace {
@@ -90,31 +90,6 @@ struct Sides {
   }
 };
 
-// Of each circle the others about whose middle it is, or that are about its own, but that are not
-// concentric with it: such are edges of one solid (the rims of a cup, a saucer, a collar, a wheel),
-// at different heights, rounded. None is an exact circle: a plane that they share would choose one
-// of two poses by how they err.
-std::vector<std::vector<int>> OfOneSolid(const std::vector<CircleEvidence>& circles) {
-  // Centres apart by this share of the larger one's semi-minor axis. What lies on a disc by chance
-  // is within it once in ten times.
-  constexpr double kSameMiddle = 0.3;
-  std::vector<std::vector<int>> others(circles.size());
-  std::vector<Ellipse> ellipses(circles.size());
-  for (std::size_t i = 0; i < circles.size(); ++i) {
-    const CircleObservation& a = circles[i].observation;
-    ConicToEllipse(a.fit->conic, &ellipses[i]);  // Fits of contours are ellipses.
-    for (std::size_t j = 0; j < i; ++j) {
-      const CircleObservation& b = circles[j].observation;
-      if (!a.concentric.empty() && a.concentric == b.concentric) continue;
-      const double apart = (ellipses[i].center - ellipses[j].center).norm();
-      if (!(apart < kSameMiddle * std::max(ellipses[i].b, ellipses[j].b))) continue;
-      others[i].push_back(static_cast<int>(j));
-      others[j].push_back(static_cast<int>(i));
-    }
-  }
-  return others;
-}
-
 // The lines of the region in which lines of about the directions of two pencils form corners.
 std::vector<int> LinesWhereTheyMeet(const std::vector<DetectedLine>& lines,
                                     const std::array<DetectedPencil, 2>& pair, double diagonal_px) {
@@ -146,7 +121,7 @@ class PlaneChooser {
   // All must outlive it.
   PlaneChooser(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
                const std::vector<CircleEvidence>& circles)
-      : options_(options), lines_(lines), circles_(circles), of_one_solid_(OfOneSolid(circles)) {}
+      : options_(options), lines_(lines), circles_(circles), rims_(circles) {}
 
   Plane OfCircles() const {
     Plane best;
@@ -174,16 +149,13 @@ class PlaneChooser {
 
  private:
   // The best supported rim of a solid speaks for all.
-  bool IsOfSolidIn(const Plane& plane, std::size_t i) const {
-    return std::find_first_of(plane.circles.begin(), plane.circles.end(), of_one_solid_[i].begin(),
-                              of_one_solid_[i].end()) != plane.circles.end();
-  }
-
   void AddCircles(Plane* plane) const {
     for (std::size_t i = 0; i < circles_.size(); ++i) {
-      if (IsOfSolidIn(*plane, i) || !CanLieIn(*circles_[i].observation.fit, plane->normal))
+      const int circle = static_cast<int>(i);
+      if (rims_.IsSilent(circle, plane->circles, plane->normal.direction) ||
+          !CanLieIn(*circles_[i].observation.fit, plane->normal))
         continue;
-      plane->circles.push_back(static_cast<int>(i));
+      plane->circles.push_back(circle);
       plane->support_px += kCircleWeight * circles_[i].support_px;
     }
   }
@@ -285,7 +257,7 @@ class PlaneChooser {
   const AssemblyOptions& options_;
   const std::vector<DetectedLine>& lines_;
   const std::vector<CircleEvidence>& circles_;
-  const std::vector<std::vector<int>> of_one_solid_;  // Of circles_.
+  const SolidRims rims_;  // Of circles_.
 };
 
 }  // namespace
