@@ -38,9 +38,12 @@ struct PieceSums {
   }
 };
 
-// Pieces of so many pixels of a contour, nothing where its conic is no ellipse.
+// Pieces of a contour, nothing where its conic is no ellipse: of so many pixels, or where there are
+// few of these of twelfths of the way round, which show what is off three to six times around, as
+// thick and sawn rims are; of four points or more.
 PieceSums SumPieces(const std::vector<CalibratedPoint>& points, const Eigen::Matrix3d& conic,
-                    double length_px) {
+                    double most_px) {
+  constexpr double kPieces = 12.0, kLeastPoints = 4.0;
   // Bins of eccentric anomaly, each shorter than a piece of all but the largest.
   constexpr int kNumBins = 256;
   std::array<Piece, kNumBins> bins{};
@@ -60,14 +63,18 @@ PieceSums SumPieces(const std::vector<CalibratedPoint>& points, const Eigen::Mat
     bins[std::min<std::size_t>(bin, kNumBins - 1)] += {1.0, distance, distance * distance};
   }
   const double px_per_calibrated = static_cast<double>(points.size()) / calibrated_per_px;
+  const double a = ellipse.a, b = ellipse.b;  // Perimeter after Ramanujan.
+  const double around_px =
+      px_per_calibrated * kPi * (3.0 * (a + b) - std::sqrt((3.0 * a + b) * (a + 3.0 * b)));
+  const double num_pieces = std::min(kPieces, static_cast<double>(points.size()) / kLeastPoints);
+  const double length_px = std::min(most_px, around_px / num_pieces);
   const double step = 2.0 * kPi / kNumBins;
   const Eigen::Rotation2Dd turn(step);
   Eigen::Vector2d around(-1.0, 0.0);
   Piece piece;
   double length = 0.0;
   for (const Piece& bin : bins) {
-    const double bin_px =
-        step * px_per_calibrated * std::hypot(ellipse.a * around.y(), ellipse.b * around.x());
+    const double bin_px = step * px_per_calibrated * std::hypot(a * around.y(), b * around.x());
     if (length + bin_px > length_px) {
       sums.Add(piece);
       piece = Piece();
