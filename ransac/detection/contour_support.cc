@@ -119,6 +119,10 @@ void EdgeCollector::Take(const std::vector<int>& points) {
   for (const int i : points) taken_[static_cast<std::size_t>(i)] = 1;
 }
 
+void EdgeCollector::Release(const std::vector<int>& points) {
+  for (const int i : points) taken_[static_cast<std::size_t>(i)] = 0;
+}
+
 double EdgeCollector::QuickLook(const std::vector<ContourSample>& samples, BrightSide bright,
                                 double reach) const {
   const auto hits = std::count_if(samples.begin(), samples.end(), [&](const ContourSample& s) {

@@ -70,6 +70,7 @@ class EdgeCollector {
 
   // Marks points as belonging to an accepted ellipse: they support no other.
   void Take(const std::vector<int>& points);
+  void Release(const std::vector<int>& points);
   bool IsTaken(int i) const { return taken_[static_cast<std::size_t>(i)] != 0; }
 
   // A first look with few samples: the share of them near which there are edge points with the

@@ -9,6 +9,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
+#include "circline/estimators/conic_fit.h"
 #include "circline/ransac/detection/arcs.h"
 #include "circline/ransac/detection/ellipse_fitter.h"
 
@@ -34,6 +35,8 @@ constexpr double kRimStep = 0.05;
 // What hides up to half of a rim runs beside it within this ratio of its size, but for a tenth of
 // its edges, and where the rim has edges on no more than a quarter of the way. Of renderings.
 constexpr double kMostHidden = 0.5, kBesideRatio = 1.25, kStraysBeside = 0.1, kMostShared = 0.25;
+// Of the edges of an outline a rim within it gets back so much of the way round, degrees.
+constexpr double kLeastShared = 60.0;
 constexpr std::size_t kSectors = 72;  // Of the way round a rim.
 // Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
 constexpr double kDuplicatePx = 2.5;
@@ -80,6 +83,7 @@ class EllipseDetector {
       AddRims(accepted_[k].fit.conic);
       AcceptBest();
     }
+    ShareFarSides();
     DropWhatHides();
     Rank();
     return std::move(accepted_);
@@ -182,6 +186,47 @@ class EllipseDetector {
     return false;
   }
 
+  // The far side of the top of a thing is that of its outline, too, which took its edges.
+  void ShareFarSides() {
+    for (DetectedEllipse& rim : accepted_) {
+      if (rim.coverage_deg > 360.0 * kMostHidden) continue;
+      for (const DetectedEllipse& outline : accepted_) {
+        if (outline.coverage_deg < rim.coverage_deg + kLeastShared) continue;
+        fitter_.Release(outline);
+        fitter_.Release(rim);
+        DetectedEllipse whole;
+        EllipseCandidate start;
+        start.bright = BrightSide::kEither;
+        const bool is_whole = FitTogether(rim, outline, &start.conic) &&
+                              fitter_.Fit(start, &whole) &&
+                              whole.coverage_deg > rim.coverage_deg + kLeastShared &&
+                              fitter_.LiesOn(rim, whole.fit.conic, kDuplicatePx) &&
+                              !fitter_.LiesOn(whole, outline.fit.conic, kDuplicatePx);
+        if (is_whole) rim = std::move(whole);
+        fitter_.Take(rim);
+        fitter_.Take(outline);
+        if (is_whole) break;
+      }
+    }
+  }
+
+  // To the edges of a rim, and to those of an outline where the rim has none.
+  bool FitTogether(const DetectedEllipse& rim, const DetectedEllipse& outline, Matrix3d* conic) {
+    Ellipse about;
+    if (!ConicToEllipse(outline.fit.conic, &about)) return false;
+    double strays = 0.0;
+    const std::bitset<kSectors> of_rim = SectorsOf(rim, about, &strays);
+    std::vector<CalibratedPoint> points;
+    CalibratedPoint p;
+    for (const int i : rim.points) {
+      if (fitter_.Calibrate(i, &p)) points.push_back(p);
+    }
+    for (const int i : outline.points) {
+      if (fitter_.Calibrate(i, &p) && !of_rim.test(SectorOf(InAxes(p, about)))) points.push_back(p);
+    }
+    return FitConicDirect(points, conic).ok();
+  }
+
   void DropWhatHides() {
     std::vector<DetectedEllipse> kept;
     for (const DetectedEllipse& arc : accepted_) {
@@ -206,19 +251,28 @@ class EllipseDetector {
     return static_cast<double>(shared.count()) <= kMostShared * static_cast<double>(of_arc.count());
   }
 
+  // Where a point lies in an ellipse's own axes.
+  static Vector2d InAxes(const CalibratedPoint& p, const Ellipse& about) {
+    return (Eigen::Rotation2Dd(-about.angle) * (p.x - about.center))
+        .cwiseQuotient(Vector2d(about.a, about.b));
+  }
+
+  static std::size_t SectorOf(const Vector2d& in_axes) {
+    const double turn = std::atan2(in_axes.y(), in_axes.x()) / (2.0 * kPi) + 0.5;
+    return static_cast<std::size_t>(turn * kSectors) % kSectors;
+  }
+
   // Those of the way round an ellipse where edges of one are; adds to `strays` how many of these
   // are not beside it.
   std::bitset<kSectors> SectorsOf(const DetectedEllipse& e, const Ellipse& about, double* strays) {
     std::bitset<kSectors> sectors;
-    const Eigen::Rotation2Dd onto_axes(-about.angle);
     for (const int i : e.points) {
       CalibratedPoint p;
       if (!fitter_.Calibrate(i, &p)) continue;
-      const Vector2d unit =
-          (onto_axes * (p.x - about.center)).cwiseQuotient(Vector2d(about.a, about.b));
-      const double ratio = unit.norm(), turn = std::atan2(unit.y(), unit.x()) / (2.0 * kPi) + 0.5;
+      const Vector2d in_axes = InAxes(p, about);
+      const double ratio = in_axes.norm();
       *strays += std::max(ratio, 1.0 / ratio) > kBesideRatio ? 1.0 : 0.0;
-      sectors.set(static_cast<std::size_t>(turn * kSectors) % kSectors);
+      sectors.set(SectorOf(in_axes));
     }
     return sectors;
   }

@@ -50,6 +50,7 @@ class EllipseFitter {
 
   // Marks the ellipse's points: they support no other.
   void Take(const DetectedEllipse& e) { collector_.Take(e.points); }
+  void Release(const DetectedEllipse& e) { collector_.Release(e.points); }
   bool IsTaken(int i) const { return collector_.IsTaken(i); }
 
   // An edge point; false where the camera cannot undistort it.

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <opencv2/core.hpp>
 #include <utility>
 #include <vector>
 
@@ -10,6 +13,8 @@
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/conic_fit.h"
+#include "circline/ransac/detection/detect_ellipses.h"
+#include "circline/ransac/detection/edges.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
 namespace circline {
@@ -53,6 +58,17 @@ CircleEvidence Contour(const Vector3d& center, const Vector3d& below, bool is_ar
   return circle;
 }
 
+// How far the better of a circle's two normals is from the table's.
+double OffDeg(const ConicFit& fit) {
+  std::array<UncertainDirection, 2> normals;
+  double off_deg = 90.0;
+  for (int k = CircleNormals(fit, &normals) - 1; k >= 0; --k) {
+    const Vector3d& normal = normals[static_cast<std::size_t>(k)].direction;
+    off_deg = std::min(off_deg, detection_test::AxisDeg(normal, kUp));
+  }
+  return off_deg;
+}
+
 CircleEvidence Outline(const Vector3d& top) { return Contour(top, top - kThickness * kUp, true); }
 CircleEvidence Rim(const Vector3d& center) { return Contour(center, center, true); }
 CircleEvidence Floor(const Vector3d& mouth) {
@@ -70,6 +86,27 @@ TEST(SolidRims, TakeTheTopOfWhatStandsOutAndTheMouthOfAHollow) {
   const Vector3d down(0.1, 0.8, -1.0);
   EXPECT_FALSE(coin.IsSilent(0, {}, down.normalized()));
   EXPECT_TRUE(coin.IsSilent(1, {}, down.normalized()));
+}
+
+// The outline, which goes all the way round, has the far edge of the top for its own.
+TEST(SolidRims, TheTopOfACoinIsFoundWhole) {
+  const Camera camera = detection_test::TestCamera();
+  const Vector3d top(0.3, 0.2, 5.0);
+  constexpr int kSlices = 24;
+  std::vector<Eigen::Matrix3d> slices;
+  for (int k = 0; k <= kSlices; ++k) slices.push_back(Image(top - k * kThickness / kSlices * kUp));
+  const cv::Mat image = detection_test::Develop(
+      detection_test::Render(camera.width, camera.height, [&](double u, double v) {
+        const Vector3d p((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
+        const auto covers = [&](const Eigen::Matrix3d& slice) { return p.dot(slice * p) < 0.0; };
+        if (covers(slices[0])) return 170.0;
+        return std::any_of(slices.begin(), slices.end(), covers) ? 40.0 : 230.0;
+      }));
+  int tops = 0;
+  for (const DetectedEllipse& e : DetectEllipses(DetectEdges(image), camera, EllipseOptions())) {
+    tops += OffDeg(e.fit) < 0.5 && e.coverage_deg > 300.0 ? 1 : 0;
+  }
+  EXPECT_EQ(tops, 1);
 }
 
 // A wheel's hub may pass for concentric with its rim, in one of two poses; its tyre does not.
@@ -91,11 +128,7 @@ TEST(SolidRims, CoinsLieWhereTheirTopsDo) {
   AssembleObservations({}, {}, {}, &circles, &pencils, &found);
   ASSERT_EQ(found.circles.size(), 4u);
   for (const CircleObservation& circle : found.circles) {
-    std::array<UncertainDirection, 2> normals;
-    double off_deg = 90.0;
-    for (int k = CircleNormals(*circle.fit, &normals) - 1; k >= 0; --k)
-      off_deg = std::min(
-          off_deg, detection_test::AxisDeg(normals[static_cast<std::size_t>(k)].direction, kUp));
+    const double off_deg = OffDeg(*circle.fit);
     EXPECT_EQ(circle.plane == "p0", off_deg < 0.5) << off_deg;
     EXPECT_TRUE(circle.plane == "p0" || off_deg > 2.0) << off_deg;
   }
