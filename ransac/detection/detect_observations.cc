@@ -22,6 +22,10 @@ using Eigen::Vector2d;
 // A photo has no more directions worth telling apart.
 constexpr int kMostDirections = 100;
 
+// Where nothing tells a pose, edges of this share of the usual contrast are looked at: in haze, in
+// the dark.
+constexpr double kFaint = 0.5;
+
 std::vector<CircleEvidence> MakeCircles(const EdgeMap& edges,
                                         const std::vector<DetectedEllipse>& ellipses,
                                         const Camera& camera, const NoiseModel& noise) {
@@ -55,6 +59,22 @@ PhotoEvidence CollectEvidence(const EdgeMap& edges, const Camera& camera,
   return evidence;
 }
 
+void Observe(const EdgeMap& edges, const Camera& camera, const DetectionOptions& options,
+             Observations* observations) {
+  *observations = Observations();
+  observations->camera = camera;
+  observations->camera.width = edges.width;
+  observations->camera.height = edges.height;
+  const double diagonal_px = DiagonalPx(edges.width, edges.height);
+  const auto collect = [&](const Camera& through) {
+    return CollectEvidence(edges, through, options);
+  };
+  PhotoEvidence evidence = options.noise_model.camera.IsWide()
+                               ? LookForFocal(collect, options, diagonal_px, observations)
+                               : collect(observations->camera);
+  ObserveEvidence(options, diagonal_px, &evidence, observations);
+}
+
 }  // namespace
 
 Status DetectionOptions::Validate() const {
@@ -84,17 +104,10 @@ Status DetectObservations(const cv::Mat& image, const Camera& camera,
   Status status = CheckDetectionInput(image, camera, options);
   if (status.ok()) status = ToGray(image, &gray);
   if (!status.ok()) return status;
-  observations->camera.width = image.cols;
-  observations->camera.height = image.rows;
-  const EdgeMap edges = DetectEdges(gray);
-  const double diagonal_px = DiagonalPx(image.cols, image.rows);
-  const auto collect = [&](const Camera& through) {
-    return CollectEvidence(edges, through, options);
-  };
-  PhotoEvidence evidence = options.noise_model.camera.IsWide()
-                               ? LookForFocal(collect, options, diagonal_px, observations)
-                               : collect(observations->camera);
-  ObserveEvidence(options, diagonal_px, &evidence, observations);
+  for (const double faintness : {1.0, kFaint}) {
+    Observe(DetectEdges(gray, kEdgeSmoothingPx, nullptr, faintness), camera, options, observations);
+    if (!observations->circles.empty() || observations->pencils.size() > 1) break;
+  }
   return Status::Ok();
 }
 

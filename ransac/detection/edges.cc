@@ -224,14 +224,16 @@ double CurvatureBias(const EdgePoint& point, double blur_px, double curvature) {
   return 0.5 * curvature * (variance + (1.0 - cosine * cosine) * (1.0 - 3.0 * offset * offset));
 }
 
-EdgeMap DetectEdges(const cv::Mat& gray, double smoothing_px, const std::vector<cv::Rect>* within) {
+EdgeMap DetectEdges(const cv::Mat& gray, double smoothing_px, const std::vector<cv::Rect>* within,
+                    double faintness) {
   EdgeMap edges;
   edges.width = gray.cols;
   edges.height = gray.rows;
   edges.gray = gray;
   edges.gradient_noise = GradientNoise(EstimateNoise(gray), smoothing_px);
-  const double low = RaiseToNoise(kLowGradient, kLowNoiseFactor, edges.gradient_noise);
-  const double high = RaiseToNoise(kHighGradient, kHighNoiseFactor, edges.gradient_noise);
+  const double low = RaiseToNoise(faintness * kLowGradient, kLowNoiseFactor, edges.gradient_noise);
+  const double high =
+      RaiseToNoise(faintness * kHighGradient, kHighNoiseFactor, edges.gradient_noise);
   const std::vector<std::int32_t> pixels = FindEdgePoints(smoothing_px, low, within, &edges);
   ChainEdgePoints(pixels, high, &edges);
   return edges;

@@ -83,9 +83,10 @@ Status ToGray(const cv::Mat& image, cv::Mat* gray);
 // `gray` is 8-bit with one channel, not empty. `smoothing_px` is the standard deviation of the
 // smoothing, in [0.5, 5]: more finds fainter edges in noise, less resolves finer structure and
 // rounds corners less. `within` (optional): only in these rectangles, as in FindEdgePoints; chains
-// end at their borders. About 2 ms for a 640x480 photo.
+// end at their borders. `faintness`: edges of that share of the usual contrast count. About 2 ms
+// for a 640x480 photo.
 EdgeMap DetectEdges(const cv::Mat& gray, double smoothing_px = kEdgeSmoothingPx,
-                    const std::vector<cv::Rect>* within = nullptr);
+                    const std::vector<cv::Rect>* within = nullptr, double faintness = 1.0);
 
 // Fills the points of `map`, row by row, and its index from its grey photo; no chains. Returns
 // where each point stands in the index. The outermost pixels hold no points. `low` is the weakest

@@ -43,6 +43,22 @@ TEST(DetectObservations, NothingIsInvented) {
   }
 }
 
+// A disc in haze, ten grey levels darker than what is around it: its edges count where there are no
+// others; beside a disc of full contrast they do not.
+TEST(DetectObservations, LooksForFaintEdgesWhereNothingElseTells) {
+  const Camera camera = TestCamera();
+  const CameraPose pose = LookAt(40.0, 10.0, 0.0, 8.0);
+  for (const bool has_other : {false, true}) {
+    const cv::Mat image = Develop(RenderPlane(camera, pose, 200.0, [&](double x, double y) {
+      if (std::hypot(x + 1.0, y) < 0.8) return 190.0;
+      return has_other && std::hypot(x - 1.4, y) < 0.5 ? 60.0 : 200.0;
+    }));
+    const Observations found = Detect(image, camera);
+    ASSERT_EQ(found.circles.size(), 1U) << has_other;
+    EXPECT_EQ(found.circles[0].points[0].x() > camera.cx, has_other);
+  }
+}
+
 // Noise of every scale from 1 to 16 pixels, of full contrast.
 cv::Mat Texture(int width, int height, std::uint64_t seed) {
   cv::Mat sum(height, width, CV_32F, cv::Scalar(128.0));
