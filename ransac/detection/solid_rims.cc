@@ -13,8 +13,9 @@ namespace circline {
 namespace {
 
 // About one middle: centres apart by this share of the larger one's semi-minor axis. What lies on a
-// disc by chance is within it once in ten times.
-constexpr double kSameMiddle = 0.3;
+// disc by chance is within it once in ten times. Or within the other, and of more than this share
+// of its size: the hub of a wheel and the tyre's outline, seen from the side.
+constexpr double kSameMiddle = 0.3, kLargeWithin = 0.5;
 // Touching: of the gaps between two rims, over the outer one's semi-minor axis, the least is such a
 // share of the largest, and that is neither an error of the fits nor a thing of its own (a cup on a
 // saucer). On rendered tables, streets and wheels; of photographs none had a part.
@@ -38,6 +39,18 @@ Gaps GapsBetween(const Ellipse& outer, const Ellipse& inner) {
   return gaps;
 }
 
+double Size(const Ellipse& e) { return std::sqrt(e.a * e.b); }
+
+bool AreOfOneSolid(const Ellipse& outer, const Ellipse& inner, const Gaps& gaps) {
+  return (outer.center - inner.center).norm() < kSameMiddle * std::max(outer.b, inner.b) ||
+         (gaps.least > 0.0 && Size(inner) > kLargeWithin * Size(outer));
+}
+
+bool AreTouching(const Gaps& gaps) {
+  return std::abs(gaps.least) < kMostLeast * gaps.most && gaps.most > kLeastGap &&
+         gaps.most < kMostGap;
+}
+
 // Where the far side of a plane lies in the photo from a point of it, calibrated.
 Eigen::Vector2d FarSide(const Eigen::Vector2d& point, const Eigen::Vector3d& normal) {
   const Eigen::Vector3d ray = point.homogeneous().normalized();
@@ -55,16 +68,14 @@ SolidRims::SolidRims(const std::vector<CircleEvidence>& circles) : rims_(circles
     for (std::size_t j = 0; j < i; ++j) {
       const CircleObservation& b = circles[j].observation;
       if (!a.concentric.empty() && a.concentric == b.concentric) continue;
-      const double apart = (ellipses[i].center - ellipses[j].center).norm();
-      if (!(apart < kSameMiddle * std::max(ellipses[i].b, ellipses[j].b))) continue;
+      const bool is_outer = Size(ellipses[i]) > Size(ellipses[j]);
+      const std::size_t outer = is_outer ? i : j, inner = is_outer ? j : i;
+      if ((ellipses[i].center - ellipses[j].center).norm() > ellipses[outer].a) continue;
+      const Gaps gaps = GapsBetween(ellipses[outer], ellipses[inner]);
+      if (!AreOfOneSolid(ellipses[outer], ellipses[inner], gaps)) continue;
       rims_[i].others.push_back(static_cast<int>(j));
       rims_[j].others.push_back(static_cast<int>(i));
-      const bool is_outer = ellipses[i].a * ellipses[i].b > ellipses[j].a * ellipses[j].b;
-      const std::size_t outer = is_outer ? i : j, inner = is_outer ? j : i;
-      const Gaps gaps = GapsBetween(ellipses[outer], ellipses[inner]);
-      if (!(std::abs(gaps.least) < kMostLeast * gaps.most) || gaps.most < kLeastGap ||
-          gaps.most > kMostGap)
-        continue;
+      if (!AreTouching(gaps)) continue;
       const Eigen::Vector2d& center = ellipses[outer].center;
       const Eigen::Vector2d towards = ellipses[inner].center - center;
       rims_[outer].touches.push_back({true, center, towards});
