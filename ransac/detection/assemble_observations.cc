@@ -16,19 +16,18 @@
 #include "circline/ransac/detection/orthogonal_evidence.h"
 #include "circline/ransac/detection/pencil_fitter.h"
 #include "circline/ransac/detection/segment_meetings.h"
+#include "circline/ransac/detection/solid_rims.h"
 #include "circline/ransac/detection/third_direction.h"
 
 namespace circline {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // A further pencil of the plane meets its lines over this share of its length.
 constexpr double kMinMeetingShare = 0.4;
 // Or lies in the convex hull of its circles, widened by this factor: a plate reaches beyond them.
 constexpr double kCirclesGrowth = 2.0;
-
 // Evidence of a pencil (LogOddsOfDirection) that no box outweighs: six edges along two of its axes,
 // at four each.
 constexpr double kMostOddsOfABox = 24.0;
@@ -64,7 +63,7 @@ class Assembler {
   void AddGrid(const Camera& camera, const Plane& of_circles) {
     if (of_circles.circles.empty()) return;
     // All circles: on small ones the normal is too uncertain to tell who belongs to the plane.
-    std::vector<Matrix3d> conics;
+    std::vector<Eigen::Matrix3d> conics;
     for (const CircleEvidence& circle : circles_) conics.push_back(circle.observation.fit->conic);
     for (DetectedPencil& row : FindGridPencils(camera, conics, of_circles.normal.direction))
       pencils_.emplace_back(std::move(row)).of_grid = true;
@@ -83,11 +82,13 @@ class Assembler {
       const CircleEvidence& circle = circles_[static_cast<std::size_t>(plane->circles[0])];
       normals.assign(circle.normals.begin(), circle.normals.begin() + circle.num_normals);
     }
-    std::vector<Vector3d> vectors;
-    for (const UncertainDirection& normal : normals) vectors.push_back(normal.direction);
-    std::optional<FoundBox> box = FindBox(AllLines(), vectors, options_.diagonal_px);
+    std::vector<Vector3d> axes;
+    for (const UncertainDirection& normal : normals) axes.push_back(normal.direction);
+    std::optional<FoundBox> box = FindBox(AllLines(), axes, options_.diagonal_px);
     if (!box) return false;
     plane->normal = normals[box->given];
+    int& rim = plane->circles[0];
+    if (normals.size() > 1) rim = SolidRims(circles_).RimOf(rim, plane->normal.direction);
     PlaceBox(&*box);
     return true;
   }
@@ -318,11 +319,9 @@ class Assembler {
       if (static_cast<int>(observations->pencils.size()) >= options_.max_pencils) break;
       // Old houses have verticals a degree apart: what is nearly parallel to a better supported
       // pencil says nothing new, and no plane is spanned by both.
-      const Vector3d& v = pencil.along.direction;
-      if (std::any_of(directions.begin(), directions.end(),
-                      [&](const Vector3d& direction) { return AreAlike(v, direction); }))
-        continue;
-      directions.push_back(v);
+      const auto is_like = [&](const Vector3d& v) { return AreAlike(v, pencil.along.direction); };
+      if (std::any_of(directions.begin(), directions.end(), is_like)) continue;
+      directions.push_back(pencil.along.direction);
       const std::string number = std::to_string(observations->pencils.size());
       pencil.observation.id = "L" + number;
       // Directions of different things: without a plane each they would be taken to span one.

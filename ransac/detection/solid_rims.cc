@@ -78,8 +78,8 @@ SolidRims::SolidRims(const std::vector<CircleEvidence>& circles) : rims_(circles
       if (!AreTouching(gaps)) continue;
       const Eigen::Vector2d& center = ellipses[outer].center;
       const Eigen::Vector2d towards = ellipses[inner].center - center;
-      rims_[outer].touches.push_back({true, center, towards});
-      rims_[inner].touches.push_back({false, center, towards});
+      rims_[outer].touches.push_back({static_cast<int>(inner), true, center, towards});
+      rims_[inner].touches.push_back({static_cast<int>(outer), false, center, towards});
     }
   }
   AddConcentric(circles);
@@ -104,9 +104,19 @@ bool SolidRims::IsSilent(int i, const std::vector<int>& members,
   const Rim& rim = rims_[static_cast<std::size_t>(i)];
   return std::find_first_of(members.begin(), members.end(), rim.others.begin(), rim.others.end()) !=
              members.end() ||
-         std::any_of(rim.touches.begin(), rim.touches.end(), [&](const Touch& touch) {
-           return touch.is_outer == (touch.towards.dot(FarSide(touch.center, normal)) > 0.0);
-         });
+         std::any_of(rim.touches.begin(), rim.touches.end(),
+                     [&](const Touch& touch) { return touch.IsOutline(normal); });
+}
+
+bool SolidRims::Touch::IsOutline(const Eigen::Vector3d& normal) const {
+  return is_outer == (towards.dot(FarSide(center, normal)) > 0.0);
+}
+
+int SolidRims::RimOf(int i, const Eigen::Vector3d& normal) const {
+  for (const Touch& touch : rims_[static_cast<std::size_t>(i)].touches) {
+    if (touch.IsOutline(normal)) return touch.other;
+  }
+  return i;
 }
 
 }  // namespace circline

@@ -20,14 +20,22 @@ class SolidRims {
   // another rim of its solid is among them, or it is no rim there, but an outline.
   bool IsSilent(int i, const std::vector<int>& members, const Eigen::Vector3d& normal) const;
 
+  // The rim that circle `i` is taken for in a plane with this normal: its own, or where it is an
+  // outline there the one that it touches.
+  int RimOf(int i, const Eigen::Vector3d& normal) const;
+
  private:
   // Two rims that touch on one side. Seen from above, that is the far side of a thing that stands
   // out, whose top is the inner one, and the outer one goes over to its foot; of a hollow it is the
   // near side, and the inner one goes over from its floor to its mouth.
   struct Touch {
+    int other;
     bool is_outer;
     Eigen::Vector2d center;   // Of the outer one, calibrated.
     Eigen::Vector2d towards;  // The side, from there.
+
+    // Whether this is the rim that goes over to the other's height.
+    bool IsOutline(const Eigen::Vector3d& normal) const;
   };
   struct Rim {
     std::vector<int> others;  // Of its solid.

@@ -82,6 +82,9 @@ TEST(SolidRims, TakeTheTopOfWhatStandsOutAndTheMouthOfAHollow) {
   EXPECT_FALSE(coin.IsSilent(1, {}, kUp));
   EXPECT_FALSE(bowl.IsSilent(0, {}, kUp));
   EXPECT_TRUE(bowl.IsSilent(1, {}, kUp));
+  EXPECT_EQ(coin.RimOf(0, kUp), 1);
+  EXPECT_EQ(coin.RimOf(1, kUp), 1);
+  EXPECT_EQ(bowl.RimOf(1, kUp), 0);
   // Seen from below, as a lamp on a ceiling is, it is the other way round.
   const Vector3d down(0.1, 0.8, -1.0);
   EXPECT_FALSE(coin.IsSilent(0, {}, down.normalized()));
