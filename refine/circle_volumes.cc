@@ -11,8 +11,10 @@
 namespace circline {
 namespace {
 
-// Log determinant of the covariance of where a circle's centre is seen (two angles, radians) and of
-// how large it is there (the logarithm of radius over distance), rotation and focal length given.
+// Log determinant of the covariance of where a circle's centre is seen (two angles, radians, times
+// the focal length over that of the camera: the photo has as much room whatever its focal length)
+// and of how large it is there (the logarithm of radius over distance), rotation and focal length
+// given.
 double LogVolume(const JointProblem& problem, const State& state, const Linearization& at,
                  const JointProblem::CircleBlocks& circle) {
   std::vector<int> given = at.Columns(JointProblem::kRotation), columns;
@@ -42,7 +44,8 @@ double LogVolume(const JointProblem& problem, const State& state, const Lineariz
   add(circle.radius, Eigen::Vector3d(0.0, 0.0, 1.0 / radius));
   const Eigen::MatrixXd C = at.Covariance(columns), by_given = seen * C.leftCols(num_given);
   const Eigen::MatrixXd C_given = C.topLeftCorner(num_given, num_given);
-  return LogDetOfKnown(seen * C * seen.transpose() -
+  return 4.0 * problem.LogFocalAt(state) +
+         LogDetOfKnown(seen * C * seen.transpose() -
                        by_given *
                            C_given.completeOrthogonalDecomposition().solve(by_given.transpose()));
 }

@@ -82,6 +82,44 @@ TEST(GuessedFocalLength, IsKnownAsWellAsShortEdgesTellIt) {
   EXPECT_GT(rms, 0.5);
 }
 
+// The photo has as much room for a circle at every focal length, so that a circle given three
+// times, each with the square root of three times the noise, says no more than once: not that a
+// short one is likelier, under which circles fill more of what can be seen.
+TEST(GuessedFocalLength, IsNoShorterForMoreCircles) {
+  constexpr std::uint64_t kScenes = 40;
+  int compared = 0;
+  for (std::uint64_t seed = 1; seed <= kScenes; ++seed) {
+    Random draw(seed);
+    PlaneScene scene(draw.Uniform(0.2, 0.6), 0.5, seed);
+    scene.camera.distortion = {};
+    Observations once = scene.Empty();
+    once.circles = {scene.Circle("c0", draw.Uniform(-1.0, 1.0), draw.Uniform(-1.0, 1.0), 1.0)};
+    const double turn = draw.Uniform(0.0, kPi);
+    once.pencils = {scene.Pencil("x", PencilDirection::kX,
+                                 Eigen::Vector3d(std::cos(turn), std::sin(turn), 0.0))};
+    Observations thrice = once;
+    thrice.circles.assign(3, once.circles[0]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      thrice.circles[k].id = "c" + std::to_string(k);
+      thrice.circles[k].sigma_px *= std::sqrt(3.0);
+    }
+    EstimationOptions options = Guessed();
+    options.noise_model = NoiseModel::Exact();
+    // Of the longer one of two; the logarithm.
+    const auto odds = [&](const Observations& observations) {
+      const PoseEstimate estimate = EstimatePose(observations, options);
+      if (estimate.hypotheses.size() != 2) return std::nan("");
+      const PoseHypothesis &a = estimate.hypotheses[0], &b = estimate.hypotheses[1];
+      return std::copysign(std::log(a.probability / b.probability), a.focal_scale - b.focal_scale);
+    };
+    const double one = odds(once);
+    if (!std::isfinite(one)) continue;
+    ++compared;
+    EXPECT_NEAR(odds(thrice), one, 0.7) << seed;
+  }
+  EXPECT_GE(compared, 5);
+}
+
 // Evidence that knows the focal length of another camera than the one given says so.
 TEST(GuessedFocalLength, FarFromWhatWasGivenIsSaid) {
   for (const bool is_far : {false, true}) {
