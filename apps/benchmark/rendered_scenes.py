@@ -75,7 +75,7 @@ def score(line, truth):
     focal = line.get('focal_px', truth['focal_px']) / truth['focal_px']
     return {'is_sure': line['probability'] >= 0.9, 'error': float(numpy.degrees(numpy.arccos(min(1.0, max(cosines))))),
             'sigma': line.get('sigma_normal_deg') or max(sigmas), 'focal': abs(focal - 1),
-            'focal_deviation': abs(numpy.log(focal)) / max(line.get('focal_sigma') or 0, 1e-9)}
+            'focal_deviation': abs(numpy.log(focal)) * line.get('focal_scale', 1) / max(line.get('focal_sigma') or 0, 1e-9)}
 
 
 def report(title, truths, lines):
