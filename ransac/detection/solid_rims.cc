@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 
 namespace circline {
