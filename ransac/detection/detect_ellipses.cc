@@ -35,8 +35,9 @@ constexpr double kRimStep = 0.05;
 // What hides up to half of a rim runs beside it within this ratio of its size, but for a tenth of
 // its edges, and where the rim has edges on no more than a quarter of the way. Of renderings.
 constexpr double kMostHidden = 0.5, kBesideRatio = 1.25, kStraysBeside = 0.1, kMostShared = 0.25;
-// Of the edges of an outline a rim within it gets back so much of the way round, degrees.
-constexpr double kLeastShared = 60.0;
+// Of the edges of an outline a rim within it gets back so much of the way round, degrees. The two
+// are apart by no more than this share of the outline's size, and no more different in size.
+constexpr double kLeastShared = 60.0, kMostApart = 0.5;
 constexpr std::size_t kSectors = 72;  // Of the way round a rim.
 // Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
 constexpr double kDuplicatePx = 2.5;
@@ -210,10 +211,13 @@ class EllipseDetector {
     }
   }
 
-  // To the edges of a rim, and to those of an outline where the rim has none.
+  // To the edges of a rim, and to those of an outline where the rim has none. False where the two
+  // are not of one thing.
   bool FitTogether(const DetectedEllipse& rim, const DetectedEllipse& outline, Matrix3d* conic) {
-    Ellipse about;
-    if (!ConicToEllipse(outline.fit.conic, &about)) return false;
+    Ellipse about, own;
+    if (!ConicToEllipse(outline.fit.conic, &about) || !ConicToEllipse(rim.fit.conic, &own) ||
+        (own.center - about.center).norm() > kMostApart * about.b || own.a < kMostApart * about.a)
+      return false;
     double strays = 0.0;
     const std::bitset<kSectors> of_rim = SectorsOf(rim, about, &strays);
     std::vector<CalibratedPoint> points;

@@ -128,9 +128,13 @@ Status DetectCircleInRoi(const cv::Mat& image, const Camera& camera, const cv::R
   shifted.height = inside.height;
   shifted.cx -= inside.x;
   shifted.cy -= inside.y;
-  const EdgeMap edges = DetectEdges(gray);
-  const std::vector<DetectedEllipse> ellipses =
-      DetectEllipses(edges, shifted, {options.min_ellipse_axis_px, options.min_arc_deg});
+  EdgeMap edges;
+  std::vector<DetectedEllipse> ellipses;
+  for (const double faintness : {1.0, kFaint}) {
+    edges = DetectEdges(gray, kEdgeSmoothingPx, nullptr, faintness);
+    ellipses = DetectEllipses(edges, shifted, {options.min_ellipse_axis_px, options.min_arc_deg});
+    if (!ellipses.empty()) break;
+  }
   if (ellipses.empty()) return Status::Refused("no ellipse found inside the rectangle");
   FillCircle(edges, ellipses.front(), shifted, options.noise_model, circle);
   for (Vector2d& p : circle->points) p += Vector2d(inside.x, inside.y);

@@ -17,9 +17,9 @@ namespace {
 // disc by chance is within it once in ten times. Or within the other, and of more than this share
 // of its size: the hub of a wheel and the tyre's outline, seen from the side.
 constexpr double kSameMiddle = 0.3, kLargeWithin = 0.5;
-// Touching: of the gaps between two rims, over the outer one's semi-minor axis, the least is such a
-// share of the largest, and that is neither an error of the fits nor a thing of its own (a cup on a
-// saucer). On rendered tables, streets and wheels; of photographs none had a part.
+// Touching: of the gaps between two rims, shares of the outer one's radius there, the least is such
+// a share of the largest, and that is neither an error of the fits nor a thing of its own (a cup on
+// a saucer). On rendered tables, streets and wheels; of photographs none had a part.
 constexpr double kMostLeast = 0.25, kLeastGap = 0.03, kMostGap = 0.5;
 
 struct Gaps {
