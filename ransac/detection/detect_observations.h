@@ -58,7 +58,7 @@ struct DetectionOptions {
 // `image` is 8-bit, 1, 3 or 4 channels. The status is not ok for an empty image, a wrong type, a
 // wrong size (against camera.width x height) or bad options; a photo in which nothing is found is
 // ok; observations->message says so, and what was cut. Where nothing tells a pose the photo is
-// looked at once more, for edges of half the usual contrast: twice the time.
+// looked at once more, for edges of half the usual contrast: two to three times the time.
 Status DetectObservations(const cv::Mat& image, const Camera& camera,
                           const DetectionOptions& options, Observations* observations);
 
