@@ -13,6 +13,7 @@ length, where it was not known, and how many are within two. Then sure answers b
 import json
 import os
 import random
+import shutil
 import subprocess
 import sys
 
@@ -24,11 +25,14 @@ import scripts
 
 def render(args, numbers):
     missing = [n for n in numbers if not os.path.exists(f'{args.folder}/{n:04d}.json')]
+    if missing and not shutil.which('blender'):
+        sys.exit('blender is not installed: apt-get install --no-install-recommends blender')
     if missing:
         script = os.path.join(scripts.HERE, 'rendered_scenes_blender.py')
-        print(f'{len(missing)} of {len(numbers)} scenes are to be rendered', file=sys.stderr)
+        print(f'{len(missing)} of {len(numbers)} scenes are to be rendered, {len(missing) / 4:.1f} minutes', file=sys.stderr)
         subprocess.run(['blender', '--background', '--factory-startup', '--python-exit-code', '1', '--python', script, '--',
                         str(missing[0]), str(missing[-1] + 1), args.folder], check=True, stdout=subprocess.DEVNULL)
+        print(file=sys.stderr)
 
 
 def expose(args, number):

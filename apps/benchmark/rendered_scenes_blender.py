@@ -148,7 +148,7 @@ class Scene:
             [(0, 0), (foot, 0), (radius, height), (radius - thick, height), (foot - thick, thick), (0, thick)],
             self.material(roughness=self.draw(0.05, 0.5)), at)
 
-    def has_axes(self, turn) -> tuple:
+    def add_axes(self, turn) -> tuple:
         """Notes the sides of what is turned by so much, and returns its axes."""
         axes = Vector((math.cos(turn), math.sin(turn), 0)), Vector((-math.sin(turn), math.cos(turn), 0))
         self.planes += axes
@@ -156,7 +156,7 @@ class Scene:
 
     def house(self, x, y, turn, size):
         self.box(size, self.material("plain", "noise", "bricks", scale=self.draw(0.8, 1.5)), (x, y, 0), turn)
-        along, across = self.has_axes(turn)
+        along, across = self.add_axes(turn)
         frame, glass = self.material(), self.material(roughness=0.1)
         for out, side, half, width in ((along, across, size[0] / 2, size[1]), (-along, across, size[0] / 2, size[1]),
                                        (across, along, size[1] / 2, size[0]), (-across, along, size[1] / 2, size[0])):
@@ -214,7 +214,7 @@ class Scene:
             if kind == "box":
                 size = (self.draw(0.06, 0.12), self.draw(0.06, 0.12), self.draw(0.05, 0.2))
             self.box(size, self.material("plain", "noise", "bricks", "cells", scale=8), at, turn)
-            self.has_axes(turn)
+            self.add_axes(turn)
 
     def street(self):
         self.ground(200, self.material("noise", "plain"))
@@ -240,7 +240,7 @@ class Scene:
         self.disc(self.draw(0.28, 0.4), (0, 0, 0), 0.006, True)
         if self.happens(0.5):  # A kerb.
             turn = self.draw(0, math.pi)
-            place = self.has_axes(turn)[1] * self.draw(0.6, 1.0)
+            place = self.add_axes(turn)[1] * self.draw(0.6, 1.0)
             self.box((30, 0.2, 0.12), self.material("noise", scale=2), place, turn)
         if self.happens(0.4):
             at = (self.draw(0.5, 0.9), self.draw(-0.9, -0.4), 0)
@@ -290,7 +290,7 @@ class Scene:
             size = (self.draw(0.4, 0.9), self.draw(0.4, 1.2), self.draw(0.3, 0.9))
             at = (self.draw(-length / 4, length / 4), self.draw(-width / 8, width / 3), 0)
             self.box(size, self.material("plain", "noise", "bricks", "checks"), at, turn)
-            self.has_axes(turn)
+            self.add_axes(turn)
         if self.happens(0.6):  # A clock.
             at = (self.draw(-length / 4, length / 4), width / 2 - 0.006, self.draw(1.5, 1.9))
             self.disc(self.draw(0.12, 0.2), at, 0.004, True, (UPRIGHT, 0, 0))
@@ -341,6 +341,7 @@ KINDS = ("table", "street", "pavement", "wheel", "room")
 
 first, last, folder = sys.argv[sys.argv.index("--") + 1 :]
 for number in range(int(first), int(last)):
+    print(f"\rscene {number} of {first} to {int(last) - 1}", end="", file=sys.stderr, flush=True)
     kind = KINDS[number % len(KINDS)]
     scene = Scene(number)
     view = getattr(scene, kind)()

@@ -70,6 +70,7 @@ class EdgeCollector {
 
   // Marks points as belonging to an accepted ellipse: they support no other.
   void Take(const std::vector<int>& points);
+  // Undoes that.
   void Release(const std::vector<int>& points);
   bool IsTaken(int i) const { return taken_[static_cast<std::size_t>(i)] != 0; }
 

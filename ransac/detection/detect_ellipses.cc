@@ -35,9 +35,10 @@ constexpr double kRimStep = 0.05;
 // What hides up to half of a rim runs beside it within this ratio of its size, but for a tenth of
 // its edges, and where the rim has edges on no more than a quarter of the way. Of renderings.
 constexpr double kMostHidden = 0.5, kBesideRatio = 1.25, kStraysBeside = 0.1, kMostShared = 0.25;
-// Of the edges of an outline a rim within it gets back so much of the way round, degrees. The two
-// are apart by no more than this share of the outline's size, and no more different in size.
-constexpr double kLeastShared = 60.0, kMostApart = 0.5;
+// A rim whose own edges go less than so far round may have others in common with an outline, so
+// much at least, degrees. The two are apart by no more than this share of the outline's size, and
+// no more different in size. Drawn from a coin seen aslant, not fitted.
+constexpr double kMostOwn = 180.0, kLeastShared = 60.0, kMostApart = 0.5;
 constexpr std::size_t kSectors = 72;  // Of the way round a rim.
 // Contours nearer than this everywhere, with the same side bright, are one contour, pixels.
 constexpr double kDuplicatePx = 2.5;
@@ -190,7 +191,7 @@ class EllipseDetector {
   // The far side of the top of a thing is that of its outline, too, which took its edges.
   void ShareFarSides() {
     for (DetectedEllipse& rim : accepted_) {
-      if (rim.coverage_deg > 360.0 * kMostHidden) continue;
+      if (rim.coverage_deg > kMostOwn) continue;
       for (const DetectedEllipse& outline : accepted_) {
         if (outline.coverage_deg < rim.coverage_deg + kLeastShared) continue;
         fitter_.Release(outline);

@@ -48,7 +48,7 @@ class EllipseFitter {
   // The final fit; false if what the edges follow is no ellipse.
   bool Fit(EllipseCandidate candidate, DetectedEllipse* e);
 
-  // Marks the ellipse's points: they support no other.
+  // Marks the ellipse's points, which then support no other, and undoes that.
   void Take(const DetectedEllipse& e) { collector_.Take(e.points); }
   void Release(const DetectedEllipse& e) { collector_.Release(e.points); }
   bool IsTaken(int i) const { return collector_.IsTaken(i); }
