@@ -168,17 +168,13 @@ int PixelsToCalibrated(const Camera& camera, const std::vector<Eigen::Vector2d>&
   points->clear();
   points->reserve(pixels.size());
   if (indices != nullptr) indices->clear();
-  int dropped = 0;
   CalibratedPoint point;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (!PixelToCalibrated(camera, pixels[i], &point)) {
-      ++dropped;
-      continue;
-    }
+    if (!PixelToCalibrated(camera, pixels[i], &point)) continue;
     points->push_back(point);
     if (indices != nullptr) indices->push_back(static_cast<int>(i));
   }
-  return dropped;
+  return static_cast<int>(pixels.size() - points->size());
 }
 
 bool CameraToPixel(const Camera& camera, const Eigen::Vector3d& X_cam, Eigen::Vector2d* pixel) {

@@ -7,13 +7,12 @@ namespace circline {
 int CalibrateInliers(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
                      const std::vector<std::uint8_t>& inliers,
                      std::vector<CalibratedPoint>* points) {
-  if (inliers.empty()) return PixelsToCalibrated(camera, pixels, points);
   points->clear();
   points->reserve(pixels.size());
   int dropped = 0;
   CalibratedPoint point;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (inliers[i] == 0) continue;
+    if (!inliers.empty() && inliers[i] == 0) continue;
     if (PixelToCalibrated(camera, pixels[i], &point)) {
       points->push_back(point);
     } else {
