@@ -46,7 +46,18 @@ inline constexpr PoseTangent kSophusRight = {false, true, false};
 // longer of unit length), information matrices J^-T I J^-1; J is always invertible. Where there are
 // free directions, or the scale is not known, J C J^T is singular: add what else you know, or use
 // the information, before you hand it to a noise model that inverts it.
-Matrix6d TangentJacobian(const CameraPose& estimate, const PoseTangent& tangent);
+inline Matrix6d TangentJacobian(const CameraPose& estimate, const PoseTangent& tangent) {
+  // Rows [omega, v] of T on one side. T^-1 on the right is T on the left, and the other way round.
+  Matrix6d J = Matrix6d::Identity();
+  if (tangent.right == tangent.world_from_cam) {
+    J.bottomLeftCorner<3, 3>() = CrossMatrix(estimate.translation);
+  } else {
+    J.topLeftCorner<3, 3>() = J.bottomRightCorner<3, 3>() = estimate.rotation.transpose();
+  }
+  if (tangent.world_from_cam) J = -J;
+  if (!tangent.rotation_first) J.topRows<3>().swap(J.bottomRows<3>());
+  return J;
+}
 
 }  // namespace circline
 
