@@ -89,10 +89,7 @@ std::array<Eigen::Vector3d, 2> LinesOf(const Eigen::Matrix3d& pair,
   Eigen::Index i, row, column;
   adjugate.diagonal().minCoeff(&i);
   const Eigen::Vector3d p = -adjugate.col(i) / std::sqrt(-adjugate(i, i));
-  Eigen::Matrix3d single = pair;
-  single.row(0) += Eigen::RowVector3d(0.0, -p.z(), p.y());
-  single.row(1) += Eigen::RowVector3d(p.z(), 0.0, -p.x());
-  single.row(2) += Eigen::RowVector3d(-p.y(), p.x(), 0.0);
+  const Eigen::Matrix3d single = pair + CrossMatrix(p);
   single.cwiseAbs().maxCoeff(&row, &column);
   return {single.row(row).transpose(), single.col(column)};
 }

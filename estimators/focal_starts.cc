@@ -24,8 +24,7 @@ std::string Named(const char* kind, const std::string& id) {
 }
 
 bool AreAlongDifferentAxes(const PencilObservation& a, const PencilObservation& b) {
-  const PencilDirection free = PencilDirection::kFree;
-  return a.direction != free && b.direction != free && a.direction != b.direction;
+  return RunsAlongAxis(a) && RunsAlongAxis(b) && a.direction != b.direction;
 }
 
 // Two or more, all about one centre.

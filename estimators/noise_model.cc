@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "circline/estimators/basics.h"
+
 namespace circline {
 namespace {
 
@@ -34,7 +36,7 @@ struct Extent {
     if (num_points > 0.0) size = box.sizes();
   }
   // Of an ellipse in the box, about.
-  double Perimeter() const { return 1.5707963267948966 * size.sum(); }
+  double Perimeter() const { return kRightAngle * size.sum(); }
 };
 
 }  // namespace
