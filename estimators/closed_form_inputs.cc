@@ -10,15 +10,11 @@
 namespace circline {
 namespace {
 
-RayPair Homogeneous(const CalibratedPoint& a, const CalibratedPoint& b) {
-  return {a.Homogeneous(), b.Homogeneous()};
-}
-
 std::optional<RayPair> CalibrateSegment(const Camera& camera, const Segment& segment) {
   CalibratedPoint a, b;
   if (!PixelToCalibrated(camera, segment[0], &a) || !PixelToCalibrated(camera, segment[1], &b))
     return {};
-  return Homogeneous(a, b);
+  return RayPair{a.Homogeneous(), b.Homogeneous()};
 }
 
 Measured FromLine(const LineFit& fit) { return Measured(fit.line, fit.covariance); }

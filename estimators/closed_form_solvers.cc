@@ -49,12 +49,10 @@ void FillSupport(const Observations& evidence, PoseHypothesis* h) {
     for (const LineObservation& line : pencil.lines) {
       if (line.fit) add(line.fit->rms_px, line.points, line.inliers, line.is_parallel);
     }
-    if (!pencil.fit) continue;
-    PencilEstimate estimate;
-    estimate.id = pencil.id;
-    estimate.direction = pencil.fit->direction;
-    estimate.sigma_deg = LargestSigmaDeg(pencil.fit->covariance);
-    h->pencils.push_back(estimate);
+    if (pencil.fit) {
+      h->pencils.push_back(
+          {pencil.id, pencil.fit->direction, LargestSigmaDeg(pencil.fit->covariance)});
+    }
   }
   if (h->num_inliers > 0) h->rms_px = std::sqrt(squares / h->num_inliers);
 }
@@ -75,14 +73,13 @@ std::string AngleBetween(const PencilObservation& a, const PencilObservation& b)
 }
 
 void FillCircle(const Observations& evidence, const CirclePose& pose, PoseHypothesis* h) {
-  const CircleObservation& circle = evidence.circles.front();
   // CirclePose counts in radii; the hypothesis' unit is metric, or makes the translation a unit
   // vector.
   const Eigen::Vector3d n = h->cam_from_world.rotation.col(2);
   const double distance = std::abs(n.dot(h->cam_from_world.translation));
   const double unit = distance / std::abs(pose.normal.dot(pose.center));
   CircleEstimate estimate;
-  estimate.id = circle.id;
+  estimate.id = evidence.circles.front().id;
   estimate.normal = pose.normal;
   estimate.center = unit * pose.center;
   estimate.radius = unit;
