@@ -54,13 +54,14 @@ Status FitLine(const std::vector<CalibratedPoint>& points, double sigma_px, Line
   if (!RegressLine(points, weights, &line))
     return Status::Refused("the points of the line coincide");
 
-  Eigen::Matrix3d information;
+  Eigen::Matrix<double, 3, 2> basis;
+  Eigen::Matrix2d covariance;  // In that basis, for a noise of 1 px.
   double cost = 0.0, sum = 0.0;
   // The distance is measured in the photo, so the metric changes along a distorted line: the
   // regression is the start, Gauss-Newton on the sphere of lines the answer.
   constexpr int kPasses = 3;
   for (int pass = 0; pass < kPasses; ++pass) {
-    information.setZero();
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
     cost = sum = 0.0;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -73,19 +74,14 @@ Status FitLine(const std::vector<CalibratedPoint>& points, double sigma_px, Line
       cost += w * r * r;
       sum += w;
     }
+    basis = BasisAcross(line);
+    covariance = (basis.transpose() * information * basis).inverse();
+    if (!covariance.allFinite()) return Status::Refused("the points of the line coincide");
     if (pass + 1 == kPasses) break;
-    const Eigen::Matrix<double, 3, 2> basis = BasisAcross(line);
-    const Eigen::Vector2d step =
-        (basis.transpose() * information * basis).inverse() * (basis.transpose() * gradient);
-    if (!step.allFinite()) return Status::Refused("the points of the line coincide");
-    line = (line - basis * step).normalized();
+    line = (line - basis * (covariance * (basis.transpose() * gradient))).normalized();
   }
-  const Eigen::Matrix<double, 3, 2> basis = BasisAcross(line);
-  const Eigen::Matrix2d covariance =
-      sigma_px * sigma_px * (basis.transpose() * information * basis).inverse();
-  if (!covariance.allFinite()) return Status::Refused("the points of the line coincide");
   fit->line = line;
-  fit->covariance = basis * covariance * basis.transpose();
+  fit->covariance = basis * (sigma_px * sigma_px * covariance) * basis.transpose();
   fit->rms_px = std::sqrt(cost / sum);
   return Status::Ok();
 }
