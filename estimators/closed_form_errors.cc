@@ -52,29 +52,25 @@ void ChangeCoordinates(const Eigen::Matrix3d& A, const MovedInput& input) {
   }
 }
 
-// A change of calibrated coordinates, x' = A x, by `part` of a standard deviation.
-using CoordinateChange = std::function<Eigen::Matrix3d(double part)>;
-
-// What the errors of focal length, aspect and principal point do.
-std::vector<CoordinateChange> CameraErrors(const CameraSigma& sigma, const Camera& camera) {
-  std::vector<CoordinateChange> all;
-  const auto add = [&all](double deviation, double x_scale, double y_scale, double x, double y) {
+// The errors of focal length, aspect and principal point.
+void AddCameraErrors(const CameraSigma& sigma, const Camera& camera,
+                     std::vector<Perturbation>* all) {
+  const auto add = [all](double deviation, double x_scale, double y_scale, double x, double y) {
     if (deviation == 0.0) return;
-    all.push_back([=](double part) {
+    all->push_back([=](double part, const std::vector<MovedInput>& moved) {
       const double s = part * deviation;
       Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
       A(0, 0) = std::exp(s * x_scale);
       A(1, 1) = std::exp(s * y_scale);
       A(0, 2) = s * x;
       A(1, 2) = s * y;
-      return A;
+      for (const MovedInput& input : moved) ChangeCoordinates(A, input);
     });
   };
   add(sigma.log_focal, 1.0, 1.0, 0.0, 0.0);
   add(sigma.log_aspect, 0.0, 1.0, 0.0, 0.0);
   add(sigma.principal_point_px, 0.0, 0.0, 1.0 / camera.fx, 0.0);
   add(sigma.principal_point_px, 0.0, 0.0, 0.0, 1.0 / camera.fy);
-  return all;
 }
 
 // Both semi-axes longer by so much: of the curve at a distance from an ellipse, the ellipse nearest
@@ -218,11 +214,7 @@ std::vector<Perturbation> Perturbations(const std::vector<MovedInput>& inputs,
       });
     }
   }
-  for (const CoordinateChange& change : CameraErrors(noise.SigmaOf(camera), camera)) {
-    all.push_back([change](double part, const std::vector<MovedInput>& moved) {
-      for (const MovedInput& input : moved) ChangeCoordinates(change(part), input);
-    });
-  }
+  AddCameraErrors(noise.SigmaOf(camera), camera, &all);
   const double offset = noise.contour_offset_px / std::sqrt(camera.fx * camera.fy);
   for (const int contrast : contrasts) {
     if (offset == 0.0) continue;
