@@ -6,6 +6,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/conic_moments.h"
 #include "circline/ransac/conic_weights.h"
 
 namespace circline {
@@ -92,14 +93,11 @@ ConicModel::ConicModel(const std::vector<CalibratedPoint>& points, const EdgeDir
       sigma_px_(threshold / kInlierSigmas) {
   const std::size_t n = points.size();
   if (n == 0) return;
-  Eigen::Vector2d low = points[0].x, high = points[0].x;
-  for (const CalibratedPoint& p : points) {
-    low = low.cwiseMin(p.x);
-    high = high.cwiseMax(p.x);
-  }
-  center_ = 0.5 * (low + high);
-  scale_ = std::max(0.5 * (high - low).norm(), 1e-12);
-  half_box_ = 0.5 * (high - low) / scale_;
+  Eigen::AlignedBox2d box;
+  for (const CalibratedPoint& p : points) box.extend(p.x);
+  center_ = box.center();
+  scale_ = std::max(0.5 * box.diagonal().norm(), 1e-12);
+  half_box_ = 0.5 * box.diagonal() / scale_;
   box_area_ = 4.0 * half_box_.prod();
   data_.resize((directions.normals.empty() ? 6 : 8) * n);
   double area = 0.0;
@@ -145,16 +143,13 @@ ConicModel::Value ConicModel::ToValue(const Eigen::Matrix3d& conic) {
 }
 
 Eigen::Matrix3d ConicModel::ToConic(const Value& value) const {
-  Eigen::Matrix3d T;
-  T << 1.0 / scale_, 0.0, -center_.x() / scale_, 0.0, 1.0 / scale_, -center_.y() / scale_, 0.0, 0.0,
-      1.0;
-  return TransformConic(ToMatrix(value), T);
+  const Normalization normalization{center_.x(), center_.y(), scale_};
+  return TransformConic(ToMatrix(value), normalization.Matrix());
 }
 
 bool ConicModel::FromConic(const Eigen::Matrix3d& conic, Value* value) const {
-  Eigen::Matrix3d T;
-  T << scale_, 0.0, center_.x(), 0.0, scale_, center_.y(), 0.0, 0.0, 1.0;
-  *value = ToValue(TransformConic(conic, T));
+  const Normalization normalization{center_.x(), center_.y(), scale_};
+  *value = ToValue(TransformConic(conic, normalization.Inverse()));
   return Normalize(value);
 }
 
@@ -217,6 +212,39 @@ void ConicModel::Residuals(const Value& value, int begin, int end, float* r2) co
       r2[i] += sine * sine * inverse;
     }
   }
+}
+
+// Hyper-renormalisation (Kanatani, Al-Sharadqah, Chernov, Sugaya, ECCV 2012): the closed form for
+// points that weigh as the gradient per pixel of the current conic tells, so that distances in
+// pixels are what it minimises.
+bool ConicModel::Refine(const float* weights, Value* value) const {
+  const Eigen::Matrix3d conic = ToMatrix(*value);
+  const auto sum_about = [&](const Eigen::Vector2d& center, int* count) {
+    Moments sums;
+    *count = 0;
+    for (int i = 0; i < NumData(); ++i) {
+      if (!(weights[i] > 0.0f)) continue;
+      const CalibratedPoint& p = Point(i);
+      const Eigen::Vector2d gradient = p.GradientPerPixel((conic * p.Homogeneous()).head<2>());
+      const Eigen::Vector2d x = p.x - center;
+      sums.Add(x.x(), x.y(), static_cast<double>(weights[i]) / gradient.squaredNorm());
+      ++*count;
+    }
+    return sums;
+  };
+  int count = 0;
+  const Moments sums = sum_about(Eigen::Vector2d::Zero(), &count);
+  if (count < kMinSamples) return false;
+  const Eigen::Vector2d mean = Eigen::Vector2d(sums.x, sums.y) / sums.one;
+  const Moments moments = sum_about(mean, &count);
+  const double scale = std::sqrt(0.5 * (moments.xx + moments.yy) / moments.one);
+  Eigen::Matrix3d fitted;
+  if (!(scale > 0.0) || !FitEllipse(moments.Mean(scale), &fitted)) return false;
+  const Normalization normalization{mean.x(), mean.y(), scale};
+  Value moved = ToValue(TransformConic(fitted, normalization.Matrix()));
+  if (!Normalize(&moved)) return false;
+  *value = moved;
+  return true;
 }
 
 bool ConicModel::Accept(const Value& value, double threshold) const {

@@ -1,5 +1,6 @@
 #include "circline/ransac/line_model.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -12,13 +13,10 @@ LineModel::LineModel(const std::vector<CalibratedPoint>& points)
     : index_(RandomOrder(static_cast<int>(points.size()), 1)) {
   const std::size_t n = points.size();
   if (n == 0) return;
-  Eigen::Vector2d low = points[0].x, high = points[0].x;
-  for (const CalibratedPoint& p : points) {
-    low = low.cwiseMin(p.x);
-    high = high.cwiseMax(p.x);
-  }
-  center_ = 0.5 * (low + high);
-  scale_ = std::max(0.5 * (high - low).norm(), 1e-12);
+  Eigen::AlignedBox2d box;
+  for (const CalibratedPoint& p : points) box.extend(p.x);
+  center_ = box.center();
+  scale_ = std::max(0.5 * box.diagonal().norm(), 1e-12);
   data_.resize(6 * n);
   x_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
