@@ -47,16 +47,15 @@ struct Pool {
   }
 };
 
-// The final estimate: reweighted maximum likelihood on the lines `candidates`, from the engine's
-// direction. Each line weighs as the posterior probability that it belongs: a short segment points
-// near any direction by chance, a long one does not. `members` receives the candidates within the
-// threshold of the answer.
-Status FitFinal(const Pool& pool, const std::vector<int>& candidates,
-                const Eigen::Vector3d& initial, VanishingPointFit* fit, std::vector<int>* members) {
+// The final estimate: reweighted maximum likelihood on the lines `candidates`, from the direction
+// that `fit` has. Each line weighs as the posterior probability that it belongs: a short segment
+// points near any direction by chance, a long one does not. `members` receives the candidates
+// within the threshold of the answer.
+Status FitFinal(const Pool& pool, const std::vector<int>& candidates, VanishingPointFit* fit,
+                std::vector<int>* members) {
   const double num_all = static_cast<double>(pool.all.size());
   std::vector<LineFit> chosen;
   std::vector<double> weights;
-  fit->direction = initial;
   constexpr int kPasses = 4;
   for (int pass = 0; pass <= kPasses; ++pass) {
     members->clear();
@@ -95,7 +94,8 @@ Status FindOne(const std::vector<LineFit>& lines, const Pool& pool, const std::v
   RansacReport<PencilModel::Value> report;
   engine.Run(model, &report);
   if (!report.success) return Status::Refused("the lines of the pencil coincide");
-  return FitFinal(pool, indices, Eigen::Vector3d(report.model.data()), fit, members);
+  fit->direction = Eigen::Vector3d(report.model.data());
+  return FitFinal(pool, indices, fit, members);
 }
 
 // Gives every line to the direction that it misses least, within the threshold.
@@ -120,8 +120,8 @@ bool Refit(const Pool& pool, const std::vector<int>& indices, const PencilOption
            FoundPencil* pencil) {
   if (static_cast<int>(pencil->lines.size()) < options.min_lines) return false;
   std::vector<int> members;
-  VanishingPointFit fit;
-  const Status status = FitFinal(pool, pencil->lines, pencil->fit.direction, &fit, &members);
+  VanishingPointFit fit = pencil->fit;
+  const Status status = FitFinal(pool, pencil->lines, &fit, &members);
   if (!status.ok() || static_cast<int>(members.size()) < options.min_lines) return false;
   pencil->fit = fit;
   pencil->lines = members;
@@ -136,9 +136,7 @@ Status FitTrimmed(const Pool& pool, VanishingPointFit* fit, std::vector<int>* me
   std::vector<LineFit> usable;
   for (const int i : pool.all) usable.push_back(pool[i]);
   const Status status = FitTrimmedDirection(usable, usable.size() - 3 * usable.size() / 10, fit);
-  if (!status.ok()) return status;
-  const Eigen::Vector3d direction = fit->direction;
-  return FitFinal(pool, pool.all, direction, fit, members);
+  return status.ok() ? FitFinal(pool, pool.all, fit, members) : status;
 }
 
 double TruncatedCost(const Pool& pool, const Eigen::Vector3d& direction) {
