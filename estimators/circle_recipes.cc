@@ -1,6 +1,5 @@
 // The closed forms of circles: which evidence each one uses, and what it reads of it.
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <array>
 #include <functional>
 #include <map>

@@ -1,7 +1,6 @@
 #include "circline/estimators/conic_moments.h"
 
 #include <Eigen/Dense>
-#include <algorithm>
 #include <cmath>
 
 #include "circline/estimators/cholesky6.h"

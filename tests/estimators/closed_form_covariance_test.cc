@@ -5,7 +5,6 @@
 #include <cmath>
 #include <string>
 
-#include "circline/estimators/basics.h"
 #include "circline/estimators/pencil_lean.h"
 #include "tests/estimators/closed_form_call.h"
 #include "tests/plane_scene.h"

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "circline/estimators/basics.h"
-#include "circline/estimators/conic_fit.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/random.h"
 #include "tests/pinhole_camera.h"

@@ -13,7 +13,6 @@
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/circular_points.h"
 #include "circline/estimators/line_pose.h"
-#include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
 #include "tests/trials.h"
 

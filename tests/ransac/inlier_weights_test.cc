@@ -4,9 +4,7 @@
 
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
-#include "circline/estimators/noise_model.h"
 #include "circline/estimators/random.h"
 
 namespace circline {

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <cmath>
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"

@@ -164,10 +164,6 @@ TEST(FitConicRobust, SameSeedSameBits) {
 
 TEST(FitConicRobust, CovarianceIsHonest) {
   // Mean of e^T Cov^+ e over trials, chi-square with 5 degrees of freedom each.
-  const Camera camera = conic_scene::TestCamera();
-  Eigen::Matrix3d x_from_pixel;
-  x_from_pixel << 1.0 / camera.fx, 0.0, -camera.cx / camera.fx, 0.0, 1.0 / camera.fy,
-      -camera.cy / camera.fy, 0.0, 0.0, 1.0;
   constexpr int kTrials = Trials(100);
   double sum = 0.0;
   for (int trial = 0; trial < kTrials; ++trial) {

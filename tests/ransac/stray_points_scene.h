@@ -6,7 +6,6 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <utility>
 
 #include "circline/estimators/observations.h"
 #include "circline/estimators/random.h"
