@@ -122,14 +122,13 @@ bool PixelToCalibrated(const Camera& camera, const Eigen::Vector2d& pixel, Calib
                                (pixel.y() - camera.cy) / camera.fy);
   if (!target.allFinite()) return false;
   Eigen::Vector2d x = target;
-  Distorted d = Distort(camera, x);
   if (camera.model == CameraModel::kFisheye) {
     // tan is steep: start where an equidistant lens would have the pixel, not near the edge.
     constexpr double kMaxStart = 1.0;  // Radians.
     const double distorted = target.norm();
     if (distorted > 1e-8) x = target * (std::tan(std::min(distorted, kMaxStart)) / distorted);
-    d = Distort(camera, x);
   }
+  Distorted d = Distort(camera, x);
   if (camera.model != CameraModel::kPinhole) {
     // Newton, damped: rational and high-order polynomials bend where a full step overshoots.
     constexpr int kMaxIterations = 50;
@@ -154,8 +153,7 @@ bool PixelToCalibrated(const Camera& camera, const Eigen::Vector2d& pixel, Calib
   }
   const double s = x.squaredNorm();
   if (!(s < kMaxTanAngle * kMaxTanAngle) || !IsOneToOne(camera, s)) return false;
-  const double det = d.jacobian.determinant();
-  if (!(det > 0.0)) return false;
+  if (!(d.jacobian.determinant() > 0.0)) return false;
   point->x = x;
   const Eigen::Matrix2d inverse = d.jacobian.inverse();
   point->x_from_pixel = {inverse(0, 0) / camera.fx, inverse(0, 1) / camera.fy,
