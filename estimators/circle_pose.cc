@@ -1,7 +1,6 @@
 #include "circline/estimators/circle_pose.h"
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
+#include <Eigen/Dense>
 #include <cmath>
 #include <limits>
 
@@ -10,36 +9,16 @@ namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-// The six entries of a symmetric matrix.
-struct Symmetric3 {
-  double xx, yy, zz, xy, xz, yz;
-
-  Eigen::Vector3d operator*(const Eigen::Vector3d& v) const {
-    return {xx * v.x() + xy * v.y() + xz * v.z(), xy * v.x() + yy * v.y() + yz * v.z(),
-            xz * v.x() + yz * v.y() + zz * v.z()};
-  }
-};
-
 // The ellipse scaled to entries of order 1 and the signature (+, +, -); false for what
 // NormalizeEllipse refuses. Its Frobenius norm is not needed here.
-bool ScaledEllipse(const Eigen::Matrix3d& conic, Symmetric3* scaled) {
+bool ScaledEllipse(const Eigen::Matrix3d& conic, Eigen::Matrix3d* scaled) {
   const double largest = conic.cwiseAbs().maxCoeff();
   // Summed, because maxCoeff may pass over a NaN.
   if (!(largest > 0.0) || !std::isfinite(conic.sum())) return false;
   const double scale = conic(0, 0) + conic(1, 1) < 0.0 ? -largest : largest;
   const Eigen::Matrix3d C = conic / scale;
-  const Symmetric3 S = {C(0, 0),
-                        C(1, 1),
-                        C(2, 2),
-                        0.5 * (C(0, 1) + C(1, 0)),
-                        0.5 * (C(0, 2) + C(2, 0)),
-                        0.5 * (C(1, 2) + C(2, 1))};
-  const double quadratic = S.xx * S.yy - S.xy * S.xy;
-  const double determinant = S.xx * (S.yy * S.zz - S.yz * S.yz) -
-                             S.xy * (S.xy * S.zz - S.yz * S.xz) +
-                             S.xz * (S.xy * S.yz - S.yy * S.xz);
-  *scaled = S;
-  return quadratic > 0.0 && determinant < 0.0;
+  *scaled = 0.5 * (C + C.transpose());
+  return scaled->topLeftCorner<2, 2>().determinant() > 0.0 && scaled->determinant() < 0.0;
 }
 
 struct Eigen3 {
@@ -58,21 +37,13 @@ double LargestCubicRoot(double r) {
 
 // Eigenvector of a simple eigenvalue l, far from the other two: the longest column of the adjugate
 // of S - l I, which is proportional to v v^T.
-Eigen::Vector3d SimpleEigenvector(const Symmetric3& S, double l) {
-  const double xx = S.xx - l, yy = S.yy - l, zz = S.zz - l;
-  const double a = yy * zz - S.yz * S.yz, b = xx * zz - S.xz * S.xz, c = xx * yy - S.xy * S.xy;
-  const double ab = S.xz * S.yz - S.xy * zz, ac = S.xy * S.yz - S.xz * yy,
-               bc = S.xy * S.xz - S.yz * xx;
-  const double aa = std::abs(a), bb = std::abs(b), cc = std::abs(c);
-  Eigen::Vector3d v;
-  if (aa >= bb && aa >= cc) {
-    v = {a, ab, ac};
-  } else if (bb >= cc) {
-    v = {ab, b, bc};
-  } else {
-    v = {ac, bc, c};
-  }
-  return v.normalized();
+Eigen::Vector3d SimpleEigenvector(Eigen::Matrix3d S, double l) {
+  S.diagonal().array() -= l;
+  const Eigen::Vector3d a = S.col(1).cross(S.col(2)), b = S.col(2).cross(S.col(0)),
+                        c = S.col(0).cross(S.col(1));
+  const double aa = std::abs(a.x()), bb = std::abs(b.y()), cc = std::abs(c.z());
+  if (aa >= bb && aa >= cc) return a.normalized();
+  return (bb >= cc ? b : c).normalized();
 }
 
 // Eigenvalues and outer eigenvectors. The eigenvalue that stands apart from the other two - by half
@@ -80,22 +51,26 @@ Eigen::Vector3d SimpleEigenvector(const Symmetric3& S, double l) {
 // vector leaves a 2x2 problem, whose gap of eigenvalues a hypotenuse gives to rounding however
 // small it is. Iterative solvers take three times as long; direct ones that read all three vectors
 // off the polynomial lose those of close eigenvalues (tilt 1e-4: 1e-4 rad).
-bool SolveEigen3(const Symmetric3& S, Eigen3* e) {
-  const double mean = (S.xx + S.yy + S.zz) / 3.0;
-  const double xx = S.xx - mean, yy = S.yy - mean, zz = S.zz - mean;
-  const double p = std::sqrt(
-      (xx * xx + yy * yy + zz * zz + 2.0 * (S.xy * S.xy + S.xz * S.xz + S.yz * S.yz)) / 6.0);
+bool SolveEigen3(const Eigen::Matrix3d& S, Eigen3* e) {
+  const double mean = (S(0, 0) + S(1, 1) + S(2, 2)) / 3.0;
+  Eigen::Matrix3d D = S;
+  D.diagonal().array() -= mean;
+  const double p = std::sqrt((D(0, 0) * D(0, 0) + D(1, 1) * D(1, 1) + D(2, 2) * D(2, 2) +
+                              2.0 * (D(0, 1) * D(0, 1) + D(0, 2) * D(0, 2) + D(1, 2) * D(1, 2))) /
+                             6.0);
   if (!(p > 0.0)) return false;
-  const double determinant = xx * (yy * zz - S.yz * S.yz) - S.xy * (S.xy * zz - S.yz * S.xz) +
-                             S.xz * (S.xy * S.yz - yy * S.xz);
-  const double r = 0.5 * determinant / (p * p * p);
+  const double r = 0.5 * D.determinant() / (p * p * p);
   const bool largest_apart = r >= 0.0;
   const double root = LargestCubicRoot(std::fmin(1.0, std::abs(r)));
   const Eigen::Vector3d v = SimpleEigenvector(S, largest_apart ? mean + p * root : mean - p * root);
 
   const Eigen::Vector3d w1 = v.unitOrthogonal(), w2 = v.cross(w1);
-  const Eigen::Vector3d Sw1 = S * w1, Sw2 = S * w2;
-  const double apart = v.dot(S * v);
+  // S x, column by column.
+  const auto times = [&S](const Eigen::Vector3d& x) -> Eigen::Vector3d {
+    return S.col(0) * x.x() + S.col(1) * x.y() + S.col(2) * x.z();
+  };
+  const Eigen::Vector3d Sw1 = times(w1), Sw2 = times(w2);
+  const double apart = v.dot(times(v));
   const double a = w1.dot(Sw1), b = w1.dot(Sw2), c = w2.dot(Sw2);
   const double difference = 0.5 * (a - c), center = 0.5 * (a + c);
   const double radius = std::sqrt(difference * difference + b * b);
@@ -120,7 +95,7 @@ bool SolveEigen3(const Symmetric3& S, Eigen3* e) {
 }  // namespace
 
 int CirclePoses(const Eigen::Matrix3d& conic, std::array<CirclePose, 2>* poses) {
-  Symmetric3 S;
+  Eigen::Matrix3d S;
   Eigen3 e;
   if (!ScaledEllipse(conic, &S) || !SolveEigen3(S, &e)) return 0;
   if (!(e.l2 > kEpsilon * e.l1) || !(e.l3 < -kEpsilon * e.l1)) return 0;  // Degenerate to rounding.
