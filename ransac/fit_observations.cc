@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <optional>
 #include <string>
 #include <utility>
 
@@ -150,13 +149,11 @@ class PointFitter {
   }
 
   // From `initial`, or by a search.
-  Status FitCircle(const FittedFeature& f, const ConicFit* initial, CircleObservation* circle) {
-    const EdgeDirections directions = Directions(f, *circle);
-    const RobustFitOptions options = NextOptions(f);
+  Status FitCircle(const FittedFeature& f, const Eigen::Matrix3d* initial,
+                   CircleObservation* circle) {
     ConicFit fit;
     const Status status =
-        FindConic(f.points, options, initial == nullptr ? nullptr : &initial->conic, &fit, &mask_,
-                  directions);
+        FindConic(f.points, NextOptions(f), initial, &fit, &mask_, Directions(f, *circle));
     if (!status.ok()) return status;
     circle->fit = fit;
     circle->inliers = PixelMask(f, circle->points.size());
@@ -197,12 +194,9 @@ class PointFitter {
       const double before = circles_[i].sigma_px;
       if (!circles_[i].FollowNoise(noise.circles[i])) continue;
       const bool is_wider = circles_[i].sigma_px > before;
-      const std::optional<ConicFit> initial = circle.fit;
-      if (is_wider && (!initial || HasManyOutliers(circle.inliers))) {
-        moved |= FitCircle(circles_[i], nullptr, &circle).ok();
-      } else if (initial) {
-        moved |= FitCircle(circles_[i], &*initial, &circle).ok();
-      }
+      const bool search = is_wider && (!circle.fit || HasManyOutliers(circle.inliers));
+      if (!search && !circle.fit) continue;
+      moved |= FitCircle(circles_[i], search ? nullptr : &circle.fit->conic, &circle).ok();
     }
     for (std::size_t k = 0; k < lines_.size(); ++k) {
       for (std::size_t i = 0; i < lines_[k].size(); ++i) {
