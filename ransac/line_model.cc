@@ -97,9 +97,6 @@ Status FitFinal(const std::vector<CalibratedPoint>& points, const LineModel& mod
                 const RobustFitOptions& options, LineModel::Value value, LineFit* fit,
                 std::vector<std::uint8_t>* mask) {
   const double threshold = options.ransac.threshold;
-  const auto point = [&](std::size_t i) -> const CalibratedPoint& {
-    return points[static_cast<std::size_t>(model.PointIndex(static_cast<int>(i)))];
-  };
   std::vector<float> squares(points.size());
   std::vector<double> residuals(points.size()), weights, chosen_weights;
   double sigma = 0.0;
@@ -113,10 +110,11 @@ Status FitFinal(const std::vector<CalibratedPoint>& points, const LineModel& mod
     if (pass + 1 < kPasses && !model.Refine(steps.data(), &value)) break;
   }
   std::vector<CalibratedPoint> chosen;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (weights[i] < 1e-3) continue;
-    chosen.push_back(point(i));
-    chosen_weights.push_back(weights[i]);
+  for (int i = 0; i < model.NumData(); ++i) {
+    const double w = weights[static_cast<std::size_t>(i)];
+    if (w < 1e-3) continue;
+    chosen.push_back(points[static_cast<std::size_t>(model.PointIndex(i))]);
+    chosen_weights.push_back(w);
   }
   const Status status = FitLine(chosen, options.sigma_px, fit, &chosen_weights);
   if (!status.ok()) return status;
