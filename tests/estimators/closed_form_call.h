@@ -1,4 +1,4 @@
-// A closed form, called by its name.
+// A closed form, called by its name, and what most of them are asked about.
 #ifndef CIRCLINE_TESTS_ESTIMATORS_CLOSED_FORM_CALL_H_
 #define CIRCLINE_TESTS_ESTIMATORS_CLOSED_FORM_CALL_H_
 
@@ -7,6 +7,7 @@
 #include <string>
 
 #include "circline/estimators/closed_form_solvers.h"
+#include "tests/plane_scene.h"
 
 namespace circline {
 
@@ -21,6 +22,19 @@ inline PoseEstimate SolveClosedForm(const std::string& name, const Observations&
   const Solver* solver = registry.Find(name, SolverStage::kClosedForm);
   EXPECT_NE(solver, nullptr) << name;
   return solver->Solve(observations);
+}
+
+inline Observations OneCircle(PlaneScene* scene, double x = 0.5, double y = 0.2) {
+  Observations observations = scene->Empty();
+  observations.circles = {scene->Circle("c0", x, y, 1.0)};
+  return observations;
+}
+
+inline PencilObservation AlongX(PlaneScene* scene, int lines = 3, int points = 2) {
+  return scene->Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX(), lines, points);
+}
+inline PencilObservation AlongY(PlaneScene* scene, int lines = 3, int points = 2) {
+  return scene->Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY(), lines, points);
 }
 
 }  // namespace circline

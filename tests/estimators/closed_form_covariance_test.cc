@@ -7,7 +7,6 @@
 
 #include "circline/estimators/pencil_lean.h"
 #include "tests/estimators/closed_form_call.h"
-#include "tests/plane_scene.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -22,8 +21,7 @@ TEST(ClosedFormCovarianceTest, CovarianceIsHonest) {
     for (int i = 0; i < kTrials; ++i) {
       Observations observations = scene.Empty();
       observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.5)};
-      observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
-                              scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+      observations.pencils = {AlongX(&scene), AlongY(&scene)};
       for (PencilObservation& pencil : observations.pencils) {
         const auto& line = pencil.lines[1].points;  // Through the origin.
         (pencil.id == "L1" ? observations.frame.x_axis : observations.frame.y_axis) =
@@ -127,8 +125,7 @@ TEST(ClosedFormCovarianceTest, TheNoiseModelIsInTheCovariance) {
   Observations observations = scene.Empty();
   observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0, 200)};
   observations.circles[0].radius = 1.0;
-  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX(), 5, 30),
-                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY(), 5, 30)};
+  observations.pencils = {AlongX(&scene, 5, 30), AlongY(&scene, 5, 30)};
   const auto covariance = [&](const char* name, const NoiseModel& noise) -> Matrix6d {
     const PoseEstimate estimate = SolveClosedForm(name, observations, noise);
     EXPECT_TRUE(estimate.status.ok()) << estimate.status.message;

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "tests/estimators/closed_form_call.h"
-#include "tests/plane_scene.h"
 
 namespace circline {
 namespace {
@@ -38,8 +37,7 @@ TEST(ClosedFormRefusalsTest, RefusalsNameWhatIsMissing) {
 // Axes on one line span no plane.
 TEST(ClosedFormRefusalsTest, NothingIsDecidedWhereNoPoseFits) {
   PlaneScene scene;
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  Observations observations = OneCircle(&scene);
   observations.frame.x_axis = Segment{scene.Pixel(0, 0), scene.Pixel(2, 0)};
   observations.frame.y_axis = observations.frame.x_axis;
   const PoseEstimate estimate = SolveClosedForm("circle_frame", observations);
@@ -56,11 +54,9 @@ TEST(ClosedFormRefusalsTest, PixelsThatNoRayReachesSayNothing) {
   const Eigen::Vector2d outside(2000.0, 2000.0);
   CalibratedPoint point;
   ASSERT_FALSE(PixelToCalibrated(scene.camera, outside, &point));
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  Observations observations = OneCircle(&scene);
   observations.circles[0].center = scene.Pixel(0.5, 0.2);
-  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
-                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+  observations.pencils = {AlongX(&scene), AlongY(&scene)};
   observations.known_lengths = {
       KnownLength{Segment{scene.Pixel(0, 0), outside}, "p0", 5.0},
       KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(2, 0)}, "p0", 2.0}};
@@ -82,8 +78,7 @@ TEST(ClosedFormRefusalsTest, PixelsThatNoRayReachesSayNothing) {
 
 TEST(ClosedFormRefusalsTest, BrokenInputIsInvalidNotFatal) {
   PlaneScene scene;
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
+  Observations observations = OneCircle(&scene, 0.0, 0.0);
   observations.circles[0].points[3].x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(SolveClosedForm("single_circle", observations).status.code,
             StatusCode::kInvalidArgument);
@@ -95,8 +90,7 @@ TEST(ClosedFormRefusalsTest, BrokenInputIsInvalidNotFatal) {
 
 TEST(ClosedFormRefusalsTest, ALengthOfAPlaneThatIsNotThereIsNamed) {
   PlaneScene scene;
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
+  Observations observations = OneCircle(&scene, 0.0, 0.0);
   observations.known_lengths = {KnownLength{Segment{scene.Pixel(0, 0), scene.Pixel(1, 0)}, "", 1}};
   EXPECT_TRUE(observations.Validate().ok());
   observations.known_lengths[0].plane = observations.circles[0].plane;

@@ -6,7 +6,6 @@
 
 #include "circline/estimators/basics.h"
 #include "tests/estimators/closed_form_call.h"
-#include "tests/plane_scene.h"
 
 namespace circline {
 namespace {
@@ -19,8 +18,7 @@ void DrawAxes(PlaneScene* scene, Observations* observations) {
 
 TEST(ClosedFormSolversTest, SingleCircleReturnsBothPosesAsEquals) {
   PlaneScene scene;
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  Observations observations = OneCircle(&scene);
   const PoseEstimate estimate = SolveClosedForm("single_circle", observations);
   ASSERT_TRUE(estimate.status.ok());
   ASSERT_EQ(estimate.hypotheses.size(), 2U);
@@ -40,8 +38,7 @@ TEST(ClosedFormSolversTest, SingleCircleReturnsBothPosesAsEquals) {
 
 TEST(ClosedFormSolversTest, CenterDecidesAndRadiusMakesItMetric) {
   PlaneScene scene;
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  Observations observations = OneCircle(&scene);
   observations.circles[0].center = scene.Pixel(0.5, 0.2);
   observations.circles[0].radius = 1.0;
   const PoseEstimate estimate = SolveClosedForm("circle_center", observations);
@@ -60,8 +57,7 @@ TEST(ClosedFormSolversTest, CenterDecidesAndRadiusMakesItMetric) {
 
 TEST(ClosedFormSolversTest, DiametersAreAsGoodAsTheCenter) {
   PlaneScene scene;
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  Observations observations = OneCircle(&scene);
   observations.circles[0].diameters = {Segment{scene.Pixel(-0.5, 0.2), scene.Pixel(1.5, 0.2)},
                                        Segment{scene.Pixel(0.5, -0.8), scene.Pixel(0.5, 1.2)}};
   const PoseEstimate estimate = SolveClosedForm("circle_diameters", observations);
@@ -88,8 +84,7 @@ TEST(ClosedFormSolversTest, CirclesOfOnePlaneDecideTogether) {
 
 TEST(ClosedFormSolversTest, CircleFrameRecoversTheDrawnFrame) {
   PlaneScene scene;
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  Observations observations = OneCircle(&scene);
   DrawAxes(&scene, &observations);
   const PoseEstimate estimate = SolveClosedForm("circle_frame", observations);
   ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
@@ -141,8 +136,7 @@ TEST(ClosedFormSolversTest, TheOriginMayLieBehindTheCamera) {
 // Axes drawn the other way round, or so that Z points away from the camera, are taken as drawn.
 TEST(ClosedFormSolversTest, AxesDecideTheSigns) {
   PlaneScene scene;
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+  Observations observations = OneCircle(&scene);
   observations.frame.x_axis = Segment{scene.Pixel(0, 0), scene.Pixel(-2, 0)};
   observations.frame.y_axis = Segment{scene.Pixel(0, 0), scene.Pixel(0, 2)};
   const PoseEstimate estimate = SolveClosedForm("circle_frame", observations);
@@ -155,10 +149,8 @@ TEST(ClosedFormSolversTest, AxesDecideTheSigns) {
 // origin.
 TEST(ClosedFormSolversTest, CircleFrameTakesLinesAlongTheAxes) {
   PlaneScene scene;
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
-  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX(), 2),
-                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY(), 2)};
+  Observations observations = OneCircle(&scene);
+  observations.pencils = {AlongX(&scene, 2), AlongY(&scene, 2)};
   observations.frame.origin_is_center = "c0";
   const PoseEstimate estimate = SolveClosedForm("circle_frame", observations);
   ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
@@ -169,8 +161,7 @@ TEST(ClosedFormSolversTest, LinePairsForAnyTwoDirections) {
   PlaneScene scene;
   // Orthogonal, with roles; then oblique and free; then along X and the normal.
   Observations observations = scene.Empty();
-  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
-                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+  observations.pencils = {AlongX(&scene), AlongY(&scene)};
   DrawAxes(&scene, &observations);
   for (const char* name : {"line_pairs", "orthogonal_vanishing_points"}) {
     const PoseEstimate estimate = SolveClosedForm(name, observations);
@@ -242,8 +233,7 @@ TEST(ClosedFormSolversTest, KnownAnglesHaveNoSense) {
 TEST(ClosedFormSolversTest, OddLinesAreLeftOut) {
   PlaneScene scene(0.7, 0.3);
   Observations observations = scene.Empty();
-  observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX(), 4),
-                          scene.Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY(), 4)};
+  observations.pencils = {AlongX(&scene, 4), AlongY(&scene, 4)};
   Observations odd = observations;
   LineObservation line = scene.Line({-1.5, 0.3, 0.0}, {1.5, 1.1, 0.0});
   line.is_parallel = false;

@@ -8,8 +8,7 @@
 #include <limits>
 #include <string>
 
-#include "circline/estimators/closed_form_solvers.h"
-#include "tests/plane_scene.h"
+#include "tests/estimators/closed_form_call.h"
 
 namespace circline {
 namespace {
@@ -55,13 +54,6 @@ double BestNormalError(const PoseEstimate& estimate, const PlaneScene& scene) {
   return best;
 }
 
-PencilObservation AlongX(PlaneScene* scene, int lines = 2) {
-  return scene->Pencil("L1", PencilDirection::kX, Vector3d::UnitX(), lines);
-}
-PencilObservation AlongY(PlaneScene* scene, int lines = 2) {
-  return scene->Pencil("L2", PencilDirection::kY, Vector3d::UnitY(), lines);
-}
-
 // Both candidates coincide where the circle is seen straight on: the direction to its centre is
 // the normal.
 TEST(DegeneracyTest, AFrontalCircleKeepsItsNormal) {
@@ -70,8 +62,7 @@ TEST(DegeneracyTest, AFrontalCircleKeepsItsNormal) {
     scene.camera.distortion = {};
     scene.pose.rotation = ExpRotation({tilt, 0.0, 0.0}) * Vector3d(1.0, -1.0, -1.0).asDiagonal();
     scene.pose.translation = Vector3d(0.0, 0.0, 10.0);
-    Observations observations = scene.Empty();
-    observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
+    Observations observations = OneCircle(&scene, 0.0, 0.0);
     const PoseEstimate estimate = SolveDefined("single_circle", observations);
     ASSERT_GE(estimate.hypotheses.size(), 1U) << estimate.status.message;
     // The fit knows the two largest eigenvalues to 1e-15 or so; the tilt is their root.
@@ -105,8 +96,7 @@ TEST(DegeneracyTest, AnAxisAlongTheTiltLeavesProposition4Open) {
   PlaneScene scene;
   scene.pose.rotation = ExpRotation({0.7, 0.0, 0.0}) * Vector3d(1.0, -1.0, -1.0).asDiagonal();
   scene.pose.translation = Vector3d(0.0, 0.0, 10.0);
-  Observations observations = scene.Empty();
-  observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
+  Observations observations = OneCircle(&scene, 0.0, 0.0);
   // The origin is the centre, or lies elsewhere on the axis: ambiguous all the same.
   for (const double origin : {0.0, 0.8}) {
     observations.frame.x_axis = Segment{scene.Pixel(0, origin), scene.Pixel(2, origin)};
@@ -155,7 +145,7 @@ TEST(DegeneracyTest, PencilsParallelInTheImageAreOrdinary) {
   scene.camera.distortion = {};
   scene.pose.rotation = Vector3d(1.0, -1.0, -1.0).asDiagonal();
   Observations observations = scene.Empty();
-  observations.pencils = {AlongX(&scene), AlongY(&scene)};
+  observations.pencils = {AlongX(&scene, 2), AlongY(&scene, 2)};
   observations.frame.x_axis = Segment{scene.Pixel(0, 0), scene.Pixel(2, 0)};
   observations.frame.y_axis = Segment{scene.Pixel(0, 0), scene.Pixel(0, 2)};
   const PoseEstimate estimate = SolveDefined("line_pairs", observations);
@@ -189,7 +179,7 @@ TEST(DegeneracyTest, LinesMayRunAnywhere) {
   scene.pose.translation = Vector3d(0.0, 0.0, 10.0);
   Observations observations = scene.Empty();
   // Of three lines each the middle one is seen through the principal point: horizontal, vertical.
-  observations.pencils = {AlongX(&scene, 3), AlongY(&scene, 3)};
+  observations.pencils = {AlongX(&scene), AlongY(&scene)};
   const PoseEstimate estimate = SolveDefined("line_pairs", observations);
   ASSERT_EQ(estimate.hypotheses.size(), 1U) << estimate.status.message;
   EXPECT_LT(NormalError(estimate.hypotheses[0], scene), kExact);
@@ -220,7 +210,7 @@ TEST(DegeneracyTest, UnusablePencilsAreNamed) {
   for (const BrokenPencil& broken : cases) {
     PlaneScene scene;
     Observations observations = scene.Empty();
-    observations.pencils = {AlongX(&scene), AlongY(&scene)};
+    observations.pencils = {AlongX(&scene, 2), AlongY(&scene, 2)};
     broken.damage(&observations.pencils[1]);
     const PoseEstimate estimate = SolveDefined("line_pairs", observations);
     ASSERT_FALSE(estimate.status.ok()) << broken.name;
@@ -259,8 +249,7 @@ TEST(DegeneracyTest, UnusableContoursAreNamed) {
   for (const BrokenCircle& broken : cases) {
     PlaneScene scene;
     scene.camera.distortion = {};
-    Observations observations = scene.Empty();
-    observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
+    Observations observations = OneCircle(&scene);
     observations.circles[0].center = scene.Pixel(0.5, 0.2);
     broken.damage(&observations.circles[0]);
     const PoseEstimate estimate = SolveDefined("circle_center", observations);
