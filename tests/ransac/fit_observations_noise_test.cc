@@ -19,6 +19,7 @@
 namespace circline {
 namespace {
 
+using stray_points_scene::FitProblems;
 using stray_points_scene::Pixel;
 using stray_points_scene::SquaredError;
 using stray_points_scene::TestCamera;
@@ -121,8 +122,7 @@ TEST(FitObservationsNoise, FindsNoEllipseInClutter) {
             circle.points.emplace_back(320.0 + width_px * x, 240.0 + 0.75 * width_px * y);
           }
           observations.circles.push_back(circle);
-          std::vector<std::string> problems;
-          ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+          const std::vector<std::string> problems = FitProblems(&observations);
           fits += observations.circles[0].fit.has_value() ? 1 : 0;
           silent += problems.empty() ? 1 : 0;
           for (const std::string& problem : problems)
@@ -188,8 +188,7 @@ TEST(FitObservationsNoise, AStatedNoiseThatIsFarTooSmallIsNamed) {
         circle.points.push_back(Pixel(0.25 * std::cos(t), 0.2 * std::sin(t), &random, 0.5));
       }
       observations.circles.push_back(circle);
-      std::vector<std::string> problems;
-      ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+      const std::vector<std::string> problems = FitProblems(&observations);
       if (stated_px == 0.5) {
         EXPECT_TRUE(problems.empty()) << problems[0];
         continue;
@@ -216,8 +215,7 @@ TEST(FitObservationsNoise, AStatedNoiseThatIsFarTooSmallForLinesIsNamed) {
         pencil.lines.push_back(line);
       }
       observations.pencils.push_back(pencil);
-      std::vector<std::string> problems;
-      ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+      const std::vector<std::string> problems = FitProblems(&observations);
       const auto is_named =
           std::count_if(problems.begin(), problems.end(), [](const std::string& problem) {
             return problem.find("pencil 'L1': its points lie") == 0;
@@ -242,8 +240,7 @@ TEST(FitObservationsNoise, ASecondRimIsASecondReadingAndNamed) {
         0.5 * Eigen::Vector2d(x, y));
   }
   observations.circles = {circle};
-  std::vector<std::string> problems;
-  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+  const std::vector<std::string> problems = FitProblems(&observations);
   const CircleObservation& fitted = observations.circles[0];
   ASSERT_TRUE(fitted.fit && fitted.second);
   EXPECT_NEAR(static_cast<double>(std::count(fitted.inliers.begin(), fitted.inliers.end(), 1)),

@@ -18,6 +18,7 @@
 namespace circline {
 namespace {
 
+using stray_points_scene::FitProblems;
 using stray_points_scene::MakeObservations;
 using stray_points_scene::Pixel;
 using stray_points_scene::SquaredError;
@@ -25,8 +26,7 @@ using stray_points_scene::TestCamera;
 
 TEST(FitObservations, FillsEveryFit) {
   Observations observations = MakeObservations();
-  std::vector<std::string> problems;
-  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+  const std::vector<std::string> problems = FitProblems(&observations);
 
   const CircleObservation& circle = observations.circles[0];
   ASSERT_TRUE(circle.fit.has_value());
@@ -117,8 +117,7 @@ TEST(FitObservations, NamesWhatCannotBeFitted) {
   pencil.lines[0].points = {{100.0, 100.0}, {100.0, 100.0}};
   pencil.lines[1].points = {{100.0, 100.0}, {200.0, 120.0}};
   observations.pencils = {pencil};
-  std::vector<std::string> problems;
-  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+  const std::vector<std::string> problems = FitProblems(&observations);
   ASSERT_EQ(problems.size(), 4u);
   EXPECT_NE(problems[0].find("circle 'few'"), std::string::npos);
   EXPECT_NE(problems[1].find("circle 'collinear'"), std::string::npos);
@@ -150,8 +149,7 @@ TEST(FitObservations, NamesWhatTheLensLeavesNoPointOf) {
   }
   observations.circles = {circle};
   observations.pencils = {pencil};
-  std::vector<std::string> problems;
-  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+  const std::vector<std::string> problems = FitProblems(&observations);
   ASSERT_EQ(problems.size(), 4u);
   EXPECT_NE(problems[0].find("circle 'corner'"), std::string::npos);
   EXPECT_EQ(observations.num_dropped_points, 60);
@@ -161,14 +159,10 @@ TEST(FitObservations, ASingleLineAlongAnAxisIsNoProblem) {
   Observations observations = MakeObservations();
   PencilObservation& pencil = observations.pencils[0];
   pencil.lines.resize(1);
-  std::vector<std::string> problems;
-  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
-  EXPECT_NE(problems.back().find("two lines"), std::string::npos);
+  const std::vector<std::string> before = FitProblems(&observations);
+  EXPECT_NE(before.back().find("two lines"), std::string::npos);
   pencil.direction = PencilDirection::kX;
-  const std::size_t before = problems.size();
-  problems.clear();
-  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
-  EXPECT_EQ(problems.size(), before - 1);
+  EXPECT_EQ(FitProblems(&observations).size(), before.size() - 1);
   EXPECT_TRUE(pencil.lines[0].fit.has_value());
   EXPECT_FALSE(pencil.fit.has_value());
 }
@@ -257,8 +251,7 @@ TEST(FitObservations, LinesThatAreNotParallelAreOutliers) {
             MakeKerbs(static_cast<std::uint64_t>(trial), c.num_lines, c.num_odd, c.points, sigma);
         PencilObservation& pencil = observations.pencils[0];
         if (c.stated) pencil.sigma_px = sigma;
-        std::vector<std::string> problems;
-        ASSERT_TRUE(FitObservations(options, &observations, &problems).ok());
+        const std::vector<std::string> problems = FitProblems(&observations, options);
         ASSERT_TRUE(pencil.fit);
         std::size_t flagged = 0;
         for (std::size_t i = 0; i < pencil.lines.size(); ++i) {
@@ -300,8 +293,7 @@ TEST(FitObservations, SegmentsTellTheirNoise) {
 TEST(FitObservations, APencilWithoutLinesIsNamed) {
   Observations observations = MakeObservations();
   observations.pencils[0].lines.clear();
-  std::vector<std::string> problems;
-  ASSERT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
+  const std::vector<std::string> problems = FitProblems(&observations);
   ASSERT_EQ(problems.size(), 1u);
   EXPECT_NE(problems[0].find(observations.pencils[0].id), std::string::npos) << problems[0];
   EXPECT_FALSE(observations.pencils[0].fit.has_value());
@@ -310,9 +302,7 @@ TEST(FitObservations, APencilWithoutLinesIsNamed) {
 TEST(FitObservations, NothingToFitIsOk) {
   Observations observations;
   observations.camera = TestCamera();
-  std::vector<std::string> problems;
-  EXPECT_TRUE(FitObservations(FitOptions(), &observations, &problems).ok());
-  EXPECT_TRUE(problems.empty());
+  EXPECT_TRUE(FitProblems(&observations).empty());
 }
 
 }  // namespace

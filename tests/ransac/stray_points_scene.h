@@ -6,9 +6,12 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "circline/estimators/observations.h"
 #include "circline/estimators/random.h"
+#include "circline/ransac/fit_observations.h"
 #include "tests/pinhole_camera.h"
 
 namespace circline::stray_points_scene {
@@ -67,6 +70,14 @@ inline Observations MakeObservations() {
   }
   observations.pencils.push_back(pencil);
   return observations;
+}
+
+// Fits, and returns the problems that are reported.
+inline std::vector<std::string> FitProblems(Observations* observations,
+                                            const FitOptions& options = FitOptions()) {
+  std::vector<std::string> problems;
+  EXPECT_TRUE(FitObservations(options, observations, &problems).ok());
+  return problems;
 }
 
 // Squared error in standard deviations, in the `rank` directions of a covariance that has them.
