@@ -6,10 +6,12 @@
 #include <array>
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "circline/estimators/pose.h"
+#include "circline/refine/adjust_photos.h"
 
 namespace circline {
 
@@ -99,6 +101,15 @@ bool AlignById(const Places& from, const Places& to, Alignment* alignment);
 bool AlignByPattern(const Places& from, const Places& to, Alignment* alignment);
 // From one to start from: all circles that coincide under it.
 bool AlignFrom(const Places& from, const Places& to, const Similarity& start, Alignment* alignment);
+
+// --- given_poses.cc: photos whose poses are known up to where, how large and how turned the world
+// is: which circles of one are which of another, and where they lie. ---
+
+// Where the world lies, and the photos' circles and directions in it. `estimates`: each photo's
+// own, the unit of each another one. None where no circle is found in two of them.
+std::optional<GivenFrame> PlaceByGivenPoses(const std::vector<PoseEstimate>& estimates,
+                                            const std::vector<std::optional<CameraPose>>& given,
+                                            SharedLayout* shared);
 
 }  // namespace circline
 

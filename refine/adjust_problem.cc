@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "circline/refine/evidence_points.h"
-#include "circline/refine/given_poses.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/mostly_exact.h"
 

@@ -56,6 +56,13 @@ inline bool IsTangential(CameraModel model, int shift) {
   return model == CameraModel::kOpenCV && (shift == 6 || shift == 7);
 }
 
+// A pose against one of another frame and unit, X_other = s R X + t: rotation, translation, those
+// of R (4) and t (3), log s (1). `rotation`, `translation`: the camera's in the other frame; the
+// deviation of the translation in the unit of the world.
+ceres::CostFunction* NewGivenPosePrior(const Eigen::Matrix3d& rotation,
+                                       const Eigen::Vector3d& translation, double rotation_sigma,
+                                       double translation_sigma);
+
 // How each photo's own pose is estimated.
 EstimationOptions PoseOptions(const AdjustOptions& options);
 

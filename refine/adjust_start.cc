@@ -1,5 +1,3 @@
-#include "circline/refine/adjust_start.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <atomic>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "circline/estimators/closed_form_solvers.h"
+#include "circline/refine/adjustment.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/readings.h"

@@ -5,9 +5,7 @@
 #include <mutex>
 #include <string>
 
-#include "circline/refine/adjust_start.h"
 #include "circline/refine/adjustment.h"
-#include "circline/refine/given_poses.h"
 #include "circline/refine/known_pose.h"
 #include "circline/refine/statistics.h"
 

@@ -1,11 +1,10 @@
-#include "circline/refine/frame_news.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "circline/estimators/geometric_residuals.h"
+#include "circline/refine/track_steps.h"
 
 namespace circline {
 

@@ -1,5 +1,3 @@
-#include "circline/refine/given_poses.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -60,6 +58,12 @@ bool Meet(const Sighting& a, const Sighting& b, WorldSeed* seed) {
   const double radius = along[0] * a.radius, larger = radius / (along[1] * b.radius);
   *seed = {&a, along[0], (rays * along - between).norm() / radius};
   return larger < kLarger && larger > 1.0 / kLarger && seed->gap < kApart;
+}
+
+// The pose in the world of a photo that has the given one.
+CameraPose PoseInWorld(const GivenFrame& world, const CameraPose& given) {
+  return {given.rotation * world.rotation,
+          (given.rotation * world.translation + given.translation) / world.scale};
 }
 
 class Placer {
@@ -248,11 +252,6 @@ void Placer::Assemble(const GivenFrame& world, const Layout& start, SharedLayout
 }
 
 }  // namespace
-
-CameraPose PoseInWorld(const GivenFrame& world, const CameraPose& given) {
-  return {given.rotation * world.rotation,
-          (given.rotation * world.translation + given.translation) / world.scale};
-}
 
 std::optional<GivenFrame> PlaceByGivenPoses(const std::vector<PoseEstimate>& estimates,
                                             const std::vector<std::optional<CameraPose>>& given,

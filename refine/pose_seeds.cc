@@ -1,5 +1,3 @@
-#include "circline/refine/pose_seeds.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
@@ -9,6 +7,7 @@
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/closed_form_solvers.h"
+#include "circline/refine/readings.h"
 
 namespace circline {
 namespace {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "circline/estimators/point_noise.h"
-#include "circline/refine/frame_news.h"
 #include "circline/refine/scratch.h"
 #include "circline/refine/statistics.h"
 #include "circline/refine/track_frame.h"

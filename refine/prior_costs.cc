@@ -10,8 +10,8 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/directions.h"
+#include "circline/refine/adjust_problem.h"
 #include "circline/refine/cost_functions.h"
-#include "circline/refine/given_poses.h"
 
 namespace circline {
 namespace {

@@ -8,7 +8,6 @@
 
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/joint_result.h"
-#include "circline/refine/pose_seeds.h"
 #include "circline/refine/readings.h"
 
 namespace circline {

@@ -13,7 +13,6 @@
 #include "circline/estimators/point_noise.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
-#include "circline/refine/pose_seeds.h"
 
 namespace circline {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "circline/estimators/random.h"
 #include "circline/refine/adjust_photos.h"
-#include "circline/refine/adjust_start.h"
+#include "circline/refine/adjustment.h"
 #include "tests/sheet_photos.h"
 
 namespace circline {

@@ -9,8 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "circline/refine/adjust_problem.h"
-#include "circline/refine/adjust_start.h"
+#include "circline/refine/adjustment.h"
 #include "tests/sheet_photos.h"
 #include "tests/trials.h"
 
