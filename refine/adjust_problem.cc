@@ -47,15 +47,15 @@ AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
   translations_.assign(photos.size(), -1);
   AddCameras();
   for (std::size_t i = 0; i < photos.size(); ++i) {
-    if (photos[i].takes_part) AddPhoto(static_cast<int>(i));
+    if (photos[i].takes_part) AddPhoto(i);
   }
   SetGauge();
   if (given != nullptr) AddGivenPoses(*given);
 }
 
-void AdjustProblem::AddFeature(int photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
-                               std::vector<int> blocks) {
-  const bool active = photos_[static_cast<std::size_t>(photo)].left_out.count(id) == 0;
+void AdjustProblem::AddFeature(std::size_t photo, const std::string& id,
+                               std::unique_ptr<FeatureCost> cost, std::vector<int> blocks) {
+  const bool active = photos_[photo].left_out.count(id) == 0;
   const int term = AddTerm(cost.release(), std::move(blocks), static_cast<int>(features_.size()));
   features_.push_back({photo, id, term, active});
 }
@@ -112,12 +112,11 @@ void AdjustProblem::AddGivenPoses(const GivenFrame& given) {
   }
 }
 
-void AdjustProblem::AddPhoto(int photo) {
-  const auto i = static_cast<std::size_t>(photo);
-  const AdjustInput& input = photos_[i];
+void AdjustProblem::AddPhoto(std::size_t photo) {
+  const AdjustInput& input = photos_[photo];
   const Eigen::Vector3d& t = input.pose.translation;
-  rotations_[i] = AddRotation(input.pose.rotation);
-  translations_[i] = AddBlock(3, {t.x(), t.y(), t.z()});
+  rotations_[photo] = AddRotation(input.pose.rotation);
+  translations_[photo] = AddBlock(3, {t.x(), t.y(), t.z()});
   const Observations& obs = *input.observations;
   for (const CircleObservation& circle : obs.circles) {
     if (circle.fit && circle.plane == obs.frame.plane) AddCircle(photo, circle);
@@ -133,16 +132,15 @@ void AdjustProblem::SetGauge() {
   for (const Feature& feature : features_) {
     if (feature.active) observed.insert(term(feature.term).blocks[1]);
   }
-  std::map<int, bool> done;
+  std::set<std::size_t> done;  // Worlds.
   for (std::size_t i = 0; i < photos_.size(); ++i) {
-    const int world = photos_[i].world;
+    const std::size_t world = photos_[i].world;
     if (rotations_[i] < 0 || photos_[i].grid != nullptr) continue;  // A grid says all.
     if (observed.count(translations_[i]) == 0) {
       block(translations_[i]).is_constant = true;  // Nothing speaks of it.
       continue;
     }
-    if (done[world]) continue;
-    done[world] = true;
+    if (!done.insert(world).second) continue;
     if (has_scale_[world]) {
       SetManifold(translations_[i], std::make_unique<ScaleManifold>());
     } else {
@@ -153,7 +151,7 @@ void AdjustProblem::SetGauge() {
   }
 }
 
-void AdjustProblem::AddKnownRadius(int world, const CircleObservation& circle, int radius) {
+void AdjustProblem::AddKnownRadius(std::size_t world, const CircleObservation& circle, int radius) {
   if (!(circle.radius > 0.0) || !known_radii_.insert(radius).second) return;
   const double sigma =
       circle.radius_sigma > 0.0 ? circle.radius_sigma : options_.noise_model.radius;
@@ -163,16 +161,16 @@ void AdjustProblem::AddKnownRadius(int world, const CircleObservation& circle, i
   has_scale_[world] = metric_ = true;
 }
 
-AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservation& circle) {
-  const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
-  const int world = input.world;
+AdjustProblem::Circle* AdjustProblem::CircleOf(std::size_t photo, const CircleObservation& circle) {
+  const AdjustInput& input = photos_[photo];
+  const std::size_t world = input.world;
   const std::string& id = input.NameOf(circle.id);
   const auto known = circles_.find({world, id});
   if (known != circles_.end()) {
     AddKnownRadius(world, circle, known->second.radius);
     return &known->second;
   }
-  const Layout& layout = layouts_[static_cast<std::size_t>(world)];
+  const Layout& layout = layouts_[world];
   const auto start = layout.find(id);
   if (start == layout.end()) return nullptr;
   const NoiseModel& model = options_.noise_model;
@@ -206,7 +204,7 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(int photo, const CircleObservatio
 }
 
 // Contours of one contrast share an offset, in each photo its own.
-int AdjustProblem::OffsetOf(int photo, const CircleObservation& circle) {
+int AdjustProblem::OffsetOf(std::size_t photo, const CircleObservation& circle) {
   const double sigma = options_.noise_model.contour_offset_px;
   if (!(sigma > 0.0)) return -1;
   int& offset = OneOf({photo, std::clamp(circle.contrast, -1, 1)}, &offsets_);
@@ -217,9 +215,8 @@ int AdjustProblem::OffsetOf(int photo, const CircleObservation& circle) {
   return offset;
 }
 
-void AdjustProblem::AddCircle(int photo, const CircleObservation& circle) {
-  const auto i = static_cast<std::size_t>(photo);
-  const AdjustInput& input = photos_[i];
+void AdjustProblem::AddCircle(std::size_t photo, const CircleObservation& circle) {
+  const AdjustInput& input = photos_[photo];
   ImagePoints points;
   if (!FillEvidencePoints(input.observations->camera, circle.points, circle.inliers,
                           circle.sigma_px, true, pose_options_, num_distortion_, &points))
@@ -234,24 +231,24 @@ void AdjustProblem::AddCircle(int photo, const CircleObservation& circle) {
   with.shape = made->shape >= 0;
   with.offset = offset >= 0;
   with.camera = true;
-  std::vector<int> blocks = {rotations_[i], translations_[i], made->center, made->radius};
+  std::vector<int> blocks = {rotations_[photo], translations_[photo], made->center, made->radius};
   for (const int block : {made->tilt, made->shape, offset}) {
     if (block >= 0) blocks.push_back(block);
   }
-  blocks.push_back(cameras_[static_cast<std::size_t>(input.camera)]);
+  blocks.push_back(cameras_[input.camera]);
   AddFeature(photo, circle.id, std::make_unique<PlaneCircleContourCost>(std::move(points), with),
              blocks);
   if (!circle.center) return;
   AddFeature(photo, circle.id + ".center",
              std::make_unique<PlanePointCost>(input.observations->camera, *circle.center,
                                               center_sigma, options_.line_loss.type, true),
-             {rotations_[i], translations_[i], made->center, blocks.back()});
+             {rotations_[photo], translations_[photo], made->center, blocks.back()});
 }
 
 // Where a world has its pencils: along an axis, or in the plane.
-int AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
+int AdjustProblem::DirectionOf(std::size_t photo, const PencilObservation& pencil) {
   constexpr double kAlong = 0.98;  // Cosine: it is that axis, not one turned against it.
-  const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
+  const AdjustInput& input = photos_[photo];
   const auto named = input.pencil_names.find(pencil.id);
   const bool is_own =
       named == input.pencil_names.end() && (!input.names.empty() || input.given != nullptr);
@@ -259,7 +256,7 @@ int AdjustProblem::DirectionOf(int photo, const PencilObservation& pencil) {
   if (named != input.pencil_names.end()) id = named->second;
   Direction& made = directions_[{input.world, id}];
   if (made.block >= 0) return made.block;
-  made.photo = is_own ? photo : input.world - 1;
+  made.photo = static_cast<int>(is_own ? photo + 1 : input.world) - 1;
   const double sigma = std::max(options_.noise_model.pencil_axis_rad, 1e-6);
   Eigen::Vector3d d = input.pose.rotation.transpose() * pencil.fit->direction;
   const bool is_free = pencil.direction == PencilDirection::kFree;
@@ -289,10 +286,10 @@ double AdjustProblem::GridSigma(const AdjustInput& photo, double share) const {
 }
 
 // All pieces of a line of the board are off their place by the same.
-int AdjustProblem::AddGridPlace(int photo, std::size_t pencil, std::size_t line,
+int AdjustProblem::AddGridPlace(std::size_t photo, std::size_t pencil, std::size_t line,
                                 const CurveCost& cost, std::vector<int> blocks) {
   constexpr double kPieces = 0.1;  // Of the deviation of the whole.
-  const AdjustInput& input = photos_[static_cast<std::size_t>(photo)];
+  const AdjustInput& input = photos_[photo];
   const auto found = input.grid->places.find({pencil, line});
   if (found == input.grid->places.end()) return -1;
   const PencilObservation& observed = input.observations->pencils[pencil];
@@ -302,7 +299,7 @@ int AdjustProblem::AddGridPlace(int photo, std::size_t pencil, std::size_t line,
     off = AddBlock(1, {});
     AddTerm(NewGaussianPrior({GridSigma(input, 1.0)}), {off});
   }
-  blocks.insert(blocks.end(), {off, cameras_[static_cast<std::size_t>(input.camera)]});
+  blocks.insert(blocks.end(), {off, cameras_[input.camera]});
   return AddTerm(NewGridLinePrior(input.observations->camera, observed.lines[line].fit->line,
                                   cost.points()->Middle(nullptr).head<2>(),
                                   options_.noise_model.line_direction_rad > 0.0, axis,
@@ -310,13 +307,13 @@ int AdjustProblem::AddGridPlace(int photo, std::size_t pencil, std::size_t line,
                  std::move(blocks));
 }
 
-void AdjustProblem::AddPencil(int photo, std::size_t index) {
-  const auto i = static_cast<std::size_t>(photo);
-  const AdjustInput& input = photos_[i];
+void AdjustProblem::AddPencil(std::size_t photo, std::size_t index) {
+  const AdjustInput& input = photos_[photo];
   const PencilObservation& pencil = input.observations->pencils[index];
   const bool is_free = pencil.direction == PencilDirection::kFree;
   if (!pencil.fit || (is_free && pencil.plane != input.observations->frame.plane)) return;
-  const int direction = DirectionOf(photo, pencil);
+  const int rotation = rotations_[photo], direction = DirectionOf(photo, pencil),
+            camera = cameras_[input.camera];
   for (std::size_t j = 0; j < pencil.lines.size(); ++j) {
     const LineObservation& line = pencil.lines[j];
     if (!line.fit || !line.is_parallel) continue;
@@ -325,18 +322,16 @@ void AdjustProblem::AddPencil(int photo, std::size_t index) {
                             LineSigma(pencil, line), false, pose_options_, num_distortion_,
                             &points))
       continue;
-    DirectionLineCost::Options options;
-    options.direction_sigma = options_.noise_model.line_direction_rad;
-    options.camera = true;
-    auto cost = std::make_unique<DirectionLineCost>(std::move(points), line.fit->line, options);
-    const int place = AddBlock(options.direction_sigma > 0.0 ? 2 : 1, {}),
-              camera = cameras_[static_cast<std::size_t>(input.camera)];
-    const double* at[] = {Values(rotations_[i]), Values(direction), Values(place), Values(camera)};
+    const double deviation = options_.noise_model.line_direction_rad;
+    auto cost = std::make_unique<DirectionLineCost>(std::move(points), line.fit->line,
+                                                    DirectionLineCost::Options{deviation, true});
+    const int place = AddBlock(deviation > 0.0 ? 2 : 1, {});
+    const double* at[] = {Values(rotation), Values(direction), Values(place), Values(camera)};
     if (!cost->Start(at, Values(place))) continue;
-    const std::vector<int> on_plane = {rotations_[i], translations_[i], direction, place};
+    const std::vector<int> on_plane = {rotation, translations_[photo], direction, place};
     const int on_grid = input.grid != nullptr ? AddGridPlace(photo, index, j, *cost, on_plane) : -1;
     AddFeature(photo, pencil.id + "[" + std::to_string(j) + "]", std::move(cost),
-               {rotations_[i], direction, place, camera});
+               {rotation, direction, place, camera});
     features_.back().grid_term = on_grid;
   }
 }

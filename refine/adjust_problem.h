@@ -4,13 +4,13 @@
 #define CIRCLINE_REFINE_ADJUST_PROBLEM_H_
 
 #include <Eigen/Core>
-#include <array>
-#include <cstdint>
+#include <cstddef>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -28,9 +28,9 @@ class Linearization;
 // A photo as the problem takes it. All outlive the problem.
 struct AdjustInput {
   const Observations* observations = nullptr;  // As of Prepare, through the camera at start.
-  int camera = 0;
-  int world = 0;    // Photos of one world share circles and pencils of one id.
-  CameraPose pose;  // To start from, of that world.
+  std::size_t camera = 0;
+  std::size_t world = 0;  // Photos of one world share circles and pencils of one id.
+  CameraPose pose;        // To start from, of that world.
   // What the world calls its circles, by own id; empty: the same. What it calls its pencils; where
   // it does not say and circles have other names, or poses are given, each photo has its own.
   std::map<std::string, std::string> names, pencil_names;
@@ -80,7 +80,7 @@ class AdjustProblem : private Graph {
   double LargestRms() const { return Graph::LargestRms(ActiveTerms(), values().data()); }
 
   struct Feature {
-    int photo = 0;
+    std::size_t photo = 0;
     std::string id;  // As PoseHypothesis::left_out.
     int term = -1;
     bool active = true;
@@ -110,11 +110,12 @@ class AdjustProblem : private Graph {
     double log_scale = 0.0;       // Variance, of GivenFrame::scale.
   };
   // `at_minimum`: counts how far losses may have moved the estimate (Linearization::Options).
-  Covariances Covariance(int end, bool at_minimum = true) const;
+  Covariances Covariance(std::size_t end, bool at_minimum = true) const;
 
-  bool IsUsed(int camera) const;  // By a photo that takes part; else there is nothing to ask of it.
-  Camera CameraAt(int camera) const;
-  CameraPose PoseAt(int photo) const;
+  bool IsUsed(
+      std::size_t camera) const;  // By a photo that takes part; else there is nothing to ask of it.
+  Camera CameraAt(std::size_t camera) const;
+  CameraPose PoseAt(std::size_t photo) const;
   std::vector<std::vector<AdjustedResidual>> Residuals() const;  // Of the inliers; by photo.
   std::vector<AdjustedCircle> Circles() const;
   std::vector<AdjustedDirection> Directions() const;
@@ -133,28 +134,26 @@ class AdjustProblem : private Graph {
 
   void AddCameras();
   void AddCameraPrior(const CameraPrior& prior);
-  void AddPhoto(int photo);
+  void AddPhoto(std::size_t photo);
   void SetGauge();
   void AddGivenPoses(const GivenFrame& given);
-  void AddCircle(int photo, const CircleObservation& circle);
-  Circle* CircleOf(int photo, const CircleObservation& circle);
-  void AddKnownRadius(int world, const CircleObservation& circle, int radius);
-  int OffsetOf(int photo, const CircleObservation& circle);
-  void AddPencil(int photo, std::size_t pencil);
+  void AddCircle(std::size_t photo, const CircleObservation& circle);
+  Circle* CircleOf(std::size_t photo, const CircleObservation& circle);
+  void AddKnownRadius(std::size_t world, const CircleObservation& circle, int radius);
+  int OffsetOf(std::size_t photo, const CircleObservation& circle);
+  void AddPencil(std::size_t photo, std::size_t pencil);
   // Squares, of a photo that has a grid: this share of how far its lines are off their places, or,
   // where they are exact, a tenth of what their pixels leave.
   double GridSigma(const AdjustInput& photo, double share) const;
-  int AddGridPlace(int photo, std::size_t pencil, std::size_t line, const CurveCost& cost,
+  int AddGridPlace(std::size_t photo, std::size_t pencil, std::size_t line, const CurveCost& cost,
                    std::vector<int> blocks);
-  int DirectionOf(int photo, const PencilObservation& pencil);
-  void AddFeature(int photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
+  int DirectionOf(std::size_t photo, const PencilObservation& pencil);
+  void AddFeature(std::size_t photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
                   std::vector<int> blocks);
   int AddRotation(const Eigen::Matrix3d& rotation);
   // Of the features in force of photos before `end`, and of the priors of what these have.
-  std::vector<const Term*> ActiveTerms(int end) const;
-  std::vector<const Term*> ActiveTerms() const {
-    return ActiveTerms(static_cast<int>(photos_.size()));
-  }
+  std::vector<const Term*> ActiveTerms(std::size_t end) const;
+  std::vector<const Term*> ActiveTerms() const { return ActiveTerms(photos_.size()); }
   Matrix6d PoseCovariance(std::size_t photo, const Linearization& at) const;
 
   const std::vector<AdjustInput>& photos_;
@@ -166,12 +165,13 @@ class AdjustProblem : private Graph {
   std::vector<int> cameras_, rotations_, translations_;  // Blocks, -1: the photo takes no part.
   // Where poses are given, GivenFrame: rotation, translation, log scale.
   std::vector<int> given_;
-  std::map<std::pair<int, std::string>, Circle> circles_;
-  std::map<std::pair<int, std::string>, Direction> directions_;
-  std::map<std::pair<int, std::string>, int> radius_groups_, centers_;
-  std::map<std::pair<int, int>, int> offsets_;
-  std::map<std::array<int, 3>, int> grid_lines_;  // By photo, axis and place: how far off it is.
-  std::map<int, bool> x_is_fixed_, has_scale_;    // By world.
+  std::map<std::pair<std::size_t, std::string>, Circle> circles_;
+  std::map<std::pair<std::size_t, std::string>, Direction> directions_;
+  std::map<std::pair<std::size_t, std::string>, int> radius_groups_, centers_;
+  std::map<std::pair<std::size_t, int>, int> offsets_;
+  // By photo, axis and place: how far off it is.
+  std::map<std::tuple<std::size_t, int, int>, int> grid_lines_;
+  std::map<std::size_t, bool> x_is_fixed_, has_scale_;  // By world.
   std::set<int> known_radii_;
   std::vector<Feature> features_;
   bool metric_ = false;

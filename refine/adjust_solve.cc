@@ -13,7 +13,7 @@
 
 namespace circline {
 
-std::vector<const Term*> AdjustProblem::ActiveTerms(int end) const {
+std::vector<const Term*> AdjustProblem::ActiveTerms(std::size_t end) const {
   std::vector<const Term*> active;
   for (const Feature& feature : features_) {
     if (!feature.active || feature.photo >= end) continue;
@@ -86,8 +86,8 @@ void AdjustProblem::Judge() {
 std::vector<AdjustProblem::GridLine> AdjustProblem::GridLines() const {
   std::vector<GridLine> lines;
   for (const auto& [key, off] : grid_lines_) {
-    const auto i = static_cast<std::size_t>(key[0]);
-    lines.push_back({i, key[1], key[2], *Values(off) / GridSigma(photos_[i], 1.0)});
+    const auto& [photo, axis, place] = key;
+    lines.push_back({photo, axis, place, *Values(off) / GridSigma(photos_[photo], 1.0)});
   }
   return lines;
 }
@@ -113,23 +113,22 @@ double AdjustProblem::Misfit() const {
   return rows > unknowns ? chi2 / (rows - unknowns) : 1.0;
 }
 
-bool AdjustProblem::IsUsed(int camera) const {
+bool AdjustProblem::IsUsed(std::size_t camera) const {
   return std::any_of(photos_.begin(), photos_.end(), [&](const AdjustInput& photo) {
     return photo.camera == camera && photo.takes_part;
   });
 }
 
-Camera AdjustProblem::CameraAt(int camera) const {
+Camera AdjustProblem::CameraAt(std::size_t camera) const {
   const auto member = std::find_if(photos_.begin(), photos_.end(), [&](const AdjustInput& photo) {
     return photo.camera == camera && photo.takes_part;
   });
-  return ShiftedCamera(member->observations->camera,
-                       Values(cameras_[static_cast<std::size_t>(camera)]));
+  return ShiftedCamera(member->observations->camera, Values(cameras_[camera]));
 }
 
-CameraPose AdjustProblem::PoseAt(int photo) const {
-  const auto i = static_cast<std::size_t>(photo);
-  return {RotationFromBlock(Values(rotations_[i])), Eigen::Vector3d(Values(translations_[i]))};
+CameraPose AdjustProblem::PoseAt(std::size_t photo) const {
+  return {RotationFromBlock(Values(rotations_[photo])),
+          Eigen::Vector3d(Values(translations_[photo]))};
 }
 
 Matrix6d AdjustProblem::PoseCovariance(std::size_t photo, const Linearization& at) const {
@@ -149,7 +148,7 @@ Matrix6d AdjustProblem::PoseCovariance(std::size_t photo, const Linearization& a
   return by * at.Covariance(columns) * by.transpose();
 }
 
-AdjustProblem::Covariances AdjustProblem::Covariance(int end, bool at_minimum) const {
+AdjustProblem::Covariances AdjustProblem::Covariance(std::size_t end, bool at_minimum) const {
   Weighing inliers;
   inliers.inliers_only = true;
   constexpr double kTiny = 1e-10;  // What nothing ties (one circle's spin) says nothing.
@@ -172,7 +171,7 @@ AdjustProblem::Covariances AdjustProblem::Covariance(int end, bool at_minimum) c
   }
   if (!given_.empty()) out.log_scale = at.Covariance(at.Columns(given_[2])).trace();
   for (std::size_t i = 0; i < photos_.size(); ++i) {
-    if (rotations_[i] >= 0 && static_cast<int>(i) < end) out.poses[i] = PoseCovariance(i, at);
+    if (rotations_[i] >= 0 && i < end) out.poses[i] = PoseCovariance(i, at);
   }
   return out;
 }
@@ -208,8 +207,7 @@ std::vector<std::vector<AdjustedResidual>> AdjustProblem::Residuals() const {
     const double gate = kInlierSigmas * points->options().sigma_px;
     for (std::size_t i = 0; i < distances.size(); ++i) {
       if (std::abs(distances[i]) <= gate)
-        out[static_cast<std::size_t>(feature.photo)].push_back(
-            {points->pixels()[i], distances[i] * across[i]});
+        out[feature.photo].push_back({points->pixels()[i], distances[i] * across[i]});
     }
   }
   return out;
@@ -232,7 +230,8 @@ std::vector<AdjustedCircle> AdjustProblem::Circles() const {
   for (const auto& [key, circle] : circles_) {
     const PlaneCircle at(Values(circle.center), *Values(circle.radius),
                          circle.tilt >= 0 ? Values(circle.tilt) : nullptr);
-    out.push_back({key.second, key.first - 1, at.center, at.normal.normalized(), at.radius});
+    out.push_back({key.second, static_cast<int>(key.first) - 1, at.center, at.normal.normalized(),
+                   at.radius});
   }
   return out;
 }

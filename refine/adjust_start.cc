@@ -15,11 +15,11 @@
 
 namespace circline {
 
-void ParallelFor(int count, int num_threads, const std::function<void(int)>& work) {
-  std::atomic<int> next{0};
+void ParallelFor(std::size_t count, int num_threads, const std::function<void(std::size_t)>& work) {
+  std::atomic<std::size_t> next{0};
   const auto run = [&] {
     try {
-      for (int i = next++; i < count; i = next++) work(i);
+      for (std::size_t i = next++; i < count; i = next++) work(i);
     } catch (...) {  // No memory left, or a cost function of the user's.
       next = count;
       throw;
@@ -27,7 +27,8 @@ void ParallelFor(int count, int num_threads, const std::function<void(int)>& wor
   };
   std::vector<std::future<void>> others;
   try {
-    for (int k = 1; k < std::min(num_threads, count); ++k)
+    for (std::size_t k = 1; k < std::min<std::size_t>(static_cast<std::size_t>(num_threads), count);
+         ++k)
       others.push_back(std::async(std::launch::async, run));
   } catch (const std::exception&) {  // No more threads can be had: fewer do the work.
   }
@@ -75,28 +76,26 @@ double CoarsePose(const Observations& photo, const EstimationOptions& options,
   return best.cost + LeftOutCost(problem, best) + impossible;
 }
 
-CameraSweep::CameraSweep(std::vector<const Observations*> photos, const Camera& given,
+CameraSweep::CameraSweep(const std::vector<Observations>& photos, const Camera& given,
                          const EstimationOptions& options, int num_threads)
-    : photos_(std::move(photos)),
+    : photos_(photos),
       given_(given),
       options_(options),
       num_threads_(num_threads),
       noise_(photos_.size()),
       least_(photos_.size(), std::numeric_limits<double>::infinity()) {
-  ParallelFor(static_cast<int>(photos_.size()), num_threads_, [&](int i) {
-    const auto index = static_cast<std::size_t>(i);
-    noise_[index] = MeasurePointNoise(Prepare(*photos_[index], given_, options_));
+  ParallelFor(photos_.size(), num_threads_, [&](std::size_t i) {
+    noise_[i] = MeasurePointNoise(Prepare(photos_[i], given_, options_));
   });
 }
 
 std::vector<double> CameraSweep::CostsAt(const std::vector<Camera>& cameras) {
   std::vector<std::vector<double>> costs(photos_.size());
-  ParallelFor(static_cast<int>(photos_.size()), num_threads_, [&](int i) {
-    const auto index = static_cast<std::size_t>(i);
+  ParallelFor(photos_.size(), num_threads_, [&](std::size_t i) {
     for (const Camera& camera : cameras) {
-      const Observations photo = Prepare(*photos_[index], camera, options_, &noise_[index]);
-      costs[index].push_back(CoarsePose(photo, options_, nullptr));
-      least_[index] = std::min(least_[index], costs[index].back());
+      const Observations photo = Prepare(photos_[i], camera, options_, &noise_[i]);
+      costs[i].push_back(CoarsePose(photo, options_, nullptr));
+      least_[i] = std::min(least_[i], costs[i].back());
     }
   });
   // A photo that no pose explains at one of them tells nothing but that.

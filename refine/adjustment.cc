@@ -35,7 +35,7 @@ double Adjustment::JudgePhotos() {
   std::vector<std::vector<double>> by_photo(given_.size());
   for (const AdjustProblem::Feature& feature : problem_->features()) {
     if (feature.active && feature.rows > 0)
-      by_photo[static_cast<std::size_t>(feature.photo)].push_back(feature.chi2 / feature.rows);
+      by_photo[feature.photo].push_back(feature.chi2 / feature.rows);
   }
   std::vector<double> misfits;
   for (std::size_t i = 0; i < given_.size(); ++i) {
@@ -56,7 +56,7 @@ bool Adjustment::LeaveOut() {
   bool any = false;
   std::vector<int> left(given_.size(), 0), all(given_.size(), 0);
   for (const AdjustProblem::Feature& feature : problem_->features()) {
-    const auto i = static_cast<std::size_t>(feature.photo);
+    const std::size_t i = feature.photo;
     ++all[i];
     if (!feature.active) continue;
     ++left[i];
@@ -125,8 +125,8 @@ bool Adjustment::LeaveGridLinesOut() {
 bool Adjustment::HasMoved() const {
   constexpr double kMoved[] = {0.005, 0.005};  // Of log f; of the first distortion coefficient.
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (!problem_->IsUsed(static_cast<int>(c))) continue;
-    const Shifts moved = ShiftsBetween(cameras_[c], problem_->CameraAt(static_cast<int>(c)));
+    if (!problem_->IsUsed(c)) continue;
+    const Shifts moved = ShiftsBetween(cameras_[c], problem_->CameraAt(c));
     if (std::abs(moved[0]) > kMoved[0] || std::abs(moved[4]) > kMoved[1]) return true;
   }
   return false;
@@ -141,14 +141,12 @@ void Adjustment::PrepareAnew() {
   layouts_ = std::move(found);
   if (given_frame_) given_frame_ = problem_->GivenFrameAt();
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (problem_->IsUsed(static_cast<int>(c)))
-      cameras_[c] = problem_->CameraAt(static_cast<int>(c));
+    if (problem_->IsUsed(c)) cameras_[c] = problem_->CameraAt(c);
   }
-  ParallelFor(static_cast<int>(given_.size()), options_.num_threads, [&](int index) {
-    const auto i = static_cast<std::size_t>(index);
+  ParallelFor(given_.size(), options_.num_threads, [&](std::size_t i) {
     if (!inputs_[i].takes_part) return;
-    prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions(options_));
-    inputs_[i].pose = problem_->PoseAt(index);
+    prepared_[i] = Prepare(given_[i], cameras_[inputs_[i].camera], PoseOptions(options_));
+    inputs_[i].pose = problem_->PoseAt(i);
   });
 }
 
@@ -172,12 +170,10 @@ void Adjustment::SolveWithoutOutliers() {
 // Where lines alone are seen, and lie on a grid of squares. True where there are any.
 bool Adjustment::FindGrids() {
   if (!options_.square_grids) return false;
-  ParallelFor(static_cast<int>(given_.size()), options_.num_threads, [&](int index) {
-    const auto i = static_cast<std::size_t>(index);
+  ParallelFor(given_.size(), options_.num_threads, [&](std::size_t i) {
     const AdjustInput& input = inputs_[i];
-    if (input.takes_part && layouts_[static_cast<std::size_t>(input.world)].empty() &&
-        input.given == nullptr)
-      grids_[i] = FindSquareGrid(prepared_[i], problem_->PoseAt(index).rotation);
+    if (input.takes_part && layouts_[input.world].empty() && input.given == nullptr)
+      grids_[i] = FindSquareGrid(prepared_[i], problem_->PoseAt(i).rotation);
   });
   return std::any_of(grids_.begin(), grids_.end(),
                      [](const std::optional<SquareGrid>& grid) { return grid.has_value(); });
@@ -199,7 +195,7 @@ void Adjustment::ReportSigmas(double scale) {
   constexpr int kMost = 64;
   int seen = 0, next = 1;
   const auto add = [&](std::size_t end) {
-    const auto covariances = problem_->Covariance(static_cast<int>(end), false);
+    const auto covariances = problem_->Covariance(end, false);
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       auto& sigmas = out_.cameras[c].sigma_by_photos;
       if (counts[c] > 0 && (sigmas.empty() || sigmas.back().first < counts[c]))
@@ -208,7 +204,7 @@ void Adjustment::ReportSigmas(double scale) {
   };
   for (std::size_t i = 0; i < given_.size(); ++i) {
     if (!inputs_[i].takes_part) continue;
-    ++counts[CameraOf(i)];
+    ++counts[inputs_[i].camera];
     if (++seen < next || seen > kMost) continue;
     next *= 2;
     add(i + 1);
@@ -219,17 +215,16 @@ void Adjustment::ReportSigmas(double scale) {
 void Adjustment::Report() {
   JudgePhotos();
   const double scale = std::max(1.0, problem_->Misfit());
-  const AdjustProblem::Covariances covariances =
-      problem_->Covariance(static_cast<int>(given_.size()));
+  const AdjustProblem::Covariances covariances = problem_->Covariance(given_.size());
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     AdjustedCamera made;
     made.camera = cameras_[c];
-    if (!problem_->IsUsed(static_cast<int>(c))) {
+    if (!problem_->IsUsed(c)) {
       out_.notes.push_back("camera '" + made.camera.id + "': no photo of it takes part");
       out_.cameras.push_back(made);
       continue;
     }
-    made.camera = problem_->CameraAt(static_cast<int>(c));
+    made.camera = problem_->CameraAt(c);
     Eigen::Map<Eigen::Matrix<double, kCameraSize, kCameraSize, Eigen::RowMajor>>(
         made.covariance.data()) = scale * covariances.cameras[c];
     const Shifts prior = ShiftSigmas(cameras_[c], priors_[c], options_);
@@ -258,7 +253,7 @@ void Adjustment::Report() {
   for (std::size_t i = 0; i < given_.size(); ++i) {
     if (!inputs_[i].takes_part) continue;
     AdjustedPhoto& photo = out_.photos[i];
-    photo.cam_from_world = problem_->PoseAt(static_cast<int>(i));
+    photo.cam_from_world = problem_->PoseAt(i);
     Eigen::Map<Matrix6d>(photo.covariance.data()) = scale * covariances.poses[i];  // Symmetric.
     if (inputs_[i].grid != nullptr)
       photo.num_grid_lines = static_cast<int>(inputs_[i].grid->places.size());
@@ -267,9 +262,9 @@ void Adjustment::Report() {
     double sum = 0.0;
     for (const AdjustedResidual& r : photo.residuals) sum += r.offset.squaredNorm();
     photo.rms_px = count > 0 ? std::sqrt(sum / count) : 0.0;
-    squares[CameraOf(i)] += sum;
-    counts[CameraOf(i)] += count;
-    ++out_.cameras[CameraOf(i)].num_photos;
+    squares[inputs_[i].camera] += sum;
+    counts[inputs_[i].camera] += count;
+    ++out_.cameras[inputs_[i].camera].num_photos;
   }
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (counts[c] > 0) out_.cameras[c].rms_px = std::sqrt(squares[c] / counts[c]);

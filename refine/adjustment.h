@@ -3,6 +3,7 @@
 #ifndef CIRCLINE_REFINE_ADJUSTMENT_H_
 #define CIRCLINE_REFINE_ADJUSTMENT_H_
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -22,7 +23,7 @@ namespace circline {
 
 // Calls work(0) .. work(count - 1) on so many threads. What one of them throws ends the rest, and
 // is thrown again.
-void ParallelFor(int count, int num_threads, const std::function<void(int)>& work);
+void ParallelFor(std::size_t count, int num_threads, const std::function<void(std::size_t)>& work);
 
 // A photo as it is refined: fitted anew through this camera, resolved (ResolveWorld), each feature
 // with its noise, which is measured where `noise` is null.
@@ -38,7 +39,7 @@ double CoarsePose(const Observations& photo, const EstimationOptions& options,
 class CameraSweep {
  public:
   // `given`: the camera that the photos come with. All outlive it.
-  CameraSweep(std::vector<const Observations*> photos, const Camera& given,
+  CameraSweep(const std::vector<Observations>& photos, const Camera& given,
               const EstimationOptions& options, int num_threads);
   // Of CoarsePose, all photos, none counted for more than being hopeless.
   std::vector<double> CostsAt(const std::vector<Camera>& cameras);
@@ -48,7 +49,7 @@ class CameraSweep {
   std::vector<Camera> Candidates(double log_focal_sigma, bool has_radial);
 
  private:
-  std::vector<const Observations*> photos_;
+  const std::vector<Observations>& photos_;
   const Camera& given_;
   const EstimationOptions& options_;
   int num_threads_;
@@ -108,9 +109,6 @@ class Adjustment {
   void SolveOnce();
   void Report();
   void ReportSigmas(double scale);
-  std::size_t CameraOf(std::size_t photo) const {
-    return static_cast<std::size_t>(inputs_[photo].camera);
-  }
 
   const AdjustOptions& options_;
   const std::vector<Observations>& given_;

@@ -20,7 +20,7 @@ bool IsSameCamera(const Camera& a, const Camera& b) {
 // A sigma of a camera that no photo has is a slip of its name: the camera meant would count as
 // unknown.
 Status CheckNames(const std::map<std::string, CameraSigma>& sigmas,
-                  const std::map<std::string, int>& cameras) {
+                  const std::map<std::string, std::size_t>& cameras) {
   std::string known;
   for (const auto& [id, index] : cameras) known += (known.empty() ? "'" : ", '") + id + "'";
   for (const auto& [id, sigma] : sigmas) {
@@ -59,10 +59,10 @@ Shifts ShiftsBetween(const Camera& from, const Camera& to) {
 
 Status Adjustment::FindCameras() {
   if (given_.empty()) return Status::Refused("there is no photo");
-  std::map<std::string, int> index;
+  std::map<std::string, std::size_t> index;
   for (std::size_t i = 0; i < given_.size(); ++i) {
     const Camera& camera = given_[i].camera;
-    const auto [known, is_new] = index.insert({camera.id, static_cast<int>(cameras_.size())});
+    const auto [known, is_new] = index.insert({camera.id, cameras_.size()});
     inputs_[i].camera = known->second;
     if (is_new) {
       const Status status = camera.Validate();
@@ -71,11 +71,11 @@ Status Adjustment::FindCameras() {
       const auto stated = options_.camera_sigma.find(camera.id);
       priors_.push_back(stated != options_.camera_sigma.end() ? stated->second
                                                               : UnknownCamera(camera));
-    } else if (!IsSameCamera(camera, cameras_[static_cast<std::size_t>(known->second)])) {
+    } else if (!IsSameCamera(camera, cameras_[known->second])) {
       return Status::Invalid("photo " + std::to_string(i) + ": its camera '" + camera.id +
                              "' is not the one that an earlier photo has under that id");
     }
-    out_.photos[i].camera = known->second;
+    out_.photos[i].camera = static_cast<int>(known->second);
     out_.photos[i].status = given_[i].Validate();
   }
   guesses_ = cameras_;
@@ -125,19 +125,17 @@ Observations LessExact(Observations observations) {
 
 // Every photo through the cameras as they stand.
 void Adjustment::Estimate() {
-  const int count = static_cast<int>(given_.size());
   std::mutex mutex;
   int done = 0;
   estimates_.assign(given_.size(), {});
-  ParallelFor(count, options_.num_threads, [&](int index) {
-    const auto i = static_cast<std::size_t>(index);
+  ParallelFor(given_.size(), options_.num_threads, [&](std::size_t i) {
     if (out_.photos[i].status.ok()) {
-      prepared_[i] = Prepare(given_[i], cameras_[CameraOf(i)], PoseOptions(options_));
+      prepared_[i] = Prepare(given_[i], cameras_[inputs_[i].camera], PoseOptions(options_));
       inputs_[i].observations = &prepared_[i];
       if (start_ != nullptr) {
         CoarsePose(prepared_[i], PoseOptions(options_), &estimates_[i]);
       } else {
-        const bool is_wide = priors_[CameraOf(i)].IsWide();
+        const bool is_wide = priors_[inputs_[i].camera].IsWide();
         estimates_[i] =
             EstimatePose(is_wide ? LessExact(prepared_[i]) : prepared_[i], PoseOptions(options_));
       }
@@ -145,7 +143,7 @@ void Adjustment::Estimate() {
       estimates_[i].status = out_.photos[i].status;
     }
     const std::lock_guard<std::mutex> lock(mutex);
-    if (options_.progress) options_.progress("poses", ++done, count);
+    if (options_.progress) options_.progress("poses", ++done, static_cast<int>(given_.size()));
   });
 }
 
@@ -153,19 +151,17 @@ void Adjustment::Estimate() {
 void Adjustment::FindCamera(std::size_t c) {
   constexpr int kCoarseIterations = 10;
   constexpr double kMostPhotos = 12.0;  // So many tell a start.
-  std::vector<Observations> members;
+  std::vector<const Observations*> members;
   for (std::size_t i = 0; i < given_.size(); ++i) {
-    if (CameraOf(i) == c && out_.photos[i].status.ok()) members.push_back(LessExact(given_[i]));
+    if (inputs_[i].camera == c && out_.photos[i].status.ok()) members.push_back(&given_[i]);
   }
   const double step = std::max(1.0, static_cast<double>(members.size()) / kMostPhotos);
   std::vector<Observations> used;
   for (double i = 0.0; i < static_cast<double>(members.size()); i += step)
-    used.push_back(members[static_cast<std::size_t>(i)]);
-  std::vector<const Observations*> pointers;
-  for (const Observations& photo : used) pointers.push_back(&photo);
+    used.push_back(LessExact(*members[static_cast<std::size_t>(i)]));
   EstimationOptions pose = PoseOptions(options_);
   pose.conic_distance = ConicDistanceType::kSampson;  // Cheaper.
-  CameraSweep sweep(pointers, guesses_[c], pose, options_.num_threads);
+  CameraSweep sweep(used, guesses_[c], pose, options_.num_threads);
   // What a fisheye lens bends is in its model.
   const bool has_radial = cameras_[c].model == CameraModel::kOpenCV &&
                           ShiftSigmas(cameras_[c], priors_[c], options_)[4] > 0.0;
@@ -216,7 +212,7 @@ Status Adjustment::PlaceWorlds() {
     inputs_[i].takes_part = photo.status.ok() && !estimates_[i].hypotheses.empty();
     if (!inputs_[i].takes_part) continue;
     ++with_pose;
-    inputs_[i].world = static_cast<int>(i) + 1;
+    inputs_[i].world = i + 1;
     inputs_[i].pose = estimates_[i].hypotheses.front().cam_from_world;
     layouts_[i + 1] = LayoutOf(estimates_[i].hypotheses.front());
   }
@@ -251,11 +247,11 @@ Status Adjustment::PlaceWorlds() {
 
 // Every world in the unit of the radii that are known in it.
 void Adjustment::ScaleWorlds() {
-  std::map<int, std::vector<double>> ratios;
+  std::map<std::size_t, std::vector<double>> ratios;
   for (const AdjustInput& input : inputs_) {
     if (!input.takes_part) continue;
     for (const CircleObservation& circle : input.observations->circles) {
-      const Layout& layout = layouts_[static_cast<std::size_t>(input.world)];
+      const Layout& layout = layouts_[input.world];
       const auto at = layout.find(input.NameOf(circle.id));
       if (circle.radius > 0.0 && at != layout.end())
         ratios[input.world].push_back(circle.radius / at->second.radius);
@@ -263,7 +259,7 @@ void Adjustment::ScaleWorlds() {
   }
   for (auto& [world, own] : ratios) {
     const double scale = Median(std::move(own));
-    for (auto& [id, circle] : layouts_[static_cast<std::size_t>(world)])
+    for (auto& [id, circle] : layouts_[world])
       circle = {scale * circle.center, scale * circle.radius};
     for (AdjustInput& input : inputs_) {
       if (input.takes_part && input.world == world) input.pose.translation *= scale;

@@ -74,7 +74,7 @@ void Adjustment::SetAsideEqualViews() {
     const double pixels = options_.nearly_equal * std::hypot(camera.width, camera.height);
     AdjustedPhoto& photo = out_.photos[i];
     for (std::size_t j = 0; j < i && photo.status.ok(); ++j) {
-      if (!out_.photos[j].status.ok() || CameraOf(j) != CameraOf(i) ||
+      if (!out_.photos[j].status.ok() || inputs_[j].camera != inputs_[i].camera ||
           !IsIn(views[i], views[j], pixels) || !IsIn(views[j], views[i], pixels)) {
         continue;
       }

@@ -21,7 +21,7 @@ namespace {
 TEST(ParallelFor, ThrowsWhatAThreadThrows) {
   for (const int threads : {1, 4}) {
     std::atomic<int> done{0};
-    const auto work = [&](int i) {
+    const auto work = [&](std::size_t i) {
       if (i == 10) throw std::bad_alloc();
       ++done;
     };
