@@ -106,6 +106,16 @@ double Deviation(const PlaneSeed& plane, const NoiseModel& noise, const AxisLine
 
 }  // namespace
 
+void KeepFullest(std::size_t most, std::vector<AgreeingLines>* readings) {
+  const auto size = [](const AgreeingLines& lines) {
+    return std::count(lines.reading.begin(), lines.reading.end(), 1);
+  };
+  std::stable_sort(
+      readings->begin(), readings->end(),
+      [&](const AgreeingLines& a, const AgreeingLines& b) { return size(a) > size(b); });
+  readings->resize(std::min(readings->size(), most));
+}
+
 std::vector<AgreeingLines> FindAgreeingLines(const JointProblem& problem,
                                              const std::vector<Seed>& seeds,
                                              std::size_t max_readings) {
@@ -113,7 +123,7 @@ std::vector<AgreeingLines> FindAgreeingLines(const JointProblem& problem,
   const std::vector<AxisLine> lines = LinesAlongAxes(problem);
   if (lines.size() > kMost) return {};
   const std::vector<PlaneSeed> planes = CirclePlaneSeeds(problem, seeds);
-  const int all = static_cast<int>(lines.size());
+  const Reading everything(problem.features().size(), 1);
   std::vector<AgreeingLines> found;
   for (const AxisLine& line : lines) {
     std::vector<Seed> turned;
@@ -122,26 +132,21 @@ std::vector<AgreeingLines> FindAgreeingLines(const JointProblem& problem,
       if (Turn(line, problem.observations().frame, &seed)) turned.push_back(seed);
     }
     for (const PlaneSeed& plane : planes) {
-      AgreeingLines agreeing;
-      agreeing.reading.assign(problem.features().size(), 1);
+      AgreeingLines agreeing{everything, {}};
       for (const AxisLine& other : lines) {
         const bool agrees = &other == &line || Deviation(plane, problem.options().noise_model, line,
                                                          other) <= kInlierSigmas;
         agreeing.reading[other.feature] = agrees ? 1 : 0;
-        agreeing.num_lines += agrees ? 1 : 0;
       }
       const bool is_known = std::any_of(found.begin(), found.end(), [&](const AgreeingLines& a) {
         return a.reading == agreeing.reading;
       });
-      if (is_known || agreeing.num_lines == all) continue;
+      if (is_known || agreeing.reading == everything) continue;
       agreeing.seeds = turned;
       found.push_back(std::move(agreeing));
     }
   }
-  std::stable_sort(found.begin(), found.end(), [](const AgreeingLines& a, const AgreeingLines& b) {
-    return a.num_lines > b.num_lines;
-  });
-  found.resize(std::min(found.size(), max_readings));
+  KeepFullest(max_readings, &found);
   return found;
 }
 

@@ -115,17 +115,13 @@ std::vector<AgreeingLines> FindAgreeingPencils(const JointProblem& problem,
     const Eigen::Vector3d normal = p.is_across   ? a.fit.direction
                                    : q.is_across ? b.fit.direction
                                                  : a.fit.direction.cross(b.fit.direction);
-    AgreeingLines agreeing;
     Seed seed = seeds[0];
     if (!WorldRotation(problem.observations(), normal.normalized(), seed.pose.translation,
                        kAnySigmaPx, &seed.pose.rotation))
       return;
-    agreeing.seeds = {seed};
-    agreeing.reading.assign(problem.features().size(), 1);
+    AgreeingLines agreeing{Reading(problem.features().size(), 1), {seed}};
     for (const std::size_t line : a.odd) agreeing.reading[p.features[line]] = 0;
     for (const std::size_t line : b.odd) agreeing.reading[q.features[line]] = 0;
-    agreeing.num_lines =
-        static_cast<int>(std::count(agreeing.reading.begin(), agreeing.reading.end(), 1));
     found.push_back(std::move(agreeing));
   };
   for (auto p = pencils.begin(); p != pencils.end(); ++p) {
@@ -135,10 +131,7 @@ std::vector<AgreeingLines> FindAgreeingPencils(const JointProblem& problem,
       }
     }
   }
-  std::stable_sort(found.begin(), found.end(), [](const AgreeingLines& a, const AgreeingLines& b) {
-    return a.num_lines > b.num_lines;
-  });
-  found.resize(std::min(found.size(), kMostReadings));
+  KeepFullest(kMostReadings, &found);
   return found;
 }
 

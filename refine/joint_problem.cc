@@ -9,8 +9,8 @@
 
 namespace circline {
 
-std::vector<std::uint8_t> JointProblem::FirstReading() const {
-  std::vector<std::uint8_t> reading(features_.size(), 1);
+Reading JointProblem::FirstReading() const {
+  Reading reading(features_.size(), 1);
   for (std::size_t i = 0; i < features_.size(); ++i) {
     const Feature& f = features_[i];
     if (f.kind == Feature::Kind::kLine && f.line >= 0) reading[i] = LineOf(f).is_parallel ? 1 : 0;
@@ -78,10 +78,7 @@ double JointProblem::Cost(const State& state) const {
 }
 
 CameraPose JointProblem::PoseAt(const State& state) const {
-  CameraPose pose;
-  pose.rotation = RotationFromBlock(At(kRotation, state));
-  pose.translation = Eigen::Map<const Eigen::Vector3d>(At(kTranslation, state));
-  return pose;
+  return {RotationFromBlock(At(kRotation, state)), Eigen::Vector3d(At(kTranslation, state))};
 }
 
 }  // namespace circline

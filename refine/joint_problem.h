@@ -50,11 +50,14 @@ struct Feature {
   std::optional<Eigen::Matrix3d> covariance = std::nullopt;
 };
 
+// Which features take part, by feature: 1 or 0.
+using Reading = std::vector<std::uint8_t>;
+
 // Where a refinement stands.
 struct State {
-  std::vector<double> x;             // All parameter blocks.
-  std::vector<std::uint8_t> active;  // By feature.
-  double cost = 0.0;                 // Of the active terms, priors included.
+  std::vector<double> x;  // All parameter blocks.
+  Reading active;
+  double cost = 0.0;  // Of the active terms, priors included.
 
   bool Has(int feature) const { return active[static_cast<std::size_t>(feature)] != 0; }
 };
@@ -71,7 +74,7 @@ class JointProblem : public Graph {
   // by its own fits. Features that cannot lie in that plane in front of the camera are made
   // inactive. Refused where no circle can that the reading keeps, or the origin lies beyond the
   // horizon.
-  Status Start(const CameraPose& seed, double log_focal, const std::vector<std::uint8_t>& reading,
+  Status Start(const CameraPose& seed, double log_focal, const Reading& reading,
                State* state) const;
   // Makes an inactive line, circle, centre, angle or prior active, at the state's pose. False for
   // other features, and where it cannot lie there.
@@ -106,7 +109,7 @@ class JointProblem : public Graph {
   const double* At(int i, const State& state) const { return state.x.data() + block(i).offset; }
   double* At(int i, State* state) const { return state->x.data() + block(i).offset; }
   // Features that a fit has not found to contradict their like.
-  std::vector<std::uint8_t> FirstReading() const;
+  Reading FirstReading() const;
   // What the observations say that has no part in the problem, and why, a sentence each.
   const std::vector<std::string>& unused() const { return unused_; }
 
@@ -158,7 +161,7 @@ class JointProblem : public Graph {
   };
   bool PlaceCircle(const CircleBlocks& circle, State* state, Eigen::Vector3d* in_plane) const;
   Placed PlaceCircles(State* state) const;
-  bool LinesSuffice(const std::vector<std::uint8_t>& reading) const;
+  bool LinesSuffice(const Reading& reading) const;
   bool OriginRay(const State& state, Eigen::Vector3d* ray) const;
   bool PlaceOrigin(const Placed& placed, State* state) const;
   void PlaceScale(Placed placed, State* state) const;

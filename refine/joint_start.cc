@@ -235,7 +235,7 @@ Eigen::Matrix3d JointProblem::SenseOfPriors(const CameraPose& seed, const State&
 }
 
 // Whether a reading leaves all circles out, and lines of two directions tell the plane.
-bool JointProblem::LinesSuffice(const std::vector<std::uint8_t>& reading) const {
+bool JointProblem::LinesSuffice(const Reading& reading) const {
   const bool has_circle = std::any_of(circles_.begin(), circles_.end(), [&](const auto& circle) {
     return reading[static_cast<std::size_t>(circle.feature)] != 0;
   });
@@ -248,8 +248,8 @@ bool JointProblem::LinesSuffice(const std::vector<std::uint8_t>& reading) const 
   return !has_circle && told > 1;
 }
 
-Status JointProblem::Start(const CameraPose& given, double log_focal,
-                           const std::vector<std::uint8_t>& reading, State* state) const {
+Status JointProblem::Start(const CameraPose& given, double log_focal, const Reading& reading,
+                           State* state) const {
   state->x = values();
   state->active = reading;
   CameraPose seed = given;

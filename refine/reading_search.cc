@@ -1,7 +1,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <set>
 #include <utility>
@@ -22,8 +21,7 @@ constexpr std::size_t kMostCircles = 6;
 constexpr double kHopeless = 300.0;  // Gaps that no start comes down.
 constexpr double kNoRival = std::numeric_limits<double>::infinity();
 
-using Reading = std::vector<std::uint8_t>;  // By feature: takes part.
-constexpr std::size_t kFew = 6;             // Of so few features any may be the odd one.
+constexpr std::size_t kFew = 6;  // Of so few features any may be the odd one.
 
 class ReadingSearch {
  public:
@@ -291,7 +289,7 @@ bool IsSamePose(const JointProblem& problem, const State& a, const State& b, dou
 }
 
 std::vector<SeedStart> StartsOf(const JointProblem& problem, const std::vector<Seed>& seeds,
-                                const std::vector<std::uint8_t>& reading, Status* last) {
+                                const Reading& reading, Status* last) {
   std::vector<SeedStart> starts;
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     State state;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <limits>
 #include <optional>
@@ -144,7 +143,7 @@ NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* 
   Status unused;
   // What is told of angles is no feature's error, and where it is wrong all would seem to have
   // some.
-  std::vector<std::uint8_t> reading = problem.FirstReading();
+  Reading reading = problem.FirstReading();
   for (std::size_t i = 0; i < reading.size(); ++i) {
     if (problem.features()[i].kind == Feature::Kind::kAngle) reading[i] = 0;
   }

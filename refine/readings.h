@@ -5,7 +5,6 @@
 #define CIRCLINE_REFINE_READINGS_H_
 
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -87,7 +86,7 @@ struct SeedStart {
 };
 // Of all seeds that can start, the cheapest first; `last` receives what became of the last seed.
 std::vector<SeedStart> StartsOf(const JointProblem& problem, const std::vector<Seed>& seeds,
-                                const std::vector<std::uint8_t>& reading, Status* last);
+                                const Reading& reading, Status* last);
 
 // All minima of all readings that compete, in the order of the seeds; their cost is with what is
 // left out. A feature that contradicts the others as a whole makes a reading without it, and the
@@ -99,10 +98,11 @@ Status FindMinima(const JointProblem& problem, const std::vector<Seed>& seeds,
 // do. ---
 
 struct AgreeingLines {
-  std::vector<std::uint8_t> reading;  // Without the lines that do not agree.
-  std::vector<Seed> seeds;            // The planes, turned such that one of them fits.
-  int num_lines = 0;                  // That agree.
+  Reading reading;          // Without the lines that do not agree.
+  std::vector<Seed> seeds;  // The planes, turned such that one of them fits.
 };
+// Those with most lines first, and no more than `most` of them.
+void KeepFullest(std::size_t most, std::vector<AgreeingLines>* readings);
 
 // In a circle's plane one line along an axis tells how the world is turned: the sample of a search
 // by consensus. For each such line, and each plane of the best known circle among the seeds, the

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
-#include <cstdint>
-#include <vector>
 
 #include "circline/refine/joint_result.h"
 #include "tests/plane_scene.h"
@@ -29,7 +27,7 @@ TEST(JointProblem, AdmitsARimWithoutMovingTheOthersCentre) {
   ASSERT_EQ(problem.circles().size(), 2U);
   const JointProblem::CircleBlocks &out = problem.circles()[0], &in = problem.circles()[1];
   ASSERT_EQ(out.center, in.center);
-  std::vector<std::uint8_t> reading = problem.FirstReading();
+  Reading reading = problem.FirstReading();
   reading[static_cast<std::size_t>(in.feature)] = 0;
   State state;
   ASSERT_TRUE(problem.Start(scene.pose, 0.0, reading, &state).ok());
