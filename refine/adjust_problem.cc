@@ -189,17 +189,9 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(std::size_t photo, const CircleOb
   made.radius = radius;
   AddKnownRadius(world, circle, radius);
   const std::array<double, 3> tilt_sigmas = TiltSigmas(model);
-  if (tilt_sigmas[0] > 0.0) {
-    made.tilt = AddBlock(3, {});
-    AddTerm(NewGaussianPrior({tilt_sigmas.begin(), tilt_sigmas.end()}), {made.tilt});
-  }
-  if (model.circle_shape > 0.0) {
-    made.shape = AddBlock(2, {});
-    const double sigma = model.circle_shape * circle.fit->irregularity;
-    const int prior = AddTerm(NewGaussianPrior({sigma, sigma}), {made.shape}, -1,
-                              std::make_unique<MostlyExact>());
-    term(prior).is_counted_at_once = true;
-  }
+  if (tilt_sigmas[0] > 0.0) made.tilt = AddDeviation({tilt_sigmas.begin(), tilt_sigmas.end()});
+  if (model.circle_shape > 0.0)
+    made.shape = AddShape(model.circle_shape * circle.fit->irregularity);
   return &(circles_[{world, id}] = made);
 }
 
@@ -208,10 +200,7 @@ int AdjustProblem::OffsetOf(std::size_t photo, const CircleObservation& circle) 
   const double sigma = options_.noise_model.contour_offset_px;
   if (!(sigma > 0.0)) return -1;
   int& offset = OneOf({photo, std::clamp(circle.contrast, -1, 1)}, &offsets_);
-  if (offset < 0) {
-    offset = AddBlock(1, {});
-    AddTerm(NewGaussianPrior({sigma}), {offset}, -1, std::make_unique<MostlyExact>());
-  }
+  if (offset < 0) offset = AddDeviation({sigma}, -1, std::make_unique<MostlyExact>());
   return offset;
 }
 
@@ -223,8 +212,7 @@ void AdjustProblem::AddCircle(std::size_t photo, const CircleObservation& circle
     return;
   const Circle* made = CircleOf(photo, circle);
   if (made == nullptr) return;
-  // No better than the contour as a whole.
-  const double center_sigma = points.options().sigma_px / std::sqrt(points.options().weight);
+  const double center_sigma = ContourSigma(points);
   const int offset = OffsetOf(photo, circle);
   PlaneCircleContourCost::Blocks with;
   with.tilt_and_height = made->tilt >= 0;
@@ -295,10 +283,7 @@ int AdjustProblem::AddGridPlace(std::size_t photo, std::size_t pencil, std::size
   const PencilObservation& observed = input.observations->pencils[pencil];
   const int axis = AxisAcross(observed);
   int& off = OneOf({photo, axis, found->second}, &grid_lines_);
-  if (off < 0) {
-    off = AddBlock(1, {});
-    AddTerm(NewGaussianPrior({GridSigma(input, 1.0)}), {off});
-  }
+  if (off < 0) off = AddDeviation({GridSigma(input, 1.0)});
   blocks.insert(blocks.end(), {off, cameras_[input.camera]});
   return AddTerm(NewGridLinePrior(input.observations->camera, observed.lines[line].fit->line,
                                   cost.points()->Middle(nullptr).head<2>(),

@@ -39,6 +39,11 @@ inline bool FillEvidencePoints(const Camera& camera, const std::vector<Eigen::Ve
   return true;
 }
 
+// Standard deviation of a contour as a whole, pixels: no mark of its centre is better known.
+inline double ContourSigma(const ImagePoints& points) {
+  return points.options().sigma_px / std::sqrt(points.options().weight);
+}
+
 // What is known exactly has this share of the standard deviation that its own pixels give it, which
 // adds a hundredth to variances. With less the cost has a bent valley, so narrow that the solver
 // stops half-way along it.

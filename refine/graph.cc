@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "circline/refine/block_chain.h"
+#include "circline/refine/mostly_exact.h"
 
 namespace circline {
 namespace {
@@ -51,6 +52,19 @@ int Graph::AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feat
   terms_.push_back({std::unique_ptr<ceres::CostFunction>(owned), std::move(blocks), feature,
                     dynamic_cast<FeatureCost*>(owned), std::move(loss)});
   return static_cast<int>(terms_.size()) - 1;
+}
+
+int Graph::AddDeviation(const std::vector<double>& sigmas, int feature,
+                        std::unique_ptr<ceres::LossFunction> loss) {
+  const int block = AddBlock(static_cast<int>(sigmas.size()), {});
+  AddTerm(NewGaussianPrior(sigmas), {block}, feature, std::move(loss));
+  return block;
+}
+
+int Graph::AddShape(double sigma, int feature) {
+  const int block = AddDeviation({sigma, sigma}, feature, std::make_unique<MostlyExact>());
+  terms_.back().is_counted_at_once = true;
+  return block;
 }
 
 void Graph::Parameters(const Term& term, const double* x, const double** out) const {

@@ -69,6 +69,12 @@ class Graph {
   // What is not in `value` is 0.
   int AddBlock(int size, const std::vector<double>& value,
                std::unique_ptr<ceres::Manifold> manifold = {}, bool is_constant = false);
+  // A block of zeros about which a prior is Gaussian, with these standard deviations, under a loss
+  // or none.
+  int AddDeviation(const std::vector<double>& sigmas, int feature = -1,
+                   std::unique_ptr<ceres::LossFunction> loss = {});
+  // How far a circle is out of round (PlaneCircleContourCost), about zeros.
+  int AddShape(double sigma, int feature = -1);
   void SetManifold(int block, std::unique_ptr<ceres::Manifold> manifold) {
     this->block(block).manifold = std::move(manifold);
   }

@@ -89,11 +89,8 @@ int JointProblemBuilder::OffsetBlock(const CircleObservation& circle) {
   if (!(model_.contour_offset_px > 0.0)) return -1;
   const std::size_t contrast = ContrastOf(circle);
   int& block = offsets_[contrast];
-  if (block < 0 && (num_circles_[contrast] > 1 || circle.radius > 0.0)) {
-    block = p_.AddBlock(1, {});
-    p_.AddTerm(NewGaussianPrior({model_.contour_offset_px}), {block}, -1,
-               std::make_unique<MostlyExact>());
-  }
+  if (block < 0 && (num_circles_[contrast] > 1 || circle.radius > 0.0))
+    block = p_.AddDeviation({model_.contour_offset_px}, -1, std::make_unique<MostlyExact>());
   return block;
 }
 
@@ -116,18 +113,11 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   const int tilt = blocks.tilt_and_height ? p_.AddBlock(3, {}) : -1;
   if (tilt >= 0) used.push_back(tilt);
   blocks.shape = model_.circle_shape > 0.0;
-  if (blocks.shape) {
-    used.push_back(p_.AddBlock(2, {}));
-    const double sigma = model_.circle_shape * circle.fit->irregularity;
-    const int prior = p_.AddTerm(NewGaussianPrior({sigma, sigma}), {used.back()}, f,
-                                 std::make_unique<MostlyExact>());
-    p_.term(prior).is_counted_at_once = true;
-  }
+  if (blocks.shape) used.push_back(p_.AddShape(model_.circle_shape * circle.fit->irregularity, f));
   const int offset = OffsetBlock(circle);
   blocks.offset = offset >= 0;
   if (offset >= 0) used.push_back(offset);
-  // No better than the contour as a whole.
-  const double mark_sigma = points.options().sigma_px / std::sqrt(points.options().weight);
+  const double mark_sigma = ContourSigma(points);
   const int term =
       AddFeatureTerm(std::make_unique<PlaneCircleContourCost>(std::move(points), blocks), used, f);
   p_.circles_.push_back({static_cast<int>(index), f, term, center, radius, tilt});

@@ -81,7 +81,6 @@ void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle) {
   blocks.tilt_and_height = circle.tilt >= 0;
   blocks.offset = circle.offset >= 0;
   blocks.camera = map_.has_camera();
-  const int parent = static_cast<int>(terms_.size());
   Term& term = AddTerm(Term::Kind::kCircle, (blocks.tilt_and_height ? 1 : 0) +
                                                 (blocks.offset ? 2 : 0) + (blocks.camera ? 4 : 0));
   term.blocks = {TrackMap::kRotation, TrackMap::kTranslation, circle.center, circle.radius};
@@ -91,8 +90,7 @@ void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle) {
   term.id = circle.id;
   term.dof = 5;
   term.free_twice_cost = FreeTwiceCost(points_, seen.fit->conic);
-  const ImagePoints::Options& contour = points_.options();
-  const double mark_sigma = contour.sigma_px / std::sqrt(contour.weight);
+  const double mark_sigma = ContourSigma(points_);
   if (term.cost == nullptr)
     term.cost = std::make_unique<PlaneCircleContourCost>(ImagePoints(), blocks);
   static_cast<PlaneCircleContourCost&>(*term.cost).Exchange(&points_);
@@ -104,20 +102,21 @@ void TrackFrame::AddCircle(std::size_t index, const TrackMap::Circle& circle) {
     best_observation_ = static_cast<int>(index);
     best_circle_ = static_cast<int>(&circle - map_.circles.data());
   }
-  if (!seen.center) return;
-  AddCenter(seen, circle, mark_sigma);
-  terms_[terms_.size() - 1].parent = parent;
+  if (seen.center) AddCenter(seen, circle, mark_sigma);
 }
 
+// Of the circle that came last.
 void TrackFrame::AddCenter(const CircleObservation& seen, const TrackMap::Circle& circle,
                            double sigma_px) {
   const bool has_camera = map_.has_camera();
+  const int parent = static_cast<int>(terms_.size()) - 1;
   Term& mark = AddTerm(Term::Kind::kCenter, has_camera ? 1 : 0);
   mark.blocks = {TrackMap::kRotation, TrackMap::kTranslation, circle.center};
   if (has_camera) mark.blocks.push_back(TrackMap::kCamera);
   mark.id = circle.id;
   mark.id += ".center";
   mark.dof = 2;
+  mark.parent = parent;
   if (mark.cost == nullptr) {
     mark.cost = std::make_unique<PlanePointCost>(observations_->camera, *seen.center, sigma_px,
                                                  options_.line_loss.type, has_camera);
@@ -155,12 +154,10 @@ void TrackFrame::AddLine(const LineObservation& line, double sigma_px,
   if (!FillEvidencePoints(observations_->camera, line.points, line.inliers, sigma_px, false,
                           options_, NumDistortion(options_), &points_))
     return;
-  DirectionLineCost::Options options;
-  options.direction_sigma = deviation;
-  options.camera = map_.has_camera();
-  Term& term = AddTerm(Term::Kind::kLine, (deviation > 0.0 ? 1 : 0) + (map_.has_camera() ? 2 : 0));
+  const bool has_camera = map_.has_camera();
+  Term& term = AddTerm(Term::Kind::kLine, (deviation > 0.0 ? 1 : 0) + (has_camera ? 2 : 0));
   term.blocks = {TrackMap::kRotation, direction.block, kOwn};
-  if (map_.has_camera()) term.blocks.push_back(TrackMap::kCamera);
+  if (has_camera) term.blocks.push_back(TrackMap::kCamera);
   term.id = direction.id;
   if (number >= 0) {
     char text[16];
@@ -171,7 +168,8 @@ void TrackFrame::AddLine(const LineObservation& line, double sigma_px,
   term.own = deviation > 0.0 ? 2 : 1;
   term.free_twice_cost = FreeTwiceCost(points_, line.fit->line);
   if (term.cost == nullptr)
-    term.cost = std::make_unique<DirectionLineCost>(ImagePoints(), line.fit->line, options);
+    term.cost = std::make_unique<DirectionLineCost>(
+        ImagePoints(), line.fit->line, DirectionLineCost::Options{deviation, has_camera});
   static_cast<DirectionLineCost&>(*term.cost).Exchange(&points_, line.fit->line);
 }
 
