@@ -58,7 +58,6 @@ Status AdjustProblem::Solve(double stretch, int max_iterations) {
 }
 
 void AdjustProblem::Judge() {
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const double* parameters[kMostBlocks];
   for (Feature& feature : features_) {
     const Term& term = this->term(feature.term);

@@ -123,11 +123,11 @@ bool Adjustment::LeaveGridLinesOut() {
 
 // Whether the photos have led to another camera than they were prepared with.
 bool Adjustment::HasMoved() const {
-  constexpr double kMoved[] = {0.005, 0.005};  // Of log f; of the first distortion coefficient.
+  constexpr double kMoved = 0.005;  // Of log f; of the first distortion coefficient.
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (!problem_->IsUsed(c)) continue;
     const Shifts moved = ShiftsBetween(cameras_[c], problem_->CameraAt(c));
-    if (std::abs(moved[0]) > kMoved[0] || std::abs(moved[4]) > kMoved[1]) return true;
+    if (std::abs(moved[0]) > kMoved || std::abs(moved[4]) > kMoved) return true;
   }
   return false;
 }

@@ -31,6 +31,22 @@ Status CheckNames(const std::map<std::string, CameraSigma>& sigmas,
   return Status::Ok();
 }
 
+// Through a camera that is a little off the most exact contours of one plane contradict each other:
+// to start from, none is more exact than this.
+Observations LessExact(Observations observations) {
+  constexpr double kLeastPx = 0.3;  // Serves simulated noise of 0.02 to 0.4; no photo chose it.
+  for (CircleObservation& circle : observations.circles) {
+    if (circle.sigma_px > 0.0) circle.sigma_px = std::max(circle.sigma_px, kLeastPx);
+  }
+  for (PencilObservation& pencil : observations.pencils) {
+    if (pencil.sigma_px > 0.0) pencil.sigma_px = std::max(pencil.sigma_px, kLeastPx);
+    for (LineObservation& line : pencil.lines) {
+      if (line.sigma_px > 0.0) line.sigma_px = std::max(line.sigma_px, kLeastPx);
+    }
+  }
+  return observations;
+}
+
 }  // namespace
 
 // kOpenCV has k1 k2 p1 p2 k3, kFisheye k1 to k4.
@@ -102,26 +118,6 @@ Status Adjustment::CheckGivenPoses() {
   }
   return Status::Ok();
 }
-
-namespace {
-
-// Through a camera that is a little off the most exact contours of one plane contradict each other:
-// to start from, none is more exact than this.
-Observations LessExact(Observations observations) {
-  constexpr double kLeastPx = 0.3;  // Serves simulated noise of 0.02 to 0.4; no photo chose it.
-  for (CircleObservation& circle : observations.circles) {
-    if (circle.sigma_px > 0.0) circle.sigma_px = std::max(circle.sigma_px, kLeastPx);
-  }
-  for (PencilObservation& pencil : observations.pencils) {
-    if (pencil.sigma_px > 0.0) pencil.sigma_px = std::max(pencil.sigma_px, kLeastPx);
-    for (LineObservation& line : pencil.lines) {
-      if (line.sigma_px > 0.0) line.sigma_px = std::max(line.sigma_px, kLeastPx);
-    }
-  }
-  return observations;
-}
-
-}  // namespace
 
 // Every photo through the cameras as they stand.
 void Adjustment::Estimate() {

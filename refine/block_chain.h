@@ -27,13 +27,15 @@ inline Eigen::Matrix<double, 3, 4> DeltaFromQuaternion(const double* q) {
   return G;
 }
 
+// Jacobians as ceres has them.
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
 // jacobians[block] (num_residuals x size, row-major) = [J, 0; 0, 0], where ceres asks for it.
 template <typename Derived>
 void WriteJacobian(const Eigen::MatrixBase<Derived>& J, int num_residuals, int block,
                    double** jacobians, int size) {
   if (jacobians[block] == nullptr) return;
-  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(
-      jacobians[block], num_residuals, size);
+  Eigen::Map<RowMajor> out(jacobians[block], num_residuals, size);
   out.setZero();
   out.topLeftCorner(J.rows(), J.cols()) = J;
 }

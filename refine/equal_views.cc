@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "circline/estimators/basics.h"
 #include "circline/refine/adjustment.h"
 
 namespace circline {
@@ -41,8 +42,7 @@ bool IsNear(const Spot& a, const Spot& b, double distance) {
     return (b.first - a.first).norm() < distance && (b.last - a.last).norm() < distance;
   const Eigen::Vector2d along = (a.last - a.first).normalized();
   const auto off = [&](const Eigen::Vector2d& pixel) {
-    const Eigen::Vector2d d = pixel - a.first;
-    return std::abs(along.x() * d.y() - along.y() * d.x());
+    return std::abs(Cross(along, pixel - a.first));
   };
   return off(b.first) < distance && off(b.last) < distance;
 }

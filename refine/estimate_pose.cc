@@ -1,6 +1,7 @@
 #include "circline/refine/estimate_pose.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -12,27 +13,9 @@
 #include "circline/refine/readings.h"
 
 namespace circline {
-
 namespace {
 
 constexpr std::array kConicDistanceNames = {"auto", "sampson", "orthogonal"};  // By their type.
-
-}  // namespace
-
-const char* ConicDistanceName(ConicDistanceType type) {
-  return kConicDistanceNames[static_cast<std::size_t>(type)];
-}
-
-bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type) {
-  for (std::size_t i = 0; i < kConicDistanceNames.size(); ++i) {
-    if (name != kConicDistanceNames[i]) continue;
-    *type = static_cast<ConicDistanceType>(i);
-    return true;
-  }
-  return false;
-}
-
-namespace {
 
 bool IsPose(const CameraPose& pose) {
   return IsRotation(pose.rotation) && pose.translation.allFinite() && pose.translation.norm() > 0.0;
@@ -44,6 +27,17 @@ bool IsUnit(const Eigen::Vector3d& v) {
 }
 
 }  // namespace
+
+const char* ConicDistanceName(ConicDistanceType type) {
+  return kConicDistanceNames[static_cast<std::size_t>(type)];
+}
+
+bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type) {
+  const auto found = std::find(kConicDistanceNames.begin(), kConicDistanceNames.end(), name);
+  if (found == kConicDistanceNames.end()) return false;
+  *type = static_cast<ConicDistanceType>(found - kConicDistanceNames.begin());
+  return true;
+}
 
 Status EstimationOptions::Validate() const {
   for (const auto& [loss, name] :

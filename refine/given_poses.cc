@@ -167,12 +167,8 @@ std::vector<WorldSeed> Placer::Seeds() const {
 GivenFrame Placer::WorldOf(const WorldSeed& seed) const {
   const CameraPose& given = *given_[seed.sighting->photo];
   const CameraPose& own = seed.sighting->pose->cam_from_world;
-  GivenFrame world;
-  world.scale = seed.unit;
-  world.rotation = given.rotation.transpose() * own.rotation;
-  world.translation =
-      given.rotation.transpose() * (seed.unit * own.translation - given.translation);
-  return world;
+  return {seed.unit, given.rotation.transpose() * own.rotation,
+          given.rotation.transpose() * (seed.unit * own.translation - given.translation)};
 }
 
 // The photo's pose that finds most of the layout.

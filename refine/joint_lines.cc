@@ -139,9 +139,7 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
 void JointProblemBuilder::AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,
                                   double direction_sigma, Feature feature) {
   feature.free_twice_cost = FreeTwiceCost(points, fit);
-  DirectionLineCost::Options options;
-  options.direction_sigma = direction_sigma;
-  options.camera = has_camera_;
+  const DirectionLineCost::Options options{direction_sigma, has_camera_};
   const int f = AddFeature(std::move(feature)),
             own = p_.AddBlock(direction_sigma > 0.0 ? 2 : 1, {});
   const int term =

@@ -7,11 +7,11 @@
 #include <map>
 #include <utility>
 
+#include "circline/estimators/basics.h"
 #include "circline/refine/adjust_layout.h"
 #include "circline/refine/statistics.h"
 
 namespace circline {
-
 namespace {
 
 constexpr double kReach = 0.3;  // Deviation of two sights of one circle.
@@ -43,31 +43,6 @@ Pairs NeighbourPairs(const Places& places) {
   return pairs;
 }
 
-}  // namespace
-
-Places PlacesOf(const Layout& layout) {
-  Places places;
-  places.reserve(layout.size());
-  for (const auto& [id, circle] : layout) places.push_back({&id, circle, circle.radius});
-  std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
-    return a.circle.center.x() < b.circle.center.x();
-  });
-  constexpr double kShare = 0.3;  // A board's discs have about that radius, of their distances.
-  const std::vector<double> gaps = Gaps(places);
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    if (std::isfinite(gaps[k])) places[k].unit = std::max(places[k].unit, kShare * gaps[k]);
-  }
-  for (Place& place : places) {
-    const auto alike = std::count_if(places.begin(), places.end(), [&place](const Place& other) {
-      return std::abs(std::log(other.circle.radius / place.circle.radius)) < kReach;
-    });
-    place.weight = 1.0 + std::log(static_cast<double>(places.size()) / static_cast<double>(alike));
-  }
-  return places;
-}
-
-namespace {
-
 // Least squares of the centres (Umeyama 1991). False for fewer than two.
 bool Fit(const Places& from, const Places& to, const Pairs& pairs, Similarity* out) {
   constexpr std::size_t kFewest = 2;
@@ -82,7 +57,7 @@ bool Fit(const Places& from, const Places& to, const Pairs& pairs, Similarity* o
   for (const auto& [own, shared] : pairs) {
     const Eigen::Vector2d u = from[own].circle.center - a, v = to[shared].circle.center - b;
     dot += u.dot(v);
-    cross += u.x() * v.y() - u.y() * v.x();
+    cross += Cross(u, v);
     square += u.squaredNorm();
   }
   const double both = std::hypot(dot, cross);
@@ -107,43 +82,6 @@ bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
   alignment->misfit = Median(std::move(deviations));
   return true;
 }
-
-}  // namespace
-
-Pairs Matches(const Places& from, const Places& to, const Similarity& similarity) {
-  struct Match {
-    double deviation;
-    std::size_t own, shared;
-  };
-  double largest = 0.0;
-  for (const Place& place : to) largest = std::max(largest, place.unit);
-  const double farthest = kReach * largest;
-  std::vector<Match> near;
-  for (std::size_t own = 0; own < from.size(); ++own) {
-    const Eigen::Vector2d at = similarity(from[own].circle.center);
-    const auto first =
-        std::lower_bound(to.begin(), to.end(), at.x() - farthest,
-                         [](const Place& place, double x) { return place.circle.center.x() < x; });
-    for (auto k = static_cast<std::size_t>(first - to.begin());
-         k < to.size() && to[k].circle.center.x() <= at.x() + farthest; ++k) {
-      if (std::abs(to[k].circle.center.y() - at.y()) > farthest) continue;
-      const double deviation = Deviation(from[own].circle, to[k], similarity);
-      if (deviation < kReach) near.push_back({deviation, own, k});
-    }
-  }
-  std::stable_sort(near.begin(), near.end(),
-                   [](const Match& a, const Match& b) { return a.deviation < b.deviation; });
-  Pairs pairs;
-  std::vector<std::uint8_t> is_matched(from.size(), 0), is_taken(to.size(), 0);
-  for (const Match& match : near) {
-    if (is_matched[match.own] != 0 || is_taken[match.shared] != 0) continue;
-    is_matched[match.own] = is_taken[match.shared] = 1;
-    pairs.push_back({match.own, match.shared});
-  }
-  return pairs;
-}
-
-namespace {
 
 // The affine map of least squares. False for points in line, or seen from behind.
 bool FitAffine(const Places& from, const Places& to, const Pairs& pairs, Similarity* out) {
@@ -177,6 +115,60 @@ Pairs GrownMatches(const Places& from, const Places& to, Pairs pairs) {
 }
 
 }  // namespace
+
+Places PlacesOf(const Layout& layout) {
+  Places places;
+  places.reserve(layout.size());
+  for (const auto& [id, circle] : layout) places.push_back({&id, circle, circle.radius});
+  std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+    return a.circle.center.x() < b.circle.center.x();
+  });
+  constexpr double kShare = 0.3;  // A board's discs have about that radius, of their distances.
+  const std::vector<double> gaps = Gaps(places);
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    if (std::isfinite(gaps[k])) places[k].unit = std::max(places[k].unit, kShare * gaps[k]);
+  }
+  for (Place& place : places) {
+    const auto alike = std::count_if(places.begin(), places.end(), [&place](const Place& other) {
+      return std::abs(std::log(other.circle.radius / place.circle.radius)) < kReach;
+    });
+    place.weight = 1.0 + std::log(static_cast<double>(places.size()) / static_cast<double>(alike));
+  }
+  return places;
+}
+
+Pairs Matches(const Places& from, const Places& to, const Similarity& similarity) {
+  struct Match {
+    double deviation;
+    std::size_t own, shared;
+  };
+  double largest = 0.0;
+  for (const Place& place : to) largest = std::max(largest, place.unit);
+  const double farthest = kReach * largest;
+  std::vector<Match> near;
+  for (std::size_t own = 0; own < from.size(); ++own) {
+    const Eigen::Vector2d at = similarity(from[own].circle.center);
+    const auto first =
+        std::lower_bound(to.begin(), to.end(), at.x() - farthest,
+                         [](const Place& place, double x) { return place.circle.center.x() < x; });
+    for (auto k = static_cast<std::size_t>(first - to.begin());
+         k < to.size() && to[k].circle.center.x() <= at.x() + farthest; ++k) {
+      if (std::abs(to[k].circle.center.y() - at.y()) > farthest) continue;
+      const double deviation = Deviation(from[own].circle, to[k], similarity);
+      if (deviation < kReach) near.push_back({deviation, own, k});
+    }
+  }
+  std::stable_sort(near.begin(), near.end(),
+                   [](const Match& a, const Match& b) { return a.deviation < b.deviation; });
+  Pairs pairs;
+  std::vector<std::uint8_t> is_matched(from.size(), 0), is_taken(to.size(), 0);
+  for (const Match& match : near) {
+    if (is_matched[match.own] != 0 || is_taken[match.shared] != 0) continue;
+    is_matched[match.own] = is_taken[match.shared] = 1;
+    pairs.push_back({match.own, match.shared});
+  }
+  return pairs;
+}
 
 bool AlignById(const Places& from, const Places& to, Alignment* alignment) {
   std::map<std::string, std::size_t> shared;

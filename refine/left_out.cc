@@ -83,22 +83,6 @@ double ClutterCost(const JointProblem& problem, const Feature& f) {
   return std::max(0.0, cost);
 }
 
-}  // namespace
-
-double LeftOutCost(const JointProblem& problem, const State& state) {
-  double cost = 0.0;
-  for (std::size_t i = 0; i < problem.features().size(); ++i) {
-    const Feature& f = problem.features()[i];
-    const bool parent_is_out = f.parent >= 0 && !state.Has(f.parent);
-    if (state.active[i] != 0 && !parent_is_out) continue;
-    cost += 0.5 * f.free_twice_cost;
-    if (!parent_is_out) cost += ClutterCost(problem, f);
-  }
-  return cost;
-}
-
-namespace {
-
 // Makes all active that is left out but agrees with this pose, so that leaving it out costs more
 // than keeping it. False where there is no such line or circle.
 bool AdmitWhatFits(const JointProblem& problem, State* state) {
@@ -129,6 +113,18 @@ bool AdmitWhatFits(const JointProblem& problem, State* state) {
 }
 
 }  // namespace
+
+double LeftOutCost(const JointProblem& problem, const State& state) {
+  double cost = 0.0;
+  for (std::size_t i = 0; i < problem.features().size(); ++i) {
+    const Feature& f = problem.features()[i];
+    const bool parent_is_out = f.parent >= 0 && !state.Has(f.parent);
+    if (state.active[i] != 0 && !parent_is_out) continue;
+    cost += 0.5 * f.free_twice_cost;
+    if (!parent_is_out) cost += ClutterCost(problem, f);
+  }
+  return cost;
+}
 
 void TakeBackWhatFits(const JointProblem& problem, State* minimum) {
   for (State with = *minimum; AdmitWhatFits(problem, &with);) {

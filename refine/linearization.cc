@@ -11,8 +11,6 @@
 namespace circline {
 namespace {
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 Linearization::Options OptionsOf(const JointProblem& problem) {
   Linearization::Options options;
   options.core = {JointProblem::kRotation, JointProblem::kTranslation};
@@ -20,9 +18,8 @@ Linearization::Options OptionsOf(const JointProblem& problem) {
     options.core.push_back(JointProblem::kCamera);
   } else {
     const Shifts sigmas = ShiftSigmas(problem.observations().camera, problem.camera_sigma());
-    options.considered_sigmas = {sigmas.begin(), sigmas.end()};
-    if (std::any_of(sigmas.begin(), sigmas.end(), [](double s) { return s > 0.0; }))
-      options.considered = JointProblem::kCamera;
+    options.considered_sigmas = Eigen::Map<const Eigen::VectorXd>(sigmas.data(), kCameraSize);
+    if (options.considered_sigmas.maxCoeff() > 0.0) options.considered = JointProblem::kCamera;
   }
   return options;
 }

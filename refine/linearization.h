@@ -26,7 +26,7 @@ class Linearization {
     // A block that is held, but whose error counts ("consider" covariance), -1: none. And the
     // standard deviations of its numbers.
     int considered = -1;
-    std::vector<double> considered_sigmas;
+    Eigen::VectorXd considered_sigmas;
     // Information that is added to every unknown, of what it has and in itself.
     double floor = 0.0;
     // Whether x is where the terms cost least; else how far what a loss counts for more than it

@@ -100,9 +100,7 @@ void Linearization::AddConsidered(const Eigen::MatrixXd& with_considered) {
   const Eigen::Index c = with_considered.cols();
   if (c == 0) return;
   const Eigen::MatrixXd& P = PlusJacobian(options_.considered);
-  Eigen::VectorXd variances = Eigen::VectorXd::Zero(P.rows());
-  for (std::size_t k = 0; k < options_.considered_sigmas.size(); ++k)
-    variances[static_cast<Eigen::Index>(k)] = std::pow(options_.considered_sigmas[k], 2.0);
+  const Eigen::VectorXd variances = options_.considered_sigmas.cwiseAbs2();
   Part part{Eigen::MatrixXd(num_unknowns_ + c, c), P.transpose() * variances.asDiagonal() * P};
   part.X.topRows(num_unknowns_) = -inverse_->Times(with_considered);
   part.X.bottomRows(c).setIdentity();

@@ -11,6 +11,15 @@
 
 namespace circline {
 
+// Angle times axis.
+template <typename T>
+Eigen::Matrix<T, 3, 1> AngleAxisOf(const Eigen::Quaternion<T>& q) {
+  const T by_ceres[4] = {q.w(), q.x(), q.y(), q.z()};
+  Eigen::Matrix<T, 3, 1> angle_axis;
+  ceres::QuaternionToAngleAxis(by_ceres, angle_axis.data());
+  return angle_axis;
+}
+
 // Unit quaternions (x, y, z, w), perturbed in the world: R exp([delta]x). With two tangent
 // dimensions the spin about the world's Z axis is held.
 template <int kTangentSize>
@@ -30,12 +39,9 @@ struct TurnOfWorld {
   }
   template <typename T>
   bool Minus(const T* y, const T* x, T* y_minus_x) const {
-    const Quaternion<T> turn =
-        Eigen::Map<const Quaternion<T>>(x).conjugate() * Eigen::Map<const Quaternion<T>>(y);
-    const T by_ceres[4] = {turn.w(), turn.x(), turn.y(), turn.z()};
-    T angle_axis[3];
-    ceres::QuaternionToAngleAxis(by_ceres, angle_axis);
-    std::copy(angle_axis, angle_axis + kTangentSize, y_minus_x);
+    const Eigen::Matrix<T, 3, 1> turn = AngleAxisOf<T>(
+        Eigen::Map<const Quaternion<T>>(x).conjugate() * Eigen::Map<const Quaternion<T>>(y));
+    std::copy(turn.data(), turn.data() + kTangentSize, y_minus_x);
     return true;
   }
 };

@@ -1,7 +1,6 @@
 // What is known beside the pixels. Few and small: derivatives are automatic.
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/normal_prior.h>
-#include <ceres/rotation.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "circline/estimators/directions.h"
 #include "circline/refine/adjust_problem.h"
 #include "circline/refine/cost_functions.h"
+#include "circline/refine/manifolds.h"
 
 namespace circline {
 namespace {
@@ -23,15 +23,6 @@ template <typename T>
 using Vector3Block = Eigen::Map<const Vector3<T>>;
 template <typename T>
 using RotationBlock = Eigen::Map<const Eigen::Quaternion<T>>;
-
-// Angle times axis.
-template <typename T>
-Vector3<T> AngleAxisOf(const Eigen::Quaternion<T>& q) {
-  const T by_ceres[4] = {q.w(), q.x(), q.y(), q.z()};
-  Vector3<T> angle_axis;
-  ceres::QuaternionToAngleAxis(by_ceres, angle_axis.data());
-  return angle_axis;
-}
 
 struct AngleResidual {
   double angle, sigma;

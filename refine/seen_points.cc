@@ -157,7 +157,6 @@ class SeenCost : public ceres::CostFunction {
   template <typename Derived>
   void Add(const Eigen::MatrixBase<Derived>& J, double* jacobian, int size) const {
     if (jacobian == nullptr) return;
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     Eigen::Map<RowMajor>(jacobian, num_residuals(), size).leftCols(J.cols()) += J;
   }
 

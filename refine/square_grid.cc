@@ -181,6 +181,24 @@ Found Search(const Offsets& x, const Offsets& y) {
   return best;
 }
 
+// Gives lines their places across an axis, from 0; returns the offset of 0.
+double SetPlaces(const Offsets& offsets, double first, double square, SquareGrid* grid) {
+  std::vector<std::pair<const PlaneOffset*, int>> on_grid;
+  int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();
+  for (const PlaneOffset& o : offsets) {
+    const int place = static_cast<int>(NearestPlace(o, first, square));
+    const double sigma = std::sqrt(o.variance + kLoose * kLoose * square * square);
+    if (std::abs(o.offset - first - place * square) > kInlierSigmas * sigma) continue;
+    on_grid.emplace_back(&o, place);
+    least = std::min(least, place);
+    most = std::max(most, place);
+  }
+  if (on_grid.empty()) return first;
+  for (const auto& [o, place] : on_grid) grid->places[{o->pencil, o->line}] = place - least;
+  grid->width = std::max(grid->width, most - least);
+  return first + least * square;
+}
+
 }  // namespace
 
 int AxisAcross(const PencilObservation& pencil) {
@@ -201,28 +219,6 @@ bool SquareGrid::HasBothAxes(const Observations& photo) const {
   constexpr std::size_t kFewest = 4;
   return std::min(kept[0].size(), kept[1].size()) >= kFewest;
 }
-
-namespace {
-
-// Gives lines their places across an axis, from 0; returns the offset of 0.
-double SetPlaces(const Offsets& offsets, double first, double square, SquareGrid* grid) {
-  std::vector<std::pair<const PlaneOffset*, int>> on_grid;
-  int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();
-  for (const PlaneOffset& o : offsets) {
-    const int place = static_cast<int>(NearestPlace(o, first, square));
-    const double sigma = std::sqrt(o.variance + kLoose * kLoose * square * square);
-    if (std::abs(o.offset - first - place * square) > kInlierSigmas * sigma) continue;
-    on_grid.emplace_back(&o, place);
-    least = std::min(least, place);
-    most = std::max(most, place);
-  }
-  if (on_grid.empty()) return first;
-  for (const auto& [o, place] : on_grid) grid->places[{o->pencil, o->line}] = place - least;
-  grid->width = std::max(grid->width, most - least);
-  return first + least * square;
-}
-
-}  // namespace
 
 std::optional<SquareGrid> FindSquareGrid(const Observations& photo,
                                          const Eigen::Matrix3d& rotation) {

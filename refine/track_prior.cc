@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "circline/refine/block_chain.h"
+
 namespace circline {
 
 // phi of x, in its place. False where the origin is not before the camera.
@@ -61,10 +63,8 @@ bool TrackPrior::Evaluate(const double* const* parameters, double* residuals,
   Eigen::Index first = 0;
   for (std::size_t k = 0; jacobians != nullptr && k < blocks.size(); ++k) {
     const int size = parameter_block_sizes()[k];
-    if (jacobians[k] != nullptr) {
-      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-          jacobians[k], J_.rows(), size) = J_.middleCols(first, size);
-    }
+    if (jacobians[k] != nullptr)
+      Eigen::Map<RowMajor>(jacobians[k], J_.rows(), size) = J_.middleCols(first, size);
     first += size;
   }
   return true;

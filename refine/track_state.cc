@@ -71,10 +71,8 @@ int TrackMap::AddBlock(int size, std::unique_ptr<ceres::Manifold> manifold, bool
 }
 
 CameraPose TrackState::Pose(const TrackMap& map) const {
-  CameraPose pose;
-  pose.rotation = RotationFromBlock(x.data() + map.block(TrackMap::kRotation).offset);
-  pose.translation = Vector(map, TrackMap::kTranslation);
-  return pose;
+  return {RotationFromBlock(x.data() + map.block(TrackMap::kRotation).offset),
+          Vector(map, TrackMap::kTranslation)};
 }
 
 void TrackState::SetPose(const TrackMap& map, const CameraPose& pose) {

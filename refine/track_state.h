@@ -26,7 +26,7 @@ class TrackMap : private Graph {
  public:
   using Graph::block;
   using Graph::blocks;
-  enum { kRotation, kTranslation, kTurnRate, kVelocity, kCamera, kFirstLandmark };
+  enum { kRotation, kTranslation, kTurnRate, kVelocity, kCamera };  // Landmarks come behind.
   struct Circle {
     std::string id;
     int center = -1, radius = -1;  // Blocks: X and Y in the world plane; in the world's unit.
