@@ -13,6 +13,7 @@
 #include "circline/estimators/random.h"
 #include "circline/refine/adjust_photos.h"
 #include "circline/refine/adjustment.h"
+#include "tests/refine/simulated_options.h"
 #include "tests/sheet_photos.h"
 
 namespace circline {
@@ -34,8 +35,7 @@ TEST(ParallelFor, ThrowsWhatAThreadThrows) {
 
 TEST(AdjustHard, OnePhotoIsAsGoodAsItsSigma) {
   const Photos sheet = Photos(1).WithCircles();
-  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
   EXPECT_FALSE(adjusted.rigid);
   const AdjustedCamera& made = adjusted.cameras.front();
   EXPECT_EQ(made.num_photos, 1);
@@ -52,8 +52,7 @@ TEST(AdjustHard, PhotosThatShareNothingShareTheCamera) {
     sheet.photos[i].circles = own;
   }
   AdjustOptions options = PointNoiseOnly();
-  const AdjustedPhotos apart = AdjustPhotos(sheet.photos, options);
-  ASSERT_TRUE(apart.status.ok()) << apart.status.message;
+  const AdjustedPhotos apart = Ok(AdjustPhotos(sheet.photos, options));
   EXPECT_FALSE(apart.rigid);
   EXPECT_EQ(apart.cameras[0].num_photos, 4);
   EXPECT_LT(std::abs(std::log(apart.cameras[0].camera.fx / sheet.truth().fx)),
@@ -76,8 +75,7 @@ TEST(AdjustHard, PhotosThatOverlapInPartAreOfOneWorld) {
     }
     sheet.photos[i].circles = own;
   }
-  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
   EXPECT_TRUE(adjusted.rigid);
   EXPECT_EQ(adjusted.circles.size(), 9U);
   EXPECT_EQ(adjusted.cameras[0].num_photos, 6);
@@ -88,8 +86,7 @@ TEST(AdjustHard, PhotosThatOverlapInPartAreOfOneWorld) {
 TEST(AdjustHard, AMarkSaysHowABoardLies) {
   for (std::uint64_t seed = 4; seed <= 6; ++seed) {
     const Photos sheet = Photos(6, seed).WithMarkedBoard(seed);
-    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
     EXPECT_TRUE(adjusted.rigid);
     EXPECT_EQ(adjusted.circles.size(), 64U) << seed;
     for (std::size_t i = 0; i < sheet.poses.size(); ++i) {
@@ -111,8 +108,7 @@ TEST(AdjustHard, ExactContoursKeepTheirCircles) {
     const Photos sheet =
         Photos(count, seed, 0.3 + 0.03 * static_cast<double>(seed), CameraModel::kOpenCV, 0.002)
             .WithCircles();
-    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
     EXPECT_EQ(adjusted.circles.size(), 9U) << seed;
     EXPECT_NEAR(adjusted.cameras[0].camera.fx / sheet.truth().fx, 1.0, 0.01) << seed;
   }
@@ -130,13 +126,9 @@ TEST(AdjustHard, ACameraFarFromTheOneGivenIsNamed) {
       photo.camera.fx = wrong * sheet.truth().fx;
       photo.camera.fy = wrong * sheet.truth().fy;
     }
-    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
-    const bool is_named =
-        std::any_of(adjusted.notes.begin(), adjusted.notes.end(), [](const std::string& note) {
-          return note.find("its focal length is so far from the one given") != std::string::npos;
-        });
-    EXPECT_EQ(is_named, wrong > 1.0) << wrong;
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, options));
+    EXPECT_EQ(HasNote(adjusted, "its focal length is so far from the one given"), wrong > 1.0)
+        << wrong;
   }
 }
 
@@ -146,8 +138,7 @@ TEST(AdjustHard, ALensFarOffCentreKeepsThePrincipalPoint) {
     Photos sheet = Photos(8).OffCentre(p1).WithCircles();
     AdjustOptions options = PointNoiseOnly();
     options.tangential_sigma = AdjustOptions().tangential_sigma;
-    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, options));
     const AdjustedCamera& made = adjusted.cameras[0];
     EXPECT_LT(std::abs(made.camera.distortion[2] - p1), 3.0 * made.Sigma(6)) << p1;
     EXPECT_LT(made.Sigma(6), p1 > 0.0 ? 2e-3 : 5e-4) << p1;
@@ -214,13 +205,11 @@ TEST(AdjustHard, NearlyEqualFramesTakePartWhereThatIsAskedFor) {
   views.photos.push_back(views.photos.front());
   AdjustOptions options = PointNoiseOnly();
   options.nearly_equal = 0.0;
-  const AdjustedPhotos adjusted = AdjustPhotos(views.photos, options);
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(AdjustPhotos(views.photos, options));
   EXPECT_EQ(adjusted.cameras[0].num_photos, 3);
   // One that cannot take part stands for no other.
   views.photos[0].circles[0].radius = -1.0;
-  const AdjustedPhotos others = AdjustPhotos(views.photos, PointNoiseOnly());
-  ASSERT_TRUE(others.status.ok()) << others.status.message;
+  const AdjustedPhotos others = Ok(AdjustPhotos(views.photos, PointNoiseOnly()));
   EXPECT_EQ(others.cameras[0].num_photos, 2);
   options.nearly_equal = -1.0;
   EXPECT_EQ(AdjustPhotos(views.photos, options).status.code, StatusCode::kInvalidArgument);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/refine/simulated_options.h"
 #include "tests/sheet_photos.h"
 #include "tests/trials.h"
 
@@ -25,8 +26,7 @@ TEST(AdjustPhotos, CameraComesOutWithinItsSigma) {
       const Photos sheet = Photos(6, static_cast<std::uint64_t>(10 + trial)).WithCircles();
       AdjustOptions options = PointNoiseOnly();
       options.rigid = rigid;
-      const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
-      ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+      const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, options));
       EXPECT_EQ(adjusted.rigid, rigid == RigidWorld::kAuto);
       const AdjustedCamera& made = adjusted.cameras.front();
       EXPECT_EQ(made.num_photos, 6);
@@ -60,8 +60,7 @@ TEST(AdjustPhotos, AWholeLensFitsAsWellAsIsExpected) {
 TEST(AdjustPhotos, SmallDotsFarApartShareAWorld) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Photos sheet = Photos(6, seed).WithCircles(0.06);
-    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
     EXPECT_TRUE(adjusted.rigid) << seed;
     EXPECT_LT(std::abs(adjusted.cameras[0].camera.fx / sheet.truth().fx - 1.0), 0.02) << seed;
   }
@@ -100,8 +99,7 @@ TEST(AdjustPhotos, PosesComeOutWithinTheirCovariance) {
   int count = 0;
   for (int trial = 0; trial < trials; ++trial) {
     const Photos sheet = Photos(5, static_cast<std::uint64_t>(50 + trial)).WithCircles();
-    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
     std::size_t first = 0;  // Held: its translation has no variance.
     while (first < 4 && adjusted.photos[first].covariance[35] > 0.0) ++first;
     for (std::size_t i = 0; i < adjusted.photos.size(); ++i) {
@@ -140,8 +138,7 @@ TEST(AdjustPhotos, CirclesAreMatchedByHowTheyLie) {
 
   // Pencils are then each photo's own.
   sheet.WithPencils();
-  const AdjustedPhotos with_pencils = AdjustPhotos(sheet.photos, PointNoiseOnly());
-  ASSERT_TRUE(with_pencils.status.ok()) << with_pencils.status.message;
+  const AdjustedPhotos with_pencils = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
   EXPECT_EQ(with_pencils.directions.size(), 12U);
   for (const AdjustedDirection& direction : with_pencils.directions)
     EXPECT_EQ(direction.id.find(std::to_string(direction.photo) + ":"), 0U) << direction.id;
@@ -149,8 +146,7 @@ TEST(AdjustPhotos, CirclesAreMatchedByHowTheyLie) {
 
 TEST(AdjustPhotos, RowsAndColumnsOfUnknownSpacingSuffice) {
   const Photos board = Photos(8).WithPencils();
-  const AdjustedPhotos adjusted = AdjustPhotos(board.photos, PointNoiseOnly());
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(AdjustPhotos(board.photos, PointNoiseOnly()));
   const AdjustedCamera& made = adjusted.cameras.front();
   EXPECT_LT(std::abs(std::log(made.camera.fx / board.truth().fx)), 4.0 * made.Sigma(0));
   EXPECT_LT(made.Sigma(0), 0.02);
@@ -159,8 +155,7 @@ TEST(AdjustPhotos, RowsAndColumnsOfUnknownSpacingSuffice) {
 TEST(AdjustPhotos, AKnownRadiusMakesItMetric) {
   Photos sheet = Photos(5).WithCircles();
   sheet.photos[3].circles[4].radius = 0.05;  // A tenth; one photo says so.
-  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
   EXPECT_TRUE(adjusted.metric);
   for (std::size_t i = 0; i < sheet.photos.size(); ++i) {
     // Up to where the world lies in the plane: the camera's height over it.
@@ -177,8 +172,7 @@ TEST(AdjustPhotos, AGrossPhotoIsLeftOutAndNamed) {
   for (CircleObservation& circle : sheet.photos[3].circles) {
     for (Eigen::Vector2d& pixel : circle.points) pixel.x() = 320.0 + 0.8 * (pixel.x() - 320.0);
   }
-  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
   for (std::size_t i = 0; i < sheet.photos.size(); ++i)
     EXPECT_EQ(adjusted.photos[i].status.ok(), i != 3) << i << adjusted.photos[i].status.message;
   EXPECT_NE(adjusted.photos[3].status.message, "");
@@ -188,8 +182,7 @@ TEST(AdjustPhotos, AGrossPhotoIsLeftOutAndNamed) {
 
 TEST(AdjustPhotos, FrontalPhotosDoNotTellTheFocalLength) {
   const Photos sheet = Photos(4, 1, 0.0).WithCircles();
-  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
   const std::vector<std::string>& unknown = adjusted.cameras.front().at_prior;
   EXPECT_NE(std::find(unknown.begin(), unknown.end(), "focal length"), unknown.end())
       << adjusted.cameras.front().Sigma(0);
@@ -208,8 +201,7 @@ TEST(AdjustPhotos, TwoCamerasAreTwo) {
     photo.camera.cy *= 1.5;
     sheet.photos.push_back(photo);
   }
-  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
   ASSERT_EQ(adjusted.cameras.size(), 2U);
   EXPECT_NEAR(adjusted.cameras[1].camera.fx / adjusted.cameras[0].camera.fx, 1.5, 0.01);
 }
@@ -236,8 +228,7 @@ TEST(AdjustPhotos, RefusesInWords) {
 TEST(AdjustPhotos, EveryCameraModelComesOutWithinItsSigma) {
   for (const CameraModel model : {CameraModel::kPinhole, CameraModel::kFisheye}) {
     const Photos sheet = Photos(6, 3, 0.6, model).WithCircles();
-    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, PointNoiseOnly());
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
     const AdjustedCamera& made = adjusted.cameras.front();
     EXPECT_LT(std::abs(std::log(made.camera.fx / sheet.truth().fx)), 4.0 * made.Sigma(0));
     EXPECT_LT(std::abs(made.camera.cx - sheet.truth().cx), 4.0 * made.Sigma(2));

@@ -38,6 +38,7 @@ inline Camera LensCamera() {
 inline const Eigen::Matrix3d kRotation =
     ExpRotation({0.6, 0.1, 0.2}) * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
 inline const Eigen::Vector3d kTranslation(0.3, -0.2, 8.0);
+inline const Eigen::Vector3d kOff(0.003, -0.002, 0.004);  // A turn.
 
 // Parameter blocks with their manifolds.
 struct Blocks {
@@ -49,9 +50,12 @@ struct Blocks {
     manifolds.push_back(std::move(manifold));
   }
   // A little off the pose that the pixels are made with.
-  void AddPose(const Eigen::Vector3d& off = {0.003, -0.002, 0.004}) {
+  void AddRotation(const Eigen::Vector3d& off = kOff) {
     const Eigen::Quaterniond q(Eigen::Matrix3d(ExpRotation(off) * kRotation));
     Add({q.x(), q.y(), q.z(), q.w()}, std::make_shared<ceres::EigenQuaternionManifold>());
+  }
+  void AddPose(const Eigen::Vector3d& off = kOff) {
+    AddRotation(off);
     Add({kTranslation.x(), kTranslation.y() + 0.01, kTranslation.z()});
   }
   std::vector<const double*> Pointers() const {

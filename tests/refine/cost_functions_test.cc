@@ -17,22 +17,8 @@
 #include "circline/estimators/pose.h"
 #include "tests/refine/cost_function_checks.h"
 
-namespace circline {
+namespace circline::cost_function_checks {
 namespace {
-
-using cost_function_checks::Blocks;
-using cost_function_checks::CameraShifts;
-using cost_function_checks::Contour;
-using cost_function_checks::CostOf;
-using cost_function_checks::ExpectGradientByDifferences;
-using cost_function_checks::kLosses;
-using cost_function_checks::kRotation;
-using cost_function_checks::kTranslation;
-using cost_function_checks::LensCamera;
-using cost_function_checks::Line;
-using cost_function_checks::Linearize;
-using cost_function_checks::Moved;
-using cost_function_checks::Points;
 
 TEST(CostFunctionsTest, ContourOfAPlaneCircle) {
   const Eigen::Vector3d center(0.4, -0.3, 0.0);
@@ -98,9 +84,7 @@ TEST(CostFunctionsTest, ALineOfADirection) {
           options.camera = true;
           const DirectionLineCost cost(std::move(prepared), fit.line, options);
           Blocks blocks;
-          blocks.AddPose({0.001, 0.0005, -0.001});
-          blocks.values.pop_back();  // No translation.
-          blocks.manifolds.pop_back();
+          blocks.AddRotation({0.001, 0.0005, -0.001});
           const Eigen::Vector3d d = Eigen::Vector3d(1.0, -0.003, -0.001).normalized();
           blocks.Add({d.x(), d.y(), d.z()}, std::make_shared<ceres::SphereManifold<3>>());
           blocks.Add({0.002, -0.001});
@@ -126,9 +110,7 @@ TEST(CostFunctionsTest, ALineStartsWhereItsPointsAskFor) {
   options.camera = true;
   const DirectionLineCost cost(std::move(prepared), fit.line, options);
   Blocks blocks;
-  blocks.AddPose();
-  blocks.values.pop_back();
-  blocks.manifolds.pop_back();
+  blocks.AddRotation();
   blocks.Add({1.0, 0.0, 0.0}, std::make_shared<ceres::SphereManifold<3>>());
   blocks.Add({0.0});
   blocks.Add(CameraShifts());
@@ -209,8 +191,8 @@ TEST(CostFunctionsTest, NoInformationOnACameraIsLost) {
     options.camera = true;
     const DirectionLineCost cost(points, fit.line, options);
     Blocks blocks;
-    blocks.AddPose({0.0, 0.0, 0.0});
-    blocks.values[1] = {3.0, 0.01, 0.0};  // The direction, in place of the translation.
+    blocks.AddRotation({0.0, 0.0, 0.0});
+    blocks.Add({3.0, 0.01, 0.0});  // The direction.
     blocks.Add({0.0});
     blocks.Add(std::vector<double>(kCameraSize, 0.0));
     ASSERT_TRUE(cost.Start(blocks.Pointers().data(), blocks.values[2].data()));
@@ -304,4 +286,4 @@ TEST(CostFunctionsTest, BehindTheCameraIsRefused) {
 }
 
 }  // namespace
-}  // namespace circline
+}  // namespace circline::cost_function_checks

@@ -7,6 +7,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/refine/estimate_pose.h"
 #include "tests/plane_scene.h"
+#include "tests/refine/simulated_options.h"
 
 namespace circline {
 namespace {
@@ -96,8 +97,7 @@ TEST(DirectionReadings, AreSeenThroughTheCameraThatWasFound) {
   EstimationOptions options;
   options.camera_sigma = CameraSigma();
   options.camera_sigma->log_focal = 0.5;
-  const PoseEstimate estimate = EstimatePose(observations, options);
-  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  const PoseEstimate estimate = Ok(EstimatePose(observations, options));
   EXPECT_NEAR(estimate.hypotheses[0].focal_scale, 1.0 / kGuess, 0.1);
   EXPECT_EQ(estimate.hypotheses.size(), 1U);
   EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 2.0 * kDegree);

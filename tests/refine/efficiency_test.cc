@@ -36,10 +36,7 @@ Efficiency Measure(const std::string& name, SolverStage stage, LossType loss, do
   Efficiency result;
   Random random(7);
   for (int i = 0; i < trials; ++i) {
-    const PoseEstimate estimate = solver->Solve(PaperScene(sigma_px, &random));
-    EXPECT_TRUE(estimate.status.ok()) << name << ": " << estimate.status.message;
-    if (!estimate.status.ok()) return result;
-    const PoseHypothesis& best = estimate.hypotheses.front();
+    const PoseHypothesis best = Best(solver->Solve(PaperScene(sigma_px, &random)));
     const Eigen::Vector3d error =
         LogRotation(PaperPose().rotation * best.cam_from_world.rotation.transpose());
     result.rms_rad += error.squaredNorm() / trials;
@@ -109,8 +106,7 @@ TEST(EfficiencyTest, OrthogonalDistancesLeanSmallRingsOverLess) {
     for (const auto distance :
          {ConicDistanceType::kSampson, ConicDistanceType::kOrthogonal, ConicDistanceType::kAuto}) {
       options.conic_distance = distance;
-      const PoseEstimate estimate = EstimatePose(observations, options);
-      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      const PoseEstimate estimate = Ok(EstimatePose(observations, options));
       double nearest = 10.0;  // Of either hypothesis: small rings do not always tell them apart.
       for (const PoseHypothesis& h : estimate.hypotheses) {
         const double off = std::acos(-h.circles[0].normal.z()) - kTilt;

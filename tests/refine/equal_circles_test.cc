@@ -84,9 +84,7 @@ TEST(EqualCirclesTest, NormalSitsOnItsBound) {
       PlaneScene scene(0.6, kSigmaPx, static_cast<std::uint64_t>(i + 1));
       EstimationOptions options = Exact();
       options.conic_loss.type = LossType::kTrivial;
-      const PoseEstimate estimate = EstimatePose(Dots(&scene, equal), options);
-      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-      const PoseHypothesis& best = estimate.hypotheses[0];
+      const PoseHypothesis best = Best(EstimatePose(Dots(&scene, equal), options));
       const double error = NormalError(best, scene);
       rms[equal ? 1 : 0] += error * error / kTrials;
       nees += equal ? NormalErrors(best, scene.pose).Nees() / kTrials : 0.0;
@@ -110,12 +108,11 @@ TEST(EqualCirclesTest, TheSizesTellThePlane) {
   for (int i = 0; i < 20; ++i) {
     PlaneScene scene(0.5, 0.3, static_cast<std::uint64_t>(i + 1));
     scene.pose.translation.z() = 30.0;
-    const PoseEstimate estimate = EstimatePose(Dots(&scene, true), Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    EXPECT_LT(NormalError(estimate.hypotheses[0], scene), 0.1);
-    ASSERT_EQ(estimate.hypotheses[0].circles.size(), 5U);
-    for (const CircleEstimate& circle : estimate.hypotheses[0].circles)
-      EXPECT_DOUBLE_EQ(circle.radius, estimate.hypotheses[0].circles[0].radius);
+    const PoseHypothesis best = Best(EstimatePose(Dots(&scene, true), Exact()));
+    EXPECT_LT(NormalError(best, scene), 0.1);
+    ASSERT_EQ(best.circles.size(), 5U);
+    for (const CircleEstimate& circle : best.circles)
+      EXPECT_DOUBLE_EQ(circle.radius, best.circles[0].radius);
   }
 }
 
@@ -123,10 +120,9 @@ TEST(EqualCirclesTest, OneKnownRadiusIsThatOfTheGroup) {
   PlaneScene scene(0.6, 0.0);
   Observations observations = Dots(&scene, true);
   observations.circles[3].radius = kRadius;
-  const PoseEstimate estimate = EstimatePose(observations, Exact());
-  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-  EXPECT_TRUE(estimate.hypotheses[0].metric);
-  EXPECT_NEAR(estimate.hypotheses[0].circles[0].radius, kRadius, 1e-9);
+  const PoseHypothesis best = Best(EstimatePose(observations, Exact()));
+  EXPECT_TRUE(best.metric);
+  EXPECT_NEAR(best.circles[0].radius, kRadius, 1e-9);
   observations.circles[1].radius = 2.0 * kRadius;
   EXPECT_NE(observations.Validate().message.find("radius group 'dots'"), std::string::npos);
 }

@@ -28,8 +28,7 @@ CameraSigma FocalSigma(double log_focal) {
 }
 
 EstimationOptions WithFocal(LossType loss = LossType::kTrivial) {
-  EstimationOptions options = Exact();
-  options.conic_loss.type = options.line_loss.type = loss;
+  EstimationOptions options = Exact(loss);
   options.camera_sigma = FocalSigma(kPrior);
   return options;
 }
@@ -113,9 +112,7 @@ TEST(FocalTest, GridsSitOnTheBoundOfRotationAndFocalLength) {
     Observations observations = Grid(&scene);
     const double mistake = std::exp(kPrior * random.Normal());
     Mistake(mistake, &observations);
-    const PoseEstimate estimate = EstimatePose(observations, WithFocal());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses[0];
+    const PoseHypothesis best = Best(EstimatePose(observations, WithFocal()));
     const Vector4d error = Error(best, scene, mistake);
     rotation += error.head<3>().squaredNorm() / kTrials;
     focal += error[3] * error[3] / kTrials;
@@ -148,8 +145,7 @@ class WrongFocalTest : public ::testing::TestWithParam<CameraModel> {
       if (GetParam() == CameraModel::kPinhole) scene.camera.distortion = {};
       Observations observations = observe(&scene);
       Mistake(kMistake, &observations);
-      const PoseEstimate estimate = EstimatePose(observations, WithFocal());
-      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      const PoseEstimate estimate = Ok(EstimatePose(observations, WithFocal()));
       const PoseHypothesis& best = estimate.hypotheses[0];
       const double error =
           std::log(kMistake * best.focal_scale) / (best.focal_sigma / best.focal_scale);
@@ -196,8 +192,7 @@ TEST(FocalTest, OneCircleLeavesItToThePrior) {
   PlaneScene scene(0.7, 0.1);
   Observations observations = scene.Empty();
   observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0)};
-  const PoseEstimate estimate = EstimatePose(observations, WithFocal());
-  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  const PoseEstimate estimate = Ok(EstimatePose(observations, WithFocal()));
   for (const PoseHypothesis& h : estimate.hypotheses) {
     EXPECT_NEAR(h.focal_scale, 1.0, 1e-3);
     EXPECT_NEAR(h.focal_sigma, kPrior, 0.01 * kPrior);
@@ -254,9 +249,7 @@ TEST(FocalTest, RobustLossesFindIt) {
         line.inliers[4] = 0;
       }
     }
-    const PoseEstimate estimate = EstimatePose(observations, WithFocal(loss));
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses[0];
+    const PoseHypothesis best = Best(EstimatePose(observations, WithFocal(loss)));
     EXPECT_NEAR(best.focal_scale, 1.0 / 0.97, 3.0 * best.focal_sigma) << LossName(loss);
     EXPECT_LT(best.focal_sigma, 0.3 * kPrior) << LossName(loss);
   }
@@ -313,9 +306,7 @@ TEST(FocalTest, PointsAtTheLensRimAreKept) {
     Mistake(1.03, &observations);
     EstimationOptions options = Exact();
     options.camera_sigma = FocalSigma(0.1);
-    const PoseEstimate estimate = EstimatePose(observations, options);
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses[0];
+    const PoseHypothesis best = Best(EstimatePose(observations, options));
     EXPECT_EQ(best.num_observations, 30 + 60 + 2 * 5 * 9);
     EXPECT_LT(NormalError(best, scene), 0.03) << seed;
     EXPECT_NEAR(1.03 * best.focal_scale, 1.0, 0.1) << seed;

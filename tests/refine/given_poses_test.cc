@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/refine/simulated_options.h"
 #include "tests/sheet_photos.h"
 #include "tests/trials.h"
 
@@ -66,8 +67,7 @@ TEST(GivenPoses, OneCircleOfKnownRadiusGivesScaleAndPlane) {
   GivenSheet given(5);
   given.KeepOneCircle();
   given.sheet.photos[2].circles[0].radius = 0.05;  // A tenth of what it is.
-  const AdjustedPhotos adjusted = given.Run();
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(given.Run());
   ASSERT_TRUE(adjusted.given.has_value());
   EXPECT_TRUE(adjusted.metric);
   EXPECT_NEAR(adjusted.given->scale, 10.0 * kScale, 0.005 * 10.0 * kScale);
@@ -87,8 +87,7 @@ TEST(GivenPoses, ScaleIsAsGoodAsItsSigma) {
     GivenSheet given(5, static_cast<std::uint64_t>(100 + trial), 1.0);
     given.KeepOneCircle();
     given.sheet.photos[0].circles[0].radius = 0.5;
-    const AdjustedPhotos adjusted = given.Run();
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedPhotos adjusted = Ok(given.Run());
     const double error = std::log(adjusted.given->scale / kScale);
     EXPECT_GT(adjusted.given->log_scale_sigma, 0.0);
     sum += std::pow(error / adjusted.given->log_scale_sigma, 2);
@@ -104,8 +103,7 @@ TEST(GivenPoses, CirclesAreFoundAgainWhateverTheirIds) {
     for (std::size_t k = 0; k < 9; ++k)
       given.sheet.photos[i].circles[k].id = "c" + std::to_string((k + 2 * i) % 9);
   }
-  const AdjustedPhotos adjusted = given.Run();
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(given.Run());
   EXPECT_EQ(adjusted.circles.size(), 9U);
   EXPECT_FALSE(adjusted.metric);
   EXPECT_GT(std::abs(adjusted.given->rotation.col(2).dot(kTurn.col(2))), std::cos(0.001));
@@ -117,8 +115,7 @@ TEST(GivenPoses, EachOfTwoRimsIsALandmark) {
   for (Observations& photo : given.sheet.photos) photo.circles.clear();
   given.sheet.WithCircle("a", 1.0).WithCircle("b", 1.2);
   given.sheet.photos[1].circles[1].radius = 0.12;  // A tenth of what it is.
-  const AdjustedPhotos adjusted = given.Run();
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(given.Run());
   ASSERT_EQ(adjusted.circles.size(), 2U);
   EXPECT_NEAR(adjusted.circles[0].radius, 0.1, 0.0005);
   EXPECT_NEAR(adjusted.circles[1].radius, 0.12, 1e-6);
@@ -132,8 +129,7 @@ TEST(GivenPoses, TheOrderOfPhotosLosesNone) {
   given.Keep(1, {0, 1});
   given.Keep(2, {1, 4});
   given.Keep(3, {4, 8});
-  const AdjustedPhotos adjusted = given.Run();
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(given.Run());
   for (std::size_t i = 0; i < 4; ++i)
     EXPECT_TRUE(adjusted.photos[i].status.ok()) << i << adjusted.photos[i].status.message;
   EXPECT_EQ(adjusted.circles.size(), 4U);
@@ -147,8 +143,7 @@ TEST(GivenPoses, PhotosFarApartInTheListAreFound) {
     given.Keep(9, {0});
     for (std::size_t i = 1; i < 9; ++i)
       given.Keep(i, are_blank ? std::vector<std::size_t>() : std::vector<std::size_t>{i});
-    const AdjustedPhotos adjusted = given.Run();
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedPhotos adjusted = Ok(given.Run());
     EXPECT_TRUE(adjusted.photos[0].status.ok()) << adjusted.photos[0].status.message;
     EXPECT_TRUE(adjusted.photos[9].status.ok()) << adjusted.photos[9].status.message;
     EXPECT_EQ(adjusted.circles.size(), 1U);
@@ -164,8 +159,7 @@ TEST(GivenPoses, DirectionsAreFoundAgainWhateverTheirIds) {
     if (i % 2 == 1) std::swap(photo.pencils[0].id, photo.pencils[1].id);
     for (std::size_t k = 0; k < 9; ++k) photo.circles[k].id = "c" + std::to_string((k + 2 * i) % 9);
   }
-  const AdjustedPhotos adjusted = given.Run();
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(given.Run());
   ASSERT_EQ(adjusted.directions.size(), 2U);
   EXPECT_EQ(adjusted.directions[0].photo, -1);
   EXPECT_LT(std::abs(adjusted.directions[0].direction.dot(adjusted.directions[1].direction)), 0.01);
@@ -175,8 +169,7 @@ TEST(GivenPoses, APhotoOfAnotherPlaceIsLeftOutAndNamed) {
   GivenSheet given(6);
   std::optional<CameraPose>& wrong = given.options.given_poses[3];
   wrong->rotation = ExpRotation({0.0, 0.05, 0.0}) * wrong->rotation;
-  const AdjustedPhotos adjusted = given.Run();
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(given.Run());
   for (std::size_t i = 0; i < 6; ++i)
     EXPECT_EQ(adjusted.photos[i].status.ok(), i != 3) << i << adjusted.photos[i].status.message;
   EXPECT_NE(adjusted.photos[3].status.message.find("contradicts the other photos"),

@@ -35,9 +35,7 @@ TEST(GravityPriorTest, DecidesBetweenThePosesOfACircle) {
     const Observations observations = OneCircle(&scene);
     EstimationOptions options = LeastSquares();
     options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.02, &scene);
-    const PoseEstimate estimate = EstimatePose(observations, options);
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& h = estimate.hypotheses[0];
+    const PoseHypothesis h = Best(EstimatePose(observations, options));
     EXPECT_GT(h.probability, 0.999) << seed;
     EXPECT_LT(NormalError(h, scene), 0.06) << seed;
     EXPECT_TRUE(h.RotationIsFree());  // Along the normal it does not tell the spin.
@@ -76,9 +74,7 @@ TEST(GravityPriorTest, EntersTheCovariance) {
     EstimationOptions options = LeastSquares();
     const PoseEstimate alone = EstimatePose(observations, options);
     options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.003, &scene);
-    const PoseEstimate estimate = EstimatePose(observations, options);
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const NormalErrors normal(estimate.hypotheses[0], scene.pose);
+    const NormalErrors normal(Best(EstimatePose(observations, options)), scene.pose);
     nees += normal.Nees() / kTrials;
     with += normal.covariance.trace() / kTrials;
     without += alone.hypotheses[0].Covariance().topLeftCorner<3, 3>().trace() / kTrials;
@@ -99,9 +95,7 @@ TEST(GravityPriorTest, TellsTheSpinOfACircleOnAWall) {
     observations.circles[0].center = scene.Pixel(0.0, 0.0);
     EstimationOptions options = LeastSquares();
     options.gravity_prior = Measured(-Vector3d::UnitY(), 0.01, &scene);
-    const PoseEstimate estimate = EstimatePose(observations, options);
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& h = estimate.hypotheses[0];
+    const PoseHypothesis h = Best(EstimatePose(observations, options));
     EXPECT_FALSE(h.RotationIsFree());
     EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.05) << turn;
     EXPECT_LT(h.SigmaRotation().maxCoeff(), 0.02) << turn;
@@ -119,9 +113,7 @@ TEST(GravityPriorTest, IsLeftOutWhereThePhotoContradictsIt) {
       options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.01, &scene);
       options.gravity_prior->in_camera =
           ExpRotation(off * Vector3d::UnitX()) * options.gravity_prior->in_camera;
-      const PoseEstimate estimate = EstimatePose(observations, options);
-      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-      const PoseHypothesis& h = estimate.hypotheses[0];
+      const PoseHypothesis h = Best(EstimatePose(observations, options));
       EXPECT_EQ(h.left_out,
                 off > 0.0 ? std::vector<std::string>{"gravity_prior"} : std::vector<std::string>());
       EXPECT_LT(NormalError(h, scene), 0.02) << seed;
@@ -140,9 +132,7 @@ TEST(GravityPriorTest, TellsTheSenseOfAnAxis) {
                             scene.Pencil("L2", PencilDirection::kY, Vector3d::UnitY())};
     EstimationOptions options = LeastSquares();
     options.gravity_prior = Measured(-Vector3d::UnitY(), 0.01, &scene);
-    const PoseEstimate estimate = EstimatePose(observations, options);
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& h = estimate.hypotheses[0];
+    const PoseHypothesis h = Best(EstimatePose(observations, options));
     EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.05) << turn;
   }
 }

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -8,9 +7,17 @@
 
 #include "circline/refine/estimate_pose.h"
 #include "tests/plane_scene.h"
+#include "tests/refine/simulated_options.h"
 
 namespace circline {
 namespace {
+
+EstimationOptions Guessed() {
+  EstimationOptions options;
+  options.camera_sigma = CameraSigma();
+  options.camera_sigma->log_focal = 0.5;
+  return options;
+}
 
 // A camera that faces a wall sees its uprights and its levels at right angles at nearly any focal
 // length: what walls lean says nothing of that, and what is stated of it is the prior.
@@ -20,12 +27,7 @@ TEST(GuessedFocalLength, IsKnownToItsPriorWhereRightAnglesSayNothing) {
     Observations observations = scene.Empty();
     observations.pencils = {scene.Pencil("x", PencilDirection::kX, Eigen::Vector3d::UnitX()),
                             scene.Pencil("y", PencilDirection::kY, Eigen::Vector3d::UnitY())};
-    EstimationOptions options;
-    options.camera_sigma = CameraSigma();
-    options.camera_sigma->log_focal = 0.5;
-    const PoseEstimate estimate = EstimatePose(observations, options);
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses.front();
+    const PoseHypothesis best = Best(EstimatePose(observations, Guessed()));
     const double sigma = best.focal_sigma / best.focal_scale;
     EXPECT_LT(sigma, std::hypot(0.5, std::log(best.focal_scale))) << tilt;
     EXPECT_GT(sigma, 0.01) << tilt;
@@ -54,13 +56,6 @@ Observations Front(PlaneScene* scene) {
   return observations;
 }
 
-EstimationOptions Guessed() {
-  EstimationOptions options;
-  options.camera_sigma = CameraSigma();
-  options.camera_sigma->log_focal = 0.5;
-  return options;
-}
-
 TEST(GuessedFocalLength, IsKnownAsWellAsShortEdgesTellIt) {
   constexpr int kScenes = 60;
   int within = 0;
@@ -68,9 +63,7 @@ TEST(GuessedFocalLength, IsKnownAsWellAsShortEdgesTellIt) {
   for (std::uint64_t seed = 1; seed <= kScenes; ++seed) {
     PlaneScene scene(0.7, 1.0, seed);
     scene.camera.distortion = {};
-    const PoseEstimate estimate = EstimatePose(Front(&scene), Guessed());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses.front();
+    const PoseHypothesis best = Best(EstimatePose(Front(&scene), Guessed()));
     const double off = std::log(best.focal_scale) / (best.focal_sigma / best.focal_scale);
     within += std::abs(off) < 2.0 ? 1 : 0;
     squares += off * off;
@@ -129,14 +122,9 @@ TEST(GuessedFocalLength, FarFromWhatWasGivenIsSaid) {
     scene.camera.distortion = {};
     Observations observations = Front(&scene);
     if (is_far) observations.camera.fx = observations.camera.fy = 8.0 * scene.camera.fx;
-    const PoseEstimate estimate = EstimatePose(observations, Guessed());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const std::string& note = estimate.notes.front();
-    EXPECT_EQ(note.find("focal length: "), 0U) << note;
-    EXPECT_EQ(
-        note.find("the camera given, or the evidence, is not what it seems") != std::string::npos,
-        is_far)
-        << note;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, Guessed()));
+    EXPECT_EQ(estimate.notes.front().find("focal length: "), 0U) << estimate.notes.front();
+    EXPECT_EQ(HasNote(estimate, "the camera given, or the evidence, is not what it seems"), is_far);
   }
 }
 
@@ -148,16 +136,12 @@ TEST(GuessedFocalLength, IsStatedInWordsAsItIsReturned) {
     Observations observations = scene.Empty();
     observations.circles = {scene.Circle("c0", 0.3, 0.2, 0.8)};
     observations.pencils = {scene.Pencil("x", PencilDirection::kX, Eigen::Vector3d::UnitX())};
-    const PoseEstimate estimate = EstimatePose(observations, Guessed());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, Guessed()));
     const PoseHypothesis& best = estimate.hypotheses.front();
     char expected[80];
     std::snprintf(expected, sizeof(expected), "focal length: %.4f times the camera's, +- %.4f",
                   best.focal_scale, best.focal_sigma);
-    const bool is_said =
-        std::any_of(estimate.notes.begin(), estimate.notes.end(),
-                    [&](const std::string& note) { return note.find(expected) == 0; });
-    EXPECT_TRUE(is_said) << seed << ": " << expected;
+    EXPECT_TRUE(HasNote(estimate, expected)) << seed << ": " << expected;
   }
 }
 
@@ -195,9 +179,7 @@ TEST(GuessedFocalLength, IsNeverKnownWorseThanBeforehand) {
       pencil.axis_probability = scene.random.Uniform(0.5, 1.0);
     observations.camera.fx *= 1.4;
     observations.camera.fy *= 1.4;
-    const PoseEstimate estimate = EstimatePose(observations, Guessed());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses.front();
+    const PoseHypothesis best = Best(EstimatePose(observations, Guessed()));
     const double before = std::hypot(0.5, std::log(best.focal_scale));
     EXPECT_LT(best.focal_sigma / best.focal_scale, 1.1 * before) << seed;
   }

@@ -6,7 +6,6 @@
 #endif
 
 #include <cstddef>
-#include <cstdlib>
 
 #include "circline/refine/estimate_pose.h"
 #include "circline/refine/pose_tracker.h"
@@ -55,8 +54,7 @@ TEST(HeapTest, ATrackDoesNotGrowIt) {
   run(1000);  // Some kilobytes stay in the allocator's caches of a thread, once.
   const std::size_t before = mallinfo2().uordblks;
   // CIRCLINE_TRACK_FRAMES=100000: a long run.
-  const char* asked = std::getenv("CIRCLINE_TRACK_FRAMES");
-  const int frames = asked != nullptr ? std::atoi(asked) : 1000;
+  const int frames = Trials("CIRCLINE_TRACK_FRAMES", 1000);
   run(frames);
   EXPECT_LT(mallinfo2().uordblks, before + static_cast<std::size_t>(frames));
 }

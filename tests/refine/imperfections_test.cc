@@ -69,13 +69,11 @@ TEST(ImperfectionsTest, CirclesOffTheirPlaneAreCountedHonestly) {
     add("c0", -1.8, -0.8, 1.0);
     add("c1", 1.6, -0.5, 0.9);
     add("c2", 0.2, 1.6, 0.8);
-    const PoseEstimate estimate = EstimatePose(observations, LeastSquares(model)),
-                       exact = EstimatePose(observations, LeastSquares(NoiseModel::Exact()));
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    ASSERT_TRUE(exact.status.ok()) << exact.status.message;
-    left_out += estimate.hypotheses[0].left_out.empty() ? 0 : 1;
-    nees += NormalErrors(estimate.hypotheses[0], scene.pose).Nees() / kTrials;
-    nees_exact += NormalErrors(exact.hypotheses[0], scene.pose).Nees() / kTrials;
+    const PoseHypothesis best = Best(EstimatePose(observations, LeastSquares(model))),
+                         exact = Best(EstimatePose(observations, LeastSquares()));
+    left_out += best.left_out.empty() ? 0 : 1;
+    nees += NormalErrors(best, scene.pose).Nees() / kTrials;
+    nees_exact += NormalErrors(exact, scene.pose).Nees() / kTrials;
   }
   if (kSanitized) return;
   ExpectHonest("circles off their plane", 0.5 * nees);
@@ -94,8 +92,7 @@ TEST(ImperfectionsTest, AnOvalIsCountedHonestly) {
     PlaneScene scene(0.7, 0.2, static_cast<std::uint64_t>(i + 1));
     Observations observations = scene.Empty();
     observations.circles = {OffPlane(&scene, "c0", {0.2, -0.3}, 1.5, 0.0, 0.0, model.circle_shape)};
-    const PoseEstimate estimate = EstimatePose(observations, LeastSquares(model));
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, LeastSquares(model)));
     double least = std::numeric_limits<double>::infinity();
     for (const PoseHypothesis& h : estimate.hypotheses)
       least = std::min(least, NormalErrors(h, scene.pose).Nees());
@@ -134,9 +131,8 @@ TEST(ImperfectionsTest, PencilsOffTheirAxesAreCountedHonestly) {
                                          leaning(PencilDirection::kZ, Vector3d::UnitZ()), 5, 9)};
     for (PencilObservation& pencil : observations.pencils) pencil.plane.clear();
     observations.pencils[0].plane = observations.pencils[1].plane = "p0";
-    const PoseEstimate estimate = EstimatePose(observations, LeastSquares(model));
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    nees += RotationNees(estimate.hypotheses[0], scene.pose) / kTrials;
+    const PoseHypothesis best = Best(EstimatePose(observations, LeastSquares(model)));
+    nees += RotationNees(best, scene.pose) / kTrials;
   }
   if (kSanitized) return;
   ExpectHonest("pencils off their axes", nees / 3.0);
@@ -166,9 +162,8 @@ TEST(ImperfectionsTest, ACornerIsAsSquareAsItsSidesAreStraight) {
       Observations observations = scene.Empty();
       observations.pencils = {side("L1", PencilDirection::kX, 0.0, 0.4),
                               side("L2", PencilDirection::kY, 0.5 * kPi - kCorner, 0.2)};
-      const PoseEstimate estimate = EstimatePose(observations, LeastSquares(NoiseModel()));
-      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-      const std::vector<PencilEstimate>& pencils = estimate.hypotheses[0].pencils;
+      const PoseHypothesis best = Best(EstimatePose(observations, LeastSquares(NoiseModel())));
+      const std::vector<PencilEstimate>& pencils = best.pencils;
       const double corner = std::acos(std::abs(pencils[0].direction.dot(pencils[1].direction)));
       misses += std::abs(corner - (0.5 * kPi - kCorner)) / kDegree / kTrials;
     }
@@ -213,9 +208,7 @@ TEST(ImperfectionsTest, ContoursThatShareAnOffsetAreCountedHonestly) {
       }
       observations.circles.push_back(circle);
     }
-    const PoseEstimate estimate = EstimatePose(observations, LeastSquares(model));
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& h = estimate.hypotheses[0];
+    const PoseHypothesis h = Best(EstimatePose(observations, LeastSquares(model)));
     EXPECT_TRUE(h.left_out.empty()) << i;
     nees += NormalErrors(h, scene.pose).Nees() / kTrials;
   }
@@ -279,9 +272,8 @@ TEST(ImperfectionsTest, ACameraThatIsALittleOffIsCountedHonestly) {
     camera.cy += sigma.principal_point_px * scene.random.Normal();
     EstimationOptions options = LeastSquares(NoiseModel::Exact());
     options.camera_sigma = sigma;
-    const PoseEstimate estimate = EstimatePose(observations, options);
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    nees += NormalErrors(estimate.hypotheses[0], scene.pose).Nees() / kTrials;
+    const PoseHypothesis best = Best(EstimatePose(observations, options));
+    nees += NormalErrors(best, scene.pose).Nees() / kTrials;
   }
   if (kSanitized) return;
   ExpectHonest("a camera a little off", 0.5 * nees);

@@ -66,8 +66,7 @@ TEST(OddPencilsTest, TheOddLineIsLeftOutAndTheAnswerHonest) {
     int missing = 0, sure_and_wrong = 0;
     for (int i = 0; i < kScenes; ++i) {
       const OddScene odd(4, i + 1);
-      const PoseEstimate estimate = EstimatePose(odd.observations, options);
-      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      const PoseEstimate estimate = Ok(EstimatePose(odd.observations, options));
       const PoseHypothesis& best = estimate.hypotheses[0];
       missing += IsAmong(estimate, odd.scene) ? 0 : 1;
       sure_and_wrong += best.probability >= 0.95 && !IsRight(best, odd.scene) ? 1 : 0;
@@ -89,8 +88,7 @@ TEST(OddPencilsTest, AWrongAngleIsLeftOut) {
       pencil.direction = PencilDirection::kFree;
     const double off = (i % 2 == 0 ? 10.0 : 20.0) * kDegree;
     odd.observations.known_angles = {{{"a", "b"}, 0.5 * kPi - off, 0.1 * kDegree}};
-    const PoseEstimate estimate = EstimatePose(odd.observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseEstimate estimate = Ok(EstimatePose(odd.observations, Exact()));
     const PoseHypothesis& best = estimate.hypotheses[0];
     missing += IsAmong(estimate, odd.scene) ? 0 : 1;
     sure_and_wrong += best.probability >= 0.95 && !IsRight(best, odd.scene) ? 1 : 0;

@@ -18,9 +18,7 @@ TEST(OriginTest, TheOriginIsTheCenterOfAllRingsAboutIt) {
   observations.frame.origin = scene.Pixel(0.5, 0.2);
   for (const char* named : {"a", "b"}) {
     observations.frame.origin_is_center = named;
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses[0];
+    const PoseHypothesis best = Best(EstimatePose(observations, Exact()));
     for (const CircleEstimate& circle : best.circles) {
       EXPECT_LT((circle.center - best.cam_from_world.translation).norm(), 1e-9)
           << circle.id << " where " << named << " is named";
@@ -34,9 +32,7 @@ TEST(OriginTest, TheOriginIsTheCenterOfALoneCircle) {
   for (const char* id : {"c0", ""}) {
     Observations observations = scene.Empty();
     observations.circles = {scene.Circle(id, 0.5, 0.2, 1.0)};
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& best = estimate.hypotheses[0];
+    const PoseHypothesis best = Best(EstimatePose(observations, Exact()));
     EXPECT_LT((best.circles[0].center - best.cam_from_world.translation).norm(), 1e-9);
     EXPECT_GT(best.covariance[35], 0.0);
   }
@@ -50,8 +46,7 @@ TEST(OriginTest, AnOriginWithoutPointsIsNone) {
   FitDirect(0.3, &observations);
   observations.circles[0].inliers.assign(observations.circles[0].points.size(), 0);
   observations.frame.origin_is_center = "c0";
-  const PoseEstimate estimate = EstimatePose(observations, Exact());
-  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+  const PoseEstimate estimate = Ok(EstimatePose(observations, Exact()));
   for (const PoseHypothesis& h : estimate.hypotheses) {
     EXPECT_FALSE(h.origin_observed);
     ASSERT_EQ(h.circles.size(), 1U);

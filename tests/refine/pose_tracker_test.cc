@@ -9,6 +9,7 @@
 #include <string>
 
 #include "apps/benchmark/trajectory.h"
+#include "tests/refine/simulated_options.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -56,10 +57,7 @@ TEST_P(SequencesTest, BestIsRightAndSurenessIsTrue) {
             if (k < kFramesOfMotion) return;
             ++held_to_account;
             right += is_right ? 1 : 0;
-            const Eigen::Vector3d error =
-                LogRotation(frame.pose.rotation * first.cam_from_world.rotation.transpose());
-            const Eigen::Matrix3d covariance = first.Covariance().topLeftCorner<3, 3>();
-            if (trajectory.pencil) nees += error.dot(covariance.ldlt().solve(error));
+            if (trajectory.pencil) nees += RotationNees(first, frame.pose);
           });
   }
   if (kSanitized) return;

@@ -69,17 +69,13 @@ TEST(PriorTest, APoseToStartFromIsNoEvidence) {
   PlaneScene scene(0.7, 0.3);
   Observations observations = CircleAndAxes(&scene);
   EstimationOptions options = LeastSquares();
-  const PoseEstimate without = EstimatePose(observations, options);
-  ASSERT_TRUE(without.status.ok()) << without.status.message;
-  const PoseHypothesis& expected = without.hypotheses[0];
+  const PoseHypothesis expected = Best(EstimatePose(observations, options));
   // Near, and far off: a plane seen from behind its edge.
   for (const Vector3d& off : {Vector3d(0.05, -0.04, 0.02), Vector3d(1.5, 0.0, 0.0)}) {
     options.prior = scene.pose;
     options.prior->rotation = ExpRotation(off) * scene.pose.rotation;
     options.prior->translation *= 3.0;  // Its unit has no meaning.
-    const PoseEstimate with = EstimatePose(observations, options);
-    ASSERT_TRUE(with.status.ok()) << with.status.message;
-    const PoseHypothesis& h = with.hypotheses[0];
+    const PoseHypothesis h = Best(EstimatePose(observations, options));
     EXPECT_LT(RotationAngle(h.cam_from_world.rotation, expected.cam_from_world.rotation), 1e-6);
     EXPECT_NEAR(h.probability, expected.probability, 1e-3);
     EXPECT_LT((h.Covariance() - expected.Covariance()).norm(), 1e-3 * h.Covariance().norm());
@@ -123,8 +119,7 @@ TEST(PosePriorTest, EntersTheEstimateAndItsCovariance) {
     Observations observations = CircleAndAxes(&scene);
     observations.circles[0].radius = 1.0;
     EstimationOptions options = LeastSquares();
-    const PoseEstimate photo = EstimatePose(observations, options);
-    ASSERT_TRUE(photo.status.ok()) << photo.status.message;
+    const PoseEstimate photo = Ok(EstimatePose(observations, options));
     const PoseHypothesis& alone = photo.hypotheses[0];
     ASSERT_EQ(alone.rank, 6);
     const Matrix6d C1 = alone.Covariance();
@@ -139,9 +134,7 @@ TEST(PosePriorTest, EntersTheEstimateAndItsCovariance) {
     prior.mean.translation = alone.cam_from_world.translation + off.tail<3>();
     Eigen::Map<Matrix6d>(prior.covariance.data()) = C2;
     options.pose_prior = prior;
-    const PoseEstimate estimate = EstimatePose(observations, options);
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& h = estimate.hypotheses[0];
+    const PoseHypothesis h = Best(EstimatePose(observations, options));
 
     const Matrix6d C = (C1.inverse() + C2.inverse()).inverse();
     const Vector6d expected = C * C2.inverse() * off;
@@ -216,9 +209,7 @@ TEST(PosePriorTest, IsLeftOutWhereThePhotoContradictsIt) {
       options.pose_prior = Around(scene.pose, 0.01, 0.02);
       options.pose_prior->mean.rotation =
           ExpRotation(off * Vector3d(0.6, 0.0, 0.8)) * options.pose_prior->mean.rotation;
-      const PoseEstimate estimate = EstimatePose(observations, options);
-      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-      const PoseHypothesis& h = estimate.hypotheses[0];
+      const PoseHypothesis h = Best(EstimatePose(observations, options));
       EXPECT_EQ(h.left_out,
                 off > 0.0 ? std::vector<std::string>{"pose_prior"} : std::vector<std::string>());
       EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.02) << seed;
@@ -240,8 +231,7 @@ TEST(PosePriorTest, IsLeftOutWhereItAloneTellsTheTurn) {
     Eigen::Matrix3d& turned = options.pose_prior->mean.rotation;
     turned = ExpRotation(0.4 * Vector3d(0.0, 1.0, 0.0)) * turned;
     for (const Observations& observations : {one, many}) {
-      const PoseEstimate estimate = EstimatePose(observations, options);
-      ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+      const PoseEstimate estimate = Ok(EstimatePose(observations, options));
       const PoseHypothesis& h = Nearest(estimate, scene.pose.rotation.col(2));
       EXPECT_EQ(h.left_out, std::vector<std::string>{"pose_prior"}) << seed;
       EXPECT_EQ(h.free_directions.size(), 1U) << seed;

@@ -63,8 +63,7 @@ TEST_P(TiltedCircleTest, OneOfThreeIsNamedAndTheOthersKeepTheirPose) {
         scene.Circle("c0", -1.8, -0.8, 1.0),
         Tilted(&scene, "c1", {1.6, -0.5}, 0.9, GetParam(), scene.random.Uniform(0.0, 6.28)),
         scene.Circle("c2", 0.2, 1.6, 0.8)};
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, Exact()));
     const PoseHypothesis& h = estimate.hypotheses[0];
     right += NormalError(h, scene) < 3.5 * SigmaNormal(h) ? 1 : 0;
     if (h.left_out != Ids{"c1"}) continue;
@@ -94,8 +93,7 @@ TEST(ReadingsTest, ThePlanesOnlyCircleIsLeftOut) {
         Tilted(&scene, "c0", {0.5, 0.2}, 1.0, 20.0 * kDegree, scene.random.Uniform(0.0, 6.28))};
     observations.pencils = {scene.Pencil("rows", PencilDirection::kX, Vector3d::UnitX(), 4, 20),
                             scene.Pencil("columns", PencilDirection::kY, Vector3d::UnitY(), 4, 20)};
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, Exact()));
     const PoseHypothesis& h = estimate.hypotheses[0];
     right += NormalError(h, scene) < 3.5 * SigmaNormal(h) ? 1 : 0;
     named += h.left_out == Ids{"c0"} && HasNote(estimate, "circle 'c0'") ? 1 : 0;
@@ -120,9 +118,7 @@ TEST(ReadingsTest, ManyTiltedCirclesAmongManyAreNamed) {
         Tilted(&scene, id, center, 0.25, is_tilted ? 20.0 * kDegree : 0.0, 0.4 * i));
     if (is_tilted) tilted.push_back(id);
   }
-  const PoseEstimate estimate = EstimatePose(observations, Exact());
-  ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-  const PoseHypothesis& best = estimate.hypotheses.front();
+  const PoseHypothesis best = Best(EstimatePose(observations, Exact()));
   Ids left_out = best.left_out;
   std::sort(left_out.begin(), left_out.end());
   std::sort(tilted.begin(), tilted.end());
@@ -141,9 +137,7 @@ TEST(ReadingsTest, AWrongRadiusIsNamed) {
     observations.circles[0].radius = 1.0;
     observations.circles[1].radius = 0.9 * 1.05;
     observations.circles[2].radius = 0.8;
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& h = estimate.hypotheses[0];
+    const PoseHypothesis h = Best(EstimatePose(observations, Exact()));
     if (h.left_out != Ids{"c1"}) continue;
     ++named;
     EXPECT_TRUE(h.metric);
@@ -167,8 +161,7 @@ TEST(ReadingsTest, TwoContradictingCirclesGiveBothReadings) {
     observations.circles = {
         scene.Circle("c0", -1.5, -0.5, 1.0),
         Tilted(&scene, "c1", {1.5, 0.5}, 1.0, 15.0 * kDegree, scene.random.Uniform(0.0, 6.28))};
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, Exact()));
     double without_first = 0.0, without_second = 0.0, nearest = 4.0;
     for (const PoseHypothesis& h : estimate.hypotheses) {
       without_first += h.left_out == Ids{"c0"} ? h.probability : 0.0;
@@ -215,8 +208,7 @@ TEST(ReadingsTest, TheSecondRimIsReadWhereTheFirstContradicts) {
     PlaneScene scene(0.7, 0.2, seed);
     Observations observations = scene.Empty();
     observations.circles = {scene.Circle("c0", -1.5, -0.5, 1.0), TwoRims(&scene)};
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, Exact()));
     EXPECT_TRUE(HasNote(estimate,
                         "circle 'c1': tried as the second ellipse through its points, too, which "
                         "the best pose takes"));
@@ -244,9 +236,7 @@ TEST(ReadingsTest, ThreeCirclesAndAShortArcAgree) {
         Tilted(&scene, "arc", {1.5, 1.2}, 1.0, 0.0, scene.random.Uniform(0.0, 6.28), arc, 40),
         scene.Circle("c0", -1.8, -0.8, 1.0), scene.Circle("c1", 1.6, -1.3, 0.9),
         scene.Circle("c2", -0.8, 1.6, 0.8)};
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    const PoseHypothesis& h = estimate.hypotheses[0];
+    const PoseHypothesis h = Best(EstimatePose(observations, Exact()));
     gross += NormalError(h, scene) > 5.0 * SigmaNormal(h) ? 1 : 0;
     left_out += h.left_out.empty() ? 0 : 1;
   }
@@ -265,8 +255,7 @@ TEST(ReadingsTest, AShortArcAndAPencilHaveAllTheirPlanes) {
     observations.circles = {Tilted(&scene, "arc", {0.2, 0.1}, 2.5, 0.0, random.Uniform(0.0, 6.28),
                                    60.0 * kDegree, 100)};
     observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX(), 4, 30)};
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, Exact()));
     const auto is_near = [&](const PoseHypothesis& h) {
       return NormalError(h, scene) < std::max(2.0 * kDegree, 4.0 * SigmaNormal(h));
     };
@@ -286,8 +275,7 @@ TEST(ReadingsTest, ASmallShareOfInliersIsNamed) {
     observations.circles = {scene.Circle("c0", 0.5, 0.2, 1.0, 100)};
     observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX(), 4, 30)};
     observations.circles[0].sigma_px = observations.pencils[0].sigma_px = is_small ? 0.03 : 0.5;
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, Exact()));
     EXPECT_EQ(HasNote(estimate, "of 220 points agree with the pose"), is_small);
   }
 }
@@ -303,11 +291,9 @@ TEST(ReadingsTest, NothingIsLeftOutOfWhatAgrees) {
     observations.circles[0].center = scene.Pixel(-1.8, -0.8);
     observations.pencils = {scene.Pencil("L1", PencilDirection::kX, Vector3d::UnitX()),
                             scene.Pencil("L2", PencilDirection::kY, Vector3d::UnitY())};
-    const PoseEstimate estimate = EstimatePose(observations, Exact());
-    ASSERT_TRUE(estimate.status.ok()) << estimate.status.message;
-    left_out += estimate.hypotheses[0].left_out.empty() ? 0 : 1;
-    EXPECT_LT(NormalError(estimate.hypotheses[0], scene),
-              5.0 * SigmaNormal(estimate.hypotheses[0]));
+    const PoseHypothesis best = Best(EstimatePose(observations, Exact()));
+    left_out += best.left_out.empty() ? 0 : 1;
+    EXPECT_LT(NormalError(best, scene), 5.0 * SigmaNormal(best));
   }
   // One of the centre's gate in 120 by chance, of features as a whole none.
   EXPECT_LE(left_out, kScenes / 25);

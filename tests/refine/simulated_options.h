@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <string>
 
 #include "circline/estimators/noise_model.h"
@@ -13,22 +14,34 @@
 
 namespace circline {
 
-inline EstimationOptions Exact() {
+inline EstimationOptions Exact(LossType loss = LossOptions().type) {
   EstimationOptions options;
   options.noise_model = NoiseModel::Exact();
+  options.conic_loss.type = options.line_loss.type = loss;
   return options;
 }
 
 // Gaussian noise without outliers: the bound holds for this.
 inline EstimationOptions LeastSquares(const NoiseModel& model = NoiseModel::Exact()) {
-  EstimationOptions options;
+  EstimationOptions options = Exact(LossType::kTrivial);
   options.noise_model = model;
-  options.conic_loss.type = options.line_loss.type = LossType::kTrivial;
   return options;
 }
 
-inline bool HasNote(const PoseEstimate& estimate, const std::string& words) {
-  return std::any_of(estimate.notes.begin(), estimate.notes.end(), [&](const std::string& note) {
+// An estimate, or adjusted photos, that must be ok; what was missing ends the test.
+template <typename Answer>
+Answer Ok(Answer answer) {
+  if (!answer.status.ok()) throw std::runtime_error(answer.status.message);
+  return answer;
+}
+
+// The best hypothesis of an estimate that must have one.
+inline PoseHypothesis Best(const PoseEstimate& estimate) { return Ok(estimate).hypotheses.front(); }
+
+// Of an estimate, or of adjusted photos.
+template <typename Answer>
+bool HasNote(const Answer& answer, const std::string& words) {
+  return std::any_of(answer.notes.begin(), answer.notes.end(), [&](const std::string& note) {
     return note.find(words) != std::string::npos;
   });
 }

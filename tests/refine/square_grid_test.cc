@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "circline/refine/adjustment.h"
+#include "tests/refine/simulated_options.h"
 #include "tests/sheet_photos.h"
 #include "tests/trials.h"
 
@@ -97,8 +98,7 @@ TEST(SquareGrid, TellsTheCameraWithinItsSigma) {
       photo.camera.cy -= 7.0;
     }
     AdjustOptions options = PointNoiseOnly();
-    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, options));
     for (std::size_t i = 0; i < adjusted.photos.size(); ++i) {
       const AdjustedPhoto& photo = adjusted.photos[i];
       ASSERT_TRUE(photo.status.ok()) << photo.status.message;
@@ -136,8 +136,7 @@ TEST(SquareGrid, AnExactOneIsRefinedToTheEnd) {
     AddLines({1.0, 1.0, 5, 5}, &sheet);
     AdjustOptions options;
     options.noise_model = NoiseModel::Exact();
-    const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
-    ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, options));
     nees += CameraNees(adjusted.cameras[0], sheet.truth(), 3) / trials;
   }
   if (kSanitized) return;
@@ -150,8 +149,7 @@ TEST(SquareGrid, AnOddRowIsLeftOut) {
   sheet.WithLine(PencilDirection::kX, {-3.5, 3.54}, {3.5, 3.54});
   AdjustOptions options = PointNoiseOnly();
   options.noise_model.grid_line = NoiseModel().grid_line;
-  const AdjustedPhotos adjusted = AdjustPhotos(sheet.photos, options);
-  ASSERT_TRUE(adjusted.status.ok()) << adjusted.status.message;
+  const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, options));
   for (const AdjustedPhoto& photo : adjusted.photos) EXPECT_EQ(photo.num_grid_lines, 14);
   EXPECT_LT(CameraNees(adjusted.cameras[0], sheet.truth(), 3), 4.0);
 }

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -96,8 +95,7 @@ void CallInThreads(const Expected& expected, int calls) {
 
 TEST(Threads, EstimatesAndTracksAtOnceAreThoseOfOneThread) {
   const Expected expected;
-  const char* asked = std::getenv("CIRCLINE_SOAK_CALLS");
-  const int calls = asked != nullptr ? std::atoi(asked) : Trials(2000);
+  const int calls = Trials("CIRCLINE_SOAK_CALLS", 2000);
   CallInThreads(expected, std::max(calls / 10, 2 * kThreads));
   const std::size_t kilobytes = ResidentKilobytes(), descriptors = NumDescriptors();
   CallInThreads(expected, calls);
