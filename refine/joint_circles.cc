@@ -1,6 +1,5 @@
 // Circles and the origin, as blocks and terms.
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "circline/refine/evidence_points.h"

@@ -4,10 +4,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <limits>
-#include <utility>
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/refine/block_chain.h"
