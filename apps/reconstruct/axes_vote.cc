@@ -73,8 +73,7 @@ double AxesVote::Vote(const Eigen::Matrix3d& axes) const {
   double sum = 0.0;
   for (const auto& [i, j] : corners_) {
     if (axis[i] < 0 || axis[j] < 0 || axis[i] == axis[j]) continue;
-    sum += std::min((lines_[i].ends[1] - lines_[i].ends[0]).norm(),
-                    (lines_[j].ends[1] - lines_[j].ends[0]).norm());
+    sum += std::min(lines_[i].LengthPx(), lines_[j].LengthPx());
   }
   return sum;
 }

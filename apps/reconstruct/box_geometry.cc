@@ -9,9 +9,18 @@ Eigen::Vector3d BoxCorner(const Eigen::Vector3d& length, int corner) {
           (corner & 4) != 0 ? length.z() : 0.0};
 }
 
-bool FaceIsSeen(const CameraPose& cam_from_box, const Eigen::Vector3d& length, int axis, bool far) {
-  const Eigen::Vector3d eye = -(cam_from_box.rotation.transpose() * cam_from_box.translation);
-  return far ? eye[axis] > length[axis] : eye[axis] < 0.0;
+bool FaceIsSeen(const BoxFit& fit, int axis, bool far) {
+  const CameraPose& pose = fit.cam_from_box;
+  const Eigen::Vector3d eye = -(pose.rotation.transpose() * pose.translation);
+  return far ? eye[axis] > fit.length[axis] : eye[axis] < 0.0;
+}
+
+int NumSeenFaces(const BoxFit& fit, int axis, int corner) {
+  int seen = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (k != axis && FaceIsSeen(fit, k, (corner >> k & 1) != 0)) ++seen;
+  }
+  return seen;
 }
 
 double EdgeLengthPx(const BoxEdge& edge) {

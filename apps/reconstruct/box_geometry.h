@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 
 #include "apps/common/solids.h"
-#include "circline/estimators/pose.h"
+#include "apps/reconstruct/fit_box.h"
 
 namespace circline::apps {
 
@@ -13,7 +13,10 @@ namespace circline::apps {
 Eigen::Vector3d BoxCorner(const Eigen::Vector3d& length, int corner);
 
 // Whether the camera sees the face across `axis`, at its far or its near end, from outside.
-bool FaceIsSeen(const CameraPose& cam_from_box, const Eigen::Vector3d& length, int axis, bool far);
+bool FaceIsSeen(const BoxFit& fit, int axis, bool far);
+
+// Of the two faces that meet in the edge along `axis` at that corner, how many it sees.
+int NumSeenFaces(const BoxFit& fit, int axis, int corner);
 
 // Of the part that is marked or found, in whatever order its points are.
 double EdgeLengthPx(const BoxEdge& edge);

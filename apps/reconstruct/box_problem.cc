@@ -7,8 +7,7 @@
 #include <memory>
 
 #include "apps/reconstruct/box_edge_cost.h"
-#include "circline/estimators/line.h"
-#include "circline/estimators/observations.h"
+#include "apps/reconstruct/box_start.h"
 
 namespace circline::apps {
 
@@ -158,10 +157,8 @@ void BoxProblem::AddEdge(const BoxEdge& edge) {
 // As EstimatePose has the lines of a pencil.
 void BoxProblem::AddLine(const FaceLine& line) {
   const NoiseModel& noise = options_.noise;
-  std::vector<CalibratedPoint> calibrated;
-  CalibrateInliers(camera_, line.points, {}, &calibrated);
-  LineFit fit;
-  if (calibrated.size() < 2 || !FitLine(calibrated, 1.0, &fit).ok()) return;
+  Eigen::Vector3d plane;
+  if (!PlaneOfPoints(camera_, line.points, &plane)) return;
   ImagePoints::Options how;
   how.sigma_px = line.sigma_px;
   how.loss = LossType::kCauchy;
@@ -169,7 +166,7 @@ void BoxProblem::AddLine(const FaceLine& line) {
   DirectionLineCost::Options options;
   options.direction_sigma = noise.line_direction_rad;
   options.camera = has_camera_;
-  auto* cost = new DirectionLineCost(ImagePoints(camera_, line.points, {}, how), fit.line, options);
+  auto* cost = new DirectionLineCost(ImagePoints(camera_, line.points, {}, how), plane, options);
   double* const direction = directions_.col(line.axis).data();
   line_blocks_.push_back({0.0, 0.0});
   std::vector<double*> blocks = {state_.rotation.coeffs().data(), direction,

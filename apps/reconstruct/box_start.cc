@@ -8,19 +8,16 @@
 #include "circline/estimators/observations.h"
 
 namespace circline::apps {
-namespace {
 
-// The normal of the plane through the camera and the edge.
-bool PlaneOfEdge(const Camera& camera, const BoxEdge& edge, Eigen::Vector3d* normal) {
+bool PlaneOfPoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
+                   Eigen::Vector3d* normal) {
   std::vector<CalibratedPoint> points;
-  CalibrateInliers(camera, edge.points, {}, &points);
+  CalibrateInliers(camera, pixels, {}, &points);
   LineFit fit;
   if (points.size() < 2 || !FitLine(points, 1.0, &fit).ok()) return false;
   *normal = fit.line;
   return true;
 }
-
-}  // namespace
 
 // The first axis is X = c u + s v, u and v in its plane, c^2 + s^2 = 1; the second lies across it
 // in its own plane: Y ~ n1 x X; the third, X x Y, lies in its own where n1.n2 = (X.n1)(X.n2):
@@ -55,7 +52,7 @@ std::vector<Eigen::Matrix3d> BoxAxes(const Camera& camera, const std::vector<Box
     const auto axis = static_cast<std::size_t>(edge.axis);
     Eigen::Vector3d normal;
     const double length_px = EdgeLengthPx(edge);
-    if (length_px <= longest[axis] || !PlaneOfEdge(camera, edge, &normal)) continue;
+    if (length_px <= longest[axis] || !PlaneOfPoints(camera, edge.points, &normal)) continue;
     longest[axis] = length_px;
     normals[axis] = normal;
   }
@@ -71,7 +68,7 @@ bool PlaceBox(const Camera& camera, const std::vector<BoxEdge>& edges, const Eig
   for (const BoxEdge& edge : edges) {
     Eigen::Vector3d normal;
     CalibratedPoint ray;
-    if (!PlaneOfEdge(camera, edge, &normal)) continue;
+    if (!PlaneOfPoints(camera, edge.points, &normal)) continue;
     if (PixelToCalibrated(camera, edge.points.front(), &ray)) middle += ray.Homogeneous();
     Eigen::Matrix<double, 6, 1> row;
     row.head<3>() = normal;

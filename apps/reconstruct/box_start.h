@@ -11,6 +11,11 @@
 
 namespace circline::apps {
 
+// The normal of the plane through the camera and the points of a straight edge. False where the
+// camera can undistort no two of them.
+bool PlaneOfPoints(const Camera& camera, const std::vector<Eigen::Vector2d>& pixels,
+                   Eigen::Vector3d* normal);
+
 // Rotations of which each axis lies in one of three planes through the camera, those of the images
 // of three edges of a box: two at most; none where no directions at right angles look like that.
 // Senses are without meaning.

@@ -14,12 +14,6 @@ constexpr double kOverrunPx = 60.0;  // Beyond a corner; what lies farther off i
 constexpr double kFreeRunPx = 3.0;   // Lines end a little beyond rounded corners.
 constexpr double kGapWeight = 0.5;
 
-void LongestFirst(std::vector<FlatLine>* lines) {
-  std::stable_sort(lines->begin(), lines->end(), [](const FlatLine& a, const FlatLine& b) {
-    return (a.ends[1] - a.ends[0]).norm() > (b.ends[1] - b.ends[0]).norm();
-  });
-}
-
 }  // namespace
 
 std::vector<FlatLine> FlatLines(const std::vector<DetectedLine>& lines, const Camera& camera) {
@@ -35,7 +29,9 @@ std::vector<FlatLine> FlatLines(const std::vector<DetectedLine>& lines, const Ca
     }
     if (seen) flat.push_back(line);
   }
-  LongestFirst(&flat);
+  std::stable_sort(flat.begin(), flat.end(), [](const FlatLine& a, const FlatLine& b) {
+    return a.LengthPx() > b.LengthPx();
+  });
   return flat;
 }
 

@@ -15,6 +15,8 @@ namespace circline::apps {
 struct FlatLine {
   std::array<Eigen::Vector2d, 2> ends;
   Eigen::Vector3d plane;  // Normal of the plane through the camera and the line.
+
+  double LengthPx() const { return (ends[1] - ends[0]).norm(); }
 };
 
 // Longest first.

@@ -128,8 +128,7 @@ class BoxTracer {
         const double length = -line.plane.dot(box.corner) / across;
         if (!(length > 0.0) || !ToFlat(box.corner + length * box.axis[k], focal_px_, &far))
           continue;
-        if ((far - near).norm() >= kMinEdgePx)
-          ends.push_back({-(line.ends[1] - line.ends[0]).norm(), length});
+        if ((far - near).norm() >= kMinEdgePx) ends.push_back({-line.LengthPx(), length});
       }
     }
     std::sort(ends.begin(), ends.end());

@@ -25,7 +25,6 @@ constexpr double kUnknowns = 7.0;  // Rotation, direction, ratios of lengths.
 constexpr double kContradiction = 4.0;
 constexpr double kEstimatedFocal = 0.01;  // As EstimatePose has it.
 constexpr int kMinEdges = 5;              // Unknowns: rotation, direction, ratios of lengths: 7.
-const char* const kAxisNames[] = {"x", "y", "z"};
 
 // Of a carton before its own edges tell; none where lines are exact, that is simulated.
 double UsualWearPx(const BoxObservation& box, const NoiseModel& noise) {
@@ -53,7 +52,7 @@ std::vector<std::size_t> UsableEdges(const Camera& camera, const BoxObservation&
     if (points.size() >= 2) {
       usable.push_back(e);
     } else {
-      notes->push_back(std::string("an edge along ") + kAxisNames[box.edges[e].axis] +
+      notes->push_back(std::string("an edge along ") + "xyz"[box.edges[e].axis] +
                        " lies where the lens shows nothing and is left out");
     }
   }
@@ -70,9 +69,9 @@ Status CheckEdges(const BoxObservation& box, const std::vector<std::size_t>& edg
       if (edge.axis == k) along = true;
       if (edge.axis != k) (edge.far[static_cast<std::size_t>(k)] ? far : near) = true;
     }
-    if (!along) return Status::Refused(name + ": no edge along " + kAxisNames[k] + " is seen");
+    if (!along) return Status::Refused(name + ": no edge along " + "xyz"[k] + " is seen");
     if (!near || !far) {
-      return Status::Refused(name + ": edges at one end only of its length along " + kAxisNames[k] +
+      return Status::Refused(name + ": edges at one end only of its length along " + "xyz"[k] +
                              " are seen, which leaves that open");
     }
   }
@@ -112,17 +111,6 @@ bool StartState(const Camera& camera, const BoxObservation& box,
   return true;
 }
 
-void Fill(const Camera& camera, const BoxOptions& options, const BoxState& state,
-          const BoxProblem& problem, BoxFit* fit) {
-  fit->cam_from_box.rotation = state.rotation.normalized().toRotationMatrix();
-  fit->cam_from_box.translation = state.translation;
-  fit->length = state.length;
-  fit->metric = problem.metric();
-  const bool estimated = options.camera.log_focal >= kEstimatedFocal;
-  fit->camera = estimated ? ShiftedCamera(camera, state.camera.data()) : camera;
-  fit->cost = problem.cost();
-}
-
 BoxObservation WithZTurned(BoxObservation box) {
   for (BoxEdge& edge : box.edges) edge.far[2] = !edge.far[2];
   return box;
@@ -132,6 +120,7 @@ BoxObservation WithZTurned(BoxObservation box) {
 void FitEdges(const Camera& camera, const BoxObservation& box, const BoxOptions& options,
               const std::vector<std::size_t>& edges, const std::vector<Eigen::Matrix3d>& starts,
               double wear_px, BoxFit* fit, std::vector<double>* residuals_px) {
+  const bool is_estimated = options.camera.log_focal >= kEstimatedFocal;
   for (const Eigen::Matrix3d& axes : starts) {
     BoxState state;
     if (!StartState(camera, box, edges, axes, &state)) continue;
@@ -139,13 +128,16 @@ void FitEdges(const Camera& camera, const BoxObservation& box, const BoxOptions&
     if (!problem.Solve() || !(state.length.minCoeff() > 0.0)) continue;
     if (!fit->edges.empty() && problem.cost() >= fit->cost) continue;
     BoxFit now;
-    Fill(camera, options, state, problem, &now);
-    std::vector<double> now_residuals_px = problem.ResidualsPx();
     if (!problem.Covariance(&now.covariance, &now.focal_sigma)) continue;
-    if (options.camera.log_focal < kEstimatedFocal) now.focal_sigma = 0.0;
+    if (!is_estimated) now.focal_sigma = 0.0;
+    now.cam_from_box = {state.rotation.normalized().toRotationMatrix(), state.translation};
+    now.length = state.length;
+    now.metric = problem.metric();
+    now.camera = is_estimated ? ShiftedCamera(camera, state.camera.data()) : camera;
+    now.cost = problem.cost();
     now.edges = edges;
     *fit = std::move(now);
-    *residuals_px = std::move(now_residuals_px);
+    *residuals_px = problem.ResidualsPx();
   }
 }
 
@@ -192,7 +184,7 @@ Status FitBox(const Camera& camera, const BoxObservation& observed, const BoxOpt
       fit->rms_px = std::sqrt(sum / static_cast<double>(residuals_px.size()));
       break;
     }
-    notes.push_back(std::string("an edge along ") + kAxisNames[edge.axis] +
+    notes.push_back(std::string("an edge along ") + "xyz"[edge.axis] +
                     " contradicts the others and is left out");
     edges = std::move(others);
   }

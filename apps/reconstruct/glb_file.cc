@@ -9,7 +9,7 @@
 
 #include "apps/common/output_file.h"
 #include "apps/compare/gltf_pose.h"
-#include "apps/reconstruct/model_files.h"
+#include "apps/reconstruct/model.h"
 
 namespace circline::apps {
 namespace {

@@ -15,11 +15,8 @@
 #include "apps/compare/image_run.h"
 #include "apps/compare/options.h"
 #include "apps/compare/overlay.h"
-#include "apps/reconstruct/box_picture.h"
-#include "apps/reconstruct/measure_box.h"
 #include "apps/reconstruct/measurements.h"
 #include "apps/reconstruct/model.h"
-#include "apps/reconstruct/model_files.h"
 #include "apps/reconstruct/trace_box.h"
 #include "apps/reconstruct/views.h"
 
@@ -145,17 +142,19 @@ void SeeThrough(const Camera& camera, const NoiseModel& noise, Observations* obs
 
 // --- A box ---
 
-// Axes that the hypotheses of the photo's pose have, the most probable first; where the rotation is
-// free the normal is right all the same.
-std::vector<Eigen::Matrix3d> CandidateAxes(const ImageRun& run) {
+// Along axes that the hypotheses of the photo's pose have, the most probable first; where the
+// rotation is free the normal is right all the same.
+Status FindBox(const ImageRun& run, const BoxOptions& options, BoxObservation* box, BoxFit* fit) {
   constexpr std::size_t kMost = 8;
+  Camera camera = run.observations.camera;
   std::vector<Eigen::Matrix3d> axes;
-  const SolverRun* shown = RunToShow(run);
-  if (shown == nullptr) return axes;
-  for (const PoseHypothesis& hypothesis : shown->estimate.hypotheses) {
-    if (axes.size() < kMost) axes.push_back(hypothesis.cam_from_world.rotation);
+  if (const SolverRun* shown = RunToShow(run)) {
+    camera = CameraOf(shown->estimate.hypotheses.front(), camera);
+    for (const PoseHypothesis& hypothesis : shown->estimate.hypotheses) {
+      if (axes.size() < kMost) axes.push_back(hypothesis.cam_from_world.rotation);
+    }
   }
-  return axes;
+  return TraceBox(run.photo, camera, options, axes, box, fit);
 }
 
 Status ReconstructBox(const CompareOptions& options, const ImageRun& run, BoxObservation box,
@@ -166,17 +165,9 @@ Status ReconstructBox(const CompareOptions& options, const ImageRun& run, BoxObs
   box_options.camera = CameraSigmaOf(estimation, *run.image);
   box_options.point_sigma_px = FLAGS_point_sigma_px;
   BoxFit fit;
-  Status status;
-  if (box.edges.empty()) {
-    const SolverRun* shown = RunToShow(run);
-    const Camera camera =
-        shown == nullptr || shown->estimate.hypotheses.empty()
-            ? run.observations.camera
-            : CameraOf(shown->estimate.hypotheses.front(), run.observations.camera);
-    status = TraceBox(run.photo, camera, box_options, CandidateAxes(run), &box, &fit);
-  } else {
-    status = FitMarkedBox(run.photo, run.image->observations.camera, box_options, &box, &fit);
-  }
+  const Status status = box.edges.empty() ? FindBox(run, box_options, &box, &fit)
+                                          : FitMarkedBox(run.photo, run.image->observations.camera,
+                                                         box_options, &box, &fit);
   if (!status.ok()) return status;
   made->model = BoxModel(fit);
   if (made->model.patches.empty())

@@ -5,9 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "apps/reconstruct/fit_box.h"
 #include "apps/reconstruct/model.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
+#include "circline/refine/estimate_pose.h"
 
 namespace circline::apps {
 
@@ -30,6 +32,14 @@ struct MeasuredValue {
 std::vector<MeasuredValue> Measure(const Observations& observations,
                                    const PoseHypothesis& hypothesis, const Model& model,
                                    double point_sigma_px);
+
+// The lengths of the box's edges and their ratios; the distance of the camera from its origin,
+// where a length is known; for each circle of `observations` the angle between its normal, from the
+// circle alone, and the box's axes, from its edges alone ("agreement"): the least over the poses
+// that the circle leaves and the three axes.
+std::vector<MeasuredValue> MeasureBox(const BoxFit& fit, const BoxObservation& box,
+                                      const Observations& observations,
+                                      const EstimationOptions& options);
 
 // what,id,value,sigma,unit,truth,relative_error; the last two are empty where no truth is known.
 std::string MeasurementsCsv(const std::vector<MeasuredValue>& measurements);

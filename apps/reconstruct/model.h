@@ -12,8 +12,10 @@
 #include "apps/common/solids.h"
 #include "apps/reconstruct/fit_box.h"
 #include "apps/reconstruct/patch.h"
+#include "circline/estimators/camera.h"
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
+#include "circline/estimators/status.h"
 
 namespace circline::apps {
 
@@ -76,6 +78,20 @@ void TextureModel(const cv::Mat& photo, const Camera& camera, const CameraPose& 
 // Gives all patches names of files, letters, digits, "_", "-" and "." only, no two of which are the
 // same; most stay what they are.
 void NamePatches(Model* model);
+
+// ---- As files of 3-D programs ----
+
+// Wavefront OBJ, which every 3-D program reads: model.obj, model.mtl and a texture for each patch
+// (texture.png for the plane, texture_<name>.png for the others). Z is up, the unit is the pose's.
+// The camera is a pyramid of lines. `camera` states its size.
+Status WriteObj(const Model& model, const Camera& camera, const CameraPose& pose,
+                const std::string& folder);
+
+// Binary glTF 2.0, which browsers and Blender open: one mesh for each patch, with its texture
+// inside the file, and the camera. Y is up, as glTF has it. Textures are shown as they are, without
+// light; what is transparent in them is cut out. `camera` states its size.
+Status WriteGlb(const Model& model, const Camera& camera, const CameraPose& pose,
+                const std::string& path);
 
 }  // namespace circline::apps
 

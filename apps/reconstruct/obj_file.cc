@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "apps/common/output_file.h"
-#include "apps/reconstruct/model_files.h"
+#include "apps/reconstruct/model.h"
 
 namespace circline::apps {
 namespace {

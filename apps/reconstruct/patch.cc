@@ -170,9 +170,7 @@ cv::Mat PatchTexture(const cv::Mat& photo, const Camera& camera, const CameraPos
   }
   cv::Mat color, texture;
   cv::remap(photo, color, map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-  if (color.channels() == 1) cv::cvtColor(color, color, cv::COLOR_GRAY2BGR);
-  if (color.channels() == 4) cv::cvtColor(color, color, cv::COLOR_BGRA2BGR);
-  cv::cvtColor(color, texture, cv::COLOR_BGR2BGRA);
+  cv::cvtColor(color, texture, color.channels() == 1 ? cv::COLOR_GRAY2BGRA : cv::COLOR_BGR2BGRA);
   cv::insertChannel(alpha, texture, 3);
   return texture;
 }

@@ -1,10 +1,11 @@
-// The edges of a box in a photo, where they are expected.
+// The edges of a box in a photo, where they are expected, and the lines on its faces.
 #ifndef CIRCLINE_APPS_RECONSTRUCT_SNAP_BOX_H_
 #define CIRCLINE_APPS_RECONSTRUCT_SNAP_BOX_H_
 
 #include <vector>
 
 #include "apps/reconstruct/fit_box.h"
+#include "circline/ransac/detection/detect_lines.h"
 #include "circline/ransac/detection/edges.h"
 
 namespace circline::apps {
@@ -28,6 +29,11 @@ using PhotoEdges = std::vector<EdgeMap>;
 // marked box's edges is how far off the others lie. Edges of which the photo shows less than a
 // third are left out.
 SnappedBox SnapBox(const PhotoEdges& edges, const BoxFit& fit, double reach_px, bool is_marked);
+
+// Of the photo's lines those within a visible face of the box, where `fit` has it, and nearly along
+// one of its axes: printed borders and pictures are. They tell the box's directions better than its
+// worn edges do.
+std::vector<FaceLine> FaceLines(const std::vector<DetectedLine>& lines, const BoxFit& fit);
 
 }  // namespace circline::apps
 

@@ -184,25 +184,14 @@ Model BoxModel(const BoxFit& fit) {
   for (int k = 0; k < 3; ++k) {
     const int a = (k + 1) % 3, b = (k + 2) % 3;
     for (const bool far : {false, true}) {
-      if (!FaceIsSeen(fit.cam_from_box, fit.length, k, far)) continue;
+      if (!FaceIsSeen(fit, k, far)) continue;
       Patch patch;
       patch.name = std::string("box_") + "xyz"[k] + (far ? "1" : "0");
       patch.corner = far ? (fit.length[k] * Vector3d::Unit(k)).eval() : Vector3d::Zero().eval();
       patch.u = fit.length[a] * Vector3d::Unit(a);
       patch.v = fit.length[b] * Vector3d::Unit(b);
-      // Upright faces have z up; their outside is where u and v turn counterclockwise.
-      if (k == 0 && !far) {
-        patch.corner.y() = fit.length[a];
-        patch.u = -patch.u;
-      }
-      if (k == 1) {
-        std::swap(patch.u, patch.v);
-        if (far) {
-          patch.corner.x() = fit.length[b];
-          patch.u = -patch.u;
-        }
-      }
-      if (k == 2 && !far) std::swap(patch.u, patch.v);
+      // Upright faces have z up.
+      if (k == 1 || (k == 2 && !far)) std::swap(patch.u, patch.v);
       model.patches.push_back(patch);
     }
   }

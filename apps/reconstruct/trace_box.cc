@@ -8,7 +8,6 @@
 
 #include "apps/reconstruct/box_geometry.h"
 #include "apps/reconstruct/box_tracer.h"
-#include "apps/reconstruct/face_lines.h"
 #include "apps/reconstruct/snap_box.h"
 #include "circline/ransac/detection/edge_shift.h"
 #include "circline/ransac/detection/edges.h"
@@ -72,7 +71,7 @@ BoxFit Named(const TracedBox& box, const Camera& camera) {
 // Whether all faces that are seen meet at the corner.
 bool IsOnSeenFaces(const BoxFit& fit, int corner) {
   for (int k = 0; k < 3; ++k) {
-    if (FaceIsSeen(fit.cam_from_box, fit.length, k, (corner >> k & 1) == 0)) return false;
+    if (FaceIsSeen(fit, k, (corner >> k & 1) == 0)) return false;
   }
   return true;
 }
@@ -136,8 +135,6 @@ bool Agree(const BoxFit& a, const BoxFit& b) {
 std::vector<cv::Mat> Channels(const cv::Mat& photo) {
   std::vector<cv::Mat> channels;
   cv::split(photo, channels);
-  constexpr std::size_t kColors = 3;  // Not how opaque it is.
-  if (channels.size() > kColors) channels.resize(kColors);
   return channels;
 }
 

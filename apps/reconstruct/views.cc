@@ -2,11 +2,14 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "apps/common/text.h"
 #include "apps/compare/canvas.h"
+#include "apps/compare/pose_curves.h"
+#include "apps/reconstruct/box_geometry.h"
 #include "circline/estimators/basics.h"
 
 namespace circline::apps {
@@ -14,6 +17,20 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+
+// ---- A box on the photo ----
+
+const cv::Scalar kColors[] = {{60, 60, 255}, {60, 220, 60}, {255, 140, 40}};
+const cv::Scalar kPoints(0, 230, 255), kLetters(255, 255, 255);
+
+// Straight in space, bent by the lens.
+PixelCurve EdgeCurve(const BoxFit& fit, int from, int to) {
+  const Eigen::Vector3d a = BoxCorner(fit.length, from), b = BoxCorner(fit.length, to);
+  return ProjectCurve(fit.camera, 16, 0.0, 1.0,
+                      [&](double t) { return fit.InCamera(a + t * (b - a)); });
+}
+
+// ---- The model ----
 
 const cv::Vec3b kGround(245, 243, 240), kBehind(170, 170, 170);
 constexpr int kFiner = 2;      // Rendered so many times as large, then averaged.
@@ -25,6 +42,8 @@ struct Corner {
   Vector2d texture;  // (s, t).
 };
 
+// The model as a pinhole camera sees it (BGR), on a light ground; what is transparent shows what is
+// behind it. Surfaces seen from behind are grey.
 class Renderer {
  public:
   Renderer(const Camera& camera, const CameraPose& pose)
@@ -124,10 +143,33 @@ CameraPose LookAt(const Vector3d& center, double azimuth, double elevation, doub
 
 }  // namespace
 
-cv::Mat RenderModel(const Model& model, const Camera& camera, const CameraPose& pose) {
-  Renderer renderer(camera, pose);
-  for (const Patch& patch : model.patches) renderer.Draw(patch);
-  return renderer.picture();
+cv::Mat DrawBox(const cv::Mat& photo, const BoxObservation& box, const BoxFit& fit) {
+  Canvas canvas(photo);
+  std::array<bool, 3> labelled{};
+  std::vector<std::pair<Eigen::Vector2d, std::string>> labels;
+  for (int axis = 0; axis < 3; ++axis) {
+    const cv::Scalar& color = kColors[axis];
+    for (int corner = 0; corner < 8; ++corner) {
+      if ((corner >> axis & 1) != 0) continue;
+      const PixelCurve curve = EdgeCurve(fit, corner, corner | 1 << axis);
+      if (NumSeenFaces(fit, axis, corner) == 0) {
+        canvas.Dashes(curve, color, 1.0);
+        continue;
+      }
+      canvas.Polyline(curve, color, 2.0);
+      const auto k = static_cast<std::size_t>(axis);
+      if (labelled[k]) continue;
+      labelled[k] = true;
+      labels.emplace_back(curve[curve.size() / 2],
+                          std::string(1, "xyz"[axis]) + " " + FormatShort(fit.length[axis]) +
+                              " +- " + FormatShort(std::sqrt(fit.covariance(6 + axis, 6 + axis))));
+    }
+  }
+  for (const std::size_t e : fit.edges) {
+    for (const Eigen::Vector2d& point : box.edges[e].points) canvas.Dot(point, 1.5, kPoints);
+  }
+  for (const auto& [at, text] : labels) canvas.Label(at, text, kLetters, 0.6);
+  return canvas.Image();
 }
 
 cv::Mat ModelViews(const cv::Mat& photo, const Model& model, const CameraPose& pose,
@@ -154,8 +196,10 @@ cv::Mat ModelViews(const cv::Mat& photo, const Model& model, const CameraPose& p
   for (const auto& from : kSides) {
     const CameraPose view =
         LookAt(center, azimuth + from[0] * kDegree, side * from[1] * kDegree, kDistance * radius);
+    Renderer renderer(camera, view);
+    for (const Patch& patch : model.patches) renderer.Draw(patch);
     cv::Mat small;
-    cv::resize(RenderModel(model, camera, view), small, shown.size(), 0.0, 0.0, cv::INTER_AREA);
+    cv::resize(renderer.picture(), small, shown.size(), 0.0, 0.0, cv::INTER_AREA);
     pictures.push_back(small);
   }
   cv::Mat above, below, all;

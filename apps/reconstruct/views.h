@@ -1,4 +1,4 @@
-// A picture of the photo and of the model from three sides.
+// Pictures: a box drawn on its photo; the photo and the model from three sides.
 #ifndef CIRCLINE_APPS_RECONSTRUCT_VIEWS_H_
 #define CIRCLINE_APPS_RECONSTRUCT_VIEWS_H_
 
@@ -6,15 +6,16 @@
 #include <string>
 #include <vector>
 
+#include "apps/reconstruct/fit_box.h"
 #include "apps/reconstruct/model.h"
-#include "circline/estimators/camera.h"
 #include "circline/estimators/pose.h"
 
 namespace circline::apps {
 
-// The model as a pinhole camera sees it (BGR), on a light ground; what is transparent shows what is
-// behind it. Surfaces seen from behind are grey.
-cv::Mat RenderModel(const Model& model, const Camera& camera, const CameraPose& pose);
+// The edges of a box as fitted, x red, y green, z blue, those behind it dashed; the points that
+// they were fitted to; along each axis its length, with the standard deviation. BGR, as large as
+// the photo.
+cv::Mat DrawBox(const cv::Mat& photo, const BoxObservation& box, const BoxFit& fit);
 
 // Four pictures of one size, at most 1600 pixels along the longer side: `photo` (BGR), then the
 // model from the left of where the photo was taken, from the right, and from above, with `caption`
