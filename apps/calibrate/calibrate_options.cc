@@ -82,9 +82,8 @@ Status CalibrateOptionsFromFlags(CalibrateOptions* options) {
   if (!status.ok()) return status;
   const CameraGuess& guess = options->compare.inputs.guess;
   if (!FLAGS_import.empty() &&
-      (!FLAGS_camera.empty() || !FLAGS_model.empty() || guess.focal_px > 0.0 ||
-       guess.fov_deg > 0.0 || !FLAGS_fix.empty() || !FLAGS_free.empty() ||
-       options->adjust.rigid != RigidWorld::kAuto)) {
+      (!FLAGS_camera.empty() || !FLAGS_model.empty() || guess.IsGiven() || !FLAGS_fix.empty() ||
+       !FLAGS_free.empty() || options->adjust.rigid != RigidWorld::kAuto)) {
     return Status::Invalid(
         "--import brings its own cameras, and poses of one world: leave out --camera, --model, "
         "--focal_px, --fov_deg, --fix, --free and --rigid; --noise_model and --focal_sigma say how "

@@ -86,10 +86,8 @@ Json PhotoJson(const AdjustedPhoto& photo, std::size_t index,
               {"status", photo.status.ok() ? "ok" : "refused"},
               {"message", WhyLeftOut(photo, names)}};
   if (!photo.status.ok()) return out;
-  const Eigen::Matrix3d by_rows = photo.cam_from_world.rotation.transpose();
-  const Eigen::Vector3d& t = photo.cam_from_world.translation;
-  out["rotation"] = std::vector<double>(by_rows.data(), by_rows.data() + 9);
-  out["translation"] = {t.x(), t.y(), t.z()};
+  out["rotation"] = JsonNumbers(photo.cam_from_world.rotation);
+  out["translation"] = JsonNumbers(photo.cam_from_world.translation);
   out["covariance"] = photo.covariance;
   out["left_out"] = photo.left_out;
   out["rms_px"] = photo.rms_px;
@@ -164,13 +162,12 @@ Status WriteCalibration(const AdjustedPhotos& adjusted, const std::vector<Observ
 
 Status WriteCalibratedScene(const std::string& source, const AdjustedPhotos& adjusted,
                             const std::vector<SceneImage>& images, const std::string& path) {
-  StorageDocument given;
+  Json given, scene;
   if (!source.empty()) {
-    const Status status = given.Open(source);
+    const Status status = ReadStorage(source, &given);
     if (!status.ok()) return status;
   }
-  Json scene;
-  if (given.root()->contains("rigid")) scene["rigid"] = (*given.root())["rigid"];
+  if (given.contains("rigid")) scene["rigid"] = given["rigid"];
   std::set<std::string> ids;
   for (const AdjustedCamera& made : adjusted.cameras) {
     scene["cameras"].push_back(SceneEntry(made));
@@ -180,7 +177,7 @@ Status WriteCalibratedScene(const std::string& source, const AdjustedPhotos& adj
     const std::string& id = image.observations.camera.id;
     if (ids.count(id) == 0) continue;  // No photo of that camera could be read.
     Json entry;
-    if (!source.empty()) entry = (*given.root())["images"][image.index];
+    if (!source.empty()) entry = given["images"][image.index];
     entry["file"] = std::filesystem::absolute(image.path).lexically_normal().string();
     entry["camera"] = id;
     scene["images"].push_back(std::move(entry));

@@ -9,7 +9,7 @@
 #include "apps/common/report_page.h"
 #include "apps/common/svg_plot.h"
 #include "apps/common/text.h"
-#include "apps/compare/report_image.h"
+#include "apps/compare/report_parts.h"
 #include "circline/estimators/basics.h"
 
 namespace circline::apps {
@@ -163,14 +163,6 @@ std::string Pictures(const AdjustedPhotos& adjusted, const std::vector<std::stri
          OverlayLegend() + "<div class=\"two\">" + html + "</div>";
 }
 
-// A list, of a class of the page's; nothing where there are none.
-std::string Sentences(const char* html_class, const std::vector<std::string>& sentences) {
-  if (sentences.empty()) return "";
-  std::string html = std::string("<ul class=\"") + html_class + "\">";
-  for (const std::string& sentence : sentences) html += "<li>" + EscapeHtml(sentence) + "</li>";
-  return html + "</ul>";
-}
-
 std::string PhotoTable(const AdjustedPhotos& adjusted, const std::vector<std::string>& names) {
   std::ostringstream html;
   html << "<div class=\"scroll\"><table class=\"named sortable\"><thead><tr><th class=\"l\">photo"
@@ -242,7 +234,7 @@ std::string CalibrationReport(const AdjustedPhotos& adjusted, const std::vector<
   html << PageTop("circline: calibration") << "<h1>Calibration</h1><p class=\"lead\">"
        << names.size() << " photos, "
        << (adjusted.rigid ? "one sheet seen from all of them" : "each with a sheet of its own")
-       << (adjusted.metric ? ", metric" : "") << "</p>" << Sentences("say", adjusted.notes);
+       << (adjusted.metric ? ", metric" : "") << "</p>" << ListHtml(adjusted.notes);
   for (std::size_t c = 0; c < adjusted.cameras.size(); ++c) {
     const AdjustedCamera& made = adjusted.cameras[c];
     const std::string which = adjusted.cameras.size() > 1 ? " " + made.camera.id : "";
@@ -259,7 +251,7 @@ std::string CalibrationReport(const AdjustedPhotos& adjusted, const std::vector<
             "</p></div></div><h3>Correlations</h3>"
          << CorrelationTable(made) << SigmaPlot(made);
     const std::vector<std::string> advice = Advice(adjusted, static_cast<int>(c));
-    if (!advice.empty()) html << "<h3>What would help most</h3>" << Sentences("", advice);
+    if (!advice.empty()) html << "<h3>What would help most</h3>" << ListHtml(advice, "");
   }
   html << "<h2>Photos</h2>" << PhotoTable(adjusted, names) << Pictures(adjusted, names, pictures)
        << PageEnd();

@@ -29,8 +29,6 @@ const ColmapImage* Find(const ColmapModel& model, const std::string& path) {
   return best;
 }
 
-Json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 Eigen::Affine3d ModelFromWorld(const GivenFrame& given) {
   return Eigen::Translation3d(given.translation) * given.rotation * Eigen::Scaling(given.scale);
 }
@@ -119,31 +117,30 @@ Status WriteLandmarks(const AdjustedPhotos& adjusted, const std::vector<WorldPla
                       const std::string& folder) {
   const Eigen::Affine3d world_from_model = ModelFromWorld(*adjusted.given).inverse();
   const double scale = 1.0 / adjusted.given->scale;
-  const Eigen::Matrix3d& by_columns = adjusted.given->rotation;  // Those of the inverse by rows.
   Json json = {{"metric", adjusted.metric},
                {"world_from_model",
                 {{"scale", scale},
                  {"scale_sigma", adjusted.metric ? scale * adjusted.given->log_scale_sigma : 0.0},
-                 {"rotation", std::vector<double>(by_columns.data(), by_columns.data() + 9)},
-                 {"translation", Vector(world_from_model.translation())}}},
+                 {"rotation", JsonNumbers(adjusted.given->rotation.transpose())},
+                 {"translation", JsonNumbers(world_from_model.translation())}}},
                {"planes", Json::array()},
                {"directions", Json::array()}};
   for (const WorldPlane& plane : planes) {
     Json circles = Json::array();
     for (const AdjustedCircle& circle : plane.circles) {
       circles.push_back({{"id", circle.id},
-                         {"center", Vector(circle.center)},
-                         {"normal", Vector(circle.normal)},
+                         {"center", JsonNumbers(circle.center)},
+                         {"normal", JsonNumbers(circle.normal)},
                          {"radius", circle.radius}});
     }
     json["planes"].push_back({{"id", plane.id},
-                              {"origin", Vector(plane.origin)},
-                              {"normal", Vector(plane.normal)},
+                              {"origin", JsonNumbers(plane.origin)},
+                              {"normal", JsonNumbers(plane.normal)},
                               {"circles", circles}});
   }
   for (const AdjustedDirection& direction : adjusted.directions)
     json["directions"].push_back(
-        {{"id", direction.id}, {"direction", Vector(direction.direction)}});
+        {{"id", direction.id}, {"direction", JsonNumbers(direction.direction)}});
   const Status status = WriteFile(folder + "/landmarks.json", DocumentText(json));
   if (!status.ok()) return status;
   std::ostringstream text;

@@ -101,10 +101,10 @@ CameraModel ReadDistortionModel(const StorageNode& root) {
 
 Status ParseOpenCvCalibration(const std::string& path, const std::string& text,
                               std::vector<Camera>* cameras) {
-  StorageDocument document;
-  Status status = document.Parse(path, text);
+  StorageNode::Json document;
+  Status status = ParseStorage(path, text, &document);
   if (!status.ok()) return status;
-  const StorageNode root(document.root(), path, &status);
+  const StorageNode root(&document, path, &status);
   const StorageNode matrix = GetAny(root, {"camera_matrix", "Camera_Matrix", "cameraMatrix"});
   if (!matrix.Exists()) {
     root.Fail("'camera_matrix' is missing: a camera needs its focal length");

@@ -4,6 +4,7 @@
 #include <yaml.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -271,6 +272,15 @@ Status ParseDocument(const std::string& text, Json* root, const DocumentLimits& 
   } catch (const DocumentError& error) {
     return Status::Invalid(std::string("not valid YAML, JSON or XML: ") + error.what());
   }
+}
+
+Json JsonNumbers(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
+  Json numbers = Json::array();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j)
+      numbers.push_back(std::isfinite(matrix(i, j)) ? Json(matrix(i, j)) : Json());
+  }
+  return numbers;
 }
 
 std::string JsonText(const Json& json) {

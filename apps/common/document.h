@@ -4,6 +4,7 @@
 #ifndef CIRCLINE_APPS_COMMON_DOCUMENT_H_
 #define CIRCLINE_APPS_COMMON_DOCUMENT_H_
 
+#include <Eigen/Core>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
@@ -23,6 +24,9 @@ struct DocumentLimits {
 // in a map, an alias, and a second document.
 Status ParseDocument(const std::string& text, nlohmann::ordered_json* root,
                      const DocumentLimits& limits = {});
+
+// The entries of a matrix, row by row; null for what is not finite.
+nlohmann::ordered_json JsonNumbers(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
 
 // JSON on one line; what is not UTF-8 is replaced, so that a file name cannot stop a run.
 std::string JsonText(const nlohmann::ordered_json& json);

@@ -5,8 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <memory>
+
+#include "apps/common/text.h"
 
 namespace circline::apps {
 namespace {
@@ -62,10 +63,8 @@ double PixelsPerMm(ExifData* data) {
   return mm > 0.0 ? resolution / mm : 0.0;
 }
 
-std::string Millimetres(const char* tag, double mm) {
-  char text[80];
-  std::snprintf(text, sizeof(text), "EXIF's %s of %.4g mm", tag, mm);
-  return text;
+std::string Millimetres(const std::string& tag, double mm) {
+  return "EXIF's " + tag + " of " + FormatPlain(mm, 4) + " mm";
 }
 
 }  // namespace

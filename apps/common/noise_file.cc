@@ -1,5 +1,6 @@
 #include "apps/common/noise_file.h"
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -25,11 +26,11 @@ void ReadFields(const StorageNode& node, const std::vector<std::pair<std::string
 }  // namespace
 
 Status ReadNoiseModel(const std::string& path, NoiseModel* model, StatedCameraSigma* stated) {
-  StorageDocument document;
-  Status status = document.Open(path);
+  StorageNode::Json document;
+  Status status = ReadStorage(path, &document);
   if (!status.ok()) return status;
   NoiseModel read = *model;
-  const StorageNode root(document.root(), "", &status);
+  const StorageNode root(&document, "", &status);
   ReadFields<double>(root,
                      {{"contour_px", &read.contour_px},
                       {"line_px", &read.line_px},

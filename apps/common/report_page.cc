@@ -109,6 +109,13 @@ std::string PageEnd() {
          "</script></body></html>\n";
 }
 
+std::string ListHtml(const std::vector<std::string>& sentences, const std::string& css) {
+  if (sentences.empty()) return "";
+  std::string html = "<ul class='" + css + "'>";
+  for (const std::string& sentence : sentences) html += "<li>" + EscapeHtml(sentence) + "</li>";
+  return html + "</ul>";
+}
+
 std::string PictureHtml(const std::string& alt, const std::string& jpeg) {
   return "<img alt='" + EscapeHtml(alt) + "' src='data:image/jpeg;base64," + EncodeBase64(jpeg) +
          "'>";

@@ -3,6 +3,7 @@
 #define CIRCLINE_APPS_COMMON_REPORT_PAGE_H_
 
 #include <string>
+#include <vector>
 
 namespace circline::apps {
 
@@ -10,6 +11,9 @@ namespace circline::apps {
 std::string PageTop(const std::string& title);
 // From the body's last element on, with the script: sorting, choosing photos, zoom.
 std::string PageEnd();
+
+// A list; nothing where there are no sentences.
+std::string ListHtml(const std::vector<std::string>& sentences, const std::string& css = "say");
 
 // An <img> element that has the picture in it.
 std::string PictureHtml(const std::string& alt, const std::string& jpeg);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "apps/common/camera_file.h"
@@ -63,13 +64,7 @@ void ReadPencil(const StorageNode& node, Ids* ids, Observations* observations) {
 
 void CheckPlane(const StorageNode& node, const std::string& plane, const Observations& observations,
                 bool detect_everything) {
-  if (plane.empty() || detect_everything) return;
-  for (const CircleObservation& circle : observations.circles) {
-    if (circle.plane == plane) return;
-  }
-  for (const PencilObservation& pencil : observations.pencils) {
-    if (pencil.plane == plane) return;
-  }
+  if (plane.empty() || detect_everything || NamesPlane(observations, plane)) return;
   node.Fail("no circle and no pencil names the plane '" + plane + "'");
 }
 
@@ -228,6 +223,14 @@ const char* SymmetryName(Symmetry symmetry) {
   return kSymmetries[static_cast<std::size_t>(symmetry)];
 }
 
+bool NamesPlane(const Observations& observations, const std::string& plane) {
+  const auto is_in_plane = [&](const auto& feature) { return feature.plane == plane; };
+  const auto& circles = observations.circles;
+  const auto& pencils = observations.pencils;
+  return std::any_of(circles.begin(), circles.end(), is_in_plane) ||
+         std::any_of(pencils.begin(), pencils.end(), is_in_plane);
+}
+
 Status ReadScene(const std::string& path, const std::vector<Camera>& cameras,
                  std::vector<SceneImage>* images, std::string* rigid) {
   images->clear();
@@ -242,10 +245,10 @@ Status ParseScene(const std::string& name, const std::string& text, const std::s
                   const std::vector<Camera>& cameras, std::vector<SceneImage>* images,
                   std::string* rigid) {
   images->clear();
-  StorageDocument document;
-  Status status = document.Parse(name, text);
+  StorageNode::Json document;
+  Status status = ParseStorage(name, text, &document);
   if (!status.ok()) return status;
-  const StorageNode root(document.root(), "", &status);
+  const StorageNode root(&document, "", &status);
   root.AllowKeys({"cameras", "images", "rigid"});
   const StorageNode stated = root.Get("rigid");
   const std::string choice = ReadOptionalText(stated);

@@ -70,6 +70,9 @@ struct SceneImage {
   Solids solids;  // To be modelled; no evidence of the pose.
 };
 
+// Whether a circle or a pencil lies in the plane of that id.
+bool NamesPlane(const Observations& observations, const std::string& plane);
+
 // Reads and checks a scene file. `cameras`, from a camera file, are for one that has none of its
 // own, else empty; an image that names no camera takes the only one there is. Not ok: one line that
 // names the file, the place in it (images[3] ("a.jpg").circles[0].contour) and what is wrong there.

@@ -43,21 +43,18 @@ Status ReadTextFile(const std::string& path, std::string* text) {
   return Status::Ok();
 }
 
-Status StorageDocument::Open(const std::string& path) {
-  std::string text;
-  const Status status = ReadTextFile(path, &text);
-  return status.ok() ? Parse(path, text) : status;
-}
-
-Status StorageDocument::Parse(const std::string& name, const std::string& text) {
-  const Status status = ParseDocument(text, json_.get());
+Status ParseStorage(const std::string& name, const std::string& text, StorageNode::Json* root) {
+  const Status status = ParseDocument(text, root);
   if (!status.ok()) return Status::Invalid(name + ": " + status.message);
-  if (json_->is_object()) return Status::Ok();
+  if (root->is_object()) return Status::Ok();
   return Status::Invalid(name + ": not a YAML or JSON document with keys and values");
 }
 
-StorageDocument::StorageDocument() : json_(std::make_unique<nlohmann::ordered_json>()) {}
-StorageDocument::~StorageDocument() = default;
+Status ReadStorage(const std::string& path, StorageNode::Json* root) {
+  std::string text;
+  const Status status = ReadTextFile(path, &text);
+  return status.ok() ? ParseStorage(path, text, root) : status;
+}
 
 bool StorageNode::Exists() const { return node_ != nullptr && !node_->is_null(); }
 

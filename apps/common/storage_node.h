@@ -4,9 +4,9 @@
 #ifndef CIRCLINE_APPS_COMMON_STORAGE_NODE_H_
 #define CIRCLINE_APPS_COMMON_STORAGE_NODE_H_
 
-#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "circline/estimators/status.h"
@@ -52,23 +52,11 @@ class StorageNode {
   Status* status_;
 };
 
-// A document held in memory until the object goes: a map of keys and values.
-class StorageDocument {
- public:
-  StorageDocument();
-  ~StorageDocument();
-  StorageDocument(const StorageDocument&) = delete;
-  StorageDocument& operator=(const StorageDocument&) = delete;
-
-  // Not ok: one line that names the file, and the line in it where the parser can tell.
-  Status Open(const std::string& path);
-  // The same of a text; messages call it `name`.
-  Status Parse(const std::string& name, const std::string& text);
-  const nlohmann::ordered_json* root() const { return json_.get(); }
-
- private:
-  std::unique_ptr<nlohmann::ordered_json> json_;
-};
+// Parses a text that must be a map of keys and values; messages call it `name`. Not ok: one line,
+// with the line of the text where the parser can tell.
+Status ParseStorage(const std::string& name, const std::string& text, StorageNode::Json* root);
+// The same of a file.
+Status ReadStorage(const std::string& path, StorageNode::Json* root);
 
 // The bytes of a file, without a byte order mark.
 Status ReadTextFile(const std::string& path, std::string* text);

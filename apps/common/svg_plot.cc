@@ -27,20 +27,23 @@ std::string TickText(double value) {
   return text;
 }
 
+// Of the way from `low` to `high`, on a linear or logarithmic axis.
+double ShareOfAxis(double value, double low, double high, bool log) {
+  const double share =
+      log ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
+  return std::clamp(share, 0.0, 1.0);
+}
+
 struct Frame {
   const Plot& plot;
 
   double right() const { return plot.width - kRight; }
   double bottom() const { return plot.height - kBottom; }
   double X(double x) const {
-    const double t = plot.log_x ? std::log(x / plot.x_min) / std::log(plot.x_max / plot.x_min)
-                                : (x - plot.x_min) / (plot.x_max - plot.x_min);
-    return kLeft + std::clamp(t, 0.0, 1.0) * (right() - kLeft);
+    return kLeft + ShareOfAxis(x, plot.x_min, plot.x_max, plot.log_x) * (right() - kLeft);
   }
   double Y(double y) const {
-    const double t = plot.log_y ? std::log(y / plot.y_min) / std::log(plot.y_max / plot.y_min)
-                                : (y - plot.y_min) / (plot.y_max - plot.y_min);
-    return bottom() - std::clamp(t, 0.0, 1.0) * (bottom() - kTop);
+    return bottom() - ShareOfAxis(y, plot.y_min, plot.y_max, plot.log_y) * (bottom() - kTop);
   }
 };
 

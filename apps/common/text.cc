@@ -58,6 +58,10 @@ std::string JoinList(const std::vector<std::string>& parts, const std::string& s
   return text;
 }
 
+void AddOnce(const std::string& name, std::vector<std::string>* names) {
+  if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
+}
+
 bool ParseDouble(const std::string& text, double* value) {
   if (text.empty()) return false;
   char* end = nullptr;
@@ -115,9 +119,9 @@ std::string FormatShort(double value, int digits) {
   return FormatFixed(value, std::clamp(digits - whole_digits, 0, 9));
 }
 
-std::string FormatPlain(double value) {
+std::string FormatPlain(double value, int digits) {
   char buffer[64];
-  std::snprintf(buffer, sizeof(buffer), "%g", value);
+  std::snprintf(buffer, sizeof(buffer), "%.*g", digits, value);
   return buffer;
 }
 

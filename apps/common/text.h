@@ -12,6 +12,8 @@ namespace circline::apps {
 // "a, b,c" -> {"a", "b", "c"}; blanks around the parts are removed, empty parts are kept.
 std::vector<std::string> SplitList(const std::string& text, char separator = ',');
 std::string JoinList(const std::vector<std::string>& parts, const std::string& separator);
+// Unless it is among them.
+void AddOnce(const std::string& name, std::vector<std::string>* names);
 
 // The whole text as a finite number, or false.
 bool ParseDouble(const std::string& text, double* value);
@@ -27,8 +29,8 @@ std::string NotOneOf(const std::string& name, const std::vector<std::string>& kn
 std::string FormatFixed(double value, int decimals);
 // About `digits` significant digits without an exponent where that is readable (0.012, 3.4, 120).
 std::string FormatShort(double value, int digits = 3);
-// As short as six digits can be: "0.1", "2", "1e-06".
-std::string FormatPlain(double value);
+// As short as so many digits can be: "0.1", "2", "1e-06".
+std::string FormatPlain(double value, int digits = 6);
 // "412 us", "3.1 ms", "2.4 s".
 std::string FormatMicroseconds(double microseconds);
 

@@ -43,7 +43,7 @@ std::string AccuracyText(double sigma, double doubtful) {
 }  // namespace
 
 StatedCameraSigma CameraGuess::Stated() const {
-  if (!is_exact || !(focal_px > 0.0 || fov_deg > 0.0)) return stated;
+  if (!is_exact || !IsGiven()) return stated;
   const CameraSigma sigma = stated.Over(CameraSigma::Exact());
   return {sigma.log_focal, sigma.log_aspect, sigma.principal_point_px, sigma.k1,
           sigma.doubtful_log_focal};
@@ -94,7 +94,7 @@ GuessedCamera CameraGuess::ForPhoto(const std::string& path, int width, int heig
 }
 
 std::string DescribeGuess(const CameraGuess& guess) {
-  if (guess.fov_deg > 0.0 || guess.focal_px > 0.0) {
+  if (guess.IsGiven()) {
     const double sigma = guess.Stated().log_focal.value_or(kGuessSigma);
     if (!(sigma > 0.0)) return "the camera is a guess, its focal length taken as exact";
     return "the camera is a guess, its focal length good to " + FormatShort(100.0 * sigma) +
@@ -117,9 +117,7 @@ Status CameraGuessFromFlags(CameraGuess* guess) {
   if (!(guess->fov_deg == 0.0 || (guess->fov_deg >= 0.01 && guess->fov_deg <= 179.0))) {
     return Status::Invalid("--fov_deg must be between 0.01 and 179");
   }
-  return guess->focal_px > 0.0 && guess->fov_deg > 0.0
-             ? Status::Invalid("give one of --camera, --focal_px, --fov_deg")
-             : Status::Ok();
+  return Status::Ok();
 }
 
 }  // namespace circline::apps

@@ -25,6 +25,7 @@ struct CameraGuess {
   StatedCameraSigma stated;  // How well it is known, where that is stated.
   bool is_exact = false;     // focal_px and fov_deg are, but for what is stated.
 
+  bool IsGiven() const { return fov_deg > 0.0 || focal_px > 0.0; }
   // From what is given, else from the photo's EXIF data, else 60 degrees. A guess is as unknown as
   // UnknownCamera() but for its focal length and what is stated. One that is stated to be known
   // better than to 1 % is a pinhole camera, known as well as a calibrated one (`calibrated`).

@@ -24,8 +24,6 @@ cv::Mat ToColor(const cv::Mat& photo) {
   cv::Mat color;
   if (photo.channels() == 1) {
     cv::cvtColor(photo, color, cv::COLOR_GRAY2BGR);
-  } else if (photo.channels() == 4) {
-    cv::cvtColor(photo, color, cv::COLOR_BGRA2BGR);
   } else {
     photo.copyTo(color);
   }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -10,7 +11,6 @@
 
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
-#include "apps/compare/gltf_pose.h"
 #include "apps/compare/record_files.h"
 
 namespace circline::apps {
@@ -139,6 +139,24 @@ std::string ScaleNote(std::size_t num_poses, int num_metric) {
 
 }  // namespace
 
+std::array<double, 4> GltfUpright() {
+  const double half = std::sqrt(0.5);
+  return {-half, 0.0, 0.0, half};
+}
+
+GltfNode GltfCameraNode(const CameraPose& pose) {
+  const Eigen::Vector3d center = -(pose.rotation.transpose() * pose.translation);
+  const Eigen::Matrix3d world_from_gltf =
+      pose.rotation.transpose() * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+  const Eigen::Quaterniond q(world_from_gltf);
+  return {{center.x(), center.y(), center.z()}, {q.x(), q.y(), q.z(), q.w()}};
+}
+
+GltfPerspective GltfPerspectiveOf(const Camera& camera) {
+  const double half_x = 0.5 * camera.width / camera.fx, half_y = 0.5 * camera.height / camera.fy;
+  return {2.0 * std::atan(half_y), half_x / half_y};
+}
+
 const std::vector<ExportFormat>& ExportFormats() {
   static const auto* const formats =
       new std::vector<ExportFormat>{{"colmap", {"images.txt", "cameras.txt", "points3D.txt"}},
@@ -177,7 +195,7 @@ Status WriteExports(const std::string& folder, const std::vector<std::string>& f
   for (ImageLines lines; reader.Next(&lines);) {
     const Status status = ParseRecord(lines, &record);
     if (!status.ok()) return status;
-    const SolverRecord* shown = SolverToShow(record);
+    const SolverRecord* shown = AnswerToShow(record.solvers);
     if (shown == nullptr) continue;
     const HypothesisRecord& best = shown->hypotheses.front();
     num_metric += best.metric ? 1 : 0;

@@ -2,7 +2,7 @@
 #ifndef CIRCLINE_APPS_COMPARE_EXPORT_H_
 #define CIRCLINE_APPS_COMPARE_EXPORT_H_
 
-#include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +21,29 @@ struct ExportedPose {
   CameraPose cam_from_world;
   std::optional<double> time_s = std::nullopt;  // Where it is known otherwise than by the name.
 };
+
+// ---- glTF's terms ----
+
+// Turns our Z, the plane's normal, into glTF's Y, which is up: the quaternion (x, y, z, w) of the
+// node above all others.
+std::array<double, 4> GltfUpright();
+
+// A camera's node. glTF cameras look along -Z with Y up, ours along +Z with Y down.
+struct GltfNode {
+  std::array<double, 3> translation;
+  std::array<double, 4> rotation;  // x, y, z, w.
+};
+GltfNode GltfCameraNode(const CameraPose& pose);
+
+// A pinhole camera with its axis in the middle: lens and principal point have no place in glTF.
+struct GltfPerspective {
+  double yfov, aspect_ratio;
+};
+GltfPerspective GltfPerspectiveOf(const Camera& camera);
+
+constexpr double kGltfNear = 1e-3;
+
+// ---- Files ----
 
 struct ExportFormat {
   std::string name;

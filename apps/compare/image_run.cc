@@ -26,20 +26,15 @@ std::string SizeError(const cv::Mat& photo, const Camera& camera) {
 // What the scene says of a photo in which everything is detected: the frame and lengths in pixels
 // hold; ids of planes mean nothing unless the detection happens to use them.
 void CopyFrame(const Observations& scene, Observations* detected) {
-  const auto has_plane = [&](const std::string& plane) {
-    return std::any_of(detected->circles.begin(), detected->circles.end(),
-                       [&](const CircleObservation& c) { return c.plane == plane; }) ||
-           std::any_of(detected->pencils.begin(), detected->pencils.end(),
-                       [&](const PencilObservation& p) { return p.plane == plane; });
-  };
   const FrameObservation& frame = scene.frame;
-  if (!frame.plane.empty() && has_plane(frame.plane)) detected->frame.plane = frame.plane;
+  if (!frame.plane.empty() && NamesPlane(*detected, frame.plane))
+    detected->frame.plane = frame.plane;
   if (frame.origin) detected->frame.origin = frame.origin;
   if (frame.x_axis) detected->frame.x_axis = frame.x_axis;
   if (frame.y_axis) detected->frame.y_axis = frame.y_axis;
   detected->known_lengths = scene.known_lengths;
   for (KnownLength& length : detected->known_lengths) {
-    if (!has_plane(length.plane)) length.plane.clear();
+    if (!NamesPlane(*detected, length.plane)) length.plane.clear();
   }
 }
 
@@ -252,21 +247,9 @@ std::vector<SolverKey> SolverSet::Keys(const CompareOptions& options) const {
   return keys;
 }
 
-const SolverRun* RunToShow(const ImageRun& run) {
-  const SolverRun* best = nullptr;
-  const auto rank = [](const SolverRun& r) {
-    const PoseHypothesis& first = r.estimate.hypotheses.front();
-    return ShowRank(r.solver, r.loss != nullptr, first.probability, first.num_observations);
-  };
-  bool joint_refuses = false;
-  for (const SolverRun& candidate : run.solvers) {
-    if (candidate.estimate.status.ok() && !candidate.estimate.hypotheses.empty()) {
-      if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
-    } else if (candidate.solver == kJoint) {
-      joint_refuses = true;
-    }
-  }
-  return best != nullptr && joint_refuses && best->solver != kJoint ? nullptr : best;
+std::array<int, 4> SolverRun::Rank() const {
+  const PoseHypothesis& first = estimate.hypotheses.front();
+  return ShowRank(solver, loss != nullptr, first.probability, first.num_observations);
 }
 
 }  // namespace circline::apps

@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_COMPARE_IMAGE_RUN_H_
 #define CIRCLINE_APPS_COMPARE_IMAGE_RUN_H_
 
+#include <array>
 #include <chrono>
 #include <opencv2/core.hpp>
 #include <string>
@@ -58,6 +59,10 @@ struct SolverRun {
   PoseEstimate estimate;
   std::vector<PoseErrors> errors;  // One for each hypothesis.
   double microseconds = 0.0;
+
+  bool HasAnswer() const { return estimate.status.ok() && !estimate.hypotheses.empty(); }
+  const std::string& name() const { return solver; }
+  std::array<int, 4> Rank() const;  // ShowRank of its answer.
 };
 
 struct ImageRun {
@@ -88,9 +93,6 @@ ImageRun RunImage(const CompareOptions& options, const SolverSet* solvers, Scene
 
 // Gives it to the circle whose image has the longest axis, whose index is returned; -1: to none.
 int SetLargestRadius(double radius, Observations* observations);
-
-// The run to show in a picture (see ShowRank). Null if every solver refused, or joint did.
-const SolverRun* RunToShow(const ImageRun& run);
 
 }  // namespace circline::apps
 

@@ -44,8 +44,7 @@ Status CheckSources(const CameraGuess& guess) {
   }
   if (missing < 2) return Status::Invalid("give --scene, --images or --merge, not both");
   if (!FLAGS_images.empty()) return Status::Ok();
-  const bool for_images = guess.focal_px > 0.0 || guess.fov_deg > 0.0 || !FLAGS_roi.empty() ||
-                          FLAGS_circle_radius != 0.0;
+  const bool for_images = guess.IsGiven() || !FLAGS_roi.empty() || FLAGS_circle_radius != 0.0;
   return for_images ? Status::Invalid(
                           "--focal_px, --fov_deg, --roi and --circle_radius go with "
                           "--images; a scene file says these things itself")
@@ -54,11 +53,11 @@ Status CheckSources(const CameraGuess& guess) {
 
 Status ReadGuess(CameraGuess* guess) {
   const Status status = CameraGuessFromFlags(guess);
-  const bool is_guess = guess->focal_px > 0.0 || guess->fov_deg > 0.0;
   guess->wanted = !FLAGS_images.empty() && FLAGS_camera.empty();
-  return status.ok() && is_guess && !FLAGS_camera.empty()
-             ? Status::Invalid("give one of --camera, --focal_px, --fov_deg")
-             : status;
+  const int given = (FLAGS_camera.empty() ? 0 : 1) + (guess->focal_px > 0.0 ? 1 : 0) +
+                    (guess->fov_deg > 0.0 ? 1 : 0);
+  return status.ok() && given > 1 ? Status::Invalid("give one of --camera, --focal_px, --fov_deg")
+                                  : status;
 }
 
 Status ReadRoi(std::optional<std::array<int, 4>>* roi) {

@@ -19,17 +19,13 @@ namespace fs = std::filesystem;
 // One folder with its next image.
 struct Source {
   explicit Source(std::string f) : folder(std::move(f)), reader(folder) { Advance(); }
-  void Advance() {
-    LineCounts counts;
-    has_next = reader.Next(&lines) && ReadLineCounts(lines.observations, &counts);
-    index = counts.index;
-  }
+  void Advance() { has_next = reader.Next(&lines); }
+  std::size_t index() const { return reader.index(); }
 
   std::string folder;
   RecordReader reader;
   ImageLines lines;
   bool has_next = false;
-  std::size_t index = 0;
 };
 
 // All images of all folders, by index.
@@ -44,7 +40,7 @@ class Merger {
     current_ = nullptr;
     for (const auto& source : sources_) {
       if (!source->has_next) continue;
-      if (current_ == nullptr || source->index < current_->index) current_ = source.get();
+      if (current_ == nullptr || source->index() < current_->index()) current_ = source.get();
     }
     return current_;
   }
@@ -113,10 +109,10 @@ Status CheckImages(const std::vector<std::string>& folders) {
     ImageRecord record;
     const Status status = ParseRecord(source->lines, &record);
     if (!status.ok()) return Status::Invalid("--merge: " + source->folder + ": " + status.message);
-    if (source->index != expected) {
-      const bool twice = source->index < expected;
+    if (source->index() != expected) {
+      const bool twice = source->index() < expected;
       return Status::Invalid(
-          "--merge: image " + std::to_string(twice ? source->index : expected) +
+          "--merge: image " + std::to_string(twice ? source->index() : expected) +
           (twice ? " (" + record.name + ") is there twice" : " is missing: is a shard not named?"));
     }
     ++expected;

@@ -130,36 +130,18 @@ SolverRegistry AllSolvers() {
 
 // The flags beside solvers and losses that shape what is found in a photo; and those that say which
 // photos are read, and how to see them without a scene file.
-std::vector<std::string> TuningFlags() {
-  return {"conic_loss",
-          "conic_loss_scale_px",
-          "line_loss",
-          "line_loss_scale_px",
-          "conic_distance",
-          "focal_sigma",
-          "noise",
-          "noise_model",
-          "inlier_threshold_px",
-          "ransac_confidence",
-          "ransac_max_iterations",
-          "min_ellipse_axis_px",
-          "min_arc_deg",
-          "min_segment_length_px",
-          "max_circles",
-          "max_pencils",
-          "seed"};
-}
-std::vector<std::string> InputFlags() {
-  return {"fov_deg", "focal_px", "roi", "circle_radius", "max_megapixels"};
-}
+constexpr char kTuningFlags[] =
+    "conic_loss,conic_loss_scale_px,line_loss,line_loss_scale_px,conic_distance,focal_sigma,noise,"
+    "noise_model,inlier_threshold_px,ransac_confidence,ransac_max_iterations,min_ellipse_axis_px,"
+    "min_arc_deg,min_segment_length_px,max_circles,max_pencils,seed";
+constexpr char kInputFlags[] = "fov_deg,focal_px,roi,circle_radius,max_megapixels";
 
 using FlagInfo = gflags::CommandLineFlagInfo;
 
-// Those that are wanted, as "--name=value".
-std::vector<std::string> FlagTexts(const std::vector<std::string>& names,
-                                   bool (*is_wanted)(const FlagInfo&)) {
+// Those that are wanted, as "--name=value". `names`: separated by commas.
+std::vector<std::string> FlagTexts(const std::string& names, bool (*is_wanted)(const FlagInfo&)) {
   std::vector<std::string> texts;
-  for (const std::string& name : names) {
+  for (const std::string& name : SplitList(names)) {
     FlagInfo info;
     if (gflags::GetCommandLineFlagInfo(name.c_str(), &info) && is_wanted(info))
       texts.push_back("--" + name + "=" + info.current_value);
@@ -209,15 +191,12 @@ Status OptionsFromFlags(CompareOptions* options) {
   options->overlays = FLAGS_overlays;
   options->resume = FLAGS_resume;
   options->peers = FLAGS_peers;
+  const std::string shaping = std::string(kTuningFlags) + "," + kInputFlags;
   options->result_flags =
-      Lines(FlagTexts({"plugin", "solvers", "robust_loss", "loss_scale_px", "shard", "overlays"},
-                      Any)) +
-      Lines(FlagTexts(TuningFlags(), Any)) + Lines(FlagTexts(InputFlags(), Any));
-  options->unusual_flags = FlagTexts(TuningFlags(), IsUnusual);
-  for (std::string& text : FlagTexts(InputFlags(), IsUnusual))
-    options->unusual_flags.push_back(std::move(text));
+      Lines(FlagTexts("plugin,solvers,robust_loss,loss_scale_px,shard,overlays," + shaping, Any));
+  options->unusual_flags = FlagTexts(shaping, IsUnusual);
   options->finish.save_options = FLAGS_save_options;
-  options->finish.other_flags = Lines(FlagTexts(TuningFlags(), IsGiven));
+  options->finish.other_flags = Lines(FlagTexts(kTuningFlags, IsGiven));
   return Status::Ok();
 }
 
@@ -231,11 +210,7 @@ Status CheckOneLoss(const CompareOptions& options) {
 std::vector<std::string> SolverNames() {
   const SolverRegistry registry = AllSolvers();
   std::vector<std::string> names;
-  for (const auto& solver : registry.solvers()) {
-    if (std::find(names.begin(), names.end(), solver->name()) == names.end()) {
-      names.push_back(solver->name());
-    }
-  }
+  for (const auto& solver : registry.solvers()) AddOnce(solver->name(), &names);
   return names;
 }
 

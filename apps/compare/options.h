@@ -7,7 +7,6 @@
 
 #include "apps/common/photo_file.h"
 #include "apps/compare/estimation_flags.h"
-#include "apps/compare/finish.h"
 #include "apps/compare/inputs.h"
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/status.h"
@@ -15,6 +14,12 @@
 #include "circline/ransac/fit_observations.h"
 
 namespace circline::apps {
+
+struct FinishOptions {
+  std::string save_options;          // File for the flags of the best loss and scale; may be empty.
+  std::string other_flags;           // To stand in it as well, one a line.
+  std::vector<std::string> exports;  // See WriteExports.
+};
 
 struct CompareOptions {
   std::string output;

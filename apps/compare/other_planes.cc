@@ -13,8 +13,7 @@ constexpr double kSure = 0.9;      // Probability of a first hypothesis.
 constexpr double kFarApart = 5.0;  // Degrees between normals; those of sure answers are known to 1.
 
 bool IsSure(const SolverRun& run) {
-  return run.estimate.status.ok() && !run.estimate.hypotheses.empty() &&
-         run.estimate.hypotheses.front().probability >= kSure;
+  return run.HasAnswer() && run.estimate.hypotheses.front().probability >= kSure;
 }
 
 double AngleBetweenNormalsDeg(const SolverRun& a, const SolverRun& b) {

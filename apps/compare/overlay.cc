@@ -205,7 +205,7 @@ cv::Mat DrawOverlay(const ImageRun& run) {
   canvas.Blend(0.55, [&] {
     for (const CircleObservation& circle : observations.circles) DrawContourPoints(circle, &canvas);
   });
-  const SolverRun* shown = RunToShow(run);
+  const SolverRun* shown = AnswerToShow(run.solvers);
   for (const CircleObservation& circle : observations.circles) {
     DrawEllipse(observations.camera, circle, IsUsed(circle, shown), &canvas);
   }

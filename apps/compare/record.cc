@@ -215,25 +215,13 @@ std::array<int, 4> ShowRank(const std::string& solver, bool refined, double prob
           num_observations};
 }
 
-std::string FlagText(const std::vector<std::string>& flags) {
-  return flags.empty() ? "the default flags" : JoinList(flags, " ");
+std::array<int, 4> SolverRecord::Rank() const {
+  const HypothesisRecord& first = hypotheses.front();
+  return ShowRank(name(), key.refined(), first.probability, first.num_observations);
 }
 
-const SolverRecord* SolverToShow(const ImageRecord& record) {
-  const SolverRecord* best = nullptr;
-  const auto rank = [](const SolverRecord& r) {
-    const HypothesisRecord& first = r.hypotheses.front();
-    return ShowRank(r.key.solver, r.key.refined(), first.probability, first.num_observations);
-  };
-  bool joint_refuses = false;
-  for (const SolverRecord& candidate : record.solvers) {
-    if (candidate.HasAnswer()) {
-      if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
-    } else if (candidate.key.solver == kJoint) {
-      joint_refuses = true;
-    }
-  }
-  return best != nullptr && joint_refuses && best->key.solver != kJoint ? nullptr : best;
+std::string FlagText(const std::vector<std::string>& flags) {
+  return flags.empty() ? "the default flags" : JoinList(flags, " ");
 }
 
 }  // namespace circline::apps

@@ -57,6 +57,8 @@ struct SolverRecord {
   double microseconds = kUnknown;
 
   bool HasAnswer() const { return !hypotheses.empty(); }
+  const std::string& name() const { return key.solver; }
+  std::array<int, 4> Rank() const;  // ShowRank of its answer.
 };
 
 struct ImageRecord {
@@ -116,8 +118,21 @@ std::array<int, 4> ShowRank(const std::string& solver, bool refined, double prob
 // "--seed=2 --max_pencils=3", or that none was given.
 std::string FlagText(const std::vector<std::string>& flags);
 
-// The answer to show; of the first loss. Null if every solver refused, or joint did.
-const SolverRecord* SolverToShow(const ImageRecord& record);
+// The answer to show of a photo's solvers, records or runs: of the largest rank, and of the first
+// loss. Null if every solver refused, or joint did.
+template <typename Solver>
+const Solver* AnswerToShow(const std::vector<Solver>& solvers) {
+  const Solver* best = nullptr;
+  bool joint_refuses = false;
+  for (const Solver& candidate : solvers) {
+    if (!candidate.HasAnswer()) {
+      joint_refuses = joint_refuses || candidate.name() == kJoint;
+    } else if (best == nullptr || candidate.Rank() > best->Rank()) {
+      best = &candidate;
+    }
+  }
+  return best != nullptr && joint_refuses && best->name() != kJoint ? nullptr : best;
+}
 
 }  // namespace circline::apps
 

@@ -22,11 +22,10 @@ RecordReader::RecordReader(const std::string& folder)
       timings_(folder + "/timings.jsonl", std::ios::binary) {}
 
 bool RecordReader::Next(ImageLines* lines) {
-  LineCounts counts;
   const bool whole = ReadLines(1, &observations_, &lines->observations) &&
-                     ReadLineCounts(lines->observations, &counts) &&
-                     ReadLines(counts.results, &results_, &lines->results) &&
-                     ReadLines(counts.timings, &timings_, &lines->timings);
+                     ReadLineCounts(lines->observations, &counts_) &&
+                     ReadLines(counts_.results, &results_, &lines->results) &&
+                     ReadLines(counts_.timings, &timings_, &lines->timings);
   if (!whole) return false;
   bytes_read_[0] += lines->results.size();
   bytes_read_[1] += lines->observations.size();

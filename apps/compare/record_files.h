@@ -19,11 +19,14 @@ class RecordReader {
   explicit RecordReader(const std::string& folder);
   // False after the last image that is there whole.
   bool Next(ImageLines* lines);
+  // Of the image that Next has returned last, in the whole set.
+  std::size_t index() const { return counts_.index; }
   // Of what Next has returned: results, observations, timings.
   const std::array<std::uint64_t, 3>& bytes_read() const { return bytes_read_; }
 
  private:
   std::ifstream results_, observations_, timings_;
+  LineCounts counts_;
   std::array<std::uint64_t, 3> bytes_read_{};
 };
 

@@ -10,9 +10,7 @@
 #include "apps/common/text.h"
 #include "apps/compare/encode.h"
 #include "apps/compare/record_files.h"
-#include "apps/compare/report_image.h"
-#include "apps/compare/report_plots.h"
-#include "apps/compare/report_tables.h"
+#include "apps/compare/report_parts.h"
 #include "apps/compare/sweep.h"
 
 namespace circline::apps {

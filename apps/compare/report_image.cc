@@ -1,12 +1,10 @@
-#include "apps/compare/report_image.h"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "apps/common/report_page.h"
 #include "apps/common/text.h"
-#include "apps/compare/report_tables.h"
+#include "apps/compare/report_parts.h"
 
 namespace circline::apps {
 namespace {
@@ -108,7 +106,7 @@ std::string HypothesisRow(const SolverRecord& run, std::size_t i, const Columns&
 }
 
 std::string SolverTable(const ImageRecord& record, const std::vector<SolverKey>& keys) {
-  const SolverRecord* shown = SolverToShow(record);
+  const SolverRecord* shown = AnswerToShow(record.solvers);
   if (shown == nullptr) return "";
   const Columns columns(record);
   std::string html = "<div class='scroll'><table><thead>" + SolverHead(columns) + "</thead><tbody>";
@@ -145,17 +143,14 @@ std::string Refusals(const ImageRecord& record) {
 }
 
 // At most so many sentences, so that a hundred bad points do not hide the rest.
-std::string Problems(const std::vector<std::string>& problems) {
+std::string Problems(std::vector<std::string> problems) {
   constexpr std::size_t kMost = 8;
-  if (problems.empty()) return "";
-  std::string html = "<ul class='say'>";
-  for (std::size_t i = 0; i < std::min(kMost, problems.size()); ++i) {
-    html += "<li>" + EscapeHtml(problems[i]) + "</li>";
-  }
   if (problems.size() > kMost) {
-    html += "<li>and " + std::to_string(problems.size() - kMost) + " more</li>";
+    const std::string more = "and " + std::to_string(problems.size() - kMost) + " more";
+    problems.resize(kMost);
+    problems.push_back(more);
   }
-  return html + "</ul>";
+  return ListHtml(problems);
 }
 
 std::string EvidenceText(const ImageRecord& record) {

@@ -1,5 +1,3 @@
-#include "apps/compare/report_plots.h"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -8,6 +6,7 @@
 
 #include "apps/common/svg_plot.h"
 #include "apps/common/text.h"
+#include "apps/compare/report_parts.h"
 #include "apps/compare/sweep.h"
 
 namespace circline::apps {

@@ -1,9 +1,8 @@
-#include "apps/compare/report_tables.h"
-
 #include <algorithm>
 #include <set>
 
 #include "apps/common/text.h"
+#include "apps/compare/report_parts.h"
 #include "apps/compare/sweep.h"
 
 namespace circline::apps {
@@ -16,10 +15,6 @@ std::string Breakable(const std::string& name) {
   std::string html;
   for (const char c : name) html += c == '_' ? "_<wbr>" : EscapeHtml(std::string(1, c));
   return html;
-}
-
-void AddOnce(const std::string& name, std::vector<std::string>* names) {
-  if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
 }
 
 // The cell's number: the median error, or the residual and the share of inliers.

@@ -28,15 +28,6 @@ Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(); 
 Json Number(const std::optional<double>& value) { return value ? Number(*value) : Json(); }
 Json TextOrNull(const std::string& text) { return text.empty() ? Json() : Json(text); }
 
-template <typename Derived>
-Json Array(const Eigen::MatrixBase<Derived>& m) {  // Row by row.
-  Json array = Json::array();
-  for (Eigen::Index i = 0; i < m.rows(); ++i) {
-    for (Eigen::Index j = 0; j < m.cols(); ++j) array.push_back(Number(m(i, j)));
-  }
-  return array;
-}
-
 Json ScaleJson(double scale_px) { return scale_px > 0.0 ? Json(scale_px) : Json("auto"); }
 
 // Which solver ran on which image, with which loss.
@@ -101,13 +92,13 @@ Json HypothesisLine(const ImageRun& image, const SolverRun& run, std::size_t ind
   line["hypothesis"] = index;
   line["num_hypotheses"] = run.estimate.hypotheses.size();
   line["probability"] = Number(h.probability);
-  line["rotation"] = Array(h.cam_from_world.rotation);
-  line["translation"] = Array(h.cam_from_world.translation);
+  line["rotation"] = JsonNumbers(h.cam_from_world.rotation);
+  line["translation"] = JsonNumbers(h.cam_from_world.translation);
   line["metric"] = h.metric;
   line["rms_px"] = h.num_inliers > 0 ? Number(h.rms_px) : Json();  // Null: a prediction.
   line["num_inliers"] = h.num_inliers;
   line["num_observations"] = h.num_observations;
-  line["sigma_rotation_deg"] = Array((h.SigmaRotation() / kDegree).eval());
+  line["sigma_rotation_deg"] = JsonNumbers(h.SigmaRotation() / kDegree);
   line["sigma_normal_deg"] = Number(SigmaNormalDeg(h));
   line["free_directions"] = Json::array();
   for (const std::array<double, 6>& direction : h.free_directions) {
@@ -142,7 +133,7 @@ Json EllipseJson(const CircleObservation& circle) {
   json["id"] = circle.id;
   PixelEllipse pixel;
   if (FitPixelEllipse(circle, &pixel)) {
-    json["center"] = Array(pixel.ellipse.center);
+    json["center"] = JsonNumbers(pixel.ellipse.center);
     json["axes"] = {pixel.ellipse.a, pixel.ellipse.b};
     json["angle_rad"] = pixel.ellipse.angle;
   } else {
@@ -164,7 +155,7 @@ Json EllipseJson(const CircleObservation& circle) {
 Json PencilJson(const PencilObservation& pencil, double pencil_axis_rad) {
   Json json;
   json["id"] = pencil.id;
-  json["direction"] = pencil.fit ? Array(pencil.fit->direction) : Json();
+  json["direction"] = pencil.fit ? JsonNumbers(pencil.fit->direction) : Json();
   json["num_segments"] = pencil.lines.size();
   if (pencil.fit) {
     json["sigma_deg"] = Number(LargestSigmaDeg(
@@ -224,7 +215,7 @@ std::size_t CountLines(const std::string& text) {
 std::vector<Json> ResultLines(const ImageRun& image) {
   std::vector<Json> lines;
   for (const SolverRun& run : image.solvers) {
-    if (!run.estimate.status.ok() || run.estimate.hypotheses.empty()) {
+    if (!run.HasAnswer()) {
       lines.push_back(RefusalLine(image, run));
       continue;
     }

@@ -2,13 +2,19 @@
 #ifndef CIRCLINE_APPS_COMPARE_RUN_H_
 #define CIRCLINE_APPS_COMPARE_RUN_H_
 
-#include "apps/compare/finish.h"
+#include <string>
+
 #include "apps/compare/image_set.h"
 #include "apps/compare/options.h"
 #include "apps/compare/ranks.h"
 #include "circline/estimators/status.h"
 
 namespace circline::apps {
+
+struct ComparisonResult {
+  int num_unreadable = 0;  // Images, each named on stderr.
+  std::string table;       // Summary for people, and what else there is to say.
+};
 
 // Works on options.threads images at a time, on every rank, and writes their lines in the order of
 // `images` as they are done, so that the files do not depend on the number of threads. Summary and

@@ -10,7 +10,7 @@ ImageScore ScoreOf(const ImageRecord& record) {
     score.fate = Fate::kUnreadable;
     return score;
   }
-  const SolverRecord* shown = SolverToShow(record);
+  const SolverRecord* shown = AnswerToShow(record.solvers);
   if (shown == nullptr) return score;
   const HypothesisRecord& best = shown->hypotheses.front();
   const std::optional<double> error = best.errors.Headline();

@@ -234,8 +234,7 @@ std::string Summary::Table() const {
   std::vector<std::string> refused;
   for (const SummaryRow* row : Ranked()) {
     if (row->refused == row->images) {
-      if (std::find(refused.begin(), refused.end(), row->key.solver) == refused.end())
-        refused.push_back(row->key.solver);
+      AddOnce(row->key.solver, &refused);
       continue;
     }
     std::vector<std::string> line;
@@ -243,10 +242,8 @@ std::string Summary::Table() const {
     lines.push_back(std::move(line));
   }
   std::string table = lines.size() > 1 ? Align(columns, lines) : "";
-  for (std::size_t i = 0; i < refused.size(); ++i) {
-    table += (i == 0 ? "refused every image (the report says why): " : ", ") + refused[i];
-  }
-  return refused.empty() ? table : table + "\n";
+  if (refused.empty()) return table;
+  return table + "refused every image (the report says why): " + JoinList(refused, ", ") + "\n";
 }
 
 }  // namespace circline::apps

@@ -36,10 +36,7 @@ std::vector<LossPoint> LossPoints(const Summary& summary) {
 std::vector<std::string> RefinedSolvers(const Summary& summary) {
   std::vector<std::string> names;
   for (const SummaryRow& row : summary.rows()) {
-    if (!row.key.refined() || row.ok == 0) continue;
-    if (std::find(names.begin(), names.end(), row.key.solver) == names.end()) {
-      names.push_back(row.key.solver);
-    }
+    if (row.key.refined() && row.ok > 0) AddOnce(row.key.solver, &names);
   }
   return names;
 }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "apps/common/output_file.h"
-#include "apps/compare/gltf_pose.h"
+#include "apps/compare/export.h"
 #include "apps/reconstruct/model.h"
 
 namespace circline::apps {

@@ -112,7 +112,7 @@ Status WriteAll(const cv::Mat& photo, Reconstruction* made, const ModelOptions& 
 
 // The pose to take of those that explain the photo.
 Status ChoosePose(const ImageRun& run, const PoseHypothesis** hypothesis) {
-  const SolverRun* shown = RunToShow(run);
+  const SolverRun* shown = AnswerToShow(run.solvers);
   if (shown == nullptr) {
     return Status::Refused("no pose: " + (run.solvers.empty()
                                               ? "there is no solver"
@@ -148,7 +148,7 @@ Status FindBox(const ImageRun& run, const BoxOptions& options, BoxObservation* b
   constexpr std::size_t kMost = 8;
   Camera camera = run.observations.camera;
   std::vector<Eigen::Matrix3d> axes;
-  if (const SolverRun* shown = RunToShow(run)) {
+  if (const SolverRun* shown = AnswerToShow(run.solvers)) {
     camera = CameraOf(shown->estimate.hypotheses.front(), camera);
     for (const PoseHypothesis& hypothesis : shown->estimate.hypotheses) {
       if (axes.size() < kMost) axes.push_back(hypothesis.cam_from_world.rotation);

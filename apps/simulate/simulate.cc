@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <iomanip>
 #include <limits>
 #include <mutex>
@@ -192,12 +191,7 @@ SimulationRow Summarize(const std::vector<Trial>& trials, std::size_t method_ind
 }
 
 // Empty where there is nothing to say.
-std::string Number(double value) {
-  if (!std::isfinite(value)) return "";
-  char text[40];
-  std::snprintf(text, sizeof(text), "%.9g", value);
-  return text;
-}
+std::string Number(double value) { return std::isfinite(value) ? FormatPlain(value, 9) : ""; }
 
 }  // namespace
 

@@ -4,8 +4,12 @@
 #include <array>
 #include <cmath>
 
+#include "apps/common/document.h"
+#include "apps/common/output_file.h"
+#include "apps/compare/export.h"
 #include "apps/compare/pose_curves.h"
 #include "apps/compare/results.h"
+#include "apps/reconstruct/measurements.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/metrology.h"
 
@@ -34,8 +38,6 @@ Json CurvesJson(const Curves& curves) {
   return json;
 }
 
-Json VectorJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 Json DrawingJson(const ImageRun& run, const PoseHypothesis& hypothesis) {
   const PoseCurves curves =
       CurvesOfPose(run.observations, hypothesis, run.photo.cols, run.photo.rows);
@@ -44,8 +46,8 @@ Json DrawingJson(const ImageRun& run, const PoseHypothesis& hypothesis) {
     const bool seen = circle.center_px.allFinite() && !circle.center_px.isZero();
     circles.push_back({{"id", circle.id},
                        {"center_px", seen ? PixelJson(circle.center_px) : Json()},
-                       {"center", VectorJson(circle.center)},
-                       {"normal", VectorJson(circle.normal)},
+                       {"center", JsonNumbers(circle.center)},
+                       {"normal", JsonNumbers(circle.normal)},
                        {"radius", circle.radius}});
   }
   return {{"grid", CurvesJson(curves.grid)},
@@ -84,6 +86,44 @@ bool Measure(const std::string& kind, const std::vector<Eigen::Vector2d>& p, dou
   return true;
 }
 
+// A request's `measure`, checked: a list, and not too long a one; empty where there is none.
+Json AskedMeasurements(const Json& request) {
+  Json asked = request.value("measure", Json::array());
+  if (!asked.is_array()) throw RequestError(400, "'measure' must be a list");
+  if (asked.size() > kMaxMeasurements) throw RequestError(413, "more than 200 measurements");
+  return asked;
+}
+
+// Which hypothesis of so many a request speaks of: the first unless it says so.
+std::size_t ChosenHypothesis(const Json& request, std::size_t count) {
+  const auto chosen = request.find("hypothesis");
+  if (chosen == request.end()) return 0;
+  if (chosen->is_number_integer() && *chosen >= 0 && *chosen < count)
+    return chosen->get<std::size_t>();
+  throw RequestError(400, "'hypothesis' must be a whole number, 0 to " + std::to_string(count - 1) +
+                              ": there are " + std::to_string(count));
+}
+
+// `note`: how many cannot be had.
+Status WriteMeasurements(const Json& asked, const PoseHypothesis& hypothesis, const Camera& camera,
+                         const std::string& folder, std::string* note) {
+  std::vector<MeasuredValue> values;
+  std::size_t number = 0;
+  for (const Json& item : asked) {
+    ++number;
+    const Json measured = Measured(item, hypothesis, camera);
+    if (!measured["value"].is_number()) continue;
+    values.push_back({measured["what"], item.value("id", std::to_string(number)), measured["value"],
+                      measured["sigma"], measured["unit"]});
+  }
+  if (values.size() < number) {
+    *note = std::to_string(number - values.size()) + " of " + std::to_string(number) +
+            " measurements cannot be had, as they are not on this side of the plane's horizon, and "
+            "are left out";
+  }
+  return WriteFile(folder + "/measurements.csv", MeasurementsCsv(values));
+}
+
 }  // namespace
 
 Json DetectionJson(const ImageRun& run, const NoiseModel& noise) {
@@ -106,26 +146,10 @@ Json DetectionJson(const ImageRun& run, const NoiseModel& noise) {
   return line;
 }
 
-Json AskedMeasurements(const Json& request) {
-  Json asked = request.value("measure", Json::array());
-  if (!asked.is_array()) throw RequestError(400, "'measure' must be a list");
-  if (asked.size() > kMaxMeasurements) throw RequestError(413, "more than 200 measurements");
-  return asked;
-}
-
 const Json& Required(const Json& request, const char* key) {
   const auto value = request.find(key);
   if (value == request.end()) throw RequestError(400, std::string("'") + key + "' is missing");
   return *value;
-}
-
-std::size_t ChosenHypothesis(const Json& request, std::size_t count) {
-  const auto chosen = request.find("hypothesis");
-  if (chosen == request.end()) return 0;
-  if (chosen->is_number_integer() && *chosen >= 0 && *chosen < count)
-    return chosen->get<std::size_t>();
-  throw RequestError(400, "'hypothesis' must be a whole number, 0 to " + std::to_string(count - 1) +
-                              ": there are " + std::to_string(count));
 }
 
 Json Measured(const Json& asked, const PoseHypothesis& hypothesis, const Camera& camera) {
@@ -172,6 +196,42 @@ Json EstimateJson(const ImageRun& run, const Json& request) {
     json["measurements"].push_back(Measured(item, hypothesis, run.observations.camera));
   }
   return json;
+}
+
+std::vector<std::string> ExportedFiles(const std::string& format) {
+  if (format == "csv") return {"measurements.csv"};
+  for (const ExportFormat& known : ExportFormats()) {
+    if (known.name == format) return known.files;
+  }
+  throw RequestError(400, "'format' must be one of gltf, colmap, tum, csv");
+}
+
+Json ExportPose(const ImageRun& run, const Json& request, const std::string& folder) {
+  if (!run.read_error.empty()) throw RequestError(422, run.read_error);
+  const SolverRun* shown = AnswerToShow(run.solvers);
+  if (shown == nullptr) {
+    throw RequestError(422, "there is no pose: " + run.solvers.front().estimate.status.message);
+  }
+  const std::vector<PoseHypothesis>& hypotheses = shown->estimate.hypotheses;
+  const PoseHypothesis& hypothesis = hypotheses[ChosenHypothesis(request, hypotheses.size())];
+  Camera camera = CameraOf(hypothesis, run.observations.camera);
+  camera.width = run.photo.cols;
+  camera.height = run.photo.rows;
+  const std::string format = Required(request, "format");
+  std::string note;
+  Status status;
+  if (format == "csv") {
+    status = WriteMeasurements(AskedMeasurements(request), hypothesis, run.observations.camera,
+                               folder, &note);
+  } else {
+    status = ExportPoses(format,
+                         {{run.image->name, run.image->index, camera, hypothesis.cam_from_world}},
+                         folder, &note);
+  }
+  if (!status.ok()) throw RequestError(409, status.message);
+  Json files = Json::array();
+  for (const std::string& name : ExportedFiles(format)) files.push_back(folder + "/" + name);
+  return {{"files", files}, {"note", note}};
 }
 
 }  // namespace circline::apps

@@ -1,7 +1,8 @@
-// What the page shows of an estimate.
+// What the page shows of an estimate, and what it exports of it.
 #ifndef CIRCLINE_APPS_STUDIO_ANSWER_H_
 #define CIRCLINE_APPS_STUDIO_ANSWER_H_
 
+#include <string>
 #include <vector>
 
 #include "apps/compare/image_run.h"
@@ -22,17 +23,19 @@ Json DetectionJson(const ImageRun& run, const NoiseModel& noise);
 // its `hypothesis`.
 Json EstimateJson(const ImageRun& run, const Json& request);
 
-// A request's `measure`, checked: a list, and not too long a one; empty where there is none.
-Json AskedMeasurements(const Json& request);
-
 // What a request must have.
 const Json& Required(const Json& request, const char* key);
 
-// Which hypothesis of so many a request speaks of: the first unless it says so.
-std::size_t ChosenHypothesis(const Json& request, std::size_t count);
-
 // One measurement; null with the reason in `error` where it cannot be had.
 Json Measured(const Json& asked, const PoseHypothesis& hypothesis, const Camera& camera);
+
+// Names of what a format writes: gltf, colmap, tum, csv. Throws RequestError where there is no such
+// format.
+std::vector<std::string> ExportedFiles(const std::string& format);
+
+// Of {format, hypothesis, measure} writes the hypothesis' camera or the measurements into a folder.
+// {files, note}. Throws RequestError.
+Json ExportPose(const ImageRun& run, const Json& request, const std::string& folder);
 
 }  // namespace circline::apps
 

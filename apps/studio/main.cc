@@ -49,12 +49,9 @@ Status CheckFlags() {
 Status ReadOptions(CompareOptions* options) {
   FLAGS_output = FLAGS_images;  // Nothing is written elsewhere.
   const Status status = OptionsFromFlags(options);
-  if (!status.ok()) return status;
   options->solvers = {"joint"};
   options->overlays = false;
-  return options->losses.size() == 1
-             ? status
-             : Status::Invalid("--robust_loss and --loss_scale_px: circline_studio takes one each");
+  return status.ok() ? CheckOneLoss(*options) : status;
 }
 
 Status ReadCamera(const CompareOptions& options, Camera* camera) {

@@ -140,11 +140,8 @@ Json WithImage(const Json& scene, const Json& document) {
 Status ReadSceneJson(const std::string& path, Json* scene) {
   std::vector<SceneImage> images;
   Status status = ReadScene(path, {}, &images);
-  StorageDocument document;
-  if (status.ok()) status = document.Open(path);
-  if (!status.ok()) return status;
-  *scene = *document.root();
-  WriteNamesAsText(scene, "");
+  if (status.ok()) status = ReadStorage(path, scene);
+  if (status.ok()) WriteNamesAsText(scene, "");
   return status;
 }
 

@@ -10,7 +10,6 @@
 #include "apps/common/storage_node.h"
 #include "apps/compare/encode.h"
 #include "apps/studio/answer.h"
-#include "apps/studio/export_pose.h"
 
 namespace circline::apps {
 namespace {

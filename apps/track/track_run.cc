@@ -39,12 +39,9 @@ std::string TrackLine(const std::string& best_line, const Frame& frame, const Tr
   line["num_hypotheses"] = pose.estimate.hypotheses.size();
   line["hypotheses"] = Json::array();
   for (const PoseHypothesis& h : pose.estimate.hypotheses) {
-    const Eigen::Matrix3d by_rows = h.cam_from_world.rotation.transpose();
-    const Eigen::Vector3d& t = h.cam_from_world.translation;
-    line["hypotheses"].push_back(
-        {{"probability", h.probability},
-         {"rotation", std::vector<double>(by_rows.data(), by_rows.data() + 9)},
-         {"translation", {t.x(), t.y(), t.z()}}});
+    line["hypotheses"].push_back({{"probability", h.probability},
+                                  {"rotation", JsonNumbers(h.cam_from_world.rotation)},
+                                  {"translation", JsonNumbers(h.cam_from_world.translation)}});
   }
   return JsonText(line) + "\n";
 }

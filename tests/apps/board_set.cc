@@ -101,7 +101,7 @@ std::string DetectedImage(const Board& board, const std::string& file) {
   return "  - file: \"" + file + "\"\n    camera: \"k\"\n" + TruthText(board, "D4");
 }
 
-std::string MakeSet(const TestFolder& folder) {
+std::string MakeSet(const TestFolder& folder, const std::string& more) {
   std::string scene = "%YAML:1.0\n---\n" + BoardCamera() + "images:\n";
   for (const double tilt : {25.0, 40.0, 55.0}) {
     const Board board(tilt);
@@ -109,7 +109,7 @@ std::string MakeSet(const TestFolder& folder) {
     board.Paint(folder / name);
     scene += AnnotatedImage(board, name) + DetectedImage(board, name);
   }
-  return folder.Write("scene.yaml", scene);
+  return folder.Write("scene.yaml", scene + more);
 }
 
 std::set<std::string> FilesIn(const std::string& folder) {

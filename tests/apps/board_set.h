@@ -33,8 +33,11 @@ std::string TruthText(const Board& board, const std::string& symmetry);
 // The board's evidence, exact: the disc with its centre, two lines along X and two along Y.
 std::string AnnotatedImage(const Board& board, const std::string& file);
 std::string DetectedImage(const Board& board, const std::string& file);
-// Photos with evidence given and with evidence to detect; returns the scene file.
-std::string MakeSet(const TestFolder& folder);
+// Photos with evidence given and with evidence to detect, and `more` images; returns the scene
+// file.
+std::string MakeSet(const TestFolder& folder, const std::string& more = "");
+// A photo that is not there.
+inline constexpr char kMissingImage[] = "  - { file: \"gone.png\", camera: \"k\" }\n";
 
 std::set<std::string> FilesIn(const std::string& folder);
 // The files whose bytes a run must repeat: all but those with times.

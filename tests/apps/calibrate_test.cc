@@ -25,10 +25,7 @@ Outcome Calibrate(const std::string& arguments) {
   return RunProgram(CIRCLINE_CALIBRATE, arguments);
 }
 
-nlohmann::json ReadJson(const std::string& path) {
-  std::ifstream file(path);
-  return nlohmann::json::parse(file);
-}
+nlohmann::json ReadJson(const std::string& path) { return nlohmann::json::parse(ReadAll(path)); }
 
 class CalibrateTest : public testing::Test {
  protected:
@@ -183,8 +180,7 @@ TEST_F(CalibrateTest, ItsReportShowsItsNotes) {
   const nlohmann::json notes = ReadJson(Output() + "/calibration.json")["notes"];
   ASSERT_FALSE(notes.empty());
   for (const std::string note : notes)
-    EXPECT_CONTAINS(ReadAll(Output() + "/report.html"),
-                    ("<li>" + EscapeHtml(note) + "</li>").c_str());
+    EXPECT_CONTAINS(ReadAll(Output() + "/report.html"), "<li>" + EscapeHtml(note) + "</li>");
 }
 
 TEST_F(CalibrateTest, NamesAGrossPhotoOfTen) {

@@ -10,7 +10,6 @@
 
 #include "apps/common/output_file.h"
 #include "tests/apps/board_set.h"
-#include "tests/apps/json_lines.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
 
@@ -39,7 +38,7 @@ class CompareBadInput : public testing::Test {
   void ExpectUnusable(const std::string& arguments, const std::string& words) {
     const Outcome outcome = RunCompare(arguments);
     EXPECT_EQ(outcome.exit_code, 2) << arguments << "\n" << outcome.err;
-    EXPECT_CONTAINS(outcome.err, words.c_str());
+    EXPECT_CONTAINS(outcome.err, words);
     EXPECT_EQ(outcome.out, "");
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
     EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));

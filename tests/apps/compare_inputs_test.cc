@@ -9,7 +9,6 @@
 
 #include "circline/estimators/basics.h"
 #include "tests/apps/board_set.h"
-#include "tests/apps/json_lines.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
 

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "tests/apps/board_set.h"
-#include "tests/apps/json_lines.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
 
@@ -20,11 +19,6 @@ using nlohmann::json;
 
 class CompareMerge : public testing::Test {
  protected:
-  CompareMerge() {
-    const std::string scene = MakeSet(folder_);
-    scene_ =
-        folder_.Write("more.yaml", ReadAll(scene) + "  - { file: \"gone.png\", camera: \"k\" }\n");
-  }
   Outcome Run(const std::string& flags, const std::string& output) {
     return RunCompare("--scene='" + scene_ + "' " + flags + " --output='" + folder_ / output + "'");
   }
@@ -35,7 +29,7 @@ class CompareMerge : public testing::Test {
     return RunCompare("--merge='" + list + "' --output='" + folder_ / "merged" + "'");
   }
   const TestFolder folder_;
-  std::string scene_;
+  std::string scene_ = MakeSet(folder_, kMissingImage);
 };
 
 TEST_F(CompareMerge, ShardsGiveTheFilesOfTheWhole) {
@@ -68,7 +62,7 @@ TEST_F(CompareMerge, RefusesWhatIsNotOneSet) {
   for (const auto& [inputs, words] : cases) {
     const Outcome outcome = Merge(inputs);
     EXPECT_EQ(outcome.exit_code, 2) << inputs;
-    EXPECT_CONTAINS(outcome.err, words.c_str());
+    EXPECT_CONTAINS(outcome.err, words);
     EXPECT_FALSE(std::filesystem::exists(folder_ / "merged")) << inputs;
   }
 }
@@ -105,7 +99,7 @@ TEST_F(CompareMerge, RefusesOtherCameras) {
   for (const char* other : {"longer", "guess"}) {
     const Outcome outcome = Merge(std::string("a ") + other);
     EXPECT_EQ(outcome.exit_code, 2);
-    EXPECT_CONTAINS(outcome.err, (std::string(other) + " ran with another camera").c_str());
+    EXPECT_CONTAINS(outcome.err, std::string(other) + " ran with another camera");
   }
   EXPECT_EQ(Merge("a b").exit_code, 0);
 }
@@ -125,7 +119,7 @@ TEST_F(CompareMerge, SweepNamesTheBestAndSavesItsFlags) {
   // The chosen rows repeat the sweep's.
   const std::string csv = ReadAll(folder_ / "sweep/summary.csv");
   std::istringstream lines(ReadAll(folder_ / "again/summary.csv"));
-  for (std::string line; std::getline(lines, line);) EXPECT_CONTAINS(csv, line.c_str());
+  for (std::string line; std::getline(lines, line);) EXPECT_CONTAINS(csv, line);
 }
 
 // Hours of work, and then nowhere to put the flags: said before.
@@ -134,7 +128,7 @@ TEST_F(CompareMerge, FlagsThatCannotBeSavedAreNoticedFirst) {
   for (const std::string& path : {folder_ / "none/best.flags", folder_.path()}) {
     const Outcome outcome = Run(flags + "'" + path + "'", "out");
     EXPECT_EQ(outcome.exit_code, 2);
-    EXPECT_CONTAINS(outcome.err, ("--save_options: " + path + ": cannot be written").c_str());
+    EXPECT_CONTAINS(outcome.err, "--save_options: " + path + ": cannot be written");
     EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
   }
   ASSERT_EQ(Run(flags + "'" + folder_ / "out/best.flags" + "'", "out").exit_code, 1);

@@ -18,20 +18,14 @@ class CompareMpi : public testing::Test {
     if (RunCompare("--version").out.find("MPI") == std::string::npos) {
       GTEST_SKIP() << "built without -DCIRCLINE_WITH_MPI=ON";
     }
-    const std::string scene = MakeSet(folder_);
-    scene_ =
-        folder_.Write("more.yaml", ReadAll(scene) + "  - { file: \"gone.png\", camera: \"k\" }\n");
+    scene_ = MakeSet(folder_, kMissingImage);
     // Open MPI asks before it runs as root, and wants a core for each rank.
     setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
     setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
   }
   Outcome Run(int ranks, const std::string& flags) {
-    const std::string command = "mpirun --oversubscribe -np " + std::to_string(ranks) + " '" +
-                                CIRCLINE_COMPARE_BINARY + "' " + flags + " >'" + folder_ / "out" +
-                                "' 2>'" + folder_ / "err" + "' </dev/null";
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadAll(folder_ / "out"),
-            ReadAll(folder_ / "err")};
+    return RunProgram("mpirun", "--oversubscribe -np " + std::to_string(ranks) + " '" +
+                                    CIRCLINE_COMPARE_BINARY + "' " + flags);
   }
   std::string Arguments(const std::string& output) {
     return "--scene='" + scene_ + "' --output='" + folder_ / output + "' ";
@@ -68,7 +62,7 @@ TEST_F(CompareMpi, RefusesBadFlagsOnce) {
   EXPECT_EQ(outcome.exit_code, 2);
   const std::string words = "'hubert' is not one of";
   EXPECT_EQ(outcome.err.find(words), outcome.err.rfind(words));
-  EXPECT_CONTAINS(outcome.err, words.c_str());
+  EXPECT_CONTAINS(outcome.err, words);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out/results.jsonl"));
 }
 

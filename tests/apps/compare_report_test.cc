@@ -24,10 +24,7 @@ int Count(const std::string& text, const std::string& part) {
 }
 
 std::string RunSweep(const TestFolder& folder) {
-  const std::string scene = MakeSet(folder);
-  const std::string text =
-      ReadAll(scene) + "  - { file: \"gone.png\", camera: \"k\" }\n";  // Cannot be read.
-  EXPECT_EQ(RunCompare("--scene='" + folder.Write("more.yaml", text) +
+  EXPECT_EQ(RunCompare("--scene='" + MakeSet(folder, kMissingImage) +
                        "' --robust_loss=huber,tukey --loss_scale_px=0.5,1,auto --output='" +
                        folder / "out" + "'")
                 .exit_code,
@@ -44,17 +41,17 @@ TEST(CompareReport, ShowsNoPoseThatTheJointSolverRefuses) {
     made.hypotheses.resize(1);
     made.hypotheses[0].probability = 1.0;
   }
-  ASSERT_NE(SolverToShow(record), nullptr);
-  EXPECT_EQ(SolverToShow(record)->key.solver, "joint");
+  ASSERT_NE(AnswerToShow(record.solvers), nullptr);
+  EXPECT_EQ(AnswerToShow(record.solvers)->key.solver, "joint");
   record.solvers[1].hypotheses.clear();
-  EXPECT_EQ(SolverToShow(record), nullptr);
+  EXPECT_EQ(AnswerToShow(record.solvers), nullptr);
   record.solvers.push_back(record.solvers[0]);  // With another loss it does not.
   record.solvers[2].key = {"joint", "refined", "huber"};
-  ASSERT_NE(SolverToShow(record), nullptr);
-  EXPECT_EQ(SolverToShow(record)->key.loss, "huber");
+  ASSERT_NE(AnswerToShow(record.solvers), nullptr);
+  EXPECT_EQ(AnswerToShow(record.solvers)->key.loss, "huber");
   record.solvers.resize(1);  // It was not asked.
-  ASSERT_NE(SolverToShow(record), nullptr);
-  EXPECT_EQ(SolverToShow(record)->key.solver, "line_pairs");
+  ASSERT_NE(AnswerToShow(record.solvers), nullptr);
+  EXPECT_EQ(AnswerToShow(record.solvers)->key.solver, "line_pairs");
 }
 
 TEST(CompareReport, ShowsSomeImagesAndNamesTheOthers) {
@@ -153,13 +150,13 @@ TEST(CompareReport, RunsInABrowserWithoutAnError) {
   ASSERT_NE(end, std::string::npos);
   page.replace(end, 7, clicks);
   folder.Write("page.html", page);
-  const std::string command =
+  const auto [exit_code, dom, log] = RunProgram(
+      "env",
       "HOME='" + folder.path() +
-      "' timeout 120 chromium --headless --no-sandbox --disable-gpu --disable-dev-shm-usage "
-      "--enable-logging=stderr --v=0 --virtual-time-budget=3000 --dump-dom 'file://" +
-      folder / "page.html" + "' >'" + folder / "dom" + "' 2>'" + folder / "log" + "'";
-  ASSERT_EQ(std::system(command.c_str()), 0) << ReadAll(folder / "log");
-  const std::string log = ReadAll(folder / "log"), dom = ReadAll(folder / "dom");
+          "' timeout 120 chromium --headless --no-sandbox --disable-gpu --disable-dev-shm-usage "
+          "--enable-logging=stderr --v=0 --virtual-time-budget=3000 --dump-dom 'file://" +
+          folder / "page.html" + "'");
+  ASSERT_EQ(exit_code, 0) << log;
   const std::string title =
       dom.substr(dom.find("<title>"), dom.find("</title>") - dom.find("<title>"));
   EXPECT_EQ(Count(log, "CONSOLE"), 0) << log;

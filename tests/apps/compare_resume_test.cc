@@ -35,7 +35,7 @@ std::string MakeLongSet(const TestFolder& folder) {
     board.Paint(folder / name);
     scene += AnnotatedImage(board, name) + DetectedImage(board, name);
   }
-  return folder.Write("scene.yaml", scene + "  - { file: \"gone.png\", camera: \"k\" }\n");
+  return folder.Write("scene.yaml", scene + kMissingImage);
 }
 
 // Waits until a program has begun to write the file, or has ended.

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "tests/apps/board_set.h"
-#include "tests/apps/json_lines.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/small_disk.h"
 #include "tests/apps/test_files.h"

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "apps/compare/summary.h"
-#include "tests/apps/json_lines.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
 

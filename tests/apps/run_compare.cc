@@ -7,6 +7,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <sstream>
 #include <thread>
 
 #include "tests/apps/test_files.h"
@@ -24,6 +25,13 @@ Outcome RunProgram(const std::string& program, const std::string& arguments) {
 
 Outcome RunCompare(const std::string& arguments) {
   return RunProgram(CIRCLINE_COMPARE_BINARY, arguments);
+}
+
+std::vector<nlohmann::json> ReadJsonLines(const std::string& path) {
+  std::vector<nlohmann::json> lines;
+  std::istringstream text(ReadAll(path));
+  for (std::string line; std::getline(text, line);) lines.push_back(nlohmann::json::parse(line));
+  return lines;
 }
 
 pid_t StartProgram(const std::string& program, const std::vector<std::string>& arguments) {

@@ -1,9 +1,10 @@
-// Runs circline_compare, and other programs, as their users do.
+// Runs circline_compare, and other programs, as their users do, and reads what they write.
 #ifndef CIRCLINE_TESTS_APPS_RUN_COMPARE_H_
 #define CIRCLINE_TESTS_APPS_RUN_COMPARE_H_
 
 #include <sys/types.h>
 
+#include <nlohmann/json.hpp>
 #include <random>
 #include <string>
 #include <vector>
@@ -22,6 +23,9 @@ struct Outcome {
 
 Outcome RunProgram(const std::string& program, const std::string& arguments);
 Outcome RunCompare(const std::string& arguments);
+
+// The values of a file of JSON lines.
+std::vector<nlohmann::json> ReadJsonLines(const std::string& path);
 
 // As a process of ours that goes on, silent.
 pid_t StartProgram(const std::string& program, const std::vector<std::string>& arguments);

@@ -1,17 +1,17 @@
 // circline_simulate as its users run it.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "apps/common/text.h"
+#include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
 #include "tests/trials.h"
 
@@ -22,41 +22,21 @@ constexpr char kHeader[] =
     "noise_px,outlier_ratio,method,trials,failures,axis_mean_rad,axis_std_rad,angle_mean_rad,"
     "angle_std_rad,rotation_rms_rad,bound_rms_rad,nees_mean";
 
-// Exit code; what it says on stderr goes to `err`, on stdout to `out`.
-int RunSimulate(const std::string& arguments, std::string* err = nullptr,
-                std::string* out = nullptr) {
-  const TestFolder folder;
-  const std::string command = std::string("'") + CIRCLINE_SIMULATE + "' " + arguments + " >'" +
-                              folder / "out" + "' 2>'" + folder / "err" + "' </dev/null";
-  const int status = std::system(command.c_str());
-  if (err != nullptr) *err = ReadAll(folder / "err");
-  if (out != nullptr) *out = ReadAll(folder / "out");
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+Outcome RunSimulate(const std::string& arguments) {
+  return RunProgram(CIRCLINE_SIMULATE, arguments);
 }
 
 using CsvRow = std::map<std::string, std::string>;
-
-std::vector<std::string> Cells(const std::string& line) {
-  std::vector<std::string> cells(1);
-  for (const char c : line) {
-    if (c == ',') {
-      cells.emplace_back();
-    } else {
-      cells.back() += c;
-    }
-  }
-  return cells;
-}
 
 std::vector<CsvRow> ReadCsv(const std::string& path, const std::string& header = kHeader) {
   std::istringstream text(ReadAll(path));
   std::string line;
   std::getline(text, line);
   EXPECT_EQ(line, header);
-  const std::vector<std::string> names = Cells(line);
+  const std::vector<std::string> names = SplitList(line);
   std::vector<CsvRow> rows;
   while (std::getline(text, line)) {
-    const std::vector<std::string> cells = Cells(line);
+    const std::vector<std::string> cells = SplitList(line);
     EXPECT_EQ(cells.size(), names.size()) << line;
     CsvRow row;
     for (std::size_t i = 0; i < std::min(cells.size(), names.size()); ++i) row[names[i]] = cells[i];
@@ -68,7 +48,8 @@ std::vector<CsvRow> ReadCsv(const std::string& path, const std::string& header =
 TEST(Simulate, WritesARowForEachMethodNoiseAndRatio) {
   const TestFolder folder;
   ASSERT_EQ(RunSimulate("--trials=200 --noise_px=0,1 --outlier_ratio=0,0.3 --output='" +
-                        folder / "out" + "'"),
+                        folder / "out" + "'")
+                .exit_code,
             0);
   const std::vector<CsvRow> rows = ReadCsv(folder / "out/simulation.csv");
   ASSERT_EQ(rows.size(), 2U * 2U * 5U);
@@ -120,7 +101,8 @@ TEST(Simulate, JointHoldsAgainstClustersAndBands) {
   for (const std::string kind : {"cluster", "band"}) {
     ASSERT_EQ(RunSimulate("--trials=" + std::to_string(Trials(100)) +
                           " --noise_px=1,2,3 --outlier_ratio=0.5 --outlier_kind=" + kind +
-                          " --output='" + folder / kind + "'"),
+                          " --output='" + folder / kind + "'")
+                  .exit_code,
               0);
     for (CsvRow row : ReadCsv(folder / (kind + "/simulation.csv"))) {
       if (row["method"] != "joint") continue;
@@ -141,12 +123,12 @@ TEST(Simulate, SameBytesWhateverTheThreads) {
   const TestFolder folder;
   const std::string arguments =
       "--trials=12 --noise_px=1,2 --outlier_ratio=0,0.5 --outlier_kind=cluster --seed=5 ";
-  ASSERT_EQ(RunSimulate(arguments + "--threads=1 --output='" + folder / "one" + "'"), 0);
-  ASSERT_EQ(RunSimulate(arguments + "--threads=2 --output='" + folder / "two" + "'"), 0);
+  ASSERT_EQ(RunSimulate(arguments + "--threads=1 --output='" + folder / "one" + "'").exit_code, 0);
+  ASSERT_EQ(RunSimulate(arguments + "--threads=2 --output='" + folder / "two" + "'").exit_code, 0);
   for (const char* file : {"/simulation.csv", "/simulation.svg"}) {
     EXPECT_EQ(ReadAll(folder / "one" + file), ReadAll(folder / "two" + file)) << file;
   }
-  ASSERT_EQ(RunSimulate(arguments + "--seed=6 --output='" + folder / "other" + "'"), 0);
+  ASSERT_EQ(RunSimulate(arguments + "--seed=6 --output='" + folder / "other" + "'").exit_code, 0);
   EXPECT_NE(ReadAll(folder / "one/simulation.csv"), ReadAll(folder / "other/simulation.csv"));
 }
 
@@ -172,11 +154,9 @@ double Area(const std::vector<CsvRow>& rows, const std::string& who, double most
 TEST(Simulate, StreetsAreFoundAboutAsWellAsIfMembershipWereKnown) {
   const TestFolder folder;
   constexpr int kStreets = kSanitized ? 20 : 400;
-  std::string out;
-  ASSERT_EQ(RunSimulate("--scene=street --trials=" + std::to_string(kStreets) + " --output='" +
-                            folder / "out" + "'",
-                        nullptr, &out),
-            0);
+  const Outcome run = RunSimulate("--scene=street --trials=" + std::to_string(kStreets) +
+                                  " --output='" + folder / "out" + "'");
+  ASSERT_EQ(run.exit_code, 0);
   const std::vector<CsvRow> rows = ReadCsv(folder / "out/street.csv", kStreetHeader);
   ASSERT_EQ(rows.size(), static_cast<std::size_t>(kStreets));
   // The line on stdout says what the rows do.
@@ -184,7 +164,7 @@ TEST(Simulate, StreetsAreFoundAboutAsWellAsIfMembershipWereKnown) {
   std::snprintf(areas, sizeof areas, "%.1f of %.1f, %.1f of %.1f, %.1f of %.1f",
                 Area(rows, "detected", 3.0), Area(rows, "known", 3.0), Area(rows, "detected", 5.0),
                 Area(rows, "known", 5.0), Area(rows, "detected", 10.0), Area(rows, "known", 10.0));
-  EXPECT_CONTAINS(out.c_str(), areas);
+  EXPECT_CONTAINS(run.out, areas);
   int orthogonal = 0, within = 0, all = 0, sure = 0, sure_and_wrong = 0;
   for (CsvRow row : rows) {
     orthogonal += row["orthogonal"] == "1" ? 1 : 0;
@@ -220,7 +200,8 @@ TEST(Simulate, SquareHousesTellTheFocalLength) {
   const TestFolder folder;
   constexpr int kStreets = kSanitized ? 20 : 300;
   ASSERT_EQ(RunSimulate("--scene=street --trials=" + std::to_string(kStreets) +
-                        " --focal_sigma=0.5 --output='" + folder / "out" + "'"),
+                        " --focal_sigma=0.5 --output='" + folder / "out" + "'")
+                .exit_code,
             0);
   const std::vector<CsvRow> rows = ReadCsv(folder / "out/street.csv", kStreetHeader);
   ASSERT_EQ(rows.size(), static_cast<std::size_t>(kStreets));
@@ -242,10 +223,10 @@ TEST(Simulate, SquareHousesTellTheFocalLength) {
 TEST(Simulate, StreetsAreTheSameWhateverTheThreads) {
   const TestFolder folder;
   const std::string arguments = "--scene=street --trials=20 --seed=5 ";
-  ASSERT_EQ(RunSimulate(arguments + "--threads=1 --output='" + folder / "one" + "'"), 0);
-  ASSERT_EQ(RunSimulate(arguments + "--threads=2 --output='" + folder / "two" + "'"), 0);
+  ASSERT_EQ(RunSimulate(arguments + "--threads=1 --output='" + folder / "one" + "'").exit_code, 0);
+  ASSERT_EQ(RunSimulate(arguments + "--threads=2 --output='" + folder / "two" + "'").exit_code, 0);
   EXPECT_EQ(ReadAll(folder / "one/street.csv"), ReadAll(folder / "two/street.csv"));
-  ASSERT_EQ(RunSimulate(arguments + "--seed=6 --output='" + folder / "other" + "'"), 0);
+  ASSERT_EQ(RunSimulate(arguments + "--seed=6 --output='" + folder / "other" + "'").exit_code, 0);
   EXPECT_NE(ReadAll(folder / "one/street.csv"), ReadAll(folder / "other/street.csv"));
 }
 
@@ -272,11 +253,11 @@ TEST(Simulate, BadFlagsAreNamedAndNothingIsWritten) {
       {"--threads=-1", "--threads"},
       {"more", "unexpected argument 'more'"}};
   for (const auto& [flag, message] : cases) {
-    std::string err;
-    EXPECT_EQ(RunSimulate("--output='" + folder / "out" + "' " + flag, &err), 2) << flag;
-    EXPECT_CONTAINS(err.c_str(), message.c_str()) << flag;
+    const Outcome run = RunSimulate("--output='" + folder / "out" + "' " + flag);
+    EXPECT_EQ(run.exit_code, 2) << flag;
+    EXPECT_CONTAINS(run.err, message) << flag;
   }
-  EXPECT_EQ(RunSimulate("--trials=1"), 2);  // No output.
+  EXPECT_EQ(RunSimulate("--trials=1").exit_code, 2);  // No output.
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 

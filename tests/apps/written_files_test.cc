@@ -76,7 +76,7 @@ class KeptInputs : public testing::Test {
     const std::map<std::string, std::string> before = Files();
     const Outcome outcome = RunProgram(program, flags + " --output='" + folder_ / "own" + "'");
     EXPECT_EQ(outcome.exit_code, 2) << program << " " << flags << outcome.err;
-    EXPECT_CONTAINS(outcome.err, (name + ": is read, and would be written over").c_str());
+    EXPECT_CONTAINS(outcome.err, name + ": is read, and would be written over");
     EXPECT_TRUE(Files() == before) << program << " " << flags;
   }
   std::map<std::string, std::string> Files() const {
