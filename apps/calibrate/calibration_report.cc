@@ -105,9 +105,9 @@ std::string ParameterTable(const AdjustedCamera& made) {
   std::ostringstream html;
   const auto row = [&](const std::string& name, double value, double sigma, const char* unit,
                        int decimals) {
-    html << "<tr><td class=\"l\">" << name << "</td><td>" << FormatFixed(value, decimals)
-         << "</td><td>" << (sigma > 0.0 ? FormatShort(sigma, 2) : "held") << "</td><td class=\"l\">"
-         << unit << "</td></tr>";
+    html << "<tr>" << CellHtml(name, "l") << CellHtml(FormatFixed(value, decimals))
+         << CellHtml(sigma > 0.0 ? FormatShort(sigma, 2) : "held") << CellHtml(unit, "l")
+         << "</tr>";
   };
   html << "<div class=\"scroll\"><table class=\"named\"><tr><th class=\"l\">parameter</th><th>value"
           "</th><th>sigma</th><th class=\"l\">unit</th></tr>";
@@ -170,15 +170,12 @@ std::string PhotoTable(const AdjustedPhotos& adjusted, const std::vector<std::st
           "</thead><tbody>";
   for (std::size_t i = 0; i < names.size(); ++i) {
     const AdjustedPhoto& photo = adjusted.photos[i];
-    html << "<tr><td class=\"l\">" << EscapeHtml(names[i]) << "</td>";
-    if (photo.status.ok()) {
-      html << "<td>" << FormatFixed(photo.rms_px, 3) << "</td><td>" << FormatFixed(photo.misfit, 2)
-           << "</td><td>" << photo.residuals.size() << "</td><td class=\"say\">"
-           << EscapeHtml(JoinList(photo.left_out, ", ")) << "</td></tr>";
-    } else {
-      html << "<td>-</td><td>-</td><td>-</td><td class=\"say\">"
-           << EscapeHtml(WhyLeftOut(photo, names)) << "</td></tr>";
-    }
+    const bool ok = photo.status.ok();
+    html << "<tr>" << CellHtml(names[i], "l") << CellHtml(ok ? FormatFixed(photo.rms_px, 3) : "-")
+         << CellHtml(ok ? FormatFixed(photo.misfit, 2) : "-")
+         << CellHtml(ok ? std::to_string(photo.residuals.size()) : "-")
+         << CellHtml(ok ? JoinList(photo.left_out, ", ") : WhyLeftOut(photo, names), "say")
+         << "</tr>";
   }
   html << "</tbody></table></div>";
   return html.str();

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <iostream>
 #include <map>
-#include <mutex>
 #include <optional>
 
 #include "apps/calibrate/calibrate_options.h"
@@ -56,18 +55,16 @@ void SetModel(const CalibrateOptions& options, Camera* camera) {
 std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<SceneImage>* images) {
   std::vector<ImageRun> runs(images->size());
   Progress progress("photos", static_cast<int>(images->size()), 0);
-  std::mutex mutex;
-  InParallel(static_cast<int>(images->size()), [&](int i) {
-    const auto index = static_cast<std::size_t>(i);
-    runs[index] = RunImage(options, nullptr, &(*images)[index]);
-    Camera& camera = runs[index].observations.camera;
+  InParallel(images->size(), [&](std::size_t i) {
+    ImageRun& run = runs[i];
+    run = RunImage(options, nullptr, &(*images)[i]);
+    Camera& camera = run.observations.camera;
     // Not the one that the photo alone makes likeliest: the prior is about the one given.
-    camera = (*images)[index].observations.camera;
-    runs[index].observations.stated_focal_px = runs[index].observations.found_k1 = 0.0;
-    if (camera.width == 0) camera.width = runs[index].photo.cols;
-    if (camera.height == 0) camera.height = runs[index].photo.rows;
-    runs[index].photo.release();
-    const std::lock_guard<std::mutex> lock(mutex);
+    camera = (*images)[i].observations.camera;
+    run.observations.stated_focal_px = run.observations.found_k1 = 0.0;
+    if (camera.width == 0) camera.width = run.photo.cols;
+    if (camera.height == 0) camera.height = run.photo.rows;
+    run.photo.release();
     progress.Advance();
   });
   return runs;
@@ -225,8 +222,8 @@ std::vector<std::string> CalibrationPictures(const CompareOptions& options,
   const SolverSet solvers(joint);
   const std::vector<std::size_t> chosen = ChoosePhotos(adjusted);
   std::vector<std::string> pictures(images.size()), errors(images.size());
-  InParallel(static_cast<int>(chosen.size()), [&](int k) {
-    const std::size_t i = chosen[static_cast<std::size_t>(k)];
+  InParallel(chosen.size(), [&](std::size_t k) {
+    const std::size_t i = chosen[k];
     SceneImage image = images[i];
     const AdjustedCamera& made =
         adjusted.cameras[static_cast<std::size_t>(adjusted.photos[i].camera)];

@@ -17,15 +17,15 @@ void Order() {
 // Not a lambda: OpenCV would look at it in the thread before the lock.
 class Body : public cv::ParallelLoopBody {
  public:
-  explicit Body(const std::function<void(int)>& work) : work_(work) {}
+  explicit Body(const std::function<void(std::size_t)>& work) : work_(work) {}
   void operator()(const cv::Range& range) const override {
     Order();
-    for (int i = range.start; i < range.end; ++i) work_(i);
+    for (int i = range.start; i < range.end; ++i) work_(static_cast<std::size_t>(i));
     Order();
   }
 
  private:
-  const std::function<void(int)>& work_;
+  const std::function<void(std::size_t)>& work_;
 };
 
 }  // namespace
@@ -34,10 +34,10 @@ void UseThreads(int count) {
   if (count > 0) cv::setNumThreads(std::min(count, cv::getNumberOfCPUs()));
 }
 
-void InParallel(int count, const std::function<void(int)>& work) {
+void InParallel(std::size_t count, const std::function<void(std::size_t)>& work) {
   const Body body(work);
   Order();
-  cv::parallel_for_(cv::Range(0, count), body);
+  cv::parallel_for_(cv::Range(0, static_cast<int>(count)), body);
   Order();
 }
 

@@ -2,6 +2,7 @@
 #ifndef CIRCLINE_APPS_COMMON_IN_PARALLEL_H_
 #define CIRCLINE_APPS_COMMON_IN_PARALLEL_H_
 
+#include <cstddef>
 #include <functional>
 
 namespace circline::apps {
@@ -12,7 +13,7 @@ void UseThreads(int count);
 
 // Calls work(0) to work(count - 1) in OpenCV's thread pool, on as many threads as cv::getNumThreads
 // says. What is thrown is thrown here.
-void InParallel(int count, const std::function<void(int)>& work);
+void InParallel(std::size_t count, const std::function<void(std::size_t)>& work);
 
 }  // namespace circline::apps
 

@@ -41,6 +41,7 @@ void Progress::Clear() const {
 }
 
 void Progress::Advance() {
+  const std::lock_guard<std::mutex> lock(mutex_);
   ++done_;
   const Clock::time_point now = Clock::now();
   const double seconds = std::chrono::duration<double>(now - start_).count();

@@ -3,12 +3,13 @@
 #define CIRCLINE_APPS_COMMON_PROGRESS_H_
 
 #include <chrono>
+#include <mutex>
 #include <string>
 
 namespace circline::apps {
 
 // Silent for the first second. On a terminal one line is refreshed; elsewhere a line is written
-// every ten seconds. Not thread-safe: call it under the lock that counts.
+// every ten seconds. Many threads may call it.
 class Progress {
  public:
   // Of `total`, `done` were there before; the rate does not count them.
@@ -23,6 +24,7 @@ class Progress {
 
   std::string what_;
   int total_, done_, before_;
+  std::mutex mutex_;  // Of what changes.
   bool terminal_;
   bool printed_ = false;
   Clock::time_point start_, last_print_;

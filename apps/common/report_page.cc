@@ -109,6 +109,10 @@ std::string PageEnd() {
          "</script></body></html>\n";
 }
 
+std::string CellHtml(const std::string& text, const std::string& css) {
+  return (css.empty() ? "<td>" : "<td class='" + css + "'>") + EscapeHtml(text) + "</td>";
+}
+
 std::string ListHtml(const std::vector<std::string>& sentences, const std::string& css) {
   if (sentences.empty()) return "";
   std::string html = "<ul class='" + css + "'>";

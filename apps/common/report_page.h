@@ -12,6 +12,9 @@ std::string PageTop(const std::string& title);
 // From the body's last element on, with the script: sorting, choosing photos, zoom.
 std::string PageEnd();
 
+// A cell of a table, its text escaped; `css`: its class.
+std::string CellHtml(const std::string& text, const std::string& css = "");
+
 // A list; nothing where there are no sentences.
 std::string ListHtml(const std::vector<std::string>& sentences, const std::string& css = "say");
 

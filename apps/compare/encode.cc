@@ -32,4 +32,9 @@ std::string EncodeJpeg(const cv::Mat& picture, int max_width) {
   return {bytes.begin(), bytes.end()};
 }
 
+std::string JpegOfFile(const std::string& path, int max_width) {
+  const cv::Mat picture = cv::imread(path, cv::IMREAD_COLOR);
+  return picture.empty() ? "" : EncodeJpeg(picture, max_width);
+}
+
 }  // namespace circline::apps

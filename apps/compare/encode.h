@@ -10,6 +10,8 @@ namespace circline::apps {
 std::string EncodePng(const cv::Mat& picture);
 // At most `max_width` pixels wide.
 std::string EncodeJpeg(const cv::Mat& picture, int max_width);
+// The same of a picture's file; empty where there is none.
+std::string JpegOfFile(const std::string& path, int max_width);
 
 }  // namespace circline::apps
 

@@ -1,8 +1,6 @@
 #include "apps/compare/report.h"
 
 #include <algorithm>
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "apps/common/in_parallel.h"
 #include "apps/common/output_file.h"
@@ -81,19 +79,6 @@ std::string Chapters(const Digest& digest) {
   return page.Html();
 }
 
-std::string ReadPicture(const std::string& folder, const std::string& overlay) {
-  if (overlay.empty()) return {};
-  const cv::Mat picture = cv::imread(folder + "/" + overlay, cv::IMREAD_COLOR);
-  return picture.empty() ? "" : EncodeJpeg(picture, kPictureWidth);
-}
-
-// The rows of the tables of single images.
-std::vector<SolverKey> KeysOfTables(const Summary& summary) {
-  std::vector<SolverKey> keys;
-  for (const SummaryRow* row : RowsToShow(summary)) keys.push_back(row->key);
-  return keys;
-}
-
 // Buttons that choose between the kinds of photos, where not all are shown.
 std::string Chooser(const std::vector<ShownImage>& shown, std::size_t num_images) {
   if (shown.size() == num_images) return "";
@@ -109,8 +94,8 @@ std::string OtherImage(const ImageRecord& record, const ImageScore& score) {
   const std::string fate = score.fate == Fate::kRefused      ? "refused"
                            : score.fate == Fate::kUnreadable ? "not read"
                                                              : FormatShort(score.value) + unit;
-  return "<tr><td class='l'>" + EscapeHtml(record.name) + "</td><td>" + fate +
-         "</td><td class='l'>" + EscapeHtml(record.overlay) + "</td></tr>\n";
+  return "<tr>" + CellHtml(record.name, "l") + CellHtml(fate) + CellHtml(record.overlay, "l") +
+         "</tr>\n";
 }
 
 // Pictures are made by all threads, a few at a time.
@@ -121,9 +106,9 @@ void WriteSections(const std::string& folder, const std::vector<ShownImage>& sho
   for (std::size_t begin = 0; begin < shown.size(); begin += kAtATime) {
     const std::size_t count = std::min(kAtATime, shown.size() - begin);
     std::vector<std::string> pictures(count);
-    InParallel(static_cast<int>(count), [&](int k) {
-      const auto i = static_cast<std::size_t>(k);
-      pictures[i] = ReadPicture(folder, records[begin + i].overlay);
+    InParallel(count, [&](std::size_t i) {
+      const std::string& overlay = records[begin + i].overlay;
+      if (!overlay.empty()) pictures[i] = JpegOfFile(folder + "/" + overlay, kPictureWidth);
     });
     for (std::size_t i = 0; i < count; ++i) {
       file->Write(ImageSection(records[begin + i], keys, pictures[i], shown[begin + i].why));
@@ -154,8 +139,10 @@ Status AddImages(const std::string& folder, const Digest& digest, std::size_t ma
       records[static_cast<std::size_t>(slots[i])] = std::move(record);
     }
   }
+  std::vector<SolverKey> keys;  // The rows of the tables of single images.
+  for (const SummaryRow* row : RowsToShow(digest.summary)) keys.push_back(row->key);
   file->Write(Chooser(shown, slots.size()));
-  WriteSections(folder, shown, KeysOfTables(digest.summary), records, file);
+  WriteSections(folder, shown, keys, records, file);
   if (!others.empty()) {
     file->Write(
         "<details><summary>The other images" + std::string(num_others > kMostNamed ? kNotAll : "") +
@@ -168,6 +155,50 @@ Status AddImages(const std::string& folder, const Digest& digest, std::size_t ma
 }
 
 }  // namespace
+
+ImageScore ScoreOf(const ImageRecord& record) {
+  ImageScore score;
+  if (!record.error.empty()) {
+    score.fate = Fate::kUnreadable;
+    return score;
+  }
+  const SolverRecord* shown = AnswerToShow(record.solvers);
+  if (shown == nullptr) return score;
+  const HypothesisRecord& best = shown->hypotheses.front();
+  const std::optional<double> error = best.errors.Headline();
+  score.fate = Fate::kAnswered;
+  score.has_truth = error.has_value();
+  score.value = static_cast<float>(error.value_or(best.rms_px));
+  return score;
+}
+
+std::vector<ShownImage> SelectImages(const std::vector<ImageScore>& scores, std::size_t limit) {
+  std::vector<ShownImage> shown;
+  if (scores.size() <= limit) {
+    for (std::size_t i = 0; i < scores.size(); ++i) shown.push_back({i, ""});
+    return shown;
+  }
+  std::vector<std::size_t> answered, others;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    (scores[i].fate == Fate::kAnswered ? answered : others).push_back(i);
+  }
+  // Worst first: those with a truth before those without, whose residual is another measure.
+  std::stable_sort(answered.begin(), answered.end(), [&](std::size_t a, std::size_t b) {
+    if (scores[a].has_truth != scores[b].has_truth) return scores[a].has_truth;
+    return scores[a].value > scores[b].value;
+  });
+  const std::size_t refused =
+      std::min(others.size(), std::max(limit / 3, limit - std::min(limit, answered.size())));
+  const std::size_t middle = std::min(answered.size(), limit / 3);
+  const std::size_t worst = std::min(answered.size() - middle, limit - refused - middle);
+  for (std::size_t i = 0; i < worst; ++i) shown.push_back({answered[i], "worst"});
+  const std::size_t first =
+      std::max(worst, answered.size() / 2 - std::min(answered.size() / 2, middle / 2));
+  const std::size_t begin = std::min(first, answered.size() - middle);
+  for (std::size_t i = begin; i < begin + middle; ++i) shown.push_back({answered[i], "median"});
+  for (std::size_t i = 0; i < refused; ++i) shown.push_back({others[i], "refused"});
+  return shown;
+}
 
 Status ReadDigest(const std::string& folder, Digest* digest) {
   RecordReader reader(folder);

@@ -87,21 +87,21 @@ std::string HypothesisRow(const SolverRecord& run, std::size_t i, const Columns&
   const HypothesisRecord& h = run.hypotheses[i];
   const PoseErrors& errors = h.errors;
   std::string html = i > 0 ? "<tr class='more'>" : shown ? "<tr class='shown'>" : "<tr>";
-  html +=
-      i > 0 ? "<td></td><td></td><td></td>"
-            : Cell(run.key.solver, "l") + Cell(StageText(run), "l") + Cell(run.key.LossText(), "l");
-  html += Cell(std::to_string(i + 1) + " of " + std::to_string(run.hypotheses.size())) +
-          Cell(FormatFixed(h.probability, 3));
-  if (columns.rotation) html += Cell(ErrorText(errors.rotation_deg));
-  if (columns.normal) html += Cell(ErrorText(errors.normal_deg));
-  if (columns.translation) html += Cell(ErrorText(errors.translation_deg));
-  if (columns.directions) html += Cell(DirectionText(errors), "l");
-  if (columns.focal) html += Cell(FocalText(h));
-  html += Cell(FormatShort(h.rms_px)) +
-          Cell(std::to_string(h.num_inliers) + " / " + std::to_string(h.num_observations)) +
-          Cell(SigmaText(h));
+  html += i > 0 ? "<td></td><td></td><td></td>"
+                : CellHtml(run.key.solver, "l") + CellHtml(StageText(run), "l") +
+                      CellHtml(run.key.LossText(), "l");
+  html += CellHtml(std::to_string(i + 1) + " of " + std::to_string(run.hypotheses.size())) +
+          CellHtml(FormatFixed(h.probability, 3));
+  if (columns.rotation) html += CellHtml(ErrorText(errors.rotation_deg));
+  if (columns.normal) html += CellHtml(ErrorText(errors.normal_deg));
+  if (columns.translation) html += CellHtml(ErrorText(errors.translation_deg));
+  if (columns.directions) html += CellHtml(DirectionText(errors), "l");
+  if (columns.focal) html += CellHtml(FocalText(h));
+  html += CellHtml(FormatShort(h.rms_px)) +
+          CellHtml(std::to_string(h.num_inliers) + " / " + std::to_string(h.num_observations)) +
+          CellHtml(SigmaText(h));
   html += i > 0 ? "<td></td><td></td>"
-                : Cell(FormatMicroseconds(run.microseconds)) + Cell(Sentences(run), "say");
+                : CellHtml(FormatMicroseconds(run.microseconds)) + CellHtml(Sentences(run), "say");
   return html + "</tr>";
 }
 

@@ -13,9 +13,6 @@ namespace circline::apps {
 
 // ---- Tables ----
 
-// A cell, its text escaped; `css`: its class.
-std::string Cell(const std::string& text, const char* css = nullptr);
-
 std::string SummaryTable(const Summary& summary);
 
 // A row and a column for each solver that answered together with some other.

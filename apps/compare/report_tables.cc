@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <set>
 
+#include "apps/common/report_page.h"
 #include "apps/common/text.h"
 #include "apps/compare/report_parts.h"
 #include "apps/compare/sweep.h"
@@ -27,11 +28,6 @@ std::string SweepText(const SummaryRow* row) {
 
 }  // namespace
 
-std::string Cell(const std::string& text, const char* css) {
-  return std::string("<td") + (css == nullptr ? "" : std::string(" class='") + css + "'") + ">" +
-         EscapeHtml(text) + "</td>";
-}
-
 std::string SummaryTable(const Summary& summary) {
   std::vector<SummaryColumn> columns = summary.Columns();
   columns.push_back(
@@ -57,7 +53,7 @@ std::string SummaryTable(const Summary& summary) {
     html += rest ? "<tr class='rest'>" : "<tr>";
     for (const SummaryColumn& column : columns) {
       const std::string text = column.text(*row);
-      html += column.left ? "<td class='l'>" + Breakable(text) + "</td>" : Cell(text);
+      html += column.left ? "<td class='l'>" + Breakable(text) + "</td>" : CellHtml(text);
     }
     html += "</tr>";
   }
@@ -122,11 +118,11 @@ std::string SweepTable(const Summary& summary) {
   }
   html += "</tr></thead><tbody>";
   for (const LossPoint& point : points) {
-    html += "<tr>" + Cell(point.loss, "l") +
-            Cell(point.scale_px > 0.0 ? FormatPlain(point.scale_px) : "auto");
+    html += "<tr>" + CellHtml(point.loss, "l") +
+            CellHtml(point.scale_px > 0.0 ? FormatPlain(point.scale_px) : "auto");
     for (std::size_t i = 0; i < solvers.size(); ++i) {
       const SummaryRow* row = FindRefined(summary, solvers[i], point);
-      html += Cell(SweepText(row), row != nullptr && row == best[i] ? "best" : nullptr);
+      html += CellHtml(SweepText(row), row != nullptr && row == best[i] ? "best" : "");
     }
     html += "</tr>";
   }

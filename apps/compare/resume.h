@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/compare/image_set.h"
+#include "apps/compare/inputs.h"
 #include "apps/compare/options.h"
 #include "apps/compare/record.h"
 #include "circline/estimators/status.h"

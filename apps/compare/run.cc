@@ -7,6 +7,7 @@
 #include <memory>
 #include <opencv2/core/utility.hpp>
 #include <utility>
+#include <vector>
 
 #include "apps/common/flags_util.h"
 #include "apps/common/in_parallel.h"
@@ -77,20 +78,6 @@ Status FinishFolder(const std::string& folder, const FinishOptions& options,
 
 // ---- The work ----
 
-// Of the images that are left, every n-th is this rank's, n being the number of ranks.
-class Share {
- public:
-  Share(std::size_t done, std::size_t total, const Ranks& ranks)
-      : first_(done + static_cast<std::size_t>(ranks.rank())),
-        total_(total),
-        step_(static_cast<std::size_t>(ranks.count())) {}
-  std::size_t size() const { return first_ < total_ ? (total_ - first_ - 1) / step_ + 1 : 0; }
-  std::size_t At(std::size_t i) const { return first_ + i * step_; }
-
- private:
-  std::size_t first_, total_, step_;
-};
-
 // The lines of a photo that is solved, and its overlay if that is wanted.
 WorkedImage Finish(const CompareOptions& options, ImageRun* run) {
   WorkedImage worked;
@@ -150,8 +137,12 @@ class Output {
 // Rank 0 writes: after each image of its own it takes those of the other ranks that follow.
 Status WorkOnShare(const ImageSet& images, const CompareOptions& options, const SolverSet& solvers,
                    const DonePart& done, const Ranks& ranks) {
-  const Share share(done.images, images.size(), ranks);
-  const auto work = [&](std::size_t i) { return WorkOn(options, solvers, images.At(share.At(i))); };
+  // Of the images that are left, every n-th is this rank's, n being the number of ranks.
+  std::vector<std::size_t> share;
+  for (auto i = done.images + static_cast<std::size_t>(ranks.rank()); i < images.size();
+       i += static_cast<std::size_t>(ranks.count()))
+    share.push_back(i);
+  const auto work = [&](std::size_t i) { return WorkOn(options, solvers, images.At(share[i])); };
   if (!ranks.is_first()) {
     WorkInOrder(share.size(), work, [&](std::size_t, const WorkedImage& image) {
       ranks.SendToFirst(image);
@@ -162,9 +153,9 @@ Status WorkOnShare(const ImageSet& images, const CompareOptions& options, const 
   Output output(images, options.output, done);
   if (!output.status().ok()) return output.status();
   WorkInOrder(share.size(), work, [&](std::size_t i, const WorkedImage& image) {
-    bool go_on = output.Write(share.At(i), image);
+    bool go_on = output.Write(share[i], image);
     for (int other = 1; go_on && other < ranks.count(); ++other) {
-      const std::size_t theirs = share.At(i) + static_cast<std::size_t>(other);
+      const std::size_t theirs = share[i] + static_cast<std::size_t>(other);
       if (theirs < images.size()) go_on = output.Write(theirs, ranks.Receive(other));
     }
     return go_on;

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "apps/compare/image_set.h"
+#include "apps/compare/inputs.h"
 #include "apps/compare/options.h"
 #include "apps/compare/ranks.h"
 #include "circline/estimators/status.h"

@@ -44,10 +44,7 @@ std::vector<std::string> RefinedSolvers(const Summary& summary) {
 const SummaryRow* FindRefined(const Summary& summary, const std::string& solver,
                               const LossPoint& point) {
   for (const SummaryRow& row : summary.rows()) {
-    if (row.key.refined() && row.key.solver == solver && row.key.loss == point.loss &&
-        row.key.scale_px == point.scale_px) {
-      return &row;
-    }
+    if (row.key == SolverKey{solver, "refined", point.loss, point.scale_px}) return &row;
   }
   return nullptr;
 }

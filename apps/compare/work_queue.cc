@@ -137,7 +137,7 @@ class Finisher {
 void WorkInOrder(std::size_t count, const std::function<Finishing(std::size_t)>& work,
                  const std::function<bool(std::size_t, const WorkedImage&)>& deliver) {
   const std::size_t threads = static_cast<std::size_t>(std::max(1, cv::getNumThreads()));
-  const int num_workers = static_cast<int>(std::min(threads, count));
+  const std::size_t num_workers = std::min(threads, count);
   if (num_workers == 0) return;
   Queue queue(count, deliver);
   {
@@ -148,7 +148,7 @@ void WorkInOrder(std::size_t count, const std::function<Finishing(std::size_t)>&
         if (!finisher.Accept(index, &finishing)) queue.Put(index, finishing());
       }
     };
-    InParallel(num_workers, [&](int) { queue.Guard(work_all); });
+    InParallel(num_workers, [&](std::size_t) { queue.Guard(work_all); });
   }
   queue.Finish();
 }

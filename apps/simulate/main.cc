@@ -7,7 +7,6 @@
 #include "apps/common/output_file.h"
 #include "apps/common/text.h"
 #include "apps/common/written_files.h"
-#include "apps/simulate/plot.h"
 #include "apps/simulate/simulate.h"
 #include "apps/simulate/street_trials.h"
 

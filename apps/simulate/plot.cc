@@ -1,5 +1,3 @@
-#include "apps/simulate/plot.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,6 +5,7 @@
 
 #include "apps/common/svg_plot.h"
 #include "apps/common/text.h"
+#include "apps/simulate/simulate.h"
 
 namespace circline::apps {
 namespace {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <iomanip>
 #include <limits>
-#include <mutex>
 #include <sstream>
 
 #include "apps/common/in_parallel.h"
@@ -41,12 +40,10 @@ double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 }
 
 // A seed of its own for each trial.
-std::uint64_t TrialSeed(std::uint64_t seed, std::size_t noise, std::size_t ratio, int trial) {
-  for (const std::uint64_t index :
-       {static_cast<std::uint64_t>(noise), static_cast<std::uint64_t>(ratio),
-        static_cast<std::uint64_t>(trial)}) {
+std::uint64_t TrialSeed(std::uint64_t seed, std::size_t noise, std::size_t ratio,
+                        std::size_t trial) {
+  for (const std::uint64_t index : {noise, ratio, trial})
     seed = Random(Random(seed).Next() + index).Next();
-  }
   return seed;
 }
 
@@ -235,7 +232,6 @@ std::vector<SimulationRow> Simulate(const SimulationOptions& options) {
   const Solvers clean(options.loss), robust(options.outlier_loss);
   const std::size_t num_cells = options.noise_px.size() * options.outlier_ratios.size();
   Progress progress("images", static_cast<int>(num_cells) * options.trials);
-  std::mutex mutex;
   std::vector<SimulationRow> rows;
   for (std::size_t i = 0; i < options.noise_px.size(); ++i) {
     for (std::size_t j = 0; j < options.outlier_ratios.size(); ++j) {
@@ -243,10 +239,9 @@ std::vector<SimulationRow> Simulate(const SimulationOptions& options) {
                                     options.outlier_kind};
       const Solvers& solvers = disturbance.outlier_ratio > 0.0 ? robust : clean;
       std::vector<Trial> trials(static_cast<std::size_t>(options.trials));
-      InParallel(options.trials, [&](int k) {
-        trials[static_cast<std::size_t>(k)] = RunTrial(
-            scene, disturbance, solvers, options.inlier_sigmas, TrialSeed(options.seed, i, j, k));
-        const std::lock_guard<std::mutex> lock(mutex);
+      InParallel(trials.size(), [&](std::size_t k) {
+        trials[k] = RunTrial(scene, disturbance, solvers, options.inlier_sigmas,
+                             TrialSeed(options.seed, i, j, k));
         progress.Advance();
       });
       for (std::size_t m = 0; m < Methods().size(); ++m) {

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <mutex>
 
 #include "apps/common/in_parallel.h"
 #include "apps/common/progress.h"
@@ -220,16 +219,14 @@ std::vector<StreetTrial> SimulateStreets(int num_trials, double focal_sigma, std
                                          int threads) {
   UseThreads(threads);
   Progress progress("photos", num_trials);
-  std::mutex mutex;
   std::vector<StreetTrial> trials(static_cast<std::size_t>(num_trials));
-  InParallel(num_trials, [&](int k) {
-    Random random(Random(seed).Next() + static_cast<std::uint64_t>(k));
+  InParallel(trials.size(), [&](std::size_t k) {
+    Random random(Random(seed).Next() + k);
     random = Random(random.Next());
-    StreetTrial& trial = trials[static_cast<std::size_t>(k)];
+    StreetTrial& trial = trials[k];
     trial.photo = DrawStreet(focal_sigma, &random);
     trial.detected = Judge(trial.photo, Detect(trial.photo, random.Next()));
     trial.known = Judge(trial.photo, Know(trial.photo));
-    const std::lock_guard<std::mutex> lock(mutex);
     progress.Advance();
   });
   return trials;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "apps/common/scene.h"
-#include "apps/compare/image_set.h"
+#include "apps/compare/inputs.h"
 #include "circline/estimators/status.h"
 
 namespace circline::apps {

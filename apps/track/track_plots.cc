@@ -1,5 +1,3 @@
-#include "apps/track/track_plots.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <utility>
 
 #include "apps/common/svg_plot.h"
+#include "apps/track/track_report.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <opencv2/imgcodecs.hpp>
 #include <utility>
 
 #include "apps/common/output_file.h"
@@ -10,7 +9,6 @@
 #include "apps/common/text.h"
 #include "apps/compare/encode.h"
 #include "apps/compare/summary.h"
-#include "apps/track/track_plots.h"
 
 namespace circline::apps {
 namespace {
@@ -81,12 +79,12 @@ std::string Pictures(const std::string& folder, const std::vector<TrackedFrame>&
     const TrackedFrame& f = frames[i];
     if (f.overlay.empty() || (i % step != 0 && !f.reinitialized)) continue;
     ++shown;
-    const cv::Mat picture = cv::imread(folder + "/" + f.overlay, cv::IMREAD_COLOR);
-    if (picture.empty()) continue;
+    const std::string jpeg = JpegOfFile(folder + "/" + f.overlay, kPictureWidth);
+    if (jpeg.empty()) continue;
     const std::string caption =
         "frame " + std::to_string(i) + ", " + FormatFixed(f.time_s, 2) + " s, " + FateText(f);
-    html += "<figure>" + PictureHtml(caption, EncodeJpeg(picture, kPictureWidth)) + "<figcaption>" +
-            EscapeHtml(caption) + "</figcaption></figure>\n";
+    html += "<figure>" + PictureHtml(caption, jpeg) + "<figcaption>" + EscapeHtml(caption) +
+            "</figcaption></figure>\n";
   }
   return html.empty() ? "" : "<h2>Frames</h2><div class='plots'>" + html + "</div>";
 }
@@ -100,12 +98,12 @@ std::string FrameTable(const std::vector<TrackedFrame>& frames) {
       "<th>error, deg</th><th class='l'>message</th></tr></thead><tbody>";
   for (std::size_t i = 0; i < std::min(frames.size(), kMostRows); ++i) {
     const TrackedFrame& f = frames[i];
-    html += "<tr><td class='l'>" + EscapeHtml(f.name) + "</td><td>" + FormatFixed(f.time_s, 3) +
-            "</td><td class='l'>" + FateText(f) + "</td><td>" +
-            (f.has_pose ? FormatFixed(f.probabilities.front(), 3) : "-") + "</td><td>" +
-            FormatShort(f.sigma_deg.value_or(kUnknown)) + "</td><td>" +
-            FormatShort(f.error_deg.value_or(kUnknown)) + "</td><td class='say'>" +
-            EscapeHtml(f.error.empty() ? f.message : f.error) + "</td></tr>\n";
+    html += "<tr>" + CellHtml(f.name, "l") + CellHtml(FormatFixed(f.time_s, 3)) +
+            CellHtml(FateText(f), "l") +
+            CellHtml(f.has_pose ? FormatFixed(f.probabilities.front(), 3) : "-") +
+            CellHtml(FormatShort(f.sigma_deg.value_or(kUnknown))) +
+            CellHtml(FormatShort(f.error_deg.value_or(kUnknown))) +
+            CellHtml(f.error.empty() ? f.message : f.error, "say") + "</tr>\n";
   }
   return html + "</tbody></table></div></details>";
 }
@@ -124,7 +122,7 @@ Status WriteTrackReport(const std::string& folder, const std::vector<TrackedFram
   std::string html =
       PageTop("circline: track") + "<h1>Poses of a moving camera</h1><h2>Summary</h2><table>";
   for (const auto& [what, value] : SummaryRows(frames))
-    html += "<tr><td class='l'>" + what + "</td><td>" + value + "</td></tr>";
+    html += "<tr>" + CellHtml(what, "l") + CellHtml(value) + "</tr>";
   html += "</table>";
   if (!frames.empty()) html += "<h2>Over time</h2>" + TrackPlots(frames);
   html += Pictures(folder, frames) + FrameTable(frames) + PageEnd();

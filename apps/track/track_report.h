@@ -13,6 +13,10 @@ namespace circline::apps {
 // Self-contained; pictures are taken from the overlays in the folder.
 Status WriteTrackReport(const std::string& folder, const std::vector<TrackedFrame>& frames);
 
+// Its plots over time, HTML: rotation, position, probabilities, standard deviation and error, NEES,
+// times. One frame or more.
+std::string TrackPlots(const std::vector<TrackedFrame>& frames);
+
 // For stdout: how many frames were tracked, lost, predicted; times.
 std::string TrackTable(const std::vector<TrackedFrame>& frames);
 

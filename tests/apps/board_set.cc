@@ -34,19 +34,23 @@ double Board::Brightness(double u, double v) const {
   return away > 0.7 && away < 0.9 ? 70.0 : 210.0;  // A square frame about it.
 }
 
-void Board::Paint(const std::string& path) const {
-  constexpr int kSub = 4;
-  cv::Mat photo(kHeight, kWidth, CV_8U);
-  for (int v = 0; v < kHeight; ++v) {
-    for (int u = 0; u < kWidth; ++u) {
+void PaintPhoto(const std::string& path, int width, int height, int finer,
+                const std::function<double(double, double)>& brightness) {
+  cv::Mat photo(height, width, CV_8U);
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
       double sum = 0.0;
-      for (int i = 0; i < kSub * kSub; ++i) {
-        sum += Brightness(u + (i % kSub + 0.5) / kSub - 0.5, v + (i / kSub + 0.5) / kSub - 0.5);
+      for (int i = 0; i < finer * finer; ++i) {
+        sum += brightness(u + (i % finer + 0.5) / finer - 0.5, v + (i / finer + 0.5) / finer - 0.5);
       }
-      photo.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::lround(sum / (kSub * kSub)));
+      photo.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::lround(sum / (finer * finer)));
     }
   }
   cv::imwrite(path, photo);
+}
+
+void Board::Paint(const std::string& path) const {
+  PaintPhoto(path, kWidth, kHeight, 4, [this](double u, double v) { return Brightness(u, v); });
 }
 
 std::string BoardCamera() {

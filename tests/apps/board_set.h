@@ -3,6 +3,7 @@
 #define CIRCLINE_TESTS_APPS_BOARD_SET_H_
 
 #include <Eigen/Core>
+#include <functional>
 #include <set>
 #include <string>
 #include <vector>
@@ -15,6 +16,10 @@ namespace circline::apps {
 
 inline constexpr int kWidth = 320, kHeight = 240;
 inline constexpr double kFocal = 300.0;
+
+// A photo whose pixels are means of finer x finer samples of brightness(u, v).
+void PaintPhoto(const std::string& path, int width, int height, int finer,
+                const std::function<double(double, double)>& brightness);
 
 struct Board {
   Eigen::Matrix3d rotation;

@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -160,11 +159,7 @@ TEST_F(CalibrateTest, TheSceneSaysHowWellItsCameraIsKnown) {
 TEST_F(CalibrateTest, ItsReportShowsThePhotosAndWhatEachHasAdded) {
   ASSERT_EQ(Calibrate(Photos() + " --output=" + Output()).exit_code, 0);
   const std::string report = ReadAll(Output() + "/report.html");
-  std::size_t pictures = 0;
-  for (std::size_t at = report.find("data:image/jpeg"); at != std::string::npos;
-       at = report.find("data:image/jpeg", at + 1))
-    ++pictures;
-  EXPECT_EQ(pictures, 5U);
+  EXPECT_EQ(Count(report, "data:image/jpeg"), 5);
   EXPECT_CONTAINS(report, "What each photo has added");
   const nlohmann::json sigmas =
       ReadJson(Output() + "/calibration.json")["cameras"][0]["sigma_by_photos"];

@@ -7,9 +7,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
@@ -17,6 +15,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
+#include "tests/apps/board_set.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
 
@@ -64,20 +63,10 @@ class Room {
   void Paint(const CameraPose& pose, const std::string& path) const {
     const Eigen::Matrix3d back = pose.rotation.transpose();
     const Eigen::Vector3d eye = -back * pose.translation;
-    cv::Mat photo(kRenderedHeight, kRenderedWidth, CV_8U);
-    for (int v = 0; v < kRenderedHeight; ++v) {
-      for (int u = 0; u < kRenderedWidth; ++u) {
-        double sum = 0.0;
-        for (int k = 0; k < 4; ++k) {
-          const double x = u + (k % 2 - 0.5) / 2.0 - (kRenderedWidth - 1) / 2.0,
-                       y = v + (k / 2 - 0.5) / 2.0 - (kRenderedHeight - 1) / 2.0;
-          sum +=
-              Brightness(eye, back * Eigen::Vector3d(x / kRenderedFocal, y / kRenderedFocal, 1.0));
-        }
-        photo.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::lround(sum / 4.0));
-      }
-    }
-    cv::imwrite(path, photo);
+    PaintPhoto(path, kRenderedWidth, kRenderedHeight, 2, [&](double u, double v) {
+      const double x = u - (kRenderedWidth - 1) / 2.0, y = v - (kRenderedHeight - 1) / 2.0;
+      return Brightness(eye, back * Eigen::Vector3d(x / kRenderedFocal, y / kRenderedFocal, 1.0));
+    });
   }
 
  private:
@@ -199,8 +188,7 @@ class ColmapImport : public testing::Test {
   }
   std::string Photos() const { return "--images='" + folder_ / "photos" + "' "; }
   nlohmann::json Landmarks() const {
-    std::ifstream file(folder_ / "out/landmarks.json");
-    return nlohmann::json::parse(file);
+    return nlohmann::json::parse(ReadAll(folder_ / "out/landmarks.json"));
   }
 
   const TestFolder folder_;

@@ -117,9 +117,8 @@ TEST_F(Colmap, ReadsPosesThatARadiusMadeMetric) {
   const std::string circle = "{ id: \"c\", ", known = circle + "radius: 0.25, ";
   for (std::size_t at = 0; (at = scene.find(circle, at)) != std::string::npos; at += known.size())
     scene.replace(at, circle.size(), known);
-  const Outcome outcome =
-      RunCompare("--overlays=false --export_as=colmap --scene='" +
-                 folder_.Write("scene.yaml", scene) + "' --output='" + folder_ / "out" + "'");
+  const Outcome outcome = CompareScene(folder_.Write("scene.yaml", scene), folder_ / "out",
+                                       "--overlays=false --export_as=colmap");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.out.find("exported poses"), std::string::npos);  // All of them metric.
   ASSERT_NO_FATAL_FAILURE(ThroughColmap(folder_ / "out", folder_ / "text"));

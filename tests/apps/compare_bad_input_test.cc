@@ -130,8 +130,7 @@ TEST_F(CompareBadInput, CameraFile) {
 
 TEST_F(CompareBadInput, OutputThatCannotBe) {
   folder_.Write("file", "x");
-  const Outcome outcome = RunCompare("--scene='" + SceneOf(Image("good.png")) + "' --output='" +
-                                     folder_ / "file" + "'");
+  const Outcome outcome = CompareScene(SceneOf(Image("good.png")), folder_ / "file");
   EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
   EXPECT_EQ(ReadAll(folder_ / "file"), "x");
 }

@@ -20,7 +20,7 @@ using nlohmann::json;
 class CompareMerge : public testing::Test {
  protected:
   Outcome Run(const std::string& flags, const std::string& output) {
-    return RunCompare("--scene='" + scene_ + "' " + flags + " --output='" + folder_ / output + "'");
+    return CompareScene(scene_, folder_ / output, flags);
   }
   Outcome Merge(const std::string& inputs) {
     std::istringstream names(inputs);

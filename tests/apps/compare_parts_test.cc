@@ -16,7 +16,7 @@
 #include "apps/compare/overlay.h"
 #include "apps/compare/pixel_ellipse.h"
 #include "apps/compare/record_files.h"
-#include "apps/compare/selection.h"
+#include "apps/compare/report.h"
 #include "apps/compare/sweep.h"
 #include "apps/compare/work_queue.h"
 #include "circline/estimators/basics.h"

@@ -44,10 +44,7 @@ class ComparePeers : public testing::Test {
         folder_.Write("scene.yaml", "%YAML:1.0\n---\n" + BoardCamera() + "images:\n" +
                                         AnnotatedImage(board, "a.png") + Points(board) +
                                         AnnotatedImage(board, "a.png"));
-    ASSERT_EQ(RunCompare("--peers --overlays=false --scene='" + scene + "' --output='" +
-                         folder_ / "out" + "'")
-                  .exit_code,
-              0);
+    ASSERT_EQ(CompareScene(scene, folder_ / "out", "--peers --overlays=false").exit_code, 0);
     for (const PeerSolver& peer : PeerSolvers()) {
       peers_.insert({peer.name, SolverStageName(peer.stage)});
     }

@@ -15,18 +15,9 @@
 namespace circline::apps {
 namespace {
 
-int Count(const std::string& text, const std::string& part) {
-  int found = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) {
-    ++found;
-  }
-  return found;
-}
-
 std::string RunSweep(const TestFolder& folder) {
-  EXPECT_EQ(RunCompare("--scene='" + MakeSet(folder, kMissingImage) +
-                       "' --robust_loss=huber,tukey --loss_scale_px=0.5,1,auto --output='" +
-                       folder / "out" + "'")
+  EXPECT_EQ(CompareScene(MakeSet(folder, kMissingImage), folder / "out",
+                         "--robust_loss=huber,tukey --loss_scale_px=0.5,1,auto")
                 .exit_code,
             1);
   return folder / "out";

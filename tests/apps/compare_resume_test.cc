@@ -55,9 +55,8 @@ TEST(CompareResume, KilledAtRandomGivesTheSameBytes) {
   const TestFolder folder;
   const std::string scene = MakeLongSet(folder);
   const auto begin = std::chrono::steady_clock::now();
-  ASSERT_EQ(RunCompare("--scene='" + scene + "' --threads=2 --output='" + folder / "whole" + "'")
-                .exit_code,
-            1);  // One photo is not there.
+  // One photo is not there.
+  ASSERT_EQ(CompareScene(scene, folder / "whole", "--threads=2").exit_code, 1);
   const double whole_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 
@@ -77,7 +76,7 @@ TEST(CompareResume, KilledAtRandomGivesTheSameBytes) {
       EXPECT_TRUE(ReadAll(folder / "whole/" + file).compare(0, bytes.size(), bytes) == 0) << file;
     }
     if (killed && !ReadAll(out + "/results.jsonl").empty()) ++num_begun;
-    const Outcome outcome = RunCompare("--scene='" + scene + "' --resume --output='" + out + "'");
+    const Outcome outcome = CompareScene(scene, out, "--resume");
     EXPECT_EQ(outcome.exit_code, 1);
     EXPECT_CONTAINS(outcome.err, "gone.png: the file does not exist");
     ExpectSameFiles(folder / "whole", out);
@@ -89,17 +88,14 @@ TEST(CompareResume, KilledAtRandomGivesTheSameBytes) {
 TEST(CompareResume, DropsALineThatWasCutOff) {
   const TestFolder folder;
   const std::string scene = MakeSet(folder);
-  const std::string whole = "--scene='" + scene + "' --output='" + folder / "whole" + "'";
-  ASSERT_EQ(RunCompare(whole).exit_code, 0);
+  ASSERT_EQ(CompareScene(scene, folder / "whole").exit_code, 0);
   for (const char* file : {"results.jsonl", "observations.jsonl", "timings.jsonl"}) {
     for (const std::uintmax_t cut : {1U, 700U, 9000U}) {
       fs::remove_all(folder / "cut");
       fs::copy(folder / "whole", folder / "cut", fs::copy_options::recursive);
       const std::uintmax_t size = fs::file_size(folder / "cut/" + file);
       fs::resize_file(folder / "cut/" + file, size - std::min(cut, size));
-      ASSERT_EQ(RunCompare("--resume --scene='" + scene + "' --output='" + folder / "cut" + "'")
-                    .exit_code,
-                0);
+      ASSERT_EQ(CompareScene(scene, folder / "cut", "--resume").exit_code, 0);
       ExpectSameFiles(folder / "whole", folder / "cut");
     }
   }
@@ -113,7 +109,7 @@ TEST(CompareResume, LeavesTheFilesOfOthers) {
     folder.Write(name, "theirs");
   for (const char* name : {"out/report.html.part", "out/overlays/01.png.part"})
     folder.Write(name, "cut off");
-  ASSERT_EQ(RunCompare("--scene='" + scene + "' --output='" + folder / "out" + "'").exit_code, 0);
+  ASSERT_EQ(CompareScene(scene, folder / "out").exit_code, 0);
   EXPECT_EQ(ReadAll(folder / "out/download.part"), "theirs");
   EXPECT_EQ(ReadAll(folder / "out/overlays/film.mp4.part"), "theirs");
   EXPECT_FALSE(fs::exists(folder / "out/report.html.part"));
@@ -123,11 +119,9 @@ TEST(CompareResume, LeavesTheFilesOfOthers) {
 TEST(CompareResume, SkipsWhatIsDone) {
   const TestFolder folder;
   const std::string scene = MakeSet(folder);
-  const std::string arguments =
-      "--resume --scene='" + scene + "' --output='" + folder / "out" + "'";
-  ASSERT_EQ(RunCompare(arguments).exit_code, 0);
+  ASSERT_EQ(CompareScene(scene, folder / "out", "--resume").exit_code, 0);
   const std::string times = ReadAll(folder / "out/timings.jsonl");
-  ASSERT_EQ(RunCompare(arguments).exit_code, 0);
+  ASSERT_EQ(CompareScene(scene, folder / "out", "--resume").exit_code, 0);
   EXPECT_EQ(ReadAll(folder / "out/timings.jsonl"), times);  // Measured again, they would differ.
 }
 
@@ -140,7 +134,7 @@ TEST(CompareResume, DoesAgainWhatHasChanged) {
                         DetectedImage(Board(35.0), "a.png") + DetectedImage(Board(35.0), "b.png") +
                         DetectedImage(Board(35.0), "c.png"));
   const auto run = [&scene](const std::string& out) {
-    return RunCompare("--resume --threads=1 --scene='" + scene + "' --output='" + out + "'");
+    return CompareScene(scene, out, "--resume --threads=1");
   };
   const std::string out = folder / "out";
   EXPECT_CONTAINS(run(out).err, "b.png: the file does not exist");

@@ -224,8 +224,7 @@ TEST(PhotoFaults, PhotosThatChangeWhileTheyAreReadAreReadOrNamed) {
       folder.Write("tilt40.png", photo);
     }
   });
-  const Outcome outcome = RunCompare("--scene='" + folder / "scene.yaml" +
-                                     "' --solvers=joint --output='" + folder / "out" + "'");
+  const Outcome outcome = CompareScene(folder / "scene.yaml", folder / "out", "--solvers=joint");
   ended = true;
   writer.join();
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;

@@ -7,11 +7,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/pose.h"
+#include "tests/apps/board_set.h"
 #include "tests/pinhole_camera.h"
 
 namespace circline::apps {
@@ -76,24 +76,7 @@ struct PaintedBox {
     return seen;
   }
   void Paint(const std::string& path) const {
-    PaintPhoto(path, [this](double u, double v) { return Brightness(u, v); });
-  }
-  // Any other scene, as this camera sees it: `brightness(u, v)`.
-  template <typename Brightness>
-  static void PaintPhoto(const std::string& path, const Brightness& brightness) {
-    constexpr int kFiner = 4;  // Samples along each side of a pixel.
-    cv::Mat photo(kHeight, kWidth, CV_8U);
-    for (int v = 0; v < kHeight; ++v) {
-      for (int u = 0; u < kWidth; ++u) {
-        int sum = 0;
-        for (int i = 0; i < kFiner; ++i) {
-          for (int j = 0; j < kFiner; ++j)
-            sum += brightness(u + (j + 0.5) / kFiner - 0.5, v + (i + 0.5) / kFiner - 0.5);
-        }
-        photo.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(sum / (kFiner * kFiner));
-      }
-    }
-    cv::imwrite(path, photo);
+    PaintPhoto(path, kWidth, kHeight, 4, [this](double u, double v) { return Brightness(u, v); });
   }
 };
 

@@ -41,8 +41,7 @@ class PhotographsTest : public testing::Test {
     }
     const std::string scene = folder_.Write(
         "scene.yaml", ReadAll(std::string(CIRCLINE_SOURCE_DIR) + "/apps/demo/" + demo));
-    const Outcome outcome =
-        RunCompare("--scene='" + scene + "' --overlays=false --output='" + folder_ / "out" + "'");
+    const Outcome outcome = CompareScene(scene, folder_ / "out", "--overlays=false");
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
     for (const nlohmann::json& line : ReadJsonLines(folder_ / "out/results.jsonl")) {
       if (line["status"] == "ok" && line["hypothesis"] == 0 &&

@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "tests/apps/board_set.h"
-#include "tests/apps/measured_rows.h"
 #include "tests/apps/painted_box.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"

@@ -11,7 +11,6 @@
 
 #include "circline/estimators/basics.h"
 #include "tests/apps/board_set.h"
-#include "tests/apps/measured_rows.h"
 #include "tests/apps/painted_box.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
@@ -26,8 +25,8 @@ constexpr int kLid = 220, kSide = 90, kGround = 150, kLabel = 50;
 class ReconstructCylinder : public testing::Test {
  protected:
   void SetUp() override {
-    PaintedBox::PaintPhoto(folder_ / "tin.png",
-                           [this](double u, double v) { return Brightness(u, v); });
+    PaintPhoto(folder_ / "tin.png", PaintedBox::kWidth, PaintedBox::kHeight, 4,
+               [this](double u, double v) { return Brightness(u, v); });
   }
   int Brightness(double u, double v) const {
     const Eigen::Vector3d ray = camera_.Ray(u, v), eye = camera_.Eye() - axis_;

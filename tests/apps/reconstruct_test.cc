@@ -14,7 +14,6 @@
 
 #include "circline/estimators/basics.h"
 #include "tests/apps/board_set.h"
-#include "tests/apps/measured_rows.h"
 #include "tests/apps/run_compare.h"
 #include "tests/apps/test_files.h"
 
@@ -55,13 +54,7 @@ class Box {
     return kAround;
   }
   void Paint(const std::string& path) const {
-    cv::Mat photo(kHeight, kWidth, CV_8U);
-    for (int v = 0; v < kHeight; ++v) {
-      for (int u = 0; u < kWidth; ++u) {
-        photo.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(Brightness(u, v));
-      }
-    }
-    cv::imwrite(path, photo);
+    PaintPhoto(path, kWidth, kHeight, 1, [this](double u, double v) { return Brightness(u, v); });
   }
   // An image of a scene file: all that is seen of the box, exact.
   std::string Scene(const std::string& file) const {

@@ -27,11 +27,37 @@ Outcome RunCompare(const std::string& arguments) {
   return RunProgram(CIRCLINE_COMPARE_BINARY, arguments);
 }
 
+Outcome CompareScene(const std::string& scene, const std::string& output,
+                     const std::string& flags) {
+  return RunCompare("--scene='" + scene + "' --output='" + output + "' " + flags);
+}
+
 std::vector<nlohmann::json> ReadJsonLines(const std::string& path) {
   std::vector<nlohmann::json> lines;
   std::istringstream text(ReadAll(path));
   for (std::string line; std::getline(text, line);) lines.push_back(nlohmann::json::parse(line));
   return lines;
+}
+
+std::map<std::string, MeasuredRow> ReadMeasurements(const std::string& path) {
+  std::map<std::string, MeasuredRow> rows;
+  std::istringstream csv(ReadAll(path));
+  std::string line;
+  std::getline(csv, line);
+  EXPECT_EQ(line, "what,id,value,sigma,unit,truth,relative_error");
+  while (std::getline(csv, line)) {
+    std::vector<std::string> cells;
+    std::istringstream row(line + ",");  // An empty last cell is one, too.
+    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+    EXPECT_EQ(cells.size(), 7U) << line;
+    if (cells.size() != 7) continue;
+    const auto number = [](const std::string& cell) {
+      return cell.empty() ? 0.0 : std::stod(cell);
+    };
+    rows[cells[0] + " " + cells[1].substr(1, cells[1].size() - 2)] = {
+        number(cells[2]), number(cells[3]), number(cells[5]), number(cells[6]), cells[4]};
+  }
+  return rows;
 }
 
 pid_t StartProgram(const std::string& program, const std::vector<std::string>& arguments) {

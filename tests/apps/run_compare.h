@@ -4,6 +4,7 @@
 
 #include <sys/types.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <string>
@@ -23,9 +24,20 @@ struct Outcome {
 
 Outcome RunProgram(const std::string& program, const std::string& arguments);
 Outcome RunCompare(const std::string& arguments);
+// Of a scene file, into a folder.
+Outcome CompareScene(const std::string& scene, const std::string& output,
+                     const std::string& flags = "");
 
 // The values of a file of JSON lines.
 std::vector<nlohmann::json> ReadJsonLines(const std::string& path);
+
+// A row of measurements.csv; truth and relative error 0 where it has none.
+struct MeasuredRow {
+  double value = 0.0, sigma = 0.0, truth = 0.0, relative_error = 0.0;
+  std::string unit;
+};
+// By what was measured and its id: "length carton x".
+std::map<std::string, MeasuredRow> ReadMeasurements(const std::string& path);
 
 // As a process of ours that goes on, silent.
 pid_t StartProgram(const std::string& program, const std::vector<std::string>& arguments);

@@ -1,12 +1,14 @@
-// A photo for the studio, and its options.
+// A studio, and a photo for it.
 #ifndef CIRCLINE_TESTS_APPS_STUDIO_DISC_H_
 #define CIRCLINE_TESTS_APPS_STUDIO_DISC_H_
 
+#include <memory>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string>
 
 #include "apps/compare/options.h"
-#include "apps/studio/scene_document.h"
+#include "apps/studio/studio.h"
 
 namespace circline::apps {
 
@@ -25,6 +27,16 @@ inline CompareOptions StudioOptions() {
   options.overlays = false;
   options.losses.resize(1);
   return options;
+}
+
+// Of the photos in a folder; `camera` may be null.
+inline std::unique_ptr<Studio> OpenStudio(const std::string& folder,
+                                          const Camera* camera = nullptr) {
+  PhotoFolder photos;
+  photos.Open(folder);
+  auto studio = std::make_unique<Studio>(StudioOptions(), photos, camera);
+  studio->ReadFiles();
+  return studio;
 }
 
 // The first ellipse of a detection as a scene file's circle.

@@ -50,17 +50,14 @@ TEST(StudioFaults, AFullDiskLeavesWhatWasSaved) {
   if (!disk.mounted()) GTEST_SKIP() << "no file system can be mounted here (root may)";
   ASSERT_TRUE(disk.Renew(64));
   cv::imwrite(disk / "disc.png", DiscPhoto(96, 72));
-  PhotoFolder photos;
-  ASSERT_TRUE(photos.Open(folder / "disk").ok());
-  Studio studio(StudioOptions(), photos, nullptr);
-  ASSERT_TRUE(studio.ReadFiles().ok());
-  studio.Save({{"image", 0}, {"scene", SceneOfRadius(1.0)}});
-  studio.Draft({{"image", 0}, {"state", SceneOfRadius(1.0)}});
+  const auto studio = OpenStudio(folder / "disk");
+  studio->Save({{"image", 0}, {"scene", SceneOfRadius(1.0)}});
+  studio->Draft({{"image", 0}, {"state", SceneOfRadius(1.0)}});
   std::ofstream(disk / "filler") << std::string(1 << 17, 'x');
   const auto expect_refused = [&](Json (Studio::*ask)(const Json&), const Json& request,
                                   const std::string& file) {
     try {
-      (studio.*ask)(request);
+      ((*studio).*ask)(request);
       ADD_FAILURE() << file;
     } catch (const RequestError& error) {
       EXPECT_CONTAINS(std::string(error.what()), "/disk/" + file + ": cannot be written");
@@ -71,7 +68,7 @@ TEST(StudioFaults, AFullDiskLeavesWhatWasSaved) {
   EXPECT_EQ(SavedRadius(folder / "disk"), 1.0);
   EXPECT_EQ(DraftedRadius(folder / "disk"), 1.0);
   fs::remove(disk / "filler");
-  studio.Save({{"image", 0}, {"scene", SceneOfRadius(3.0)}});
+  studio->Save({{"image", 0}, {"scene", SceneOfRadius(3.0)}});
   EXPECT_EQ(SavedRadius(folder / "disk"), 3.0);
 }
 

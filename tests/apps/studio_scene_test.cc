@@ -36,14 +36,7 @@ class StudioSceneTest : public testing::Test {
     for (const char* name : {"a.png", "b.png"}) cv::imwrite(folder_ / name, DiscPhoto(320, 240));
   }
 
-  // `camera` may be null.
-  std::unique_ptr<Studio> Open(const Camera* camera) {
-    PhotoFolder photos;
-    EXPECT_TRUE(photos.Open(folder_.path()).ok());
-    auto studio = std::make_unique<Studio>(StudioOptions(), photos, camera);
-    studio->ReadFiles();
-    return studio;
-  }
+  std::unique_ptr<Studio> Open(const Camera* camera) { return OpenStudio(folder_.path(), camera); }
   std::vector<SceneImage> Saved() {
     std::vector<SceneImage> images;
     const Status status = ReadScene(folder_ / "scene.json", {}, &images);

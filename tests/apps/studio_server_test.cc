@@ -27,10 +27,7 @@ class StudioServerTest : public testing::Test {
   ~StudioServerTest() override { Stop(); }
 
   void Start() {
-    PhotoFolder photos;
-    ASSERT_TRUE(photos.Open(folder_.path()).ok());
-    studio_ = std::make_unique<Studio>(StudioOptions(), photos, nullptr);
-    studio_->ReadFiles();
+    studio_ = OpenStudio(folder_.path());
     server_ = std::make_unique<StudioServer>(studio_.get());
     ASSERT_TRUE(server_->Bind(0).ok());
     thread_ = std::thread([this] { server_->Serve(); });

@@ -29,6 +29,9 @@ class TestFolder {
 
 std::string ReadAll(const std::string& path);
 
+// How many times the part stands in the text.
+int Count(const std::string& text, const std::string& part);
+
 }  // namespace circline::apps
 
 #endif  // CIRCLINE_TESTS_APPS_TEST_FILES_H_

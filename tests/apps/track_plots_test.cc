@@ -1,10 +1,10 @@
-#include "apps/track/track_plots.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <string>
 #include <vector>
+
+#include "apps/track/track_report.h"
 
 namespace circline::apps {
 namespace {
