@@ -10,6 +10,7 @@
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 
 namespace circline {
 
@@ -38,8 +39,7 @@ inline Eigen::Vector2d PaperPixel(double x, double y, double sigma_px, Random* r
   Eigen::Vector2d pixel;
   CameraToPixel(PaperCamera(), pose.rotation * Eigen::Vector3d(x, y, 0.0) + pose.translation,
                 &pixel);
-  const double dx = random->Normal(), dy = random->Normal();
-  return pixel + sigma_px * Eigen::Vector2d(dx, dy);
+  return pixel + Noise2(sigma_px, random);
 }
 
 inline LineObservation PaperLine(double x0, double y0, double x1, double y1, double sigma_px,

@@ -11,6 +11,7 @@
 #include "circline/estimators/observations.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 
 namespace circline {
 
@@ -36,21 +37,28 @@ class PlaneScene {
   Eigen::Vector2d Pixel(double x, double y, double z = 0.0) {
     Eigen::Vector2d pixel(-1e9, -1e9);
     CameraToPixel(camera, pose.rotation * Eigen::Vector3d(x, y, z) + pose.translation, &pixel);
-    const double dx = random.Normal(), dy = random.Normal();
-    return pixel + sigma_px_ * Eigen::Vector2d(dx, dy);
+    return pixel + Noise2(sigma_px_, &random);
   }
 
-  CircleObservation Circle(const std::string& id, double x, double y, double radius,
-                           int points = 60) {
+  // A circle that is said to be of the plane: its points are `on(0)`, `on(1)`, ..., 3-vectors.
+  template <typename On>
+  CircleObservation Contour(const std::string& id, int points, const On& on) {
     CircleObservation circle;
     circle.id = id;
     circle.plane = "p0";
     circle.sigma_px = sigma();
     for (int i = 0; i < points; ++i) {
-      const double a = 2.0 * kPi * i / points;
-      circle.points.push_back(Pixel(x + radius * std::cos(a), y + radius * std::sin(a)));
+      const Eigen::Vector3d X = on(i);
+      circle.points.push_back(Pixel(X.x(), X.y(), X.z()));
     }
     return circle;
+  }
+  CircleObservation Circle(const std::string& id, double x, double y, double radius,
+                           int points = 60) {
+    return Contour(id, points, [=](int i) {
+      const double a = 2.0 * kPi * i / points;
+      return Eigen::Vector3d(x + radius * std::cos(a), y + radius * std::sin(a), 0.0);
+    });
   }
 
   LineObservation Line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int points = 2) {
@@ -80,6 +88,11 @@ class PlaneScene {
     return pencil;
   }
 
+  // Pencils along X and along Y.
+  std::vector<PencilObservation> Axes(int lines = 3, int points = 2) {
+    return {Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX(), lines, points),
+            Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY(), lines, points)};
+  }
   Observations Empty() const {
     Observations observations;
     observations.camera = camera;

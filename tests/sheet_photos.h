@@ -84,8 +84,7 @@ class Photos {
   Photos& WithPencils() {
     for (std::size_t i = 0; i < photos.size(); ++i) {
       scene_.pose = poses[i];
-      photos[i].pencils = {scene_.Pencil("rows", PencilDirection::kX, {1.0, 0.0, 0.0}, 4, 30),
-                           scene_.Pencil("columns", PencilDirection::kY, {0.0, 1.0, 0.0}, 4, 30)};
+      photos[i].pencils = scene_.Axes(4, 30);
     }
     return *this;
   }

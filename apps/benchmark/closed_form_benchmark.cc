@@ -19,6 +19,7 @@
 #include "circline/estimators/line_pose.h"
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 
 #ifdef CIRCLINE_BENCHMARK_CALIB3D
 #include <opencv2/calib3d.hpp>
@@ -181,8 +182,7 @@ struct EllipsePoints {
     for (std::int64_t i = 0; i < count; ++i) {
       Vector2d u =
           EllipsePoint(ellipse, 2.0 * kPi * static_cast<double>(i) / static_cast<double>(count));
-      const double dx = random.Normal(), dy = random.Normal();
-      u += Vector2d(dx, dy);
+      u += Noise2(1.0, &random);
       CalibratedPoint p;
       p.x = u / kFocal;
       p.x_from_pixel = {1.0 / kFocal, 0.0, 0.0, 1.0 / kFocal};

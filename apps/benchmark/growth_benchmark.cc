@@ -13,6 +13,7 @@
 #include "circline/estimators/random.h"
 #include "circline/ransac/fit_observations.h"
 #include "circline/refine/estimate_pose.h"
+#include "tests/basics.h"
 
 namespace circline {
 namespace {
@@ -89,8 +90,7 @@ LineObservation SegmentTo(const Eigen::Vector2d& vanishing_point, Random* random
   const double length = random->Uniform(20.0, 90.0);
   const Eigen::Vector2d to = from + length * (vanishing_point - from).normalized();
   const auto noisy = [random](const Eigen::Vector2d& p) {
-    const double dx = random->Normal(), dy = random->Normal();
-    return Eigen::Vector2d(p + kSegmentNoisePx * Eigen::Vector2d(dx, dy));
+    return Eigen::Vector2d(p + Noise2(kSegmentNoisePx, random));
   };
   return {{noisy(from), noisy(to)}, {}, {}};
 }
@@ -224,8 +224,7 @@ class Sheet {
         Eigen::Vector3d(0.0, 0.0, 6.0);
     Eigen::Vector2d pixel;
     CameraToPixel(observations_.camera, ray, &pixel);
-    const double dx = random_.Normal(), dy = random_.Normal();
-    return pixel + noise_px_ * Eigen::Vector2d(dx, dy);
+    return pixel + Noise2(noise_px_, &random_);
   }
 
   double noise_px_;

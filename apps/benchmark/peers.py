@@ -18,7 +18,7 @@ import subprocess
 
 import numpy as np
 
-from scripts import TOP, json_lines, parser_of, read, write
+from scripts import TOP, bash, json_lines, median, parser_of, read, write
 
 PAGE = os.path.join(TOP, 'docs/scene_files.md')
 F, WIDTH, HEIGHT, NOISE_PX = 800.0, 640, 480, 0.5
@@ -34,10 +34,6 @@ ROWS = [
     ('line_pairs', 'closed_form', 'two pairs of parallels'), ('line_pairs', 'refined', 'two pairs of parallels'),
     ('joint', 'refined', 'the circle, its centre, the parallels'),
 ]
-
-
-def shell(script):
-    subprocess.run(['bash', '-c', f'set -euo pipefail; . cmake/setup.sh; {script}'], check=True, cwd=TOP)
 
 
 def numbers(values):
@@ -96,7 +92,7 @@ def measure(build, scene, *flags):
     for line in json_lines(os.path.join(out, 'timings.jsonl')):
         if 'solver' in line:
             found[line['solver'], line['stage']][2].append(line['microseconds'])
-    return {key: [*(statistics.median(v or [float('inf')]) for v in values[:2]), statistics.quantiles(values[2], n=4)[0]]
+    return {key: [*map(median, values[:2]), statistics.quantiles(values[2], n=4)[0]]
             for key, values in found.items()}
 
 
@@ -117,14 +113,14 @@ def main():
     args = parser_of(__doc__, build='', images=300, write=False).parse_args()
     if not args.build:
         args.build = os.path.join(TOP, 'build/peers')
-        shell('''options=(-DCIRCLINE_BUILD_{TESTS,BENCHMARKS}=OFF -DCIRCLINE_WERROR="${CIRCLINE_WERROR:-OFF}")
+        bash('''options=(-DCIRCLINE_BUILD_{TESTS,BENCHMARKS}=OFF -DCIRCLINE_WERROR="${CIRCLINE_WERROR:-OFF}")
             for peer in opengv visp; do
               [ -z "$(dpkg-query -W -f '${db:Status-Abbrev}' "lib$peer-dev" 2> /dev/null | grep ^ii)" ] ||
                 options+=("-DCIRCLINE_WITH_${peer^^}=ON")
             done
             quietly build/peers-configure.log cmake --preset release -B build/peers "${options[@]}"
             cmake --build build/peers --target circline_compare -j "$(nproc)" -- --quiet''')
-    shell('lay_out disc')
+    bash('lay_out disc')
     scene = write(os.path.join(args.build, 'peers.yaml'), simulated_scene(args.images))
     made = table(measure(args.build, os.path.join(TOP, 'build/demo/disc/scene.yaml')),
                  measure(args.build, scene, '--noise=exact'))

@@ -3,9 +3,8 @@ import itertools
 import math
 import os
 import re
-import subprocess
 
-from scripts import TOP, compare, make_scene, read, write
+from scripts import TOP, bash, compare, make_scene, read, write
 
 EQUAL = 'equal circles'  # Not for to_scene.py: all circles of a photo are one radius_group.
 SURE = 0.9  # The probability of an answer that counts as sure.
@@ -33,10 +32,6 @@ def run(args, data_set, options, scratch, cache={}):
         if data_set == 'box-camprodon':
             cache[key] = set_box_errors(scene_rotations(scene), cache[key])
     return cache[key]
-
-
-def bash(script, *arguments):
-    subprocess.run(['bash', '-c', f'set -euo pipefail; . cmake/setup.sh; {script}', 'bash', *arguments], check=True, cwd=TOP)
 
 
 def run_demo(args, scene, scratch, cache={}):

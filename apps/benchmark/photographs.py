@@ -12,13 +12,12 @@ groundtruth.yml, of which to_scene.py makes scene files; that needs python3-open
 import copy
 import os
 import re
-import statistics
 import sys
 import tempfile
 
-from photograph_answers import (EQUAL, SURE, answers, any_error, bash, box_axes, error, folder, is_right_first, run, run_demo,
+from photograph_answers import (EQUAL, SURE, answers, any_error, box_axes, error, folder, is_right_first, run, run_demo,
                                 scene_rotations, set_box_errors, shares_plane, sure_errors)
-from scripts import TOP, Claims, json_lines, parser_of, read, write
+from scripts import TOP, Claims, bash, json_lines, median, parser_of, read, write
 
 AUTO = ['--evidence=auto']  # Nothing annotated.
 # Fields of TABLE: the rotation's error, of the photos with an answer to it; of those with a sure one.
@@ -88,8 +87,8 @@ def median_figure(images, field):
         errors = [error(h[0], 'rotation_error_deg') for h in images if h and 'rotation_error_deg' in h[0]]
     else:
         errors = [error(h[0], field) if h else float('inf') for h in images]
-    median = statistics.median(errors or [float('inf')])
-    return f'{median:.{2 if median < 1 else 1}f}' + (f' ({len(errors)} of {len(images)})' if len(errors) < len(images) else '')
+    middle = median(errors)
+    return f'{middle:.{2 if middle < 1 else 1}f}' + (f' ({len(errors)} of {len(images)})' if len(errors) < len(images) else '')
 
 
 def same_figure(a, b):
@@ -130,19 +129,19 @@ def check_table(args, scratch, claim):
 
 
 def check_bars(args, scratch, claim):
+    def bounded(text, errors, bar, fewest=0):
+        claim(f'{text}: {median(errors):.3f} <= {bar}', median(errors) <= bar and len(errors) >= fewest)
+
     for data_set, options, solver, stage, field, which, bar in CLAIMS:
         images = answers(run(args, data_set, options, scratch), solver, stage)
         errors = [min(error(line, field) for line in (h if which == 'better' else h[:1])) if h else float('inf')
                   for h in images]
-        median = statistics.median(errors)
-        claim(f'{data_set} {" ".join(options)}: {solver} ({stage}), {field} of the {which} hypothesis, median of '
-              f'{len(images)} photos: {median:.3f} <= {bar}', median <= bar)
+        bounded(f'{data_set} {" ".join(options)}: {solver} ({stage}), {field} of the {which} hypothesis, median of '
+                f'{len(images)} photos', errors, bar)
     automatic = {s: run(args, s, AUTO, scratch) for s in AUTOMATIC}
     pooled = [error(h[0], 'rotation_error_deg') if h else float('inf')
               for s in BOARDS for h in answers(automatic[s], 'joint', 'refined')]
-    median = statistics.median(pooled)
-    claim(f'all boards --evidence=auto: joint (refined), rotation_error_deg, median of {len(pooled)} photos: '
-          f'{median:.3f} <= 0.3', median <= 0.3)
+    bounded(f'all boards --evidence=auto: joint (refined), rotation_error_deg, median of {len(pooled)} photos', pooled, 0.3)
     sure = {f'{s}/{os.path.basename(h[0]["image"])}': any_error(h[0]) for s in AUTOMATIC
             for h in answers(automatic[s], 'joint', 'refined') if h and h[0]['probability'] >= SURE}
     far = {name: e for name, e in sure.items() if e > FAR_DEG}
@@ -150,14 +149,12 @@ def check_bars(args, scratch, claim):
           f'{len(far)} are off by more than {FAR_DEG} degrees: ' + ', '.join(f'{n} {e:.1f}' for n, e in far.items()),
           not far)
     box = sure_errors(answers(automatic['box-camprodon'], 'joint', 'refined'))
-    median = statistics.median(box) if box else float('inf')
-    claim(f'box-camprodon --evidence=auto: joint (refined), rotation_error_deg up to the choice of the face, median of the '
-          f'{len(box)} of 10 photos with a sure answer: {median:.3f} <= 1.5', median <= 1.5 and len(box) >= 7)
+    bounded(f'box-camprodon --evidence=auto: joint (refined), rotation_error_deg up to the choice of the face, median of the '
+            f'{len(box)} of 10 photos with a sure answer', box, 1.5, fewest=7)
     set_box_errors(box_axes(args, 'turntable-teabox'), automatic['turntable-teabox'])
     box = sure_errors(answers(automatic['turntable-teabox'], 'joint', 'refined'))
-    median = statistics.median(box) if box else float('inf')
-    claim(f'turntable-teabox --evidence=auto: joint (refined), axes of the box, median of the {len(box)} of 9 photos with a '
-          f'sure answer: {median:.3f} <= 1.3', median <= 1.3 and len(box) >= 8)
+    bounded(f'turntable-teabox --evidence=auto: joint (refined), axes of the box, median of the {len(box)} of 9 photos with a '
+            f'sure answer', box, 1.3, fewest=8)
     observations = json_lines(os.path.join(folder('turntable-teabox', AUTO, scratch), 'observations.jsonl'))
     shared = sum(map(shares_plane, observations))
     claim(f'turntable-teabox --evidence=auto: the disc and the box share a plane in {shared} of 9', shared >= 8)

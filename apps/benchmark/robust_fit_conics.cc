@@ -2,15 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "apps/benchmark/robust_fit_options.h"
-#include "apps/benchmark/robust_fit_rows.h"
 #include "apps/benchmark/robust_fit_scenes.h"
 #include "apps/benchmark/robust_fit_table.h"
-#include "apps/benchmark/timing.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/random.h"
@@ -22,13 +19,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 
-using ConicMethod = std::function<bool(const ConicScene&, Matrix3d*)>;
-
-struct NamedConicMethod {
-  const char* name;
-  ConicMethod fit;
-  bool ours;
-};
+using ConicMethod = Method<ConicScene, Matrix3d>;
 
 bool FromOpenCv(const cv::RotatedRect& rect, Matrix3d* conic) {
   Ellipse ellipse;
@@ -37,7 +28,7 @@ bool FromOpenCv(const cv::RotatedRect& rect, Matrix3d* conic) {
   ellipse.b = 0.5 * static_cast<double>(rect.size.height);
   ellipse.angle = static_cast<double>(rect.angle) * kDegree;
   if (!(ellipse.a > 0.0 && ellipse.b > 0.0)) return false;
-  *conic = TransformConic(EllipseToConic(ellipse), PixelFromX(SceneCamera()));
+  *conic = TransformConic(EllipseToConic(ellipse), PixelFromX());
   return conic->allFinite();
 }
 
@@ -95,29 +86,26 @@ bool RansacThenTukey(const ConicScene& scene, Matrix3d* conic) {
   return true;
 }
 
-bool OursOnPoints(const ConicScene& scene, Matrix3d* conic) {
+bool Ours(const ConicScene& scene, const EdgeDirections& directions, Matrix3d* conic) {
   ConicFit fit;
-  if (!FitConicRobust(scene.points, PixelOptions(), &fit).ok()) return false;
+  if (!FitConicRobust(scene.points, PixelOptions(), &fit, nullptr, directions).ok()) return false;
   *conic = fit.conic;
   return true;
 }
+
+bool OursOnPoints(const ConicScene& scene, Matrix3d* conic) { return Ours(scene, {}, conic); }
 
 bool OursWithDirections(const ConicScene& scene, Matrix3d* conic) {
-  ConicFit fit;
-  const Status status =
-      FitConicRobust(scene.points, PixelOptions(), &fit, nullptr, scene.directions);
-  if (!status.ok()) return false;
-  *conic = fit.conic;
-  return true;
+  return Ours(scene, scene.directions, conic);
 }
 
-std::vector<NamedConicMethod> ConicMethods(bool all_points) {
+std::vector<ConicMethod> ConicMethods(bool all_points) {
   const auto open_cv = [](cv::RotatedRect (*fit)(cv::InputArray)) {
     return [fit](const ConicScene& scene, Matrix3d* conic) {
       return FromOpenCv(fit(OpenCvPoints(scene.pixels)), conic);
     };
   };
-  std::vector<NamedConicMethod> methods;
+  std::vector<ConicMethod> methods;
   if (FLAGS_peers && all_points) {
     // OpenCV 4.6 has AMS and Direct fall back to fitEllipse, silently, from 200 points on.
     methods.push_back({"all points, fitEllipse", open_cv(cv::fitEllipse), false});
@@ -141,6 +129,7 @@ struct ConicRow {
 };
 
 void RunConicRow(const ConicRow& row) {
+  if (!Wanted(row.name)) return;
   ConicSceneOptions options;
   options.outlier_ratio = row.outlier_ratio;
   options.arc_deg = row.arc_deg;
@@ -152,17 +141,7 @@ void RunConicRow(const ConicRow& row) {
     scenes.push_back(MakeConicScene(options, TrialSeed(trial)));
     scenes.back().directions.sigma_rad = std::max(options.direction_sigma_rad, 1e-3);
   }
-  for (const NamedConicMethod& method : ConicMethods(row.clutter == Clutter::kUniform)) {
-    Tally tally;
-    for (const ConicScene& scene : scenes) {
-      Matrix3d conic;
-      bool found = false;
-      const double ms = Milliseconds([&] { found = method.fit(scene, &conic); });
-      const double error = found ? scene.Error(conic) : 1e9;
-      tally.Add(std::isfinite(error) ? error : 1e9, ms);
-    }
-    PrintRow(row.name, method.name, tally, method.ours ? row.bar : Bar());
-  }
+  FitAndPrintRows(row.name, scenes, ConicMethods(row.clutter == Clutter::kUniform), row.bar);
 }
 
 const ConicRow kConicRows[] = {
@@ -196,13 +175,9 @@ void RunConics() {
                 "%d trials",
                 FLAGS_sigma_px, FLAGS_direction_sigma_deg, FLAGS_trials);
   PrintHead(title, "median C");
-  for (const ConicRow& row : kConicRows) {
-    if (Wanted(row.name)) RunConicRow(row);
-  }
+  for (const ConicRow& row : kConicRows) RunConicRow(row);
   PrintHead("Conics among structured outliers", "median C");
-  for (const ConicRow& row : kStructuredRows) {
-    if (Wanted(row.name)) RunConicRow(row);
-  }
+  for (const ConicRow& row : kStructuredRows) RunConicRow(row);
 }
 
 }  // namespace circline::apps

@@ -5,13 +5,13 @@
 #include <vector>
 
 #include "apps/benchmark/robust_fit_options.h"
-#include "apps/benchmark/robust_fit_rows.h"
 #include "apps/benchmark/robust_fit_scenes.h"
 #include "apps/benchmark/robust_fit_table.h"
 #include "apps/benchmark/timing.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/ransac/fit_observations.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::apps {
 namespace {
@@ -48,7 +48,7 @@ const ContourRow kRows[] = {
 
 Observations Observe(const ConicScene& scene, bool is_stated, bool with_directions) {
   Observations observations;
-  observations.camera = SceneCamera();
+  observations.camera = PinholeCamera();
   CircleObservation circle;
   circle.id = "c";
   circle.points = scene.pixels;
@@ -61,11 +61,10 @@ Observations Observe(const ConicScene& scene, bool is_stated, bool with_directio
 // Of the first reading. A second one must follow the second rim, at least within 3 sigma where that
 // is seen, or be none where there is none.
 double ErrorOf(const ConicScene& scene, const CircleObservation& circle) {
-  constexpr double kMissed = 1e9;
-  if (!circle.fit || circle.second.has_value() == scene.rim.empty()) return kMissed;
-  if (circle.second && !(scene.RimError(circle.second->fit.conic) <= 3.0)) return kMissed;
+  if (!circle.fit || circle.second.has_value() == scene.rim.empty()) return kLost;
+  if (circle.second && !(scene.RimError(circle.second->fit.conic) <= 3.0)) return kLost;
   const double error = scene.Error(circle.fit->conic);
-  return std::isfinite(error) ? error : kMissed;
+  return std::isfinite(error) ? error : kLost;
 }
 
 void RunRow(const ContourRow& row, bool with_directions) {

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <string>
 
-#include "circline/estimators/status.h"
 #include "circline/ransac/ransac.h"
 #include "circline/ransac/robust_conic.h"
 
@@ -21,9 +20,6 @@ DECLARE_double(confidence);
 DECLARE_uint64(ransac_seed);
 
 namespace circline::apps {
-
-// Not ok: one line that names the flag.
-Status CheckFlags();
 
 RansacOptions EngineOptions();    // Its threshold in standard deviations.
 RobustFitOptions PixelOptions();  // For points: in pixels.

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "apps/benchmark/robust_fit_options.h"
-#include "apps/benchmark/robust_fit_rows.h"
 #include "apps/benchmark/robust_fit_scenes.h"
 #include "apps/benchmark/robust_fit_table.h"
 #include "apps/benchmark/timing.h"
@@ -60,15 +59,11 @@ bool RotationOfInliers(const PencilScene& scene, Matrix3d* rotation) {
 // which no fit of a single one makes use of: compare it with that of the inliers alone. Lost are
 // errors beyond ten times the bound.
 void RunPencilRow(const std::string& name, double clutter_ratio, const Bar& bar) {
-  struct Method {
-    const char* name;
-    bool (*fit)(const PencilScene&, Matrix3d*);
-    bool ours;
-  };
-  const Method methods[] = {{"inliers alone", RotationOfInliers, false},
-                            {"ours, one by one", RotationFromPencils, true}};
-  constexpr double kLost = 10.0;
-  for (const Method& method : methods) {
+  if (!Wanted(name)) return;
+  const Method<PencilScene, Matrix3d> methods[] = {{"inliers alone", RotationOfInliers, false},
+                                                   {"ours, one by one", RotationFromPencils, true}};
+  constexpr double kTooFar = 10.0;  // Bounds.
+  for (const auto& method : methods) {
     std::vector<double> times;
     double squares = 0.0, bounds = 0.0;
     int ok = 0, same = 0;
@@ -78,8 +73,8 @@ void RunPencilRow(const std::string& name, double clutter_ratio, const Bar& bar)
       bool found = false;
       times.push_back(Milliseconds([&] { found = method.fit(scene, &rotation); }));
       same += found && method.fit(scene, &again) && again == rotation ? 1 : 0;
-      const double error = found ? scene.Error(rotation) : 1e9;
-      if (error > kLost * scene.rotation_bound) continue;
+      const double error = found ? scene.Error(rotation) : kLost;
+      if (error > kTooFar * scene.rotation_bound) continue;
       ++ok;
       squares += error * error;
       bounds += scene.rotation_bound * scene.rotation_bound;
@@ -97,9 +92,9 @@ void RunPencilRow(const std::string& name, double clutter_ratio, const Bar& bar)
 void RunPencils() {
   PrintHead("Pencils: 30 segments along each of three orthogonal directions, sigma 0.5 px",
             "rms/bound");
-  if (Wanted("pencils, clean")) RunPencilRow("pencils, clean", 0.0, {100.0, 0.0, 2.0});
-  if (Wanted("pencils, 50 %")) RunPencilRow("pencils, 50 %", 0.5, {100.0, 0.0, 2.0});
-  if (Wanted("pencils, 70 %")) RunPencilRow("pencils, 70 %", 0.7, {});
+  RunPencilRow("pencils, clean", 0.0, {100.0, 0.0, 2.0});
+  RunPencilRow("pencils, 50 %", 0.5, {100.0, 0.0, 2.0});
+  RunPencilRow("pencils, 70 %", 0.7, {});
 }
 
 }  // namespace circline::apps

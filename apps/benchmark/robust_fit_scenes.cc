@@ -8,6 +8,9 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
+#include "tests/pinhole_camera.h"
+#include "tests/ransac/segment_scene.h"
 
 namespace circline::apps {
 namespace {
@@ -18,11 +21,6 @@ using Eigen::Vector3d;
 
 // Semi-axes of the second rim over those of the first.
 constexpr double kRimScale = 1.15;
-
-Vector2d Noise(double sigma, Random* random) {
-  const double x = random->Normal(), y = random->Normal();
-  return {sigma * x, sigma * y};
-}
 
 Vector2d Unit(double angle) { return {std::cos(angle), std::sin(angle)}; }
 
@@ -88,18 +86,18 @@ class ClutterSource {
         break;
       case Clutter::kEllipse: {
         const double t = random_->Uniform(0.0, 2.0 * kPi);
-        *pixel = EllipsePoint(other_, t) + Noise(options_.sigma_px, random_);
+        *pixel = EllipsePoint(other_, t) + Noise2(options_.sigma_px, random_);
         *normal = Turned(EllipseNormal(other_, t), options_.direction_sigma_rad, random_);
         break;
       }
       case Clutter::kEdge:
-        *pixel =
-            on_edge_ + random_->Uniform(-150.0, 150.0) * along_ + Noise(options_.sigma_px, random_);
+        *pixel = on_edge_ + random_->Uniform(-150.0, 150.0) * along_ +
+                 Noise2(options_.sigma_px, random_);
         *normal = Turned({-along_.y(), along_.x()}, options_.direction_sigma_rad, random_);
         break;
       case Clutter::kRim: {
         const double t = rim_start_ + random_->Uniform(0.0, rim_arc_);
-        *pixel = EllipsePoint(rim_, t) + Noise(options_.sigma_px, random_);
+        *pixel = EllipsePoint(rim_, t) + Noise2(options_.sigma_px, random_);
         *normal = Turned(EllipseNormal(rim_, t), options_.direction_sigma_rad, random_);
         break;
       }
@@ -129,40 +127,25 @@ class ClutterSource {
   double rim_start_ = 0.0, rim_arc_ = 0.0;
 };
 
-double RmsOver(double sum, double parameters, double sigma) {
-  return std::sqrt(sum / parameters) / sigma;
-}
-
-}  // namespace
-
-Camera SceneCamera() {
-  Camera camera;
-  camera.id = "cam";
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 800.0;
-  camera.cx = 320.0;
-  camera.cy = 240.0;
-  return camera;
-}
-
-namespace {
-
-double ErrorAlong(const std::vector<CalibratedPoint>& truth, const Matrix3d& conic, double sigma) {
+// Of a fit of so many parameters.
+template <typename Distance>
+double ErrorAlong(const std::vector<CalibratedPoint>& truth, int parameters, double sigma_px,
+                  const Distance& distance) {
   double sum = 0.0;
-  for (const CalibratedPoint& p : truth) {
-    const double d = ConicDistancePx(p, conic);
-    sum += d * d;
-  }
-  return RmsOver(sum, 5.0, sigma);
+  for (const CalibratedPoint& p : truth) sum += distance(p) * distance(p);
+  return std::sqrt(sum / parameters) / sigma_px;
 }
 
 }  // namespace
 
-double ConicScene::Error(const Matrix3d& conic) const { return ErrorAlong(truth, conic, sigma_px); }
+double ConicScene::Error(const Matrix3d& conic) const {
+  return ErrorAlong(truth, 5, sigma_px,
+                    [&](const CalibratedPoint& p) { return ConicDistancePx(p, conic); });
+}
 
 double ConicScene::RimError(const Matrix3d& conic) const {
-  return ErrorAlong(rim, conic, sigma_px);
+  return ErrorAlong(rim, 5, sigma_px,
+                    [&](const CalibratedPoint& p) { return ConicDistancePx(p, conic); });
 }
 
 ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed) {
@@ -180,7 +163,7 @@ ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed) 
   for (int i = 0; i < options.num_inliers; ++i) {
     const double t = start + arc * i / options.num_inliers;
     truth.push_back(EllipsePoint(ellipse, t));
-    scene.pixels.push_back(truth.back() + Noise(options.sigma_px, &random));
+    scene.pixels.push_back(truth.back() + Noise2(options.sigma_px, &random));
     scene.directions.normals.push_back(
         Turned(EllipseNormal(ellipse, t), options.direction_sigma_rad, &random));
   }
@@ -193,19 +176,15 @@ ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed) 
     scene.pixels.push_back(pixel);
     scene.directions.normals.push_back(normal);
   }
-  PixelsToCalibrated(SceneCamera(), scene.pixels, &scene.points);
-  PixelsToCalibrated(SceneCamera(), truth, &scene.truth);
-  PixelsToCalibrated(SceneCamera(), clutter.Rim(), &scene.rim);
+  PixelsToCalibrated(PinholeCamera(), scene.pixels, &scene.points);
+  PixelsToCalibrated(PinholeCamera(), truth, &scene.truth);
+  PixelsToCalibrated(PinholeCamera(), clutter.Rim(), &scene.rim);
   return scene;
 }
 
 double LineScene::Error(const Vector3d& line) const {
-  double sum = 0.0;
-  for (const CalibratedPoint& p : truth) {
-    const double d = LineDistancePx(p, line);
-    sum += d * d;
-  }
-  return RmsOver(sum, 2.0, sigma_px);
+  return ErrorAlong(truth, 2, sigma_px,
+                    [&](const CalibratedPoint& p) { return LineDistancePx(p, line); });
 }
 
 LineScene MakeLineScene(double outlier_ratio, double sigma_px, std::uint64_t seed) {
@@ -216,40 +195,16 @@ LineScene MakeLineScene(double outlier_ratio, double sigma_px, std::uint64_t see
   std::vector<Vector2d> truth;
   for (int i = 0; i < 100; ++i) {
     truth.push_back(center + along * (3.0 * i - 150.0));
-    scene.pixels.push_back(truth.back() + Noise(sigma_px, &random));
+    scene.pixels.push_back(truth.back() + Noise2(sigma_px, &random));
   }
   for (int i = 0; i < NumOutliers(100, outlier_ratio); ++i) {
     const double x = random.Uniform(-200.0, 200.0), y = random.Uniform(-200.0, 200.0);
     scene.pixels.push_back(center + Vector2d(x, y));
   }
-  PixelsToCalibrated(SceneCamera(), scene.pixels, &scene.points);
-  PixelsToCalibrated(SceneCamera(), truth, &scene.truth);
+  PixelsToCalibrated(PinholeCamera(), scene.pixels, &scene.points);
+  PixelsToCalibrated(PinholeCamera(), truth, &scene.truth);
   return scene;
 }
-
-namespace {
-
-// A segment anywhere in the photo along the image of `direction` or, where that is null, any way.
-LineFit DrawSegment(const Vector3d* direction, Random* random) {
-  const Camera camera = SceneCamera();
-  constexpr double kSigma = 0.5;
-  const double u = random->Uniform(0.0, camera.width), v = random->Uniform(0.0, camera.height);
-  Vector2d along = Unit(random->Uniform(0.0, kPi));
-  if (direction != nullptr) {
-    const Vector3d x((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
-    along = (*direction - direction->z() * x).head<2>().normalized();
-  }
-  const Vector2d half = random->Uniform(10.0, 60.0) * along;
-  const Vector2d first = Vector2d(u, v) + half + Noise(kSigma, random);
-  const Vector2d last = Vector2d(u, v) - half + Noise(kSigma, random);
-  std::vector<CalibratedPoint> ends;
-  PixelsToCalibrated(camera, {first, last}, &ends);
-  LineFit fit;
-  (void)FitLine(ends, kSigma, &fit);  // Never refused: the ends lie 20 px apart.
-  return fit;
-}
-
-}  // namespace
 
 double PencilScene::Error(const Matrix3d& estimate) const {
   // The columns that are nearest; a rotation, whatever the third one's sign.
@@ -270,15 +225,14 @@ double PencilScene::Error(const Matrix3d& estimate) const {
 
 PencilScene MakePencilScene(int per_direction, double clutter_ratio, std::uint64_t seed) {
   Random random(seed);
-  const double w = random.Normal(), x = random.Normal(), y = random.Normal(), z = random.Normal();
   PencilScene scene;
   scene.per_direction = per_direction;
-  scene.rotation = Eigen::Quaterniond(w, x, y, z).normalized().toRotationMatrix();
+  scene.rotation = segment_scene::RandomRotation(&random);
   Matrix3d information = Matrix3d::Zero();
   for (int k = 0; k < 3; ++k) {
     const Vector3d direction = scene.rotation.col(k);
     for (int i = 0; i < per_direction; ++i) {
-      scene.lines.push_back(DrawSegment(&direction, &random));
+      segment_scene::AddSegment(&direction, &random, &scene.lines);
       // l . (v + delta x v) moves by delta . (v x l).
       const LineFit& line = scene.lines.back();
       const Vector3d slope = direction.cross(line.line);
@@ -287,7 +241,7 @@ PencilScene MakePencilScene(int per_direction, double clutter_ratio, std::uint64
   }
   scene.rotation_bound = std::sqrt(information.inverse().trace());
   const int clutter = NumOutliers(3 * per_direction, clutter_ratio);
-  for (int i = 0; i < clutter; ++i) scene.lines.push_back(DrawSegment(nullptr, &random));
+  for (int i = 0; i < clutter; ++i) segment_scene::AddSegment(nullptr, &random, &scene.lines);
   return scene;
 }
 

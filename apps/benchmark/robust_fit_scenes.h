@@ -1,5 +1,5 @@
-// What circline_robust_fit_benchmark fits: seeded contours, lines and segments among clutter, with
-// what is true of them.
+// What circline_robust_fit_benchmark and the tests fit: seeded contours, lines and segments among
+// clutter, seen by PinholeCamera(), with what is true of them.
 #ifndef CIRCLINE_APPS_BENCHMARK_ROBUST_FIT_SCENES_H_
 #define CIRCLINE_APPS_BENCHMARK_ROBUST_FIT_SCENES_H_
 
@@ -14,9 +14,6 @@
 
 namespace circline::apps {
 
-// A pinhole of 640 x 480 pixels, focal length 800.
-Camera SceneCamera();
-
 enum class Clutter {
   kUniform,  // In 1.5 times the bounding box of the whole ellipse.
   kArcBox,   // In 1.5 times the bounding box of the arc that is seen.
@@ -29,7 +26,7 @@ enum class Clutter {
 // Points of an ellipse of semi-axes 100 and 60 px, evenly spread (in the eccentric anomaly)
 // over an arc, with Gaussian noise on both coordinates; then the clutter.
 struct ConicScene {
-  std::vector<Eigen::Vector2d> pixels;
+  std::vector<Eigen::Vector2d> pixels;  // The contour's first, then the clutter.
   std::vector<CalibratedPoint> points;  // The same.
   EdgeDirections directions;            // Normals with noise; any where the clutter has none.
   std::vector<CalibratedPoint> truth;   // The contour without noise.
@@ -48,7 +45,7 @@ struct ConicSceneOptions {
   double arc_deg = 360.0;
   Clutter clutter = Clutter::kUniform;
   double sigma_px = 1.0;
-  double direction_sigma_rad = 0.09;
+  double direction_sigma_rad = EdgeDirections().sigma_rad;
 };
 
 ConicScene MakeConicScene(const ConicSceneOptions& options, std::uint64_t seed);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "apps/benchmark/timing.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline::apps {
 
@@ -57,7 +57,8 @@ std::vector<cv::Point2f> OpenCvPoints(const std::vector<Eigen::Vector2d>& pixels
   return points;
 }
 
-Eigen::Matrix3d PixelFromX(const Camera& camera) {
+Eigen::Matrix3d PixelFromX() {
+  const Camera camera = PinholeCamera();
   Eigen::Matrix3d pixel_from_x;
   pixel_from_x << camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0;
   return pixel_from_x;

@@ -13,6 +13,7 @@
 #include "apps/common/progress.h"
 #include "apps/common/text.h"
 #include "circline/refine/pose_tracker.h"
+#include "tests/basics.h"
 
 namespace circline::apps {
 namespace {
@@ -58,9 +59,8 @@ TrackerOptions OptionsFor(const Setting& setting, LossType loss) {
 // The turn between two frames as a gyroscope has it.
 MotionPrior Odometry(const CameraPose& before, const CameraPose& now, Random* random) {
   MotionPrior motion = Gyroscope(before, now);
-  const double x = random->Normal(), y = random->Normal(), z = random->Normal();
   Eigen::Matrix3d& turn = motion.relative->now_from_before.rotation;
-  turn = ExpRotation(kGyroscopeSigma * Eigen::Vector3d(x, y, z)) * turn;
+  turn = ExpRotation(Noise3(kGyroscopeSigma, random)) * turn;
   return motion;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "circline/estimators/basics.h"
+#include "tests/basics.h"
 
 namespace circline::apps {
 namespace {
@@ -53,9 +54,7 @@ std::vector<Eigen::Vector2d> Disturb(const std::vector<Sample>& samples, const D
                                      double offset_px, Random* random) {
   std::vector<Eigen::Vector2d> pixels;
   for (const Sample& sample : samples) {
-    const double dx = random->Normal(), dy = random->Normal();
-    pixels.push_back(sample.pixel + d.noise_px * Eigen::Vector2d(dx, dy) +
-                     offset_px * sample.normal);
+    pixels.push_back(sample.pixel + Noise2(d.noise_px, random) + offset_px * sample.normal);
   }
   // The first so many of a random order are replaced.
   const int n = static_cast<int>(samples.size());
@@ -218,8 +217,7 @@ Observations Observe(const World& world, const Disturbance& disturbance, Random*
     c.points = Disturb(samples, disturbance, disturbance.bleed_px, random);
     std::array<Sample, 2> center;
     if (circle.has_center && SampleCenter(world, circle, &center)) {
-      const double dx = random->Normal(), dy = random->Normal();
-      c.center = center[0].pixel + disturbance.noise_px * Eigen::Vector2d(dx, dy);
+      c.center = center[0].pixel + Noise2(disturbance.noise_px, random);
     }
   }
   for (const WorldPencil& pencil : world.pencils) {

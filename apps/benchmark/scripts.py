@@ -1,8 +1,12 @@
 """What the scripts here share: arguments, scene files, runs of circline_compare, claims."""
 import argparse
+import glob
+import gzip
 import json
 import os
 import re
+import shutil
+import statistics
 import subprocess
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -42,6 +46,29 @@ def write(path, text):
 
 def json_lines(path):
     return [json.loads(line) for line in read(path).splitlines()]
+
+
+def median(values):
+    """Of nothing it is infinite."""
+    return statistics.median(values or [float('inf')])
+
+
+def bash(script, *arguments):
+    """Runs a script with the functions of cmake/setup.sh."""
+    subprocess.run(['bash', '-c', f'set -euo pipefail; . cmake/setup.sh; {script}', 'bash', *arguments], check=True, cwd=TOP)
+
+
+def frames_of(folder, scratch):
+    """Absolute paths of the frames image.NNNN.pgm, in order; of copies in `scratch` where they are compressed."""
+    frames = []
+    for frame in sorted(glob.glob(os.path.join(folder, 'image.*.pgm')) + glob.glob(os.path.join(folder, 'image.*.pgm.gz'))):
+        name = os.path.abspath(frame)
+        if frame.endswith('.gz'):
+            name = os.path.join(scratch, os.path.basename(frame).removesuffix('.gz'))
+            with gzip.open(frame) as packed, open(name, 'wb') as file:
+                shutil.copyfileobj(packed, file)
+        frames.append(name)
+    return frames
 
 
 def make_scene(args, data_set, scene, *options):

@@ -8,15 +8,12 @@ disc that a camera moves about; the camera is that of apps/demo/disc.yaml. Every
 alone: two poses that explain the disc equally well. Counted is in how many pairs of neighbouring frames the normal of the
 first pose is nearer to that of the second pose of the frame before than to that of its first.
 """
-import glob
-import gzip
 import os
 import re
-import shutil
 import sys
 import tempfile
 
-from scripts import HERE, compare, parser_of, read, write
+from scripts import HERE, compare, frames_of, parser_of, read, write
 
 STAGES = ('closed_form', 'refined')
 DISC = os.path.join(HERE, '..', 'demo', 'disc.yaml')
@@ -25,16 +22,7 @@ DISC = os.path.join(HERE, '..', 'demo', 'disc.yaml')
 def write_scene(frames, scratch):
     """A scene file of all frames in order, with the camera of the demo and nothing annotated."""
     cameras = re.search(r'^cameras:\n.*?(?=^images:)', read(DISC), re.M | re.S).group()
-    names = []
-    for frame in frames:
-        name = os.path.join(scratch, os.path.basename(frame).removesuffix('.gz'))
-        if frame.endswith('.gz'):
-            with gzip.open(frame) as packed, open(name, 'wb') as unpacked:
-                shutil.copyfileobj(packed, unpacked)
-        else:
-            name = os.path.abspath(frame)
-        names.append(name)
-    images = ''.join(f'  - {{ file: "{name}", camera: "cam0" }}\n' for name in names)
+    images = ''.join(f'  - {{ file: "{name}", camera: "cam0" }}\n' for name in frames)
     return write(os.path.join(scratch, 'scene.yaml'), '%YAML:1.0\n---\n' + cameras + 'images:\n' + images)
 
 
@@ -62,10 +50,10 @@ def jumps(frames):
 def main():
     args = parser_of(__doc__, 'compare', data='?', flags='', verbose=False).parse_args()
     folder = args.data or '/usr/share/visp-images-data/ViSP-images/mire-2'
-    frames = sorted(glob.glob(os.path.join(folder, 'image.*.pgm')) + glob.glob(os.path.join(folder, 'image.*.pgm.gz')))
-    if len(frames) < 2:
-        sys.exit(f'no frames image.NNNN.pgm in {folder}; apt-get install visp-images-data')
     with tempfile.TemporaryDirectory() as scratch:
+        frames = frames_of(folder, scratch)
+        if len(frames) < 2:
+            sys.exit(f'no frames image.NNNN.pgm in {folder}; apt-get install visp-images-data')
         scene = write_scene(frames, scratch)
         results = compare(args, scene, os.path.join(scratch, 'out'), '--solvers=single_circle', *args.flags.split())
     normals = normals_by_frame(results)

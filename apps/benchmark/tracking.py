@@ -21,13 +21,10 @@ places, two seconds apart: the track begins anew with each, and each is to be re
 frame of 640 x 480: processor time of the program on one core, the least of three runs, for a photograph of a board seen by a
 camera that turns; what it takes to start and to look at the first frame is taken off.
 """
-import glob
-import gzip
 import math
 import os
 import re
 import resource
-import shutil
 import statistics
 import subprocess
 import sys
@@ -37,7 +34,7 @@ import cv2
 import numpy
 
 from photographs import BOARDS
-from scripts import TOP, Claims, json_lines, make_scene, parser_of, read, write
+from scripts import TOP, Claims, frames_of, json_lines, make_scene, parser_of, read, write
 
 FAR_DEG, SURE, OPEN = 5.0, 0.95, 0.6
 
@@ -72,16 +69,6 @@ def count_flips(frames):
     return flips, settled
 
 
-def unpacked(frame, folder):
-    """The frame's absolute path; that of a copy where it is compressed."""
-    if not frame.endswith('.gz'):
-        return os.path.abspath(frame)
-    name = os.path.join(folder, os.path.basename(frame).removesuffix('.gz'))
-    with gzip.open(frame) as packed, open(name, 'wb') as file:
-        shutil.copyfileobj(packed, file)
-    return name
-
-
 def judge(frames, errors):
     """Text; how many are right, how many sure and wrong, flips."""
     errors = [(f, e) for f, e in errors if not f['predicted_only']]
@@ -98,7 +85,7 @@ def judge(frames, errors):
 
 
 def mire(args, claims):
-    frames = sorted(glob.glob(os.path.join(args.frames, 'image.*.pgm')) + glob.glob(os.path.join(args.frames, 'image.*.pgm.gz')))
+    frames = frames_of(args.frames, args.keep)
     if not frames:
         print(f'skipped: no frames image.NNNN.pgm in {args.frames}; apt-get install visp-images-data')
         return
@@ -109,7 +96,7 @@ def mire(args, claims):
     calibration = write(os.path.join(args.keep, 'mire.yml'),
                         f'%YAML:1.0\n---\nimage_width: 384\nimage_height: 288\ncamera_matrix: {camera[1]}\n'
                         f'distortion_coefficients: {camera[2]}\n')
-    photos = [f'--images={",".join(unpacked(frame, args.keep) for frame in frames)}', f'--camera={calibration}']
+    photos = [f'--images={",".join(frames)}', f'--camera={calibration}']
     for name, extra in (('disc alone', ['--roi=127,157,79,61']), ('all detected', [])):
         lines = track(args, 'mire-2 ' + name, photos, extra)
         stem = lambda f: os.path.splitext(os.path.basename(f['image']))[0]

@@ -16,6 +16,8 @@
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
 #include "circline/refine/pose_tracker.h"
+#include "tests/basics.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline {
 
@@ -46,11 +48,6 @@ class Trajectory {
 
   Trajectory(const TrajectoryOptions& options, std::uint64_t seed)
       : options_(options), random_(seed) {
-    camera.width = 1280;
-    camera.height = 960;
-    camera.fx = camera.fy = 1000.0;
-    camera.cx = 639.5;
-    camera.cy = 479.5;
     while (!Draw()) continue;
   }
 
@@ -62,8 +59,7 @@ class Trajectory {
     const auto pixel = [&](double x, double y) {
       Eigen::Vector2d p = Pixel(frame.pose, x, y);
       if (noise == nullptr) return p;
-      const double dx = noise->Normal(), dy = noise->Normal();
-      return Eigen::Vector2d(p + options_.noise_px * Eigen::Vector2d(dx, dy));
+      return Eigen::Vector2d(p + Noise2(options_.noise_px, noise));
     };
     for (const Circle& c : Circles()) {
       CircleObservation circle;
@@ -111,16 +107,11 @@ class Trajectory {
   }
   const TrajectoryOptions& options() const { return options_; }
 
-  Camera camera;
+  Camera camera = CenteredCamera(1000.0, 1280, 960);
   std::vector<Frame> frames;
 
  private:
   static constexpr double kTurn = 2.0 * kPi;
-
-  Eigen::Vector3d Normal() {
-    const double x = random_.Normal(), y = random_.Normal(), z = random_.Normal();
-    return {x, y, z};
-  }
 
   Frame First() {
     Frame first;
@@ -131,8 +122,8 @@ class Trajectory {
     first.pose.translation = options_.depth * Eigen::Vector3d(0.05, -0.05, 1.0);
     const Eigen::Vector3d about_origin =
         options_.speed * Eigen::Vector3d(std::cos(to), std::sin(to), 0.0);
-    first.turn_rate = about_origin + options_.initial_turn_rate_sigma * Normal();
-    first.velocity = options_.initial_velocity_sigma * options_.depth * Normal() -
+    first.turn_rate = about_origin + options_.initial_turn_rate_sigma * Noise3(1.0, &random_);
+    first.velocity = options_.initial_velocity_sigma * options_.depth * Noise3(1.0, &random_) -
                      about_origin.cross(first.pose.translation);
     return first;
   }
@@ -151,9 +142,9 @@ class Trajectory {
     constexpr int kSteps = 4;
     const double dt = 1.0 / (options_.fps * kSteps);
     for (int i = 0; i < kSteps; ++i) {
-      frame.turn_rate += options_.turn_rate_sigma * std::sqrt(dt) * Normal();
-      frame.velocity +=
-          options_.velocity_sigma * std::sqrt(dt) * frame.pose.translation.norm() * Normal();
+      frame.turn_rate += options_.turn_rate_sigma * std::sqrt(dt) * Noise3(1.0, &random_);
+      frame.velocity += options_.velocity_sigma * std::sqrt(dt) * frame.pose.translation.norm() *
+                        Noise3(1.0, &random_);
       const Eigen::Vector3d turn = dt * frame.turn_rate;
       frame.pose.rotation = ExpRotation(turn) * frame.pose.rotation;
       frame.pose.translation = ExpRotation(turn) * frame.pose.translation +

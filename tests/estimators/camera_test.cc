@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 
 namespace circline {
 namespace {
@@ -136,17 +137,17 @@ TEST(CameraTest, ValidateNamesTheField) {
   EXPECT_TRUE(camera.Validate().ok());
   camera.id = "cam7";
   camera.fx = 0.0;
-  EXPECT_NE(camera.Validate().message.find("fx"), std::string::npos);
-  EXPECT_NE(camera.Validate().message.find("cam7"), std::string::npos);
+  EXPECT_CONTAINS(camera.Validate().message, "fx");
+  EXPECT_CONTAINS(camera.Validate().message, "cam7");
   for (const double f : {-1.0, 1e-310, 1e300, std::numeric_limits<double>::quiet_NaN()}) {
     camera.fx = f;
     EXPECT_FALSE(camera.Validate().ok()) << f;
   }
   camera.fx = 500.0;
   camera.distortion[3] = std::numeric_limits<double>::infinity();
-  EXPECT_NE(camera.Validate().message.find("distortion must be finite"), std::string::npos);
+  EXPECT_CONTAINS(camera.Validate().message, "distortion must be finite");
   camera.distortion[3] = 1e-3;
-  EXPECT_NE(camera.Validate().message.find("pinhole camera has no distortion"), std::string::npos);
+  EXPECT_CONTAINS(camera.Validate().message, "pinhole camera has no distortion");
   camera.model = CameraModel::kOpenCV;
   EXPECT_TRUE(camera.Validate().ok());
 }

@@ -10,6 +10,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -34,8 +35,7 @@ struct Arc {
       p.x_from_pixel = {1.0 / kFocal, 0.0, 0.0, 1.0 / kFocal};
       p.x = EllipsePoint(ellipse, start + degrees * kDegree * i / kPoints);
       truth.push_back(p);
-      const double dx = random->Normal(), dy = random->Normal();
-      p.x += sigma_px / kFocal * Eigen::Vector2d(dx, dy);
+      p.x += Noise2(sigma_px / kFocal, random);
       noisy.push_back(p);
     }
   }

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/basics.h"
+
 namespace circline {
 namespace {
 
@@ -107,7 +109,7 @@ TEST(ErrorPropagation, PosesMustHaveAsManyContradictionsEach) {
       if (inputs[1].value[0] > above) poses[1].contradiction.push_back(0.0);
       return poses;
     };
-    EXPECT_NE(ErrorOf(uneven, Inputs()).find("contradictions"), std::string::npos) << above;
+    EXPECT_CONTAINS(ErrorOf(uneven, Inputs()), "contradictions") << above;
   }
 }
 

@@ -16,6 +16,7 @@
 #include "circline/estimators/line.h"
 #include "circline/estimators/random.h"
 #include "circline/estimators/vanishing_point.h"
+#include "tests/basics.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -74,8 +75,7 @@ struct FocalScene {
   }
   static CalibratedPoint Noisy(const Eigen::Vector3d& point, double sigma_px, Random* random) {
     CalibratedPoint p;
-    const double dx = random->Normal(), dy = random->Normal();
-    p.x = point.hnormalized() + sigma_px / kGuess * Eigen::Vector2d(dx, dy);
+    p.x = point.hnormalized() + Noise2(sigma_px / kGuess, random);
     p.x_from_pixel = {1.0 / kGuess, 0.0, 0.0, 1.0 / kGuess};
     return p;
   }

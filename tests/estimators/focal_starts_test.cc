@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/basics.h"
 #include "tests/plane_scene.h"
 #include "tests/trials.h"
 
@@ -27,12 +28,9 @@ CircleObservation Named(CircleObservation circle, const std::string& plane) {
 }
 
 std::vector<Kind> Kinds() {
-  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(),
-                        z = Eigen::Vector3d::UnitZ(), free(0.6, 0.8, 0.0);
-  const auto axes = [=](PlaneScene* scene, Observations* o) {
-    o->pencils = {scene->Pencil("x", PencilDirection::kX, x),
-                  scene->Pencil("y", PencilDirection::kY, y)};
-  };
+  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), z = Eigen::Vector3d::UnitZ(),
+                        free(0.6, 0.8, 0.0);
+  const auto axes = [](PlaneScene* scene, Observations* o) { o->pencils = scene->Axes(); };
   return {
       {"two axes", axes},
       {"three axes",
@@ -231,7 +229,7 @@ TEST(FocalStartsTest, SaysWhatCouldNotSay) {
   Observations blind = Scene().Empty();
   blind.camera.fx = 0.0;
   EXPECT_TRUE(FocalLengthStarts(blind, 0.1, exact, &problems).empty());
-  EXPECT_NE(problems.back().find("fx"), std::string::npos) << problems.back();
+  EXPECT_CONTAINS(problems.back(), "fx");
 
   // A circle alone, with the plane that it names.
   PlaneScene scene = Scene();
@@ -241,7 +239,7 @@ TEST(FocalStartsTest, SaysWhatCouldNotSay) {
   problems.clear();
   EXPECT_TRUE(FocalLengthStarts(alone, 0.1, exact, &problems).empty());
   ASSERT_EQ(problems.size(), 1U);
-  EXPECT_NE(problems[0].find("'c'"), std::string::npos) << problems[0];
+  EXPECT_CONTAINS(problems[0], "'c'");
 }
 
 TEST(FocalStartsTest, NumbersThatAreNotFiniteAreRefused) {

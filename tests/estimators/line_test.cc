@@ -10,6 +10,7 @@
 
 #include "circline/estimators/random.h"
 #include "circline/estimators/vanishing_point.h"
+#include "tests/basics.h"
 #include "tests/pinhole_camera.h"
 #include "tests/trials.h"
 
@@ -32,9 +33,8 @@ std::vector<CalibratedPoint> NoisyLine(const Camera& camera, const Eigen::Vector
     const Eigen::Vector2d x = a + (b - a) * i / (n - 1);
     Eigen::Vector2d pixel;
     CameraToPixel(camera, {x.x(), x.y(), 1.0}, &pixel);
-    const double dx = random->Normal(), dy = random->Normal();
     CalibratedPoint p;
-    PixelToCalibrated(camera, pixel + sigma_px * Eigen::Vector2d(dx, dy), &p);
+    PixelToCalibrated(camera, pixel + Noise2(sigma_px, random), &p);
     points.push_back(p);
   }
   return points;

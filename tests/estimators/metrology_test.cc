@@ -11,6 +11,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 
 namespace circline {
 namespace {
@@ -265,9 +266,8 @@ TEST_P(MetrologyUncertaintyTest, SigmaIsTheSpread) {
     refined.fx = refined.fy = given.fx * (h.focal_scale + delta[6]);
     std::array<Vector3d, 5> x;
     for (std::size_t i = 0; i < 5; ++i) {
-      const double dx = random.Normal(), dy = random.Normal();
       CalibratedPoint point;
-      ASSERT_TRUE(PixelToCalibrated(refined, p[i] + kSigmaPx * Vector2d(dx, dy), &point));
+      ASSERT_TRUE(PixelToCalibrated(refined, p[i] + Noise2(kSigmaPx, &random), &point));
       x[i] = point.Homogeneous();
     }
     std::array<double, 6> v;

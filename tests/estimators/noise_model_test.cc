@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/basics.h"
+
 namespace circline {
 namespace {
 
@@ -39,13 +41,13 @@ TEST(NoiseModel, NamesBadFields) {
   EXPECT_TRUE(NoiseModel::Exact().Validate().ok());
   NoiseModel model;
   model.circle_tilt_rad = -1.0;
-  EXPECT_NE(model.Validate().message.find("circle_tilt_rad"), std::string::npos);
+  EXPECT_CONTAINS(model.Validate().message, "circle_tilt_rad");
   model = NoiseModel();
   model.correlation_px = 0.0;
-  EXPECT_NE(model.Validate().message.find("correlation_px"), std::string::npos);
+  EXPECT_CONTAINS(model.Validate().message, "correlation_px");
   model = NoiseModel();
   model.camera.log_focal = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_NE(model.Validate().message.find("camera.log_focal"), std::string::npos);
+  EXPECT_CONTAINS(model.Validate().message, "camera.log_focal");
 }
 
 TEST(NoiseModel, TrustsTheAspectOfSquarePixelsOnly) {

@@ -6,6 +6,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 #include "tests/pinhole_camera.h"
 
 namespace circline {
@@ -17,18 +18,13 @@ Observations MakePhoto() {
   return photo;
 }
 
-Eigen::Vector2d Jitter(double sigma, Random* random) {
-  const double x = random->Normal(), y = random->Normal();
-  return sigma * Eigen::Vector2d(x, y);
-}
-
 void AddCircle(double sigma, int n, Random* random, Observations* photo) {
   CircleObservation circle;
   circle.id = "c" + std::to_string(photo->circles.size());
   for (int i = 0; i < n; ++i) {
     const double t = 2.0 * kPi * i / n;
     circle.points.push_back(Eigen::Vector2d(300.0 + 100.0 * std::cos(t), 200 + 60.0 * std::sin(t)) +
-                            Jitter(sigma, random));
+                            Noise2(sigma, random));
   }
   photo->circles.push_back(circle);
 }
@@ -42,7 +38,7 @@ void AddPencil(double sigma, int num_lines, int n, Random* random, Observations*
     for (int k = 0; k < n; ++k) {
       const double share = k / (n - 1.0), y = 40.0 * i;
       const Eigen::Vector2d from(100.0, y), to(500.0, y + (300.0 - y) * 400.0 / 1900.0);
-      line.points.push_back(from + share * (to - from) + Jitter(sigma, random));
+      line.points.push_back(from + share * (to - from) + Noise2(sigma, random));
     }
     pencil.lines.push_back(line);
   }

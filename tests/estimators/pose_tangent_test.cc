@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -24,12 +25,8 @@ const std::vector<PoseTangent>& AllTangents() {
   return *all;
 }
 
-Vector3d DrawVector(Random* random, double size) {
-  return size * Vector3d(random->Normal(), random->Normal(), random->Normal());
-}
-
 CameraPose DrawPose(Random* random) {
-  return {ExpRotation(DrawVector(random, 1.5)), DrawVector(random, 3.0)};
+  return {ExpRotation(Noise3(1.5, random)), Noise3(3.0, random)};
 }
 
 Matrix4d Homogeneous(const CameraPose& pose) {
@@ -94,7 +91,7 @@ TEST(PoseTangentTest, MovesThePoseAsTheLibraryDoes) {
   for (int trial = 0; trial < 100; ++trial) {
     const CameraPose pose = DrawPose(&random);
     Vector6d change;
-    change << DrawVector(&random, kStep), DrawVector(&random, kStep);
+    change << Noise3(kStep, &random), Noise3(kStep, &random);
     for (const PoseTangent& tangent : AllTangents()) {
       const Vector6d xi = TangentJacobian(pose, tangent) * change;
       const double off =
@@ -111,7 +108,7 @@ TEST(PoseTangentTest, AgreesWithTheOtherRetractionOfGtsam) {
   for (int trial = 0; trial < 100; ++trial) {
     const CameraPose pose = DrawPose(&random);
     Vector6d change;
-    change << DrawVector(&random, kStep), DrawVector(&random, kStep);
+    change << Noise3(kStep, &random), Noise3(kStep, &random);
     const Vector6d xi = TangentJacobian(pose, kGtsamPose3) * change;
     const Matrix4d kept = Kept(pose, kGtsamPose3);
     const Matrix3d R = kept.topLeftCorner<3, 3>();

@@ -14,6 +14,7 @@
 #include "circline/estimators/circular_points.h"
 #include "circline/estimators/line_pose.h"
 #include "circline/estimators/random.h"
+#include "circline/refine/statistics.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -89,20 +90,15 @@ struct MethodErrors {
       ++(degenerate ? near_degenerate_failures : regular_failures);
     }
   }
-  static double Median(std::vector<double>* v) {
-    const auto middle = v->begin() + static_cast<std::ptrdiff_t>(v->size() / 2);
-    std::nth_element(v->begin(), middle, v->end());
-    return *middle;
-  }
   void Check(const char* name) {
     ASSERT_FALSE(regular.empty());
-    const double median = Median(&regular);
+    const double median = Median(regular);
     const double worst = *std::max_element(regular.begin(), regular.end());
     std::printf("%-18s %8zu scenes  failures %d  median %.1e  max %.1e rad", name, regular.size(),
                 regular_failures, median, worst);
     if (!near_degenerate.empty()) {
       std::printf("   near-degenerate %7zu  failures %d  median %.1e  max %.1e",
-                  near_degenerate.size(), near_degenerate_failures, Median(&near_degenerate),
+                  near_degenerate.size(), near_degenerate_failures, Median(near_degenerate),
                   *std::max_element(near_degenerate.begin(), near_degenerate.end()));
     }
     std::printf("\n");

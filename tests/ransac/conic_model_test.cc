@@ -5,18 +5,18 @@
 #include <array>
 #include <cmath>
 
+#include "apps/benchmark/robust_fit_scenes.h"
 #include "circline/estimators/conic_fit.h"
 #include "circline/estimators/random.h"
-#include "tests/ransac/conic_scene.h"
 
 namespace circline {
 namespace {
 
-using conic_scene::MakeScene;
-using conic_scene::Scene;
+using apps::ConicScene;
+using apps::MakeConicScene;
 
 TEST(ConicModel, ResidualsAreDistancesInPixels) {
-  const Scene scene = MakeScene(2, 0.5);
+  const ConicScene scene = MakeConicScene({100, 0.5}, 2);
   const ConicModel model(scene.points);
   const std::array<int, 5> sample{0, 1, 2, 3, 4};
   Random random(1);
@@ -50,7 +50,7 @@ TEST(ConicModel, ResidualsAreDistancesInPixels) {
 }
 
 TEST(ConicModel, RefineFindsTheMaximumLikelihood) {
-  const Scene scene = MakeScene(4, 0.0);
+  const ConicScene scene = MakeConicScene({100, 0.0}, 4);
   const ConicModel model(scene.points);
   ConicFit fit;
   ASSERT_TRUE(FitConic(scene.points, 1.0, &fit).ok());
@@ -67,7 +67,7 @@ TEST(ConicModel, RefineFindsTheMaximumLikelihood) {
 }
 
 TEST(ConicModel, RefineNeedsFivePoints) {
-  const Scene scene = MakeScene(4, 0.0);
+  const ConicScene scene = MakeConicScene({100, 0.0}, 4);
   const ConicModel model(scene.points);
   std::vector<float> weights(scene.points.size(), 0.0f);
   for (std::size_t i = 0; i < 4; ++i) weights[i] = 1.0f;

@@ -13,6 +13,7 @@
 #include "circline/estimators/conic.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/fit_observations.h"
+#include "tests/basics.h"
 #include "tests/ransac/stray_points_scene.h"
 #include "tests/trials.h"
 
@@ -125,8 +126,7 @@ TEST(FitObservationsNoise, FindsNoEllipseInClutter) {
           const std::vector<std::string> problems = FitProblems(&observations);
           fits += observations.circles[0].fit.has_value() ? 1 : 0;
           silent += problems.empty() ? 1 : 0;
-          for (const std::string& problem : problems)
-            EXPECT_NE(problem.find("'clutter'"), std::string::npos) << problem;
+          for (const std::string& problem : problems) EXPECT_CONTAINS(problem, "'clutter'");
         }
         if (kSanitized) continue;
         EXPECT_LE(silent, 0.02 * trials) << stated_px << ' ' << width_px << ' ' << num_points;
@@ -194,7 +194,7 @@ TEST(FitObservationsNoise, AStatedNoiseThatIsFarTooSmallIsNamed) {
         continue;
       }
       ASSERT_FALSE(problems.empty()) << stated_px << ' ' << seed;
-      EXPECT_NE(problems[0].find("state none, or a larger one"), std::string::npos) << problems[0];
+      EXPECT_CONTAINS(problems[0], "state none, or a larger one");
     }
   }
 }
@@ -234,10 +234,9 @@ TEST(FitObservationsNoise, ASecondRimIsASecondReadingAndNamed) {
   circle.id = "cover";
   for (int i = 0; i < 140; ++i) {
     const double t = 0.0628 * i, scale = i < 100 ? 1.0 : 1.15;
-    const double x = random.Normal(), y = random.Normal();
     circle.points.emplace_back(
         Pixel(0.05 + 0.15 * scale * std::cos(t), 0.09 * scale * std::sin(t)) +
-        0.5 * Eigen::Vector2d(x, y));
+        Noise2(0.5, &random));
   }
   observations.circles = {circle};
   const std::vector<std::string> problems = FitProblems(&observations);
@@ -249,7 +248,7 @@ TEST(FitObservationsNoise, ASecondRimIsASecondReadingAndNamed) {
   EXPECT_NEAR(static_cast<double>(std::count(others.begin() + 100, others.end(), 1)), 40.0, 2.0);
   EXPECT_LE(std::count(others.begin(), others.begin() + 100, 1), 2);
   ASSERT_EQ(problems.size(), 1U);
-  EXPECT_NE(problems[0].find("circle 'cover': a second ellipse"), std::string::npos) << problems[0];
+  EXPECT_CONTAINS(problems[0], "circle 'cover': a second ellipse");
 }
 
 TEST(FitObservationsNoise, ACapIsKept) {

@@ -6,48 +6,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "circline/estimators/random.h"
-#include "tests/ransac/conic_scene.h"
+#include "apps/benchmark/robust_fit_scenes.h"
+#include "tests/basics.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline {
 namespace {
 
-struct LineScene {
-  std::vector<CalibratedPoint> points, truth;
-
-  // In units of the Cramer-Rao bound (2 parameters).
-  double Error(const Eigen::Vector3d& line) const {
-    double sum = 0.0;
-    for (const CalibratedPoint& p : truth) {
-      const double d = LineDistancePx(p, line);
-      sum += d * d;
-    }
-    return std::sqrt(sum / 2.0);
-  }
-};
-
-// 100 points along 300 px with sigma 1 px, outliers uniform in 400 x 400 px.
-LineScene MakeLineScene(std::uint64_t seed, double outlier_ratio, double sigma = 1.0) {
-  Random random(seed);
-  const double angle = random.Uniform(0.0, 3.14159);
-  const Eigen::Vector2d along(std::cos(angle), std::sin(angle)), center(320.0, 240.0);
-  std::vector<Eigen::Vector2d> truth, pixels;
-  for (int i = 0; i < 100; ++i) {
-    truth.push_back(center + along * (3.0 * i - 150.0));
-    const double nx = random.Normal(), ny = random.Normal();
-    pixels.push_back(truth.back() + sigma * Eigen::Vector2d(nx, ny));
-  }
-  const int num_outliers =
-      static_cast<int>(std::lround(100.0 * outlier_ratio / (1.0 - outlier_ratio)));
-  for (int i = 0; i < num_outliers; ++i) {
-    const double x = random.Uniform(-200.0, 200.0), y = random.Uniform(-200.0, 200.0);
-    pixels.push_back(center + Eigen::Vector2d(x, y));
-  }
-  LineScene scene;
-  PixelsToCalibrated(conic_scene::TestCamera(), pixels, &scene.points);
-  PixelsToCalibrated(conic_scene::TestCamera(), truth, &scene.truth);
-  return scene;
-}
+using apps::LineScene;
+using apps::MakeLineScene;
 
 TEST(FitLineRobust, IsEfficientUpToSeventyPercentOutliers) {
   struct Case {
@@ -56,7 +23,7 @@ TEST(FitLineRobust, IsEfficientUpToSeventyPercentOutliers) {
   for (const Case& c : {Case{0.0, 1.0}, Case{0.5, 1.05}, Case{0.7, 1.1}}) {
     std::vector<double> errors;
     for (std::uint64_t seed = 0; seed < 100; ++seed) {
-      const LineScene scene = MakeLineScene(seed, c.outlier_ratio);
+      const LineScene scene = MakeLineScene(c.outlier_ratio, 1.0, seed);
       LineFit fit;
       ASSERT_TRUE(FitLineRobust(scene.points, RobustFitOptions(), &fit).ok());
       errors.push_back(scene.Error(fit.line));
@@ -69,7 +36,7 @@ TEST(FitLineRobust, IsEfficientUpToSeventyPercentOutliers) {
 }
 
 TEST(FitLineRobust, MaskIsThatOfTheReturnedLine) {
-  const LineScene scene = MakeLineScene(3, 0.6);
+  const LineScene scene = MakeLineScene(0.6, 1.0, 3);
   const RobustFitOptions options;
   LineFit fit;
   std::vector<std::uint8_t> mask;
@@ -82,7 +49,7 @@ TEST(FitLineRobust, MaskIsThatOfTheReturnedLine) {
 }
 
 TEST(FitLineRobust, CleanPointsGiveTheFitOfEstimators) {
-  const LineScene scene = MakeLineScene(3, 0.0, 0.3);
+  const LineScene scene = MakeLineScene(0.0, 0.3, 3);
   LineFit robust, direct;
   ASSERT_TRUE(FitLineRobust(scene.points, RobustFitOptions(), &robust).ok());
   ASSERT_TRUE(FitLine(scene.points, 1.0, &direct).ok());
@@ -92,7 +59,7 @@ TEST(FitLineRobust, CleanPointsGiveTheFitOfEstimators) {
 
 TEST(FitLineRobust, TwoPointsAreFittedAsTheyAre) {
   std::vector<CalibratedPoint> points;
-  PixelsToCalibrated(conic_scene::TestCamera(), {{100.0, 200.0}, {400.0, 250.0}}, &points);
+  PixelsToCalibrated(PinholeCamera(), {{100.0, 200.0}, {400.0, 250.0}}, &points);
   LineFit fit;
   std::vector<std::uint8_t> mask;
   ASSERT_TRUE(FitLineRobust(points, RobustFitOptions(), &fit, &mask).ok());
@@ -103,7 +70,7 @@ TEST(FitLineRobust, TwoPointsAreFittedAsTheyAre) {
 
 TEST(FitLineRobust, OneStrayPointOfFour) {
   std::vector<CalibratedPoint> points;
-  PixelsToCalibrated(conic_scene::TestCamera(),
+  PixelsToCalibrated(PinholeCamera(),
                      {{100.0, 200.0}, {200.0, 200.1}, {240.0, 260.0}, {400.0, 200.0}}, &points);
   LineFit fit;
   std::vector<std::uint8_t> mask;
@@ -117,8 +84,7 @@ TEST(FitLineRobust, RefusesWhatHoldsNoLine) {
   EXPECT_EQ(FitLineRobust({}, options, &fit).code, StatusCode::kRefused);
   for (const std::size_t n : {1u, 2u, 10u}) {
     std::vector<CalibratedPoint> points;
-    PixelsToCalibrated(conic_scene::TestCamera(), std::vector<Eigen::Vector2d>(n, {100.0, 50.0}),
-                       &points);
+    PixelsToCalibrated(PinholeCamera(), std::vector<Eigen::Vector2d>(n, {100.0, 50.0}), &points);
     EXPECT_EQ(FitLineRobust(points, options, &fit).code, StatusCode::kRefused) << n;
   }
 }
@@ -127,13 +93,13 @@ TEST(FitLineRobust, NamesBadOptions) {
   RobustFitOptions options;
   options.sigma_px = -1.0;
   LineFit fit;
-  const Status status = FitLineRobust(MakeLineScene(1, 0.0).points, options, &fit);
+  const Status status = FitLineRobust(MakeLineScene(0.0, 1.0, 1).points, options, &fit);
   EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
-  EXPECT_NE(status.message.find("sigma_px"), std::string::npos);
+  EXPECT_CONTAINS(status.message, "sigma_px");
 }
 
 TEST(LineModel, ResidualsAreDistancesInPixels) {
-  const LineScene scene = MakeLineScene(2, 0.5);
+  const LineScene scene = MakeLineScene(0.5, 1.0, 2);
   const LineModel model(scene.points);
   const std::array<int, 2> sample{3, 90};
   LineModel::Value value;

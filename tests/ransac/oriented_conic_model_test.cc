@@ -4,23 +4,24 @@
 
 #include <array>
 
+#include "apps/benchmark/robust_fit_scenes.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/ransac.h"
-#include "tests/ransac/conic_scene.h"
+#include "tests/pinhole_camera.h"
 
 namespace circline {
 namespace {
 
-using conic_scene::MakeScene;
-using conic_scene::Scene;
+using apps::ConicScene;
+using apps::MakeConicScene;
 
 // Points of a calibrated ellipse, seen through a lens, with their exact normals on the photo.
-Scene ExactScene(const Ellipse& ellipse, int num_points) {
-  Camera camera = conic_scene::TestCamera();
+ConicScene ExactScene(const Ellipse& ellipse, int num_points) {
+  Camera camera = PinholeCamera();
   camera.model = CameraModel::kOpenCV;
   camera.distortion = {-0.3, 0.1, 1e-3, -1e-3, 0.0, 0.0, 0.0, 0.0};
-  Scene scene;
+  ConicScene scene;
   std::vector<Eigen::Vector2d> pixels;
   for (int i = 0; i < num_points; ++i) {
     std::array<Eigen::Vector2d, 3> p;  // The point and its neighbours on the contour.
@@ -42,7 +43,7 @@ TEST(OrientedConicModel, ThreeExactPointsGiveTheExactEllipse) {
   truth.a = 0.2;
   truth.b = 0.12;
   truth.angle = 0.6;
-  const Scene scene = ExactScene(truth, 40);
+  const ConicScene scene = ExactScene(truth, 40);
   const ConicModel points(scene.points, scene.directions);
   const OrientedConicModel model(points);
   Random random(1);
@@ -63,13 +64,19 @@ TEST(OrientedConicModel, ThreeExactPointsGiveTheExactEllipse) {
   }
 }
 
-// Share of samples of three of the points from..to-1 that give an ellipse.
-double FitShare(const Scene& scene, const ConicModel& points, int from, int to) {
-  const OrientedConicModel model(points);
-  std::vector<int> position(scene.points.size());
+// Where the model has each of the points.
+std::vector<int> Positions(const ConicModel& points) {
+  std::vector<int> position(static_cast<std::size_t>(points.NumData()));
   for (int i = 0; i < points.NumData(); ++i) {
     position[static_cast<std::size_t>(points.PointIndex(i))] = i;
   }
+  return position;
+}
+
+// Share of samples of three of the points from..to-1 that give an ellipse.
+double FitShare(const ConicModel& points, int from, int to) {
+  const OrientedConicModel model(points);
+  const std::vector<int> position = Positions(points);
   Random random(3);
   constexpr int kTrials = 4000;
   int fitted = 0;
@@ -85,16 +92,16 @@ double FitShare(const Scene& scene, const ConicModel& points, int from, int to) 
 }
 
 TEST(OrientedConicModel, RefusesMostSamplesOfOutliersAndFewOfInliers) {
-  const Scene scene = MakeScene(1, 0.7);
+  const ConicScene scene = MakeConicScene({100, 0.7}, 1);
   const ConicModel points(scene.points, scene.directions);
-  const double inliers = FitShare(scene, points, 0, 100);
-  const double outliers = FitShare(scene, points, 100, points.NumData());
+  const double inliers = FitShare(points, 0, 100);
+  const double outliers = FitShare(points, 100, points.NumData());
   EXPECT_GT(inliers, 0.7);
   EXPECT_LT(outliers, 0.25);
 }
 
 TEST(OrientedConicModel, ResidualsHoldDistanceAndDirection) {
-  const Scene scene = MakeScene(2, 0.5);
+  const ConicScene scene = MakeConicScene({100, 0.5}, 2);
   const double threshold = 2.0;
   const ConicModel model(scene.points, scene.directions, threshold);
   ConicFit truth;
@@ -119,7 +126,7 @@ TEST(OrientedConicModel, ResidualsHoldDistanceAndDirection) {
 }
 
 TEST(OrientedConicModel, NeedsFarFewerDraws) {
-  const Scene scene = MakeScene(4, 0.7);
+  const ConicScene scene = MakeConicScene({100, 0.7}, 4);
   const ConicModel points(scene.points, scene.directions);
   const ConicModel plain(scene.points);
   RansacOptions options;
@@ -135,15 +142,12 @@ TEST(OrientedConicModel, NeedsFarFewerDraws) {
 }
 
 TEST(OrientedConicModel, RefusesDegenerateSamples) {
-  Scene scene = MakeScene(1, 0.0);
+  ConicScene scene = MakeConicScene({100, 0.0}, 1);
   scene.directions.normals[1].setZero();
   scene.points[3] = scene.points[2];
   const ConicModel points(scene.points, scene.directions);
   const OrientedConicModel model(points);
-  std::vector<int> position(scene.points.size());
-  for (int i = 0; i < points.NumData(); ++i) {
-    position[static_cast<std::size_t>(points.PointIndex(i))] = i;
-  }
+  const std::vector<int> position = Positions(points);
   ConicModel::Value value;
   const std::array<int, 3> unknown{position[1], position[40], position[70]};
   EXPECT_FALSE(model.Fit(unknown.data(), &value));

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "circline/estimators/random.h"
@@ -14,14 +15,11 @@
 namespace circline {
 namespace {
 
-using segment_scene::AddSegment;
-
 TEST(PencilModel, ResidualsAreThoseOfTheFit) {
   Random random(7);
-  std::vector<LineFit> lines;
-  for (int i = 0; i < 20; ++i) AddSegment(nullptr, &random, &lines);
-  std::vector<int> indices;
-  for (int i = 0; i < 20; ++i) indices.push_back(i);
+  const std::vector<LineFit> lines = segment_scene::StrayLines(20, &random);
+  std::vector<int> indices(lines.size());
+  std::iota(indices.begin(), indices.end(), 0);
   const PencilModel model(lines, indices, 0.0);
   const std::array<int, 2> sample{3, 8};
   PencilModel::Value value;

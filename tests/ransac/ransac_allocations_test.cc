@@ -4,15 +4,16 @@
 #include <atomic>
 #include <cstdlib>
 #include <new>
+#include <numeric>
 #include <utility>
 #include <vector>
 
+#include "apps/benchmark/robust_fit_scenes.h"
 #include "circline/ransac/conic_model.h"
 #include "circline/ransac/line_model.h"
 #include "circline/ransac/oriented_conic_model.h"
 #include "circline/ransac/pencil_model.h"
 #include "circline/ransac/ransac.h"
-#include "tests/ransac/conic_scene.h"
 #include "tests/ransac/location_model.h"
 #include "tests/ransac/segment_scene.h"
 
@@ -86,23 +87,18 @@ void ExpectNoAllocations(const Model& model, double threshold) {
 }
 
 TEST(Ransac, TheModelsAllocateNothingInTheLoop) {
-  const conic_scene::Scene contour = conic_scene::MakeScene(1, 0.5);
+  const apps::ConicScene contour = apps::MakeConicScene({100, 0.5}, 1);
   const ConicModel conic(contour.points);
   const ConicModel oriented(contour.points, contour.directions);
   ExpectNoAllocations(conic, kInlierSigmas);
   ExpectNoAllocations(OrientedConicModel(oriented), kInlierSigmas);
   ExpectNoAllocations(LineModel(contour.points), kInlierSigmas);
   Random random(1);
-  const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
-  std::vector<LineFit> lines;
-  std::vector<int> indices;
-  for (int i = 0; i < 60; ++i) {
-    const Eigen::Vector3d v = R.col(i % 2);
-    segment_scene::AddSegment(i < 40 ? &v : nullptr, &random, &lines);
-    indices.push_back(i);
-  }
-  const PencilModel pencil(lines, indices, 0.0);
-  ExpectNoAllocations(pencil, kInlierSigmas);
+  const std::vector<LineFit> lines =
+      segment_scene::Lines(segment_scene::RandomRotation(&random).col(0), 40, 20, &random);
+  std::vector<int> indices(lines.size());
+  std::iota(indices.begin(), indices.end(), 0);
+  ExpectNoAllocations(PencilModel(lines, indices, 0.0), kInlierSigmas);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "tests/basics.h"
 #include "tests/ransac/location_model.h"
 
 namespace circline {
@@ -195,11 +196,11 @@ TEST(RansacOptions, NamesTheBadField) {
     c.spoil(&options.ransac);
     const Status status = options.Validate();
     EXPECT_EQ(status.code, StatusCode::kInvalidArgument) << c.field;
-    EXPECT_NE(status.message.find(c.field), std::string::npos) << status.message;
+    EXPECT_CONTAINS(status.message, c.field);
   }
   RobustFitOptions options;
   options.sigma_px = 0.0;
-  EXPECT_NE(options.Validate().message.find("sigma_px"), std::string::npos);
+  EXPECT_CONTAINS(options.Validate().message, "sigma_px");
 }
 
 }  // namespace

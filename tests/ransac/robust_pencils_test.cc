@@ -7,7 +7,9 @@
 #include <cmath>
 #include <set>
 
+#include "apps/benchmark/robust_fit_scenes.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 #include "tests/ransac/segment_scene.h"
 
 namespace circline {
@@ -15,22 +17,18 @@ namespace {
 
 using segment_scene::AddSegment;
 using segment_scene::AngleBetween;
+using segment_scene::Lines;
 using segment_scene::RandomRotation;
+using segment_scene::StrayLines;
 
 TEST(FindPencils, ThreeDirectionsAmongFiftyPercentClutter) {
   constexpr int kTrials = 40;
   double squared_error = 0.0, bound = 0.0;
   for (std::uint64_t trial = 0; trial < kTrials; ++trial) {
-    Random random(trial);
-    const Eigen::Matrix3d R = RandomRotation(&random);
-    std::vector<LineFit> lines;
-    for (int k = 0; k < 3; ++k) {
-      const Eigen::Vector3d direction = R.col(k);
-      for (int i = 0; i < 30; ++i) AddSegment(&direction, &random, &lines);
-    }
-    ASSERT_EQ(lines.size(), 90u);
-    const std::vector<LineFit> inliers = lines;
-    for (int i = 0; i < 90; ++i) AddSegment(nullptr, &random, &lines);
+    const apps::PencilScene scene = apps::MakePencilScene(30, 0.5, trial);
+    const Eigen::Matrix3d& R = scene.rotation;
+    const std::vector<LineFit>& lines = scene.lines;
+    ASSERT_EQ(lines.size(), 180u);
     PencilOptions options;
     options.model_sigma_rad = 0.0;
     std::vector<FoundPencil> pencils;
@@ -50,7 +48,7 @@ TEST(FindPencils, ThreeDirectionsAmongFiftyPercentClutter) {
       EXPECT_LT(error, 0.05) << trial;
       squared_error += error * error;
       VanishingPointFit oracle;
-      const std::vector<LineFit> own(inliers.begin() + 30 * k, inliers.begin() + 30 * (k + 1));
+      const std::vector<LineFit> own(lines.begin() + 30 * k, lines.begin() + 30 * (k + 1));
       ASSERT_TRUE(FitVanishingPoint(own, &oracle).ok());
       bound += oracle.covariance.trace();
       EXPECT_GE(pencil.lines.size(), 20u);
@@ -66,10 +64,8 @@ TEST(FindPencils, ClutterAloneHoldsNone) {
   int found = 0;
   for (std::uint64_t trial = 0; trial < 20; ++trial) {
     Random random(500 + trial);
-    std::vector<LineFit> lines;
-    for (int i = 0; i < 60; ++i) AddSegment(nullptr, &random, &lines);
     std::vector<FoundPencil> pencils;
-    ASSERT_TRUE(FindPencils(lines, PencilOptions(), &pencils).ok());
+    ASSERT_TRUE(FindPencils(StrayLines(60, &random), PencilOptions(), &pencils).ok());
     found += static_cast<int>(pencils.size());
   }
   EXPECT_LE(found, 1);
@@ -100,10 +96,7 @@ TEST(FindPencils, KeepsToItsStoppingRule) {
 
 TEST(FindPencils, SameSeedSameBits) {
   Random random(7);
-  const Eigen::Vector3d direction = RandomRotation(&random).col(0);
-  std::vector<LineFit> lines;
-  for (int i = 0; i < 20; ++i) AddSegment(&direction, &random, &lines);
-  for (int i = 0; i < 20; ++i) AddSegment(nullptr, &random, &lines);
+  const std::vector<LineFit> lines = Lines(RandomRotation(&random).col(0), 20, 20, &random);
   std::vector<FoundPencil> a, b;
   ASSERT_TRUE(FindPencils(lines, PencilOptions(), &a).ok());
   ASSERT_TRUE(FindPencils(lines, PencilOptions(), &b).ok());
@@ -124,9 +117,7 @@ TEST(FindPencils, FewOrBadLinesAreNoPencil) {
   EXPECT_TRUE(pencils.empty());
   // One line again and again.
   Random random(7);
-  std::vector<LineFit> same;
-  AddSegment(nullptr, &random, &same);
-  same.resize(10, same[0]);
+  const std::vector<LineFit> same(10, StrayLines(1, &random)[0]);
   ASSERT_TRUE(FindPencils(same, PencilOptions(), &pencils).ok());
   EXPECT_TRUE(pencils.empty());
 }
@@ -149,16 +140,14 @@ TEST(FindPencils, NamesBadOptions) {
     std::vector<FoundPencil> pencils;
     const Status status = FindPencils({}, options, &pencils);
     EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
-    EXPECT_NE(status.message.find(c.field), std::string::npos) << status.message;
+    EXPECT_CONTAINS(status.message, c.field);
   }
 }
 
 TEST(FitVanishingPointRobust, LeavesStrayLinesOut) {
   Random random(11);
   const Eigen::Vector3d direction = RandomRotation(&random).col(0);
-  std::vector<LineFit> lines;
-  for (int i = 0; i < 12; ++i) AddSegment(&direction, &random, &lines);
-  for (int i = 0; i < 8; ++i) AddSegment(nullptr, &random, &lines);
+  std::vector<LineFit> lines = Lines(direction, 12, 8, &random);
   lines.emplace_back();  // Never fitted.
   VanishingPointFit fit;
   std::vector<std::uint8_t> mask;
@@ -174,8 +163,7 @@ TEST(FitVanishingPointRobust, LeavesStrayLinesOut) {
 TEST(FitVanishingPointRobust, InfinityIsNothingSpecial) {
   const Eigen::Vector3d direction(1.0, 0.0, 0.0);
   Random random(12);
-  std::vector<LineFit> lines;
-  for (int i = 0; i < 12; ++i) AddSegment(&direction, &random, &lines);
+  const std::vector<LineFit> lines = Lines(direction, 12, 0, &random);
   VanishingPointFit fit;
   ASSERT_TRUE(FitVanishingPointRobust(lines, PencilOptions(), &fit).ok());
   EXPECT_LT(AngleBetween(direction, fit.direction), 0.02);
@@ -183,9 +171,7 @@ TEST(FitVanishingPointRobust, InfinityIsNothingSpecial) {
 
 TEST(FitVanishingPointRobust, TwoLinesMeet) {
   Random random(13);
-  const Eigen::Vector3d direction = RandomRotation(&random).col(0);
-  std::vector<LineFit> lines;
-  for (int i = 0; i < 2; ++i) AddSegment(&direction, &random, &lines);
+  const std::vector<LineFit> lines = Lines(RandomRotation(&random).col(0), 2, 0, &random);
   VanishingPointFit fit;
   std::vector<std::uint8_t> mask;
   ASSERT_TRUE(FitVanishingPointRobust(lines, PencilOptions(), &fit, &mask).ok());
@@ -199,7 +185,7 @@ TEST(FitVanishingPointRobust, RefusesWhatHasNoDirection) {
   std::vector<LineFit> same;
   VanishingPointFit fit;
   EXPECT_EQ(FitVanishingPointRobust(same, PencilOptions(), &fit).code, StatusCode::kRefused);
-  AddSegment(nullptr, &random, &same);
+  same = StrayLines(1, &random);
   EXPECT_EQ(FitVanishingPointRobust(same, PencilOptions(), &fit).code, StatusCode::kRefused);
   same.resize(2, same[0]);
   EXPECT_EQ(FitVanishingPointRobust(same, PencilOptions(), &fit).code, StatusCode::kRefused);

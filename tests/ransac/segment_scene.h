@@ -1,4 +1,4 @@
-// Segments along given directions among clutter, for the tests of pencils.
+// Segments along given directions among clutter, for the tests and benchmarks of pencils.
 #ifndef CIRCLINE_TESTS_RANSAC_SEGMENT_SCENE_H_
 #define CIRCLINE_TESTS_RANSAC_SEGMENT_SCENE_H_
 
@@ -11,6 +11,7 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 #include "tests/pinhole_camera.h"
 
 namespace circline::segment_scene {
@@ -33,16 +34,16 @@ inline void AddSegment(const Eigen::Vector3d* direction, Random* random,
     const Eigen::Vector3d x((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
     along = (*direction - direction->z() * x).head<2>().normalized();
   }
+  constexpr double kSigma = 0.5;
   const double half = random->Uniform(10.0, 60.0);
   std::vector<Eigen::Vector2d> ends = {{u, v}, {u, v}};
   for (std::size_t i = 0; i < 2; ++i) {
-    const double nx = random->Normal(), ny = random->Normal();
-    ends[i] += (i == 0 ? half : -half) * along + 0.5 * Eigen::Vector2d(nx, ny);
+    ends[i] = ends[i] + (i == 0 ? half : -half) * along + Noise2(kSigma, random);
   }
   std::vector<CalibratedPoint> points;
   PixelsToCalibrated(camera, ends, &points);
   LineFit fit;
-  if (FitLine(points, 0.5, &fit).ok()) lines->push_back(fit);
+  if (FitLine(points, kSigma, &fit).ok()) lines->push_back(fit);
 }
 
 // So many lines along `direction`, and others any way.
@@ -52,6 +53,10 @@ inline std::vector<LineFit> Lines(const Eigen::Vector3d& direction, int along, i
   for (int i = 0; i < along + stray; ++i)
     AddSegment(i < along ? &direction : nullptr, random, &lines);
   return lines;
+}
+
+inline std::vector<LineFit> StrayLines(int number, Random* random) {
+  return Lines(Eigen::Vector3d::UnitX(), 0, number, random);
 }
 
 inline double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {

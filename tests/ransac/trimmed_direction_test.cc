@@ -13,8 +13,8 @@
 namespace circline {
 namespace {
 
-using segment_scene::AddSegment;
 using segment_scene::AngleBetween;
+using segment_scene::Lines;
 using segment_scene::RandomRotation;
 
 TEST(FitTrimmedDirection, IsThatOfTheLinesThatAgreeWhateverTheirScale) {
@@ -22,9 +22,7 @@ TEST(FitTrimmedDirection, IsThatOfTheLinesThatAgreeWhateverTheirScale) {
   for (std::uint64_t trial = 0; trial < 50; ++trial) {
     Random random(trial);
     const Eigen::Vector3d direction = RandomRotation(&random).col(0);
-    std::vector<LineFit> lines;
-    for (int i = 0; i < 14; ++i) AddSegment(&direction, &random, &lines);
-    for (int i = 0; i < 6; ++i) AddSegment(nullptr, &random, &lines);
+    std::vector<LineFit> lines = Lines(direction, 14, 6, &random);
     ASSERT_EQ(lines.size(), 20u);
     for (LineFit& line : lines) line.covariance *= 1e4;
     VanishingPointFit fit;
@@ -38,8 +36,7 @@ TEST(FitTrimmedDirection, IsThatOfTheLinesThatAgreeWhateverTheirScale) {
 TEST(FitTrimmedDirection, TakesThreeHundredThousandLines) {
   Random random(1);
   const Eigen::Vector3d direction = RandomRotation(&random).col(0);
-  std::vector<LineFit> lines;
-  while (lines.size() < 300000) AddSegment(&direction, &random, &lines);
+  const std::vector<LineFit> lines = Lines(direction, 300000, 0, &random);
   VanishingPointFit fit;
   const std::clock_t begin = std::clock();
   ASSERT_TRUE(FitTrimmedDirection(lines, 200000, &fit).ok());
@@ -50,8 +47,7 @@ TEST(FitTrimmedDirection, TakesThreeHundredThousandLines) {
 
 TEST(FitTrimmedDirection, RefusesTooFewLines) {
   Random random(1);
-  std::vector<LineFit> lines;
-  for (int i = 0; i < 3; ++i) AddSegment(nullptr, &random, &lines);
+  const std::vector<LineFit> lines = segment_scene::StrayLines(3, &random);
   VanishingPointFit fit;
   EXPECT_EQ(FitTrimmedDirection(lines, 4, &fit).code, StatusCode::kRefused);
   EXPECT_EQ(FitTrimmedDirection(lines, 1, &fit).code, StatusCode::kRefused);

@@ -16,6 +16,7 @@
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
 #include "circline/refine/cost_functions.h"
+#include "tests/basics.h"
 
 namespace circline::cost_function_checks {
 
@@ -155,8 +156,7 @@ inline std::vector<Eigen::Vector2d> Contour(const Eigen::Vector3d& center,
     CameraToPixel(
         LensCamera(),
         kRotation * (center + radius * (std::cos(a) * u + std::sin(a) * v)) + kTranslation, &pixel);
-    const double dx = random.Normal(), dy = random.Normal();
-    pixels.push_back(pixel + (i < outliers ? 6.0 : 0.4) * Eigen::Vector2d(dx, dy));
+    pixels.push_back(pixel + Noise2(i < outliers ? 6.0 : 0.4, &random));
   }
   return pixels;
 }
@@ -169,8 +169,7 @@ inline std::vector<Eigen::Vector2d> Line(const Eigen::Vector3d& from, const Eige
     Eigen::Vector2d pixel;
     CameraToPixel(LensCamera(), kRotation * (from + (to - from) * i / (n - 1.0)) + kTranslation,
                   &pixel);
-    const double dx = random.Normal(), dy = random.Normal();
-    pixels.push_back(pixel + 0.4 * Eigen::Vector2d(dx, dy));
+    pixels.push_back(pixel + Noise2(0.4, &random));
   }
   return pixels;
 }

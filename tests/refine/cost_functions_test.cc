@@ -15,6 +15,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/pose.h"
+#include "tests/basics.h"
 #include "tests/refine/cost_function_checks.h"
 
 namespace circline::cost_function_checks {
@@ -238,8 +239,7 @@ TEST(CostFunctionsTest, AContourTellsNothingOfACameraWithoutDistortion) {
     Random random(5);
     std::vector<Eigen::Vector2d> pixels;
     for (int i = 0; i < 60; ++i) {
-      const double dx = random.Normal(), dy = random.Normal();
-      pixels.push_back(EllipsePoint(ellipse, 0.1 * i) + Eigen::Vector2d(dx, dy));
+      pixels.push_back(EllipsePoint(ellipse, 0.1 * i) + Noise2(1.0, &random));
     }
     ImagePoints::Options options;
     options.distance = distance;

@@ -6,6 +6,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/refine/estimate_pose.h"
+#include "tests/basics.h"
 #include "tests/plane_scene.h"
 #include "tests/refine/simulated_options.h"
 
@@ -16,8 +17,7 @@ using Eigen::Vector3d;
 
 Observations TwoPencils(PlaneScene* scene) {
   Observations observations = scene->Empty();
-  observations.pencils = {scene->Pencil("L0", PencilDirection::kX, Vector3d::UnitX()),
-                          scene->Pencil("L1", PencilDirection::kY, Vector3d::UnitY())};
+  observations.pencils = scene->Axes();
   return observations;
 }
 
@@ -31,8 +31,7 @@ TEST(DirectionReadings, WhatIsFarFromThePoseIsAHypothesisOfItsOwn) {
   Observations observations = TwoPencils(&scene);
   observations.pencils[1].readings = {
       {TurnedY(scene, 0.0), 0.6}, {TurnedY(scene, 1.0), 0.1}, {TurnedY(scene, 8.0), 0.3}};
-  const PoseEstimate estimate = EstimatePose(observations);
-  ASSERT_TRUE(estimate.status.ok());
+  const PoseEstimate estimate = Ok(EstimatePose(observations));
   ASSERT_EQ(estimate.hypotheses.size(), 2U);
   EXPECT_NEAR(estimate.hypotheses[0].probability, 0.7, 1e-3);
   EXPECT_NEAR(estimate.hypotheses[1].probability, 0.3, 1e-3);
@@ -48,8 +47,7 @@ TEST(DirectionReadings, CirclesTurnWithThePose) {
   observations.circles = {scene.Circle("c0", 0.5, 0.2, 0.3)};
   observations.frame.origin = scene.Pixel(0.0, 0.0);
   observations.pencils[1].readings = {{TurnedY(scene, 0.0), 0.7}, {TurnedY(scene, 8.0), 0.3}};
-  const PoseEstimate estimate = EstimatePose(observations);
-  ASSERT_TRUE(estimate.status.ok());
+  const PoseEstimate estimate = Ok(EstimatePose(observations));
   ASSERT_GE(estimate.hypotheses.size(), 2U);
   for (const PoseHypothesis& h : estimate.hypotheses) {
     ASSERT_EQ(h.circles.size(), 1U);
@@ -74,10 +72,9 @@ TEST(DirectionReadings, MustBeProbabilities) {
 TEST(DirectionReadings, WhatIsNearIsTheSamePose) {
   PlaneScene scene(0.7, 0.1);
   Observations observations = TwoPencils(&scene);
-  const PoseEstimate before = EstimatePose(observations);
+  const PoseEstimate before = Ok(EstimatePose(observations));
   observations.pencils[1].readings = {{TurnedY(scene, -1.0), 0.5}, {-TurnedY(scene, 1.0), 0.5}};
-  const PoseEstimate after = EstimatePose(observations);
-  ASSERT_TRUE(before.status.ok() && after.status.ok());
+  const PoseEstimate after = Ok(EstimatePose(observations));
   ASSERT_EQ(after.hypotheses.size(), before.hypotheses.size());
   EXPECT_EQ(after.hypotheses[0].probability, before.hypotheses[0].probability);
 }
@@ -88,7 +85,7 @@ TEST(DirectionReadings, AreSeenThroughTheCameraThatWasFound) {
   PlaneScene scene(0.7, 0.1);
   scene.camera.distortion = {};
   Observations observations = TwoPencils(&scene);
-  observations.pencils.push_back(scene.Pencil("L2", PencilDirection::kZ, Vector3d::UnitZ()));
+  observations.pencils.push_back(scene.Pencil("L3", PencilDirection::kZ, Vector3d::UnitZ()));
   constexpr double kGuess = 1.3;
   observations.camera.fx *= kGuess;
   observations.camera.fy *= kGuess;

@@ -10,6 +10,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/refine/estimate_pose.h"
+#include "tests/basics.h"
 #include "tests/plane_scene.h"
 #include "tests/refine/simulated_options.h"
 #include "tests/trials.h"

@@ -16,8 +16,7 @@ inline Observations OneCircle(PlaneScene* scene) {
 
 inline Observations CircleAndAxes(PlaneScene* scene) {
   Observations observations = OneCircle(scene);
-  observations.pencils = {scene->Pencil("L1", PencilDirection::kX, Eigen::Vector3d::UnitX()),
-                          scene->Pencil("L2", PencilDirection::kY, Eigen::Vector3d::UnitY())};
+  observations.pencils = scene->Axes();
   return observations;
 }
 

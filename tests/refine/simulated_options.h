@@ -4,13 +4,11 @@
 #define CIRCLINE_TESTS_REFINE_SIMULATED_OPTIONS_H_
 
 #include <Eigen/Dense>
-#include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "circline/estimators/noise_model.h"
 #include "circline/refine/estimate_pose.h"
+#include "tests/basics.h"
 
 namespace circline {
 
@@ -28,23 +26,8 @@ inline EstimationOptions LeastSquares(const NoiseModel& model = NoiseModel::Exac
   return options;
 }
 
-// An estimate, or adjusted photos, that must be ok; what was missing ends the test.
-template <typename Answer>
-Answer Ok(Answer answer) {
-  if (!answer.status.ok()) throw std::runtime_error(answer.status.message);
-  return answer;
-}
-
 // The best hypothesis of an estimate that must have one.
 inline PoseHypothesis Best(const PoseEstimate& estimate) { return Ok(estimate).hypotheses.front(); }
-
-// Of an estimate, or of adjusted photos.
-template <typename Answer>
-bool HasNote(const Answer& answer, const std::string& words) {
-  return std::any_of(answer.notes.begin(), answer.notes.end(), [&](const std::string& note) {
-    return note.find(words) != std::string::npos;
-  });
-}
 
 // Of a hypothesis' normal, two components.
 struct NormalErrors {

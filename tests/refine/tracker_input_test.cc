@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "apps/benchmark/trajectory.h"
+#include "tests/basics.h"
 
 namespace circline {
 namespace {
@@ -60,7 +61,7 @@ TEST_F(OneTrackTest, WrongInputIsRefusedInWordsAndChangesNothing) {
   seen.circles[0].points[3].x() = kNaN;
   const TrackedPose refused = tracker_.Update(seen, 10 / 30.0);
   EXPECT_EQ(refused.estimate.status.code, StatusCode::kInvalidArgument);
-  EXPECT_NE(refused.estimate.status.message.find("c0"), std::string::npos);
+  EXPECT_CONTAINS(refused.estimate.status.message, "c0");
   const TrackedPose next = Update(10);
   EXPECT_TRUE(next.estimate.status.ok());
   EXPECT_EQ(next.frames_since_start, last_.frames_since_start + 1);
@@ -70,7 +71,7 @@ TEST_F(OneTrackTest, WrongInputIsRefusedInWordsAndChangesNothing) {
   options.flip_odds = 0.5;
   const TrackedPose unusable = PoseTracker(options).Update(Seen(0), 0.0);
   EXPECT_EQ(unusable.estimate.status.code, StatusCode::kInvalidArgument);
-  EXPECT_NE(unusable.estimate.status.message.find("flip_odds"), std::string::npos);
+  EXPECT_CONTAINS(unusable.estimate.status.message, "flip_odds");
 }
 
 TEST_F(OneTrackTest, EmptyFramesArePredictedAndSaidToBe) {

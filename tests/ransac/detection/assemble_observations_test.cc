@@ -209,15 +209,18 @@ TEST(AssembleObservations, ThroughAGuessedCameraVagueCirclesMakeNoPlane) {
   EXPECT_LE(count(true, kVague), 0.8 * kTrials);
 }
 
+const Matrix3d kBox = ExpRotation(Vector3d(2.3, 0.1, 0.2));  // Its axes.
+
+std::vector<DetectedLine> EdgesOfBox() {
+  Random random(1);
+  return detection_test::BoxEdges(detection_test::TestCamera(), kBox, 0.2, &random);
+}
+
 // A lone circle leaves two normals, and nothing says where x is; a box on its plane says both.
 TEST(AssembleObservations, ABoxOnACirclesPlaneGivesTheAxes) {
-  Random random(1);
-  const Matrix3d axes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
-  const std::vector<DetectedLine> edges =
-      detection_test::BoxEdges(detection_test::TestCamera(), axes, 0.2, &random);
   const Vector3d unrelated(1.0, 1.0, 1.0);
   const Observations found =
-      Assemble({Circle(axes.col(2), 500.0)}, {Pencil(unrelated, 900.0)}, 3, edges);
+      Assemble({Circle(kBox.col(2), 500.0)}, {Pencil(unrelated, 900.0)}, 3, EdgesOfBox());
   ASSERT_EQ(found.circles.size(), 1U);
   EXPECT_EQ(found.circles[0].plane, "p0");
   EXPECT_EQ(found.frame.plane, "p0");
@@ -228,7 +231,7 @@ TEST(AssembleObservations, ABoxOnACirclesPlaneGivesTheAxes) {
     EXPECT_EQ(pencil.plane, k < 2 ? "p0" : "");
     EXPECT_EQ(pencil.lines.size(), 3U);
     for (const LineObservation& line : pencil.lines) {
-      EXPECT_LT(std::abs(line.fit->line.dot(axes.col(static_cast<Eigen::Index>(k)))), 0.02);
+      EXPECT_LT(std::abs(line.fit->line.dot(kBox.col(static_cast<Eigen::Index>(k)))), 0.02);
       // Points of edges that may be worn count for less than they scatter.
       EXPECT_GT(line.sigma_px, 0.3);
     }
@@ -236,23 +239,15 @@ TEST(AssembleObservations, ABoxOnACirclesPlaneGivesTheAxes) {
 }
 
 TEST(AssembleObservations, TwoPencilsOfAPlaneNeedNoBox) {
-  Random random(1);
-  const Matrix3d axes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
-  const std::vector<DetectedLine> edges =
-      detection_test::BoxEdges(detection_test::TestCamera(), axes, 0.2, &random);
   const Observations found =
-      Assemble({}, {Pencil(kFrame.col(0), 500.0), Pencil(kFrame.col(1), 400.0)}, 3, edges);
+      Assemble({}, {Pencil(kFrame.col(0), 500.0), Pencil(kFrame.col(1), 400.0)}, 3, EdgesOfBox());
   ASSERT_EQ(found.pencils.size(), 2U);
   EXPECT_LT(AxisDeg(found.pencils[0].fit->direction, kFrame.col(0)), 0.1);
 }
 
 // One pencil is no plane; a box with an axis along it has three.
 TEST(AssembleObservations, ABoxAlongAPencilGivesTheAxes) {
-  Random random(1);
-  const Matrix3d axes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
-  const std::vector<DetectedLine> edges =
-      detection_test::BoxEdges(detection_test::TestCamera(), axes, 0.2, &random);
-  const Observations found = Assemble({}, {Pencil(axes.col(1), 500.0)}, 3, edges);
+  const Observations found = Assemble({}, {Pencil(kBox.col(1), 500.0)}, 3, EdgesOfBox());
   EXPECT_EQ(found.frame.plane, "p0");
   ASSERT_EQ(found.pencils.size(), 3U);
   for (std::size_t k = 0; k < 3; ++k) {
@@ -265,13 +260,9 @@ TEST(AssembleObservations, ABoxAlongAPencilGivesTheAxes) {
 // Two that claim to span a plane at right angles, one of them along the box and the other along
 // none of its edges: the box has better evidence than a direction of no lines.
 TEST(AssembleObservations, ABoxThatContradictsAWeakPencilIsTaken) {
-  Random random(1);
-  const Matrix3d axes = ExpRotation(Vector3d(2.3, 0.1, 0.2));
-  const std::vector<DetectedLine> edges =
-      detection_test::BoxEdges(detection_test::TestCamera(), axes, 0.2, &random);
-  const Vector3d between = (axes.col(1) + axes.col(2)).normalized();
+  const Vector3d between = (kBox.col(1) + kBox.col(2)).normalized();
   const Observations found =
-      Assemble({}, {Pencil(axes.col(0), 500.0), Pencil(between, 400.0)}, 3, edges);
+      Assemble({}, {Pencil(kBox.col(0), 500.0), Pencil(between, 400.0)}, 3, EdgesOfBox());
   ASSERT_EQ(found.pencils.size(), 3U);
   for (const PencilObservation& pencil : found.pencils) EXPECT_EQ(pencil.lines.size(), 3U);
 }

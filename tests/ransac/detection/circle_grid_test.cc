@@ -7,6 +7,7 @@
 
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
 namespace circline {
@@ -27,8 +28,7 @@ std::vector<Vector2d> Lattice(int missing, double scatter) {
   for (int i = 0; i < 7; ++i) {
     for (int j = 0; j < 5; ++j) {
       if ((3 * i + 5 * j) % 7 < missing) continue;
-      points.push_back(Vector2d(3.0, -2.0) + i * a + j * b +
-                       scatter * Vector2d(random.Normal(), random.Normal()));
+      points.push_back(Vector2d(3.0, -2.0) + i * a + j * b + Noise2(scatter, &random));
     }
   }
   return points;

@@ -48,7 +48,7 @@ TEST(DetectCircleInRoi, FindsTheCircleOfTheRectangle) {
     EXPECT_EQ(circle.radius, 0.9);
     EXPECT_FALSE(circle.second);
     EXPECT_GT(circle.points.size(), 30U);
-    EXPECT_LT(BetterNormalDeg(circle, pose.rotation.col(2)), 0.5);
+    EXPECT_LT(BetterNormalDeg(*circle.fit, pose.rotation.col(2)), 0.5);
     EXPECT_NEAR(circle.fit->irregularity, truth.fit->irregularity, 0.05);
     EXPECT_NE(circle.fit->irregularity, 1.0);
     for (const Vector2d& p : circle.points) {

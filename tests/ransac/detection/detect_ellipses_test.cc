@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
+#include "apps/benchmark/detection_truth.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
@@ -17,7 +18,7 @@
 namespace circline {
 namespace {
 
-using detection_test::AxisDeg;
+using detection_test::BetterNormalDeg;
 using detection_test::DataFolder;
 using detection_test::Develop;
 using detection_test::DistortedCamera;
@@ -66,16 +67,6 @@ cv::Mat FifteenDiscs(double cut) {
       }));
 }
 
-double BetterNormalDeg(const DetectedEllipse& e, const Vector3d& normal) {
-  std::array<CirclePose, 2> poses;
-  const int n = CirclePoses(e.fit.conic, &poses);
-  double best = 180.0;
-  for (int k = 0; k < n; ++k) {
-    best = std::min(best, AxisDeg(poses[static_cast<std::size_t>(k)].normal, normal));
-  }
-  return best;
-}
-
 TEST(DetectEllipses, FindsATiltedDiscThroughEveryLens) {
   for (const Camera& camera : {TestCamera(), DistortedCamera(), FisheyeCamera()}) {
     const double distance = camera.fx > 300.0 ? 5.0 : 2.5;
@@ -87,7 +78,7 @@ TEST(DetectEllipses, FindsATiltedDiscThroughEveryLens) {
       EXPECT_GT(found[0].coverage_deg, 350.0);
       EXPECT_EQ(found[0].bright, BrightSide::kOutside);
       EXPECT_LT(found[0].fit.rms_px, 0.1);
-      EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3) << "tilt " << tilt;
+      EXPECT_LT(BetterNormalDeg(found[0].fit, pose.rotation.col(2)), 0.3) << "tilt " << tilt;
     }
   }
 }
@@ -138,7 +129,7 @@ TEST(DetectEllipses, FindsARimInPiecesBesideAWholeOne) {
   }));
   const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
   ASSERT_EQ(found.size(), 2U);
-  EXPECT_LT(BetterNormalDeg(found[1], pose.rotation.col(2)), 1.0);
+  EXPECT_LT(BetterNormalDeg(found[1].fit, pose.rotation.col(2)), 1.0);
   EXPECT_EQ(found[0].concentric, found[1].concentric);
   EXPECT_GE(found[0].concentric, 0);
 }
@@ -173,7 +164,7 @@ TEST(DetectEllipses, FindsAnOccludedDisc) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_GT(found[0].coverage_deg, 150.0);
   EXPECT_LT(found[0].coverage_deg, 290.0);
-  EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 1.0);
+  EXPECT_LT(BetterNormalDeg(found[0].fit, pose.rotation.col(2)), 1.0);
 }
 
 // What hides 30 % of the rim runs 1.5 to 2.5 px beside it, as dark as the disc.
@@ -188,7 +179,7 @@ TEST(DetectEllipses, KeepsClearOfWhatRunsBesideTheRim) {
                                 0.7, 2.0);
   const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
   ASSERT_EQ(found.size(), 1U);
-  EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3);
+  EXPECT_LT(BetterNormalDeg(found[0].fit, pose.rotation.col(2)), 0.3);
 }
 
 // The same, but brighter, and 6 to 8 px beside the rim: an arc of 108 degrees, of a rim of its own
@@ -209,7 +200,7 @@ TEST(DetectEllipses, TakesTheEdgeOfWhatHidesARimForNone) {
   const std::vector<DetectedEllipse> hidden = found(40.0), alone = found(200.0);
   ASSERT_EQ(hidden.size(), 1U);
   EXPECT_GT(hidden[0].coverage_deg, 220.0);
-  EXPECT_LT(BetterNormalDeg(hidden[0], pose.rotation.col(2)), 0.3);
+  EXPECT_LT(BetterNormalDeg(hidden[0].fit, pose.rotation.col(2)), 0.3);
   ASSERT_EQ(alone.size(), 1U);
   EXPECT_LT(alone[0].coverage_deg, 120.0);
 }
@@ -231,7 +222,7 @@ TEST(DetectEllipses, FindsAGreyDiscBeforeBlackAndWhite) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].bright, BrightSide::kEither);
   EXPECT_GT(found[0].coverage_deg, 300.0);
-  EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3);
+  EXPECT_LT(BetterNormalDeg(found[0].fit, pose.rotation.col(2)), 0.3);
 }
 
 TEST(DetectEllipses, FindsADiscAmongWhatTouchesIt) {
@@ -244,7 +235,7 @@ TEST(DetectEllipses, FindsADiscAmongWhatTouchesIt) {
   const std::vector<DetectedEllipse> found = EllipsesOf(image, camera);
   ASSERT_GE(found.size(), 1U);
   EXPECT_GT(found[0].coverage_deg, 290.0);
-  EXPECT_LT(BetterNormalDeg(found[0], pose.rotation.col(2)), 0.3);
+  EXPECT_LT(BetterNormalDeg(found[0].fit, pose.rotation.col(2)), 0.3);
 }
 
 TEST(DetectEllipses, UndoesWhatTheBendDoesToTheRim) {
@@ -295,16 +286,13 @@ TEST(DetectEllipses, KeepsToTheRimsBesideAPenumbra) {
   const cv::FileStorage storage(folder + "groundtruth.yml", cv::FileStorage::READ);
   int labels = 0, hits = 0;
   for (const cv::FileNode& node : storage["images"]) {
-    if (static_cast<std::string>(node["file"]) != file) continue;
+    if (apps::ReadText(node, "file") != file) continue;
     for (const cv::FileNode& label : node["ellipses"]) {
-      cv::Mat truth;  // Centre, semi-axes, angle.
-      label["ellipse"] >> truth;
+      const Ellipse truth = apps::ReadEllipse(apps::ReadMatrix(label, "ellipse"));
       ++labels;
       hits += std::any_of(found.begin(), found.end(), [&truth](const Ellipse& e) {
-        return std::hypot(e.center.x() - truth.at<double>(0), e.center.y() - truth.at<double>(1)) <
-                   0.5 &&
-               std::abs(e.a - truth.at<double>(2)) < 0.5 &&
-               std::abs(e.b - truth.at<double>(3)) < 0.5;
+        return (e.center - truth.center).norm() < 0.5 && std::abs(e.a - truth.a) < 0.5 &&
+               std::abs(e.b - truth.b) < 0.5;
       });
     }
   }

@@ -11,6 +11,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/detection/detect_observations.h"
+#include "tests/basics.h"
 #include "tests/ransac/detection/detection_test_util.h"
 #include "tests/ransac/detection/observations_test_util.h"
 
@@ -114,7 +115,7 @@ TEST(DetectObservations, OneCircleIsSaidToHaveTwoPoses) {
   const Observations found = Detect(image, camera);
   ASSERT_EQ(found.circles.size(), 1U);
   EXPECT_TRUE(found.pencils.empty());
-  EXPECT_NE(found.message.find("two poses"), std::string::npos);
+  EXPECT_CONTAINS(found.message, "two poses");
   // What FitObservations may want: each point with the edge's normal, which is the contour's.
   const CircleObservation& circle = found.circles[0];
   ASSERT_EQ(circle.normals.size(), circle.points.size());
@@ -136,7 +137,7 @@ TEST(DetectObservations, OnePencilIsSaidToBeTooLittle) {
   const Observations found = Detect(image, camera);
   ASSERT_EQ(found.pencils.size(), 1U);
   EXPECT_EQ(found.pencils[0].direction, PencilDirection::kFree);
-  EXPECT_NE(found.message.find("one pencil"), std::string::npos);
+  EXPECT_CONTAINS(found.message, "one pencil");
 }
 
 TEST(DetectObservations, DirectionsOfDifferentThingsSpanNoPlane) {
@@ -156,7 +157,7 @@ TEST(DetectObservations, DirectionsOfDifferentThingsSpanNoPlane) {
   EXPECT_TRUE(found.circles.empty());
   EXPECT_TRUE(found.frame.plane.empty());
   EXPECT_NE(found.pencils[0].plane, found.pencils[1].plane);
-  EXPECT_NE(found.message.find("span no plane"), std::string::npos);
+  EXPECT_CONTAINS(found.message, "span no plane");
   for (const PencilObservation& pencil : found.pencils) {
     EXPECT_EQ(pencil.direction, PencilDirection::kFree);
   }

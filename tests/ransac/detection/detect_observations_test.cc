@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "circline/estimators/basics.h"
+#include "tests/basics.h"
 #include "tests/ransac/detection/detection_test_util.h"
 #include "tests/ransac/detection/observations_test_util.h"
 
@@ -99,7 +100,7 @@ TEST(DetectObservations, CirclesJoinThePlaneTheyLieIn) {
   ASSERT_EQ(found.circles.size(), 1U);
   EXPECT_EQ(found.circles[0].id, "c0");
   EXPECT_EQ(found.circles[0].plane, "p0");
-  EXPECT_LT(BetterNormalDeg(found.circles[0], pose.rotation.col(2)), 0.5);
+  EXPECT_LT(BetterNormalDeg(*found.circles[0].fit, pose.rotation.col(2)), 0.5);
 }
 
 TEST(DetectObservations, ACircleOfAnotherPlaneStaysOut) {
@@ -121,7 +122,7 @@ TEST(DetectObservations, ACircleOfAnotherPlaneStaysOut) {
   EXPECT_LT(AxesErrorDeg(x, y, board.rotation), 0.3);
   ASSERT_EQ(found.circles.size(), 1U);
   EXPECT_TRUE(found.circles[0].plane.empty());
-  EXPECT_LT(BetterNormalDeg(found.circles[0], disc.rotation.col(2)), 0.5);
+  EXPECT_LT(BetterNormalDeg(*found.circles[0].fit, disc.rotation.col(2)), 0.5);
 }
 
 TEST(DetectObservations, WhatAContourSharesIsInItsCovariance) {
@@ -179,8 +180,7 @@ TEST(DetectObservations, AGridOfDotsIsOnePlane) {
   options.max_circles = 20;
   const Observations cut = Detect(image, camera, options);
   EXPECT_EQ(cut.circles.size(), 20U);
-  EXPECT_NE(cut.message.find("25 ellipses found, the best 20 kept"), std::string::npos)
-      << cut.message;
+  EXPECT_CONTAINS(cut.message, "25 ellipses found, the best 20 kept");
 }
 
 TEST(DetectObservations, LimitsAreKept) {
@@ -254,34 +254,34 @@ TEST(DetectObservations, SaysWhatIsWrongWithTheInput) {
     EXPECT_TRUE(found.circles.empty() && found.pencils.empty());
     return status.message;
   };
-  EXPECT_NE(message(cv::Mat(), camera, {}).find("empty"), std::string::npos);
-  EXPECT_NE(message(cv::Mat(48, 64, CV_16UC1), camera, {}).find("8 bits"), std::string::npos);
-  EXPECT_NE(message(cv::Mat(48, 64, CV_8UC2), camera, {}).find("channels"), std::string::npos);
-  EXPECT_NE(message(cv::Mat(64, 48, CV_8UC1), camera, {}).find("48 x 64"), std::string::npos);
+  EXPECT_CONTAINS(message(cv::Mat(), camera, {}), "empty");
+  EXPECT_CONTAINS(message(cv::Mat(48, 64, CV_16UC1), camera, {}), "8 bits");
+  EXPECT_CONTAINS(message(cv::Mat(48, 64, CV_8UC2), camera, {}), "channels");
+  EXPECT_CONTAINS(message(cv::Mat(64, 48, CV_8UC1), camera, {}), "48 x 64");
   Camera no_focal = camera;
   no_focal.fx = 0.0;
   EXPECT_FALSE(message(image, no_focal, {}).empty());
   DetectionOptions options;
   options.min_ellipse_axis_px = -1.0;
-  EXPECT_NE(message(image, camera, options).find("min_ellipse_axis_px"), std::string::npos);
+  EXPECT_CONTAINS(message(image, camera, options), "min_ellipse_axis_px");
   options = DetectionOptions();
   options.min_arc_deg = 0.0;
-  EXPECT_NE(message(image, camera, options).find("min_arc_deg"), std::string::npos);
+  EXPECT_CONTAINS(message(image, camera, options), "min_arc_deg");
   options = DetectionOptions();
   options.min_segment_length_px = std::nan("");
-  EXPECT_NE(message(image, camera, options).find("min_segment_length_px"), std::string::npos);
+  EXPECT_CONTAINS(message(image, camera, options), "min_segment_length_px");
   options = DetectionOptions();
   options.max_circles = -1;
-  EXPECT_NE(message(image, camera, options).find("max_circles"), std::string::npos);
+  EXPECT_CONTAINS(message(image, camera, options), "max_circles");
   options = DetectionOptions();
   options.max_pencils = -1;
-  EXPECT_NE(message(image, camera, options).find("max_pencils"), std::string::npos);
+  EXPECT_CONTAINS(message(image, camera, options), "max_pencils");
   options = DetectionOptions();
   options.max_shared_plane_deg = 0.0;
-  EXPECT_NE(message(image, camera, options).find("max_shared_plane_deg"), std::string::npos);
+  EXPECT_CONTAINS(message(image, camera, options), "max_shared_plane_deg");
   options = DetectionOptions();
   options.noise_model.contour_px = -0.1;
-  EXPECT_NE(message(image, camera, options).find("contour_px"), std::string::npos);
+  EXPECT_CONTAINS(message(image, camera, options), "contour_px");
 }
 
 }  // namespace

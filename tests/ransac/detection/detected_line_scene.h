@@ -11,6 +11,8 @@
 #include "circline/estimators/camera.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/detection/detect_lines.h"
+#include "circline/ransac/detection/observe_evidence.h"
+#include "tests/ransac/detection/detection_test_util.h"
 
 namespace circline::detection_test {
 
@@ -45,6 +47,15 @@ inline DetectedLine MakeLine(const Camera& camera, double u, double v,
   const Eigen::Vector2d half = 0.5 * length * Eigen::Vector2d(std::cos(angle), std::sin(angle));
   return LineThrough(camera, Eigen::Vector2d(u, v) - half, Eigen::Vector2d(u, v) + half, sigma,
                      random);
+}
+
+// Adds an edge of `length` pixels along the direction, somewhere in TestCamera()'s photo, as a
+// detection through another camera has it.
+inline void AddEdge(const Eigen::Vector3d& direction, double length, const Camera& through,
+                    Random* random, PhotoEvidence* evidence) {
+  const double u = random->Uniform(120.0, 360.0), v = random->Uniform(80.0, 260.0);
+  const DetectedLine line = MakeLine(TestCamera(), u, v, direction, length, 0.0, 0.1, random);
+  EXPECT_TRUE(LineFromSegment(through, line.ends, 0.1, &evidence->lines.emplace_back()).ok());
 }
 
 // The nine edges that one sees of a box of 165 x 68 x 80 at a distance of 500, its axes the columns

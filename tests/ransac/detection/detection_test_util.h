@@ -5,6 +5,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -133,6 +135,15 @@ inline cv::Mat Noise(int width, int height, double sigma, std::uint64_t seed = 1
 
 inline double AxisDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) / kDegree;
+}
+
+// Of the two normals that a circle's image allows.
+inline double BetterNormalDeg(const ConicFit& fit, const Eigen::Vector3d& normal) {
+  std::array<CirclePose, 2> poses;
+  double best = 180.0;
+  for (int k = CirclePoses(fit.conic, &poses) - 1; k >= 0; --k)
+    best = std::min(best, AxisDeg(poses[static_cast<std::size_t>(k)].normal, normal));
+  return best;
 }
 
 // Folder with sets of photographs, from the environment or beside the sources; may not exist.

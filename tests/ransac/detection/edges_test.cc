@@ -21,13 +21,13 @@ using detection_test::Noise;
 using detection_test::Render;
 
 // 60 | 180 across a line through (40.3, 31.7) whose normal, to the brighter side, is at `angle`.
-cv::Mat StepEdge(double angle, double noise = 0.0) {
+cv::Mat StepEdge(double angle, double noise = 0.0, std::uint64_t seed = 1) {
   const double c = std::cos(angle), s = std::sin(angle);
   return Develop(Render(81, 65,
                         [=](double u, double v) {
                           return c * (u - 40.3) + s * (v - 31.7) > 0.0 ? 180.0 : 60.0;
                         }),
-                 0.7, noise);
+                 0.7, noise, seed);
 }
 
 // Signed distances to that line of all points away from the border, where the blur reflects.
@@ -153,13 +153,7 @@ TEST(DetectEdges, StatesTheNoiseAndWhatItDoesToLocations) {
   double predicted = 0.0, actual = 0.0, count = 0.0;
   for (int k = 0; k < 12; ++k) {
     const double angle = 0.26 + 2.0 * kPi * k / 12;
-    const cv::Mat image = Develop(
-        Render(81, 65,
-               [=](double u, double v) {
-                 return std::cos(angle) * (u - 40.3) + std::sin(angle) * (v - 31.7) > 0.0 ? 180.0
-                                                                                          : 60.0;
-               }),
-        0.7, kNoise, static_cast<std::uint64_t>(k + 1));
+    const cv::Mat image = StepEdge(angle, kNoise, static_cast<std::uint64_t>(k + 1));
     const EdgeMap map = DetectEdges(image);
     // White noise through the derivative of a Gaussian of 1 px.
     EXPECT_NEAR(map.gradient_noise, kNoise / std::sqrt(8.0 * kPi), 0.15 * kNoise / 5.0);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "circline/estimators/conic.h"
+#include "tests/basics.h"
 #include "tests/ransac/detection/detection_test_util.h"
 #include "tests/ransac/detection/observations_test_util.h"
 
@@ -291,7 +292,7 @@ TEST(FeatureFollower, RefusesWhatDetectionRefusesAndStaysWhereItWas) {
   bad.search_px = 1.0;
   const Status status =
       FeatureFollower(camera, bad).Next(Photo(camera, PoseAt(0), 3), &observations);
-  EXPECT_NE(status.message.find("search_px"), std::string::npos);
+  EXPECT_CONTAINS(status.message, "search_px");
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
+#include "tests/basics.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
@@ -41,6 +42,19 @@ std::vector<DetectedLine> Clutter(const Camera& camera, int count, Random* rando
   return lines;
 }
 
+// The box's edges first.
+std::vector<DetectedLine> BoxAmong(int others, const Camera& camera, Random* random) {
+  std::vector<DetectedLine> lines = BoxEdges(camera, random);
+  const std::vector<DetectedLine> clutter = Clutter(camera, others, random);
+  lines.insert(lines.end(), clutter.begin(), clutter.end());
+  return lines;
+}
+
+double NearestAxisDeg(const Vector3d& axis) {
+  return std::min(
+      {AxisDeg(axis, kAxes.col(0)), AxisDeg(axis, kAxes.col(1)), AxisDeg(axis, kAxes.col(2))});
+}
+
 // Of the first of a box's axes, whichever of its edges that is.
 double AxisErrorDeg(const Vector3d& axis) {
   return std::min(AxisDeg(axis, kAxes.col(0)), AxisDeg(axis, kAxes.col(1)));
@@ -50,10 +64,8 @@ TEST(FindBox, FindsItsAxesOnTheRightOfTwoPlanes) {
   const Camera camera = TestCamera();
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
-    std::vector<DetectedLine> lines = BoxEdges(camera, &random);
-    ASSERT_EQ(lines.size(), 9u);
-    const std::vector<DetectedLine> clutter = Clutter(camera, 100, &random);
-    lines.insert(lines.end(), clutter.begin(), clutter.end());
+    const std::vector<DetectedLine> lines = BoxAmong(100, camera, &random);
+    ASSERT_EQ(lines.size(), 109u);
     const Vector3d wrong = ExpRotation(Vector3d(0.9, 0.3, 0.0)) * kAxes.col(2);
     const auto box = FindBox(lines, {wrong, kAxes.col(2)});
     ASSERT_TRUE(box.has_value()) << seed;
@@ -114,7 +126,7 @@ TEST(FindBox, IsRareByAccident) {
   int found = 0;
   constexpr int kTrials = 300;
   for (int trial = 0; trial < kTrials; ++trial) {
-    const Vector3d normal = Vector3d(random.Normal(), random.Normal(), random.Normal());
+    const Vector3d normal = Noise3(1.0, &random);
     found += FindBox(Clutter(camera, 150, &random), {normal.normalized()}).has_value() ? 1 : 0;
   }
   // Fewer than on photographs, whose lines are less independent than these.
@@ -127,9 +139,7 @@ TEST(FindFreeBox, NeedsNoMoreThanADirectionNearOneOfItsAxes) {
   int found = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
-    std::vector<DetectedLine> lines = BoxEdges(camera, &random);
-    const std::vector<DetectedLine> clutter = Clutter(camera, 60, &random);
-    lines.insert(lines.end(), clutter.begin(), clutter.end());
+    const std::vector<DetectedLine> lines = BoxAmong(60, camera, &random);
     const Matrix3d turn =
         ExpRotation(0.005 * Vector3d(random.Normal(), random.Normal(), random.Normal()));
     const Vector3d other(random.Normal(), random.Normal(), random.Normal());
@@ -138,10 +148,7 @@ TEST(FindFreeBox, NeedsNoMoreThanADirectionNearOneOfItsAxes) {
     ++found;
     EXPECT_NEAR(box->axes.determinant(), 1.0, 1e-9);
     for (int k = 0; k < 3; ++k) {
-      double nearest = 90.0;
-      for (int axis = 0; axis < 3; ++axis)
-        nearest = std::min(nearest, AxisDeg(box->axes.col(k), kAxes.col(axis)));
-      EXPECT_LT(nearest, 1.5) << seed;
+      EXPECT_LT(NearestAxisDeg(box->axes.col(k)), 1.5) << seed;
     }
     EXPECT_GE(box->pencils[0].support_px, box->pencils[1].support_px);
     EXPECT_GE(box->pencils[1].support_px, box->pencils[2].support_px);
@@ -155,18 +162,13 @@ TEST(FindAnyBox, NeedsNoDirection) {
   int found = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
-    std::vector<DetectedLine> lines = BoxEdges(camera, &random);
-    const std::vector<DetectedLine> clutter = Clutter(camera, 60, &random);
-    lines.insert(lines.end(), clutter.begin(), clutter.end());
+    const std::vector<DetectedLine> lines = BoxAmong(60, camera, &random);
     const auto box = FindAnyBox(lines);
     if (!box) continue;
     ++found;
     for (int k = 0; k < 3; ++k) {
-      double nearest = 90.0;
-      for (int axis = 0; axis < 3; ++axis)
-        nearest = std::min(nearest, AxisDeg(box->axes.col(k), kAxes.col(axis)));
       // Of three worn edges along each axis, at times with one of something else.
-      EXPECT_LT(nearest, 2.5) << seed;
+      EXPECT_LT(NearestAxisDeg(box->axes.col(k)), 2.5) << seed;
     }
   }
   EXPECT_GE(found, 18);
@@ -190,8 +192,7 @@ TEST(FindFreeBox, IsRareByAccident) {
   for (int trial = 0; trial < kTrials; ++trial) {
     std::vector<Vector3d> axes;
     for (int k = 0; k < 3; ++k) {
-      const double x = random.Normal(), y = random.Normal(), z = random.Normal();
-      axes.push_back(Vector3d(x, y, z).normalized());
+      axes.push_back(Noise3(1.0, &random).normalized());
     }
     found += FindFreeBox(Clutter(camera, 100, &random), axes).has_value() ? 1 : 0;
   }

@@ -9,7 +9,6 @@
 #include <array>
 #include <opencv2/core.hpp>
 
-#include "circline/estimators/circle_pose.h"
 #include "circline/estimators/observations.h"
 #include "circline/ransac/detection/detect_observations.h"
 #include "tests/ransac/detection/detection_test_util.h"
@@ -50,16 +49,6 @@ inline double AxesErrorDeg(const Eigen::Vector3d& x, const Eigen::Vector3d& y,
   const Eigen::Vector3d r1 = rotation.col(0), r2 = rotation.col(1);
   return std::min(std::max(AxisDeg(x, r1), AxisDeg(y, r2)),
                   std::max(AxisDeg(x, r2), AxisDeg(y, r1)));
-}
-
-inline double BetterNormalDeg(const CircleObservation& circle, const Eigen::Vector3d& normal) {
-  std::array<CirclePose, 2> poses;
-  const int n = CirclePoses(circle.fit->conic, &poses);
-  double best = 180.0;
-  for (int k = 0; k < n; ++k) {
-    best = std::min(best, AxisDeg(poses[static_cast<std::size_t>(k)].normal, normal));
-  }
-  return best;
 }
 
 }  // namespace circline::detection_test

@@ -9,6 +9,7 @@
 namespace circline {
 namespace {
 
+using detection_test::AddEdge;
 using detection_test::AxisDeg;
 using detection_test::TestCamera;
 using Eigen::Vector2d;
@@ -32,11 +33,7 @@ TEST(ObserveEvidence, SegmentsAloneHaveAPlaneAndItsAxes) {
   Random random(1);
   PhotoEvidence evidence;
   for (int k = 0; k < 40; ++k) {
-    const double u = random.Uniform(120.0, 360.0), v = random.Uniform(80.0, 260.0);
-    const DetectedLine line =
-        detection_test::MakeLine(TestCamera(), u, v, axes.col(k % 2), 60.0, 0.0, 0.1, &random);
-    evidence.lines.emplace_back();
-    ASSERT_TRUE(LineFromSegment(TestCamera(), line.ends, 0.1, &evidence.lines.back()).ok());
+    AddEdge(axes.col(k % 2), 60.0, TestCamera(), &random, &evidence);
   }
   Observations observations;
   observations.camera = TestCamera();
@@ -65,11 +62,7 @@ TEST(ObserveEvidence, AFewEdgesAlongTheNormalAreZ) {
     Random random(seed);
     PhotoEvidence evidence;
     for (int k = 0; k < 44; ++k) {
-      const double u = random.Uniform(120.0, 360.0), v = random.Uniform(80.0, 260.0);
-      const DetectedLine line = detection_test::MakeLine(
-          TestCamera(), u, v, axes.col(k < 40 ? k % 2 : 2), 60.0, 0.0, 0.1, &random);
-      evidence.lines.emplace_back();
-      ASSERT_TRUE(LineFromSegment(TestCamera(), line.ends, 0.1, &evidence.lines.back()).ok());
+      AddEdge(axes.col(k < 40 ? k % 2 : 2), 60.0, TestCamera(), &random, &evidence);
     }
     Observations observations;
     observations.camera = TestCamera();

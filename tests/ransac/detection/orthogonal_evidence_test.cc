@@ -65,9 +65,7 @@ TEST(DirectionReadings, AreProbableWhereLinesAgree) {
     Random random(seed);
     const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
     const Vector3d along = R.col(1);
-    std::vector<LineFit> lines;
-    for (int i = 0; i < 30; ++i)
-      segment_scene::AddSegment(i < 15 ? &along : nullptr, &random, &lines);
+    const std::vector<LineFit> lines = Lines(along, 15, 15, &random);
     const double off = random.Uniform(-8.0, 8.0) * kDegree;
     const auto readings =
         ReadDirection(lines, R.col(0), Eigen::AngleAxisd(off, R.col(0)) * along, 15);

@@ -8,12 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "apps/benchmark/detection_truth.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
 #include "circline/ransac/detection/detect_lines.h"
 #include "circline/ransac/detection/detect_observations.h"
 #include "circline/ransac/detection/edges.h"
 #include "circline/ransac/detection/find_box.h"
+#include "tests/basics.h"
 #include "tests/ransac/detection/detection_test_util.h"
 #include "tests/ransac/detection/observations_test_util.h"
 
@@ -30,29 +32,6 @@ using detection_test::HasSet;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-cv::Mat ReadMatrix(const cv::FileNode& node, const char* key) {
-  cv::Mat m;
-  if (!node[key].empty()) node[key] >> m;
-  return m;
-}
-
-Camera ReadCamera(const cv::FileNode& node, const cv::Mat& photo) {
-  const cv::Mat k = ReadMatrix(node, "camera_matrix");
-  const cv::Mat d = ReadMatrix(node, "distortion_coefficients");
-  Camera camera;
-  camera.model = CameraModel::kOpenCV;
-  camera.width = photo.cols;
-  camera.height = photo.rows;
-  camera.fx = k.at<double>(0, 0);
-  camera.fy = k.at<double>(1, 1);
-  camera.cx = k.at<double>(0, 2);
-  camera.cy = k.at<double>(1, 2);
-  for (int i = 0; i < std::min(8, static_cast<int>(d.total())); ++i) {
-    camera.distortion[static_cast<std::size_t>(i)] = d.at<double>(i);
-  }
-  return camera;
-}
-
 // One photo of a set, its observations and its truth.
 struct DetectedPhoto {
   std::string file;
@@ -68,31 +47,25 @@ void VisitSet(const std::string& set, std::size_t every, const PhotoVisitor& vis
   std::size_t k = 0;
   for (const cv::FileNode& node : storage["images"]) {
     if (k++ % every != 0) continue;
-    const std::string file = static_cast<std::string>(node["file"]);
+    const std::string file = apps::ReadText(node, "file");
     const cv::Mat image = cv::imread(folder + "/" + file, cv::IMREAD_COLOR);
     if (image.empty()) continue;
-    cv::FileNode camera_node = storage.root();
-    for (const cv::FileNode& c : storage["cameras"]) {
-      if (static_cast<std::string>(c["name"]) == static_cast<std::string>(node["camera"])) {
-        camera_node = c;
-      }
-    }
-    visit(image, ReadCamera(camera_node, image), node);
+    Camera camera;
+    ASSERT_TRUE(apps::CameraOf(storage.root(), node, image.size(), &camera));
+    visit(image, camera, node);
   }
 }
 
 Matrix3d ReadRotation(const cv::FileNode& node, const char* key) {
-  const cv::Mat r = ReadMatrix(node, key);
-  Matrix3d rotation = Matrix3d::Zero();
-  for (int i = 0; i < 9 && !r.empty(); ++i) rotation(i / 3, i % 3) = r.at<double>(i / 3, i % 3);
-  return rotation;
+  const cv::Mat rotation = apps::ReadMatrix(node, key);
+  return rotation.empty() ? Matrix3d(Matrix3d::Zero()) : apps::ToEigen(rotation);
 }
 
 std::vector<DetectedPhoto> DetectSet(const std::string& set, std::size_t every) {
   std::vector<DetectedPhoto> photos;
   VisitSet(set, every, [&](const cv::Mat& image, const Camera& camera, const cv::FileNode& node) {
     photos.push_back(
-        {static_cast<std::string>(node["file"]), Detect(image, camera), ReadRotation(node, "R")});
+        {apps::ReadText(node, "file"), Detect(image, camera), ReadRotation(node, "R")});
   });
   return photos;
 }
@@ -122,7 +95,7 @@ TEST(RealPhotographs, TheDiscOfTheTurntableIsFound) {
     double best = 180.0;
     for (const CircleObservation& circle : photo.found.circles) {
       if (circle.points.size() < 150) continue;  // The rim, not a print on the box.
-      best = std::min(best, BetterNormalDeg(circle, photo.rotation.col(2)));
+      best = std::min(best, BetterNormalDeg(*circle.fit, photo.rotation.col(2)));
     }
     errors.push_back(best);
   }
@@ -145,8 +118,7 @@ TEST(RealPhotographs, BoxesAreRareOnNormalsOfNothing) {
       std::vector<DetectedLine> lines = DetectLines(edges, camera, 20.0, nullptr, &bent);
       lines.insert(lines.end(), bent.begin(), bent.end());
       for (int trial = 0; trial < 40; ++trial) {
-        const double x = random.Normal(), y = random.Normal(), z = random.Normal();
-        const Vector3d normal = Vector3d(x, y, z).normalized();
+        const Vector3d normal = Noise3(1.0, &random).normalized();
         if ((axes.transpose() * normal).cwiseAbs().maxCoeff() > std::cos(8.0 * kDegree)) continue;
         ++normals;
         found += FindBox(lines, {normal}).has_value() ? 1 : 0;
@@ -163,7 +135,7 @@ TEST(RealPhotographs, LargeDiscsInStrongDistortionAreFoundAndShareAPlane) {
   for (const DetectedPhoto& photo : DetectSet("circles-discocal-tir", 3)) {
     int good = 0, on_plane = 0;
     for (const CircleObservation& circle : photo.found.circles) {
-      good += BetterNormalDeg(circle, photo.rotation.col(2)) < 3.0 ? 1 : 0;
+      good += BetterNormalDeg(*circle.fit, photo.rotation.col(2)) < 3.0 ? 1 : 0;
       on_plane += circle.plane == "p0" ? 1 : 0;
     }
     EXPECT_GE(good, 11) << photo.file;

@@ -9,6 +9,7 @@
 
 #include "circline/estimators/pose.h"
 #include "circline/estimators/random.h"
+#include "tests/basics.h"
 
 namespace circline {
 namespace {
@@ -16,10 +17,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-Vector3d RandomUnit(Random* random) {
-  const double x = random->Normal(), y = random->Normal(), z = random->Normal();
-  return Vector3d(x, y, z).normalized();
-}
+Vector3d RandomUnit(Random* random) { return Noise3(1.0, random).normalized(); }
 
 TEST(RightAngledAxes, AreRotationsTheTruthAmongThem) {
   Random random(1);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "tests/basics.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 #include "tests/ransac/detection/observations_test_util.h"
@@ -50,7 +51,7 @@ DetectedLine CurveSeen(const Camera& lens, const Camera& guess, double bend, Ran
     const Eigen::Vector2d x = middle.x + half * (u * along + 2.0 * bend * (1.0 - u * u) * across);
     Eigen::Vector2d seen;
     EXPECT_TRUE(CameraToPixel(lens, x.homogeneous(), &seen));
-    line.points.push_back(seen + 0.1 * Eigen::Vector2d(random->Normal(), random->Normal()));
+    line.points.push_back(seen + Noise2(0.1, random));
   }
   line.ends = {line.points.front(), line.points.back()};
   line.length_px = (line.ends[1] - line.ends[0]).norm();

@@ -12,6 +12,7 @@
 namespace circline {
 namespace {
 
+using detection_test::AddEdge;
 using detection_test::LookAt;
 using detection_test::TestCamera;
 
@@ -28,21 +29,12 @@ Camera Guess(double factor) {
   return camera;
 }
 
-// An edge along the direction, seen through a camera that is guessed.
-void AddEdge(const Eigen::Vector3d& direction, double factor, Random* random,
-             PhotoEvidence* evidence) {
-  const double u = random->Uniform(120.0, 360.0), v = random->Uniform(80.0, 260.0);
-  const DetectedLine line =
-      detection_test::MakeLine(TestCamera(), u, v, direction, 90.0, 0.0, 0.1, random);
-  evidence->lines.emplace_back();
-  EXPECT_TRUE(LineFromSegment(Guess(factor), line.ends, 0.1, &evidence->lines.back()).ok());
-}
-
 // Along two or three directions at right angles.
 PhotoEvidence Edges(const Eigen::Matrix3d& axes, int num_directions, double factor) {
   Random random(3);
   PhotoEvidence evidence;
-  for (int k = 0; k < 60; ++k) AddEdge(axes.col(k % num_directions), factor, &random, &evidence);
+  for (int k = 0; k < 60; ++k)
+    AddEdge(axes.col(k % num_directions), 90.0, Guess(factor), &random, &evidence);
   return evidence;
 }
 
@@ -73,8 +65,9 @@ TEST(LikeliestFocal, EdgesAroundTheOnlyPencilTell) {
   for (const double factor : {0.6, 1.0, 1.6}) {
     Random random(3);
     PhotoEvidence evidence;
-    for (int k = 0; k < 20; ++k) AddEdge(axes.col(0), factor, &random, &evidence);
-    for (int k = 0; k < 4; ++k) AddEdge(axes.col(1 + k % 2), factor, &random, &evidence);
+    for (int k = 0; k < 20; ++k) AddEdge(axes.col(0), 90.0, Guess(factor), &random, &evidence);
+    for (int k = 0; k < 4; ++k)
+      AddEdge(axes.col(1 + k % 2), 90.0, Guess(factor), &random, &evidence);
     EXPECT_NEAR(FromEdges(evidence, factor, Wide(0.5)), -std::log(factor), 0.05) << factor;
   }
 }
@@ -86,9 +79,9 @@ TEST(LikeliestFocal, AFewEdgesOfTheThirdDirectionTell) {
   for (const double factor : {0.7, 1.0, 1.4}) {
     Random random(5);
     PhotoEvidence evidence;
-    for (int k = 0; k < 40; ++k) AddEdge(axes.col(k % 2), factor, &random, &evidence);
+    for (int k = 0; k < 40; ++k) AddEdge(axes.col(k % 2), 90.0, Guess(factor), &random, &evidence);
     EXPECT_NEAR(FromEdges(evidence, factor, Wide(0.5)), 0.0, 0.1) << factor;
-    for (int k = 0; k < 5; ++k) AddEdge(axes.col(2), factor, &random, &evidence);
+    for (int k = 0; k < 5; ++k) AddEdge(axes.col(2), 90.0, Guess(factor), &random, &evidence);
     EXPECT_NEAR(FromEdges(evidence, factor, Wide(0.5)), -std::log(factor), 0.06) << factor;
   }
 }

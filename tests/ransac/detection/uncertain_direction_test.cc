@@ -10,6 +10,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/conic_fit.h"
+#include "tests/basics.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
 namespace circline {
@@ -109,7 +110,7 @@ ConicFit SmallDisc(const Vector3d& normal, Random* random) {
     Eigen::Vector2d pixel;
     CalibratedPoint point;
     EXPECT_TRUE(CameraToPixel(camera, center + std::cos(angle) * u + std::sin(angle) * v, &pixel));
-    pixel += 0.1 * Eigen::Vector2d(random->Normal(), random->Normal());
+    pixel += Noise2(0.1, random);
     EXPECT_TRUE(PixelToCalibrated(camera, pixel, &point));
     points.push_back(point);
   }
