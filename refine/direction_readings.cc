@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "circline/estimators/basics.h"
+#include "circline/refine/camera_shifts.h"
 #include "circline/refine/readings.h"
 
 namespace circline {
@@ -34,12 +35,6 @@ PoseHypothesis Turned(const PoseHypothesis& hypothesis, const Eigen::Matrix3d& t
   }
   for (PencilEstimate& pencil : turned.pencils) pencil.direction = turn * pencil.direction;
   return turned;
-}
-
-// A direction that was seen through one camera as another has it; but for distortion.
-Eigen::Vector3d SeenThrough(const Camera& other, const Camera& camera, const Eigen::Vector3d& v) {
-  return {(camera.fx * v.x() + (camera.cx - other.cx) * v.z()) / other.fx,
-          (camera.fy * v.y() + (camera.cy - other.cy) * v.z()) / other.fy, v.z()};
 }
 
 void ShareAmong(const PencilObservation& pencil, const Camera& camera,

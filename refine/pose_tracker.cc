@@ -51,7 +51,7 @@ class PoseTracker::Implementation {
       return;
     }
     if (Refine()) {
-      Use(tracked);
+      if (!StartWhereTold(observations, tracked)) Use(tracked);
     } else {
       Predicted(observations, tracked);
     }
@@ -104,7 +104,15 @@ class PoseTracker::Implementation {
     estimate.solver = "tracker";
     if (!estimate.status.ok() || Relocalize(tracked)) return;
     if (!hypotheses_.empty()) estimate.notes.emplace_back("the track was lost and starts anew");
+    StartWith(tracked);
+  }
+
+  // The same with the poses that `tracked` has of this frame.
+  void StartWith(TrackedPose* tracked) {
+    const PoseEstimate& estimate = tracked->estimate;
     tracked->reinitialized = true;
+    num_strange_ = 0;
+    looked_at_ = time_;
     contradictions_ = frames_ = 0;
     used_ = time_;
     const Observations resolved = ResolveWorld(fitted_);
@@ -125,6 +133,29 @@ class PoseTracker::Implementation {
     // What cannot be refined here cannot be carried on; the frame's answer stands.
     if (!hypotheses_.empty()) Rank(options_, &hypotheses_);
     if (fitted_.frame.plane.empty()) map_.plane = NamedPlane(fitted_, map_.plane);
+  }
+
+  // A focal length that the first frame hardly told stays as unknown until another one tells it: one
+  // with more in it, or from another side. False where this one does not.
+  bool StartWhereTold(const Observations& observations, TrackedPose* tracked) {
+    if (!map_.camera_is_unknown || !map_.camera_is_considered) return false;
+    constexpr double kOtherSide_s = 1.0;  // After so long a look is worth its time.
+    const int num_strange = NumStrange(fitted_, map_);
+    const bool is_other = num_strange > num_strange_ || time_ - looked_at_ >= kOtherSide_s;
+    num_strange_ = num_strange;
+    if (!is_other) return false;
+    looked_at_ = time_;
+    TrackedPose anew = *tracked;
+    anew.estimate = EstimatePose(observations, options_.estimation);
+    anew.estimate.solver = "tracker";
+    if (!anew.estimate.status.ok() ||
+        !TellsFocalBetter(anew.estimate.hypotheses.front(), map_, hypotheses_[0].state))
+      return false;
+    *tracked = std::move(anew);
+    tracked->estimate.notes.emplace_back(
+        "this frame tells the focal length, which those before hardly did: the track starts anew");
+    StartWith(tracked);
+    return true;
   }
 
   // Goes on in the known map, where the frame, whose own poses `tracked` has, shows some of it and
@@ -270,6 +301,9 @@ class PoseTracker::Implementation {
   Kept<TrackFit> hypotheses_;
   double time_ = -std::numeric_limits<double>::infinity(), used_ = time_;  // Seconds.
   int contradictions_ = 0, frames_ = 0;
+  // Where the focal length is not told: of the last frame (NumStrange); when it was looked for.
+  int num_strange_ = 0;
+  double looked_at_ = 0.0;  // Seconds.
   // Of the present frame; kept for their memory.
   Observations fitted_;
   FitMemory fit_memory_;

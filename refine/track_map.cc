@@ -29,9 +29,9 @@ class MapBuilder {
     if (map_.circles.size() >= kMaxCircles) return;
     std::vector<Eigen::Vector3d> placed;
     std::vector<CalibratedPoint> points;
-    CalibrateInliers(frame_.camera, circle.points, circle.inliers, &points);
     for (const TrackFit& fit : states_) {
       const CameraPose pose = fit.state.Pose(map_);
+      CalibrateInliers(CameraOf(fit.state), circle.points, circle.inliers, &points);
       Eigen::Vector3d at;
       // Beyond a hypothesis' horizon: anywhere, and the frames to come decide.
       if (!FitPlaneCircle(points, 0.0, pose, &at))
@@ -79,7 +79,8 @@ class MapBuilder {
     const int block = map_.AddBlock(3, std::move(manifold), is_constant);
     for (TrackFit& fit : states_) {
       TrackState& state = fit.state;
-      Eigen::Vector3d d = state.Pose(map_).rotation.transpose() * in_camera;
+      Eigen::Vector3d d = state.Pose(map_).rotation.transpose() *
+                          SeenThrough(CameraOf(state), frame_.camera, in_camera);
       if (!is_free) d = Eigen::Vector3d::Unit(static_cast<int>(role));
       if (is_free && in_plane) d.z() = 0.0;
       constexpr double kNone = 1e-6;
@@ -95,6 +96,11 @@ class MapBuilder {
   }
 
  private:
+  // That a hypothesis sees this frame through.
+  Camera CameraOf(const TrackState& state) const {
+    return ShiftedCamera(frame_.camera, state.x.data() + map_.block(TrackMap::kCamera).offset);
+  }
+
   // Standard deviation of an unknown length.
   Eigen::VectorXd Length(std::size_t i, int size) const {
     return Eigen::VectorXd::Constant(size,
@@ -149,9 +155,9 @@ class MapBuilder {
 };
 
 // Pose, velocities and camera of a hypothesis, as a first frame's evidence finds them.
-// `log_focal`, `k1`: the prior's mean, against the camera that the frame comes with.
+// `k1`: the prior's mean, against the camera that the frame comes with.
 TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const TrackerOptions& options,
-                      const Shifts& camera_sigmas, double log_focal, double k1) {
+                      const Shifts& camera_sigmas, double k1) {
   TrackState state;
   const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(kCameraSize);
   for (const int block :
@@ -171,7 +177,7 @@ TrackState FirstState(const TrackMap& map, const PoseHypothesis& h, const Tracke
   }
   Eigen::VectorXd mean = zeros;
   if (block.tangent_size() > 0) {
-    mean[0] = log_focal;
+    mean[0] = std::log(h.focal_scale);
     mean[4] = k1;
   }
   state.Append(map, TrackMap::kCamera, mean.data(), covariance);
@@ -243,16 +249,19 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
   };
   const auto first = std::find_if(resolved.circles.begin(), resolved.circles.end(), takes_part);
   const bool has_position = first != resolved.circles.end();
-  map->Reset(has_position, resolved.camera, sigma);
+  map->Reset(has_position, resolved.camera, sigma, TellsFocal(hypotheses.front(), sigma));
   map->metric = hypotheses.front().metric;
   map->origin_observed = hypotheses.front().origin_observed;
   map->plane = resolved.frame.plane;
   states->Shorten(0);
-  const double log_focal = sigma.log_focal > 0.0 ? StatedLogFocal(resolved) : 0.0;
   const double k1 = sigma.k1 > 0.0 ? -resolved.found_k1 : 0.0;
-  for (const PoseHypothesis& h : hypotheses)
-    states->Add().state =
-        FirstState(*map, h, options, ShiftSigmas(resolved.camera, sigma), log_focal, k1);
+  Shifts sigmas = ShiftSigmas(resolved.camera, sigma);
+  for (const PoseHypothesis& h : hypotheses) {
+    // What is only considered is known as well as this frame tells it.
+    if (map->camera_is_unknown && map->camera_is_considered)
+      sigmas[0] = h.focal_sigma / h.focal_scale;
+    states->Add().state = FirstState(*map, h, options, sigmas, k1);
+  }
   MapBuilder builder(resolved, options, map, states);
   if (has_position) {
     const auto is_at_origin = [&](const CircleObservation& c) {
@@ -266,6 +275,10 @@ void StartMap(const Observations& resolved, const std::vector<PoseHypothesis>& h
     }
   }
   AddDirections(resolved, *map, true, &builder);
+  // Landmarks lie where they are seen through a hypothesis' camera; a prior is about the one given.
+  if (map->camera_is_considered) return;
+  for (TrackFit& fit : *states)
+    fit.state.x[map->block(TrackMap::kCamera).offset] = StatedLogFocal(resolved);
 }
 
 void ExtendMap(const Observations& fitted, const TrackerOptions& options, TrackMap* map,

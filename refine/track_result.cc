@@ -88,10 +88,10 @@ void FillLandmarks(const TrackMap& map, const TrackState& state, const Camera& c
   }
 }
 
-// The camera, where its error is estimated and not only counted.
+// The camera, where it is an unknown.
 void FillCamera(const TrackMap& map, const TrackState& state, const Camera& camera,
                 PoseHypothesis* h) {
-  if (map.camera_is_considered || !map.has_camera()) return;
+  if (!map.camera_is_unknown || !map.has_camera()) return;
   const double* shifts = state.x.data() + map.block(TrackMap::kCamera).offset;
   const int column = map.tangent(TrackMap::kCamera);  // The focal length comes first.
   h->camera = ShiftedCamera(camera, shifts);

@@ -51,7 +51,8 @@ void KalmanUpdate(const TrackMap& map, const BlockMatrix& J, const BlockVector& 
 
 }  // namespace
 
-void TrackMap::Reset(bool has_position, const Camera& camera, const CameraSigma& sigma) {
+void TrackMap::Reset(bool has_position, const Camera& camera, const CameraSigma& sigma,
+                     bool is_told) {
   *this = TrackMap();
   AddBlock(4, std::make_unique<WorldRotationManifold<3>>());
   AddBlock(3, {}, !has_position);
@@ -59,7 +60,8 @@ void TrackMap::Reset(bool has_position, const Camera& camera, const CameraSigma&
   AddBlock(3, {}, !has_position);
   std::unique_ptr<ceres::Manifold> manifold = ShiftManifold(ShiftSigmas(camera, sigma));
   const bool is_exact = manifold == nullptr;
-  camera_is_considered = !sigma.IsEstimated();
+  camera_is_unknown = sigma.IsEstimated();
+  camera_is_considered = !camera_is_unknown || !is_told;
   AddBlock(kCameraSize, std::move(manifold), is_exact);
 }
 

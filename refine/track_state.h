@@ -40,7 +40,8 @@ class TrackMap : private Graph {
     PencilDirection role = PencilDirection::kFree;
   };
 
-  void Reset(bool has_position, const Camera& camera, const CameraSigma& sigma);
+  // `is_told`: a frame tells the focal length.
+  void Reset(bool has_position, const Camera& camera, const CameraSigma& sigma, bool is_told);
   // Returns the block. A null manifold is Euclidean.
   int AddBlock(int size, std::unique_ptr<ceres::Manifold> manifold = {}, bool is_constant = false);
 
@@ -58,6 +59,10 @@ class TrackMap : private Graph {
   // Its error is not estimated but counted: it stays the same from frame to frame, and no number of
   // them averages it out.
   bool camera_is_considered = true;
+  // It is an unknown of every refinement (CameraSigma::IsEstimated). One whose focal length no
+  // frame tells is considered all the same: what many frames tell of it, each a little, lies along
+  // a curved ridge of focal lengths and poses, which no Gaussian follows.
+  bool camera_is_unknown = false;
 
  private:
   std::vector<int> tangents_;

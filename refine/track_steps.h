@@ -68,6 +68,17 @@ void SetUnknownMotion(const TrackMap& map, const TrackerOptions& options, const 
 void ExtendMap(const Observations& fitted, const TrackerOptions& options, TrackMap* map,
                Kept<TrackFit>* states);
 
+// --- track_camera.cc: a focal length that is hardly known. ---
+
+// Whether a frame by itself, whose pose this is, tells it so well that the frames to come can
+// refine it. `sigma`: how well it is known besides.
+bool TellsFocal(const PoseHypothesis& hypothesis, const CameraSigma& sigma);
+// Whether one tells it much better than a state has it.
+bool TellsFocalBetter(const PoseHypothesis& hypothesis, const TrackMap& map,
+                      const TrackState& state);
+// How many features of a frame are not of the map.
+int NumStrange(const Observations& frame, const TrackMap& map);
+
 // --- track_relocate.cc: back to a known map after a loss. ---
 
 // The states of a map where a single frame, of a world of its own, sees its circles: pose and

@@ -15,7 +15,7 @@ constexpr double kStep = 1e-5;  // Of differences.
 
 TrackingBound::TrackingBound(const Trajectory& sequence, const TrackerOptions& options)
     : sequence_(sequence), options_(options) {
-  map_.Reset(true, sequence.camera, CameraSigma::Exact());
+  map_.Reset(true, sequence.camera, CameraSigma::Exact(), true);
   const Trajectory::Frame& first = sequence.frames.front();
   const double distance = first.pose.translation.norm();
   const double velocity = options.initial_velocity_sigma * distance;

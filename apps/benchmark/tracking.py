@@ -37,6 +37,7 @@ from photographs import BOARDS
 from scripts import TOP, Claims, frames_of, json_lines, make_scene, parser_of, read, write
 
 FAR_DEG, SURE, OPEN = 5.0, 0.95, 0.6
+DEVIATIONS = 2
 
 
 def angle(a, b):
@@ -96,13 +97,23 @@ def mire(args, claims):
     calibration = write(os.path.join(args.keep, 'mire.yml'),
                         f'%YAML:1.0\n---\nimage_width: 384\nimage_height: 288\ncamera_matrix: {camera[1]}\n'
                         f'distortion_coefficients: {camera[2]}\n')
+    stem = lambda f: os.path.splitext(os.path.basename(f['image']))[0]
     photos = [f'--images={",".join(frames)}', f'--camera={calibration}']
     for name, extra in (('disc alone', ['--roi=127,157,79,61']), ('all detected', [])):
         lines = track(args, 'mire-2 ' + name, photos, extra)
-        stem = lambda f: os.path.splitext(os.path.basename(f['image']))[0]
         errors = [(f, angle(normal(f['rotation']), truth[stem(f)])) for f in lines if f['rotation'] and stem(f) in truth]
         said, right, wrong, flips = judge(lines, errors)
         claims.check(f'mire-2, {name}: {said}', right == len(truth) and wrong == 0 and not flips)
+    lines = track(args, 'mire-2 guessed', photos[:1])
+    errors = [angle(normal(f['rotation']), truth[stem(f)]) / f['sigma_normal_deg'] for f in lines if f['rotation'] and stem(f) in truth]
+    focal = float(camera[1].strip('[]').split(',')[0])
+    off = [abs(math.log(f['focal_px'] / focal)) / (f['focal_sigma_px'] / f['focal_px']) for f in lines if f.get('focal_px')]
+    within = [sum(e <= DEVIATIONS for e in of) for of in (errors, off)]
+    last = lines[-1]
+    claims.check(f'mire-2, all detected, nothing known of the camera: within two deviations {within[0]} of {len(errors)} normals and the '
+                 f'focal length in {within[1]} of {len(off)} frames, at last {last["focal_px"]:.0f} +- {last["focal_sigma_px"]:.0f} px '
+                 f'for {focal:.0f}, begins {sum(f["reinitialized"] for f in lines)}',
+                 within[0] >= 10 and within[1] >= 0.9 * len(off))
 
 
 def scene_of(args, data_set, *options):

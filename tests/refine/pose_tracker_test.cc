@@ -284,30 +284,5 @@ TEST(PoseTrackerTest, LeavesOutWhatContradicts) {
   }
 }
 
-// A detector that took another focal length than the one stated: the prior stays about that.
-TEST(PoseTrackerTest, TheCamerasPriorIsAboutTheStatedFocalLength) {
-  TrajectoryOptions trajectory;
-  trajectory.occluded = 0.0;
-  trajectory.num_frames = 2;
-  trajectory.depth = 40.0;
-  const Trajectory sequence(trajectory, 3);
-  TrackerOptions options = ExactOptions(trajectory);
-  constexpr double kSigma = 0.2, kStated = 1.3;
-  options.estimation.camera_sigma = CameraSigma::Exact();
-  options.estimation.camera_sigma->log_focal = kSigma;
-  PoseTracker tracker(options);
-  Random noise(7);
-  for (std::size_t k = 0; k < 2; ++k) {
-    Observations seen = sequence.Observe(sequence.frames[k], &noise);
-    seen.stated_focal_px = kStated * seen.camera.fx;
-    const TrackedPose tracked = tracker.Update(seen, static_cast<double>(k) / 30.0);
-    ASSERT_TRUE(tracked.estimate.status.ok()) << tracked.estimate.status.message;
-    // One circle from afar says next to nothing of it.
-    const PoseHypothesis& first = tracked.estimate.hypotheses.front();
-    EXPECT_NEAR(first.focal_scale, kStated, 0.05) << k;
-    EXPECT_GT(first.focal_sigma, 0.85 * kSigma * first.focal_scale) << k;
-  }
-}
-
 }  // namespace
 }  // namespace circline
