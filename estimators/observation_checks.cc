@@ -27,6 +27,8 @@ Status ValidateCircle(const CircleObservation& circle) {
   if (!circle.inliers.empty() && circle.inliers.size() != circle.points.size()) {
     return wrong("the inlier mask has another length than the contour");
   }
+  if (circle.second && circle.second->inliers.size() != circle.points.size())
+    return wrong("the mask of its second ellipse has another length than the contour");
   if (!circle.normals.empty() && circle.normals.size() != circle.points.size()) {
     return wrong("normals must be one for each point, or none");
   }

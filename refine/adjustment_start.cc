@@ -182,10 +182,14 @@ void Adjustment::FindCamera(std::size_t c) {
 
 Status Adjustment::Start() {
   if (start_ != nullptr) cameras_.front() = *start_;
-  for (std::size_t c = 0; c < cameras_.size() && start_ == nullptr; ++c) {
+  const auto tell = [this](std::size_t found) {
     if (options_.progress)
-      options_.progress("cameras", static_cast<int>(c), static_cast<int>(cameras_.size()));
+      options_.progress("cameras", static_cast<int>(found), static_cast<int>(cameras_.size()));
+  };
+  if (start_ == nullptr) tell(0);
+  for (std::size_t c = 0; c < cameras_.size() && start_ == nullptr; ++c) {
     if (priors_[c].IsWide()) FindCamera(c);
+    tell(c + 1);
   }
   Estimate();
   const Status status = PlaceWorlds();

@@ -152,6 +152,7 @@ Status ReadBinaryImages(const std::string& path, const CameraIndex& cameras, Col
 // "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME", and the line of its points after each.
 Status ReadTextImages(const std::string& path, const CameraIndex& cameras, ColmapModel* model) {
   std::ifstream file(path);
+  if (!file) return Status::Invalid(path + ": cannot be opened");
   std::set<std::string> names;
   int number = 0;
   for (std::string line; std::getline(file, line);) {

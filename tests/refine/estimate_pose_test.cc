@@ -140,6 +140,10 @@ TEST(EstimatePoseTest, RefusalsAndBadInputHaveASentence) {
   observations.circles = {scene.Circle("c0", 0.0, 0.0, 1.0)};
   observations.circles.push_back(observations.circles[0]);
   EXPECT_NE(EstimatePose(observations, Exact()).status.message.find("c0"), std::string::npos);
+  observations.circles.pop_back();
+  observations.circles[0].second = ConicReading{{}, {1}};
+  EXPECT_NE(EstimatePose(observations, Exact()).status.message.find("second ellipse"),
+            std::string::npos);
   EstimationOptions options = Exact();
   options.conic_loss.scale_px = -1.0;
   estimate = EstimatePose(scene.Empty(), options);
