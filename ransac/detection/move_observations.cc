@@ -28,6 +28,14 @@ Matrix3d PlaneHomography(const CameraPose& from, const CameraPose& to, const Vec
   return rotation + translation * normal.transpose() / far;
 }
 
+// Takes calibrated coordinates of one camera to those of another; lenses left out.
+Matrix3d ChangeOfCamera(const Camera& from, const Camera& to) {
+  Matrix3d change = Matrix3d::Identity();
+  change.diagonal().head<2>() << from.fx / to.fx, from.fy / to.fy;
+  change.col(2).head<2>() << (from.cx - to.cx) / to.fx, (from.cy - to.cy) / to.fy;
+  return change;
+}
+
 // False, and nothing moved, where the camera cannot follow.
 bool MovePoint(const Camera& camera, const Matrix3d& homography, Vector2d* pixel) {
   CalibratedPoint p;
@@ -53,7 +61,8 @@ void MoveCircle(const Camera& camera, const Matrix3d& homography, CircleObservat
     circle->fit->conic = conic;
 }
 
-void MovePencil(const Camera& camera, const Matrix3d& homography, const Matrix3d& rotation,
+// `turn`: of directions, as the camera sees them.
+void MovePencil(const Camera& camera, const Matrix3d& homography, const Matrix3d& turn,
                 PencilObservation* pencil) {
   // Points of lines of edges that are kept: lenses bend lines. Those of fewer points may be centres
   // of circles (circle_grid.h), and each counts.
@@ -69,17 +78,18 @@ void MovePencil(const Camera& camera, const Matrix3d& homography, const Matrix3d
   }
   pencil->readings.clear();
   if (!pencil->fit) return;
-  pencil->fit->direction = rotation * pencil->fit->direction;
-  pencil->fit->covariance = rotation * pencil->fit->covariance * rotation.transpose();
+  pencil->fit->direction = (turn * pencil->fit->direction).normalized();
+  pencil->fit->covariance = turn * pencil->fit->covariance * turn.transpose();
 }
 
 // Where lines run that were followed, whose pencil nobody has fitted in this frame: as all frames
 // before say.
-std::optional<VanishingPointFit> KnownDirection(const PoseHypothesis& last, const std::string& id) {
+std::optional<VanishingPointFit> KnownDirection(const PoseHypothesis& last, const std::string& id,
+                                                const Matrix3d& to_given) {
   const auto known = std::find_if(last.pencils.begin(), last.pencils.end(),
                                   [&](const PencilEstimate& p) { return p.id == id; });
   if (known == last.pencils.end()) return std::nullopt;
-  const Vector3d& v = known->direction;
+  const Vector3d v = (to_given * known->direction).normalized();
   const double sigma = known->sigma_deg * kDegree;
   return VanishingPointFit{v, sigma * sigma * (Matrix3d::Identity() - v * v.transpose())};
 }
@@ -90,24 +100,30 @@ Observations MoveObservations(const Observations& observations, const PoseHypoth
                               const CameraPose& next) {
   Observations moved = observations;
   const CameraPose& from = last.cam_from_world;
+  // Poses are those of the camera that was found, pixels are calibrated by the one given.
+  const Matrix3d to_given =
+      ChangeOfCamera(CameraOf(last, observations.camera), observations.camera);
+  const Matrix3d to_own = to_given.inverse();
+  const auto of_plane = [&](const Vector3d& normal, double distance) -> Matrix3d {
+    return to_given * PlaneHomography(from, next, normal, distance) * to_own;
+  };
   const Vector3d normal = from.rotation.col(2);
-  const Matrix3d on_plane = PlaneHomography(from, next, normal, normal.dot(from.translation));
-  const Matrix3d at_origin = PlaneHomography(from, next, Vector3d::UnitZ(), from.translation.z());
+  const Matrix3d on_plane = of_plane(normal, normal.dot(from.translation));
+  const Matrix3d at_origin = of_plane(Vector3d::UnitZ(), from.translation.z());
   for (CircleObservation& circle : moved.circles) {
     const auto known =
         std::find_if(last.circles.begin(), last.circles.end(),
                      [&](const CircleEstimate& estimate) { return estimate.id == circle.id; });
-    const Matrix3d homography =
-        known == last.circles.end()
-            ? on_plane
-            : PlaneHomography(from, next, known->normal, known->normal.dot(known->center));
+    const Matrix3d homography = known == last.circles.end()
+                                    ? on_plane
+                                    : of_plane(known->normal, known->normal.dot(known->center));
     MoveCircle(moved.camera, homography, &circle);
   }
-  const Matrix3d rotation = next.rotation * from.rotation.transpose();
+  const Matrix3d turn = to_given * next.rotation * from.rotation.transpose() * to_own;
   for (PencilObservation& pencil : moved.pencils) {
-    if (!pencil.fit) pencil.fit = KnownDirection(last, pencil.id);
+    if (!pencil.fit) pencil.fit = KnownDirection(last, pencil.id, to_given);
     const bool is_on_plane = pencil.plane == moved.frame.plane && !pencil.plane.empty();
-    MovePencil(moved.camera, is_on_plane ? on_plane : at_origin, rotation, &pencil);
+    MovePencil(moved.camera, is_on_plane ? on_plane : at_origin, turn, &pencil);
   }
   return moved;
 }
