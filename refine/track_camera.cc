@@ -7,13 +7,13 @@ namespace circline {
 
 bool TellsFocal(const PoseHypothesis& h, const CameraSigma& sigma) {
   // Relative. Told to so much, Gaussians follow it: of 0.05 to 0.25, on simulated sequences of two
-  // circles (0.1 does there) and on mire-2 (where it does not). And better than it was known.
+  // circles, where 0.1 does, and on mire-2, where it does not. And better than it was known.
   constexpr double kTold = 0.05, kOfPrior = 0.95;
   return h.focal_sigma < std::min(kTold, kOfPrior * sigma.LargestLogFocal()) * h.focal_scale;
 }
 
 bool TellsFocalBetter(const PoseHypothesis& h, const TrackMap& map, const TrackState& state) {
-  constexpr double kMuch = 0.5;  // A world is not worth less.
+  constexpr double kMuch = 0.5;  // The world of the frames before is lost for it.
   const int focal = map.tangent(TrackMap::kCamera);
   return h.focal_sigma < kMuch * std::sqrt(state.covariance(focal, focal)) * h.focal_scale;
 }
