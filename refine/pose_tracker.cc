@@ -135,8 +135,8 @@ class PoseTracker::Implementation {
     if (fitted_.frame.plane.empty()) map_.plane = NamedPlane(fitted_, map_.plane);
   }
 
-  // A focal length that the first frame hardly told stays as unknown until another one tells it: one
-  // with more in it, or from another side. False where this one does not.
+  // A focal length that the first frame hardly told stays as unknown until another one tells it:
+  // one with more in it, or from another side. False where this one does not.
   bool StartWhereTold(const Observations& observations, TrackedPose* tracked) {
     if (!map_.camera_is_unknown || !map_.camera_is_considered) return false;
     constexpr double kOtherSide_s = 1.0;  // After so long a look is worth its time.

@@ -33,10 +33,10 @@
 // the rotation is tracked, and the translation stays that of the first frame.
 //
 // Camera. One that is an unknown (CameraSigma::IsEstimated) is refined from frame to frame once a
-// frame by itself tells the focal length to 5 %. Before, what many frames tell of it, each a little,
-// is not counted: the focal length, and its sigma, are those of the first frame, and the poses'
-// covariances count them. A frame that tells it twice as well by itself, looked for once a second
-// and where new features come, starts the track anew (`reinitialized`, with a note).
+// frame by itself tells the focal length to 5 %. Before, what many frames tell of it, each a
+// little, is not counted: the focal length, and its sigma, are those of the first frame, and the
+// poses' covariances count them. A frame that tells it twice as well by itself, looked for once a
+// second and where new features come, starts the track anew (`reinitialized`, with a note).
 //
 // Loss. A frame that contradicts all hypotheses, or has nothing of the map but other features, is
 // not used (predicted_only). After TrackerOptions::lost_after of them in a row, or a gap longer
