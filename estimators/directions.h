@@ -1,4 +1,5 @@
-// Unit vectors and their errors. Internal: not installed, but shown to the other libraries.
+// Unit vectors, their errors, and what another camera makes of them. Internal: not installed, but
+// shown to the other libraries.
 #ifndef CIRCLINE_ESTIMATORS_DIRECTIONS_H_
 #define CIRCLINE_ESTIMATORS_DIRECTIONS_H_
 
@@ -9,6 +10,7 @@
 #include <cmath>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/camera.h"
 
 namespace circline {
 
@@ -24,6 +26,15 @@ inline Eigen::Matrix<double, 3, 2> BasisAcross(const Eigen::Vector3d& unit) {
 inline double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
   return std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
+}
+
+// Takes calibrated coordinates, and directions but for their length, of one camera to those of
+// another that sees the same pixels; lenses left out.
+inline Eigen::Matrix3d ChangeOfCamera(const Camera& from, const Camera& to) {
+  Eigen::Matrix3d change = Eigen::Matrix3d::Identity();
+  change.diagonal().head<2>() << from.fx / to.fx, from.fy / to.fy;
+  change.col(2).head<2>() << (from.cx - to.cx) / to.fx, (from.cy - to.cy) / to.fy;
+  return change;
 }
 
 }  // namespace circline

@@ -112,8 +112,8 @@ class AdjustProblem : private Graph {
   // `at_minimum`: counts how far losses may have moved the estimate (Linearization::Options).
   Covariances Covariance(std::size_t end, bool at_minimum = true) const;
 
-  bool IsUsed(
-      std::size_t camera) const;  // By a photo that takes part; else there is nothing to ask of it.
+  // By a photo that takes part; else there is nothing to ask of it.
+  bool IsUsed(std::size_t camera) const;
   Camera CameraAt(std::size_t camera) const;
   CameraPose PoseAt(std::size_t photo) const;
   std::vector<std::vector<AdjustedResidual>> Residuals() const;  // Of the inliers; by photo.

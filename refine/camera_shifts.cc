@@ -86,11 +86,6 @@ CalibratedPoint SeenThrough(const Camera& shifted, const Camera& given,
   return PixelToCalibrated(shifted, pixel, &p) ? p : BeyondLens(shifted, straight, pixel);
 }
 
-Eigen::Vector3d SeenThrough(const Camera& shifted, const Camera& given, const Eigen::Vector3d& v) {
-  return {(given.fx * v.x() + (given.cx - shifted.cx) * v.z()) / shifted.fx,
-          (given.fy * v.y() + (given.cy - shifted.cy) * v.z()) / shifted.fy, v.z()};
-}
-
 LensSlope::LensSlope(const Camera& camera, int k) {
   lens_.model = camera.model;
   lens_.fx = lens_.fy = 1.0;

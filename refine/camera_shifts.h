@@ -42,9 +42,6 @@ Eigen::Matrix<T, 3, 1> ShiftedPoint(const Camera& camera, const T* shifts,
 // before.
 CalibratedPoint SeenThrough(const Camera& shifted, const Camera& given,
                             const Eigen::Vector2d& pixel, const CalibratedPoint& before);
-// A direction that was seen through the camera `given`, as the shifted one has it; lenses left out.
-Eigen::Vector3d SeenThrough(const Camera& shifted, const Camera& given,
-                            const Eigen::Vector3d& direction);
 // What one distortion coefficient does to a pixel. The models are linear in their coefficients but
 // for the rational ones of kOpenCV (k4 to k6), for which it holds at 0.
 class LensSlope {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "circline/estimators/basics.h"
-#include "circline/refine/camera_shifts.h"
+#include "circline/estimators/directions.h"
 #include "circline/refine/readings.h"
 
 namespace circline {
@@ -49,7 +49,7 @@ void ShareAmong(const PencilObservation& pencil, const Camera& camera,
     const Camera own_camera = CameraOf(h, camera);
     std::array<Side, 2> sides;
     for (const DirectionReading& reading : pencil.readings) {
-      const Eigen::Vector3d read = SeenThrough(own_camera, camera, reading.direction);
+      const Eigen::Vector3d read = ChangeOfCamera(camera, own_camera) * reading.direction;
       const double turn = std::atan(read.dot(aside) / read.dot(own));
       Side& side = sides[turn > 0.0 ? 1 : 0];
       if (!(std::abs(turn) > kOnePose)) continue;

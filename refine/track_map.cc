@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "circline/estimators/directions.h"
 #include "circline/refine/evidence_points.h"
 #include "circline/refine/manifolds.h"
 #include "circline/refine/plane_circle.h"
@@ -80,7 +81,7 @@ class MapBuilder {
     for (TrackFit& fit : states_) {
       TrackState& state = fit.state;
       Eigen::Vector3d d = state.Pose(map_).rotation.transpose() *
-                          SeenThrough(CameraOf(state), frame_.camera, in_camera);
+                          ChangeOfCamera(frame_.camera, CameraOf(state)) * in_camera;
       if (!is_free) d = Eigen::Vector3d::Unit(static_cast<int>(role));
       if (is_free && in_plane) d.z() = 0.0;
       constexpr double kNone = 1e-6;

@@ -10,6 +10,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
+#include "circline/estimators/directions.h"
 #include "circline/ransac/detection/follow_observations.h"
 
 namespace circline {
@@ -26,14 +27,6 @@ Matrix3d PlaneHomography(const CameraPose& from, const CameraPose& to, const Vec
   const Vector3d translation = to.translation - rotation * from.translation;
   const double far = std::copysign(std::max(std::abs(distance), 1e-9), distance);
   return rotation + translation * normal.transpose() / far;
-}
-
-// Takes calibrated coordinates of one camera to those of another; lenses left out.
-Matrix3d ChangeOfCamera(const Camera& from, const Camera& to) {
-  Matrix3d change = Matrix3d::Identity();
-  change.diagonal().head<2>() << from.fx / to.fx, from.fy / to.fy;
-  change.col(2).head<2>() << (from.cx - to.cx) / to.fx, (from.cy - to.cy) / to.fy;
-  return change;
 }
 
 // False, and nothing moved, where the camera cannot follow.
