@@ -135,10 +135,9 @@ class PoseTracker::Implementation {
     if (fitted_.frame.plane.empty()) map_.plane = NamedPlane(fitted_, map_.plane);
   }
 
-  // A focal length that the first frame hardly told stays as unknown until another one tells it:
-  // one with more in it, or from another side. False where this one does not.
+  // What the track lacks, a later frame may tell by itself. False where this one does not.
   bool StartWhereTold(const Observations& observations, TrackedPose* tracked) {
-    if (!map_.camera_is_unknown || !map_.camera_is_considered) return false;
+    if (!LacksFocal(map_) && map_.has_position()) return false;
     constexpr double kOtherSide_s = 1.0;  // After so long a look is worth its time.
     const int num_strange = NumStrange(fitted_, map_);
     const bool is_other = num_strange > num_strange_ || time_ - looked_at_ >= kOtherSide_s;
@@ -148,12 +147,12 @@ class PoseTracker::Implementation {
     TrackedPose anew = *tracked;
     anew.estimate = EstimatePose(observations, options_.estimation);
     anew.estimate.solver = "tracker";
-    if (!anew.estimate.status.ok() ||
-        !TellsFocalBetter(anew.estimate.hypotheses.front(), map_, hypotheses_[0].state))
-      return false;
+    if (!anew.estimate.status.ok()) return false;
+    const std::string told =
+        WhatIsTold(anew.estimate.hypotheses.front(), map_, hypotheses_[0].state);
+    if (told.empty()) return false;
     *tracked = std::move(anew);
-    tracked->estimate.notes.emplace_back(
-        "this frame tells the focal length, which those before hardly did: the track starts anew");
+    tracked->estimate.notes.push_back(told + ": the track starts anew");
     StartWith(tracked);
     return true;
   }

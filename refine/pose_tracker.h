@@ -30,7 +30,9 @@
 // a new pencil runs along X, Y or Z counts in frames that have a known one along its axis. Unit:
 // that of the first frame's pose; where that is not metric, the distance of its origin, so that
 // later translations have other lengths than 1 though `metric` is false. Without any circle only
-// the rotation is tracked, and the translation stays that of the first frame.
+// the rotation is tracked, and the translation stays that of the first frame; one that has a
+// circle in its world's plane, and a pose with a probability of 0.9 or more, starts the track anew
+// (`reinitialized`, with a note).
 //
 // Camera. One that is an unknown (CameraSigma::IsEstimated) is refined from frame to frame once a
 // frame by itself tells the focal length to 5 %. Before, what many frames tell of it, each a

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "circline/refine/track_steps.h"
 
@@ -12,10 +13,18 @@ bool TellsFocal(const PoseHypothesis& h, const CameraSigma& sigma) {
   return h.focal_sigma < std::min(kTold, kOfPrior * sigma.LargestLogFocal()) * h.focal_scale;
 }
 
-bool TellsFocalBetter(const PoseHypothesis& h, const TrackMap& map, const TrackState& state) {
-  constexpr double kMuch = 0.5;  // The world of the frames before is lost for it.
+bool LacksFocal(const TrackMap& map) { return map.camera_is_unknown && map.camera_is_considered; }
+
+std::string WhatIsTold(const PoseHypothesis& own, const TrackMap& map, const TrackState& state) {
+  // The world of the frames before is lost for it: much better, or sure.
+  constexpr double kMuchBetter = 0.5, kSure = 0.9;
   const int focal = map.tangent(TrackMap::kCamera);
-  return h.focal_sigma < kMuch * std::sqrt(state.covariance(focal, focal)) * h.focal_scale;
+  if (LacksFocal(map) &&
+      own.focal_sigma < kMuchBetter * own.focal_scale * std::sqrt(state.covariance(focal, focal)))
+    return "this frame tells the focal length, which those before hardly did";
+  if (!map.has_position() && !own.circles.empty() && own.probability >= kSure)
+    return "this frame shows a circle of the world's plane, and those before did not";
+  return {};
 }
 
 int NumStrange(const Observations& frame, const TrackMap& map) {

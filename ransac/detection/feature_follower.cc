@@ -129,8 +129,8 @@ bool FeatureFollower::HasEnough(const Observations& found) const {
 }
 
 bool FeatureFollower::IsTimeForCold() const {
-  return CountFeatures(held_) == 0 ||
-         (options_.cold_every > 0 && frames_since_cold_ + 1 >= options_.cold_every);
+  const bool has_pose = !held_.circles.empty() || held_.pencils.size() >= 2;
+  return !has_pose || (options_.cold_every > 0 && frames_since_cold_ + 1 >= options_.cold_every);
 }
 
 void FeatureFollower::Start(const Observations& given) {

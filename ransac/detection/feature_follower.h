@@ -13,7 +13,8 @@
 // a fraction of the time. A feature keeps its id; one that is not found stays expected until the
 // whole photo is looked at, and the ids of what is lost then are not used again. The whole photo is
 // looked at anew, and what is found is named after the features that it continues,
-// - every `cold_every` frames, for new features, and
+// - every `cold_every` frames, for new features,
+// - in every frame while what is expected has no pose: no circle, and less than two pencils, and
 // - where less than `min_found_share` of the circles, or of all features, that were there at the
 //   last look are found.
 #ifndef CIRCLINE_RANSAC_DETECTION_FEATURE_FOLLOWER_H_
@@ -44,10 +45,11 @@ struct FollowOptions {
   Status Validate() const;
 };
 
-// Numbers of the next new "c0", "L0", "p0", and whether pencils have had the roles x and y.
+// Numbers of the next new "c0", "L0", "p0", and what the world has had so far.
 struct NextNames {
   int circle = 0, pencil = 0, plane = 0;  // Counted up, never down.
   bool has_axes = false;                  // Whether x and y are taken.
+  bool has_circles = false;               // In its plane.
 };
 
 // Not thread-safe; several of them are, on different threads.

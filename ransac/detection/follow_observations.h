@@ -77,10 +77,11 @@ Observations MoveObservations(const Observations& observations, const PoseHypoth
 // Names what was detected cold after the predicted features that it continues, and the rest anew:
 // circles whose centre lies within `search_px`, or within half of their own semi-minor axis, of the
 // predicted one and that are as large to a factor of 1.5; pencils that share half of their lines.
-// What goes on keeps its plane, role and radius, and comes first, in the order of the prediction.
+// What goes on keeps its plane, role and radius, and comes first, in the order of what was held.
 // Nothing goes on where fewer than half of the circles and pencils would. Returns how many do.
-int KeepNames(const Observations& predicted, double search_px, NextNames* next,
-              Observations* detected);
+// Planes and roles are those of the detection where the world has had no circles in its plane yet,
+// and another plane has some.
+int KeepNames(const Observations& held, double search_px, NextNames* next, Observations* detected);
 
 }  // namespace circline
 

@@ -138,6 +138,35 @@ void SettleRoles(const Observations& predicted, NextNames* next, Observations* d
       next->has_axes || std::any_of(detected->pencils.begin(), detected->pencils.end(), IsAxis);
 }
 
+bool HasCircles(const Observations& observations) {
+  return std::any_of(
+      observations.circles.begin(), observations.circles.end(),
+      [&](const CircleObservation& c) { return c.plane == observations.frame.plane; });
+}
+
+// A world of directions alone gives way to the first plane with circles, which tells positions,
+// too: what goes on keeps its name, and takes its place in the new world.
+Observations WithoutWorld(const Observations& predicted) {
+  Observations features = predicted;
+  features.frame.plane.clear();
+  for (PencilObservation& pencil : features.pencils) {
+    pencil.plane.clear();
+    pencil.direction = PencilDirection::kFree;
+  }
+  return features;
+}
+
+// Whether the detected world is a plane of the predicted world's pencils.
+bool IsSamePlane(const Observations& predicted, const std::vector<int>& pencils,
+                 const Observations& detected) {
+  for (std::size_t k = 0; k < pencils.size(); ++k) {
+    if (pencils[k] < 0 || detected.pencils[k].plane != detected.frame.plane) continue;
+    const PencilObservation& before = predicted.pencils[static_cast<std::size_t>(pencils[k])];
+    if (before.plane == predicted.frame.plane) return true;
+  }
+  return false;
+}
+
 template <typename Feature, typename Find>
 void OldOnesFirst(const Find& find, std::vector<Feature>* features) {
   std::stable_sort(features->begin(), features->end(), [&](const Feature& a, const Feature& b) {
@@ -148,24 +177,28 @@ void OldOnesFirst(const Find& find, std::vector<Feature>* features) {
 
 }  // namespace
 
-int KeepNames(const Observations& predicted, double search_px, NextNames* next,
-              Observations* detected) {
-  std::vector<int> circles = AssignCircles(predicted, *detected, search_px);
-  std::vector<int> pencils = AssignPencils(predicted, *detected, search_px);
+int KeepNames(const Observations& held, double search_px, NextNames* next, Observations* detected) {
+  std::vector<int> circles = AssignCircles(held, *detected, search_px);
+  std::vector<int> pencils = AssignPencils(held, *detected, search_px);
   const auto goes_on = [](int i) { return i >= 0; };
   auto kept = std::count_if(circles.begin(), circles.end(), goes_on) +
               std::count_if(pencils.begin(), pencils.end(), goes_on);
-  const std::size_t fewer = std::min(predicted.circles.size() + predicted.pencils.size(),
-                                     circles.size() + pencils.size());
+  const std::size_t fewer =
+      std::min(held.circles.size() + held.pencils.size(), circles.size() + pencils.size());
   if (static_cast<double>(kept) < kMinKept * static_cast<double>(fewer)) {
     std::fill(circles.begin(), circles.end(), -1);
     std::fill(pencils.begin(), pencils.end(), -1);
     kept = 0;
   }
+  const bool has_circles = HasCircles(*detected);
+  const bool is_new_world =
+      kept == 0 || (has_circles && !next->has_circles && !IsSamePlane(held, pencils, *detected));
+  if (is_new_world) next->has_axes = next->has_circles = false;
+  next->has_circles = next->has_circles || has_circles;
+  const Observations predicted = is_new_world ? WithoutWorld(held) : held;
   PlaneNames planes(next);
   NameFeatures(predicted.circles, circles, "c", &next->circle, &planes, &detected->circles);
   NameFeatures(predicted.pencils, pencils, "L", &next->pencil, &planes, &detected->pencils);
-  if (kept == 0) next->has_axes = false;  // Another world, if any.
   SettleRoles(predicted, next, detected);
   OldOnesFirst([&](const std::string& id) { return FindCircle(predicted, id); },
                &detected->circles);

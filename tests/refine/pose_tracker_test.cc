@@ -235,6 +235,49 @@ TEST(PoseTrackerTest, LearnsCirclesAndUsesThem) {
   }
 }
 
+// Directions alone tell no position: the first sure pose with circles begins another world.
+TEST(PoseTrackerTest, CirclesAfterDirectionsStartAWorldWithPositions) {
+  TrajectoryOptions trajectory;
+  trajectory.second_circle = true;
+  trajectory.pencil = true;
+  trajectory.occluded = 0.0;
+  trajectory.noise_px = 0.5;
+  trajectory.num_frames = 40;
+  const Trajectory sequence(trajectory, 10);
+  PoseTracker tracker(ExactOptions(trajectory));
+  Random noise(11);
+  for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
+    constexpr std::size_t kCirclesFrom = 15;
+    const CameraPose& truth = sequence.frames[k].pose;
+    Observations seen = sequence.Observe(sequence.frames[k], &noise);
+    PencilObservation& across = seen.pencils.emplace_back(seen.pencils[0]);
+    across.id = "y";
+    across.direction = PencilDirection::kY;
+    for (std::size_t j = 0; j < across.lines.size(); ++j) {
+      for (int i = 0; i < Trajectory::kLinePoints; ++i)
+        across.lines[j].points[static_cast<std::size_t>(i)] =
+            sequence.Pixel(truth, Trajectory::LineHeights()[j], Trajectory::AlongLine(i)) +
+            Noise2(trajectory.noise_px, &noise);
+    }
+    for (CircleObservation& circle : seen.circles) circle.plane = seen.frame.plane = "floor";
+    if (k < kCirclesFrom) {
+      seen.circles.clear();
+      seen.frame.plane.clear();
+    }
+    const TrackedPose tracked = tracker.Update(seen, static_cast<double>(k) / trajectory.fps);
+    const PoseHypothesis first = Best(tracked.estimate);
+    EXPECT_EQ(tracked.reinitialized, k == 0 || k == kCirclesFrom) << k;
+    EXPECT_EQ(HasNote(tracked.estimate, "shows a circle"), k == kCirclesFrom) << k;
+    EXPECT_EQ(first.circles.size(), k < kCirclesFrom ? 0U : 2U) << k;
+    EXPECT_LT(NormalError(truth, first), 0.05) << k;
+    if (k < kCirclesFrom) continue;
+    EXPECT_LT(
+        (first.cam_from_world.translation.normalized() - truth.translation.normalized()).norm(),
+        0.02)
+        << k;
+  }
+}
+
 // A detector that looks anew may call another axis of the world X: the track goes on.
 TEST(PoseTrackerTest, AxesThatAreNamedAnewAreDirectionsLikeOthers) {
   TrajectoryOptions trajectory;
