@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "circline/ransac/drifted_lines.h"
 #include "circline/ransac/false_alarms.h"
 #include "circline/ransac/pencil_model.h"
 #include "circline/ransac/trimmed_direction.h"
@@ -38,6 +39,15 @@ struct Pool {
   }
 
   const LineFit& operator[](int i) const { return lines[static_cast<std::size_t>(i)]; }
+
+  // Number of lines that drift off a pencil that are expected within the threshold.
+  double ExpectedDrifted(const FoundPencil& pencil, const Eigen::Vector3d& direction) const {
+    double sum = 0.0;
+    for (const int i : pencil.lines)
+      sum += ChanceOfInlier((*this)[i], direction, threshold) *
+             DriftRatio(MiddleOf((*this)[i]), pencil.fit.direction, direction);
+    return kDriftShare * sum;
+  }
 
   // Number of unrelated lines among `indices` that are expected within the threshold.
   double Expected(const std::vector<int>& indices, const Eigen::Vector3d& direction) const {
@@ -115,9 +125,10 @@ void Assign(const Pool& pool, std::vector<FoundPencil>* pencils) {
   }
 }
 
-// Fits the pencil to its members; true if it stands on them, among the lines `indices`.
+// Fits the pencil to its members; true if it stands on them, among the lines `indices` and those
+// that drift off the others.
 bool Refit(const Pool& pool, const std::vector<int>& indices, const PencilOptions& options,
-           FoundPencil* pencil) {
+           const std::vector<FoundPencil>& others, FoundPencil* pencil) {
   if (static_cast<int>(pencil->lines.size()) < options.min_lines) return false;
   std::vector<int> members;
   VanishingPointFit fit = pencil->fit;
@@ -125,9 +136,12 @@ bool Refit(const Pool& pool, const std::vector<int>& indices, const PencilOption
   if (!status.ok() || static_cast<int>(members.size()) < options.min_lines) return false;
   pencil->fit = fit;
   pencil->lines = members;
+  double expected = pool.Expected(indices, fit.direction);
+  for (const FoundPencil& other : others) {
+    if (&other != pencil) expected += pool.ExpectedDrifted(other, fit.direction);
+  }
   const double log_false_alarms =
-      LogFalseAlarms(indices.size(), PencilModel::kMinSamples,
-                     pool.Expected(indices, fit.direction), members.size());
+      LogFalseAlarms(indices.size(), PencilModel::kMinSamples, expected, members.size());
   return log_false_alarms <= std::log(options.max_false_alarms);
 }
 
@@ -204,7 +218,7 @@ Status FindPencils(const std::vector<LineFit>& lines, const PencilOptions& optio
          static_cast<int>(left.size()) >= options.min_lines) {
     FoundPencil found;
     if (!FindOne(lines, pool, left, options, &found.fit, &found.lines).ok()) break;
-    if (!Refit(pool, left, options, &found)) break;
+    if (!Refit(pool, left, options, *pencils, &found)) break;
     std::vector<int> rest;
     std::set_difference(left.begin(), left.end(), found.lines.begin(), found.lines.end(),
                         std::back_inserter(rest));
@@ -214,7 +228,7 @@ Status FindPencils(const std::vector<LineFit>& lines, const PencilOptions& optio
   Assign(pool, pencils);
   std::vector<FoundPencil> kept;
   for (FoundPencil& pencil : *pencils) {
-    if (Refit(pool, pool.all, options, &pencil)) kept.push_back(std::move(pencil));
+    if (Refit(pool, pool.all, options, *pencils, &pencil)) kept.push_back(pencil);
   }
   *pencils = std::move(kept);
   return Status::Ok();

@@ -107,11 +107,13 @@ std::vector<LineFit> OneOfEachEdge(const LineSet& set, const std::vector<int>& s
   return fits;
 }
 
-// Boxes, boards and rooms have right angles: the direction orthogonal to `axis` that lines[subset]
-// have the best evidence of, if any.
+// Boxes, boards and rooms have right angles: the direction orthogonal to that of a pencil that
+// lines[subset] have the best evidence of, if any.
 std::optional<DetectedPencil> SearchOrthogonal(const LineSet& set, const std::vector<int>& subset,
-                                               const Vector3d& axis) {
-  const std::optional<Vector3d> best = OrthogonalEvidence(OneOfEachEdge(set, subset), axis).Best();
+                                               const DetectedPencil& pencil) {
+  const OrthogonalEvidence evidence(OneOfEachEdge(set, subset), pencil.observation.fit->direction,
+                                    pencil.members.size());
+  const std::optional<Vector3d> best = evidence.Best();
   if (!best) return std::nullopt;
   return FitPencil(set, subset, *best, kParallelSigmaRad, PencilOptions().min_lines);
 }
@@ -121,8 +123,7 @@ std::vector<DetectedPencil> SearchAround(const LineSet& set, const DetectedPenci
   std::vector<int> left = LinesAround(set, {pencil});
   std::vector<DetectedPencil> found;
   for (int k = 0; k < kFoundAround; ++k) {
-    std::optional<DetectedPencil> next =
-        SearchOrthogonal(set, left, pencil.observation.fit->direction);
+    std::optional<DetectedPencil> next = SearchOrthogonal(set, left, pencil);
     if (!next) break;
     std::vector<int> rest;
     std::set_difference(left.begin(), left.end(), next->members.begin(), next->members.end(),

@@ -1,11 +1,11 @@
 #include "circline/ransac/detection/line_odds.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 #include "circline/estimators/basics.h"
+#include "circline/ransac/drifted_lines.h"
 
 namespace circline {
 namespace {
@@ -14,13 +14,7 @@ constexpr double kLeastSine = 1e-3;  // The middle of a line is not known to bet
 
 }  // namespace
 
-// A line is known least where it turns about its middle.
-LineOdds::LineOdds(const LineFit& fit) : fit_(fit) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(fit.covariance);
-  middle_ = fit.line.cross(eigen.eigenvectors().col(2)).normalized();
-  if (middle_.z() < 0.0) middle_ = -middle_;
-}
+LineOdds::LineOdds(const LineFit& fit) : fit_(fit), middle_(MiddleOf(fit)) {}
 
 double LineOdds::Sine(const Eigen::Vector3d& direction) const {
   return std::clamp(middle_.cross(direction).norm() / direction.norm(), kLeastSine, 1.0);

@@ -8,6 +8,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/noise_model.h"
 #include "circline/ransac/detection/uncertain_direction.h"
+#include "circline/ransac/drifted_lines.h"
 
 namespace circline {
 namespace {
@@ -28,8 +29,11 @@ constexpr int kMostLean = 2;
 
 }  // namespace
 
-OrthogonalEvidence::OrthogonalEvidence(const std::vector<LineFit>& lines, const Vector3d& axis)
-    : axis_(axis) {
+OrthogonalEvidence::OrthogonalEvidence(const std::vector<LineFit>& lines, const Vector3d& axis,
+                                       std::size_t num_along)
+    : axis_(axis),
+      drifted_for_each_(kDriftShare * static_cast<double>(num_along) /
+                        std::max(1.0, static_cast<double>(lines.size()))) {
   for (const LineFit& line : lines) {
     const double lean = kRightAngleSigmaDeg * kDegree * line.line.dot(axis);
     lines_.emplace_back(WithDirectionError(line, std::hypot(kParallelSigmaRad, lean)));
@@ -42,11 +46,14 @@ double OrthogonalEvidence::LogOdds(const Vector3d& direction) const {
   std::vector<double> ratios;  // Of likelihoods, of the lines that may share the direction.
   for (const LineOdds& line : lines_) {
     const double variance = line.Variance(direction), sigma = std::sqrt(variance);
+    // As many lines run this way by chance as if there were so many of any orientation for each.
+    const double density = 1.0 + drifted_for_each_ * DriftRatio(line.middle(), axis_, direction);
     // Lines as near by chance.
-    expected += 2.0 / kPi * std::asin(std::min(1.0, kInlierSigmas * sigma / line.Sine(direction)));
+    expected += density * 2.0 / kPi *
+                std::asin(std::min(1.0, kInlierSigmas * sigma / line.Sine(direction)));
     const double slope = line.Residual(turn) / sigma;
     if (std::abs(line.Residual(direction)) > kInlierSigmas * sigma) continue;
-    ratios.push_back(std::exp(line.LogRatio(direction, variance)));
+    ratios.push_back(std::exp(line.LogRatio(direction, variance)) / density);
     information += slope * slope;
   }
   if (ratios.empty()) return -std::numeric_limits<double>::infinity();

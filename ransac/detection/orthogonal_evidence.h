@@ -3,6 +3,7 @@
 #define CIRCLINE_RANSAC_DETECTION_ORTHOGONAL_EVIDENCE_H_
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -17,8 +18,10 @@ namespace circline {
 class OrthogonalEvidence {
  public:
   // Each line is to be one of its own, no piece of another. Lines may miss the direction by
-  // kParallelSigmaRad more than their covariances say.
-  OrthogonalEvidence(const std::vector<LineFit>& lines, const Eigen::Vector3d& axis);
+  // kParallelSigmaRad more than their covariances say. `num_along`: lines along the axis, from
+  // which some of these stray (ransac/drifted_lines.h).
+  OrthogonalEvidence(const std::vector<LineFit>& lines, const Eigen::Vector3d& axis,
+                     std::size_t num_along);
 
   // Logarithm of the odds that some share about this direction to that all lie any way. The
   // likelihood of the mixture is integrated over the direction's angle about the axis (Laplace),
@@ -39,6 +42,7 @@ class OrthogonalEvidence {
 
   Eigen::Vector3d axis_;
   std::vector<LineOdds> lines_;
+  double drifted_for_each_ = 0.0;  // Lines that drift, for each of the lines.
 };
 
 // Directions about `direction`, turned about `axis`, and how probable each is by all of `lines`: a

@@ -65,6 +65,7 @@ struct Features {
   std::vector<ConicFit> circles;
   std::vector<UncertainDirection> pencils;
   std::vector<LineFit> edges;
+  std::size_t num_along = 0;  // Lines of the first pencil.
 
   Features(const PhotoEvidence& evidence, const std::vector<DetectedPencil>& detected,
            double diagonal_px) {
@@ -78,6 +79,7 @@ struct Features {
       });
       if (!is_known && pencils.size() < kMaxPencils) pencils.push_back(fit);
     }
+    if (!detected.empty()) num_along = detected[0].members.size();
     const bool tell_a_third = pencils.size() > 1 && circles.size() < 2;
     if (!tell_a_third && !IsEmpty()) return;
     edges = EdgesAround(evidence.lines, detected, diagonal_px);
@@ -155,7 +157,8 @@ class StructureEvidence {
 
   // Of the edges around the only pencil as those of one thing with it.
   static double EdgesAtRightAngles(const Features& features) {
-    const OrthogonalEvidence evidence(features.edges, features.pencils[0].direction);
+    const OrthogonalEvidence evidence(features.edges, features.pencils[0].direction,
+                                      features.num_along);
     return std::exp(std::min(evidence.HighestLogOdds(), kMostLogOdds));
   }
 

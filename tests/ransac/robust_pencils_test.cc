@@ -17,6 +17,7 @@ namespace {
 
 using segment_scene::AddSegment;
 using segment_scene::AngleBetween;
+using segment_scene::DriftedLines;
 using segment_scene::Lines;
 using segment_scene::RandomRotation;
 using segment_scene::StrayLines;
@@ -69,6 +70,29 @@ TEST(FindPencils, ClutterAloneHoldsNone) {
     found += static_cast<int>(pencils.size());
   }
   EXPECT_LE(found, 1);
+}
+
+// Lines that drift off three hundred are expected, however alike they are; another direction is
+// found beside them.
+TEST(FindPencils, LinesThatDriftAreNoPencil) {
+  int drifted = 0, both = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed);
+    const Eigen::Matrix3d R = RandomRotation(&random);
+    std::vector<LineFit> lines = Lines(R.col(0), 300, 3, &random);
+    for (const LineFit& line : DriftedLines(R.col(0), 7, &random)) lines.push_back(line);
+    std::vector<FoundPencil> pencils;
+    ASSERT_TRUE(FindPencils(lines, PencilOptions(), &pencils).ok());
+    ASSERT_GE(pencils.size(), 1U);
+    EXPECT_LT(AngleBetween(pencils[0].fit.direction, R.col(0)), 0.02);
+    drifted += pencils.size() > 1 ? 1 : 0;
+    const Eigen::Vector3d across = R.col(1);
+    for (int i = 0; i < 60; ++i) AddSegment(&across, &random, &lines);
+    ASSERT_TRUE(FindPencils(lines, PencilOptions(), &pencils).ok());
+    both += pencils.size() == 2 && AngleBetween(pencils[1].fit.direction, across) < 0.05 ? 1 : 0;
+  }
+  EXPECT_EQ(drifted, 0);
+  EXPECT_GE(both, 19);
 }
 
 TEST(FindPencils, KeepsToItsStoppingRule) {

@@ -22,28 +22,52 @@ inline Eigen::Matrix3d RandomRotation(Random* random) {
   return Eigen::Quaterniond(w, x, y, z).normalized().toRotationMatrix();
 }
 
-// Adds a segment of 20 to 120 px anywhere in a photo of 640 x 480, end points with sigma 0.5 px,
-// along the image of `direction` or, where that is null, any way.
+// The image of a direction at a pixel, a unit vector.
+inline Eigen::Vector2d ImageOf(const Eigen::Vector3d& direction, const Eigen::Vector2d& pixel) {
+  const Camera camera = PinholeCamera();
+  const Eigen::Vector3d x((pixel.x() - camera.cx) / camera.fx, (pixel.y() - camera.cy) / camera.fy,
+                          1.0);
+  return (direction - direction.z() * x).head<2>().normalized();
+}
+
+// Adds a segment, end points with sigma 0.5 px, seen by PinholeCamera.
+inline void AddSegment(const Eigen::Vector2d& middle, const Eigen::Vector2d& along, double half,
+                       Random* random, std::vector<LineFit>* lines) {
+  constexpr double kSigma = 0.5;
+  std::vector<Eigen::Vector2d> ends = {middle, middle};
+  for (std::size_t i = 0; i < 2; ++i) {
+    ends[i] = ends[i] + (i == 0 ? half : -half) * along + Noise2(kSigma, random);
+  }
+  std::vector<CalibratedPoint> points;
+  PixelsToCalibrated(PinholeCamera(), ends, &points);
+  LineFit fit;
+  if (FitLine(points, kSigma, &fit).ok()) lines->push_back(fit);
+}
+
+// One of 20 to 120 px anywhere in the photo, along the image of `direction` or, where that is null,
+// any way.
 inline void AddSegment(const Eigen::Vector3d* direction, Random* random,
                        std::vector<LineFit>* lines) {
   const Camera camera = PinholeCamera();
   const double u = random->Uniform(0.0, camera.width), v = random->Uniform(0.0, camera.height);
   const double angle = random->Uniform(0.0, kPi);
-  Eigen::Vector2d along(std::cos(angle), std::sin(angle));
-  if (direction != nullptr) {
-    const Eigen::Vector3d x((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
-    along = (*direction - direction->z() * x).head<2>().normalized();
+  const Eigen::Vector2d along = direction != nullptr
+                                    ? ImageOf(*direction, {u, v})
+                                    : Eigen::Vector2d(std::cos(angle), std::sin(angle));
+  AddSegment({u, v}, along, random->Uniform(10.0, 60.0), random, lines);
+}
+
+// Lines of 30 px in a corner of the photo, all about as far off `direction`, 5 to 8 degrees.
+inline std::vector<LineFit> DriftedLines(const Eigen::Vector3d& direction, int number,
+                                         Random* random) {
+  std::vector<LineFit> lines;
+  const double off = random->Uniform(5.0, 8.0) * kDegree;
+  for (int i = 0; i < number; ++i) {
+    const double u = random->Uniform(500.0, 620.0), v = random->Uniform(20.0, 100.0);
+    const double turn = off + 0.3 * kDegree * random->Normal();
+    AddSegment({u, v}, Eigen::Rotation2Dd(turn) * ImageOf(direction, {u, v}), 15.0, random, &lines);
   }
-  constexpr double kSigma = 0.5;
-  const double half = random->Uniform(10.0, 60.0);
-  std::vector<Eigen::Vector2d> ends = {{u, v}, {u, v}};
-  for (std::size_t i = 0; i < 2; ++i) {
-    ends[i] = ends[i] + (i == 0 ? half : -half) * along + Noise2(kSigma, random);
-  }
-  std::vector<CalibratedPoint> points;
-  PixelsToCalibrated(camera, ends, &points);
-  LineFit fit;
-  if (FitLine(points, kSigma, &fit).ok()) lines->push_back(fit);
+  return lines;
 }
 
 // So many lines along `direction`, and others any way.

@@ -18,7 +18,7 @@ TEST(OrthogonalEvidence, FindsWhatAFewLinesShareAmongOthers) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Random random(seed);
     const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
-    const OrthogonalEvidence evidence(Lines(R.col(1), 10, 20, &random), R.col(0));
+    const OrthogonalEvidence evidence(Lines(R.col(1), 10, 20, &random), R.col(0), 0);
     const auto best = evidence.Best();
     if (!best) continue;
     ++found;
@@ -36,9 +36,23 @@ TEST(OrthogonalEvidence, UnrelatedLinesShareNothing) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Random random(seed);
     const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
-    found += OrthogonalEvidence(Lines(R.col(1), 0, 30, &random), R.col(0)).Best() ? 1 : 0;
+    found += OrthogonalEvidence(Lines(R.col(1), 0, 30, &random), R.col(0), 0).Best() ? 1 : 0;
   }
   EXPECT_LE(found, 10);
+}
+
+// Those that drift off the axis are alike.
+TEST(OrthogonalEvidence, LinesThatDriftShareNothing) {
+  int found = 0, unexpected = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    Random random(seed);
+    const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
+    const std::vector<LineFit> lines = segment_scene::DriftedLines(R.col(0), 7, &random);
+    found += OrthogonalEvidence(lines, R.col(0), 300).Best() ? 1 : 0;
+    unexpected += OrthogonalEvidence(lines, R.col(0), 0).Best() ? 1 : 0;
+  }
+  EXPECT_LE(found, 10);
+  EXPECT_GE(unexpected, 50);
 }
 
 // A line through the image of the axis itself does not move as a direction turns about that: no
@@ -48,14 +62,15 @@ TEST(OrthogonalEvidence, ALineAlongTheAxisSaysNothing) {
     Random random(seed);
     const Eigen::Matrix3d R = segment_scene::RandomRotation(&random);
     const Vector3d axis = R.col(0);
-    const OrthogonalEvidence evidence({{R.col(1), 0.16 * Eigen::Matrix3d::Identity(), 0.0}}, axis);
+    const OrthogonalEvidence evidence({{R.col(1), 0.16 * Eigen::Matrix3d::Identity(), 0.0}}, axis,
+                                      0);
     EXPECT_LT(evidence.LogOdds(R.col(1)), 1.0) << seed;
     EXPECT_LT(evidence.HighestLogOdds(), 1.0) << seed;
   }
 }
 
 TEST(OrthogonalEvidence, NothingFromNothing) {
-  EXPECT_FALSE(OrthogonalEvidence({}, Vector3d::UnitX()).Best());
+  EXPECT_FALSE(OrthogonalEvidence({}, Vector3d::UnitX(), 0).Best());
 }
 
 // Some lines run along a direction, others any way; the fit is off by up to eight degrees.
