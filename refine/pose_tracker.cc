@@ -137,7 +137,7 @@ class PoseTracker::Implementation {
 
   // What the track lacks, a later frame may tell by itself. False where this one does not.
   bool StartWhereTold(const Observations& observations, TrackedPose* tracked) {
-    if (!LacksFocal(map_) && map_.has_position()) return false;
+    if (!LacksSomething(map_, hypotheses_[0].state)) return false;
     constexpr double kOtherSide_s = 1.0;  // After so long a look is worth its time.
     const int num_strange = NumStrange(fitted_, map_);
     const bool is_other = num_strange > num_strange_ || time_ - looked_at_ >= kOtherSide_s;

@@ -32,7 +32,8 @@
 // later translations have other lengths than 1 though `metric` is false. Without any circle only
 // the rotation is tracked, and the translation stays that of the first frame; one that has a
 // circle in its world's plane, and a pose with a probability of 0.9 or more, starts the track anew
-// (`reinitialized`, with a note).
+// (`reinitialized`, with a note). So does one that shows new features where the normal of the
+// world's plane has become vague, 5 degrees, and tells its own twice as well.
 //
 // Camera. One that is an unknown (CameraSigma::IsEstimated) is refined from frame to frame once a
 // frame by itself tells the focal length to 5 %. Before, what many frames tell of it, each a

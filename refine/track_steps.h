@@ -68,15 +68,15 @@ void SetUnknownMotion(const TrackMap& map, const TrackerOptions& options, const 
 void ExtendMap(const Observations& fitted, const TrackerOptions& options, TrackMap* map,
                Kept<TrackFit>* states);
 
-// --- track_camera.cc: what a map lacks, and a later frame may tell. ---
+// --- track_anew.cc: what a map lacks, and a later frame may tell. ---
 
 // Whether a frame by itself, whose pose this is, tells the focal length so well that the frames to
 // come can refine it. `sigma`: how well it is known besides.
 bool TellsFocal(const PoseHypothesis& hypothesis, const CameraSigma& sigma);
-// Whether the first frame did not.
-bool LacksFocal(const TrackMap& map);
-// What a frame by itself, whose `own` pose this is, tells and the map lacks, in words for people:
-// the focal length, much better than the state has it; positions. Empty: nothing.
+// Whether the track does not know the focal length, positions or, any more, the pose.
+bool LacksSomething(const TrackMap& map, const TrackState& state);
+// Which of these a frame by itself, whose `own` pose this is, tells much better, in words for
+// people. Empty: none.
 std::string WhatIsTold(const PoseHypothesis& own, const TrackMap& map, const TrackState& state);
 // How many features of a frame are not of the map.
 int NumStrange(const Observations& frame, const TrackMap& map);
