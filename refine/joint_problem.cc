@@ -18,11 +18,22 @@ Reading JointProblem::FirstReading() const {
   return reading;
 }
 
-bool JointProblem::IsActive(const Term& term, const State& state) const {
-  for (int f = term.feature; f >= 0; f = feature(f).parent) {
-    if (!state.Has(f)) return false;
+bool JointProblem::TakesPart(std::size_t i, const Reading& reading) const {
+  for (int f = static_cast<int>(i); f >= 0; f = feature(f).parent) {
+    if (reading[static_cast<std::size_t>(f)] == 0) return false;
   }
   return true;
+}
+
+bool JointProblem::IsSameReading(const Reading& a, const Reading& b) const {
+  for (std::size_t i = 0; i < features_.size(); ++i) {
+    if (TakesPart(i, a) != TakesPart(i, b)) return false;
+  }
+  return true;
+}
+
+bool JointProblem::IsActive(const Term& term, const State& state) const {
+  return term.feature < 0 || TakesPart(static_cast<std::size_t>(term.feature), state.active);
 }
 
 std::vector<const Term*> JointProblem::ActiveTerms(const State& state) const {
@@ -67,7 +78,7 @@ bool JointProblem::SpinIsFree(const State& state) const {
 double JointProblem::FreeCost(const State& state) const {
   double twice_cost = 0.0;
   for (std::size_t i = 0; i < features_.size(); ++i)
-    twice_cost += state.active[i] != 0 ? features_[i].free_twice_cost : 0.0;
+    twice_cost += TakesPart(i, state.active) ? features_[i].free_twice_cost : 0.0;
   return 0.5 * twice_cost;
 }
 

@@ -116,6 +116,11 @@ class JointProblem : public Graph {
   // Undistorts the points as the camera of this state has them, where it is estimated: for all that
   // is asked of that camera until the next call.
   void SeeThrough(const State& state) const;
+  // Whether it is kept and all that it is a part of: the centre of a circle that is left out says
+  // nothing, whatever the reading has of the centre.
+  bool TakesPart(std::size_t feature, const Reading& reading) const;
+  // Whether the same features take part.
+  bool IsSameReading(const Reading& a, const Reading& b) const;
   bool IsActive(const Term& term, const State& state) const;
   std::vector<const Term*> ActiveTerms(const State& state) const;
   bool IsMetric(const State& state) const;

@@ -208,7 +208,7 @@ void FillLeftOut(const JointProblem& problem, const State& state, Refined* refin
   for (std::size_t i = 0; i < problem.features().size(); ++i) {
     const Feature& f = problem.features()[i];
     const bool parent_is_out = f.parent >= 0 && !state.Has(f.parent);
-    if (state.active[i] != 0 || parent_is_out) continue;
+    if (problem.TakesPart(i, state.active) || parent_is_out) continue;
     refined->hypothesis.left_out.push_back(f.id);
     refined->notes.push_back(f.name + ": left out, it contradicts the pose found");
   }

@@ -118,8 +118,8 @@ double LeftOutCost(const JointProblem& problem, const State& state) {
   double cost = 0.0;
   for (std::size_t i = 0; i < problem.features().size(); ++i) {
     const Feature& f = problem.features()[i];
+    if (problem.TakesPart(i, state.active)) continue;
     const bool parent_is_out = f.parent >= 0 && !state.Has(f.parent);
-    if (state.active[i] != 0 && !parent_is_out) continue;
     cost += 0.5 * f.free_twice_cost;
     if (!parent_is_out) cost += ClutterCost(problem, f);
   }

@@ -55,8 +55,9 @@ class ReadingSearch {
       for (const State& minimum : minima) {
         if (IsHopeless(minimum, candidate.parent_cost)) continue;
         for (Reading& other : Rivals(minimum)) {
-          const bool is_known = std::any_of(queue.begin(), queue.end(),
-                                            [&](const Candidate& c) { return c.reading == other; });
+          const bool is_known = std::any_of(queue.begin(), queue.end(), [&](const Candidate& c) {
+            return problem_.IsSameReading(c.reading, other);
+          });
           if (!is_known) queue.push_back({std::move(other), near, minimum.cost});
         }
       }
@@ -129,7 +130,8 @@ class ReadingSearch {
       if (is_known) continue;
       if (state.cost < best) {
         best = state.cost;
-        is_consistent = state.active == candidate.reading && IsConsistent(state);
+        is_consistent =
+            problem_.IsSameReading(state.active, candidate.reading) && IsConsistent(state);
       }
       found.emplace_back(FirstLike(seeds, start.seed), std::move(state));
     }
@@ -201,7 +203,7 @@ class ReadingSearch {
   int DegreesOfFreedom(const State& state) const {
     int dof = 0;
     for (std::size_t i = 0; i < state.active.size(); ++i)
-      dof += state.active[i] != 0 ? problem_.features()[i].dof : 0;
+      dof += problem_.TakesPart(i, state.active) ? problem_.features()[i].dof : 0;
     return std::max(1, dof);
   }
 
@@ -210,9 +212,11 @@ class ReadingSearch {
   }
 
   // Of each feature, that all of a photo raise one in 10 000.
-  static double FalseAlarms(const State& state) {
-    const auto active = std::count(state.active.begin(), state.active.end(), 1);
-    return 1e-4 / static_cast<double>(std::max<std::ptrdiff_t>(1, active));
+  double FalseAlarms(const State& state) const {
+    int count = 0;
+    for (std::size_t i = 0; i < state.active.size(); ++i)
+      count += problem_.TakesPart(i, state.active) ? 1 : 0;
+    return 1e-4 / std::max(1, count);
   }
 
   // Of many features, where steps like the one from its parent would not lead to what competes.
@@ -277,7 +281,7 @@ class ReadingSearch {
 }  // namespace
 
 bool IsSamePose(const JointProblem& problem, const State& a, const State& b, double tolerance) {
-  if (a.active != b.active) return false;
+  if (!problem.IsSameReading(a.active, b.active)) return false;
   const CameraPose p = problem.PoseAt(a), q = problem.PoseAt(b);
   const Eigen::Matrix3d &A = p.rotation, &B = q.rotation;
   const Eigen::Vector3d &s = p.translation, &t = q.translation;

@@ -103,6 +103,26 @@ TEST(ReadingsTest, ThePlanesOnlyCircleIsLeftOut) {
   EXPECT_GE(right, 0.95 * kScenes);
 }
 
+// With the centre and without it would be the same pose twice, each with half of its probability.
+TEST(ReadingsTest, TheCenterOfACircleThatIsLeftOutMakesNoOtherHypothesis) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    PlaneScene scene(0.7, 0.3, seed);
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", -0.6, 0.0, 0.7), scene.Circle("c1", 0.9, 0.3, 0.4)};
+    observations.circles[0].radius = 0.7;
+    observations.circles[1].radius = 1.3 * 0.4;
+    observations.circles[0].center = scene.Pixel(-0.6, 0.0);
+    observations.circles[1].center = scene.Pixel(0.9, 0.3);
+    const PoseEstimate estimate = Ok(EstimatePose(observations, Exact()));
+    for (std::size_t k = 1; k < estimate.hypotheses.size(); ++k) {
+      const PoseHypothesis &a = estimate.hypotheses[k - 1], &b = estimate.hypotheses[k];
+      EXPECT_FALSE(a.left_out == b.left_out &&
+                   RotationAngle(a.cam_from_world.rotation, b.cam_from_world.rotation) < 1e-3)
+          << seed;
+    }
+  }
+}
+
 // More of them than readings are looked at one by one: all at once, and what agrees comes back.
 TEST(ReadingsTest, ManyTiltedCirclesAmongManyAreNamed) {
   constexpr double kNoise = 0.3;
