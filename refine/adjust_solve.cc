@@ -12,6 +12,19 @@
 #include "circline/refine/nearby_solve.h"
 
 namespace circline {
+namespace {
+
+// Why no feature takes part.
+Status NothingActive(const std::vector<AdjustInput>& photos) {
+  const bool is_any_left = std::any_of(photos.begin(), photos.end(),
+                                       [](const AdjustInput& photo) { return photo.takes_part; });
+  return Status::Refused(
+      is_any_left ? "the photos have led to a camera through which none of their circles and lines "
+                    "can be placed: a better focal length to start from is missing"
+                  : "the photos contradict each other: each has been left out");
+}
+
+}  // namespace
 
 std::vector<const Term*> AdjustProblem::ActiveTerms(std::size_t end) const {
   std::vector<const Term*> active;
@@ -36,7 +49,7 @@ Status AdjustProblem::Solve(double stretch, int max_iterations) {
   Weighing weighing;
   weighing.stretch = stretch;
   const std::vector<const Term*> active = ActiveTerms();
-  if (active.empty()) return Status::Refused("no photo has evidence in its plane");
+  if (active.empty()) return NothingActive(photos_);
   SetWeighing(weighing);
   ceres::Problem problem(OwnsNothing());
   Fill(active, Values(0), &problem);

@@ -47,6 +47,15 @@ Observations LessExact(Observations observations) {
   return observations;
 }
 
+// Nor are right angles right through it: a direction 45 degrees off the middle of the photo turns
+// by half of the error of log f. With exact axes, lines that are right would be left out.
+EstimationOptions LessExact(EstimationOptions options) {
+  constexpr double kLeastAxisRad = 0.04;  // Half of 0.3 / sqrt(12): the step that f is tried with.
+  double& axis = options.noise_model.pencil_axis_rad;
+  axis = std::max(axis, kLeastAxisRad);
+  return options;
+}
+
 }  // namespace
 
 // kOpenCV has k1 k2 p1 p2 k3, kFisheye k1 to k4.
@@ -131,9 +140,10 @@ void Adjustment::Estimate() {
       if (start_ != nullptr) {
         CoarsePose(prepared_[i], PoseOptions(options_), &estimates_[i]);
       } else {
+        const EstimationOptions options = PoseOptions(options_);
         const bool is_wide = priors_[inputs_[i].camera].IsWide();
-        estimates_[i] =
-            EstimatePose(is_wide ? LessExact(prepared_[i]) : prepared_[i], PoseOptions(options_));
+        estimates_[i] = is_wide ? EstimatePose(LessExact(prepared_[i]), LessExact(options))
+                                : EstimatePose(prepared_[i], options);
       }
     } else {
       estimates_[i].status = out_.photos[i].status;

@@ -115,6 +115,33 @@ TEST(AdjustHard, ExactContoursKeepTheirCircles) {
 }
 
 // A camera that photos contradict is named.
+// Right angles are not right through the camera that is started from: no line is left out for it.
+TEST(AdjustHard, TwoPencilsStartThroughAnyFocalLength) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    PlaneScene scene(0.0, 0.3, seed);
+    scene.camera.id = "cam";
+    scene.camera.fy = scene.camera.fx;
+    scene.camera.distortion = {-0.05};
+    std::vector<Observations> photos;
+    for (int i = 0; i < 5; ++i) {
+      const double tilt = scene.random.Uniform(0.2, 1.0), about = scene.random.Uniform(0.0, 6.28);
+      scene.pose.rotation = ExpRotation({tilt * std::cos(about), tilt * std::sin(about), 0.0}) *
+                            ExpRotation({0.0, 0.0, scene.random.Uniform(0.0, 6.28)}) *
+                            Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+      scene.pose.translation = {0.0, 0.0, 9.0};
+      photos.push_back(scene.Empty());
+      photos.back().pencils = scene.Axes(4, 20);
+      // Half way between two that are tried.
+      photos.back().camera.fx = photos.back().camera.fy = std::exp(0.15) * scene.camera.fx;
+      photos.back().camera.distortion = {};
+    }
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(photos, PointNoiseOnly()));
+    const AdjustedCamera& made = adjusted.cameras.front();
+    EXPECT_EQ(made.num_photos, 5) << seed;
+    EXPECT_LT(std::abs(std::log(made.camera.fx / scene.camera.fx)), 4.0 * made.Sigma(0)) << seed;
+  }
+}
+
 TEST(AdjustHard, ACameraFarFromTheOneGivenIsNamed) {
   for (const double wrong : {1.0, 1.2}) {
     Photos sheet = Photos(8).WithCircles();
