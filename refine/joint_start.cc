@@ -224,9 +224,10 @@ Eigen::Matrix3d JointProblem::SenseOfPriors(const CameraPose& seed, const State&
         if (!prior.Evaluate(parameters, r, nullptr)) return seed.rotation;
         cost += Eigen::Map<const Eigen::VectorXd>(r, prior.num_residuals()).squaredNorm();
       }
-      // Nothing but a clear word of the prior's turns the plane's normal round.
-      constexpr double kClear = 25.0;
-      if (!(cost + (face > 0.0 ? kClear : 0.0) < least)) continue;
+      // Nothing but a clear word of the prior's turns the plane's normal round; where it says
+      // nothing of a turn, rounding is not to decide.
+      constexpr double kClear = 25.0, kRounding = 1e-9;
+      if (!(cost + (face > 0.0 ? kClear : 0.0) < (1.0 - kRounding) * least)) continue;
       least = cost;
       best = R;
     }

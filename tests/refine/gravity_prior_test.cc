@@ -137,5 +137,16 @@ TEST(GravityPriorTest, TellsTheSenseOfAnAxis) {
   }
 }
 
+// Along the normal it does not tell the sense of an axis: X points to the right, by convention.
+TEST(GravityPriorTest, AlongTheNormalLeavesTheSenseOfAnAxis) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlaneScene scene(0.7, 0.2, seed);
+    EstimationOptions options = LeastSquares();
+    options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.01, &scene);
+    const PoseHypothesis h = Best(EstimatePose(CircleAndAxes(&scene), options));
+    EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.05) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace circline
