@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "circline/refine/block_chain.h"
 
@@ -73,6 +74,16 @@ bool JointProblem::SpinIsFree(const State& state) const {
   return !x_is_seen_ && std::none_of(pose_priors_.begin(), pose_priors_.end(), [&](const auto& p) {
     return p.tells_spin && IsActive(term(p.term), state);
   });
+}
+
+bool JointProblem::IsOnePencil(const State& state) const {
+  std::set<int> pencils;
+  for (const LineBlocks& l : lines_) {
+    if (state.Has(l.feature)) pencils.insert(feature(l.feature).observation);
+  }
+  const auto takes_part = [&](const auto& blocks) { return IsActive(term(blocks.term), state); };
+  return pencils.size() < 2 && std::none_of(circles_.begin(), circles_.end(), takes_part) &&
+         std::none_of(pose_priors_.begin(), pose_priors_.end(), takes_part);
 }
 
 double JointProblem::FreeCost(const State& state) const {

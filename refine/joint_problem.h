@@ -129,6 +129,8 @@ class JointProblem : public Graph {
   bool origin_observed() const { return origin_observed_; }
   // Whether nothing that takes part says how the world is turned about its normal.
   bool SpinIsFree(const State& state) const;
+  // Whether nothing takes part but lines of one pencil: the plane may be any about their direction.
+  bool IsOnePencil(const State& state) const;
   bool camera_is_estimated() const { return camera_is_estimated_; }
   const CameraSigma& camera_sigma() const { return camera_sigma_; }
 

@@ -81,6 +81,24 @@ void AddSweep(const Observations& resolved, const CircleObservation& arc,
   }
 }
 
+// Unit normals n of the plane, camera frame: of a pencil across it its direction; of any other, n
+// is orthogonal to the pencil's direction d and as far from gravity g as the world has it. In the
+// plane across d, in which g is seen with the length s, that is an angle to either side of g. None
+// where g runs along d.
+std::vector<Eigen::Vector3d> NormalsByGravity(const GravityPrior& gravity,
+                                              const PencilObservation& pencil) {
+  constexpr double kAlong = 0.02;  // Radians: then it hardly tells the turn about the pencil.
+  const Eigen::Vector3d &d = pencil.fit->direction, &g = gravity.in_camera;
+  const Eigen::Vector3d g_across = g - d.dot(g) * d;
+  const double s = g_across.norm();
+  if (!(s > kAlong)) return {};
+  if (pencil.direction == PencilDirection::kZ) return {d};
+  const double cosine = std::clamp(gravity.in_world.z() / s, -1.0, 1.0),
+               sine = std::sqrt(1.0 - cosine * cosine);
+  const Eigen::Vector3d u = g_across / s, v = d.cross(u);
+  return {cosine * u + sine * v, cosine * u - sine * v};
+}
+
 }  // namespace
 
 bool IsSameSeed(const Seed& a, const Seed& b) {
@@ -144,6 +162,25 @@ std::vector<Seed> CollectSeeds(const Observations& resolved,
   }
   AddCircleSeeds(resolved, log_focal, &seeds);
   return seeds;
+}
+
+void AddPriorSeeds(const EstimationOptions& options, const Observations& resolved, double log_focal,
+                   std::vector<Seed>* seeds) {
+  constexpr int kSource = 1;
+  if (options.pose_prior) seeds->push_back({options.pose_prior->mean, log_focal, kSource, -1});
+  if (!options.gravity_prior) return;
+  CameraPose pose;
+  pose.translation = Eigen::Vector3d::UnitZ();  // As of lines alone, if the origin is not seen.
+  CalibratedPoint origin;
+  if (resolved.frame.origin && PixelToCalibrated(resolved.camera, *resolved.frame.origin, &origin))
+    pose.translation = origin.Homogeneous();
+  for (const PencilObservation& pencil : resolved.pencils) {
+    if (!pencil.fit) continue;
+    for (const Eigen::Vector3d& normal : NormalsByGravity(*options.gravity_prior, pencil)) {
+      if (WorldRotation(resolved, normal, pose.translation, kAnySigmaPx, &pose.rotation))
+        seeds->push_back({pose, log_focal, kSource, -1});
+    }
+  }
 }
 
 // Calibrated coordinates shrink: x' = A x, A = diag(s, s, 1), s = exp(-log_focal) (the lens bends

@@ -282,6 +282,7 @@ class ReadingSearch {
 
 bool IsSamePose(const JointProblem& problem, const State& a, const State& b, double tolerance) {
   if (!problem.IsSameReading(a.active, b.active)) return false;
+  if (problem.IsOnePencil(a)) return true;
   const CameraPose p = problem.PoseAt(a), q = problem.PoseAt(b);
   const Eigen::Matrix3d &A = p.rotation, &B = q.rotation;
   const Eigen::Vector3d &s = p.translation, &t = q.translation;

@@ -33,15 +33,20 @@ std::string Join(const std::vector<std::string>& parts) {
   return out;
 }
 
-// What the closed forms missed, led by the one thing where all of them miss it.
+// What is missing for a pose; where that is no circle or pencil, what the closed forms say.
 Status NoSeed(const Observations& fitted, const std::vector<std::string>& reasons) {
   const auto has_fit = [](const auto& feature) { return feature.fit.has_value(); };
   const auto circles = std::count_if(fitted.circles.begin(), fitted.circles.end(), has_fit);
   const auto pencils = std::count_if(fitted.pencils.begin(), fitted.pencils.end(), has_fit);
   if (circles > 0 || pencils > 1) return Status::Refused(Join(reasons));
-  const std::string lead = "a pose takes a circle or two pencils of parallel lines; there is " +
-                           std::string(pencils == 0 ? "neither" : "one pencil only");
-  return Status::Refused(reasons.empty() ? lead : lead + " (" + Join(reasons) + ")");
+  if (pencils == 0) {
+    return Status::Refused(
+        "a pose takes a circle or two pencils of parallel lines; there is neither");
+  }
+  const auto only = std::find_if(fitted.pencils.begin(), fitted.pencils.end(), has_fit);
+  return Status::Refused("there is only one pencil of parallel lines ('" + only->id +
+                         "'); a pose takes another one, a circle, or a prior: a pose, or gravity "
+                         "that does not run along it");
 }
 
 // The prior pose and the circles' planes, where the prior leads to a pose that explains the points.
@@ -128,9 +133,13 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
                            std::vector<std::string>* reasons) {
   std::vector<Seed> seeds = CollectSeeds(resolved, seeders, 0.0, reasons);
   AddSecondDirections(resolved, seeders, &seeds);
+  const bool takes_priors = seeds.empty() && !problem.lines().empty();
+  if (takes_priors) AddPriorSeeds(problem.options(), resolved, 0.0, &seeds);
   if (!problem.camera_is_estimated() || !problem.camera_sigma().IsWide()) return seeds;
   for (const double start : FocalStarts(problem, resolved)) {
-    const std::vector<Seed> more = CollectSeeds(Refocused(resolved, start), seeders, start);
+    const Observations refocused = Refocused(resolved, start);
+    std::vector<Seed> more = CollectSeeds(refocused, seeders, start);
+    if (takes_priors) AddPriorSeeds(problem.options(), refocused, start, &more);
     seeds.insert(seeds.end(), more.begin(), more.end());
   }
   return seeds;
@@ -187,7 +196,7 @@ Status RefineResolved(const Observations& resolved,
   const Status status = FindMinima(problem, seeds, &minima);
   if (!status.ok()) {
     reasons.insert(reasons.begin(), "no pose agrees with all evidence: " + status.message);
-    return NoSeed(resolved, reasons);
+    return Status::Refused(Join(reasons));
   }
   return RankReadings(problem, minima, estimate);
 }

@@ -52,6 +52,11 @@ std::vector<Seed> CollectSeeds(const Observations& resolved,
 // open and one pencil, planes all about the pencil's direction.
 void AddCircleSeeds(const Observations& resolved, double log_focal, std::vector<Seed>* seeds);
 
+// The pose prior, and the planes that gravity leaves to each pencil that does not run along it:
+// where no closed form gives any seed.
+void AddPriorSeeds(const EstimationOptions& options, const Observations& resolved, double log_focal,
+                   std::vector<Seed>* seeds);
+
 // The same observations, fits included, through a camera of another focal length.
 Observations Refocused(const Observations& resolved, double log_focal);
 

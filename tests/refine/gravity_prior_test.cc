@@ -3,7 +3,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -146,6 +148,91 @@ TEST(GravityPriorTest, AlongTheNormalLeavesTheSenseOfAnAxis) {
     const PoseHypothesis h = Best(EstimatePose(CircleAndAxes(&scene), options));
     EXPECT_LT(RotationAngle(h.cam_from_world.rotation, scene.pose.rotation), 0.05) << seed;
   }
+}
+
+// What a corridor shows: lines of one direction. With gravity, which is not along it, they fix the
+// rotation.
+struct OnePencil {
+  PencilDirection role;
+  Vector3d along, gravity;  // In the world.
+};
+class OnePencilTest : public ::testing::TestWithParam<OnePencil> {
+ protected:
+  // Sets the options' prior.
+  Observations Draw(PlaneScene* scene) {
+    options_.gravity_prior = Measured(GetParam().gravity.normalized(), 0.005, scene);
+    Observations observations = scene->Empty();
+    observations.frame.plane = "p0";
+    observations.pencils = {scene->Pencil("L", GetParam().role, GetParam().along, 4, 20)};
+    return observations;
+  }
+  EstimationOptions options_ = LeastSquares();
+};
+
+TEST_P(OnePencilTest, FixesTheRotationWithGravity) {
+  constexpr int kTrials = Trials(400);
+  double nees = 0.0;
+  int within = 0;
+  for (int i = 0; i < kTrials; ++i) {
+    PlaneScene scene(0.6, 0.4, static_cast<std::uint64_t>(i + 1));
+    const Observations observations = Draw(&scene);
+    const PoseEstimate estimate = Ok(EstimatePose(observations, options_));
+    EXPECT_EQ(estimate.hypotheses.size(), 1U) << i;
+    const PoseHypothesis& h = estimate.hypotheses[0];
+    EXPECT_TRUE(h.free_directions.empty());
+    nees += RotationNees(h, scene.pose) / kTrials;
+    const Vector3d off = LogRotation(scene.pose.rotation * h.cam_from_world.rotation.transpose());
+    for (int k = 0; k < 3; ++k) within += std::abs(off[k]) < 2.0 * h.SigmaRotation()[k] ? 1 : 0;
+  }
+  const double covered = within / (3.0 * kTrials);
+  std::printf("NEES %.2f, within two sigma %.3f\n", nees, covered);
+  if (kSanitized) return;
+  EXPECT_NEAR(nees, 3.0, 0.5);  // 400 trials: +- 0.12.
+  EXPECT_GT(covered, 0.9);
+  EXPECT_LT(covered, 0.99);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    GravityPrior, OnePencilTest,
+    ::testing::Values(OnePencil{PencilDirection::kX, Vector3d::UnitX(), -Vector3d::UnitZ()},
+                      OnePencil{PencilDirection::kY, Vector3d::UnitY(), -Vector3d::UnitZ()},
+                      OnePencil{PencilDirection::kX, Vector3d::UnitX(), -Vector3d::UnitY()},
+                      OnePencil{PencilDirection::kX, Vector3d::UnitX(), {0.5, -0.6, 0.6}},
+                      OnePencil{PencilDirection::kZ, Vector3d::UnitZ(), -Vector3d::UnitY()},
+                      OnePencil{PencilDirection::kFree, Vector3d::UnitX(), -Vector3d::UnitY()}));
+
+// Which of both is wrong nothing tells: without gravity it is one pose that may turn about the
+// pencil, and no more.
+TEST(GravityPriorTest, IsLeftOutWhereTheOnlyPencilContradictsIt) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlaneScene scene(0.6, 0.4, seed);
+    Observations observations = scene.Empty();
+    observations.pencils = {scene.Pencil("L", PencilDirection::kX, Vector3d::UnitX(), 4, 20)};
+    EstimationOptions options = LeastSquares();
+    options.gravity_prior = Measured(-Vector3d::UnitZ(), 0.005, &scene);
+    options.gravity_prior->in_camera =
+        ExpRotation({0.3, 0.3, 0.3}) * options.gravity_prior->in_camera;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, options));
+    int without = 0;
+    for (const PoseHypothesis& h : estimate.hypotheses) {
+      if (h.left_out != std::vector<std::string>{"gravity_prior"}) continue;
+      ++without;
+      EXPECT_EQ(h.free_directions.size(), 1U);
+    }
+    EXPECT_EQ(without, 1) << seed;
+  }
+}
+
+TEST(GravityPriorTest, AlongTheOnlyPencilItSaysNothingMore) {
+  PlaneScene scene(0.6, 0.2);
+  Observations observations = scene.Empty();
+  observations.pencils = {scene.Pencil("L", PencilDirection::kX, Vector3d::UnitX(), 4, 20)};
+  EstimationOptions options = LeastSquares();
+  const auto message = [&] { return EstimatePose(observations, options).status.message; };
+  const std::string alone = message();
+  EXPECT_EQ(alone.find("there is only one pencil of parallel lines ('L')"), 0U) << alone;
+  options.gravity_prior = Measured(Vector3d::UnitX(), 1e-3, &scene);
+  EXPECT_EQ(message(), alone);
 }
 
 }  // namespace

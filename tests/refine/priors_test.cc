@@ -82,6 +82,45 @@ TEST(PriorTest, APoseToStartFromIsNoEvidence) {
   }
 }
 
+// A pose that is known from elsewhere is a start where nothing else is, and one pencil makes it
+// better.
+TEST(PriorTest, OnePencilRefinesAPoseKnownFromElsewhere) {
+  constexpr double kSigma = 0.02;
+  constexpr int kTrials = Trials(400);
+  double nees = 0.0, variance = 0.0;
+  for (int i = 0; i < kTrials; ++i) {
+    PlaneScene scene(0.6, 0.4, static_cast<std::uint64_t>(i + 1));
+    Observations observations = scene.Empty();
+    observations.pencils = {scene.Pencil("L", PencilDirection::kX, Vector3d::UnitX(), 4, 20)};
+    EstimationOptions options = LeastSquares();
+    options.pose_prior = Around(scene.pose, kSigma, 1.0);
+    Eigen::Matrix3d& mean = options.pose_prior->mean.rotation;
+    mean = ExpRotation(kSigma * Vector3d(scene.random.Normal(), scene.random.Normal(),
+                                         scene.random.Normal())) *
+           mean;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, options));
+    EXPECT_EQ(estimate.hypotheses.size(), 1U) << i;
+    nees += RotationNees(estimate.hypotheses[0], scene.pose) / kTrials;
+    variance += estimate.hypotheses[0].SigmaRotation().squaredNorm() / kTrials;
+  }
+  if (kSanitized) return;
+  EXPECT_NEAR(nees, 3.0, 0.5);  // 400 trials: +- 0.12.
+  // Of three turns the pencil leaves that about itself.
+  EXPECT_LT(variance, 1.3 * kSigma * kSigma);
+  EXPECT_GT(variance, 0.9 * kSigma * kSigma);
+}
+
+// Without any evidence it is no estimate.
+TEST(PriorTest, APriorAloneIsNoEstimate) {
+  PlaneScene scene(0.6, 0.2);
+  EstimationOptions options = LeastSquares();
+  options.pose_prior = Around(scene.pose, 0.02, 1.0);
+  options.gravity_prior = GravityPrior{};
+  const Status status = EstimatePose(scene.Empty(), options).status;
+  EXPECT_EQ(status.code, StatusCode::kRefused) << status.message;
+  EXPECT_NE(status.message.find("there is neither"), std::string::npos) << status.message;
+}
+
 TEST(PriorTest, BadPriorsAreNamed) {
   PlaneScene scene(0.7, 0.2);
   const Observations observations = OneCircle(&scene);
