@@ -213,6 +213,23 @@ class BoxSearch {
         axis_[i] = k;
       }
     }
+    DropThoseThatMeet();
+  }
+
+  // Edges that are parallel in space meet at their vanishing point alone, which no visible part of
+  // them reaches. Two that form a corner and yet are along one axis have it there by accident: any
+  // two lines pass through their own corner.
+  void DropThoseThatMeet() {
+    std::vector<std::size_t> meeting;
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      if (gain_[i] <= 0.0) continue;
+      const std::vector<std::size_t>& corners = edges_[i].corners;
+      const bool meets = std::any_of(corners.begin(), corners.end(), [&](std::size_t j) {
+        return gain_[j] > 0.0 && axis_[j] == axis_[i];
+      });
+      if (meets) meeting.push_back(i);
+    }
+    for (const std::size_t i : meeting) gain_[i] = kImpossible;
   }
 
   // The likeliest set of edges that corners between different axes connect. Each two of the axes

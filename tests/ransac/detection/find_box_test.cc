@@ -174,6 +174,27 @@ TEST(FindAnyBox, NeedsNoDirection) {
   EXPECT_GE(found, 18);
 }
 
+// A square picture frame, each of its bars with two edges. One bar's passed for y, the opposite
+// one's for z, and two sides that form a corner for x: the vanishing point was that corner.
+TEST(FindAnyBox, SidesThatFormACornerAreNotParallel) {
+  const Camera camera = TestCamera(640, 480, 775.0);
+  Random random(1);
+  std::vector<DetectedLine> lines;
+  const std::vector<Segment> edges = {
+      {Vector2d(471.5, 10.0), Vector2d(485.0, 315.0)},   // Right, outer.
+      {Vector2d(459.7, 23.0), Vector2d(473.0, 303.0)},   // Right, inner.
+      {Vector2d(196.0, 45.3), Vector2d(470.0, 8.8)},     // Top.
+      {Vector2d(206.0, 54.7), Vector2d(456.0, 22.5)},    //
+      {Vector2d(210.0, 317.7), Vector2d(484.0, 315.7)},  // Bottom.
+      {Vector2d(219.0, 307.5), Vector2d(472.0, 304.0)},  //
+      {Vector2d(195.2, 46.0), Vector2d(209.3, 317.0)},   // Left.
+      {Vector2d(204.9, 56.0), Vector2d(218.4, 307.0)},   //
+  };
+  for (const Segment& edge : edges)
+    lines.push_back(LineThrough(camera, edge[0], edge[1], 0.1, &random));
+  EXPECT_FALSE(FindAnyBox(lines).has_value());
+}
+
 TEST(FindAnyBox, IsRareByAccident) {
   const Camera camera = TestCamera();
   Random random(7);
