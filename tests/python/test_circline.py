@@ -44,6 +44,30 @@ def test_values_say_what_they_do_not_take():
         circline.estimate(observations)
 
 
+@pytest.mark.parametrize(
+    "part, wrong, said",
+    [
+        (lambda o: o, "circels", "Observations has no attribute 'circels'; did you mean 'circles'"),
+        (lambda o: o.circles[0], "sigma", "CircleObservation has no attribute 'sigma'"),
+        (lambda o: o.circles[0], "raduis", "did you mean 'radius'"),
+        (lambda o: o.pencils[1], "plain", "did you mean 'plane'"),
+        (lambda o: o.pencils[1].lines[0], "xyz", "LineObservation has no attribute 'xyz'$"),
+        (lambda o: o.frame, "x_axes", "did you mean 'x_axis'"),
+        (lambda o: o.camera, "focal", "'focal'"),
+        (lambda o: circline.KnownAngle(), "sigma_rad", "did you mean 'sigma'"),
+        (lambda o: circline.KnownLength(), "length", "KnownLength has no attribute 'length'"),
+        (lambda o: circline.SceneImage("a", "a", o), "roi", "did you mean 'rois'"),
+        (lambda o: circline.NoiseModel(), "contour", "'contour'"),
+        (lambda o: circline.NoiseModel().camera, "k2", "'k2'"),
+    ],
+)
+def test_a_misspelt_attribute_is_named(part, wrong, said):
+    value = part(scenes.observations())
+    with pytest.raises(AttributeError, match=said):
+        setattr(value, wrong, 3)
+    assert not hasattr(value, wrong)
+
+
 def test_states_an_error_that_holds():
     chi2 = []
     for seed in range(20):

@@ -1,6 +1,7 @@
 """Values survive copy and pickle, and so reach the processes of a pool."""
 
 import copy
+import dataclasses
 import pickle
 
 import numpy as np
@@ -22,6 +23,14 @@ def test_values_can_be_copied_and_pickled():
     assert copy.copy(noise).camera.k1 == 0.2
     pose = circline.estimate(observations).hypotheses[0].cam_from_world
     assert np.array_equal(copy.deepcopy(pose).rotation, pose.rotation)
+
+
+def test_observations_are_dataclasses():
+    observations = scenes.observations()
+    other = dataclasses.replace(observations, message="seen", pencils=[])
+    assert other.message == "seen" and other.circles is observations.circles
+    fields = dataclasses.asdict(copy.copy(observations))
+    assert fields["circles"][0]["id"] == "c0" and fields["camera"].fx == 1000.0
 
 
 def assert_equal(a: object, b: object) -> None:

@@ -6,13 +6,28 @@ as anything that numpy can make float64 arrays of.
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass, field
-from typing import List, Optional, Tuple
+from typing import TYPE_CHECKING, Any, List, Optional, Tuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ._circline import Camera, ConicFit, ConicReading, DirectionReading, LineFit, VanishingPointFit
+
+
+class Fields:
+    """A dataclass that takes no attribute but its fields: a misspelt one would say nothing."""
+
+    if not TYPE_CHECKING:  # A type checker knows the fields; with this it would take any name.
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            fields = self.__dataclass_fields__
+            if name not in fields:
+                near = difflib.get_close_matches(name, fields, n=1)
+                hint = f"; did you mean '{near[0]}'?" if near else ""
+                raise AttributeError(f"{type(self).__name__} has no attribute '{name}'{hint}")
+            super().__setattr__(name, value)
 
 
 def _points() -> np.ndarray:
@@ -24,7 +39,7 @@ def _segments() -> np.ndarray:
 
 
 @dataclass(eq=False)
-class CircleObservation:
+class CircleObservation(Fields):
     """Image of one circle."""
 
     id: str = ""
@@ -59,7 +74,7 @@ class CircleObservation:
 
 
 @dataclass(eq=False)
-class LineObservation:
+class LineObservation(Fields):
     """Image of one straight line: the end points of a segment, or points along it."""
 
     points: ArrayLike = field(default_factory=_points)
@@ -73,7 +88,7 @@ class LineObservation:
 
 
 @dataclass(eq=False)
-class PencilObservation:
+class PencilObservation(Fields):
     """Images of lines that are parallel in space."""
 
     id: str = ""
@@ -92,7 +107,7 @@ class PencilObservation:
 
 
 @dataclass(eq=False)
-class FrameObservation:
+class FrameObservation(Fields):
     """Where the world frame is wanted; all optional."""
 
     plane: str = ""
@@ -107,7 +122,7 @@ class FrameObservation:
 
 
 @dataclass(eq=False)
-class KnownAngle:
+class KnownAngle(Fields):
     """The angle between the directions of two pencils."""
 
     pencils: Tuple[str, str] = ("", "")
@@ -118,7 +133,7 @@ class KnownAngle:
 
 
 @dataclass(eq=False)
-class KnownLength:
+class KnownLength(Fields):
     """The distance between two points of a plane."""
 
     points: ArrayLike = field(default_factory=lambda: np.zeros((2, 2)))
@@ -132,7 +147,7 @@ class KnownLength:
 
 
 @dataclass(eq=False)
-class Observations:
+class Observations(Fields):
     """Everything that one photo tells: detected, read from a scene file, or filled by hand."""
 
     camera: Camera = field(default_factory=Camera)

@@ -8,11 +8,11 @@ from typing import Dict, List, Optional
 import numpy as np
 
 from ._circline import CameraSigma
-from .observations import Observations
+from .observations import Fields, Observations
 
 
 @dataclass(eq=False)
-class SceneImage:
+class SceneImage(Fields):
     """A photo and what is known of it; nothing is fitted or detected yet."""
 
     name: str
