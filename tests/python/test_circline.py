@@ -3,6 +3,7 @@
 import ast
 import gc
 import os
+import re
 import threading
 import time
 import tracemalloc
@@ -237,11 +238,25 @@ def test_a_pinhole_camera_with_distortion_is_refused():
         circline.Camera(model="fish")
 
 
-def test_stubs_name_the_keywords_of_constructors():
-    """Which stubtest cannot see: pybind11 knows them as **kwargs."""
+def stubs_of(kind: type) -> dict:
+    """Classes or functions of the module's stubs, by name."""
     with open(os.path.join(os.path.dirname(circline.__file__), "_circline.pyi")) as file:
         parsed = ast.parse(file.read()).body
-    stubs = {node.name: node for node in parsed if isinstance(node, ast.ClassDef)}
+    return {node.name: node for node in parsed if isinstance(node, kind)}
+
+
+def test_stubs_name_the_parameters_of_functions():
+    """Which stubtest cannot see: pybind11 writes signatures into docstrings."""
+    for name, stub in stubs_of(ast.FunctionDef).items():
+        signature = getattr(circline, name).__doc__.splitlines()[0]
+        stated = [parameter.arg for parameter in stub.args.args + stub.args.kwonlyargs]
+        assert stated == re.findall(r"(\w+): ", signature), name
+        assert bool(stub.args.kwonlyargs) == ("*, " in signature), name
+
+
+def test_stubs_name_the_keywords_of_constructors():
+    """Which stubtest cannot see: pybind11 knows them as **kwargs."""
+    stubs = stubs_of(ast.ClassDef)
     for made in (circline.Camera, circline.CameraSigma, circline.NoiseModel):
         (constructor,) = (
             node for node in stubs[made.__name__].body if getattr(node, "name", "") == "__init__"
