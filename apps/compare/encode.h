@@ -1,4 +1,5 @@
-// Pictures as the bytes of a file.
+// Pictures as the bytes of a file. Throws std::runtime_error where a picture is empty or has more
+// rows or columns than the format takes: a million in a PNG, 65500 in a JPEG.
 #ifndef CIRCLINE_APPS_COMPARE_ENCODE_H_
 #define CIRCLINE_APPS_COMPARE_ENCODE_H_
 
