@@ -4,6 +4,7 @@
 #define CIRCLINE_APPS_STUDIO_SCENE_DOCUMENT_H_
 
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 #include <vector>
 

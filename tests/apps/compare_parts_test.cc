@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <new>
 #include <opencv2/core/utility.hpp>
 #include <set>
 #include <thread>
