@@ -6,10 +6,11 @@
 #include <Eigen/Dense>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
 #include <vector>
 
-#include "circline/estimators/basics.h"
 #include "circline/estimators/camera.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/circular_points.h"
@@ -19,8 +20,8 @@
 #include "circline/estimators/line_pose.h"
 #include "circline/estimators/metrology.h"
 #include "circline/estimators/pose.h"
-#include "circline/estimators/random.h"
 #include "circline/estimators/vanishing_point.h"
+#include "tests/estimators/fuzzer.h"
 #include "tests/trials.h"
 
 namespace circline {
@@ -29,115 +30,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-// Draws inputs. Each one is bad in its own way: how likely a number is to be strange is drawn once
-// an input, so that many inputs are strange in one place only, and some are not at all.
-class Fuzzer {
- public:
-  explicit Fuzzer(std::uint64_t seed) : random(seed) {}
-
-  void NextInput() {
-    constexpr double kStrange[] = {0.0, 0.0, 0.05, 0.3, 1.0};
-    strange_ = kStrange[random.UniformInt(5)];
-    scale_ = random.Uniform() < 0.3 ? std::pow(10.0, random.Uniform(-320.0, 308.0)) : 1.0;
-    shape_ = random.UniformInt(6);
-  }
-
-  double Number() {
-    if (random.Uniform() >= strange_) return scale_ * random.Uniform(-1.0, 1.0);
-    using Limits = std::numeric_limits<double>;
-    const double sign = random.Uniform() < 0.5 ? -1.0 : 1.0;
-    switch (random.UniformInt(10)) {
-      case 0:
-        return Limits::quiet_NaN();
-      case 1:
-        return sign * Limits::infinity();
-      case 2:
-        return sign * Limits::max();
-      case 3:
-        return sign * Limits::min();
-      case 4:
-        return sign * Limits::denorm_min();
-      case 5:
-        return sign * std::pow(10.0, random.Uniform(-320.0, 308.0));
-      case 6:
-        return sign * 0.0;
-      case 7:
-        return sign * 1.0;
-      case 8:
-        return sign * Limits::epsilon();
-      default:
-        return sign * 1e200;
-    }
-  }
-  Vector2d Vector2() {
-    const double x = Number(), y = Number();
-    return {x, y};
-  }
-  Vector3d Vector3() {
-    const double x = Number(), y = Number(), z = Number();
-    return {x, y, z};
-  }
-  // Any, symmetric, of low rank, diagonal, or the image of a circle.
-  Matrix3d Conic() {
-    const Vector3d a = Vector3(), b = Vector3(), c = Vector3();
-    switch (shape_) {
-      case 0:
-        return a * b.transpose() + b * a.transpose();
-      case 1:
-        return a * a.transpose();
-      case 2:
-        return Matrix3d(a.asDiagonal());
-      case 3:
-        return ProjectCircle({a, Vector3d(b.x(), b.y(), 3.0)});
-      default: {
-        Matrix3d C;
-        C << a, b, c;
-        return shape_ == 4 ? C : Matrix3d(0.5 * (C + C.transpose()));
-      }
-    }
-  }
-  // On an ellipse, collinear, repeated, or anywhere.
-  std::vector<CalibratedPoint> Points() {
-    std::vector<CalibratedPoint> points(static_cast<std::size_t>(random.UniformInt(24)));
-    const Vector2d a = Vector2(), b = Vector2();
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const double t = random.Uniform(0.0, 2.0 * kPi);
-      switch (shape_) {
-        case 0:
-          points[i].x = a + t * b;
-          break;
-        case 1:
-          points[i].x = random.Uniform() < 0.7 ? a : b;
-          break;
-        case 2:
-          points[i].x = Vector2();
-          break;
-        default:
-          points[i].x = a + scale_ * Vector2d(std::cos(t), 0.5 * std::sin(t));
-      }
-      if (random.Uniform() < 0.3 * strange_) points[i].x = Vector2();
-      for (double& entry : points[i].x_from_pixel) {
-        if (random.Uniform() < 0.1 * strange_) entry = Number();
-      }
-    }
-    return points;
-  }
-  CameraPose Pose() {
-    CameraPose pose;
-    pose.rotation = ExpRotation(
-        {random.Uniform(-3.0, 3.0), random.Uniform(-3.0, 3.0), random.Uniform(-3.0, 3.0)});
-    pose.translation = Vector3();
-    if (random.Uniform() < 0.1 * strange_) pose.rotation.col(random.UniformInt(3)) = Vector3();
-    return pose;
-  }
-
-  Random random;
-
- private:
-  double strange_ = 0.0, scale_ = 1.0;
-  int shape_ = 0;
-};
 
 template <typename Derived>
 bool Finite(const Eigen::MatrixBase<Derived>& m) {
@@ -192,8 +84,10 @@ bool FuzzFitConic(Fuzzer* f) {
 }
 
 bool FuzzRefineConic(Fuzzer* f) {
+  const std::vector<CalibratedPoint> points = f->Points();
+  const double sigma = f->Number();
   ConicFit fit;
-  return !RefineConic(f->Points(), f->Number(), f->Conic(), &fit).ok() || Finite(fit);
+  return !RefineConic(points, sigma, f->Conic(), &fit).ok() || Finite(fit);
 }
 
 bool FuzzLines(Fuzzer* f) {
@@ -216,10 +110,12 @@ bool FuzzDirections(Fuzzer* f) {
   const Vector3d y = f->random.Uniform() < 0.2 ? Vector3d(f->Number() * x) : f->Vector3();
   Matrix3d R;
   if (RotationFromDirections(x, y, &R) && !Finite(R)) return false;
-  if (RotationFromOrthogonalDirections(x, f->Number(), y, f->Number(), &R) && !Finite(R)) {
+  const double x_variance = f->Number(), y_variance = f->Number();
+  if (RotationFromOrthogonalDirections(x, x_variance, y, y_variance, &R) && !Finite(R)) {
     return false;
   }
-  MovesAlong(x, y, f->Vector3(), f->Vector3());
+  const Vector3d from = f->Vector3(), to = f->Vector3();
+  MovesAlong(x, y, from, to);
   return true;
 }
 
@@ -231,13 +127,16 @@ bool FuzzCircularPoints(Fuzzer* f) {
   Matrix3d R;
   FrameRotation frame;
   if (VanishingLine(m, &v) && !Finite(v)) return false;
-  if (RotationFromFrame(m, f->Vector3(), f->Number(), f->Vector3(), f->Number(), &frame) &&
+  const Vector3d x = f->Vector3(), y = f->Vector3();
+  const double x_variance = f->Number(), y_variance = f->Number();
+  if (RotationFromFrame(m, x, x_variance, y, y_variance, &frame) &&
       !(Finite(frame.rotation) && Finite(frame.deviation))) {
     return false;
   }
   if (HarmonicConjugate(m, f->Vector3(), &v) && !Finite(v)) return false;
   if (RotationFromCircularPoints(m, f->Vector3(), &R) && !Finite(R)) return false;
-  return !std::isnan(HarmonicDeviation(m, f->Vector3(), f->Vector3()));
+  const Vector3d a = f->Vector3(), b = f->Vector3();
+  return !std::isnan(HarmonicDeviation(m, a, b));
 }
 
 bool FuzzCircleFrame(Fuzzer* f) {
@@ -249,7 +148,8 @@ bool FuzzCircleFrame(Fuzzer* f) {
     good = good && Finite(points[i].real) && Finite(points[i].imag);
   }
   std::array<FrameRotation, 2> rotations;
-  count = RotationsFromCircleAndFrame(conic, f->Vector3(), f->Vector3(), &rotations);
+  const Vector3d x_line = f->Vector3(), y_line = f->Vector3();
+  count = RotationsFromCircleAndFrame(conic, x_line, y_line, &rotations);
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     good = good && Finite(rotations[i].rotation) && Finite(rotations[i].deviation);
   }
