@@ -52,7 +52,7 @@ std::vector<Scene> RandomScenes(std::size_t count = kScenes) {
     circle.center = {random.Uniform(-3.0, 3.0), random.Uniform(-3.0, 3.0),
                      random.Uniform(5.0, 20.0)};
     circle.normal =
-        Vector3d(random.Uniform(-1.0, 1.0), random.Uniform(-1.0, 1.0), -1.0).normalized();
+        Vector3d{random.Uniform(-1.0, 1.0), random.Uniform(-1.0, 1.0), -1.0}.normalized();
     if (circle.normal.dot(circle.center) >= 0.0) continue;
     const Vector3d x = circle.normal.unitOrthogonal(), y = circle.normal.cross(x);
     const auto at = [&](double u, double v) -> Vector3d { return circle.center + u * x + v * y; };

@@ -44,10 +44,9 @@ struct Disc {
 
 Disc DrawDisc(const Camera& camera, Random* random) {
   Disc disc;
-  const Vector2d pixel(random->Uniform(0.0, camera.width), random->Uniform(0.0, camera.height));
+  const double y = random->Uniform(0.0, camera.height), x = random->Uniform(0.0, camera.width);
   disc.center =
-      Vector3d((pixel.x() - camera.cx) / camera.fx, (pixel.y() - camera.cy) / camera.fy, 1.0)
-          .normalized();
+      Vector3d((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0).normalized();
   disc.radius = random->Uniform(16.0, 100.0) / camera.fx;
   disc.is_ring = random->Uniform() < 0.45;
   const double tilt = random->Uniform(0.0, 75.0) * kDegree;

@@ -35,8 +35,9 @@ Observations LongContour(std::int64_t count) {
   for (std::int64_t i = 0; i < count; ++i) {
     const double angle = 2.0 * kPi * static_cast<double>(i) / static_cast<double>(count);
     const double beside = i % 10 < 3 ? random.Uniform(5.0, 60.0) : 0.0;
-    circle.points.emplace_back(200.0 * std::cos(angle) + beside + 0.2 * random.Normal(),
-                               150.0 * std::sin(angle) + 0.2 * random.Normal());
+    circle.points.push_back(
+        Eigen::Vector2d(200.0 * std::cos(angle) + beside, 150.0 * std::sin(angle)) +
+        Noise2(0.2, &random));
   }
   observations.circles = {circle};
   return observations;
@@ -85,7 +86,7 @@ constexpr double kSegmentNoisePx = 0.2;
 
 // A segment of a pencil, 20 to 90 pixels long.
 LineObservation SegmentTo(const Eigen::Vector2d& vanishing_point, Random* random) {
-  Eigen::Vector2d from(random->Uniform(-300.0, 300.0), random->Uniform(-200.0, 200.0));
+  Eigen::Vector2d from{random->Uniform(-300.0, 300.0), random->Uniform(-200.0, 200.0)};
   if ((vanishing_point - from).norm() < 200.0) from *= -1.0;
   const double length = random->Uniform(20.0, 90.0);
   const Eigen::Vector2d to = from + length * (vanishing_point - from).normalized();

@@ -90,11 +90,12 @@ class ClutterSource {
         *normal = Turned(EllipseNormal(other_, t), options_.direction_sigma_rad, random_);
         break;
       }
-      case Clutter::kEdge:
-        *pixel = on_edge_ + random_->Uniform(-150.0, 150.0) * along_ +
-                 Noise2(options_.sigma_px, random_);
+      case Clutter::kEdge: {
+        const Vector2d noise = Noise2(options_.sigma_px, random_);
+        *pixel = on_edge_ + random_->Uniform(-150.0, 150.0) * along_ + noise;
         *normal = Turned({-along_.y(), along_.x()}, options_.direction_sigma_rad, random_);
         break;
+      }
       case Clutter::kRim: {
         const double t = rim_start_ + random_->Uniform(0.0, rim_arc_);
         *pixel = EllipsePoint(rim_, t) + Noise2(options_.sigma_px, random_);

@@ -201,7 +201,10 @@ House DrawCorner(double between, double distance, double aside, Random* random) 
   return DrawHouse(random->Uniform(least, most), between, distance, aside, random);
 }
 
-double DrawSkew(Random* random) { return Sign(random) * random->Uniform(kLeastSkew, kMostSkew); }
+double DrawSkew(Random* random) {
+  const double sign = Sign(random);
+  return sign * random->Uniform(kLeastSkew, kMostSkew);
+}
 
 // Houses behind and beside: right angles, fronts that any other house's are not parallel to.
 void AddOthers(Painter* painter, Random* random, std::vector<House>* houses,
@@ -240,8 +243,8 @@ StreetPhoto DrawStreet(double focal_sigma, Random* random) {
     photo.focal_px = truth.fx;
     photo.sigma_px = LogUniform(kLeastNoise, kMostNoise, random);
     photo.is_orthogonal = random->Uniform() >= kShareSkew;
-    const Eigen::Matrix3d cam_from_world =
-        ExpRotation(Vector3d(-kMeanTilt - kTilt * random->Normal(), 0.0, kRoll * random->Normal()));
+    const double roll = kRoll * random->Normal(), tilt = kMeanTilt + kTilt * random->Normal();
+    const Eigen::Matrix3d cam_from_world = ExpRotation(Vector3d(-tilt, 0.0, roll));
     const double distance = random->Uniform(8.0, 25.0), aside = random->Uniform(-3.0, 3.0);
     const double skew = photo.is_orthogonal ? 0.0 : DrawSkew(random);
     std::vector<House> houses = {DrawCorner(90.0 * kDegree + skew, distance, aside, random)};

@@ -12,6 +12,7 @@
 #include "apps/reconstruct/box_start.h"
 #include "circline/estimators/random.h"
 #include "tests/apps/painted_box.h"
+#include "tests/basics.h"
 
 namespace circline::apps {
 namespace {
@@ -32,8 +33,7 @@ BoxObservation SeenEdges(const PaintedBox& box, double noise_px, Random* random)
     for (int i = 0; i < 20; ++i) {
       Eigen::Vector3d share(e[1], e[2], e[3]);
       share[edge.axis] = i / 19.0;
-      edge.points.push_back(box.Corner(share.x(), share.y(), share.z()) +
-                            noise_px * Eigen::Vector2d(random->Normal(), random->Normal()));
+      edge.points.push_back(box.Corner(share.x(), share.y(), share.z()) + Noise2(noise_px, random));
     }
     seen.edges.push_back(std::move(edge));
   }
@@ -183,11 +183,9 @@ TEST(FitBoxTest, LeavesOutAnEdgeThatTheLensCannotShow) {
 TEST(BoxStartTest, FindsAxesOfThreePlanes) {
   Random random(3);
   for (int trial = 0; trial < 200; ++trial) {
-    const auto some = [&random] {
-      return Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal());
-    };
+    const auto some = [&random] { return Noise3(1.0, &random); };
     const Eigen::Matrix3d truth =
-        Eigen::Quaterniond(random.Normal(), random.Normal(), random.Normal(), random.Normal())
+        Eigen::Quaterniond{random.Normal(), random.Normal(), random.Normal(), random.Normal()}
             .normalized()
             .toRotationMatrix();
     std::array<Eigen::Vector3d, 3> normals;

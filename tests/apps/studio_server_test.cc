@@ -305,12 +305,13 @@ TEST_F(StudioServerTest, SurvivesFuzzedRequests) {
     std::string body = whole;
     for (std::size_t k = 0; k < 1 + below(4); ++k) {
       const std::size_t at = below(body.size());
+      const std::size_t from = below(body.size()), length = below(20);
       if (below(2) == 0)
         body[at] = "{}[]\":,-9e. \\"[below(13)];
       else if (below(2) == 0)
-        body.erase(at, below(20));
+        body.erase(at, length);
       else
-        body.insert(at, body.substr(below(body.size()), below(20)));
+        body.insert(at, body.substr(from, length));
     }
     int status = 0;
     const Json answer = Post("/api/estimate", body, &status);

@@ -52,7 +52,7 @@ TEST(CameraTest, JacobianMatchesDifferences) {
   Random random(2);
   for (const Camera& camera : Cameras()) {
     for (int i = 0; i < 100; ++i) {
-      const Eigen::Vector2d pixel(random.Uniform(0.0, 640.0), random.Uniform(0.0, 480.0));
+      const Eigen::Vector2d pixel{random.Uniform(0.0, 640.0), random.Uniform(0.0, 480.0)};
       CalibratedPoint point, plus, minus;
       ASSERT_TRUE(PixelToCalibrated(camera, pixel, &point));
       for (int k = 0; k < 2; ++k) {

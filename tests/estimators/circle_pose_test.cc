@@ -19,7 +19,7 @@ CirclePose RandomCircle(double tilt, double distance, Random* random) {
   CirclePose pose;
   pose.center =
       distance *
-      Eigen::Vector3d(random->Uniform(-0.5, 0.5), random->Uniform(-0.5, 0.5), 1.0).normalized();
+      Eigen::Vector3d{random->Uniform(-0.5, 0.5), random->Uniform(-0.5, 0.5), 1.0}.normalized();
   const Eigen::Vector3d towards = -pose.center.normalized();
   const Eigen::Vector3d a = towards.unitOrthogonal(), b = towards.cross(a);
   const double spin = random->Uniform(0.0, 2.0 * kPi);
@@ -44,8 +44,8 @@ TEST(CirclePoseTest, TruthIsAmongTheTwo) {
   Random random(1);
   std::vector<double> errors;
   for (int i = 0; i < 100000; ++i) {
-    const CirclePose truth =
-        RandomCircle(random.Uniform(0.02, 1.45), random.Uniform(2.0, 40.0), &random);
+    const double tilt = random.Uniform(0.02, 1.45), distance = random.Uniform(2.0, 40.0);
+    const CirclePose truth = RandomCircle(tilt, distance, &random);
     // Circles that reach behind the camera's plane have no ellipse as image.
     if (truth.center.z() < 1.5) continue;
     errors.push_back(BestNormalError(truth));
@@ -59,8 +59,8 @@ TEST(CirclePoseTest, ACircleIsInViewWhereAllOfItsPointsAre) {
   Random random(6);
   int seen = 0;
   for (int i = 0; i < 2000; ++i) {
-    const CirclePose pose =
-        RandomCircle(random.Uniform(0.0, 1.5), random.Uniform(0.1, 2.0), &random);
+    const double tilt = random.Uniform(0.0, 1.5), distance = random.Uniform(0.1, 2.0);
+    const CirclePose pose = RandomCircle(tilt, distance, &random);
     const Eigen::Vector3d a = pose.normal.unitOrthogonal(), b = pose.normal.cross(a);
     double nearest = pose.center.z();
     for (int k = 0; k < 3600; ++k) {

@@ -44,7 +44,8 @@ TEST(ClosedFormCovarianceTest, CovarianceIsHonest) {
 Observations RandomEvidence(const std::string& name, PlaneScene* scene) {
   Random& random = scene->random;
   const auto circle = [&](const char* id, double x, double y) {
-    return scene->Circle(id, x, y, random.Uniform(0.6, 1.4), 20 + random.UniformInt(80));
+    const double radius = random.Uniform(0.6, 1.4);
+    return scene->Circle(id, x, y, radius, 20 + random.UniformInt(80));
   };
   Observations observations = scene->Empty();
   FrameObservation& frame = observations.frame;

@@ -152,7 +152,7 @@ TEST(ConicFitTest, DistancesAreOrthogonal) {
     // A stray point of next to no weight: far away, deep inside, or the centre itself.
     CalibratedPoint stray = arc.noisy.front();
     const double reach = 1.5 * arc.ellipse.a;
-    stray.x += Eigen::Vector2d(random.Uniform(-reach, reach), random.Uniform(-reach, reach));
+    stray.x += Eigen::Vector2d{random.Uniform(-reach, reach), random.Uniform(-reach, reach)};
     if (trial < 2) stray.x = arc.ellipse.center;
     constexpr double kWeight = 1e-6;
     std::vector<double> weights(arc.noisy.size(), 1.0);

@@ -56,8 +56,8 @@ TEST(LineTest, CovarianceIsHonestUnderDistortion) {
     constexpr int kTrials = Trials(2000);
     double nees = 0.0;
     for (int i = 0; i < kTrials; ++i) {
-      const Eigen::Vector2d a(random.Uniform(-0.5, 0.0), random.Uniform(-0.4, 0.4));
-      const Eigen::Vector2d b(random.Uniform(0.1, 0.5), random.Uniform(-0.4, 0.4));
+      const Eigen::Vector2d a{random.Uniform(-0.5, 0.0), random.Uniform(-0.4, 0.4)};
+      const Eigen::Vector2d b{random.Uniform(0.1, 0.5), random.Uniform(-0.4, 0.4)};
       const Eigen::Vector3d truth = a.homogeneous().cross(b.homogeneous()).normalized();
       LineFit fit;
       ASSERT_TRUE(FitLine(NoisyLine(camera, a, b, n, 0.5, &random), 0.5, &fit).ok());
@@ -89,7 +89,7 @@ TEST(VanishingPointTest, SitsOnItsCovarianceForMixedLengths) {
     for (int i = 0; i < kTrials; ++i) {
       std::vector<LineFit> lines;
       while (lines.size() < 8) {
-        const Eigen::Vector3d start(random.Uniform(-0.3, 0.3), random.Uniform(-0.3, 0.3), 1.0);
+        const Eigen::Vector3d start{random.Uniform(-0.3, 0.3), random.Uniform(-0.3, 0.3), 1.0};
         const Eigen::Vector3d end = start + random.Uniform(0.05, 0.4) * direction;
         LineFit fit;
         const auto points =
@@ -116,7 +116,7 @@ TEST(VanishingPointTest, SitsOnTheBoundForMixedLengths) {
     for (LineFit& line : exact) {
       // Every other segment is ten times as long as the rest.
       const double length = segments.size() % 2 == 0 ? 0.4 : 0.04;
-      const Eigen::Vector3d start(random.Uniform(-0.3, 0.1), random.Uniform(-0.3, 0.3), 1.0);
+      const Eigen::Vector3d start{random.Uniform(-0.3, 0.1), random.Uniform(-0.3, 0.3), 1.0};
       segments.push_back({start.hnormalized(), (start + length * direction).eval().hnormalized()});
       ASSERT_TRUE(
           FitLine(NoisyLine(camera, segments.back()[0], segments.back()[1], 2, 0.0, &random), 0.3,

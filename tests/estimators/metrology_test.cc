@@ -48,7 +48,7 @@ INSTANTIATE_TEST_SUITE_P(BothSides, MetrologyTest, ::testing::Bool());
 
 TEST_P(MetrologyTest, PointsComeBack) {
   for (int i = 0; i < 1000; ++i) {
-    const Vector2d truth(random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0));
+    const Vector2d truth{random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0)};
     const Vector3d x = Image(pose_, truth.x(), truth.y());
     Vector2d point;
     ASSERT_TRUE(PointOnPlane(pose_, x / x.z(), &point));
@@ -88,8 +88,8 @@ TEST_P(MetrologyTest, NothingIsSeenAtTheHorizonAndBeyond) {
 
 TEST_P(MetrologyTest, LinesComeBack) {
   for (int i = 0; i < 1000; ++i) {
-    const Vector2d a(random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0));
-    const Vector2d b(random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0));
+    const Vector2d a{random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0)};
+    const Vector2d b{random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0)};
     if ((a - b).norm() < 0.1) continue;
     const Vector3d image = 5.0 * ImageLine(pose_, a, b);
     Vector3d line;
@@ -107,7 +107,7 @@ TEST_P(MetrologyTest, LinesComeBack) {
 
 TEST_P(MetrologyTest, CirclesComeBackAsCircles) {
   for (int i = 0; i < 1000; ++i) {
-    const Vector2d center(random_.Uniform(-2.0, 2.0), random_.Uniform(-2.0, 2.0));
+    const Vector2d center{random_.Uniform(-2.0, 2.0), random_.Uniform(-2.0, 2.0)};
     const double radius = random_.Uniform(0.1, 2.0);
     CirclePose circle;
     circle.center = Image(pose_, center.x(), center.y()) / radius;
@@ -145,7 +145,7 @@ TEST_P(MetrologyTest, HomographyRectifies) {
   Matrix3d H;
   ASSERT_TRUE(RectifyingHomography(pose_, &H));
   for (int i = 0; i < 1000; ++i) {
-    const Vector2d truth(random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0));
+    const Vector2d truth{random_.Uniform(-3.0, 3.0), random_.Uniform(-3.0, 3.0)};
     const Vector3d p = H * Image(pose_, truth.x(), truth.y());
     EXPECT_GT(p.z(), 0.0);
     EXPECT_LT((p.hnormalized() - truth).norm(), 1e-12);

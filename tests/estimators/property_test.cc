@@ -46,7 +46,7 @@ CircleScene RandomScene(Random* random) {
     const double distance = 1.5 * std::pow(200.0, random->Uniform());
     const double off = std::tan(60.0 * kDegree);
     const Vector3d sight =
-        Vector3d(random->Uniform(-off, off), random->Uniform(-off, off), 1.0).normalized();
+        Vector3d{random->Uniform(-off, off), random->Uniform(-off, off), 1.0}.normalized();
     s.circle.center = distance * sight;
     s.tilt = random->Uniform(0.0, 89.0 * kDegree);
     const Vector3d a = sight.unitOrthogonal(), b = sight.cross(a);
@@ -62,8 +62,8 @@ CircleScene RandomScene(Random* random) {
     const double turn = random->Uniform(0.0, 2.0 * kPi);
     s.rotation.col(0) = std::cos(turn) * x + std::sin(turn) * s.circle.normal.cross(x);
     s.rotation.col(1) = s.circle.normal.cross(s.rotation.col(0));
-    s.origin = s.circle.center + random->Uniform(-2.0, 2.0) * s.rotation.col(0) +
-               random->Uniform(-2.0, 2.0) * s.rotation.col(1);
+    const double u = random->Uniform(-2.0, 2.0), v = random->Uniform(-2.0, 2.0);
+    s.origin = s.circle.center + u * s.rotation.col(0) + v * s.rotation.col(1);
     s.direction = {random->Uniform(0.0, kPi), random->Uniform(0.0, kPi)};
     return s;
   }

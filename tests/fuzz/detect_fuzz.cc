@@ -11,8 +11,8 @@ namespace {
 cv::Mat ArbitraryPhoto(Bytes* bytes) {
   const int types[] = {CV_8UC1, CV_8UC3, CV_8UC4, CV_32FC1};
   const int width = 1 + bytes->Below(128), height = 1 + bytes->Below(128);
-  cv::Mat photo(height, width, types[bytes->OneIn(16) ? bytes->Below(4) : 0],
-                cv::Scalar::all(bytes->Byte()));
+  const int type = types[bytes->OneIn(16) ? bytes->Below(4) : 0];
+  cv::Mat photo(height, width, type, cv::Scalar::all(bytes->Byte()));
   const auto color = [&] { return cv::Scalar::all(bytes->Byte()); };
   const auto point = [&] {
     const int x = bytes->Below(160) - 16;
@@ -21,16 +21,24 @@ cv::Mat ArbitraryPhoto(Bytes* bytes) {
   for (int i = 0; i < 12 && !bytes->empty(); ++i) {
     const int thickness = bytes->OneIn(2) ? cv::FILLED : 1 + bytes->Below(4);
     switch (bytes->Below(4)) {
-      case 0:
-        cv::ellipse(photo, point(), cv::Size(bytes->Below(64), bytes->Below(64)), bytes->Below(180),
-                    0.0, 36.0 * bytes->Below(11), color(), thickness, cv::LINE_AA);
+      case 0: {
+        const cv::Point center = point();
+        const cv::Size axes{bytes->Below(64), bytes->Below(64)};
+        const double angle = bytes->Below(180), arc = 36.0 * bytes->Below(11);
+        cv::ellipse(photo, center, axes, angle, 0.0, arc, color(), thickness, cv::LINE_AA);
         break;
-      case 1:
-        cv::line(photo, point(), point(), color(), 1 + bytes->Below(4), cv::LINE_AA);
+      }
+      case 1: {
+        const cv::Point from = point(), to = point();
+        const cv::Scalar grey = color();
+        cv::line(photo, from, to, grey, 1 + bytes->Below(4), cv::LINE_AA);
         break;
-      case 2:
-        cv::rectangle(photo, point(), point(), color(), thickness);
+      }
+      case 2: {
+        const cv::Point corner = point(), opposite = point();
+        cv::rectangle(photo, corner, opposite, color(), thickness);
         break;
+      }
       default:
         for (int k = 0; k < 32; ++k) {
           const cv::Point at = point();

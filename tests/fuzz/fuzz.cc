@@ -73,7 +73,7 @@ PencilObservation ArbitraryPencil(int i, Bytes* bytes) {
   pencil.plane = ArbitraryId(bytes);
   pencil.direction = static_cast<PencilDirection>(bytes->Below(4));
   if (bytes->OneIn(2)) pencil.sigma_px = bytes->Number(0.01, 3.0);
-  const Vector2d meet(bytes->Number(-3000.0, 3000.0), bytes->Number(-3000.0, 3000.0));
+  const Vector2d meet{bytes->Number(-3000.0, 3000.0), bytes->Number(-3000.0, 3000.0)};
   const int count = bytes->Below(5);
   for (int k = 0; k < count; ++k) {
     const Vector2d start = ArbitraryPixel(bytes);

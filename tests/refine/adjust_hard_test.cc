@@ -13,6 +13,7 @@
 #include "circline/estimators/random.h"
 #include "circline/refine/adjust_photos.h"
 #include "circline/refine/adjustment.h"
+#include "tests/basics.h"
 #include "tests/refine/simulated_options.h"
 #include "tests/sheet_photos.h"
 
@@ -189,7 +190,7 @@ TEST(AdjustHard, ATiltIsKnownBeforehandOnce) {
       ASSERT_TRUE(CameraToPixel(sheet.truth(),
                                 sheet.poses[i].rotation * point + sheet.poses[i].translation,
                                 &circle.points[k]));
-      circle.points[k] += circle.sigma_px * Eigen::Vector2d(random.Normal(), random.Normal());
+      circle.points[k] += Noise2(circle.sigma_px, &random);
     }
   }
   AdjustOptions options = PointNoiseOnly();
@@ -212,7 +213,7 @@ TEST(AdjustHard, FramesThatAreNearlyEqualCountOnce) {
   Random random(1);
   for (int i = 0; i < kFrames; ++i) {
     Observations& frame = video.emplace_back(views.photos[i < kFrames / 2 ? 0 : 1]);
-    const Eigen::Vector2d shake(0.5 * random.Normal(), 0.5 * random.Normal());
+    const Eigen::Vector2d shake = Noise2(0.5, &random);
     for (CircleObservation& circle : frame.circles) {
       for (Eigen::Vector2d& pixel : circle.points) pixel += shake;
     }

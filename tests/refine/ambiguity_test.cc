@@ -29,7 +29,7 @@ using Eigen::Vector3d;
 CirclePose RandomCircle(double distance, double tilt, Random* random) {
   CirclePose circle;
   const Vector3d sight =
-      Vector3d(random->Uniform(-0.25, 0.25), random->Uniform(-0.18, 0.18), 1.0).normalized();
+      Vector3d{random->Uniform(-0.25, 0.25), random->Uniform(-0.18, 0.18), 1.0}.normalized();
   circle.center = distance * sight;
   const Vector3d a = sight.unitOrthogonal(), b = sight.cross(a);
   const double spin = random->Uniform(0.0, 2.0 * kPi);
@@ -101,8 +101,8 @@ TEST(RingsTest, NormalSitsOnTheBoundOfBothRings) {
   Random random(31);
   double square = 0.0, bound = 0.0;
   for (int i = 0; i < kTrials; ++i) {
-    const CirclePose truth =
-        RandomCircle(random.Uniform(5.0, 12.0), random.Uniform(0.5, 1.1), &random);
+    const double distance = random.Uniform(5.0, 12.0), tilt = random.Uniform(0.5, 1.1);
+    const CirclePose truth = RandomCircle(distance, tilt, &random);
     Observations observations;
     observations.camera = camera;
     for (const double radius : radii) {
@@ -143,8 +143,9 @@ TEST(AmbiguityTest, ProbabilitiesAreCalibrated) {
   int lost = 0;
   for (int i = 0; i < scenes; ++i) {
     const double sigma = random.Uniform(0.1, 1.0);
-    const CirclePose truth =
-        RandomCircle(4.0 * std::pow(10.0, random.Uniform()), random.Uniform(0.2, 1.3), &random);
+    const double distance = 4.0 * std::pow(10.0, random.Uniform());
+    const double tilt = random.Uniform(0.2, 1.3);
+    const CirclePose truth = RandomCircle(distance, tilt, &random);
     CircleObservation circle = Observe(camera, truth, 1.0, 60, sigma, &random);
     circle.id = "c0";
     Vector2d center;
@@ -203,8 +204,8 @@ TEST(AmbiguityTest, AnArcHasTwoPosesOfOneHalf) {
   int told = 0;
   constexpr int kScenes = Trials(100);
   for (int i = 0; i < kScenes; ++i) {
-    const CirclePose truth =
-        RandomCircle(random.Uniform(1.5, 5.0), random.Uniform(0.4, 1.2), &random);
+    const double distance = random.Uniform(1.5, 5.0), tilt = random.Uniform(0.4, 1.2);
+    const CirclePose truth = RandomCircle(distance, tilt, &random);
     CircleObservation arc = Observe(camera, truth, 1.0, 200, 0.2, &random);
     arc.points.resize(i % 2 == 0 ? 50 : 80);
     if (i % 4 < 2) arc.radius = 1.0;

@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "circline/estimators/basics.h"
+#include "tests/basics.h"
 #include "tests/paper_scene.h"
 #include "tests/plane_scene.h"
 #include "tests/refine/simulated_options.h"
@@ -66,8 +67,7 @@ TEST(EstimatePoseTest, ExplainingNoContourIsDear) {
       for (PencilObservation& pencil : observations.pencils) {
         pencil.sigma_px = 0.2;
         for (LineObservation& line : pencil.lines) {
-          for (Eigen::Vector2d& p : line.points)
-            p += 0.5 * Eigen::Vector2d(scene.random.Normal(), scene.random.Normal());
+          for (Eigen::Vector2d& p : line.points) p += Noise2(0.5, &scene.random);
         }
       }
       const PoseHypothesis best = Best(EstimatePose(observations, Exact(loss)));

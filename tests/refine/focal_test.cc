@@ -261,8 +261,8 @@ TEST(FocalTest, PoorEvidenceStaysFinite) {
                         z = Eigen::Vector3d::UnitZ();
   Random random(5);
   for (int i = 0; i < 120; ++i) {
-    PlaneScene scene(random.Uniform(0.05, 1.35), random.Uniform(),
-                     static_cast<std::uint64_t>(i + 1));
+    const double tilt = random.Uniform(0.05, 1.35), noise_px = random.Uniform();
+    PlaneScene scene(tilt, noise_px, static_cast<std::uint64_t>(i + 1));
     Observations observations = scene.Empty();
     if (i % 4 == 0) {
       observations.circles = {scene.Circle("a", 0.4, -0.3, 1.0)};

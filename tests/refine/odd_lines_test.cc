@@ -69,12 +69,11 @@ TEST(OddLinesTest, TwoOddKerbsOfFiveDoNotHideThePose) {
       Observations observations = Kerbs(0.0, &scene);
       for (std::size_t k = 0; k < 5; ++k) {
         const bool is_odd = k < 2;
-        const double turned =
-            is_odd ? std::copysign(0.05 * std::pow(30.0, random.Uniform()), random.Uniform(-1, 1))
-                   : 0.0;
+        const double size = is_odd ? 0.05 * std::pow(30.0, random.Uniform()) : 0.0;
+        const double turned = is_odd ? std::copysign(size, random.Uniform(-1, 1)) : 0.0;
         const double half = random.Uniform(0.3, 1.5);
-        const Vector3d middle(random.Uniform(-1.0, 1.0), random.Uniform(-2.0, 2.0), 0.0),
-            along(half * std::cos(turned), half * std::sin(turned), 0.0);
+        const Vector3d middle{random.Uniform(-1.0, 1.0), random.Uniform(-2.0, 2.0), 0.0},
+            along{half * std::cos(turned), half * std::sin(turned), 0.0};
         observations.pencils[0].lines[k] = scene.Line(middle - along, middle + along);
       }
       const PoseEstimate estimate = Ok(EstimatePose(observations, Exact(loss)));

@@ -37,11 +37,13 @@ struct OddScene {
           scene.Pencil(is_second ? "b" : "a", role, Vector3d::Unit(is_second ? 1 : 0), lines);
       for (int k = 0; k < lines; ++k) {
         double angle = is_second ? 0.5 * kPi : 0.0;
-        if (is_odd && is_second && k == 0)
-          angle += std::copysign(random.Uniform(5.0, 25.0) * kDegree, random.Uniform(-1.0, 1.0));
+        if (is_odd && is_second && k == 0) {
+          const double off = random.Uniform(5.0, 25.0) * kDegree;
+          angle += std::copysign(off, random.Uniform(-1.0, 1.0));
+        }
         const double half = random.Uniform(0.5, 1.5);
-        const Vector3d middle(random.Uniform(-2.5, 2.5), random.Uniform(-2.5, 2.5), 0.0),
-            along(half * std::cos(angle), half * std::sin(angle), 0.0);
+        const Vector3d middle{random.Uniform(-2.5, 2.5), random.Uniform(-2.5, 2.5), 0.0},
+            along{half * std::cos(angle), half * std::sin(angle), 0.0};
         pencil.lines[static_cast<std::size_t>(k)] = scene.Line(middle - along, middle + along, 30);
       }
       observations.pencils.push_back(pencil);
@@ -58,9 +60,10 @@ bool IsAmong(const PoseEstimate& estimate, const PlaneScene& scene) {
                      [&](const PoseHypothesis& h) { return IsRight(h, scene); });
 }
 
-// A fit of all lines leads far from where those that meet lie.
+// A fit of all lines leads far from where those that meet lie. Of 3000 scenes the right answer is
+// missing in 5 with point noise alone, in 21 with that of photographs.
 TEST(OddPencilsTest, TheOddLineIsLeftOutAndTheAnswerHonest) {
-  constexpr int kScenes = Trials(150);
+  constexpr int kScenes = Trials(400);
   for (const NoiseModel& model : {NoiseModel::Exact(), NoiseModel()}) {
     EstimationOptions options;
     options.noise_model = model;

@@ -73,7 +73,7 @@ Scene RandomScene(int lines, double angle, bool corridor, Random* random) {
                    ExpRotation({0.0, 0.0, spin + (corridor ? 90.0 * kDegree : 0.0)});
   scene.directions = {scene.rotation.col(0), std::cos(angle) * scene.rotation.col(0) +
                                                  std::sin(angle) * scene.rotation.col(1)};
-  const Vector3d center(random->Uniform(-0.1, 0.1), random->Uniform(-0.1, 0.1), 1.0);
+  const Vector3d center{random->Uniform(-0.1, 0.1), random->Uniform(-0.1, 0.1), 1.0};
   for (std::size_t k = 0; k < 2; ++k) {
     for (int i = 0; i < lines; ++i) {
       scene.segments[k].push_back(

@@ -80,7 +80,7 @@ TEST(FindLattice, FindsNoneInDisorder) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
     std::vector<Vector2d> points;
-    for (int k = 0; k < 20; ++k) points.emplace_back(random.Uniform(), random.Uniform());
+    for (int k = 0; k < 20; ++k) points.push_back({random.Uniform(), random.Uniform()});
     found += finds(points) ? 1 : 0;
   }
   EXPECT_LE(found, 1);

@@ -93,8 +93,8 @@ TEST(DetectObservations, ClutterOfLinesIsNoPose) {
     for (int k = 0; k < 14; ++k) {
       std::vector<cv::Point> corners;
       for (int c = 0; c < 3; ++c) {
-        corners.emplace_back(static_cast<int>(random.Uniform() * camera.width),
-                             static_cast<int>(random.Uniform() * camera.height));
+        corners.push_back({static_cast<int>(random.Uniform() * camera.width),
+                           static_cast<int>(random.Uniform() * camera.height)});
       }
       cv::fillConvexPoly(image, corners, cv::Scalar(255.0 * random.Uniform()), cv::LINE_AA);
     }

@@ -34,7 +34,7 @@ std::vector<DetectedLine> BoxEdges(const Camera& camera, Random* random) {
 std::vector<DetectedLine> Clutter(const Camera& camera, int count, Random* random) {
   std::vector<DetectedLine> lines;
   for (int i = 0; i < count; ++i) {
-    const Vector2d from(random->Uniform(20.0, 460.0), random->Uniform(20.0, 340.0));
+    const Vector2d from{random->Uniform(20.0, 460.0), random->Uniform(20.0, 340.0)};
     const double angle = random->Uniform(0.0, 2.0 * kPi), length = random->Uniform(20.0, 90.0);
     const Vector2d to = from + length * Vector2d(std::cos(angle), std::sin(angle));
     lines.push_back(LineThrough(camera, from, to, kNoisePx, random));
@@ -140,9 +140,8 @@ TEST(FindFreeBox, NeedsNoMoreThanADirectionNearOneOfItsAxes) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
     const std::vector<DetectedLine> lines = BoxAmong(60, camera, &random);
-    const Matrix3d turn =
-        ExpRotation(0.005 * Vector3d(random.Normal(), random.Normal(), random.Normal()));
-    const Vector3d other(random.Normal(), random.Normal(), random.Normal());
+    const Matrix3d turn = ExpRotation(Noise3(0.005, &random));
+    const Vector3d other = Noise3(1.0, &random);
     const auto box = FindFreeBox(lines, {other.normalized(), turn * kAxes.col(seed % 3)});
     if (!box) continue;
     ++found;

@@ -48,7 +48,7 @@ void AddSides(const Camera& camera, const CameraPose& pose, const Corners& corne
 void AddClutter(const Camera& camera, int count, Random* random, std::vector<DetectedLine>* lines) {
   for (int i = 0; i < count; ++i) {
     const double angle = random->Uniform(0.0, kPi);
-    const Vector2d middle(random->Uniform(60.0, 420.0), random->Uniform(60.0, 300.0));
+    const Vector2d middle{random->Uniform(60.0, 420.0), random->Uniform(60.0, 300.0)};
     const Vector2d half = random->Uniform(12.0, 60.0) * Vector2d(std::cos(angle), std::sin(angle));
     lines->push_back(LineThrough(camera, middle - half, middle + half, 0.15, random));
   }

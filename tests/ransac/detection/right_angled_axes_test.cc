@@ -22,7 +22,8 @@ Vector3d RandomUnit(Random* random) { return Noise3(1.0, random).normalized(); }
 TEST(RightAngledAxes, AreRotationsTheTruthAmongThem) {
   Random random(1);
   for (int trial = 0; trial < 10000; ++trial) {
-    const Matrix3d truth = ExpRotation(random.Uniform(0.0, 3.0) * RandomUnit(&random));
+    const double angle = random.Uniform(0.0, 3.0);
+    const Matrix3d truth = ExpRotation(angle * RandomUnit(&random));
     std::array<Vector3d, 3> lines;
     for (int k = 0; k < 3; ++k)
       lines[static_cast<std::size_t>(k)] = truth.col(k).cross(RandomUnit(&random)).normalized();

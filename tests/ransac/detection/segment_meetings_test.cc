@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
+
 #include "circline/estimators/random.h"
 
 namespace circline {
@@ -49,11 +51,12 @@ TEST(SegmentMeetings, LengthCountsByTheNumberOfMeetings) {
 // Twice the pixels, twice the distances: the same photo.
 TEST(SegmentMeetings, WhatMeetsDoesSoAtAnySize) {
   Random random(1);
-  const auto point = [&random] { return random.Uniform(0.0, 120.0); };
+  const auto point = [&random] {
+    return Eigen::Vector2d{random.Uniform(0.0, 120.0), random.Uniform(0.0, 120.0)};
+  };
   int near = 0, corners = 0;
   for (int trial = 0; trial < 2000; ++trial) {
-    const Segment s = Make(point(), point(), point(), point());
-    const Segment t = Make(point(), point(), point(), point());
+    const Segment s = {point(), point()}, t = {point(), point()};
     const Segment s2 = {2.0 * s[0], 2.0 * s[1]}, t2 = {2.0 * t[0], 2.0 * t[1]};
     EXPECT_EQ(AreNear(s, t, 300.0), AreNear(s2, t2, 600.0));
     EXPECT_EQ(FormCorner(s, t, 300.0), FormCorner(s2, t2, 600.0));

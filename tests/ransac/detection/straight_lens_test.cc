@@ -40,7 +40,7 @@ double AtTrueFocal(double k1, const Camera& camera) {
 // What a detection through `guess` makes of a curve through the scene, `bend` of its length away
 // from straight.
 DetectedLine CurveSeen(const Camera& lens, const Camera& guess, double bend, Random* random) {
-  const Eigen::Vector2d pixel(random->Uniform(90.0, 390.0), random->Uniform(70.0, 290.0));
+  const Eigen::Vector2d pixel{random->Uniform(90.0, 390.0), random->Uniform(70.0, 290.0)};
   CalibratedPoint middle;
   EXPECT_TRUE(PixelToCalibrated(lens, pixel, &middle));
   const double angle = random->Uniform(0.0, kPi);

@@ -54,7 +54,8 @@ TEST(UncertainDirection, TheOddsOfARightAngleAreThoseOfItsPrior) {
   for (int trial = 0; trial < 40000; ++trial) {
     const bool is_right = random.Uniform() < 0.5;
     const double sine = 2.0 * random.Uniform() - 1.0, sigma_deg = random.Uniform(0.1, 1.5);
-    const double angle = (is_right ? turn(0.7) : std::asin(sine)) + turn(sigma_deg);
+    const double truth = is_right ? turn(0.7) : std::asin(sine);
+    const double angle = truth + turn(sigma_deg);
     const double odds = RightAngle(Make(Vector3d::UnitX(), 0.0),
                                    Make(Vector3d(std::sin(angle), std::cos(angle), 0.0), sigma_deg))
                             .LogOdds();
@@ -81,13 +82,14 @@ TEST(UncertainDirection, TheSpannedNormalHasTheSpreadOfItsSamples) {
   EXPECT_NEAR(normal.direction.dot(b.direction), 0.0, 1e-12);
   Random random(1);
   const auto moved = [&random](const UncertainDirection& d, double sigma_deg) {
-    const Vector3d noise(random.Normal(), random.Normal(), random.Normal());
-    return Vector3d(d.direction + sigma_deg * kDegree * d.direction.cross(noise));
+    const Vector3d noise = Noise3(sigma_deg * kDegree, &random);
+    return Vector3d(d.direction + d.direction.cross(noise));
   };
   Matrix3d scatter = Matrix3d::Zero();
   constexpr int kSamples = 100000;
   for (int k = 0; k < kSamples; ++k) {
-    const Vector3d d = moved(a, 0.3).cross(moved(b, 0.6)).normalized() - normal.direction;
+    const Vector3d a_moved = moved(a, 0.3), b_moved = moved(b, 0.6);
+    const Vector3d d = a_moved.cross(b_moved).normalized() - normal.direction;
     scatter += d * d.transpose() / kSamples;
   }
   EXPECT_LT((scatter - normal.covariance).norm(), 0.02 * scatter.norm());
@@ -101,7 +103,7 @@ Vector3d DrawNormal(double tilt_deg, Random* random) {
 
 // A disc of 12 pixels' radius anywhere in the photo, from 40 points with noise of 0.1 pixels.
 ConicFit SmallDisc(const Vector3d& normal, Random* random) {
-  const Vector3d center(random->Uniform(-20.0, 20.0), random->Uniform(-15.0, 15.0), 66.0);
+  const Vector3d center{random->Uniform(-20.0, 20.0), random->Uniform(-15.0, 15.0), 66.0};
   const Camera camera = detection_test::TestCamera(640, 480, 800.0);
   const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
   std::vector<CalibratedPoint> points;
