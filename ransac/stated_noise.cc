@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "circline/estimators/point_noise.h"
+#include "circline/estimators/statistics.h"
 
 namespace circline {
 namespace {
@@ -25,12 +26,6 @@ struct Points {
   }
   bool AreManyOutliers() const { return 3 * outliers >= all; }
 };
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Of a feature with the points `before`, which are those `after` where no noise is stated.
 std::string Problem(const char* what, const Points& before, const Points& after, double stated_px,

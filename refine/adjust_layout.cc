@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "circline/refine/statistics.h"
+#include "circline/estimators/statistics.h"
 
 namespace circline {
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "circline/refine/statistics.h"
+#include "circline/estimators/statistics.h"
 
 namespace circline {
 

@@ -5,9 +5,9 @@
 #include <mutex>
 #include <string>
 
+#include "circline/estimators/statistics.h"
 #include "circline/refine/adjustment.h"
 #include "circline/refine/known_pose.h"
-#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {

@@ -9,9 +9,9 @@
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/noise_model.h"
+#include "circline/estimators/statistics.h"
 #include "circline/estimators/vanishing_point.h"
 #include "circline/refine/readings.h"
-#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {

@@ -11,10 +11,10 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/metrology.h"
+#include "circline/estimators/statistics.h"
 #include "circline/refine/block_chain.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/plane_circle.h"
-#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {

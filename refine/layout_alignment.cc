@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/statistics.h"
 #include "circline/refine/adjust_layout.h"
-#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {

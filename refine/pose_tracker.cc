@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "circline/estimators/point_noise.h"
+#include "circline/estimators/statistics.h"
 #include "circline/refine/scratch.h"
-#include "circline/refine/statistics.h"
 #include "circline/refine/track_frame.h"
 #include "circline/refine/track_state.h"
 #include "circline/refine/track_steps.h"

@@ -4,10 +4,10 @@
 #include <set>
 #include <utility>
 
+#include "circline/estimators/statistics.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/linearization.h"
 #include "circline/refine/readings.h"
-#include "circline/refine/statistics.h"
 
 namespace circline {
 namespace {

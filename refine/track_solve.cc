@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "circline/estimators/statistics.h"
 #include "circline/refine/nearby_solve.h"
-#include "circline/refine/statistics.h"
 #include "circline/refine/track_frame.h"
 
 namespace circline {

@@ -12,8 +12,8 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/line.h"
+#include "circline/estimators/statistics.h"
 #include "circline/estimators/vanishing_point.h"
-#include "circline/ransac/detection/contour_support.h"
 
 namespace circline {
 namespace {
@@ -78,7 +78,7 @@ class LatticeFinder {
       x.push_back(p.x());
       y.push_back(p.y());
     }
-    const Vector2d middle(UpperMedian(std::move(x)), UpperMedian(std::move(y)));
+    const Vector2d middle(Median(std::move(x)), Median(std::move(y)));
     std::vector<std::size_t> order(points_.size());
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -96,7 +96,7 @@ class LatticeFinder {
       }
       nearest.push_back(std::sqrt(smallest));
     }
-    return UpperMedian(std::move(nearest));
+    return Median(std::move(nearest));
   }
 
   // The two steps that most points can take; of equally good ones the shorter.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/statistics.h"
 
 namespace circline {
 namespace {
@@ -168,8 +169,8 @@ void EdgeCollector::Collect(const std::vector<ContourSample>& samples, BrightSid
     sigmas.push_back(static_cast<double>(p.sigma_px));
   }
   support->gradient /= std::max(1.0, static_cast<double>(support->points.size()));
-  support->sigma_px = UpperMedian(std::move(sigmas));
-  support->normal_median = UpperMedian(std::move(deviations));
+  support->sigma_px = Median(std::move(sigmas));
+  support->normal_median = Median(std::move(deviations));
 }
 
 // The free edge point near the contour at a sample with the right direction: of several the
@@ -204,13 +205,6 @@ int EdgeCollector::Strongest(const ContourSample& s, BrightSide bright, double r
     }
   }
   return best;
-}
-
-double UpperMedian(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace circline

@@ -94,9 +94,6 @@ class EdgeCollector {
   std::vector<std::uint8_t> in_run_, in_support_;
 };
 
-// The larger one in the middle of an even number; 0 of none.
-double UpperMedian(std::vector<double> values);
-
 }  // namespace circline
 
 #endif  // CIRCLINE_RANSAC_DETECTION_CONTOUR_SUPPORT_H_

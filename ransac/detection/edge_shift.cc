@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "circline/ransac/detection/contour_support.h"
+#include "circline/estimators/statistics.h"
 
 namespace circline {
 namespace {
@@ -95,13 +95,13 @@ double CommonShift(const Camera& camera, const std::vector<DetectedLine>& lines,
     if (std::isfinite(shift)) shifts.push_back(shift);
   }
   if (shifts.size() < kMinLines) return 0.0;
-  const double median = UpperMedian(shifts);
+  const double median = Median(shifts);
   std::vector<double> deviations;
   for (const double shift : shifts) deviations.push_back(std::abs(shift - median));
   // 1.4826 makes a median of deviations a standard deviation, 1.2533 one of a mean that of a
   // median.
   const double sigma =
-      1.2533 * 1.4826 * UpperMedian(deviations) / std::sqrt(static_cast<double>(shifts.size()));
+      1.2533 * 1.4826 * Median(deviations) / std::sqrt(static_cast<double>(shifts.size()));
   return std::abs(median) > kMinSigmas * sigma ? median : 0.0;
 }
 

@@ -8,6 +8,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/statistics.h"
 #include "circline/ransac/detection/ellipse_fitter.h"
 #include "circline/ransac/detection/ellipse_shape.h"
 
@@ -179,7 +180,7 @@ bool EllipseFitter::GatherUnbiased(const EllipseCandidate& candidate, double rea
   for (const int i : support_.points) {
     blurs.push_back(static_cast<double>(map_.points[static_cast<std::size_t>(i)].blur_px));
   }
-  const double blur = UpperMedian(std::move(blurs));
+  const double blur = Median(std::move(blurs));
   for (const int i : support_.points) {
     CalibratedPoint moved;
     if (!calibrated_.Get(i, &moved)) continue;

@@ -6,6 +6,7 @@
 
 #include "circline/estimators/conic.h"
 #include "circline/estimators/conic_fit.h"
+#include "circline/estimators/statistics.h"
 #include "circline/ransac/detection/ellipse_shape.h"
 
 namespace circline {
@@ -150,7 +151,7 @@ double EllipseFitter::RobustSigma(const Matrix3d& conic) {
   std::vector<double> sizes;
   for (const double d : distances_) sizes.push_back(std::abs(d));
   // Median absolute deviation to standard deviation of a Gaussian.
-  return 1.4826 * UpperMedian(std::move(sizes));
+  return 1.4826 * Median(std::move(sizes));
 }
 
 // Whether the points of the arcs are near the contour that was fitted to them, and the gradients

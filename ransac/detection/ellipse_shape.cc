@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "circline/estimators/conic.h"
+#include "circline/estimators/statistics.h"
 
 namespace circline {
 namespace {
@@ -83,7 +84,7 @@ double SlopeDeg(const EdgeMap& map, const Matrix3d& conic, const std::vector<int
     if (chord > kMaxChordPx || !(chord > 0.0)) continue;
     slopes.push_back(std::abs(ConicDistancePx(b, conic) - ConicDistancePx(a, conic)) / chord);
   }
-  return ToDegrees(UpperMedian(std::move(slopes)));
+  return ToDegrees(Median(std::move(slopes)));
 }
 
 double ShapeDeviation(const Support& support, double rms_px, double slope_deg, double size_px,

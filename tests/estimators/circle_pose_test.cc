@@ -9,7 +9,7 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/random.h"
-#include "circline/refine/statistics.h"
+#include "circline/estimators/statistics.h"
 
 namespace circline {
 namespace {

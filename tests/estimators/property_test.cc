@@ -14,7 +14,7 @@
 #include "circline/estimators/circular_points.h"
 #include "circline/estimators/line_pose.h"
 #include "circline/estimators/random.h"
-#include "circline/refine/statistics.h"
+#include "circline/estimators/statistics.h"
 #include "tests/trials.h"
 
 namespace circline {

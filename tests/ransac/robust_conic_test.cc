@@ -10,7 +10,7 @@
 #include "circline/estimators/basics.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/random.h"
-#include "circline/refine/statistics.h"
+#include "circline/estimators/statistics.h"
 #include "tests/basics.h"
 #include "tests/pinhole_camera.h"
 #include "tests/trials.h"

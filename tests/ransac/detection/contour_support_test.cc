@@ -143,11 +143,5 @@ TEST(EdgeCollector, TakesEitherBrightSideIfAsked) {
   EXPECT_GT(support.Coverage(), 0.9);
 }
 
-TEST(UpperMedian, OfOddEvenAndNone) {
-  EXPECT_EQ(UpperMedian({3.0, 1.0, 2.0}), 2.0);
-  EXPECT_EQ(UpperMedian({4.0, 1.0, 3.0, 2.0}), 3.0);
-  EXPECT_EQ(UpperMedian({}), 0.0);
-}
-
 }  // namespace
 }  // namespace circline

@@ -1,6 +1,6 @@
 // How large sums of squares get by chance, and what is in the middle. Internal: not installed.
-#ifndef CIRCLINE_REFINE_STATISTICS_H_
-#define CIRCLINE_REFINE_STATISTICS_H_
+#ifndef CIRCLINE_ESTIMATORS_STATISTICS_H_
+#define CIRCLINE_ESTIMATORS_STATISTICS_H_
 
 #include <algorithm>
 #include <cmath>
@@ -30,4 +30,4 @@ inline double Median(std::vector<double> values) {
 
 }  // namespace circline
 
-#endif  // CIRCLINE_REFINE_STATISTICS_H_
+#endif  // CIRCLINE_ESTIMATORS_STATISTICS_H_
