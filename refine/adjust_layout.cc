@@ -105,13 +105,11 @@ class Aligner {
 void Aligner::Align(Candidate* candidate) const {
   constexpr double kFar = 0.5;  // Units of Place: another circle, or another pose of the photo.
   Alignment made;
-  bool found = false;
-  if (by_id_ || !candidate->alignment) {
-    found = by_id_ ? AlignById(candidate->own, shared_, &made)
-                   : AlignByPattern(candidate->own, shared_, &made);
-  } else {  // More circles to match under the same similarity.
-    found = AlignFrom(candidate->own, shared_, candidate->alignment->to_shared, &made);
-  }
+  // Later there are more circles to match under the same similarity.
+  const bool found = by_id_                 ? AlignById(candidate->own, shared_, &made)
+                     : candidate->alignment ? AlignFrom(candidate->own, shared_,
+                                                        candidate->alignment->to_shared, &made)
+                                            : AlignByPattern(candidate->own, shared_, &made);
   candidate->seen = shared_.size();
   candidate->alignment.reset();
   if (found && made.misfit <= kFar) candidate->alignment = std::move(made);

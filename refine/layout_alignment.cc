@@ -7,7 +7,6 @@
 #include <map>
 #include <utility>
 
-#include "circline/estimators/basics.h"
 #include "circline/estimators/statistics.h"
 #include "circline/refine/adjust_layout.h"
 
@@ -43,8 +42,12 @@ Pairs NeighbourPairs(const Places& places) {
   return pairs;
 }
 
-// Least squares of the centres (Umeyama 1991). False for fewer than two.
-bool Fit(const Places& from, const Places& to, const Pairs& pairs, Similarity* out) {
+// Which maps of the plane are looked for.
+enum class Maps { kSimilar, kAffine };
+
+// Least squares of the centres: a similarity (Umeyama 1991) or any affine map. False for fewer than
+// two, for points in line where they leave the map open, and for a map that turns the plane over.
+bool Fit(const Places& from, const Places& to, const Pairs& pairs, Maps maps, Similarity* out) {
   constexpr std::size_t kFewest = 2;
   if (pairs.size() < kFewest) return false;
   Eigen::Vector2d a = Eigen::Vector2d::Zero(), b = a;
@@ -53,19 +56,21 @@ bool Fit(const Places& from, const Places& to, const Pairs& pairs, Similarity* o
     a += from[own].circle.center / n;
     b += to[shared].circle.center / n;
   }
-  double dot = 0.0, cross = 0.0, square = 0.0;
+  Eigen::Matrix2d square = Eigen::Matrix2d::Zero(), product = square;
   for (const auto& [own, shared] : pairs) {
     const Eigen::Vector2d u = from[own].circle.center - a, v = to[shared].circle.center - b;
-    dot += u.dot(v);
-    cross += Cross(u, v);
-    square += u.squaredNorm();
+    square += u * u.transpose();
+    product += v * u.transpose();
   }
-  const double both = std::hypot(dot, cross);
-  if (!(square > 0.0) || !(both > 0.0)) return false;
-  out->scale = both / square;
-  out->turn << dot / square, -cross / square, cross / square, dot / square;
+  if (maps == Maps::kSimilar) {
+    const double dot = product.trace(), cross = product(1, 0) - product(0, 1);
+    product << dot, -cross, cross, dot;
+    square = square.trace() * Eigen::Matrix2d::Identity();
+  }
+  out->turn = product * square.inverse();
+  out->scale = std::sqrt(out->turn.determinant());
   out->shift = b - out->turn * a;
-  return true;
+  return out->turn.allFinite() && out->scale > 0.0;
 }
 
 // In place, units of Place, and in size, the logarithm of its ratio.
@@ -75,28 +80,12 @@ double Deviation(const LayoutCircle& from, const Place& to, const Similarity& si
 }
 
 bool FitAndJudge(const Places& from, const Places& to, Alignment* alignment) {
-  if (!Fit(from, to, alignment->pairs, &alignment->to_shared)) return false;
+  if (!Fit(from, to, alignment->pairs, Maps::kSimilar, &alignment->to_shared)) return false;
   std::vector<double> deviations;
   for (const auto& [own, shared] : alignment->pairs)
     deviations.push_back(Deviation(from[own].circle, to[shared], alignment->to_shared));
   alignment->misfit = Median(std::move(deviations));
   return true;
-}
-
-// The affine map of least squares. False for points in line, or seen from behind.
-bool FitAffine(const Places& from, const Places& to, const Pairs& pairs, Similarity* out) {
-  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-  Eigen::Matrix<double, 3, 2> b = Eigen::Matrix<double, 3, 2>::Zero();
-  for (const auto& [own, shared] : pairs) {
-    const Eigen::Vector3d x = from[own].circle.center.homogeneous();
-    A += x * x.transpose();
-    b += x * to[shared].circle.center.transpose();
-  }
-  const Eigen::Matrix<double, 3, 2> map = A.ldlt().solve(b);
-  out->turn = map.topRows<2>().transpose();
-  out->shift = map.row(2);
-  out->scale = std::sqrt(out->turn.determinant());
-  return map.allFinite() && out->scale > 0.0;
 }
 
 // More of them: a pose that is a little off shears and stretches its plane, and two neighbours tell
@@ -106,7 +95,7 @@ Pairs GrownMatches(const Places& from, const Places& to, Pairs pairs) {
   constexpr std::size_t kFewest = 4;
   Similarity affine;
   for (int k = 0; k < kRounds && pairs.size() >= kFewest; ++k) {
-    if (!FitAffine(from, to, pairs, &affine)) break;
+    if (!Fit(from, to, pairs, Maps::kAffine, &affine)) break;
     Pairs more = Matches(from, to, affine);
     if (more.size() <= pairs.size()) break;
     pairs = std::move(more);
@@ -199,7 +188,7 @@ bool AlignByPattern(const Places& from, const Places& to, Alignment* alignment) 
     for (const auto& [c, d] : shared_pairs) {
       if (alignment->pairs.size() == fewer) break;  // All of them.
       Similarity similarity;
-      if (!Fit(from, to, {{a, c}, {b, d}}, &similarity) ||
+      if (!Fit(from, to, {{a, c}, {b, d}}, Maps::kSimilar, &similarity) ||
           std::abs(std::log(similarity.scale * from[a].circle.radius / to[c].circle.radius)) >
               kSize) {
         continue;
