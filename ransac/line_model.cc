@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "circline/estimators/line_moments.h"
 #include "circline/ransac/inlier_weights.h"
 
 namespace circline {
@@ -63,30 +64,16 @@ bool LineModel::Refine(const float* weights, Value* value) const {
   // Total least squares, each point with its pixel's size at the current line.
   const std::size_t n = index_.size();
   const double a = (*value)[0], b = (*value)[1];
-  double sum = 0.0;
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  double xx = 0.0, xy = 0.0, yy = 0.0;
+  LineMoments moments;
   for (std::size_t i = 0; i < n; ++i) {
     if (!(weights[i] > 0.0f)) continue;
     const float* d = data_.data() + i;
     const double gu = static_cast<double>(d[2 * n]) * a + static_cast<double>(d[4 * n]) * b;
     const double gv = static_cast<double>(d[3 * n]) * a + static_cast<double>(d[5 * n]) * b;
-    const double w = static_cast<double>(weights[i]) / (gu * gu + gv * gv);
-    sum += w;
-    mean += w * x_[i];
-    xx += w * x_[i].x() * x_[i].x();
-    xy += w * x_[i].x() * x_[i].y();
-    yy += w * x_[i].y() * x_[i].y();
+    moments.Add(x_[i], static_cast<double>(weights[i]) / (gu * gu + gv * gv));
   }
-  if (!(sum > 0.0)) return false;
-  mean /= sum;
-  xx = xx / sum - mean.x() * mean.x();
-  xy = xy / sum - mean.x() * mean.y();
-  yy = yy / sum - mean.y() * mean.y();
-  if (!(xx + yy > 1e-18)) return false;
-  const double angle = 0.5 * std::atan2(2.0 * xy, xx - yy);  // Of the line.
-  const double na = -std::sin(angle), nb = std::cos(angle);
-  *value = {na, nb, -(na * mean.x() + nb * mean.y())};
+  if (!moments.SpreadBeyond(1e-9)) return false;
+  Eigen::Map<Eigen::Vector3d>(value->data()) = moments.Line();
   return true;
 }
 

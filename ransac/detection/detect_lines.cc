@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "circline/estimators/line_moments.h"
 #include "circline/ransac/detection/line_pieces.h"
 
 namespace circline {

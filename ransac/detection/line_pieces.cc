@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "circline/estimators/line_moments.h"
+
 namespace circline {
 namespace {
 
@@ -118,16 +120,6 @@ class PieceCutter {
 };
 
 }  // namespace
-
-Vector3d LineMoments::Line() const {
-  const Vector2d mean = sum_ / n_;
-  const double a = xx_ / n_ - mean.x() * mean.x();
-  const double b = xy_ / n_ - mean.x() * mean.y();
-  const double c = yy_ / n_ - mean.y() * mean.y();
-  const double angle = 0.5 * std::atan2(2.0 * b, a - c);
-  const Vector2d normal(-std::sin(angle), std::cos(angle));
-  return {normal.x(), normal.y(), -normal.dot(mean + shift_)};
-}
 
 void CutIntoPieces(const LineEdges& edges, std::vector<LinePiece>* straight,
                    std::vector<LinePiece>* bent) {

@@ -20,32 +20,6 @@ namespace circline {
 // Largest distance of an edge point to its line, pixels.
 constexpr double kMaxLineDistancePx = 0.8;
 
-// Sums of calibrated points, about a shift near them so that nothing cancels.
-class LineMoments {
- public:
-  explicit LineMoments(const Eigen::Vector2d& shift = Eigen::Vector2d::Zero()) : shift_(shift) {}
-
-  void Add(const Eigen::Vector2d& point) {
-    const Eigen::Vector2d p = point - shift_;
-    ++n_;
-    sum_ += p;
-    xx_ += p.x() * p.x();
-    xy_ += p.x() * p.y();
-    yy_ += p.y() * p.y();
-  }
-
-  int count() const { return n_; }
-
-  // Total least squares line, unit normal.
-  Eigen::Vector3d Line() const;
-
- private:
-  Eigen::Vector2d shift_;
-  int n_ = 0;
-  Eigen::Vector2d sum_ = Eigen::Vector2d::Zero();
-  double xx_ = 0.0, xy_ = 0.0, yy_ = 0.0;
-};
-
 // Unit direction of a line.
 inline Eigen::Vector2d Along(const Eigen::Vector3d& line) { return {line.y(), -line.x()}; }
 
