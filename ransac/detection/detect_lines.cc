@@ -123,9 +123,6 @@ class LineJoiner {
   }
 
   bool Continues(const Joined& joined, const LinePiece& p) const {
-    const CalibratedPoint first = edges_.X(p.begin), last = edges_.X(p.end - 1);
-    if (std::abs(LineDistancePx(first, joined.line)) > kMaxAlternatingPx) return false;
-    if (std::abs(LineDistancePx(last, joined.line)) > kMaxAlternatingPx) return false;
     const auto [from, to] = edges_.Range(joined.line, p);
     double gap = std::numeric_limits<double>::infinity(), length = 0.0;
     for (const int k : joined.pieces) {

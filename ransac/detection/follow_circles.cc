@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "circline/ransac/detection/calibrated_edges.h"
 #include "circline/ransac/detection/contour_support.h"
 #include "circline/ransac/detection/ellipse_fitter.h"
 #include "circline/ransac/detection/follow_observations.h"
@@ -47,11 +46,7 @@ class CircleFollower {
  public:
   CircleFollower(const EdgeMap& map, const Camera& camera, const EllipseOptions& options,
                  double search_px)
-      : map_(map),
-        camera_(camera),
-        search_px_(search_px),
-        fitter_(map, camera, options),
-        calibrated_(map, camera) {}
+      : map_(map), camera_(camera), search_px_(search_px), fitter_(map, camera, options) {}
 
   // Where the circle is to within the reach of the cold detector's own refits, or `far`: anywhere
   // in the band, as the ellipse that most of its free edges support. Nothing where there is none.
@@ -89,9 +84,8 @@ class CircleFollower {
     directions_.normals.clear();
     for (std::size_t i = 0; i < map_.points.size(); ++i) {
       CalibratedPoint p;
-      if (fitter_.IsTaken(static_cast<int>(i)) || !calibrated_.Get(static_cast<int>(i), &p)) {
-        continue;
-      }
+      const int point = static_cast<int>(i);
+      if (fitter_.IsTaken(point) || !fitter_.Calibrate(point, &p)) continue;
       if (!(std::abs(ConicDistancePx(p, predicted.conic)) < search_px_)) continue;
       const Vector2d normal = map_.points[i].Normal();
       const double cosine = Outward(p, predicted.conic).dot(normal);
@@ -120,7 +114,6 @@ class CircleFollower {
   const Camera& camera_;
   const double search_px_;
   EllipseFitter fitter_;
-  CalibratedEdges calibrated_;
   // Scratch.
   std::vector<CalibratedPoint> band_;
   EdgeDirections directions_;
