@@ -7,6 +7,7 @@
 #include "circline/ransac/conic_search.h"
 
 namespace circline {
+
 Status FitConicRobust(const std::vector<CalibratedPoint>& points, const RobustFitOptions& options,
                       ConicFit* fit, std::vector<std::uint8_t>* mask,
                       const EdgeDirections& directions) {

@@ -303,10 +303,11 @@ class BoxSearch {
   std::vector<std::size_t> queue_;
 };
 
-// The first `count` axes in the order of their lines' length.
-void PutLongestFirst(int count, FoundBox* box) {
+// A box, if there is one, with its first `count` axes in the order of their lines' length.
+std::optional<FoundBox> LongestFirst(int count, std::optional<FoundBox> box) {
+  if (!box) return box;
   std::array<int, 3> order = {0, 1, 2};
-  std::stable_sort(order.begin(), order.begin() + count, [box](int a, int b) {
+  std::stable_sort(order.begin(), order.begin() + count, [&box](int a, int b) {
     return box->pencils[static_cast<std::size_t>(a)].support_px >
            box->pencils[static_cast<std::size_t>(b)].support_px;
   });
@@ -317,29 +318,24 @@ void PutLongestFirst(int count, FoundBox* box) {
     box->log_odds_along[k] = before.log_odds_along[from];
   }
   box->axes = AxesOf(box->axes.col(order[0]), box->axes.col(order[2]));
+  return box;
 }
 
 }  // namespace
 
 std::optional<FoundBox> FindBox(const std::vector<DetectedLine>& lines,
                                 const std::vector<Vector3d>& normals, double diagonal_px) {
-  std::optional<FoundBox> box = BoxSearch(lines, diagonal_px).Best(normals, 0.0, kLogOddsOfNone);
-  if (box) PutLongestFirst(2, &*box);
-  return box;
+  return LongestFirst(2, BoxSearch(lines, diagonal_px).Best(normals, 0.0, kLogOddsOfNone));
 }
 
 std::optional<FoundBox> FindFreeBox(const std::vector<DetectedLine>& lines,
                                     const std::vector<Vector3d>& axes, double diagonal_px) {
-  std::optional<FoundBox> box =
-      BoxSearch(lines, diagonal_px).Best(axes, kPencilSigmaRad, kLogOddsOfNoneFree);
-  if (box) PutLongestFirst(3, &*box);
-  return box;
+  return LongestFirst(
+      3, BoxSearch(lines, diagonal_px).Best(axes, kPencilSigmaRad, kLogOddsOfNoneFree));
 }
 
 std::optional<FoundBox> FindAnyBox(const std::vector<DetectedLine>& lines, double diagonal_px) {
-  std::optional<FoundBox> box = BoxSearch(lines, diagonal_px).BestOfAll();
-  if (box) PutLongestFirst(3, &*box);
-  return box;
+  return LongestFirst(3, BoxSearch(lines, diagonal_px).BestOfAll());
 }
 
 }  // namespace circline
