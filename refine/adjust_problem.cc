@@ -213,24 +213,18 @@ void AdjustProblem::AddCircle(std::size_t photo, const CircleObservation& circle
   const Circle* made = CircleOf(photo, circle);
   if (made == nullptr) return;
   const double center_sigma = ContourSigma(points);
-  const int offset = OffsetOf(photo, circle);
-  PlaneCircleContourCost::Blocks with;
-  with.tilt_and_height = made->tilt >= 0;
-  with.shape = made->shape >= 0;
-  with.offset = offset >= 0;
-  with.camera = true;
-  std::vector<int> blocks = {rotations_[photo], translations_[photo], made->center, made->radius};
-  for (const int block : {made->tilt, made->shape, offset}) {
-    if (block >= 0) blocks.push_back(block);
-  }
-  blocks.push_back(cameras_[input.camera]);
-  AddFeature(photo, circle.id, std::make_unique<PlaneCircleContourCost>(std::move(points), with),
-             blocks);
+  const int rotation = rotations_[photo], translation = translations_[photo],
+            offset = OffsetOf(photo, circle), camera = cameras_[input.camera];
+  const PlaneCircleContourCost::Blocks with = {made->tilt >= 0, made->shape >= 0, offset >= 0,
+                                               true};
+  AddFeature(
+      photo, circle.id, std::make_unique<PlaneCircleContourCost>(std::move(points), with),
+      {rotation, translation, made->center, made->radius, made->tilt, made->shape, offset, camera});
   if (!circle.center) return;
   AddFeature(photo, circle.id + ".center",
              std::make_unique<PlanePointCost>(input.observations->camera, *circle.center,
                                               center_sigma, options_.line_loss.type, true),
-             {rotations_[photo], translations_[photo], made->center, blocks.back()});
+             {rotation, translation, made->center, camera});
 }
 
 // Where a world has its pencils: along an axis, or in the plane.

@@ -49,6 +49,7 @@ int Graph::AddBlock(int size, const std::vector<double>& value,
 
 int Graph::AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature,
                    std::unique_ptr<ceres::LossFunction> loss) {
+  blocks.erase(std::remove(blocks.begin(), blocks.end(), -1), blocks.end());
   terms_.push_back({std::unique_ptr<ceres::CostFunction>(owned), std::move(blocks), feature,
                     dynamic_cast<FeatureCost*>(owned), std::move(loss)});
   return static_cast<int>(terms_.size()) - 1;

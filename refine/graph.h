@@ -78,7 +78,7 @@ class Graph {
   void SetManifold(int block, std::unique_ptr<ceres::Manifold> manifold) {
     this->block(block).manifold = std::move(manifold);
   }
-  // Points of a feature, or a prior, of a feature or of none.
+  // Points of a feature, or a prior, of a feature or of none. Blocks of -1 are left out.
   int AddTerm(ceres::CostFunction* owned, std::vector<int> blocks, int feature = -1,
               std::unique_ptr<ceres::LossFunction> loss = {});
 

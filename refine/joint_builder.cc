@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,12 +31,6 @@ std::string Names(const char* kind, const std::vector<std::string>& ids) {
 
 }  // namespace
 
-int JointProblemBuilder::AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks,
-                                        int feature) {
-  if (has_camera_) blocks.push_back(JointProblem::kCamera);
-  return p_.AddTerm(cost.release(), std::move(blocks), feature);
-}
-
 int JointProblemBuilder::AddFeature(Feature feature) {
   p_.features_.push_back(std::move(feature));
   return static_cast<int>(p_.features_.size()) - 1;
@@ -51,7 +46,7 @@ bool JointProblemBuilder::Points(const std::vector<Eigen::Vector2d>& pixels,
 void JointProblemBuilder::Build() {
   const Shifts sigmas = ShiftSigmas(obs_.camera, p_.camera_sigma_);
   std::unique_ptr<ceres::Manifold> manifold = ShiftManifold(sigmas);
-  has_camera_ = manifold != nullptr;
+  if (manifold != nullptr) camera_ = JointProblem::kCamera;
   p_.camera_is_estimated_ = p_.camera_sigma_.IsEstimated();
 
   p_.AddBlock(4, {0.0, 0.0, 0.0, 1.0});

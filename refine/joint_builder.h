@@ -9,7 +9,6 @@
 #include <array>
 #include <cstddef>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,8 +28,6 @@ class JointProblemBuilder {
   int AddConstant(const std::vector<double>& value) {
     return p_.AddBlock(static_cast<int>(value.size()), value, {}, true);
   }
-  // The camera's block comes last.
-  int AddFeatureTerm(std::unique_ptr<FeatureCost> cost, std::vector<int> blocks, int feature);
   int AddFeature(Feature feature);
 
   bool Points(const std::vector<Eigen::Vector2d>& pixels, const std::vector<std::uint8_t>& inliers,
@@ -46,6 +43,7 @@ class JointProblemBuilder {
   void AddPencil(std::size_t index);
   void AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,
                double direction_sigma, Feature feature);
+  void AddPlaneLine(ImagePoints points, int point, int angle, int feature);
   int DirectionBlock(std::size_t pencil);
   int AxisOfLine(std::size_t pencil, std::size_t line) const;
   void AddAxisLine(ImagePoints points, const LineFit& fit, int axis, const std::string& id,
@@ -80,7 +78,8 @@ class JointProblemBuilder {
   JointProblem& p_;
   const Observations& obs_;
   const NoiseModel& model_;
-  bool has_camera_ = false, is_metric_ = false;
+  int camera_ = -1;  // Block: kCamera, or -1 where it is exact.
+  bool is_metric_ = false;
   int origin_point_ = -1;                             // Constant block (0, 0).
   const CircleObservation* origin_circle_ = nullptr;  // Whose centre is there.
   // Of one contrast, by ContrastOf: circles in the plane, the block of their offset.

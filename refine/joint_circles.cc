@@ -1,5 +1,6 @@
 // Circles and the origin, as blocks and terms.
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "circline/refine/evidence_points.h"
@@ -52,9 +53,9 @@ void JointProblemBuilder::AddPoint(const Eigen::Vector2d& pixel, double sigma_px
                          ": not used, it lies where the camera model cannot undistort it");
     return;
   }
-  AddFeatureTerm(std::make_unique<PlanePointCost>(obs_.camera, pixel, sigma_px,
-                                                  p_.options_.line_loss.type, has_camera_),
-                 {JointProblem::kRotation, JointProblem::kTranslation, block}, feature);
+  p_.AddTerm(
+      new PlanePointCost(obs_.camera, pixel, sigma_px, p_.options_.line_loss.type, camera_ >= 0),
+      {JointProblem::kRotation, JointProblem::kTranslation, block, camera_}, feature);
 }
 
 // --- Circles ---
@@ -103,22 +104,18 @@ void JointProblemBuilder::AddCircle(std::size_t index) {
   feature.observation = static_cast<int>(index);
   feature.free_twice_cost = FreeTwiceCost(points, circle.fit->conic);
   const int f = AddFeature(feature), center = CenterBlock(circle), radius = RadiusBlock(circle, f);
-
-  PlaneCircleContourCost::Blocks blocks;
-  blocks.camera = has_camera_;
-  std::vector<int> used = {JointProblem::kRotation, JointProblem::kTranslation, center, radius};
-  blocks.tilt_sigmas = TiltSigmas(model_);
-  blocks.tilt_and_height = blocks.tilt_sigmas[0] > 0.0;
-  const int tilt = blocks.tilt_and_height ? p_.AddBlock(3, {}) : -1;
-  if (tilt >= 0) used.push_back(tilt);
-  blocks.shape = model_.circle_shape > 0.0;
-  if (blocks.shape) used.push_back(p_.AddShape(model_.circle_shape * circle.fit->irregularity, f));
+  const std::array<double, 3> tilt_sigmas = TiltSigmas(model_);
+  const double shape_sigma = model_.circle_shape * circle.fit->irregularity;
+  const int tilt = tilt_sigmas[0] > 0.0 ? p_.AddBlock(3, {}) : -1;
+  const int shape = model_.circle_shape > 0.0 ? p_.AddShape(shape_sigma, f) : -1;
   const int offset = OffsetBlock(circle);
-  blocks.offset = offset >= 0;
-  if (offset >= 0) used.push_back(offset);
   const double mark_sigma = ContourSigma(points);
-  const int term =
-      AddFeatureTerm(std::make_unique<PlaneCircleContourCost>(std::move(points), blocks), used, f);
+  const PlaneCircleContourCost::Blocks with = {tilt >= 0, shape >= 0, offset >= 0, camera_ >= 0,
+                                               tilt_sigmas};
+  const int term = p_.AddTerm(new PlaneCircleContourCost(std::move(points), with),
+                              {JointProblem::kRotation, JointProblem::kTranslation, center, radius,
+                               tilt, shape, offset, camera_},
+                              f);
   p_.circles_.push_back({static_cast<int>(index), f, term, center, radius, tilt});
   if (circle.center) AddMark(circle, mark_sigma, center, f);
   for (std::size_t k = 0; k < circle.diameters.size(); ++k) AddDiameter(circle, k, center, f);
@@ -149,8 +146,7 @@ void JointProblemBuilder::AddDiameter(const CircleObservation& circle, std::size
   diameter.covariance = fit.covariance;
   const int f = AddFeature(diameter);
   const int angle = p_.AddBlock(1, {});
-  AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(points), has_camera_),
-                 {JointProblem::kRotation, JointProblem::kTranslation, center, angle}, f);
+  AddPlaneLine(std::move(points), center, angle, f);
   p_.plane_lines_.push_back({angle, fit.line});
 }
 

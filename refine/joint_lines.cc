@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "circline/estimators/basics.h"
@@ -139,13 +140,17 @@ void JointProblemBuilder::AddPencil(std::size_t index) {
 void JointProblemBuilder::AddLine(ImagePoints points, const Eigen::Vector3d& fit, int direction,
                                   double direction_sigma, Feature feature) {
   feature.free_twice_cost = FreeTwiceCost(points, fit);
-  const DirectionLineCost::Options options{direction_sigma, has_camera_};
+  const DirectionLineCost::Options options{direction_sigma, camera_ >= 0};
   const int f = AddFeature(std::move(feature)),
             own = p_.AddBlock(direction_sigma > 0.0 ? 2 : 1, {});
-  const int term =
-      AddFeatureTerm(std::make_unique<DirectionLineCost>(std::move(points), fit, options),
-                     {JointProblem::kRotation, direction, own}, f);
+  const int term = p_.AddTerm(new DirectionLineCost(std::move(points), fit, options),
+                              {JointProblem::kRotation, direction, own, camera_}, f);
   p_.lines_.push_back({term, own, f});
+}
+
+void JointProblemBuilder::AddPlaneLine(ImagePoints points, int point, int angle, int feature) {
+  p_.AddTerm(new PlaneLineCost(std::move(points), camera_ >= 0),
+             {JointProblem::kRotation, JointProblem::kTranslation, point, angle, camera_}, feature);
 }
 
 // A line through the observed origin, along X or Y.
@@ -157,8 +162,7 @@ void JointProblemBuilder::AddAxisLine(ImagePoints points, const LineFit& fit, in
   feature.free_twice_cost = FreeTwiceCost(points, fit.line);
   feature.covariance = fit.covariance;
   const int f = AddFeature(feature), angle = AddConstant({axis * kRightAngle});
-  AddFeatureTerm(std::make_unique<PlaneLineCost>(std::move(points), has_camera_),
-                 {JointProblem::kRotation, JointProblem::kTranslation, origin_point_, angle}, f);
+  AddPlaneLine(std::move(points), origin_point_, angle, f);
 }
 
 // An axis drawn apart from the pencils is a line of its own: through the origin where that is
