@@ -144,20 +144,12 @@ CameraPose AdjustProblem::PoseAt(std::size_t photo) const {
 }
 
 Matrix6d AdjustProblem::PoseCovariance(std::size_t photo, const Linearization& at) const {
-  // d [delta, delta_t] / d (the tangents of both blocks).
-  Eigen::Matrix<double, 6, Eigen::Dynamic> slopes = Eigen::Matrix<double, 6, 6>::Zero();
-  std::vector<int> columns = at.Columns(rotations_[photo]);
-  const auto turns = static_cast<Eigen::Index>(columns.size());
+  Eigen::Matrix<double, 6, 4> turn = Eigen::Matrix<double, 6, 4>::Zero();
+  Eigen::Matrix<double, 6, 3> shift = Eigen::Matrix<double, 6, 3>::Zero();
   // The block turns the world: exp([R d]x) R = R exp([d]x).
-  slopes.topLeftCorner(3, turns) = RotationFromBlock(Values(rotations_[photo])).leftCols(turns);
-  const std::vector<int> shifts = at.Columns(translations_[photo]);
-  if (!shifts.empty()) {
-    const BlockMatrix plus = block(translations_[photo]).PlusJacobian(Values(translations_[photo]));
-    slopes.block(3, turns, 3, plus.cols()) = plus;
-    columns.insert(columns.end(), shifts.begin(), shifts.end());
-  }
-  const auto by = slopes.leftCols(static_cast<Eigen::Index>(columns.size()));
-  return by * at.Covariance(columns) * by.transpose();
+  turn.topRows<3>() = PoseAt(photo).rotation * DeltaFromQuaternion(Values(rotations_[photo]));
+  shift.bottomRows<3>().setIdentity();
+  return at.Covariance({{rotations_[photo], turn}, {translations_[photo], shift}});
 }
 
 AdjustProblem::Covariances AdjustProblem::Covariance(std::size_t end, bool at_minimum) const {
@@ -176,10 +168,9 @@ AdjustProblem::Covariances AdjustProblem::Covariance(std::size_t end, bool at_mi
   out.poses.assign(photos_.size(), Matrix6d::Zero());
   if (!at.ComputeCovariance()) return out;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    const std::vector<int> columns = at.Columns(cameras_[c]);
-    if (columns.empty()) continue;
-    const BlockMatrix plus = block(cameras_[c]).PlusJacobian(Values(cameras_[c]));
-    out.cameras[c] = plus * at.Covariance(columns) * plus.transpose();
+    if (at.column(cameras_[c]) >= 0)
+      out.cameras[c] =
+          at.Covariance({{cameras_[c], Eigen::MatrixXd::Identity(kCameraSize, kCameraSize)}});
   }
   if (!given_.empty()) out.log_scale = at.Covariance(at.Columns(given_[2])).trace();
   for (std::size_t i = 0; i < photos_.size(); ++i) {

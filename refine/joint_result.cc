@@ -77,17 +77,11 @@ void FillCircles(const JointProblem& problem, const State& state, Refined* refin
 double DirectionSigmaDeg(const JointProblem& problem, const State& state, const Linearization& at,
                          const Eigen::Vector3d& direction, int block) {
   const Eigen::Matrix3d R = problem.PoseAt(state).rotation;
-  std::vector<int> columns = at.Columns(JointProblem::kRotation);
-  const auto turns = static_cast<Eigen::Index>(columns.size());
-  Eigen::MatrixXd J = -CrossMatrix(direction) * R.leftCols(turns);
-  const std::vector<int> own = block >= 0 ? at.Columns(block) : std::vector<int>();
-  if (!own.empty()) {
-    const BlockMatrix plus = problem.block(block).PlusJacobian(problem.At(block, state));
-    J.conservativeResize(3, turns + plus.cols());
-    J.rightCols(plus.cols()) = R * plus;
-    columns.insert(columns.end(), own.begin(), own.end());
-  }
-  return LargestSigmaDeg(J * at.Covariance(columns) * J.transpose());
+  const double* q = problem.At(JointProblem::kRotation, state);
+  std::vector<Linearization::Slope> slopes = {
+      {JointProblem::kRotation, -CrossMatrix(direction) * R * DeltaFromQuaternion(q)}};
+  if (block >= 0) slopes.push_back({block, R});
+  return LargestSigmaDeg(at.Covariance(slopes));
 }
 
 // Each pencil's own direction, which leans from its axis as far as the evidence says.
@@ -119,14 +113,11 @@ void FillPencils(const JointProblem& problem, const State& state, const Lineariz
 constexpr double kPriorDecides = 0.95;
 
 // What of the camera beside the focal length the evidence could have told, and does not.
-void NoteWhatStays(const JointProblem& problem, const State& state, const Linearization& at,
-                   Refined* refined) {
+void NoteWhatStays(const JointProblem& problem, const Linearization& at, Refined* refined) {
   const CameraSigma& sigma = problem.camera_sigma();
   constexpr double kWidePx = 5.0;  // What is known better needs no word.
-  const BlockMatrix plus =
-      problem.block(JointProblem::kCamera).PlusJacobian(problem.At(JointProblem::kCamera, state));
   const Eigen::MatrixXd covariance =
-      plus * at.Covariance(at.Columns(JointProblem::kCamera)) * plus.transpose();
+      at.Covariance({{JointProblem::kCamera, Eigen::MatrixXd::Identity(kCameraSize, kCameraSize)}});
   const auto stays_at = [&](int shift, double prior) {
     return prior > 0.0 && std::sqrt(covariance(shift, shift)) >= kPriorDecides * prior;
   };
@@ -199,7 +190,7 @@ void FillFocal(const JointProblem& problem, const State& state, const Linearizat
   const FocalVerdict verdict(problem, *h);
   if (sigma.doubtful_log_focal > 0.0 && verdict.prior_decides && !verdict.is_doubted)
     CountPlaceholder(sigma, h);
-  NoteWhatStays(problem, state, at, refined);
+  NoteWhatStays(problem, at, refined);
   NoteDoubtedAxes(problem.observations(), refined);
 }
 

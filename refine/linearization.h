@@ -56,6 +56,13 @@ class Linearization {
   const Eigen::MatrixXd& null_space() const { return null_space_; }
   // Of unknowns that share a residual, n x n for n columns.
   Eigen::MatrixXd Covariance(const std::vector<int>& columns) const;
+  // Derivatives of something by the values of a block.
+  struct Slope {
+    int block;
+    Eigen::MatrixXd by_values;
+  };
+  // Of what follows blocks so. Those that are constant, or that no term has, have no part in it.
+  Eigen::MatrixXd Covariance(const std::vector<Slope>& slopes) const;
 
   // --- Of one photo. ---
 

@@ -158,6 +158,21 @@ Eigen::MatrixXd Linearization::Covariance(const std::vector<int>& columns) const
   return covariance;
 }
 
+Eigen::MatrixXd Linearization::Covariance(const std::vector<Slope>& slopes) const {
+  std::vector<int> columns;
+  Eigen::MatrixXd J(slopes.front().by_values.rows(), 0);
+  for (const Slope& slope : slopes) {
+    const std::vector<int> own = Columns(slope.block);
+    if (own.empty()) continue;
+    const Block& block = graph_.block(slope.block);
+    columns.insert(columns.end(), own.begin(), own.end());
+    J.conservativeResize(Eigen::NoChange, static_cast<Eigen::Index>(columns.size()));
+    J.rightCols(static_cast<Eigen::Index>(own.size())) =
+        slope.by_values * block.PlusJacobian(x_ + block.offset);
+  }
+  return J * Covariance(columns) * J.transpose();
+}
+
 // With the leverage S = J Sigma J^T of the feature's residuals f, the others would cost 1/2 f^T S
 // (I - S)^-1 f less without it. Where S is 1 the feature alone fixes an unknown: no test there.
 Linearization::Misfit Linearization::MisfitOf(std::size_t feature) const {
