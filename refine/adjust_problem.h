@@ -113,7 +113,7 @@ class AdjustProblem : private Graph {
   Covariances Covariance(std::size_t end, bool at_minimum = true) const;
 
   // By a photo that takes part; else there is nothing to ask of it.
-  bool IsUsed(std::size_t camera) const;
+  bool IsUsed(std::size_t camera) const { return FirstOf(camera) != photos_.end(); }
   Camera CameraAt(std::size_t camera) const;
   CameraPose PoseAt(std::size_t photo) const;
   std::vector<std::vector<AdjustedResidual>> Residuals() const;  // Of the inliers; by photo.
@@ -154,6 +154,8 @@ class AdjustProblem : private Graph {
   // Of the features in force of photos before `end`, and of the priors of what these have.
   std::vector<const Term*> ActiveTerms(std::size_t end) const;
   std::vector<const Term*> ActiveTerms() const { return ActiveTerms(photos_.size()); }
+  // The first photo of a camera that takes part, or the end of all.
+  std::vector<AdjustInput>::const_iterator FirstOf(std::size_t camera) const;
   Matrix6d PoseCovariance(std::size_t photo, const Linearization& at) const;
 
   const std::vector<AdjustInput>& photos_;

@@ -125,17 +125,14 @@ double AdjustProblem::Misfit() const {
   return rows > unknowns ? chi2 / (rows - unknowns) : 1.0;
 }
 
-bool AdjustProblem::IsUsed(std::size_t camera) const {
-  return std::any_of(photos_.begin(), photos_.end(), [&](const AdjustInput& photo) {
+std::vector<AdjustInput>::const_iterator AdjustProblem::FirstOf(std::size_t camera) const {
+  return std::find_if(photos_.begin(), photos_.end(), [&](const AdjustInput& photo) {
     return photo.camera == camera && photo.takes_part;
   });
 }
 
 Camera AdjustProblem::CameraAt(std::size_t camera) const {
-  const auto member = std::find_if(photos_.begin(), photos_.end(), [&](const AdjustInput& photo) {
-    return photo.camera == camera && photo.takes_part;
-  });
-  return ShiftedCamera(member->observations->camera, Values(cameras_[camera]));
+  return ShiftedCamera(FirstOf(camera)->observations->camera, Values(cameras_[camera]));
 }
 
 CameraPose AdjustProblem::PoseAt(std::size_t photo) const {
