@@ -22,10 +22,13 @@ inline Eigen::Matrix<double, 3, 2> BasisAcross(const Eigen::Vector3d& unit) {
   return basis;
 }
 
-// The largest standard deviation of a direction of this covariance, degrees.
-inline double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
+// The largest standard deviation of a direction of this covariance, radians; degrees.
+inline double LargestSigma(const Eigen::Matrix3d& covariance) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, eigen.eigenvalues()[2])) / kDegree;
+  return std::sqrt(std::max(0.0, eigen.eigenvalues()[2]));
+}
+inline double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
+  return LargestSigma(covariance) / kDegree;
 }
 
 // Takes calibrated coordinates, and directions but for their length, of one camera to those of

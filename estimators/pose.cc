@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "circline/estimators/directions.h"
+
 namespace circline {
 
 Camera CameraOf(const PoseHypothesis& hypothesis, const Camera& given) {
@@ -57,6 +59,19 @@ Eigen::Vector3d PoseHypothesis::SigmaRotation() const {
     }
   }
   return sigma;
+}
+
+double PoseHypothesis::SigmaNormal() const {
+  constexpr double kTiny = 1e-6;
+  const Eigen::Vector3d normal = cam_from_world.rotation.col(2);
+  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - normal * normal.transpose();
+  for (const std::array<double, 6>& d : free_directions) {
+    if ((across * Eigen::Vector3d(d[0], d[1], d[2])).norm() > kTiny)
+      return std::numeric_limits<double>::infinity();
+  }
+  const Eigen::Matrix3d covariance = across * Covariance().topLeftCorner<3, 3>() * across;
+  if (!covariance.allFinite()) return std::numeric_limits<double>::quiet_NaN();
+  return LargestSigma(covariance);
 }
 
 void SetCovariance(Matrix6d covariance, PoseHypothesis* hypothesis, int num_variables) {

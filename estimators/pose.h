@@ -79,6 +79,9 @@ struct PoseHypothesis {
   bool RotationIsFree() const;
   // Standard deviations of delta's three components, radians; +infinity where unbounded.
   Eigen::Vector3d SigmaRotation() const;
+  // Standard deviation of the normal of the world's plane, where it is largest, radians; +infinity
+  // where unbounded, NaN of a solver that gives no covariance.
+  double SigmaNormal() const;
 };
 
 // What a solver or EstimatePose returns.

@@ -1,4 +1,4 @@
-// Lines that stray from a pencil. Internal: not installed.
+// Lines that drift off a pencil. Internal: not installed.
 //
 // Of many lines that run along a direction some are seen a few degrees off it: edges that step from
 // one course of bricks to the next, far away. Those of one part of a photo are alike, and pass for

@@ -228,6 +228,7 @@ Status FindPencils(const std::vector<LineFit>& lines, const PencilOptions& optio
   Assign(pool, pencils);
   std::vector<FoundPencil> kept;
   for (FoundPencil& pencil : *pencils) {
+    // A copy: the others are judged beside it.
     if (Refit(pool, pool.all, options, *pencils, &pencil)) kept.push_back(pencil);
   }
   *pencils = std::move(kept);

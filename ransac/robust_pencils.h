@@ -55,7 +55,8 @@ Status FitVanishingPointRobust(const std::vector<LineFit>& lines, const PencilOp
 
 // Several pencils from one set of lines, the best supported first. One direction after the other is
 // found among the lines that are left; the search stops at max_pencils, or when the best direction
-// left has fewer than min_lines lines or more than max_false_alarms. Then every line goes to the
+// left has fewer than min_lines lines or more than max_false_alarms; the lines that are expected to
+// drift off the pencils found, a few degrees, count among those. Then every line goes to the
 // pencil that it misses least (within the threshold), each direction is fitted again, and pencils
 // that no longer meet the conditions are dropped. No line is in two pencils. An empty answer is ok.
 Status FindPencils(const std::vector<LineFit>& lines, const PencilOptions& options,

@@ -1,11 +1,10 @@
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "circline/estimators/basics.h"
+#include "circline/estimators/directions.h"
 #include "circline/refine/track_steps.h"
 
 namespace circline {
@@ -14,27 +13,13 @@ namespace {
 // Of the normal of the world's plane, radians: what is known of the world is hardly worth keeping.
 constexpr double kVague = 5.0 * kDegree;
 
-double LargestSigma(const Eigen::Matrix2d& covariance) {
-  return std::sqrt(
-      std::max(0.0, covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
-}
-
-// Standard deviation of the normal of the world's plane, radians.
-double TiltSigma(const TrackState& state) {  // Turns are about the world's axes.
-  return LargestSigma(state.covariance.topLeftCorner<2, 2>());
-}
-
-double TiltSigma(const PoseHypothesis& h) {
-  constexpr double kTiny = 1e-6;
-  const Eigen::Matrix3d world_from_cam = h.cam_from_world.rotation.transpose();
-  for (const std::array<double, 6>& direction : h.free_directions) {
-    const Eigen::Vector3d turn(direction[0], direction[1], direction[2]);
-    if ((world_from_cam * turn).head<2>().norm() > kTiny)
-      return std::numeric_limits<double>::infinity();
-  }
-  const Eigen::Matrix3d turns =
-      world_from_cam * h.Covariance().topLeftCorner<3, 3>() * world_from_cam.transpose();
-  return LargestSigma(turns.topLeftCorner<2, 2>());
+// Standard deviation of that normal. Turns are about the world's axes: that about the third one
+// does not move it.
+double SigmaNormal(const TrackState& state) {
+  Eigen::Matrix3d turns = state.covariance.topLeftCorner<3, 3>();
+  turns.row(2).setZero();
+  turns.col(2).setZero();
+  return LargestSigma(turns);
 }
 
 bool LacksFocal(const TrackMap& map) { return map.camera_is_unknown && map.camera_is_considered; }
@@ -49,7 +34,7 @@ bool TellsFocal(const PoseHypothesis& h, const CameraSigma& sigma) {
 }
 
 bool LacksSomething(const TrackMap& map, const TrackState& state) {
-  return LacksFocal(map) || !map.has_position() || TiltSigma(state) > kVague;
+  return LacksFocal(map) || !map.has_position() || SigmaNormal(state) > kVague;
 }
 
 std::string WhatIsTold(const PoseHypothesis& own, const TrackMap& map, const TrackState& state) {
@@ -62,7 +47,7 @@ std::string WhatIsTold(const PoseHypothesis& own, const TrackMap& map, const Tra
   if (own.probability < kSure) return {};
   if (!map.has_position() && !own.circles.empty())
     return "this frame shows a circle of the world's plane, and those before did not";
-  if (TiltSigma(state) > kVague && TiltSigma(own) < kMuchBetter * TiltSigma(state))
+  if (SigmaNormal(state) > kVague && own.SigmaNormal() < kMuchBetter * SigmaNormal(state))
     return "this frame tells the pose, which had become vague";
   return {};
 }

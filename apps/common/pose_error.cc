@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "circline/estimators/basics.h"
-#include "circline/estimators/directions.h"
 
 namespace circline::apps {
 namespace {
@@ -81,17 +80,9 @@ std::optional<double> PoseErrors::Headline() const {
 }
 
 std::optional<double> SigmaNormalDeg(const PoseHypothesis& hypothesis) {
-  constexpr double kTiny = 1e-6;
-  const Eigen::Vector3d normal = hypothesis.cam_from_world.rotation.col(2);
-  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - normal * normal.transpose();
-  for (const std::array<double, 6>& direction : hypothesis.free_directions) {
-    const Eigen::Vector3d turn(direction[0], direction[1], direction[2]);
-    if ((across * turn).norm() > kTiny) return std::nullopt;
-  }
-  const Eigen::Matrix3d covariance =
-      across * hypothesis.Covariance().topLeftCorner<3, 3>() * across;
-  if (!covariance.allFinite()) return std::nullopt;  // Of a solver that gives none.
-  return LargestSigmaDeg(covariance);
+  const double sigma = hypothesis.SigmaNormal();
+  if (!std::isfinite(sigma)) return std::nullopt;
+  return sigma / kDegree;
 }
 
 PoseErrors ComparePose(const PoseHypothesis& hypothesis, const SceneImage& image) {

@@ -18,8 +18,8 @@ namespace circline {
 class OrthogonalEvidence {
  public:
   // Each line is to be one of its own, no piece of another. Lines may miss the direction by
-  // kParallelSigmaRad more than their covariances say. `num_along`: lines along the axis, from
-  // which some of these stray (ransac/drifted_lines.h).
+  // kParallelSigmaRad more than their covariances say. `num_along`: lines along the axis, off which
+  // some of these have drifted (ransac/drifted_lines.h).
   OrthogonalEvidence(const std::vector<LineFit>& lines, const Eigen::Vector3d& axis,
                      std::size_t num_along);
 

@@ -11,12 +11,20 @@
 namespace circline {
 namespace {
 
+// 0.5 px of noise, and nothing hidden; a circle or two, and lines along X.
+TrajectoryOptions Quiet(bool second_circle, bool pencil, int num_frames = 100) {
+  TrajectoryOptions trajectory;
+  trajectory.num_frames = num_frames;
+  trajectory.noise_px = 0.5;
+  trajectory.occluded = 0.0;
+  trajectory.second_circle = second_circle;
+  trajectory.pencil = pencil;
+  return trajectory;
+}
+
 // A circle of the plane that turns up later carries the pose where the first one is hidden.
 TEST(TrackerWorldTest, LearnsCirclesAndUsesThem) {
-  TrajectoryOptions trajectory;
-  trajectory.second_circle = true;
-  trajectory.occluded = 0.0;
-  trajectory.noise_px = 0.5;
+  const TrajectoryOptions trajectory = Quiet(true, false);
   const Trajectory sequence(trajectory, 10);
   PoseTracker tracker(ExactOptions(trajectory));
   Random noise(11);
@@ -39,12 +47,7 @@ TEST(TrackerWorldTest, LearnsCirclesAndUsesThem) {
 
 // Directions alone tell no position: the first sure pose with circles begins another world.
 TEST(TrackerWorldTest, CirclesAfterDirectionsStartAWorldWithPositions) {
-  TrajectoryOptions trajectory;
-  trajectory.second_circle = true;
-  trajectory.pencil = true;
-  trajectory.occluded = 0.0;
-  trajectory.noise_px = 0.5;
-  trajectory.num_frames = 40;
+  const TrajectoryOptions trajectory = Quiet(true, true, 40);
   const Trajectory sequence(trajectory, 10);
   PoseTracker tracker(ExactOptions(trajectory));
   Random noise(11);
@@ -83,10 +86,7 @@ TEST(TrackerWorldTest, CirclesAfterDirectionsStartAWorldWithPositions) {
 // One direction alone leaves the pose vague after a second: what tells it then begins another
 // world.
 TEST(TrackerWorldTest, APoseThatHasBecomeVagueGivesWayToAnotherWorlds) {
-  TrajectoryOptions trajectory;
-  trajectory.pencil = true;
-  trajectory.occluded = 0.0;
-  trajectory.noise_px = 0.5;
+  const TrajectoryOptions trajectory = Quiet(false, true);
   const Trajectory sequence(trajectory, 4);
   PoseTracker tracker(ExactOptions(trajectory));
   Random noise(11);
