@@ -133,7 +133,7 @@ struct Observations {
   // that of `camera`.
   double stated_focal_px = 0.0;
   // What the k1 of `camera` has beyond the one known beforehand, where the photo's lines are
-  // straighter with it (DetectObservations); 0 = that is the one of `camera`.
+  // straighter with it (DetectObservations), or its curves likelier (FitObservations); else 0.
   double found_k1 = 0.0;
   std::vector<CircleObservation> circles;  // Images of circles.
   std::vector<PencilObservation> pencils;  // Images of parallel lines.

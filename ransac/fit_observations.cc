@@ -10,10 +10,10 @@
 #include "circline/estimators/exactness.h"
 #include "circline/estimators/line.h"
 #include "circline/estimators/point_noise.h"
+#include "circline/ransac/camera_of_fits.h"
 #include "circline/ransac/conic_search.h"
 #include "circline/ransac/dense_clusters.h"
 #include "circline/ransac/fit_directions.h"
-#include "circline/ransac/focal_of_fits.h"
 #include "circline/ransac/line_model.h"
 #include "circline/ransac/robust_conic.h"
 #include "circline/ransac/stated_noise.h"
@@ -291,13 +291,12 @@ Status FitObservations(const FitOptions& options, Observations* observations,
   if (status.ok()) status = observations->Validate();
   if (!status.ok()) return status;
   const CameraSigma& sigma = options.noise_model.camera;
-  if (observations->stated_focal_px == 0.0 && FocalBendsCurves(observations->camera, sigma)) {
-    const auto fit_points = [&](Observations* fitted) {
-      FitRun run{options, *fitted, nullptr};
-      PointFitter(&run).FitPoints();
-    };
-    TakeFocalOfFits(sigma, fit_points, observations);
-  }
+  const auto fit_points = [&](Observations* fitted) {
+    FitRun run{options, *fitted, nullptr};
+    PointFitter(&run).FitPoints();
+  };
+  TakeFocalOfFits(sigma, fit_points, observations);
+  TakeLensOfFits(sigma, fit_points, observations);
   FitRun run{options, *observations, problems};
   PointFitter(&run).FitAll();
   return Status::Ok();

@@ -49,6 +49,13 @@ struct FitOptions {
 // stated_focal_px the one given (AdjustPhotos takes photos of one camera with the same: set it back
 // there). Points are fitted at up to 15 focal lengths for it.
 //
+// Where the lens is (NoiseModel::camera, k1 of 0.01 or more; not of a pinhole camera), fits are
+// likewise made at the k1 at which they explain most: through a wrong one the ends of long lines
+// would be left out, which tell k1, and k1 and the focal length would be biased and said to be
+// sure. Observations::camera has that one then, and found_k1 what it has beyond the one given,
+// about which the prior remains. Points are fitted at up to 25 k1 for it; lines of two points tell
+// none.
+//
 // The returned status is not ok only for invalid options or observations.
 Status FitObservations(const FitOptions& options, Observations* observations,
                        std::vector<std::string>* problems = nullptr);

@@ -27,6 +27,12 @@ struct Points {
   bool AreManyOutliers() const { return 3 * outliers >= all; }
 };
 
+// No other camera than the one given is looked for.
+FitOptions WithCameraGiven(FitOptions options) {
+  options.noise_model.camera = CameraSigma::Exact();
+  return options;
+}
+
 // Of a feature with the points `before`, which are those `after` where no noise is stated.
 std::string Problem(const char* what, const Points& before, const Points& after, double stated_px,
                     double measured_px) {
@@ -49,10 +55,10 @@ std::string StatedNoiseProblem(const FitOptions& options, const Camera& camera,
   if (!(circle.sigma_px > 0.0) || !before.AreManyOutliers()) return "";
   Observations unstated;
   unstated.camera = camera;
-  unstated.stated_focal_px = camera.fx;  // No other is looked for.
   unstated.circles = {circle};
   unstated.circles[0].sigma_px = 0.0;
-  if (!FitObservations(options, &unstated).ok() || !unstated.circles[0].fit) return "";
+  if (!FitObservations(WithCameraGiven(options), &unstated).ok() || !unstated.circles[0].fit)
+    return "";
   return Problem("the best ellipse", before, Points(unstated.circles[0]), circle.sigma_px,
                  MeasurePointNoise(unstated, options.noise_model).circles[0]);
 }
@@ -64,7 +70,6 @@ std::string StatedNoiseProblem(const FitOptions& options, const Camera& camera,
   std::vector<double> stated;
   Observations unstated;
   unstated.camera = camera;
-  unstated.stated_focal_px = camera.fx;  // No other is looked for.
   unstated.pencils = {pencil};
   unstated.pencils[0].sigma_px = 0.0;
   for (LineObservation& line : unstated.pencils[0].lines) {
@@ -72,7 +77,7 @@ std::string StatedNoiseProblem(const FitOptions& options, const Camera& camera,
     line.sigma_px = 0.0;
   }
   if (stated.empty() || !(Median(stated) > 0.0)) return "";
-  if (!FitObservations(options, &unstated).ok()) return "";
+  if (!FitObservations(WithCameraGiven(options), &unstated).ok()) return "";
   return Problem("the best lines", before, Points(unstated.pencils[0]), Median(stated),
                  Median(MeasurePointNoise(unstated, options.noise_model).lines[0]));
 }

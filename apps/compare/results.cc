@@ -70,12 +70,17 @@ Json Intrinsics(const Camera& camera) {
           {"distortion", camera.distortion}};
 }
 
+// Whether the camera is not the one given: it was looked for in the photo.
+bool HasFoundCamera(const Observations& observations) {
+  return observations.stated_focal_px > 0.0 || observations.found_k1 != 0.0;
+}
+
 // The camera that the pose is of, where it may be another one than that given: it was estimated, or
 // looked for in the photo's structure.
 void AddCamera(const Observations& observations, const PoseHypothesis& h, Json* line) {
   const Camera& seen = observations.camera;
   const bool is_estimated = h.focal_sigma > 0.0;
-  const bool has_own = h.camera || observations.stated_focal_px > 0.0;
+  const bool has_own = h.camera || HasFoundCamera(observations);
   if (is_estimated) {
     const double moved = std::exp(-StatedLogFocal(observations));  // Against the one given.
     (*line)["focal_scale"] = Number(h.focal_scale * moved);
@@ -236,7 +241,7 @@ Json ObservationLine(const ImageRun& run, const std::string& overlay,
   line["detected"] = run.image->detect_everything;
   line["camera"] = CameraJson(run);
   if (!run.image->camera_from.empty()) line["camera_from"] = run.image->camera_from;
-  if (run.observations.stated_focal_px > 0.0)
+  if (HasFoundCamera(run.observations))
     line["calibrated_with"] = Intrinsics(run.observations.camera);
   for (const char* key : {"ellipses", "segments", "pencils"}) line[key] = Json::array();
   for (const CircleObservation& circle : run.observations.circles) {
