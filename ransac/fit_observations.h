@@ -46,8 +46,7 @@ struct FitOptions {
 //
 // Where the focal length is a guess (NoiseModel::camera, IsWide) and the lens bends, fits are made
 // at the focal length at which they explain most: Observations::camera has that one then, and
-// stated_focal_px the one given (AdjustPhotos takes photos of one camera with the same: set it back
-// there). Points are fitted at up to 15 focal lengths for it.
+// stated_focal_px the one given. Points are fitted at up to 15 focal lengths for it.
 //
 // Where the lens is (NoiseModel::camera, k1 of 0.01 or more; not of a pinhole camera), fits are
 // likewise made at the k1 at which they explain most: through a wrong one the ends of long lines
@@ -55,6 +54,9 @@ struct FitOptions {
 // sure. Observations::camera has that one then, and found_k1 what it has beyond the one given,
 // about which the prior remains. Points are fitted at up to 25 k1 for it; lines of two points tell
 // none.
+//
+// AdjustPhotos takes photos of one camera with the same, the one given: set it back there, and
+// stated_focal_px and found_k1 to 0.
 //
 // The returned status is not ok only for invalid options or observations.
 Status FitObservations(const FitOptions& options, Observations* observations,
