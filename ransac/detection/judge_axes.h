@@ -3,7 +3,9 @@
 //
 // At a known focal length two directions are hardly ever square by accident. At an unknown one many
 // are so at some focal length, and the estimate takes that one: what tells is whether their lines
-// meet, as those of one thing do, and whether a third direction is square to both at the same one.
+// meet, as those of one thing do, whether that focal length is a likely one (diamond tiles are
+// square at one that is not, if at any), and whether a third direction is square to both at the
+// same one.
 #ifndef CIRCLINE_RANSAC_DETECTION_JUDGE_AXES_H_
 #define CIRCLINE_RANSAC_DETECTION_JUDGE_AXES_H_
 

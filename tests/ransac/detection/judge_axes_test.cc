@@ -61,6 +61,23 @@ TEST(JudgeAxes, LinesThatDoNotMeetAreDoubted) {
   EXPECT_LT(axes.y.observation.axis_probability, 0.1);
 }
 
+// The lines of diamond tiles meet as those of square ones do. What focal length makes them square
+// is any: where it is three times the guess, that tiles are no squares is likelier.
+TEST(JudgeAxes, WhatOnlyAnUnlikelyFocalLengthMakesSquareIsDoubted) {
+  const auto probability_at = [](double focal_ratio) {
+    Matrix3d R = Vector3d(focal_ratio, focal_ratio, 1.0).asDiagonal() * kTurned;
+    R.colwise().normalize();
+    AxisPencils axes(R);
+    JudgeAxes(Guessed(), axes.x, &axes.y, nullptr);
+    return axes.y.observation.axis_probability;
+  };
+  EXPECT_EQ(probability_at(1.0), 1.0);
+  for (const double unlikely : {1.0 / 3.0, 3.0}) {
+    EXPECT_LT(probability_at(unlikely), 0.95) << unlikely;
+    EXPECT_GT(probability_at(unlikely), 0.05) << unlikely;
+  }
+}
+
 // Whichever way a level camera sees the corner of a house, some focal length makes it square: one
 // that looks down as well has only one that makes it square to the uprights, too.
 TEST(JudgeAxes, AThirdDirectionIsConfirmedByTheSecond) {
