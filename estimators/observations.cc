@@ -27,16 +27,25 @@ std::string FirstNamedPlane(const Observations& observations) {
   return "";
 }
 
-// A radius known of one circle is that of its group.
+// A radius known of one circle is that of its group, and as well known as by the best of those
+// that say how well.
 void ShareRadii(std::vector<CircleObservation>* circles) {
-  std::map<std::string, double> known;
+  struct KnownRadius {
+    double radius = 0.0, sigma = 0.0;
+  };
+  std::map<std::string, KnownRadius> groups;
   for (const CircleObservation& circle : *circles) {
-    if (!circle.radius_group.empty() && circle.radius > 0.0)
-      known[circle.radius_group] = circle.radius;
+    if (circle.radius_group.empty() || !(circle.radius > 0.0)) continue;
+    KnownRadius& known = groups[circle.radius_group];
+    known.radius = circle.radius;
+    const double sigma = circle.radius_sigma;
+    if (sigma > 0.0 && !(known.sigma > 0.0 && known.sigma < sigma)) known.sigma = sigma;
   }
   for (CircleObservation& circle : *circles) {
-    const auto group = known.find(circle.radius_group);
-    if (group != known.end()) circle.radius = group->second;
+    const auto group = groups.find(circle.radius_group);
+    if (group == groups.end()) continue;
+    circle.radius = group->second.radius;
+    circle.radius_sigma = group->second.sigma;
   }
 }
 

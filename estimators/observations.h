@@ -46,7 +46,8 @@ struct CircleObservation {
   // +1: brighter inside than outside, -1: darker, 0: not known. Contours of one contrast share an
   // offset (NoiseModel::contour_offset_px).
   int contrast = 0;
-  // Circles with the same id have equal radii, known or not; empty = with none.
+  // Circles with the same id have equal radii, known or not; empty = with none. A radius, and its
+  // radius_sigma, may be given of one of them or of all.
   std::string radius_group;
   std::vector<Segment> diameters;  // Chords through the centre, pixels.
 
@@ -172,7 +173,8 @@ bool IsInWorldPlane(const KnownLength& length, const Observations& resolved);
 //   first circle) and those concentric with it. Where there is no circle either, and no pencil has
 //   a role, the first two pencils of different direction span it.
 // - A free pencil on one of whose lines an axis is drawn gets that axis' role.
-// - A radius known of one circle holds for its whole radius group.
+// - A radius known of one circle holds for its whole radius group, and so does the least
+//   radius_sigma stated with it; that of the noise model where none is.
 // - Where nothing fixes the X axis (no role x or y, no axis drawn), the first free pencil of that
 //   plane does: it gets role x.
 Observations ResolveWorld(const Observations& observations);

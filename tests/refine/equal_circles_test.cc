@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -125,6 +126,29 @@ TEST(EqualCirclesTest, OneKnownRadiusIsThatOfTheGroup) {
   EXPECT_NEAR(best.circles[0].radius, kRadius, 1e-9);
   observations.circles[1].radius = 2.0 * kRadius;
   EXPECT_NE(observations.Validate().message.find("radius group 'dots'"), std::string::npos);
+}
+
+// One size has one standard deviation, whichever circle states it.
+TEST(EqualCirclesTest, TheOrderOfStatedRadiiDoesNotMatter) {
+  PlaneScene scene(0.6, kSigmaPx);
+  Observations observations = Dots(&scene, true);
+  for (CircleObservation& circle : observations.circles) circle.radius = kRadius;
+  observations.circles[1].radius_sigma = 0.01;
+  observations.circles[3].radius_sigma = 0.1;
+  Observations reversed = observations;
+  std::reverse(reversed.circles.begin(), reversed.circles.end());
+  for (const Observations* some : {&observations, &reversed}) {
+    for (const CircleObservation& circle : ResolveWorld(*some).circles)
+      EXPECT_EQ(circle.radius_sigma, 0.01) << circle.id;
+  }
+  // The translation is to the origin, which is the first circle's centre unless it is said.
+  observations.frame.origin_is_center = reversed.frame.origin_is_center = "c2";
+  const EstimationOptions options;
+  const PoseHypothesis a = Best(EstimatePose(observations, options)),
+                       b = Best(EstimatePose(reversed, options));
+  const double sigma = std::sqrt(a.Covariance().bottomRightCorner<3, 3>().trace());
+  EXPECT_NEAR(std::sqrt(b.Covariance().bottomRightCorner<3, 3>().trace()) / sigma, 1.0, 1e-3);
+  EXPECT_NEAR(sigma / a.cam_from_world.translation.norm(), 0.01, 2e-3);
 }
 
 }  // namespace
