@@ -209,23 +209,26 @@ void FillLeftOut(const JointProblem& problem, const State& state, Refined* refin
 }
 
 // Log determinant of the covariance of rotation and, where it is estimated, focal length; a turn
-// that the evidence says nothing of has a variance of one, and no other has more.
+// that the evidence says nothing of has the variance of the Gaussian that has as much room as it,
+// and no other has more: sqrt(2 pi variance) = 2 pi.
 double LogDet(const JointProblem& problem, const Linearization& at) {
+  constexpr double kFreeTurn = 2.0 * kPi;
   std::vector<int> columns = at.Columns(JointProblem::kRotation);
   if (problem.camera_is_estimated()) columns.push_back(at.column(JointProblem::kCamera));
   Eigen::MatrixXd covariance = at.covariance()(columns, columns);
   const Eigen::MatrixXd nulls = at.null_space()(columns, Eigen::all);
-  covariance += nulls * nulls.transpose();
-  return LogDetOfKnown(covariance);
+  covariance += kFreeTurn * nulls * nulls.transpose();
+  return LogDetOfKnown(covariance, kFreeTurn);
 }
 
 }  // namespace
 
-double LogDetOfKnown(const Eigen::MatrixXd& covariance) {
+double LogDetOfKnown(const Eigen::MatrixXd& covariance, double most) {
   double log_det = 0.0;
   constexpr double kNone = 1e-20;  // Rounding: nothing is known, or all is a prior's.
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance, Eigen::EigenvaluesOnly);
-  for (const double v : eigen.eigenvalues()) log_det += v > kNone && v < 1.0 ? std::log(v) : 0.0;
+  for (const double v : eigen.eigenvalues())
+    log_det += std::log(v > kNone ? std::min(v, most) : most);
   return log_det;
 }
 

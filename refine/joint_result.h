@@ -33,9 +33,9 @@ struct Refined {
 void PlaceEstimate(const PlaneCircle& circle, const CameraPose& pose, double unit,
                    const Camera& camera, CircleEstimate* estimate);
 
-// Log determinant of a covariance, angles and logarithms: over its principal axes, but for those of
-// which nothing is known, which count as 1.
-double LogDetOfKnown(const Eigen::MatrixXd& covariance);
+// Log determinant of a covariance, angles and logarithms: over its principal axes; those of which
+// nothing is known have a variance of `most`, and none has more.
+double LogDetOfKnown(const Eigen::MatrixXd& covariance, double most = 1.0);
 
 // Fills everything but the probability from a minimum. Not ok: no feature has inliers, or some
 // number is not finite.

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "circline/estimators/basics.h"
 #include "circline/refine/estimate_pose.h"
 #include "tests/plane_scene.h"
 #include "tests/refine/round_scene.h"
@@ -122,6 +123,38 @@ TEST(GravityPriorTest, IsLeftOutWhereThePhotoContradictsIt) {
       EXPECT_GT(h.probability, 0.99);
     }
   }
+}
+
+// A circle on a wall again: that gravity tells the spin, and nothing does without it, is no reason
+// to leave it out, and none to keep it.
+TEST(GravityPriorTest, IsLeftOutAtTheOddsOfItsDensity) {
+  PlaneScene scene(0.7, 0.2);
+  Observations observations = OneCircle(&scene);
+  observations.circles[0].center = scene.Pixel(0.0, 0.0);
+  EstimationOptions options = LeastSquares();
+  const PoseHypothesis alone = Best(EstimatePose(observations, options));
+  const Vector3d normal = alone.cam_from_world.rotation.col(2),
+                 in_plane = -scene.pose.rotation.col(1), across = normal.cross(in_plane);
+  constexpr double kSigma = 0.01;
+  const double variance =
+      kSigma * kSigma + across.dot(alone.Covariance().topLeftCorner<3, 3>() * across);
+  const double off = 5.0 * std::sqrt(variance);
+  GravityPrior gravity;
+  gravity.in_world = -Vector3d::UnitY();
+  const Vector3d level = (in_plane - normal * normal.dot(in_plane)).normalized();
+  gravity.in_camera = std::cos(off) * level + std::sin(off) * normal;
+  gravity.sigma_rad = kSigma;
+  options.gravity_prior = gravity;
+  const PoseEstimate both = EstimatePose(observations, options);
+  ASSERT_GE(both.hypotheses.size(), 2U) << both.status.message;
+  double with = 0.0, without = 0.0;
+  for (const PoseHypothesis& h : both.hypotheses)
+    (h.left_out.empty() ? with : without) += h.probability;
+  // Any turn in the plane, a Gaussian across it; or one of 50 that has nothing to do with the
+  // world, anywhere on half of the sphere.
+  const double right = std::exp(-0.5 * 5.0 * 5.0) / (2.0 * kPi * std::sqrt(2.0 * kPi * variance)),
+               wrong = 0.02 / (2.0 * kPi);
+  EXPECT_NEAR(std::log(without / with), std::log(wrong / right), 0.2);
 }
 
 // It has a sense: of lines alone it tells which way an axis points.
