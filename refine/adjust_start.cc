@@ -9,6 +9,7 @@
 
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/adjustment.h"
+#include "circline/refine/fit_sigma.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/readings.h"
@@ -38,13 +39,12 @@ void ParallelFor(std::size_t count, int num_threads, const std::function<void(st
 
 Observations Prepare(const Observations& given, const Camera& camera,
                      const EstimationOptions& options, const PointNoise* noise) {
-  constexpr double kDefaultSigmaPx = 0.4;  // For fits only.
   Observations photo = given;
   photo.camera = camera;
   ResetFits(&photo);
   photo = ResolveWorld(photo);
   photo.num_dropped_points = 0;
-  FitDirect(kDefaultSigmaPx, &photo, nullptr, options.noise_model);
+  FitDirect(FitSigmaPx(options), &photo, nullptr, options.noise_model);
   photo = ResolveWorld(photo);
   StateNoise(noise != nullptr ? *noise : MeasurePointNoise(photo, options.noise_model),
              options.conic_loss.scale_px, options.line_loss.scale_px, &photo);

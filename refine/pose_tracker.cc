@@ -10,6 +10,7 @@
 
 #include "circline/estimators/point_noise.h"
 #include "circline/estimators/statistics.h"
+#include "circline/refine/fit_sigma.h"
 #include "circline/refine/scratch.h"
 #include "circline/refine/track_frame.h"
 #include "circline/refine/track_state.h"
@@ -86,15 +87,13 @@ class PoseTracker::Implementation {
   }
 
   void Prepare(const Observations& observations) {
-    constexpr double kDefaultSigmaPx = 0.4;  // For fits that nobody has made yet.
-    const double scale = options_.estimation.line_loss.scale_px;
     fitted_ = observations;
     problems_.clear();
-    FitDirect(scale > 0.0 ? scale : kDefaultSigmaPx, &fitted_, &problems_, NoiseModel::Exact(),
-              &fit_memory_);
-    noise_meter_.Measure(fitted_, options_.estimation.noise_model, &noise_);
-    StateNoise(noise_, options_.estimation.conic_loss.scale_px, scale, &fitted_);
-    news_ = frame_news_.Next(fitted_, options_.estimation.noise_model);
+    const EstimationOptions& estimation = options_.estimation;
+    FitDirect(FitSigmaPx(estimation), &fitted_, &problems_, NoiseModel::Exact(), &fit_memory_);
+    noise_meter_.Measure(fitted_, estimation.noise_model, &noise_);
+    StateNoise(noise_, estimation.conic_loss.scale_px, estimation.line_loss.scale_px, &fitted_);
+    news_ = frame_news_.Next(fitted_, estimation.noise_model);
   }
 
   // Begins a track with the poses of a single frame; the track before ends where there are any.

@@ -9,6 +9,7 @@
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/focal_starts.h"
 #include "circline/estimators/point_noise.h"
+#include "circline/refine/fit_sigma.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
 
@@ -212,10 +213,8 @@ PoseEstimate RefineSeeds(const std::string& name,
   if (estimate.status.ok()) estimate.status = observations.Validate();
   if (!estimate.status.ok()) return estimate;
 
-  constexpr double kDefaultSigmaPx = 0.4;  // For fits that nobody has made yet.
   Observations resolved = ResolveWorld(observations);
-  FitDirect(options.line_loss.scale_px > 0.0 ? options.line_loss.scale_px : kDefaultSigmaPx,
-            &resolved, &estimate.notes, options.noise_model);
+  FitDirect(FitSigmaPx(options), &resolved, &estimate.notes, options.noise_model);
   resolved = ResolveWorld(resolved);
   StateNoise(MeasurePointNoise(resolved, options.noise_model), options.conic_loss.scale_px,
              options.line_loss.scale_px, &resolved);

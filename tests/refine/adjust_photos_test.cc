@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "circline/refine/adjustment.h"
+#include "tests/plane_scene.h"
 #include "tests/refine/simulated_options.h"
 #include "tests/sheet_photos.h"
 #include "tests/trials.h"
@@ -239,6 +241,21 @@ TEST(AdjustPhotos, EveryCameraModelComesOutWithinItsSigma) {
     }
     EXPECT_EQ(made.Sigma(4) > 0.0, model != CameraModel::kPinhole);
   }
+}
+
+// Of features that state no noise, as in a single photo.
+TEST(AdjustPhotos, FitsTakeTheScaleThatIsGiven) {
+  PlaneScene scene(0.6, 0.2);
+  Observations photo = scene.Empty();
+  photo.pencils = scene.Axes();
+  for (PencilObservation& pencil : photo.pencils) pencil.sigma_px = 0.0;
+  const auto trace = [&](double scale_px) {
+    EstimationOptions options = Exact();
+    options.line_loss.scale_px = scale_px;
+    const Observations prepared = Prepare(photo, photo.camera, options);
+    return prepared.pencils[0].lines[0].fit.value().covariance.trace();
+  };
+  EXPECT_NEAR(trace(2.0) / trace(1.0), 4.0, 1e-6);
 }
 
 TEST(AdjustPhotos, SameBitsWithAnyNumberOfThreads) {
