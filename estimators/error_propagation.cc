@@ -56,7 +56,7 @@ MeasuredInput Input(InputKind kind, const Vector& value, const Matrix& covarianc
 std::vector<MovedInput> MovedOf(MeasuredInputs* inputs) {
   std::vector<MovedInput> moved;
   for (MeasuredInput& input : *inputs)
-    moved.push_back({input.kind, input.value.data(), {}, input.contrast});
+    moved.push_back({input.kind, input.value.data(), {}, input.contrast, input.irregularity});
   return moved;
 }
 
@@ -96,6 +96,7 @@ MeasuredInput MeasuredInput::Line(const LineFit& fit) {
 MeasuredInput MeasuredInput::Conic(const ConicFit& fit, int contrast) {
   MeasuredInput input = Input(InputKind::kConic, ConicToVector(fit.conic), fit.Covariance());
   input.contrast = contrast;
+  input.irregularity = fit.irregularity;
   return input;
 }
 MeasuredInput MeasuredInput::Number(double value, double sigma) {

@@ -28,7 +28,8 @@ struct MeasuredInput {
   // unit of its own.
   std::vector<double> value;
   std::vector<double> covariance;  // Of `value`, square, row-major.
-  int contrast = 0;                // Of a conic: CircleObservation::contrast.
+  int contrast = 0;                // Of a conic: CircleObservation::contrast,
+  double irregularity = 1.0;       // ConicFit::irregularity.
 
   // A point of the image, homogeneous.
   static MeasuredInput Point(const Eigen::Vector3d& point, const Eigen::Matrix3d& covariance);

@@ -101,6 +101,34 @@ TEST(ErrorPropagation, PosesThatAreNotFiniteDoNotCount) {
   EXPECT_TRUE(hypotheses.empty());
 }
 
+// A contour that is less regular than the noise model says has a worse known shape.
+TEST(ErrorPropagation, ConicsKeepTheIrregularityOfTheirFits) {
+  ConicFit fit;
+  fit.conic = Eigen::Vector3d(1.0, 4.0, -0.04).asDiagonal();
+  NoiseModel noise = NoiseModel::Exact();
+  noise.circle_shape = 1e-3;
+  UnknownOfPose unknown;
+  unknown.scale = false;
+  // The conic's numbers for a place: whatever follows them has their covariance.
+  const auto numbers = [](const std::vector<MeasuredInput>& inputs) {
+    const Eigen::Matrix3d conic = inputs[0].AsConic();
+    ClosedFormPose pose;
+    pose.pose.translation = Eigen::Vector3d(conic(0, 0), conic(1, 1), 5.0);
+    return std::vector<ClosedFormPose>{pose};
+  };
+  double variances[2] = {};
+  for (const double irregularity : {1.0, 3.0}) {
+    fit.irregularity = irregularity;
+    std::vector<PoseHypothesis> hypotheses;
+    ASSERT_TRUE(PropagateErrors(numbers, {MeasuredInput::Conic(fit)}, TestCamera(), noise, unknown,
+                                &hypotheses)
+                    .ok());
+    variances[irregularity > 1.0 ? 1 : 0] = hypotheses.at(0).Covariance().trace();
+  }
+  EXPECT_GT(variances[0], 0.0);
+  EXPECT_NEAR(variances[1] / variances[0], 9.0, 0.01);
+}
+
 // Also where that happens only for inputs that are moved by an error.
 TEST(ErrorPropagation, PosesMustHaveAsManyContradictionsEach) {
   for (const double above : {-1.0, 5.5, 7.0}) {
