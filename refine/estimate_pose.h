@@ -31,10 +31,11 @@ const char* ConicDistanceName(ConicDistanceType type);  // "auto", "sampson", "o
 // False, with `type` untouched, where there is no such name.
 bool ConicDistanceFromName(const std::string& name, ConicDistanceType* type);
 
-// A pose that is known from elsewhere (odometry, the filter's prediction), in the same world frame:
-// evidence like any other, in the estimate, in its covariance and in the ranking. One that
-// contradicts the photo is left out ("pose_prior"), and where nothing else tells the turn about the
-// normal that is free. With it one pencil of parallel lines, which alone is refused, gives a pose.
+// A pose that is known from elsewhere (odometry, the filter's prediction), in the resolved world
+// (ResolveWorld): evidence like any other, in the estimate, in its covariance and in the ranking.
+// One that contradicts the photo is left out ("pose_prior"), and where nothing else tells the turn
+// about the normal that is free. With it one pencil of parallel lines, which alone is refused,
+// gives a pose.
 struct PosePrior {
   CameraPose mean;  // cam_from_world.
   // Of [delta, delta_t], 6x6 row-major, as PoseHypothesis::covariance; positive definite. Where the
@@ -44,6 +45,9 @@ struct PosePrior {
 
 // A direction of the world that is known in the camera: gravity from an accelerometer. Likewise
 // evidence ("gravity_prior"); with it one pencil gives the rotation, unless gravity runs along it.
+// `in_world` is a direction of the resolved world (ResolveWorld), whose X axis runs, where no role
+// and no drawn axis says otherwise, along the first free pencil of the plane. Along the plane's
+// normal it is the same whatever X is; for any other give a pencil a role, or draw an axis.
 struct GravityPrior {
   Eigen::Vector3d in_world = Eigen::Vector3d::UnitZ();   // Unit.
   Eigen::Vector3d in_camera = Eigen::Vector3d::UnitY();  // Unit.
