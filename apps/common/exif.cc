@@ -98,4 +98,32 @@ ExifFocalLength ReadExifFocalLength(const std::string& path, int width, int heig
   return focal;
 }
 
+// After "RIFF", a size and "WEBP" come chunks: a name, a size (little endian) and as many bytes,
+// one more where that is odd.
+int WebpOrientation(const std::vector<std::uint8_t>& bytes) {
+  const std::string file(bytes.begin(), bytes.end());
+  constexpr std::size_t kHeader = 12, kChunkHeader = 8;
+  if (file.compare(0, 4, "RIFF") != 0 || file.compare(8, 4, "WEBP") != 0) return 1;
+  for (std::size_t at = kHeader; at + kChunkHeader <= file.size();) {
+    std::size_t size = 0;
+    for (std::size_t k = 0; k < 4; ++k)
+      size += static_cast<std::size_t>(bytes[at + 4 + k]) << 8 * k;
+    if (file.compare(at, 4, "EXIF") == 0) {
+      // libexif wants the mark that a JPEG has before them; some writers leave it in the chunk.
+      const std::string mark("Exif\0\0", 6);
+      std::string exif = file.substr(at + kChunkHeader, size);
+      if (exif.compare(0, mark.size(), mark) != 0) exif.insert(0, mark);
+      const ExifPointer data(
+          exif_data_new_from_data(reinterpret_cast<const unsigned char*>(exif.data()),
+                                  static_cast<unsigned int>(exif.size())),
+          exif_data_unref);
+      const double number =
+          data == nullptr ? 1.0 : Number(data.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION);
+      return number >= 1.0 && number <= 8.0 ? static_cast<int>(number) : 1;
+    }
+    at += kChunkHeader + size + size % 2;
+  }
+  return 1;
+}
+
 }  // namespace circline::apps

@@ -2,7 +2,9 @@
 #ifndef CIRCLINE_APPS_COMMON_EXIF_H_
 #define CIRCLINE_APPS_COMMON_EXIF_H_
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 namespace circline::apps {
 
@@ -17,6 +19,10 @@ struct ExifFocalLength {
 // that of the photo as taken. Figures that no lens has are passed over. Never throws, whatever is
 // broken in the file.
 ExifFocalLength ReadExifFocalLength(const std::string& path, int width, int height);
+
+// How the EXIF data of a WebP say that its picture lies: EXIF's number, 1 (as it should) to 8; 1
+// where they say nothing, or there are none. Never throws, whatever is broken in the file.
+int WebpOrientation(const std::vector<std::uint8_t>& bytes);
 
 }  // namespace circline::apps
 

@@ -13,6 +13,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "apps/common/exif.h"
 #include "apps/common/text.h"
 
 namespace circline::apps {
@@ -80,6 +81,36 @@ void ToEightBits(cv::Mat* photo) {
   photo->convertTo(*photo, CV_8U, 255.0 / white);
 }
 
+// By EXIF's number for how a picture lies: 2 to 4 are flips, 5 to 8 the same of it transposed.
+void Turn(int orientation, cv::Mat* photo) {
+  if (orientation > 4) cv::transpose(*photo, *photo);
+  constexpr std::array kFlips = {1, -1, 0};  // OpenCV's numbers: across, both ways, upside down.
+  const int flip = (orientation - 1) % 4;
+  if (flip > 0) cv::flip(*photo, *photo, kFlips[static_cast<std::size_t>(flip - 1)]);
+}
+
+// What is wrong with a file's picture, in words; empty: nothing. OpenCV turns a JPEG or PNG as its
+// EXIF data say; a WebP only some versions do, so that it is told not to.
+std::string Decode(const std::vector<std::uint8_t>& bytes, cv::Mat* photo) {
+  const int orientation = WebpOrientation(bytes),
+            flags = orientation > 1 ? cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION
+                                    : cv::IMREAD_ANYCOLOR;
+  const bool is_tiff =
+      bytes.size() >= 2 && bytes[0] == bytes[1] && (bytes[0] == 'I' || bytes[0] == 'M');
+  *photo = cv::imdecode(bytes, flags | cv::IMREAD_ANYDEPTH);
+  if (is_tiff && photo->depth() >= CV_32F) {
+    photo->release();
+    return "has floating-point pixels, and does not say which is white: save it with 8 or 16 bits";
+  }
+  if (photo->depth() == CV_16U) {
+    ToEightBits(photo);
+  } else if (photo->depth() != CV_8U) {
+    *photo = cv::imdecode(bytes, flags);
+  }
+  Turn(orientation, photo);
+  return "";
+}
+
 }  // namespace
 
 std::string ReadPhoto(const std::string& path, cv::Mat* photo, double max_megapixels) {
@@ -102,12 +133,8 @@ std::string ReadPhoto(const std::string& path, cv::Mat* photo, double max_megapi
   const std::string damage = IsJpeg(bytes) ? JpegDamage(bytes, max_megapixels) : "";
   if (!damage.empty()) return damage;
   try {
-    *photo = cv::imdecode(bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH);
-    if (photo->depth() == CV_16U) {
-      ToEightBits(photo);
-    } else if (photo->depth() != CV_8U) {
-      *photo = cv::imdecode(bytes, cv::IMREAD_ANYCOLOR);
-    }
+    const std::string wrong = Decode(bytes, photo);
+    if (!wrong.empty()) return wrong;
   } catch (const std::exception&) {
     photo->release();
   }

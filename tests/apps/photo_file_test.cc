@@ -57,6 +57,64 @@ TEST_F(PhotoFile, RefusesLargeFilesUnread) {
   EXPECT_EQ(ReadPhoto(path, &photo_), "is larger than a photo of 100 megapixels can be");
 }
 
+// OpenCV reads some, and warns of the others on stderr.
+TEST_F(PhotoFile, SaysWhatToDoWithATiffOfFloats) {
+  for (const int depth : {CV_32F, CV_64F}) {
+    cv::Mat grey;
+    cv::extractChannel(Texture(), grey, 0);
+    grey.convertTo(grey, depth);
+    testing::internal::CaptureStderr();
+    EXPECT_CONTAINS(Read(Encoded(".tiff", grey)), "save it with 8 or 16 bits");
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+    EXPECT_TRUE(photo_.empty());
+  }
+}
+
+std::string LittleEndian(std::size_t number, int bytes) {
+  std::string text;
+  for (int k = 0; k < bytes; ++k) text += static_cast<char>(number >> 8 * k & 0xFF);
+  return text;
+}
+
+// A lossless WebP, with EXIF data that say how it lies.
+std::vector<std::uint8_t> TurnedWebp(const cv::Mat& picture, std::size_t orientation) {
+  std::vector<std::uint8_t> plain;
+  cv::imencode(".webp", picture, plain, {cv::IMWRITE_WEBP_QUALITY, 101});
+  const auto columns = static_cast<std::size_t>(picture.cols),
+             rows = static_cast<std::size_t>(picture.rows);
+  constexpr std::size_t kHasExif = 8, kOrientation = 0x112, kShort = 3;
+  // A TIFF of one entry.
+  const std::string exif = "II" + LittleEndian(42, 2) + LittleEndian(8, 4) + LittleEndian(1, 2) +
+                           LittleEndian(kOrientation, 2) + LittleEndian(kShort, 2) +
+                           LittleEndian(1, 4) + LittleEndian(orientation, 4) + LittleEndian(0, 4);
+  const std::string body = "WEBPVP8X" + LittleEndian(10, 4) + LittleEndian(kHasExif, 4) +
+                           LittleEndian(columns - 1, 3) + LittleEndian(rows - 1, 3) +
+                           std::string(plain.begin() + 12, plain.end()) + "EXIF" +
+                           LittleEndian(exif.size(), 4) + exif;
+  const std::string file = "RIFF" + LittleEndian(body.size(), 4) + body;
+  return {file.begin(), file.end()};
+}
+
+TEST_F(PhotoFile, TurnsAWebpAsItsExifDataSay) {
+  const cv::Mat picture = Texture();
+  for (std::size_t orientation = 1; orientation <= 8; ++orientation) {
+    EXPECT_EQ(Read(TurnedWebp(picture, orientation)), "");
+    ASSERT_EQ(photo_.size(), orientation > 4 ? cv::Size(60, 80) : cv::Size(80, 60)) << orientation;
+    // EXIF says where row 0 and column 0 of the file are to be seen.
+    const bool row_is_right = orientation == 6 || orientation == 7,
+               column_is_right = orientation == 2 || orientation == 3,
+               row_is_bottom = orientation == 3 || orientation == 4,
+               column_is_bottom = orientation == 7 || orientation == 8;
+    const cv::Point corner(row_is_right || column_is_right ? photo_.cols - 1 : 0,
+                           row_is_bottom || column_is_bottom ? photo_.rows - 1 : 0);
+    const cv::Point along = orientation > 4
+                                ? cv::Point(corner.x, corner.y + (column_is_bottom ? -9 : 9))
+                                : cv::Point(corner.x + (column_is_right ? -9 : 9), corner.y);
+    EXPECT_EQ(photo_.at<cv::Vec3b>(corner), picture.at<cv::Vec3b>(0, 0)) << orientation;
+    EXPECT_EQ(photo_.at<cv::Vec3b>(along), picture.at<cv::Vec3b>(0, 9)) << orientation;
+  }
+}
+
 TEST_F(PhotoFile, ReadsWhateverDepthAndChannels) {
   for (const char* extension : {".jpg", ".png", ".bmp", ".tiff"}) {
     EXPECT_EQ(Read(Encoded(extension, Texture())), "") << extension;
