@@ -12,8 +12,13 @@ TEST(Median, OfOddEvenAndNone) {
 }
 
 TEST(ChiSquareLimit, IsThatOfTables) {
-  EXPECT_NEAR(ChiSquareLimit(10, 0.001), 29.588, 0.2);
-  EXPECT_NEAR(ChiSquareLimit(100, 0.001), 149.449, 0.1);
+  EXPECT_NEAR(ChiSquareLimit(1, 0.05), 3.8415, 1e-3);
+  EXPECT_NEAR(ChiSquareLimit(1, 0.001), 10.828, 1e-3);
+  EXPECT_NEAR(ChiSquareLimit(2, 1e-9), 41.447, 1e-3);
+  EXPECT_NEAR(ChiSquareLimit(3, 0.001), 16.266, 1e-3);
+  EXPECT_NEAR(ChiSquareLimit(10, 0.001), 29.588, 1e-3);
+  EXPECT_NEAR(ChiSquareLimit(100, 0.001), 149.449, 1e-3);
+  EXPECT_NEAR(ChiSquareLimit(200, 0.001), 267.541, 0.1);
 }
 
 }  // namespace
