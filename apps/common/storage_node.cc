@@ -129,7 +129,9 @@ std::vector<double> StorageNode::Numbers(std::size_t count, std::size_t multiple
   if (!ok()) return {};
   if (count != 0 && values.size() != count) {
     Fail("must have " + std::to_string(count) + " numbers, has " + std::to_string(values.size()));
-  } else if (multiple_of != 0 && (values.empty() || values.size() % multiple_of != 0)) {
+  } else if (multiple_of != 0 && values.empty()) {
+    Fail("is empty: must have " + std::to_string(multiple_of) + " numbers for each entry");
+  } else if (multiple_of != 0 && values.size() % multiple_of != 0) {
     Fail("must have " + std::to_string(multiple_of) + " numbers for each entry, has " +
          std::to_string(values.size()));
   }

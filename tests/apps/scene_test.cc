@@ -224,6 +224,8 @@ TEST(Scene, NamesWrongTypesAndCounts) {
                   "contour[3]: must be a number");
   EXPECT_CONTAINS(ErrorOfImage("circles: [ { id: \"c\", contour: [1,2,3,4,5,6,7,8,9] } ]"),
                   "must have 2 numbers for each entry, has 9");
+  EXPECT_CONTAINS(ErrorOfImage("circles: [ { id: \"c\", contour: [] } ]"),
+                  "contour: is empty: must have 2 numbers for each entry");
   EXPECT_CONTAINS(ErrorOfImage("circles: [ { id: \"c\", contour: [1,2,3,4,5,6,7,8] } ]"),
                   "must have 5 points or more, has 4");
   EXPECT_CONTAINS(ErrorOfImage("circles: [ { id: \"c\", contour: [1,2,3,.nan,5,6,7,8,9,10] } ]"),
