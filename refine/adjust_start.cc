@@ -9,7 +9,6 @@
 
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/refine/adjustment.h"
-#include "circline/refine/fit_sigma.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
 #include "circline/refine/readings.h"

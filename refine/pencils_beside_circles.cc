@@ -129,6 +129,8 @@ void WeighByPencils(const JointProblem& problem, std::vector<Refined>* all) {
       const SeenDirection seen(related, r.hypothesis, problem.observations().camera);
       ratios.push_back(RatioBeside(r.hypothesis, seen));
     }
+    const auto is_number = [](double ratio) { return std::isfinite(ratio); };
+    if (!std::all_of(ratios.begin(), ratios.end(), is_number)) continue;  // Beyond all sigmas.
     const double best = *std::max_element(ratios.begin(), ratios.end());
     constexpr double kTold = 2.0;  // Odds of planes that are worth a note.
     for (std::size_t i = 0; i < all->size(); ++i) {

@@ -10,7 +10,7 @@
 
 #include "circline/estimators/point_noise.h"
 #include "circline/estimators/statistics.h"
-#include "circline/refine/fit_sigma.h"
+#include "circline/refine/readings.h"
 #include "circline/refine/scratch.h"
 #include "circline/refine/track_frame.h"
 #include "circline/refine/track_state.h"

@@ -9,7 +9,6 @@
 #include "circline/estimators/closed_form_solvers.h"
 #include "circline/estimators/focal_starts.h"
 #include "circline/estimators/point_noise.h"
-#include "circline/refine/fit_sigma.h"
 #include "circline/refine/joint_problem.h"
 #include "circline/refine/joint_result.h"
 
@@ -24,7 +23,7 @@ std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
   if (gap < 0.5) return "nothing decides: both poses explain the evidence equally well";
   char text[120];
   std::snprintf(text, sizeof(text),
-                "residuals: chi-square lower by %.3g than that of the second pose", 2.0 * gap);
+                "evidence: chi-square lower by %.3g than that of the second pose", 2.0 * gap);
   return text;
 }
 

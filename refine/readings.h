@@ -23,6 +23,14 @@ PoseEstimate RefineSeeds(const std::string& name,
                          const std::vector<std::shared_ptr<const Solver>>& seeders,
                          const Observations& observations, const EstimationOptions& options);
 
+// Standard deviation, pixels, of the points of features that nobody has fitted and that state none,
+// for FitDirect; what they scatter by is measured on these fits.
+inline double FitSigmaPx(const EstimationOptions& options) {
+  constexpr double kDefaultSigmaPx = 0.4;
+  const double scale = options.line_loss.scale_px;
+  return scale > 0.0 ? scale : kDefaultSigmaPx;
+}
+
 // --- pose_seeds.cc: where refinements of one world plane may start. ---
 
 // For WorldRotation, where every feature has a noise of its own: never taken.

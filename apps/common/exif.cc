@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string_view>
 
 #include "apps/common/text.h"
 
@@ -101,9 +102,9 @@ ExifFocalLength ReadExifFocalLength(const std::string& path, int width, int heig
 // After "RIFF", a size and "WEBP" come chunks: a name, a size (little endian) and as many bytes,
 // one more where that is odd.
 int WebpOrientation(const std::vector<std::uint8_t>& bytes) {
-  const std::string file(bytes.begin(), bytes.end());
   constexpr std::size_t kHeader = 12, kChunkHeader = 8;
-  if (file.compare(0, 4, "RIFF") != 0 || file.compare(8, 4, "WEBP") != 0) return 1;
+  const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (file.size() < kHeader || file.substr(0, 4) != "RIFF" || file.substr(8, 4) != "WEBP") return 1;
   for (std::size_t at = kHeader; at + kChunkHeader <= file.size();) {
     std::size_t size = 0;
     for (std::size_t k = 0; k < 4; ++k)
@@ -111,7 +112,7 @@ int WebpOrientation(const std::vector<std::uint8_t>& bytes) {
     if (file.compare(at, 4, "EXIF") == 0) {
       // libexif wants the mark that a JPEG has before them; some writers leave it in the chunk.
       const std::string mark("Exif\0\0", 6);
-      std::string exif = file.substr(at + kChunkHeader, size);
+      std::string exif(file.substr(at + kChunkHeader, size));
       if (exif.compare(0, mark.size(), mark) != 0) exif.insert(0, mark);
       const ExifPointer data(
           exif_data_new_from_data(reinterpret_cast<const unsigned char*>(exif.data()),
