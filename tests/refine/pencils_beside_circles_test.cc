@@ -49,7 +49,7 @@ bool IsRight(const PoseEstimate& estimate, const PlaneScene& scene) {
 class RelatedPencils : public testing::TestWithParam<Vector3d> {};
 
 TEST_P(RelatedPencils, TellThePose) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     PlaneScene scene(0.7, kSigmaPx, seed);
     const PoseEstimate estimate = Ok(EstimatePose(Beside(GetParam(), &scene)));
     ASSERT_EQ(estimate.hypotheses.size(), 2U);
