@@ -43,8 +43,8 @@ struct PoseHypothesis {
   CameraPose cam_from_world;  // The pose itself.
   bool metric = false;        // Else the translation has unit norm.
   double probability = 1.0;   // Posterior among the hypotheses of the estimate; they sum to 1.
-  // 1/2 sum rho(r^2), residuals in standard deviations, and what features left out and pencils of
-  // unknown planes speak against the pose.
+  // 1/2 sum rho(r^2), residuals in standard deviations, and what features left out speak against
+  // the pose.
   double cost = 0.0;
   // Log determinant of the covariance of all parameters, but for what is alike among the hypotheses
   // of the estimate (Laplace's term): to compare them, not those of another photo.

@@ -85,10 +85,8 @@ struct EstimationOptions {
 // Refines every hypothesis of the closed forms on all evidence, in one ceres::Problem. Features
 // that contradict the rest as a whole are left out and named (PoseHypothesis::left_out, `notes`);
 // the readings that keep them stay among the hypotheses. Poses less than two standard deviations
-// apart are one hypothesis, but for those of a lone circle. Where circles alone tell the plane,
-// free pencils of no plane say which pose is likelier: one that they lie in, or whose normal they
-// run along. `registry` null means the built-in solvers; else its closed forms give the seeds.
-// Never throws, never returns NaN. Thread-safe.
+// apart are one hypothesis, but for those of a lone circle. `registry` null means the built-in
+// solvers; else its closed forms give the seeds. Never throws, never returns NaN. Thread-safe.
 PoseEstimate EstimatePose(const Observations& observations, const EstimationOptions& options = {},
                           const SolverRegistry* registry = nullptr);
 

@@ -55,12 +55,6 @@ std::vector<double> CircleVolumes(const JointProblem& problem, const State& stat
 // has the same under all; an arc leaves the one pose its tilt open, and the other its size.
 void CountCircleVolumes(std::vector<Refined>* all);
 
-// Where circles alone tell the plane, and leave two: adds to each cost what free pencils of no
-// plane speak against its pose, as they lie in the plane of another one, or run along its normal,
-// within errors in which an unrelated direction seldom is. Marginal over the focal length, where
-// that is estimated.
-void WeighByPencils(const JointProblem& problem, std::vector<Refined>* all);
-
 // --- joint_inliers.cc
 
 // Counts and rms of the inliers. Returns how much wider the estimate scatters than least squares on

@@ -152,7 +152,6 @@ Status RankReadings(const JointProblem& problem, const std::vector<State>& minim
   if (!status.ok()) return status;
   const std::vector<std::size_t> read_again = AddSecondReadings(problem, &all);
   CountCircleVolumes(&all);
-  WeighByPencils(problem, &all);
   estimate->hypotheses = Ranked(all);
   MergeHumps(&estimate->hypotheses);
   const PoseHypothesis& best = estimate->hypotheses.front();

@@ -23,7 +23,7 @@ std::string DecidedBy(const std::vector<PoseHypothesis>& hypotheses) {
   if (gap < 0.5) return "nothing decides: both poses explain the evidence equally well";
   char text[120];
   std::snprintf(text, sizeof(text),
-                "evidence: chi-square lower by %.3g than that of the second pose", 2.0 * gap);
+                "residuals: chi-square lower by %.3g than that of the second pose", 2.0 * gap);
   return text;
 }
 

@@ -282,7 +282,7 @@ TEST(EstimatePoseTest, WhatDecidesIsSaidTruly) {
     if (estimate.hypotheses.size() < 2) continue;
     const PoseHypothesis &first = estimate.hypotheses[0], &second = estimate.hypotheses[1];
     larger_residuals += first.cost > second.cost ? 1 : 0;
-    if (estimate.decided_by.find("chi-square") != std::string::npos) {
+    if (estimate.decided_by.find("residuals") != std::string::npos) {
       ++by_residuals;
       EXPECT_GT(second.cost - first.cost, 0.49) << estimate.decided_by;
     } else {
