@@ -90,7 +90,8 @@ void Turn(int orientation, cv::Mat* photo) {
 }
 
 // What is wrong with a file's picture, in words; empty: nothing. OpenCV turns a JPEG or PNG as its
-// EXIF data say; a WebP only some versions do, so that it is told not to.
+// EXIF data say; a WebP only some versions do, so that it is told not to. Of other formats of
+// floats it makes 8 bits when asked again; of a TIFF it warns, and makes nothing.
 std::string Decode(const std::vector<std::uint8_t>& bytes, cv::Mat* photo) {
   const int orientation = WebpOrientation(bytes),
             flags = orientation > 1 ? cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION

@@ -45,8 +45,9 @@ inline Observations MakeObservations() {
   for (int i = 0; i < 60; ++i) {
     const double t = 0.1 * i;
     const bool stray = i % 4 == 3;
+    const Eigen::Vector2d anywhere{random.Uniform(-0.2, 0.2), random.Uniform(-0.2, 0.2)};
     circle.points.push_back(
-        stray ? Pixel(random.Uniform(-0.2, 0.2), random.Uniform(-0.2, 0.2))
+        stray ? Pixel(anywhere.x(), anywhere.y())
               : Pixel(0.05 + 0.1 * std::cos(t), 0.07 * std::sin(t), &random, 0.3));
   }
   circle.points.emplace_back(1e12, 1e12);
