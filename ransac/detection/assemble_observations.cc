@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "circline/ransac/detection/box_edge.h"
+#include "circline/ransac/detection/box_rivals.h"
 #include "circline/ransac/detection/choose_plane.h"
 #include "circline/ransac/detection/circle_grid.h"
 #include "circline/ransac/detection/find_box.h"
@@ -28,9 +28,6 @@ using Eigen::Vector3d;
 constexpr double kMinMeetingShare = 0.4;
 // Or lies in the convex hull of its circles, widened by this factor: a plate reaches beyond them.
 constexpr double kCirclesGrowth = 2.0;
-// Evidence of a pencil (LogOddsOfDirection) that no box outweighs: six edges along two of its axes,
-// at four each.
-constexpr double kMostOddsOfABox = 24.0;
 
 class Assembler {
  public:
@@ -85,7 +82,7 @@ class Assembler {
     std::vector<Vector3d> axes;
     for (const UncertainDirection& normal : normals) axes.push_back(normal.direction);
     std::optional<FoundBox> box = FindBox(AllLines(), axes, options_.diagonal_px);
-    if (!box) return false;
+    if (!box || YieldsToPencils(*box, options_, lines_, circles_, plane, &pencils_)) return false;
     plane->normal = normals[box->given];
     int& rim = plane->circles[0];
     if (normals.size() > 1) rim = SolidRims(circles_).RimOf(rim, plane->normal.direction);
@@ -97,8 +94,7 @@ class Assembler {
   bool AddFreeBox(Plane* plane) {
     const bool is_of_pencils = plane->pencils[0] >= 0;
     if (plane->circles.size() > (is_of_pencils ? 0 : 1)) return false;
-    if (is_of_pencils && std::min(LogOddsOf(At(plane->pencils[0])),
-                                  LogOddsOf(At(plane->pencils[1]))) >= kMostOddsOfABox)
+    if (is_of_pencils && OutweighAnyBox(lines_, At(plane->pencils[0]), At(plane->pencils[1])))
       return false;
     std::vector<Vector3d> axes;
     for (const PlacedPencil& pencil : pencils_) {
@@ -106,7 +102,7 @@ class Assembler {
     }
     std::optional<FoundBox> box = FindFreeBox(AllLines(), axes, options_.diagonal_px);
     if (!box && !is_of_pencils) box = FindAnyBox(AllLines(), options_.diagonal_px);
-    if (!box || (is_of_pencils && !Contradicts(*box, *plane))) return false;
+    if (!box || YieldsToPencils(*box, options_, lines_, circles_, plane, &pencils_)) return false;
     *plane = Plane();
     plane->normal.direction = box->axes.col(2);
     plane->support_px = box->pencils[0].support_px + box->pencils[1].support_px;
@@ -149,32 +145,6 @@ class Assembler {
   }
 
   PlacedPencil& At(int i) { return pencils_[static_cast<std::size_t>(i)]; }
-
-  double LogOddsOf(const PlacedPencil& pencil) const {
-    return LogOddsOfDirection(lines_, pencil.members, pencil.along.direction);
-  }
-
-  // Whether the box has another direction than the two pencils, and better evidence for it: what
-  // they have in common speaks for both.
-  bool Contradicts(const FoundBox& box, const Plane& plane) {
-    std::array<double, 3> of_box = box.log_odds_along;
-    double of_pencils = 0.0;
-    bool is_other = false;
-    for (const int i : plane.pencils) {
-      const PlacedPencil& pencil = At(i);
-      bool is_axis = false;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Vector3d axis = box.axes.col(static_cast<Eigen::Index>(k));
-        if (!AreAlike(pencil.along.direction, axis)) continue;
-        is_axis = true;
-        of_box[k] = 0.0;
-      }
-      if (is_axis) continue;
-      is_other = true;
-      of_pencils += LogOddsOf(pencil);
-    }
-    return is_other && of_box[0] + of_box[1] + of_box[2] > of_pencils;
-  }
 
   void SetPlane(const Plane& plane) {
     for (const int i : plane.circles)

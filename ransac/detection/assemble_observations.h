@@ -32,7 +32,8 @@ struct AssemblyOptions {
 // ("L0", ...) to `observations`, those of the plane "p0" first. `circles` and `pencils` are ordered
 // by support; they are moved from. `lines` are those that the pencils' members index. A box, of
 // `lines` and `bent` ones, is also taken instead of two pencils one of which is along none of its
-// axes and has less evidence than they.
+// axes and has less evidence than they; beside a lone circle it is not taken, nor is that circle's
+// plane, where two pencils have more evidence than any box.
 void AssembleObservations(const AssemblyOptions& options, const std::vector<DetectedLine>& lines,
                           const std::vector<DetectedLine>& bent,
                           std::vector<CircleEvidence>* circles,
