@@ -118,6 +118,16 @@ def shares_plane(observation):
     return {'x', 'y'} <= along and any(e['plane'] == 'p0' for e in observation['ellipses'])
 
 
+def pencils_error(directions, observation):
+    """Of the direction that is farthest from the nearest pencil found, in degrees."""
+    def angle(a, b):
+        cosine = sum(x * y for x, y in zip(a, b)) / math.hypot(*a) / math.hypot(*b)
+        return math.degrees(math.acos(min(1.0, abs(cosine))))
+
+    found = [p['direction'] for p in observation['pencils'] if p['direction']]
+    return max(min((angle(d, p) for p in found), default=float('inf')) for d in directions)
+
+
 def any_error(line):
     """Of the rotation where it is known, else of the normal, else of the worst direction."""
     return next((error(line, field) for field in ('rotation_error_deg', 'normal_error_deg', 'direction_error_deg')

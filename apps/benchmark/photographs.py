@@ -15,8 +15,8 @@ import re
 import sys
 import tempfile
 
-from photograph_answers import (EQUAL, SURE, answers, any_error, box_axes, error, folder, is_right_first, run, run_demo,
-                                scene_rotations, set_box_errors, shares_plane, sure_errors)
+from photograph_answers import (EQUAL, SURE, answers, any_error, box_axes, error, folder, is_right_first, matrices,
+                                pencils_error, run, run_demo, scene_rotations, set_box_errors, shares_plane, sure_errors)
 from scripts import TOP, Claims, bash, json_lines, median, parser_of, read, write
 
 AUTO = ['--evidence=auto']  # Nothing annotated.
@@ -77,6 +77,11 @@ TABLE = [
 BOARDS = ['chessboard-opencv', 'chessboard-charuco-robot', 'circles-visp36', 'circles-discocal-rgb', 'circles-discocal-tir']
 AUTOMATIC = BOARDS + ['circles-robot10x10', 'circle-mire2', 'scene-lund', 'turntable-teabox', 'box-camprodon']
 FAR_DEG = 5.0
+# Of which each photo has two directions, the vertical and the street's; and how near is found. In four photos the verticals
+# are 1.4 to 2.4 degrees off the truth, which is that of a camera at rest: this one was turned while its shutter rolled (the
+# points that neighbouring photos share show by how much), and walls lean. One photo shows another street.
+STREETS = ['scene-lund', 'scene-lund-more']
+NEAR_DEG = 1.0
 
 
 def median_figure(images, field):
@@ -128,6 +133,21 @@ def check_table(args, scratch, claim):
         write(README, readme)
 
 
+def check_streets(args, scratch, claim):
+    """In how many photos both directions are found: among the pencils, and by the best pose."""
+    pencils, poses = [], []
+    for data_set in STREETS:
+        images = answers(run(args, data_set, AUTO, scratch), 'joint', 'refined')
+        poses += [error(h[0], 'direction_error_deg') if h else float('inf') for h in images]
+        out = folder(data_set, AUTO, scratch)
+        truths = zip(*(matrices(out + '.yaml', f'pencil: "{name}", value: ') for name in ('vertical', 'street')))
+        pencils += map(pencils_error, truths, json_lines(os.path.join(out, 'observations.jsonl')))
+    for what, errors, fewest in (('pencils', pencils, 18), ('those of joint (refined)', poses, 16)):
+        near = sum(e <= NEAR_DEG for e in errors)
+        claim(f'{", ".join(STREETS)} --evidence=auto: the vertical and the street are both within {NEAR_DEG:g} degree of '
+              f'{what} in {near} of {len(errors)} photos', near >= fewest)
+
+
 def check_bars(args, scratch, claim):
     def bounded(text, errors, bar, fewest=0):
         claim(f'{text}: {median(errors):.3f} <= {bar}', median(errors) <= bar and len(errors) >= fewest)
@@ -158,6 +178,7 @@ def check_bars(args, scratch, claim):
     observations = json_lines(os.path.join(folder('turntable-teabox', AUTO, scratch), 'observations.jsonl'))
     shared = sum(map(shares_plane, observations))
     claim(f'turntable-teabox --evidence=auto: the disc and the box share a plane in {shared} of 9', shared >= 8)
+    check_streets(args, scratch, claim)
     for data_set in ('circles-discocal-rgb', 'circles-discocal-tir'):
         images = answers(run(args, data_set, ['--centre'], scratch), 'circle_center', 'refined')
         right = sum(bool(h) and is_right_first(h) for h in images)
