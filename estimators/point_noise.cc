@@ -176,11 +176,13 @@ void PointNoiseMeter::Measure(const Observations& fitted, const NoiseModel& mode
   // own, and so have small contours.
   constexpr double kMany = 20.0, kWorth = 10.0;
   const bool many_on_circles = Freedom(circles_) >= kMany, many_on_lines = Freedom(lines_) >= kMany;
-  const double ratio = line_default_px / conic_default_px;
   const bool lines_tell = many_on_lines && !many_on_circles;
   const double conic_worth = lines_tell ? kWorth : 1.0;
+  // Posterior means of few residuals are high, and a small contour's is one of another: with the
+  // noise of the lines for a default, it would too often be half as much again (PointNoise tests).
+  const double proportion = conic_default_px / line_default_px;
   noise->conic_px =
-      Common(circles_, lines_tell ? Common(lines_, line_default_px) / ratio : conic_default_px,
+      Common(circles_, lines_tell ? proportion * Common(lines_, line_default_px) : conic_default_px,
              conic_worth);
   noise->circles.clear();
   for (std::size_t i = 0; i < circles_.size(); ++i) {
@@ -189,8 +191,7 @@ void PointNoiseMeter::Measure(const Observations& fitted, const NoiseModel& mode
                                           : Shrink(circles_[i], noise->conic_px, conic_worth));
   }
   const double worth = many_on_circles ? kWorth : 1.0;
-  noise->line_px =
-      Common(lines_, many_on_circles ? noise->conic_px * ratio : line_default_px, worth);
+  noise->line_px = Common(lines_, many_on_circles ? noise->conic_px : line_default_px, worth);
   std::size_t next = 0;
   noise->lines.resize(fitted.pencils.size());
   auto of_pencil_lines = noise->lines.begin();

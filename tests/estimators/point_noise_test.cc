@@ -158,6 +158,19 @@ TEST(PointNoise, TakesTheDefaultWhereNothingIsRedundant) {
   EXPECT_EQ(other.lines[0][1], 0.6);
 }
 
+// Two segments meet somewhere, whatever their noise: they are taken to be as sharp as the contour.
+TEST(PointNoise, ContoursTellTheNoiseOfSegments) {
+  for (const double sigma : {0.1, 0.5, 2.0}) {
+    Random random(1);
+    Observations photo = MakePhoto();
+    AddCircle(sigma, 100, &random, &photo);
+    AddPencil(sigma, 2, 2, &random, &photo);
+    const PointNoise noise = Measure(true, photo);
+    EXPECT_EQ(noise.line_px, noise.conic_px);
+    EXPECT_NEAR(noise.lines[0][1] / sigma, 1.0, 0.2);
+  }
+}
+
 TEST(PointNoise, StrayPointsHardlyCount) {
   Random random(1);
   Observations photo = MakePhoto();
