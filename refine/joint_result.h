@@ -68,8 +68,8 @@ bool DropOutliers(const JointProblem& problem, State* state);
 
 // --- left_out.cc
 
-// What all features left out cost together: their own free fits, and what clutter would cost. A
-// feature is clutter with a probability of one in fifty; clutter may have any direction.
+// What all features left out cost together: their own free fits, and what clutter would cost. One
+// feature in fifty is clutter, and more in a photo that has some; clutter may have any direction.
 double LeftOutCost(const JointProblem& problem, const State& state);
 
 // Takes in what a minimum leaves out but agrees with it: the same pose on more evidence. Costs are

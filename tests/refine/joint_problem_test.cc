@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <cstddef>
+#include <initializer_list>
 
 #include "circline/refine/joint_result.h"
 #include "tests/plane_scene.h"
@@ -42,6 +45,31 @@ TEST(JointProblem, AdmitsARimWithoutMovingTheOthersCentre) {
   EXPECT_NEAR(at(with, in.radius, 0) / at(with, out.radius, 0), 0.6, 0.01);
   EXPECT_LT(problem.Cost(with) + LeftOutCost(problem, with),
             problem.Cost(state) + LeftOutCost(problem, state));
+}
+
+// How many of a photo's features are clutter is not known beforehand: where one kerb is odd,
+// another may be.
+TEST(JointProblem, LeavingOutASecondLineCostsLessThanTheFirst) {
+  PlaneScene scene(0.7, 0.3);
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("rim", 0.0, 0.0, 1.5, 100)};
+  observations.pencils = {scene.Pencil("kerbs", PencilDirection::kX, Eigen::Vector3d::UnitX(), 5)};
+  FitDirect(scene.sigma(), &observations);
+  const Observations resolved = ResolveWorld(observations);
+  const EstimationOptions options;
+  const JointProblem problem(resolved, options);
+  State state;
+  ASSERT_TRUE(problem.Start(scene.pose, 0.0, problem.FirstReading(), &state).ok());
+  EXPECT_EQ(LeftOutCost(problem, state), 0.0);
+  const auto cost_without = [&](std::initializer_list<std::size_t> lines) {
+    State without = state;
+    for (const std::size_t line : lines)
+      without.active[static_cast<std::size_t>(problem.lines()[line].feature)] = 0;
+    return LeftOutCost(problem, without);
+  };
+  const double first = cost_without({1}), second = cost_without({2}), both = cost_without({1, 2});
+  EXPECT_GT(both, std::max(first, second));
+  EXPECT_LT(both, first + second - 1.0);
 }
 
 }  // namespace
