@@ -77,8 +77,10 @@ struct NoiseModel {
   // taken for (each of two components; LeanShape is what it makes of a pencil), radians.
   double line_direction_rad = 0.003;
   double pencil_axis_rad = 0.004;
-  // A line of a grid of equal squares (a chessboard) from its place, a share of the board's width:
-  // boards bend. Chosen on chessboard-opencv; chessboard-charuco-robot had no part.
+  // A line of a grid of equal squares (a chessboard), or either coordinate of a circle's centre on
+  // one, from its place, a share of the board's width: boards bend. Chosen on chessboard-opencv;
+  // chessboard-charuco-robot had no part, nor had circles, whose centres are 0.0002 (tir) to 0.0009
+  // (robot10x10) off.
   double grid_line = 0.0007;
   // A known radius or length that states no sigma of its own, relative.
   double radius = 0.001;

@@ -50,7 +50,8 @@ struct AdjustOptions {
   // kAuto: the evidence decides, and `rigid` of the answer says how.
   RigidWorld rigid = RigidWorld::kAuto;
   // Where a photo shows lines alone, and they lie on a grid of equal squares, as a chessboard's do,
-  // they count as that (NoiseModel::grid_line). False: as lines of two directions.
+  // they count as that (NoiseModel::grid_line); and circles of a world whose centres do, as a
+  // calibration sheet's. False: as lines of two directions, and circles anywhere.
   bool square_grids = true;
   // Photos of a video that show nearly the same share their errors, and their number makes the
   // camera no better known: of those whose features lie within so much of one another, of the

@@ -36,8 +36,10 @@ int& OneOf(const Key& key, std::map<Key, int>* blocks) {
 }  // namespace
 
 AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
-                             const std::vector<Layout>& layouts, std::vector<CameraPrior> priors,
-                             const AdjustOptions& options, const GivenFrame* given)
+                             const std::vector<Layout>& layouts,
+                             const std::vector<SquareLattice>& lattices,
+                             std::vector<CameraPrior> priors, const AdjustOptions& options,
+                             const GivenFrame* given)
     : photos_(photos),
       layouts_(layouts),
       priors_(std::move(priors)),
@@ -49,6 +51,7 @@ AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
   for (std::size_t i = 0; i < photos.size(); ++i) {
     if (photos[i].takes_part) AddPhoto(i);
   }
+  for (std::size_t world = 0; world < lattices.size(); ++world) AddLattice(world, lattices[world]);
   SetGauge();
   if (given != nullptr) AddGivenPoses(*given);
 }
@@ -210,9 +213,12 @@ void AdjustProblem::AddCircle(std::size_t photo, const CircleObservation& circle
   if (!FillEvidencePoints(input.observations->camera, circle.points, circle.inliers,
                           circle.sigma_px, true, pose_options_, num_distortion_, &points))
     return;
-  const Circle* made = CircleOf(photo, circle);
+  Circle* made = CircleOf(photo, circle);
   if (made == nullptr) return;
   const double center_sigma = ContourSigma(points);
+  const double on_sheet = input.pose.translation.norm() / input.observations->camera.fx;
+  made->told =
+      std::min(made->told, on_sheet * center_sigma / std::sqrt(static_cast<double>(points.size())));
   const int rotation = rotations_[photo], translation = translations_[photo],
             offset = OffsetOf(photo, circle), camera = cameras_[input.camera];
   const PlaneCircleContourCost::Blocks with = {made->tilt >= 0, made->shape >= 0, offset >= 0,
@@ -255,35 +261,6 @@ int AdjustProblem::DirectionOf(std::size_t photo, const PencilObservation& penci
             std::make_unique<MostlyExact>());
   }
   return made.block;
-}
-
-double AdjustProblem::GridSigma(const AdjustInput& photo, double share) const {
-  double told = std::numeric_limits<double>::infinity();
-  for (const auto& [key, place] : photo.grid->places) {
-    const LineObservation& line = photo.observations->pencils[key.first].lines[key.second];
-    told = std::min(told, LeastSigma(line.fit->covariance));
-  }
-  told *= photo.grid->cam_from_board.translation.norm();
-  return std::max(share * options_.noise_model.grid_line * photo.grid->width, kExactShare * told);
-}
-
-// All pieces of a line of the board are off their place by the same.
-int AdjustProblem::AddGridPlace(std::size_t photo, std::size_t pencil, std::size_t line,
-                                const CurveCost& cost, std::vector<int> blocks) {
-  constexpr double kPieces = 0.1;  // Of the deviation of the whole.
-  const AdjustInput& input = photos_[photo];
-  const auto found = input.grid->places.find({pencil, line});
-  if (found == input.grid->places.end()) return -1;
-  const PencilObservation& observed = input.observations->pencils[pencil];
-  const int axis = AxisAcross(observed);
-  int& off = OneOf({photo, axis, found->second}, &grid_lines_);
-  if (off < 0) off = AddDeviation({GridSigma(input, 1.0)});
-  blocks.insert(blocks.end(), {off, cameras_[input.camera]});
-  return AddTerm(NewGridLinePrior(input.observations->camera, observed.lines[line].fit->line,
-                                  cost.points()->Middle(nullptr).head<2>(),
-                                  options_.noise_model.line_direction_rad > 0.0, axis,
-                                  found->second, GridSigma(input, kPieces)),
-                 std::move(blocks));
 }
 
 void AdjustProblem::AddPencil(std::size_t photo, std::size_t index) {

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -20,6 +21,7 @@
 #include "circline/refine/adjust_photos.h"
 #include "circline/refine/graph.h"
 #include "circline/refine/square_grid.h"
+#include "circline/refine/square_lattice.h"
 
 namespace circline {
 
@@ -68,11 +70,12 @@ EstimationOptions PoseOptions(const AdjustOptions& options);
 
 class AdjustProblem : private Graph {
  public:
-  // `layouts`: of the circles, by world. `priors`: by camera. `given`: where the world lies in the
+  // `layouts`: of the circles, by world. `lattices`: on which they lie, by world, as far as worlds
+  // have been looked at. `priors`: by camera. `given`: where the world lies in the
   // frame of given poses; null: there are none.
   AdjustProblem(const std::vector<AdjustInput>& photos, const std::vector<Layout>& layouts,
-                std::vector<CameraPrior> priors, const AdjustOptions& options,
-                const GivenFrame* given);
+                const std::vector<SquareLattice>& lattices, std::vector<CameraPrior> priors,
+                const AdjustOptions& options, const GivenFrame* given);
 
   // Runs ceres with the losses `stretch` times as wide.
   Status Solve(double stretch, int max_iterations);
@@ -101,6 +104,13 @@ class AdjustProblem : private Graph {
     double deviations;
   };
   std::vector<GridLine> GridLines() const;
+  // A circle of a lattice: how far either coordinate is off, in standard deviations.
+  struct LatticeCircle {
+    std::size_t world;
+    std::pair<int, int> place;
+    Eigen::Vector2d deviations;
+  };
+  std::vector<LatticeCircle> LatticeCircles() const;
 
   // All else marginalised; from the inliers of the features in force, of photos before `end`.
   struct Covariances {
@@ -125,6 +135,8 @@ class AdjustProblem : private Graph {
  private:
   struct Circle {
     int center = -1, radius = -1, tilt = -1, shape = -1;  // Blocks.
+    // The least that its pixels in any photo leave open of its centre, about: a standard deviation.
+    double told = std::numeric_limits<double>::infinity();
   };
 
   struct Direction {
@@ -147,6 +159,7 @@ class AdjustProblem : private Graph {
   double GridSigma(const AdjustInput& photo, double share) const;
   int AddGridPlace(std::size_t photo, std::size_t pencil, std::size_t line, const CurveCost& cost,
                    std::vector<int> blocks);
+  void AddLattice(std::size_t world, const SquareLattice& lattice);
   int DirectionOf(std::size_t photo, const PencilObservation& pencil);
   void AddFeature(std::size_t photo, const std::string& id, std::unique_ptr<FeatureCost> cost,
                   std::vector<int> blocks);
@@ -173,6 +186,13 @@ class AdjustProblem : private Graph {
   std::map<std::pair<std::size_t, int>, int> offsets_;
   // By photo, axis and place: how far off it is.
   std::map<std::tuple<std::size_t, int, int>, int> grid_lines_;
+  struct LatticePlace {
+    std::size_t world;
+    std::pair<int, int> place;
+    int term;
+  };
+  std::vector<LatticePlace> lattice_places_;
+  std::vector<int> lattice_frames_;                     // Blocks: origins and sides.
   std::map<std::size_t, bool> x_is_fixed_, has_scale_;  // By world.
   std::set<int> known_radii_;
   std::vector<Feature> features_;

@@ -35,6 +35,7 @@ std::vector<const Term*> AdjustProblem::ActiveTerms(std::size_t end) const {
   }
   std::vector<std::uint8_t> is_used(blocks().size(), 0);
   for (const int block : BlocksOf(active)) is_used[static_cast<std::size_t>(block)] = 1;
+  for (const int block : lattice_frames_) is_used[static_cast<std::size_t>(block)] = 1;
   for (const int block : given_) is_used[static_cast<std::size_t>(block)] = 1;
   for (const Term& prior : terms()) {
     if (prior.feature < 0 && std::all_of(prior.blocks.begin(), prior.blocks.end(), [&](int block) {
@@ -93,15 +94,6 @@ void AdjustProblem::Judge() {
       ++feature.rows;
     }
   }
-}
-
-std::vector<AdjustProblem::GridLine> AdjustProblem::GridLines() const {
-  std::vector<GridLine> lines;
-  for (const auto& [key, off] : grid_lines_) {
-    const auto& [photo, axis, place] = key;
-    lines.push_back({photo, axis, place, *Values(off) / GridSigma(photos_[photo], 1.0)});
-  }
-  return lines;
 }
 
 double AdjustProblem::Misfit() const {

@@ -21,7 +21,7 @@ void Adjustment::SolveOnce() {
     priors.push_back({ShiftsBetween(cameras_[c], guesses_[c]),
                       ShiftSigmas(cameras_[c], priors_[c], options_), cameras_[c].model});
   }
-  problem_ = std::make_unique<AdjustProblem>(inputs_, layouts_, priors, options_,
+  problem_ = std::make_unique<AdjustProblem>(inputs_, layouts_, lattices_, priors, options_,
                                              given_frame_ ? &*given_frame_ : nullptr);
   double width = std::min(problem_->LargestRms(), kWidest);
   for (; width > kNear && out_.status.ok(); width *= kNarrower)
@@ -86,41 +86,6 @@ bool Adjustment::LeaveOut() {
   return any;
 }
 
-// Lines of boards that are off their place, by what the board's others are: rims, and rows that
-// were made of another size. Of each board the one that is off most: it draws the others with it.
-// And grids whose lines are off on the whole: they are none.
-bool Adjustment::LeaveGridLinesOut() {
-  constexpr double kLeastScale = 0.3;   // Lines as exact as that are seen on some photos.
-  constexpr double kByChance = 1e-3;    // Probability that a board is as bent as that.
-  constexpr double kGaussian = 1.4826;  // Deviation over the median's, of a Gaussian.
-  constexpr int kUnknowns = 3;          // Place and size of a board in its plane.
-  std::map<std::size_t, std::vector<AdjustProblem::GridLine>> boards;
-  for (const AdjustProblem::GridLine& line : problem_->GridLines())
-    boards[line.photo].push_back(line);
-  bool any = false;
-  for (const auto& [photo, lines] : boards) {
-    AdjustInput& input = inputs_[photo];
-    std::vector<double> off;
-    double chi2 = 0.0;
-    for (const AdjustProblem::GridLine& line : lines) {
-      off.push_back(std::abs(line.deviations));
-      chi2 += line.deviations * line.deviations;
-    }
-    const double scale = std::clamp(kGaussian * Median(off), kLeastScale, 1.0);
-    const auto worst = std::max_element(off.begin(), off.end()) - off.begin();
-    const bool is_off = off[static_cast<std::size_t>(worst)] > kInlierSigmas * scale;
-    if (is_off)
-      grids_[photo]->Remove(prepared_[photo], lines[static_cast<std::size_t>(worst)].axis,
-                            lines[static_cast<std::size_t>(worst)].place);
-    const bool is_none =
-        (!is_off && chi2 > ChiSquareLimit(static_cast<int>(lines.size()) - kUnknowns, kByChance)) ||
-        !input.grid->HasBothAxes(prepared_[photo]);
-    if (is_none) input.grid = nullptr;
-    any = any || is_off || is_none;
-  }
-  return any;
-}
-
 // Whether the photos have led to another camera than they were prepared with.
 bool Adjustment::HasMoved() const {
   constexpr double kMoved = 0.005;  // Of log f; of the first distortion coefficient.
@@ -132,13 +97,17 @@ bool Adjustment::HasMoved() const {
   return false;
 }
 
-// Fits, noise and robust distances are those of the camera that the photos have led to.
-void Adjustment::PrepareAnew() {
+std::vector<Layout> Adjustment::FoundLayouts() const {
   std::vector<Layout> found(layouts_.size());
   for (const AdjustedCircle& circle : problem_->Circles())
     found[static_cast<std::size_t>(circle.photo + 1)][circle.id] = {circle.center.head<2>(),
                                                                     circle.radius};
-  layouts_ = std::move(found);
+  return found;
+}
+
+// Fits, noise and robust distances are those of the camera that the photos have led to.
+void Adjustment::PrepareAnew() {
+  layouts_ = FoundLayouts();
   if (given_frame_) given_frame_ = problem_->GivenFrameAt();
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (problem_->IsUsed(c)) cameras_[c] = problem_->CameraAt(c);
@@ -159,32 +128,12 @@ void Adjustment::SolveWithoutOutliers() {
     bool changed = HasMoved();
     changed = LeaveOut() || changed;
     changed = LeaveGridLinesOut() || changed;
+    changed = LeaveLatticeCirclesOut() || changed;
     const bool looks_for_grids = !changed && !std::exchange(has_looked_for_grids, true);
     if (!changed && !(looks_for_grids && FindGrids())) return;
     PrepareAnew();
     if (looks_for_grids) StartOnGrids();
     SolveOnce();
-  }
-}
-
-// Where lines alone are seen, and lie on a grid of squares. True where there are any.
-bool Adjustment::FindGrids() {
-  if (!options_.square_grids) return false;
-  ParallelFor(given_.size(), options_.num_threads, [&](std::size_t i) {
-    const AdjustInput& input = inputs_[i];
-    if (input.takes_part && layouts_[input.world].empty() && input.given == nullptr)
-      grids_[i] = FindSquareGrid(prepared_[i], problem_->PoseAt(i).rotation);
-  });
-  return std::any_of(grids_.begin(), grids_.end(),
-                     [](const std::optional<SquareGrid>& grid) { return grid.has_value(); });
-}
-
-// These are the worlds of their photos.
-void Adjustment::StartOnGrids() {
-  for (std::size_t i = 0; i < inputs_.size(); ++i) {
-    if (!grids_[i]) continue;
-    inputs_[i].grid = &*grids_[i];
-    inputs_[i].pose = grids_[i]->cam_from_board;
   }
 }
 
@@ -276,6 +225,11 @@ void Adjustment::Report() {
     out_.notes.push_back(std::to_string(boards) +
                          " photos show a grid of equal squares: their poses are in squares");
   }
+  const bool has_lattice =
+      std::any_of(lattices_.begin(), lattices_.end(),
+                  [](const SquareLattice& lattice) { return !lattice.circles.empty(); });
+  if (has_lattice)
+    out_.notes.emplace_back("circles lie on a grid of equal squares, and count as that");
   if (start_ == nullptr) ReportSigmas(scale);
   out_.circles = problem_->Circles();
   out_.directions = problem_->Directions();

@@ -57,7 +57,7 @@ class CameraSweep {
   std::vector<double> least_;      // By photo, of all costs so far.
 };
 
-// --- adjustment.cc, adjustment_start.cc ---
+// --- adjustment.cc, adjustment_start.cc, adjust_grids.cc ---
 
 // Prior standard deviations of a camera's shifts; 0 = held.
 Shifts ShiftSigmas(const Camera& camera, const CameraSigma& prior, const AdjustOptions& options);
@@ -102,7 +102,9 @@ class Adjustment {
   bool FindGrids();
   void StartOnGrids();
   bool LeaveGridLinesOut();
+  bool LeaveLatticeCirclesOut();
   bool HasMoved() const;
+  std::vector<Layout> FoundLayouts() const;  // As the problem has them.
   void PrepareAnew();
   double JudgePhotos();
   bool LeaveOut();
@@ -121,6 +123,7 @@ class Adjustment {
   std::vector<std::optional<SquareGrid>> grids_;
   std::vector<PoseEstimate> estimates_;
   std::vector<Layout> layouts_;            // By world.
+  std::vector<SquareLattice> lattices_;    // By world; none until they are looked for.
   std::optional<GivenFrame> given_frame_;  // Where poses are given; as it stands.
   std::unique_ptr<AdjustProblem> problem_;
   AdjustedPhotos out_;

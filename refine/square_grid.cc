@@ -20,9 +20,6 @@
 namespace circline {
 namespace {
 
-// Of a square: how far a line may be off its place while the camera is not known well.
-constexpr double kLoose = 0.02;
-
 // Where a line of the plane lies across its direction, in distances of the plane.
 struct PlaneOffset {
   std::size_t pencil, line;
@@ -97,7 +94,7 @@ double LogOdds(const Offsets& offsets, double first, double square) {
   double odds = 0.0;
   std::optional<double> last;
   for (const PlaneOffset& o : offsets) {
-    const double sigma = std::sqrt(o.variance / (square * square) + kLoose * kLoose);
+    const double sigma = std::sqrt(o.variance / (square * square) + kLooseOnGrid * kLooseOnGrid);
     const double place = NearestPlace(o, first, square);
     const double miss = ((o.offset - first) / square - place) / sigma;
     const double on_grid = std::exp(-0.5 * miss * miss) / (std::sqrt(2.0 * kPi) * sigma);
@@ -121,7 +118,7 @@ bool Refit(const Offsets& offsets, double* first, double* square) {
   Eigen::Vector2d b = Eigen::Vector2d::Zero();
   for (const PlaneOffset& o : offsets) {
     const Eigen::Vector2d row(1.0, NearestPlace(o, *first, *square));
-    const double weight = 1.0 / (o.variance + kLoose * kLoose * *square * *square);
+    const double weight = 1.0 / (o.variance + kLooseOnGrid * kLooseOnGrid * *square * *square);
     A += weight * row * row.transpose();
     b += weight * o.offset * row;
   }
@@ -187,7 +184,7 @@ double SetPlaces(const Offsets& offsets, double first, double square, SquareGrid
   int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();
   for (const PlaneOffset& o : offsets) {
     const int place = static_cast<int>(NearestPlace(o, first, square));
-    const double sigma = std::sqrt(o.variance + kLoose * kLoose * square * square);
+    const double sigma = std::sqrt(o.variance + kLooseOnGrid * kLooseOnGrid * square * square);
     if (std::abs(o.offset - first - place * square) > kInlierSigmas * sigma) continue;
     on_grid.emplace_back(&o, place);
     least = std::min(least, place);

@@ -15,6 +15,9 @@
 
 namespace circline {
 
+// Of a square: how far what is on a grid may be off its place while the camera is not known well.
+constexpr double kLooseOnGrid = 0.02;
+
 // Which lines of a photo are on the grid of its board.
 struct SquareGrid {
   // The line's whole number: squares along Y of a line along X, and the other way round. From 0.

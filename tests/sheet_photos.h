@@ -52,10 +52,11 @@ class Photos {
     }
     return *this;
   }
-  Photos& WithCircle(const std::string& id, double radius) {
+  Photos& WithCircle(const std::string& id, double radius,
+                     const Eigen::Vector2d& at = Eigen::Vector2d::Zero()) {
     for (std::size_t i = 0; i < photos.size(); ++i) {
       scene_.pose = poses[i];
-      photos[i].circles.push_back(scene_.Circle(id, 0.0, 0.0, radius));
+      photos[i].circles.push_back(scene_.Circle(id, at.x(), at.y(), radius));
     }
     return *this;
   }

@@ -27,7 +27,8 @@ DEFINE_string(rigid, circline::RigidWorldName(circline::AdjustOptions().rigid),
 DEFINE_bool(
     square_grids, circline::AdjustOptions().square_grids,
     "Lines on a grid of equal squares, as a chessboard's, count as that: the camera is known "
-    "better, and poses are in squares. --nosquare_grids: as lines of two directions.");
+    "better, and poses are in squares; and circles on one, as a sheet's. --nosquare_grids: as "
+    "lines of two directions, and circles anywhere.");
 DEFINE_string(
     import, "",
     "Folder of a COLMAP model (cameras and images, .bin or .txt) of the photos: its cameras "
