@@ -178,8 +178,10 @@ struct AdjustedPhotos {
 // focal length is not known to 10 %, starts are sought over the prior of focal length and first
 // distortion coefficient, by how well the closed forms then explain all photos. EstimatePose gives
 // the poses. Circles of one world are matched by their ids, where they lie alike under these, else
-// by how they lie. Photos and features that contradict the rest as a whole are left out. Never
-// throws, never returns NaN. Thread-safe.
+// by how they lie. A radius that several photos state is one statement, as well known as the one
+// that knows it best; where they state different ones of one id, that is refused. Photos and
+// features that contradict the rest as a whole are left out. Never throws, never returns NaN.
+// Thread-safe.
 AdjustedPhotos AdjustPhotos(const std::vector<Observations>& photos,
                             const AdjustOptions& options = {});
 

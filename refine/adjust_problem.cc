@@ -51,6 +51,7 @@ AdjustProblem::AdjustProblem(const std::vector<AdjustInput>& photos,
   for (std::size_t i = 0; i < photos.size(); ++i) {
     if (photos[i].takes_part) AddPhoto(i);
   }
+  AddKnownRadii();
   for (std::size_t world = 0; world < lattices.size(); ++world) AddLattice(world, lattices[world]);
   SetGauge();
   if (given != nullptr) AddGivenPoses(*given);
@@ -154,14 +155,24 @@ void AdjustProblem::SetGauge() {
   }
 }
 
-void AdjustProblem::AddKnownRadius(std::size_t world, const CircleObservation& circle, int radius) {
-  if (!(circle.radius > 0.0) || !known_radii_.insert(radius).second) return;
+// Stated again, in another photo or of another circle of its group, it is the same statement, as
+// well known as where it is known best (ResolveWorld).
+void AdjustProblem::StateRadius(std::size_t world, const CircleObservation& circle, int radius) {
+  if (!(circle.radius > 0.0)) return;
   const double sigma =
       circle.radius_sigma > 0.0 ? circle.radius_sigma : options_.noise_model.radius;
-  *Values(radius) = circle.radius;
-  if (sigma > 0.0) AddTerm(NewLogPrior(circle.radius, sigma), {radius});
-  block(radius).is_constant = !(sigma > 0.0);
+  KnownRadius& known = known_radii_.insert({radius, {circle.radius, sigma, false}}).first->second;
+  const bool is_better = circle.radius_sigma > 0.0 && (!known.is_stated || sigma < known.sigma);
+  if (is_better) known = {circle.radius, sigma, true};
   has_scale_[world] = metric_ = true;
+}
+
+void AdjustProblem::AddKnownRadii() {
+  for (const auto& [radius, known] : known_radii_) {
+    *Values(radius) = known.radius;
+    if (known.sigma > 0.0) AddTerm(NewLogPrior(known.radius, known.sigma), {radius});
+    block(radius).is_constant = !(known.sigma > 0.0);
+  }
 }
 
 AdjustProblem::Circle* AdjustProblem::CircleOf(std::size_t photo, const CircleObservation& circle) {
@@ -170,7 +181,7 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(std::size_t photo, const CircleOb
   const std::string& id = input.NameOf(circle.id);
   const auto known = circles_.find({world, id});
   if (known != circles_.end()) {
-    AddKnownRadius(world, circle, known->second.radius);
+    StateRadius(world, circle, known->second.radius);
     return &known->second;
   }
   const Layout& layout = layouts_[world];
@@ -190,7 +201,7 @@ AdjustProblem::Circle* AdjustProblem::CircleOf(std::size_t photo, const CircleOb
                     : OneOf({world, own + circle.radius_group}, &radius_groups_);
   if (radius < 0) radius = AddBlock(1, {start->second.radius});
   made.radius = radius;
-  AddKnownRadius(world, circle, radius);
+  StateRadius(world, circle, radius);
   const std::array<double, 3> tilt_sigmas = TiltSigmas(model);
   if (tilt_sigmas[0] > 0.0) made.tilt = AddDeviation({tilt_sigmas.begin(), tilt_sigmas.end()});
   if (model.circle_shape > 0.0)

@@ -151,7 +151,8 @@ class AdjustProblem : private Graph {
   void AddGivenPoses(const GivenFrame& given);
   void AddCircle(std::size_t photo, const CircleObservation& circle);
   Circle* CircleOf(std::size_t photo, const CircleObservation& circle);
-  void AddKnownRadius(std::size_t world, const CircleObservation& circle, int radius);
+  void StateRadius(std::size_t world, const CircleObservation& circle, int radius);
+  void AddKnownRadii();
   int OffsetOf(std::size_t photo, const CircleObservation& circle);
   void AddPencil(std::size_t photo, std::size_t pencil);
   // Squares, of a photo that has a grid: this share of how far its lines are off their places, or,
@@ -194,7 +195,11 @@ class AdjustProblem : private Graph {
   std::vector<LatticePlace> lattice_places_;
   std::vector<int> lattice_frames_;                     // Blocks: origins and sides.
   std::map<std::size_t, bool> x_is_fixed_, has_scale_;  // By world.
-  std::set<int> known_radii_;
+  struct KnownRadius {
+    double radius, sigma;  // sigma: relative.
+    bool is_stated;        // By the photo, not by the noise model.
+  };
+  std::map<int, KnownRadius> known_radii_;  // By block.
   std::vector<Feature> features_;
   bool metric_ = false;
 };

@@ -97,6 +97,7 @@ class Adjustment {
   Status Start();
   Status PlaceWorlds();
   void ShareWorld(const SharedLayout& shared);
+  Status CheckRadii() const;
   void ScaleWorlds();
   void SolveWithoutOutliers();
   bool FindGrids();

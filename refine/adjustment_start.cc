@@ -207,6 +207,21 @@ Status Adjustment::Start() {
   return status;
 }
 
+// What one world states twice it states alike.
+Status Adjustment::CheckRadii() const {
+  std::map<std::string, double> known;
+  for (const AdjustInput& input : inputs_) {
+    if (!input.takes_part || input.world != 0 || !input.names.empty()) continue;
+    for (const CircleObservation& circle : input.observations->circles) {
+      if (!(circle.radius > 0.0)) continue;
+      const double radius = known.emplace(circle.id, circle.radius).first->second;
+      if (radius != circle.radius)
+        return Status::Invalid("circle '" + circle.id + "' has different radii in two photos");
+    }
+  }
+  return Status::Ok();
+}
+
 // One world, where the photos' circles lie alike, by their ids or whatever these are; else each its
 // own.
 Status Adjustment::PlaceWorlds() {
@@ -252,7 +267,7 @@ Status Adjustment::PlaceWorlds() {
   } else if (options_.rigid == RigidWorld::kYes) {
     out_.notes.emplace_back("the photos share no circles: each has a world of its own");
   }
-  return Status::Ok();
+  return CheckRadii();
 }
 
 // Every world in the unit of the radii that are known in it.

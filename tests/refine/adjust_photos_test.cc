@@ -169,6 +169,35 @@ TEST(AdjustPhotos, AKnownRadiusMakesItMetric) {
   }
 }
 
+// The length of a translation, relative.
+double ScaleSigma(const AdjustedPhoto& photo) {
+  const Eigen::Vector3d t = photo.cam_from_world.translation;
+  const Eigen::Map<const Matrix6d> covariance(photo.covariance.data());
+  return std::sqrt(t.dot(covariance.bottomRightCorner<3, 3>() * t)) / t.squaredNorm();
+}
+
+TEST(AdjustPhotos, ARadiusIsAsWellKnownAsByTheBestStatement) {
+  for (const auto& [first, second] : {std::pair(0.1, 0.01), {0.01, 0.1}, {0.01, 0.0}}) {
+    Photos sheet = Photos(4).WithCircles();
+    for (const std::size_t photo : {0U, 1U}) sheet.photos[photo].circles[4].radius = 0.5;
+    sheet.photos[0].circles[4].radius_sigma = first;
+    sheet.photos[1].circles[4].radius_sigma = second;
+    AdjustOptions options = PointNoiseOnly();
+    options.noise_model.radius = 0.001;  // Of those who state none.
+    const AdjustedPhotos adjusted = Ok(AdjustPhotos(sheet.photos, options));
+    EXPECT_NEAR(ScaleSigma(adjusted.photos[0]), 0.01, 0.003) << first << ' ' << second;
+  }
+}
+
+TEST(AdjustPhotos, DifferentRadiiOfOneCircleAreRefused) {
+  Photos sheet = Photos(4).WithCircles();
+  sheet.photos[0].circles[4].radius = 0.5;
+  sheet.photos[2].circles[4].radius = 0.25;
+  const Status status = AdjustPhotos(sheet.photos, PointNoiseOnly()).status;
+  EXPECT_FALSE(status.ok());
+  EXPECT_NE(status.message.find("'c4'"), std::string::npos) << status.message;
+}
+
 TEST(AdjustPhotos, AGrossPhotoIsLeftOutAndNamed) {
   Photos sheet = Photos(8).WithCircles();
   for (CircleObservation& circle : sheet.photos[3].circles) {
