@@ -55,8 +55,7 @@ struct FitOptions {
 // about which the prior remains. Points are fitted at up to 25 k1 for it; lines of two points tell
 // none.
 //
-// AdjustPhotos takes photos of one camera with the same, the one given: set it back there, and
-// stated_focal_px and found_k1 to 0.
+// AdjustPhotos takes photos of one camera with the same, the one given: it sets it back.
 //
 // The returned status is not ok only for invalid options or observations.
 Status FitObservations(const FitOptions& options, Observations* observations,

@@ -1,5 +1,6 @@
 #include "circline/refine/adjust_photos.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "circline/refine/adjustment.h"
@@ -71,8 +72,31 @@ double AdjustedCamera::Sigma(int shift) const {
   return std::sqrt(covariance[static_cast<std::size_t>(shift * (kCameraSize + 1))]);
 }
 
+namespace {
+
+// Fits and detection may have gone on to a likelier camera than the one that was given.
+bool HasFoundCamera(const Observations& photo) {
+  return photo.stated_focal_px > 0.0 || photo.found_k1 != 0.0;
+}
+
+void SetBackCamera(Observations* photo) {
+  Camera& camera = photo->camera;
+  if (photo->stated_focal_px > 0.0) {
+    camera.fy *= photo->stated_focal_px / camera.fx;
+    camera.fx = photo->stated_focal_px;
+  }
+  camera.distortion[0] -= photo->found_k1;
+  photo->stated_focal_px = photo->found_k1 = 0.0;
+}
+
+}  // namespace
+
 AdjustedPhotos AdjustPhotos(const std::vector<Observations>& photos, const AdjustOptions& options) {
-  return Adjustment(photos, options).Run();
+  if (std::none_of(photos.begin(), photos.end(), HasFoundCamera))
+    return Adjustment(photos, options).Run();
+  std::vector<Observations> given = photos;
+  for (Observations& photo : given) SetBackCamera(&photo);
+  return Adjustment(given, options).Run();
 }
 
 }  // namespace circline

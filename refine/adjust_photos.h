@@ -174,7 +174,8 @@ struct AdjustedPhotos {
 // Circles of the world's plane, their centres and radii, and pencils take part; known lengths and
 // angles, drawn axes and diameters serve the poses to start from, and no more.
 //
-// Photos with the same Camera::id share a camera, which must be the same in all of them. Where its
+// Photos with the same Camera::id share a camera, which must be the same in all of them: the one
+// known beforehand, to which that of a photo is set back (stated_focal_px, found_k1). Where its
 // focal length is not known to 10 %, starts are sought over the prior of focal length and first
 // distortion coefficient, by how well the closed forms then explain all photos. EstimatePose gives
 // the poses. Circles of one world are matched by their ids, where they lie alike under these, else

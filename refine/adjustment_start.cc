@@ -4,6 +4,7 @@
 #include <map>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include "circline/estimators/statistics.h"
 #include "circline/refine/adjustment.h"
@@ -12,9 +13,18 @@
 namespace circline {
 namespace {
 
+// To rounding: a photo's may have been set back to the one given.
 bool IsSameCamera(const Camera& a, const Camera& b) {
-  return a.model == b.model && a.width == b.width && a.height == b.height && a.fx == b.fx &&
-         a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion;
+  constexpr double kRounding = 1e-9;  // Of the focal length; of a distortion coefficient.
+  const auto near = [&](double x, double y, double unit) {
+    return std::abs(x - y) <= kRounding * unit;
+  };
+  bool same = a.model == b.model && a.width == b.width && a.height == b.height;
+  for (const auto& [x, y] : {std::pair(a.fx, b.fx), {a.fy, b.fy}, {a.cx, b.cx}, {a.cy, b.cy}})
+    same = same && near(x, y, a.fx);
+  for (std::size_t k = 0; k < a.distortion.size(); ++k)
+    same = same && near(a.distortion[k], b.distortion[k], 1.0);
+  return same;
 }
 
 // A sigma of a camera that no photo has is a slip of its name: the camera meant would count as

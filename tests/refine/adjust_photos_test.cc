@@ -198,6 +198,24 @@ TEST(AdjustPhotos, DifferentRadiiOfOneCircleAreRefused) {
   EXPECT_NE(status.message.find("'c4'"), std::string::npos) << status.message;
 }
 
+// Each photo alone has led fits to another camera; known beforehand is one.
+TEST(AdjustPhotos, SetsCamerasThatFitsFoundBack) {
+  const Photos sheet = Photos(5).WithCircles();
+  const AdjustedPhotos expected = Ok(AdjustPhotos(sheet.photos, PointNoiseOnly()));
+  std::vector<Observations> found = sheet.photos;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    Camera& camera = found[i].camera;
+    found[i].stated_focal_px = camera.fx;
+    found[i].found_k1 = -0.03 * static_cast<double>(i);
+    camera.fx *= 0.6 + 0.1 * static_cast<double>(i);
+    camera.fy *= 0.6 + 0.1 * static_cast<double>(i);
+    camera.distortion[0] += found[i].found_k1;
+  }
+  const AdjustedPhotos adjusted = Ok(AdjustPhotos(found, PointNoiseOnly()));
+  EXPECT_NEAR(adjusted.cameras[0].camera.fx, expected.cameras[0].camera.fx, 1e-3);
+  EXPECT_NEAR(adjusted.cameras[0].Sigma(0), expected.cameras[0].Sigma(0), 1e-6);
+}
+
 TEST(AdjustPhotos, AGrossPhotoIsLeftOutAndNamed) {
   Photos sheet = Photos(8).WithCircles();
   for (CircleObservation& circle : sheet.photos[3].circles) {
