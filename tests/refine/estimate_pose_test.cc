@@ -106,6 +106,21 @@ TEST(EstimatePoseTest, CovarianceIsHonest) {
   EXPECT_NEAR(translation_nees, 3.0, 0.5);
 }
 
+// Circles alone leave the spin about their normal free.
+TEST(EstimatePoseTest, OfCirclesAloneTheNormalIsWithinItsSigma) {
+  PlaneScene scene(0.7, 0.3);
+  const int trials = Trials(200);
+  double nees = 0.0;
+  for (int trial = 0; trial < trials; ++trial) {
+    Observations observations = scene.Empty();
+    observations.circles = {scene.Circle("c0", -0.6, 0.2, 0.5), scene.Circle("c1", 1.0, -0.3, 0.7)};
+    nees += RotationNees(Best(EstimatePose(observations, LeastSquares())), scene.pose) / trials;
+  }
+  EXPECT_TRUE(std::isfinite(nees));
+  if (kSanitized) return;
+  EXPECT_NEAR(nees, 2.0, 0.5);
+}
+
 // Scattered ones; a whole arc that lies off is for FitObservations to find.
 TEST(EstimatePoseTest, RobustLossSurvivesOutliers) {
   PlaneScene scene(0.7, 0.3, 9);

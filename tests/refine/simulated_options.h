@@ -47,8 +47,10 @@ struct NormalErrors {
 // Root of the sum of both variances, radians.
 inline double SigmaNormal(const PoseHypothesis& h) { return NormalErrors(h, {}).Sigma(); }
 
-// Of a hypothesis' rotation.
+// Of a hypothesis' rotation, 3 expected; where its spin about the normal is free, of the normal, 2
+// expected.
 inline double RotationNees(const PoseHypothesis& h, const CameraPose& truth) {
+  if (h.RotationIsFree()) return NormalErrors(h, truth).Nees();
   const Eigen::Vector3d error = LogRotation(truth.rotation * h.cam_from_world.rotation.transpose());
   return error.dot(h.Covariance().topLeftCorner<3, 3>().inverse() * error);
 }
