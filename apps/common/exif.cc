@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <string_view>
 
@@ -64,6 +67,71 @@ double PixelsPerMm(ExifData* data) {
   return mm > 0.0 ? resolution / mm : 0.0;
 }
 
+// A whole number of four bytes.
+std::size_t FourBytes(std::string_view bytes, bool little_endian) {
+  std::size_t number = 0;
+  for (std::size_t k = 0; k < 4; ++k)
+    number |= static_cast<std::size_t>(static_cast<std::uint8_t>(bytes[k]))
+              << 8 * (little_endian ? k : 3 - k);
+  return number;
+}
+
+// EXIF data as libexif wants them, with the mark that a JPEG has before them; some writers leave it
+// there in other formats, too.
+std::string Marked(std::string_view exif) {
+  const std::string mark("Exif\0\0", 6);
+  return exif.substr(0, mark.size()) == mark ? std::string(exif) : mark + std::string(exif);
+}
+
+// The EXIF data of a WebP; empty where it has none, or is none. After "RIFF", a size and "WEBP"
+// come chunks: a name, a size (little endian) and as many bytes, one more where that is odd.
+std::string WebpExif(std::string_view file) {
+  constexpr std::size_t kHeader = 12, kChunkHeader = 8;
+  if (file.size() < kHeader || file.substr(0, 4) != "RIFF" || file.substr(8, 4) != "WEBP")
+    return "";
+  for (std::size_t at = kHeader; at + kChunkHeader <= file.size();) {
+    const std::size_t size = FourBytes(file.substr(at + 4), true);
+    if (file.substr(at, 4) == "EXIF") return Marked(file.substr(at + kChunkHeader, size));
+    at += kChunkHeader + size + size % 2;
+  }
+  return "";
+}
+
+// Of a PNG, whose chunks are after a signature: a size (big endian), a name, as many bytes, and
+// their sum.
+std::string PngExif(std::string_view file) {
+  constexpr std::string_view kSignature("\x89PNG\r\n\x1A\n", 8);
+  constexpr std::size_t kChunkHeader = 8, kSum = 4;
+  if (file.substr(0, kSignature.size()) != kSignature) return "";
+  for (std::size_t at = kSignature.size(); at + kChunkHeader <= file.size();) {
+    const std::size_t size = FourBytes(file.substr(at), false);
+    if (file.substr(at + 4, 4) == "eXIf") return Marked(file.substr(at + kChunkHeader, size));
+    at += kChunkHeader + size + kSum;
+  }
+  return "";
+}
+
+ExifPointer FromBytes(const std::string& exif) {
+  return {exif.empty()
+              ? nullptr
+              : exif_data_new_from_data(reinterpret_cast<const unsigned char*>(exif.data()),
+                                        static_cast<unsigned int>(exif.size())),
+          exif_data_unref};
+}
+
+// Null where the file has none. libexif finds those of a JPEG itself.
+ExifPointer FromFile(const std::string& path) {
+  constexpr std::size_t kEnough = 12;  // To tell the format.
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes(kEnough, '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (bytes.substr(0, 4) != "RIFF" && bytes.substr(1, 3) != "PNG")
+    return {exif_data_new_from_file(path.c_str()), exif_data_unref};
+  bytes.append(std::istreambuf_iterator<char>(file), {});
+  const std::string exif = WebpExif(bytes);
+  return FromBytes(exif.empty() ? PngExif(bytes) : exif);
+}
+
 std::string Millimetres(const std::string& tag, double mm) {
   return "EXIF's " + tag + " of " + FormatPlain(mm, 4) + " mm";
 }
@@ -72,7 +140,7 @@ std::string Millimetres(const std::string& tag, double mm) {
 
 ExifFocalLength ReadExifFocalLength(const std::string& path, int width, int height) {
   ExifFocalLength focal;
-  const ExifPointer data(exif_data_new_from_file(path.c_str()), exif_data_unref);
+  const ExifPointer data = FromFile(path);
   if (data == nullptr) return focal;
   const double longer = std::max(width, height);
   const double film = Number(data.get(), EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
@@ -99,32 +167,12 @@ ExifFocalLength ReadExifFocalLength(const std::string& path, int width, int heig
   return focal;
 }
 
-// After "RIFF", a size and "WEBP" come chunks: a name, a size (little endian) and as many bytes,
-// one more where that is odd.
 int WebpOrientation(const std::vector<std::uint8_t>& bytes) {
-  constexpr std::size_t kHeader = 12, kChunkHeader = 8;
-  const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (file.size() < kHeader || file.substr(0, 4) != "RIFF" || file.substr(8, 4) != "WEBP") return 1;
-  for (std::size_t at = kHeader; at + kChunkHeader <= file.size();) {
-    std::size_t size = 0;
-    for (std::size_t k = 0; k < 4; ++k)
-      size += static_cast<std::size_t>(bytes[at + 4 + k]) << 8 * k;
-    if (file.compare(at, 4, "EXIF") == 0) {
-      // libexif wants the mark that a JPEG has before them; some writers leave it in the chunk.
-      const std::string mark("Exif\0\0", 6);
-      std::string exif(file.substr(at + kChunkHeader, size));
-      if (exif.compare(0, mark.size(), mark) != 0) exif.insert(0, mark);
-      const ExifPointer data(
-          exif_data_new_from_data(reinterpret_cast<const unsigned char*>(exif.data()),
-                                  static_cast<unsigned int>(exif.size())),
-          exif_data_unref);
-      const double number =
-          data == nullptr ? 1.0 : Number(data.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION);
-      return number >= 1.0 && number <= 8.0 ? static_cast<int>(number) : 1;
-    }
-    at += kChunkHeader + size + size % 2;
-  }
-  return 1;
+  const ExifPointer data =
+      FromBytes(WebpExif({reinterpret_cast<const char*>(bytes.data()), bytes.size()}));
+  const double number =
+      data == nullptr ? 1.0 : Number(data.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION);
+  return number >= 1.0 && number <= 8.0 ? static_cast<int>(number) : 1;
 }
 
 }  // namespace circline::apps

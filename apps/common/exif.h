@@ -13,7 +13,7 @@ struct ExifFocalLength {
   std::string words;      // Which tags say so, or why what they say is of no use; may be empty.
 };
 
-// From the EXIF data of a JPEG: FocalLengthIn35mmFilm, which compares diagonals (CIPA DC-008), else
+// From the EXIF data of a JPEG, WebP or PNG: FocalLengthIn35mmFilm, which compares diagonals (CIPA DC-008), else
 // FocalLength with the resolution of the focal plane. `width` and `height` are those of the photo,
 // pixels; one that was made smaller since has its focal length with it, where EXIF's size is still
 // that of the photo as taken. Figures that no lens has are passed over. Never throws, whatever is

@@ -28,8 +28,8 @@ struct Tag {
   std::optional<std::uint32_t> denominator;
 };
 
-// A JPEG that consists of EXIF data alone, little-endian: one directory that refers to the other.
-std::string Jpeg(const std::vector<Tag>& tags) {
+// EXIF data, little-endian: one directory that refers to the other.
+std::string Tiff(const std::vector<Tag>& tags) {
   constexpr std::uint32_t kFirst = 8, kExif = kFirst + 2 + 12 + 4;
   const auto after = kExif + 2 + 12 * static_cast<std::uint32_t>(tags.size()) + 4;
   std::string tiff("II*\0", 4), values;
@@ -51,12 +51,31 @@ std::string Jpeg(const std::vector<Tag>& tags) {
     Put(*t.denominator, 4, &values);
   }
   Put(0, 4, &tiff);
-  tiff += values;
-  const std::string exif = std::string("Exif\0\0", 6) + tiff;
+  return tiff + values;
+}
+
+const std::string kMark("Exif\0\0", 6);
+
+// A JPEG that consists of EXIF data alone.
+std::string Jpeg(const std::vector<Tag>& tags) {
+  const std::string exif = kMark + Tiff(tags);
   std::string jpeg("\xFF\xD8\xFF\xE1", 4);
   jpeg.push_back(static_cast<char>((exif.size() + 2) >> 8));
   jpeg.push_back(static_cast<char>((exif.size() + 2) & 0xFF));
   return jpeg + exif + "\xFF\xD9";
+}
+
+// Files of one chunk that is passed over and one of EXIF data, with the mark of a JPEG or without.
+std::string Webp(const std::string& exif) {
+  std::string file("RIFF\0\0\0\0WEBPVP8X\x03\0\0\0abc\0EXIF", 28);
+  Put(static_cast<std::uint32_t>(exif.size()), 4, &file);
+  return file + exif;
+}
+
+std::string Png(const std::string& exif) {
+  std::string file("\x89PNG\r\n\x1A\n\0\0\0\x03IHDRabcsum.", 23);
+  for (const int shift : {24, 16, 8, 0}) file.push_back(static_cast<char>(exif.size() >> shift));
+  return file + "eXIf" + exif + "sum.";
 }
 
 constexpr std::uint16_t kFilm = 0xA405, kFocalLength = 0x920A, kResolution = 0xA20E, kUnit = 0xA210,
@@ -74,6 +93,25 @@ TEST_F(Exif, EquivalentFocalLengthComparesDiagonals) {
   const ExifFocalLength focal = Read(Jpeg({{kFilm, 28, {}}}));
   EXPECT_NEAR(focal.focal_px, 28.0 * 5000.0 / std::hypot(36.0, 24.0), 1e-6);
   EXPECT_CONTAINS(focal.words, "FocalLengthIn35mmFilm of 28 mm");
+}
+
+TEST_F(Exif, IsReadOfWebpAndPng) {
+  const std::string tiff = Tiff({{kFilm, 28, {}}});
+  const double expected = 28.0 * 5000.0 / std::hypot(36.0, 24.0);
+  for (const std::string& exif : {tiff, kMark + tiff}) {
+    EXPECT_NEAR(Read(Webp(exif)).focal_px, expected, 1e-6);
+    EXPECT_NEAR(Read(Png(exif)).focal_px, expected, 1e-6);
+  }
+  // Cut off anywhere, and with sizes beyond the end.
+  for (const std::string& whole : {Webp(tiff), Png(tiff)}) {
+    for (std::size_t size = 0; size < whole.size(); ++size)
+      EXPECT_TRUE(std::isfinite(Read(whole.substr(0, size)).focal_px)) << size;
+    for (std::size_t at = 8; at < whole.size(); ++at) {
+      std::string broken = whole;
+      broken[at] = '\xFF';
+      EXPECT_TRUE(std::isfinite(Read(broken).focal_px)) << at;
+    }
+  }
 }
 
 TEST_F(Exif, FocalPlaneGivesPixelsForAMillimetre) {
