@@ -48,7 +48,7 @@ class Assembler {
     const bool has_rectangle = !has_box && AddRectangle(&plane);
     SetPlane(plane);
     if (has_rectangle) {
-      Judge(At(plane.pencils[0]), &At(plane.pencils[1]), nullptr);
+      Judge(At(plane.pencils[0]), &At(plane.pencils[1]), nullptr, nullptr);
     } else if (!has_box) {
       SetRoles(plane);
     }
@@ -200,7 +200,9 @@ class Assembler {
         x.observation.direction = PencilDirection::kX;
         y.observation.direction = PencilDirection::kY;
         if (plane.circles.empty() && !x.of_grid && !y.of_grid) ReadAgain(&x, &y);
-        Judge(x, &y, SetNormalRole(x.along, y.along));
+        const std::size_t other = a > 0 ? 0 : b > 1 ? 1 : 2;  // The first beside them.
+        Judge(x, &y, SetNormalRole(x.along, y.along),
+              other < order.size() ? &At(order[other]) : nullptr);
         return;
       }
     }
@@ -238,18 +240,18 @@ class Assembler {
 
   // The axes of a camera that is a guess. Where there is no z, of lines along the normal that are
   // too few to have been found by themselves, too. All pencils may move.
-  void Judge(const PlacedPencil& x, PlacedPencil* y, PlacedPencil* z) {
+  void Judge(const PlacedPencil& x, PlacedPencil* y, PlacedPencil* z, const PlacedPencil* skew) {
     if (!(options_.camera.log_focal > 0.0)) return;
     std::optional<ThirdPencil> found;
     if (z == nullptr)
       found = FindThirdPencil(LineSet(lines_, options_.diagonal_px), x, *y, options_.camera);
     if (!found) {
-      JudgeAxes(options_, x, y, z);
+      JudgeAxes(options_, x, y, z, skew);
       return;
     }
     PlacedPencil normal(std::move(found->pencil));
     normal.observation.direction = PencilDirection::kZ;
-    JudgeAxes(options_, x, y, &normal, found->ratio);
+    JudgeAxes(options_, x, y, &normal, skew, found->ratio);
     pencils_.push_back(std::move(normal));
   }
 

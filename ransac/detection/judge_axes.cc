@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "circline/estimators/basics.h"
+#include "circline/ransac/detection/plane_angles.h"
 #include "circline/ransac/detection/segment_meetings.h"
 #include "circline/ransac/detection/structure_focal.h"
 
@@ -48,21 +50,32 @@ double SureOr(double probability) { return probability > kSure ? 1.0 : probabili
 }  // namespace
 
 void JudgeAxes(const AssemblyOptions& options, const PlacedPencil& x, PlacedPencil* y,
-               PlacedPencil* z, double z_ratio) {
+               PlacedPencil* z, const PlacedPencil* skew, double z_ratio) {
   const double square =
       kSquareThings * ProbabilityOfOneThing(x, *y, options.diagonal_px);  // Before any angle.
   // Summed over the focal lengths: all; those where x and y are square; of both those where z is
   // square to x and y, or shares one of the axes.
   double pairs = 0.0, corners = 0.0, all = 0.0, corner = 0.0, third = 0.0;
   double of_third = 0.0, looked_at = 0.0;  // Near the focal length at which z was looked for.
+  constexpr double kSixth = kPi / 3.0;     // Of a turn: what hexagons have.
   constexpr double kAnyFocal = 3.0;        // Of log f: what is known less is not known at all.
   const double focal_sigma = std::min(options.focal_sigma, kAnyFocal);
   for (double off = -kSummedSigmas; off <= kSummedSigmas; off += kFocalStep / focal_sigma) {
     const double log_focal = options.prior_log_focal + off * focal_sigma;
     const CameraError camera{options.camera.middle_rad * std::exp(-log_focal), 0.0};
     const UncertainDirection a = Refocus(x.along, log_focal), b = Refocus(y->along, log_focal);
-    const double weight = Gaussian(off), is_corner = weight * square * Odds(a, b, camera),
-                 is_pair = is_corner + weight * (1.0 - square);
+    const double weight = Gaussian(off);
+    double is_corner = Odds(a, b, camera), is_lattice = 0.0;
+    // Of things with one more direction in the plane, squares with a brace of any angle, squares
+    // with their diagonals and lattices of three directions, of triangles or hexagons, are as
+    // likely.
+    if (skew != nullptr) {
+      const UncertainDirection c = Refocus(skew->along, log_focal);
+      is_corner += AnglesInPlane(a, b, c, camera, kRightAngle, 0.5 * kRightAngle);
+      is_lattice = AnglesInPlane(a, b, c, camera, kSixth, 2.0 * kSixth);
+    }
+    is_corner *= weight * square;
+    const double is_pair = is_corner + weight * (square * is_lattice + 1.0 - square);
     double of_z = 1.0;
     if (z != nullptr) {
       const UncertainDirection c = Refocus(z->along, log_focal);
