@@ -97,7 +97,8 @@ struct PencilObservation {
   // covariance and inliers. Empty: as `fit` says.
   std::vector<DirectionReading> readings;
   // Of a detected pencil along an axis, where the focal length is unknown: how probably it runs so.
-  // Poses are those where it does; their covariances count that it may run any way.
+  // Hypotheses in which it does have this probability in all, and others, in which it runs any way
+  // (of x and y: any way in their plane), the rest.
   double axis_probability = 1.0;
 };
 

@@ -54,16 +54,11 @@ double AxisSigma(const PencilObservation& pencil, const NoiseModel& model,
 
 // What a direction may miss its axis by, as the covariance is to count it, in units of `sigma`, the
 // axis' own: walls lean apart by what the noise model says (LeanShape), and whatever more the
-// corner is off square by is of all of them. Where the focal length is an unknown the direction
-// may run any way where it may be no axis.
+// corner is off square by is of all of them.
 Eigen::Matrix3d LeanAgainst(double sigma, const PencilObservation& pencil, const NoiseModel& model,
                             const CameraSigma& camera) {
-  constexpr double kAnyWay = 0.6;  // Radians: of each component of a direction without sense.
   const double walls = std::pow(model.pencil_axis_rad / sigma, 2.0);
-  double alike = 1.0 - walls;
-  if (camera.IsWide())
-    alike = kLeaning * kLeaning * alike +
-            std::pow(kAnyWay / sigma, 2.0) * (1.0 - pencil.axis_probability);
+  const double alike = (camera.IsWide() ? kLeaning * kLeaning : 1.0) * (1.0 - walls);
   Eigen::Matrix3d one_wall = Eigen::Matrix3d::Identity();
   if (pencil.fit) one_wall -= pencil.fit->direction * pencil.fit->direction.transpose();
   return walls * LeanShape(pencil) + alike * one_wall;

@@ -130,18 +130,6 @@ void NoteWhatStays(const JointProblem& problem, const Linearization& at, Refined
                            ", the prior alone decides");
 }
 
-// Which pencils along axes may be along none: the hypothesis is the pose where they are.
-void NoteDoubtedAxes(const Observations& observations, Refined* refined) {
-  for (const PencilObservation& pencil : observations.pencils) {
-    if (pencil.direction == PencilDirection::kFree || pencil.axis_probability >= 1.0) continue;
-    char probability[32];
-    std::snprintf(probability, sizeof(probability), "%.2f", pencil.axis_probability);
-    refined->notes.push_back("pencil '" + pencil.id + "': along " +
-                             PencilDirectionName(pencil.direction) + " with probability " +
-                             probability + " only; the deviations count any other direction");
-  }
-}
-
 // Where the prior alone decides, that the figure is a placeholder is as likely as it was before:
 // the variance is that of both Gaussians, and the pose's follows along the focal length.
 void CountPlaceholder(const CameraSigma& sigma, PoseHypothesis* h) {
@@ -191,7 +179,6 @@ void FillFocal(const JointProblem& problem, const State& state, const Linearizat
   if (sigma.doubtful_log_focal > 0.0 && verdict.prior_decides && !verdict.is_doubted)
     CountPlaceholder(sigma, h);
   NoteWhatStays(problem, at, refined);
-  NoteDoubtedAxes(problem.observations(), refined);
 }
 
 // In words, what a hypothesis leaves out.

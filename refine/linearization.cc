@@ -145,9 +145,6 @@ void Linearization::CountLoss(const Term& term, double twice_cost, Rows* rows) {
       asked = turned.squaredNorm() / static_cast<double>(n) *
               (turned.transpose() * *term.lean_shape * turned).inverse();
       r = rows->J.completeOrthogonalDecomposition().solve(rows->f);
-      // Where a direction may run any way no other one is likelier, and nothing is linear.
-      constexpr double kNear = 0.1;  // Radians.
-      if (information * asked.trace() * kNear * kNear < turned.squaredNorm()) r.setZero();
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> too_much(
         information * (W * Eigen::MatrixXd::Identity(asked.rows(), asked.rows()) - asked));

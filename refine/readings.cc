@@ -175,9 +175,9 @@ NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* 
   return ScaledNoiseModel(problem, best);
 }
 
-Status RefineResolved(const Observations& resolved,
-                      const std::vector<std::shared_ptr<const Solver>>& seeders,
-                      const EstimationOptions& options, PoseEstimate* estimate) {
+Status RefineAsRead(const Observations& resolved,
+                    const std::vector<std::shared_ptr<const Solver>>& seeders,
+                    const EstimationOptions& options, PoseEstimate* estimate) {
   const JointProblem as_stated(resolved, options);
   estimate->notes.insert(estimate->notes.end(), as_stated.unused().begin(),
                          as_stated.unused().end());
@@ -201,6 +201,29 @@ Status RefineResolved(const Observations& resolved,
   return RankReadings(problem, minima, estimate);
 }
 
+// Through a camera that is a guess, with the axes and, where these are doubted, without. Any closed
+// form may start the latter: those that take two axes have none left.
+void RefineResolved(const Observations& resolved,
+                    const std::vector<std::shared_ptr<const Solver>>& seeders,
+                    const EstimationOptions& options, PoseEstimate* estimate) {
+  const PoseEstimate before = *estimate;
+  estimate->status = RefineAsRead(resolved, seeders, options, estimate);
+  const CameraSigma sigma =
+      options.camera_sigma.value_or(options.noise_model.SigmaOf(resolved.camera));
+  if (!estimate->status.ok() || !sigma.IsWide()) return;
+  const std::vector<AxesReading> readings = ReadingsOfAxes(resolved);
+  if (readings.size() == 1) return;
+  SolverRegistry built_in;
+  AddClosedFormSolvers(&built_in);
+  std::vector<PoseEstimate> estimates = {*estimate};
+  for (std::size_t k = 1; k < readings.size(); ++k) {
+    PoseEstimate without = before;
+    without.status = RefineAsRead(readings[k].observations, built_in.solvers(), options, &without);
+    estimates.push_back(std::move(without));
+  }
+  *estimate = UnitedReadings(readings, std::move(estimates));
+}
+
 }  // namespace
 
 PoseEstimate RefineSeeds(const std::string& name,
@@ -217,8 +240,9 @@ PoseEstimate RefineSeeds(const std::string& name,
   resolved = ResolveWorld(resolved);
   StateNoise(MeasurePointNoise(resolved, options.noise_model), options.conic_loss.scale_px,
              options.line_loss.scale_px, &resolved);
-  estimate.status = RefineResolved(resolved, seeders, options, &estimate);
-  if (estimate.status.ok()) estimate.decided_by = DecidedBy(estimate.hypotheses);
+  RefineResolved(resolved, seeders, options, &estimate);
+  if (estimate.status.ok() && estimate.decided_by.empty())
+    estimate.decided_by = DecidedBy(estimate.hypotheses);
   return estimate;
 }
 

@@ -80,6 +80,25 @@ bool HasManyFeatures(const JointProblem& problem);
 // its own figures may be off.
 NoiseModel ScaledNoiseModel(const JointProblem& problem, const State& minimum);
 
+// --- doubted_axes.cc: pencils along axes that may be along none (axis_probability), where the
+// focal length is unknown. ---
+
+// The observations with some pencils along no axis, and how probable that is.
+struct AxesReading {
+  Observations observations;
+  double probability = 1.0;
+  std::string freed;  // "" where all run as they are said to, else " + free L1".
+};
+// First that all run along their axes, then that the most doubted one does not, that the next does
+// not either, and so on.
+std::vector<AxesReading> ReadingsOfAxes(const Observations& resolved);
+
+// The estimates of these readings, as one: each has its probability, however well it fits, as right
+// angles are what the focal length is told by. Those that failed have none. In words, which axes
+// are doubted.
+PoseEstimate UnitedReadings(const std::vector<AxesReading>& readings,
+                            std::vector<PoseEstimate> estimates);
+
 // --- reading_search.cc ---
 
 // Radians. Solutions stop within a few hundredths of a standard deviation, and those of hopeless

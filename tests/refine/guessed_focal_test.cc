@@ -145,25 +145,61 @@ TEST(GuessedFocalLength, IsStatedInWordsAsItIsReturned) {
   }
 }
 
-// Nothing but the prior is left where the axes may be none.
-TEST(GuessedFocalLength, IsDoubtedWithTheAxes) {
+// Of the hypotheses in which these pencils are along no axis.
+double ProbabilityOfFree(const PoseEstimate& estimate, const std::string& freed) {
+  double sum = 0.0;
+  for (const PoseHypothesis& h : estimate.hypotheses)
+    sum += h.structure == "p0" + freed ? h.probability : 0.0;
+  return sum;
+}
+
+// Where the axes may be none, nothing but the prior is left.
+TEST(GuessedFocalLength, IsThatOfTheGuessWhereTheAxesAreNone) {
   PlaneScene scene(0.7, 0.1);
   scene.camera.distortion = {};  // A known lens would tell its focal length.
   Observations observations = Front(&scene);
-  const PoseHypothesis sure = EstimatePose(observations, Guessed()).hypotheses.front();
-  observations.pencils[1].axis_probability = 0.5;
-  const PoseEstimate estimate = EstimatePose(observations, Guessed());
-  const PoseHypothesis& doubted = estimate.hypotheses.front();
-  const std::string& last = estimate.notes.back();
-  EXPECT_NE(last.find("with probability 0.50 only"), std::string::npos) << last;
-  EXPECT_NEAR(doubted.focal_scale, sure.focal_scale, 1e-9);
+  observations.camera.fx = observations.camera.fy = 1.3 * scene.camera.fx;
+  const PoseHypothesis sure = Best(EstimatePose(observations, Guessed()));
+  EXPECT_LT(std::abs(std::log(1.3 * sure.focal_scale)), 3.0 * sure.focal_sigma);
   EXPECT_LT(sure.focal_sigma, 0.25);
-  EXPECT_GT(doubted.focal_sigma, 0.3);
-  EXPECT_LT(doubted.focal_sigma / doubted.focal_scale,
-            std::hypot(0.5, std::log(doubted.focal_scale)));
+  for (const double probability : {0.8, 0.2}) {
+    observations.pencils[1].axis_probability = probability;
+    const PoseEstimate estimate = Ok(EstimatePose(observations, Guessed()));
+    const std::size_t with = probability > 0.5 ? 0 : 1;
+    ASSERT_EQ(estimate.hypotheses.size(), 2U);
+    const PoseHypothesis &square = estimate.hypotheses[with], &free = estimate.hypotheses[1 - with];
+    EXPECT_NEAR(square.probability, probability, 1e-9);
+    EXPECT_NEAR(square.focal_scale, sure.focal_scale, 1e-9);
+    EXPECT_NEAR(square.focal_sigma, sure.focal_sigma, 1e-9);
+    EXPECT_NEAR(ProbabilityOfFree(estimate, " + free y"), 1.0 - probability, 1e-9);
+    EXPECT_NEAR(free.focal_scale, 1.0, 0.2);
+    EXPECT_GT(free.focal_sigma, 0.3);
+    EXPECT_EQ(estimate.decided_by, "how probably the axes are at right angles");
+    char note[64];
+    std::snprintf(note, sizeof(note), "with probability %.2f only", probability);
+    EXPECT_NE(estimate.notes.back().find(note), std::string::npos) << estimate.notes.back();
+  }
   observations.pencils[1].axis_probability = 1.5;
   const Status status = EstimatePose(observations, Guessed()).status;
   EXPECT_EQ(status.code, StatusCode::kInvalidArgument) << status.message;
+}
+
+// The likelier of two axes is one wherever the other is, too.
+TEST(GuessedFocalLength, CountsBothDoubtedAxes) {
+  PlaneScene scene(0.7, 0.1);
+  scene.camera.distortion = {};
+  Observations observations = Front(&scene);
+  observations.pencils.push_back(
+      scene.Pencil("z", PencilDirection::kZ, Eigen::Vector3d::UnitZ(), 4));
+  observations.pencils[1].axis_probability = 0.9;
+  observations.pencils[2].axis_probability = 0.6;
+  const PoseEstimate doubted = Ok(EstimatePose(observations, Guessed()));
+  EXPECT_NEAR(ProbabilityOfFree(doubted, ""), 0.6, 1e-9);
+  EXPECT_NEAR(ProbabilityOfFree(doubted, " + free z"), 0.3, 1e-9);
+  EXPECT_NEAR(ProbabilityOfFree(doubted, " + free z + free y"), 0.1, 1e-9);
+  // Through a camera that is known a right angle is seen.
+  const PoseEstimate known = Ok(EstimatePose(observations));
+  EXPECT_NEAR(ProbabilityOfFree(known, ""), 1.0, 1e-9);
 }
 
 // Whatever the axes are doubted by: to its prior, about where the estimate would be then.
