@@ -17,7 +17,7 @@
 namespace circline {
 
 // Fills PencilObservation::axis_probability of y, and of z where there is one: null = none. 1 where
-// it is 0.95 or more. `options` are those of a camera whose focal length was looked for. `skew`: a
+// it is 0.99 or more. `options` are those of a camera whose focal length was looked for. `skew`: a
 // further direction in the plane of x and y; null = none. `z_ratio`: ThirdPencil::ratio where z was
 // looked for at right angles to both at that focal length; infinity: it was found by itself.
 void JudgeAxes(const AssemblyOptions& options, const PlacedPencil& x, PlacedPencil* y,
