@@ -57,16 +57,22 @@ function(circline_shared_library target)
   endif()
 endfunction()
 
-# circline_module(<folder> PUBLIC <targets> PRIVATE <targets> PRIVATE_HEADERS <files>): the library
-# of a folder, circline_<name> after the last part of its path, known to users as circline::<name>.
-# Its headers are public and get installed, except for PRIVATE_HEADERS.
+# circline_module(<folder> PUBLIC <targets> PRIVATE <targets> PRIVATE_HEADERS <files> PARTS <folders>):
+# the library of a folder and of folders in it, circline_<name> after the last part of its path, known
+# to users as circline::<name>. The headers of the folder itself are public and get installed, except
+# for PRIVATE_HEADERS.
 function(circline_module folder)
-  cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE;PRIVATE_HEADERS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE;PRIVATE_HEADERS;PARTS" ${ARGN})
   get_filename_component(module "${folder}" NAME)
   set_property(GLOBAL PROPERTY CIRCLINE_${module}_FOLDER "${folder}")
   set_property(GLOBAL PROPERTY CIRCLINE_${module}_PRIVATE_HEADERS ${ARG_PRIVATE_HEADERS})
   set(target circline_${module})
-  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cc")
+  set(patterns *.cc)
+  foreach(part ${ARG_PARTS})
+    list(APPEND patterns ${part}/*.cc)
+  endforeach()
+  list(TRANSFORM patterns PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
+  file(GLOB sources CONFIGURE_DEPENDS ${patterns})
   # Headers are "circline/<folder>/x.h" before and after installation; a folder within another is
   # there already.
   file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/include/circline")

@@ -9,7 +9,6 @@
 
 #include "circline/estimators/basics.h"
 #include "circline/estimators/directions.h"
-#include "circline/refine/adjust_problem.h"
 #include "circline/refine/cost_functions.h"
 #include "circline/refine/manifolds.h"
 
@@ -84,26 +83,6 @@ struct PoseResidual {
   }
 };
 
-// A pose against one that is known in another frame and unit.
-struct GivenPoseResidual {
-  Eigen::Quaterniond rotation;
-  Eigen::Vector3d translation;
-  double rotation_sigma, translation_sigma;
-
-  template <typename T>
-  bool operator()(const T* q, const T* t, const T* frame_q, const T* frame_t, const T* log_scale,
-                  T* residual) const {
-    using std::exp;
-    const Eigen::Quaternion<T> given = rotation.cast<T>();
-    const Vector3<T> moved = given * Vector3Block<T>(frame_t) + translation.cast<T>();
-    Eigen::Map<Vector3<T>> turn(residual), step(residual + 3);
-    turn = AngleAxisOf<T>(given * RotationBlock<T>(frame_q) * RotationBlock<T>(q).conjugate()) /
-           static_cast<T>(rotation_sigma);
-    step = (Vector3Block<T>(t) - moved * exp(-log_scale[0])) / static_cast<T>(translation_sigma);
-    return true;
-  }
-};
-
 struct MeasuredDirectionResidual {
   Eigen::Vector3d in_world, in_camera;
   double sigma;
@@ -160,13 +139,6 @@ ceres::CostFunction* NewPosePrior(const Eigen::Matrix3d& rotation,
   return new ceres::AutoDiffCostFunction<PoseResidual, 6, 4, 3>(
       new PoseResidual{Eigen::Quaterniond(rotation).conjugate(), translation,
                        llt.matrixL().solve(Matrix6d::Identity())});
-}
-
-ceres::CostFunction* NewGivenPosePrior(const Eigen::Matrix3d& rotation,
-                                       const Eigen::Vector3d& translation, double rotation_sigma,
-                                       double translation_sigma) {
-  return new ceres::AutoDiffCostFunction<GivenPoseResidual, 6, 4, 3, 4, 3, 1>(new GivenPoseResidual{
-      Eigen::Quaterniond(rotation), translation, rotation_sigma, translation_sigma});
 }
 
 ceres::CostFunction* NewDirectionMeasurement(const Eigen::Vector3d& in_world,

@@ -10,7 +10,7 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/conic.h"
-#include "circline/ransac/detection/detect_ellipses.h"
+#include "circline/ransac/detection/ellipses/detect_ellipses.h"
 
 namespace circline::apps {
 

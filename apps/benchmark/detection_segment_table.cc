@@ -15,9 +15,9 @@
 #include "apps/benchmark/detection_truth.h"
 #include "apps/benchmark/timing.h"
 #include "circline/estimators/line.h"
-#include "circline/ransac/detection/detect_lines.h"
 #include "circline/ransac/detection/detect_observations.h"
 #include "circline/ransac/detection/edges.h"
+#include "circline/ransac/detection/lines/detect_lines.h"
 
 namespace circline::apps {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "apps/benchmark/rows.h"
 #include "circline/refine/estimate_pose.h"
-#include "circline/refine/joint_problem.h"
-#include "circline/refine/joint_result.h"
+#include "circline/refine/joint/joint_problem.h"
+#include "circline/refine/joint/joint_result.h"
 #include "tests/plane_scene.h"
 
 namespace circline {

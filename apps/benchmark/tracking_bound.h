@@ -9,7 +9,7 @@
 
 #include "apps/benchmark/trajectory.h"
 #include "circline/refine/pose_tracker.h"
-#include "circline/refine/track_state.h"
+#include "circline/refine/track/track_state.h"
 
 namespace circline::apps {
 

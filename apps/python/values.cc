@@ -13,7 +13,7 @@
 #include "circline/estimators/noise_model.h"
 #include "circline/estimators/pose.h"
 #include "circline/refine/estimate_pose.h"
-#include "circline/refine/known_pose.h"
+#include "circline/refine/joint/known_pose.h"
 
 namespace circline::python {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "apps/reconstruct/box_start.h"
-#include "circline/ransac/detection/segment_meetings.h"
+#include "circline/ransac/detection/lines/segment_meetings.h"
 
 namespace circline::apps {
 namespace {

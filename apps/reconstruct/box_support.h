@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "circline/estimators/camera.h"
-#include "circline/ransac/detection/detect_lines.h"
+#include "circline/ransac/detection/lines/detect_lines.h"
 
 namespace circline::apps {
 

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "apps/reconstruct/axes_vote.h"
-#include "circline/ransac/detection/detect_pencils.h"
-#include "circline/ransac/detection/segment_meetings.h"
+#include "circline/ransac/detection/lines/segment_meetings.h"
+#include "circline/ransac/detection/structure/detect_pencils.h"
 
 namespace circline::apps {
 namespace {

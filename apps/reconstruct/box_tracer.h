@@ -9,7 +9,7 @@
 
 #include "apps/reconstruct/box_support.h"
 #include "circline/estimators/camera.h"
-#include "circline/ransac/detection/detect_lines.h"
+#include "circline/ransac/detection/lines/detect_lines.h"
 
 namespace circline::apps {
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "apps/reconstruct/box_geometry.h"
-#include "circline/ransac/detection/segment_meetings.h"
+#include "circline/ransac/detection/lines/segment_meetings.h"
 
 namespace circline::apps {
 namespace {

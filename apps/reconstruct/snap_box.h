@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "apps/reconstruct/fit_box.h"
-#include "circline/ransac/detection/detect_lines.h"
 #include "circline/ransac/detection/edges.h"
+#include "circline/ransac/detection/lines/detect_lines.h"
 
 namespace circline::apps {
 

@@ -9,9 +9,9 @@
 #include "apps/reconstruct/box_geometry.h"
 #include "apps/reconstruct/box_tracer.h"
 #include "apps/reconstruct/snap_box.h"
-#include "circline/ransac/detection/edge_shift.h"
 #include "circline/ransac/detection/edges.h"
-#include "circline/ransac/detection/segment_meetings.h"
+#include "circline/ransac/detection/lines/edge_shift.h"
+#include "circline/ransac/detection/lines/segment_meetings.h"
 
 namespace circline::apps {
 namespace {

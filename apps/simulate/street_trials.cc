@@ -11,7 +11,7 @@
 #include "apps/common/text.h"
 #include "circline/estimators/basics.h"
 #include "circline/estimators/pose.h"
-#include "circline/ransac/detection/look_for_focal.h"
+#include "circline/ransac/detection/structure/look_for_focal.h"
 #include "circline/refine/estimate_pose.h"
 
 namespace circline::apps {

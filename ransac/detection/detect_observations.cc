@@ -6,13 +6,13 @@
 #include <utility>
 #include <vector>
 
-#include "circline/ransac/detection/detect_ellipses.h"
-#include "circline/ransac/detection/detect_lines.h"
-#include "circline/ransac/detection/edge_shift.h"
 #include "circline/ransac/detection/edges.h"
-#include "circline/ransac/detection/ellipse_evidence.h"
-#include "circline/ransac/detection/look_for_focal.h"
-#include "circline/ransac/detection/observe_evidence.h"
+#include "circline/ransac/detection/ellipses/detect_ellipses.h"
+#include "circline/ransac/detection/ellipses/ellipse_evidence.h"
+#include "circline/ransac/detection/lines/detect_lines.h"
+#include "circline/ransac/detection/lines/edge_shift.h"
+#include "circline/ransac/detection/structure/look_for_focal.h"
+#include "circline/ransac/detection/structure/observe_evidence.h"
 
 namespace circline {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "circline/estimators/random.h"
 #include "circline/refine/adjust_photos.h"
-#include "circline/refine/adjustment.h"
+#include "circline/refine/many/adjustment.h"
 #include "tests/basics.h"
 #include "tests/refine/simulated_options.h"
 #include "tests/sheet_photos.h"

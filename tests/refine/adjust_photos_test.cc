@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "circline/refine/adjustment.h"
+#include "circline/refine/many/adjustment.h"
 #include "tests/plane_scene.h"
 #include "tests/refine/simulated_options.h"
 #include "tests/sheet_photos.h"

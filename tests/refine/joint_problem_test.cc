@@ -1,4 +1,4 @@
-#include "circline/refine/joint_problem.h"
+#include "circline/refine/joint/joint_problem.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <initializer_list>
 
-#include "circline/refine/joint_result.h"
+#include "circline/refine/joint/joint_result.h"
 #include "tests/plane_scene.h"
 
 namespace circline {

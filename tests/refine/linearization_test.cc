@@ -1,4 +1,4 @@
-#include "circline/refine/linearization.h"
+#include "circline/refine/joint/linearization.h"
 
 #include <ceres/ceres.h>
 #include <gtest/gtest.h>

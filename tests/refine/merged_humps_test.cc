@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "circline/estimators/basics.h"
-#include "circline/refine/readings.h"
+#include "circline/refine/joint/readings.h"
 
 namespace circline {
 namespace {

@@ -1,4 +1,4 @@
-#include "circline/refine/seen_points.h"
+#include "circline/refine/joint/seen_points.h"
 
 #include <ceres/ceres.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // A chessboard's lines are told by themselves, and say more than their directions.
-#include "circline/refine/square_grid.h"
+#include "circline/refine/many/square_grid.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "circline/refine/adjustment.h"
+#include "circline/refine/many/adjustment.h"
 #include "tests/refine/simulated_options.h"
 #include "tests/sheet_photos.h"
 #include "tests/trials.h"

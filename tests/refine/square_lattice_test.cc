@@ -1,5 +1,5 @@
 // Circles of a calibration sheet are told by themselves, and say more than their contours.
-#include "circline/refine/square_lattice.h"
+#include "circline/refine/many/square_lattice.h"
 
 #include <gtest/gtest.h>
 

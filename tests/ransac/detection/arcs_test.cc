@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/arcs.h"
+#include "circline/ransac/detection/ellipses/arcs.h"
 
 #include <gtest/gtest.h>
 

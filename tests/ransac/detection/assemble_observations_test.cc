@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/assemble_observations.h"
+#include "circline/ransac/detection/structure/assemble_observations.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/box_rivals.h"
+#include "circline/ransac/detection/structure/box_rivals.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "circline/estimators/pose.h"
-#include "circline/ransac/detection/pencil_fitter.h"
+#include "circline/ransac/detection/structure/pencil_fitter.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/choose_plane.h"
+#include "circline/ransac/detection/structure/choose_plane.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "circline/estimators/basics.h"
-#include "circline/ransac/detection/pencil_fitter.h"
+#include "circline/ransac/detection/structure/pencil_fitter.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 

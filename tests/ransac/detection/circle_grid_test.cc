@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/circle_grid.h"
+#include "circline/ransac/detection/structure/circle_grid.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/contour_support.h"
+#include "circline/ransac/detection/ellipses/contour_support.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/detect_ellipses.h"
+#include "circline/ransac/detection/ellipses/detect_ellipses.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/detect_lines.h"
+#include "circline/ransac/detection/lines/detect_lines.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/detect_pencils.h"
+#include "circline/ransac/detection/structure/detect_pencils.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "circline/estimators/basics.h"
-#include "circline/ransac/detection/pencil_fitter.h"
+#include "circline/ransac/detection/structure/pencil_fitter.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 

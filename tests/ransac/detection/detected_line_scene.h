@@ -10,8 +10,8 @@
 
 #include "circline/estimators/camera.h"
 #include "circline/estimators/random.h"
-#include "circline/ransac/detection/detect_lines.h"
-#include "circline/ransac/detection/observe_evidence.h"
+#include "circline/ransac/detection/lines/detect_lines.h"
+#include "circline/ransac/detection/structure/observe_evidence.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
 namespace circline::detection_test {

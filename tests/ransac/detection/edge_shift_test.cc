@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/edge_shift.h"
+#include "circline/ransac/detection/lines/edge_shift.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/ellipse_shape.h"
+#include "circline/ransac/detection/ellipses/ellipse_shape.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/find_box.h"
+#include "circline/ransac/detection/structure/find_box.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/find_rectangle.h"
+#include "circline/ransac/detection/structure/find_rectangle.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/judge_axes.h"
+#include "circline/ransac/detection/structure/judge_axes.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/line_odds.h"
+#include "circline/ransac/detection/structure/line_odds.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "circline/estimators/basics.h"
-#include "circline/ransac/detection/follow_observations.h"
+#include "circline/ransac/detection/follow/follow_observations.h"
 #include "tests/pinhole_camera.h"
 
 namespace circline {

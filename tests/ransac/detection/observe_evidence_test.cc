@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/observe_evidence.h"
+#include "circline/ransac/detection/structure/observe_evidence.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/orthogonal_evidence.h"
+#include "circline/ransac/detection/structure/orthogonal_evidence.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/plane_angles.h"
+#include "circline/ransac/detection/structure/plane_angles.h"
 
 #include <gtest/gtest.h>
 

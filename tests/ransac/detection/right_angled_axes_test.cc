@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/right_angled_axes.h"
+#include "circline/ransac/detection/structure/right_angled_axes.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/segment_meetings.h"
+#include "circline/ransac/detection/lines/segment_meetings.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/solid_rims.h"
+#include "circline/ransac/detection/structure/solid_rims.h"
 
 #include <gtest/gtest.h>
 
@@ -13,8 +13,8 @@
 #include "circline/estimators/circle_pose.h"
 #include "circline/estimators/conic.h"
 #include "circline/estimators/conic_fit.h"
-#include "circline/ransac/detection/detect_ellipses.h"
 #include "circline/ransac/detection/edges.h"
+#include "circline/ransac/detection/ellipses/detect_ellipses.h"
 #include "tests/ransac/detection/detection_test_util.h"
 
 namespace circline {

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/straight_lens.h"
+#include "circline/ransac/detection/structure/straight_lens.h"
 
 #include <gtest/gtest.h>
 

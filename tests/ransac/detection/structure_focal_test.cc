@@ -1,10 +1,10 @@
-#include "circline/ransac/detection/structure_focal.h"
+#include "circline/ransac/detection/structure/structure_focal.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "circline/ransac/detection/look_for_focal.h"
+#include "circline/ransac/detection/structure/look_for_focal.h"
 #include "tests/ransac/detection/detected_line_scene.h"
 #include "tests/ransac/detection/detection_test_util.h"
 #include "tests/ransac/detection/observations_test_util.h"

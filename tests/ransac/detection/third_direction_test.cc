@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/third_direction.h"
+#include "circline/ransac/detection/structure/third_direction.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "circline/ransac/detection/uncertain_direction.h"
+#include "circline/ransac/detection/structure/uncertain_direction.h"
 
 #include <gtest/gtest.h>
 
