@@ -50,8 +50,9 @@ bool FocalBendsCurves(const Camera& camera, const CameraSigma& sigma) {
 struct Range {
   double prior;  // Standard deviation.
   double reach;  // At most.
-  double step;   // Of the first looks; each of `halvings` then looks half as far to both sides.
-  int halvings;
+  double step;   // Of the first looks; each of `halvings` then looks half as far to both sides,
+  int halvings;  // and more do, up to `most_halvings`, where the likelihood has a narrower peak.
+  int most_halvings;
 };
 
 // By how much the value is likelier another; 0 where that is not clear.
@@ -67,23 +68,26 @@ double LikeliestShift(const Range& range, const FitPointsFn& fit_points,
   const double given = posterior(0.0);
   double best = 0.0, likeliest = given;
   const auto look = [&](double shift) {
-    if (std::abs(shift) > range.reach) return;
-    const double gain = posterior(shift);
-    if (gain > likeliest) {
-      likeliest = gain;
+    if (std::abs(shift) > range.reach) return likeliest;
+    const double there = posterior(shift);
+    if (there > likeliest) {
+      likeliest = there;
       best = shift;
     }
+    return there;
   };
   for (double shift = range.step; shift <= range.reach; shift += range.step) {
     look(shift);
     look(-shift);
   }
+  constexpr double kLess = 1.0;  // What one outlier more costs, or less.
   double step = range.step;
-  for (int k = 0; k < range.halvings; ++k) {
+  bool is_narrow = false;
+  for (int k = 0; k < range.halvings || (is_narrow && k < range.most_halvings); ++k) {
     step *= 0.5;
     const double middle = best;
-    look(middle - step);
-    look(middle + step);
+    const double below = look(middle - step), above = look(middle + step);
+    is_narrow = std::min(below, above) < likeliest - kLess;
   }
   return likeliest < given + kClearly ? 0.0 : best;
 }
@@ -102,7 +106,9 @@ void TakeFocalOfFits(const CameraSigma& sigma, const FitPointsFn& fit_points,
     result.camera.fy *= std::exp(log_focal);
     return result;
   };
-  const Range range = {prior, std::min(2.0 * prior, kMostLogFocal), 0.35, 3};
+  // To 0.044, or to 0.0014: near the edge of what a strong lens sees points are many standard
+  // deviations off their curve by 0.01.
+  const Range range = {prior, std::min(2.0 * prior, kMostLogFocal), 0.35, 3, 8};
   const double likeliest = LikeliestShift(range, fit_points, at);
   if (likeliest == 0.0) return;
   const double stated = observations->camera.fx;
@@ -126,7 +132,7 @@ void TakeLensOfFits(const CameraSigma& sigma, const FitPointsFn& fit_points,
   };
   // To 0.00625, half a pixel of the bow of the longest lines. First looks of 0.1 find the same, on
   // simulated lines and circles with up to a fifth of outliers, k1 from -0.4 to 0.1.
-  const Range range = {sigma.k1, std::min(3.0 * sigma.k1, kMostK1), 0.2, 5};
+  const Range range = {sigma.k1, std::min(3.0 * sigma.k1, kMostK1), 0.2, 5, 5};
   const double likeliest = LikeliestShift(range, fit_points, at);
   if (likeliest != 0.0) *observations = at(likeliest);
 }

@@ -46,7 +46,8 @@ struct FitOptions {
 //
 // Where the focal length is a guess (NoiseModel::camera, IsWide) and the lens bends, fits are made
 // at the focal length at which they explain most: Observations::camera has that one then, and
-// stated_focal_px the one given. Points are fitted at up to 15 focal lengths for it.
+// stated_focal_px the one given. Points are fitted at up to 15 focal lengths for it, at 25
+// where what explains them is a narrow range.
 //
 // Where the lens is (NoiseModel::camera, k1 of 0.01 or more; not of a pinhole camera), fits are
 // likewise made at the k1 at which they explain most: through a wrong one the ends of long lines

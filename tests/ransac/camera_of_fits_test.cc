@@ -78,6 +78,26 @@ TEST_P(GuessedFocalOfFits, LeavesNoPointsOut) {
 INSTANTIATE_TEST_SUITE_P(Lenses, GuessedFocalOfFits,
                          testing::Values(CameraModel::kOpenCV, CameraModel::kFisheye));
 
+// Up to just before the edge of what the lens sees, where 1 % of the focal length is many standard
+// deviations.
+TEST(FocalOfFits, LeavesNoPointsOutAtTheEdgeOfAStrongLens) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    PlaneScene scene(0.3, 0.5, seed);
+    scene.camera.fx = scene.camera.fy = 365.0;
+    scene.camera.distortion = {-0.45, 0.25, 5e-4, 5e-4, -0.06};
+    Observations truth = scene.Empty();
+    truth.circles = {scene.Circle("c", 8.2, 1.0, 3.6, 120)};
+    for (const double factor : {0.5, 0.7, 1.4, 2.0}) {
+      Observations observations = truth;
+      Guess(factor, &observations);
+      ASSERT_TRUE(FitObservations(FocalSigma(1.0), &observations).ok());
+      EXPECT_GE(ShareOfInliers(observations), 0.99) << factor << ", seed " << seed;
+      EXPECT_NEAR(std::log(observations.camera.fx / truth.camera.fx), 0.0, 0.005)
+          << factor << ", seed " << seed;
+    }
+  }
+}
+
 TEST(FocalOfFits, StaysWhereItIsKnownOrTellsNothing) {
   const auto stays = [](const FitOptions& options, Observations observations) {
     Guess(0.7, &observations);
