@@ -51,16 +51,36 @@ void SetModel(const CalibrateOptions& options, Camera* camera) {
   camera->model = model;
 }
 
+// What is known of an image's camera before.
+CameraSigma PriorOf(const CalibrateOptions& options, const SceneImage& image,
+                    const Camera& camera) {
+  const EstimationOptions& estimation = options.compare.losses.front().estimation;
+  CameraSigma sigma =
+      image.camera_sigma.Over(options.compare.inputs.guess.stated.Over(UnknownCamera(camera)));
+  if (image.guessed_sigma) sigma.log_focal = image.guessed_sigma->LargestLogFocal();
+  if (estimation.camera_sigma) sigma.log_focal = estimation.camera_sigma->log_focal;
+  if (options.fix_principal_point) sigma.principal_point_px = 0.0;
+  if (options.aspect_sigma) sigma.log_aspect = *options.aspect_sigma;
+  return sigma;
+}
+
 // The photos, each read and observed, on all threads.
-std::vector<ImageRun> ObserveAll(const CompareOptions& options, std::vector<SceneImage>* images) {
+std::vector<ImageRun> ObserveAll(const CalibrateOptions& options, std::vector<SceneImage>* images) {
   std::vector<ImageRun> runs(images->size());
   Progress progress("photos", static_cast<int>(images->size()), 0);
   InParallel(images->size(), [&](std::size_t i) {
     ImageRun& run = runs[i];
-    run = RunImage(options, nullptr, &(*images)[i]);
+    SceneImage& image = (*images)[i];
+    // The camera that comes with photos is what is to be found: no better known where they are
+    // looked at than where they are adjusted.
+    const bool is_to_be_found =
+        options.import.empty() && !options.compare.inputs.guess.wanted && !image.guessed_sigma;
+    if (is_to_be_found) image.guessed_sigma = PriorOf(options, image, image.observations.camera);
+    run = RunImage(options.compare, nullptr, &image);
+    if (is_to_be_found) image.guessed_sigma.reset();  // What the scene file says holds.
     Camera& camera = run.observations.camera;
     // Not the one that the photo alone makes likeliest: the prior is about the one given.
-    camera = (*images)[i].observations.camera;
+    camera = image.observations.camera;
     run.observations.stated_focal_px = run.observations.found_k1 = 0.0;
     if (camera.width == 0) camera.width = run.photo.cols;
     if (camera.height == 0) camera.height = run.photo.rows;
@@ -77,19 +97,6 @@ struct Calibration {
   std::vector<std::string> errors;  // Photos that could not be read.
   AdjustedPhotos adjusted;
 };
-
-// What is known of an image's camera before.
-CameraSigma PriorOf(const CalibrateOptions& options, const SceneImage& image,
-                    const Camera& camera) {
-  const EstimationOptions& estimation = options.compare.losses.front().estimation;
-  CameraSigma sigma =
-      image.camera_sigma.Over(options.compare.inputs.guess.stated.Over(UnknownCamera(camera)));
-  if (image.guessed_sigma) sigma.log_focal = image.guessed_sigma->LargestLogFocal();
-  if (estimation.camera_sigma) sigma.log_focal = estimation.camera_sigma->log_focal;
-  if (options.fix_principal_point) sigma.principal_point_px = 0.0;
-  if (options.aspect_sigma) sigma.log_aspect = *options.aspect_sigma;
-  return sigma;
-}
 
 // Of a camera that is only guessed photos may have any size: those of another one are another
 // camera's.
@@ -108,7 +115,7 @@ Status CalibrateOnce(CalibrateOptions* options, const GivenPoses& poses,
                      Calibration* calibration) {
   *calibration = Calibration();
   options->adjust.given_poses.clear();
-  std::vector<ImageRun> runs = ObserveAll(options->compare, images);
+  std::vector<ImageRun> runs = ObserveAll(*options, images);
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (!runs[i].read_error.empty()) {
       calibration->errors.push_back((*images)[i].path + ": " + runs[i].read_error);
@@ -141,6 +148,11 @@ Status CalibrateOnce(CalibrateOptions* options, const GivenPoses& poses,
   return calibration->adjusted.status;
 }
 
+bool AnyIsWide(const std::map<std::string, CameraSigma>& sigmas) {
+  return std::any_of(sigmas.begin(), sigmas.end(),
+                     [](const auto& sigma) { return sigma.second.IsWide(); });
+}
+
 // What belongs together on a photo is judged through its camera: photos in which everything is
 // detected are looked at again through the camera that they have led to.
 Status CalibrateInPasses(CalibrateOptions* options, const GivenPoses& poses,
@@ -156,7 +168,8 @@ Status CalibrateInPasses(CalibrateOptions* options, const GivenPoses& poses,
     options->compare.structure_tells_focal = pass == 0 && poses.empty();
     const Status status = CalibrateOnce(options, poses, images, &given, calibration);
     if (!status.ok() || !detects || !poses.empty() || pass + 1 == kPasses) return status;
-    bool same = true;
+    // At first each photo may have been seen through a focal length of its own.
+    bool same = pass > 0 || !AnyIsWide(options->adjust.camera_sigma);
     std::map<std::string, Camera> found;
     for (const AdjustedCamera& made : calibration->adjusted.cameras)
       found[made.camera.id] = made.camera;

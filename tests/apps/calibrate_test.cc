@@ -156,6 +156,44 @@ TEST_F(CalibrateTest, TheSceneSaysHowWellItsCameraIsKnown) {
   EXPECT_EQ(made["sigma"]["fx"], 0.0);
 }
 
+// Twelve discs of a sheet, seen from a side.
+void PaintSheet(double side_rad, const std::string& path) {
+  Board board(0.0);
+  board.rotation =
+      Eigen::AngleAxisd(0.6, Eigen::Vector3d(std::cos(side_rad), std::sin(side_rad), 0.0));
+  board.translation.x() = 0.0;
+  PaintPhoto(path, kWidth, kHeight, 4, [&board](double u, double v) {
+    const Eigen::Vector3d ray((u - (kWidth - 1) / 2.0) / kFocal, (v - (kHeight - 1) / 2.0) / kFocal,
+                              1.0);
+    const Eigen::Vector3d normal = board.rotation.col(2);
+    const Eigen::Vector3d p =
+        board.rotation.transpose() *
+        (normal.dot(board.translation) / normal.dot(ray) * ray - board.translation);
+    if (std::abs(p.x()) > 1.6 || std::abs(p.y()) > 1.2) return 210.0;
+    const Eigen::Vector2d off(std::remainder(p.x() - 0.4, 0.8), std::remainder(p.y(), 0.8));
+    return off.norm() < 0.3 ? 40.0 : 210.0;
+  });
+}
+
+// A scene file's camera, too, is where the search begins, and no more: seen through half the
+// angle of view the discs of a sheet lie in different planes.
+TEST_F(CalibrateTest, DiscsAreDetectedThroughACameraThatIsFarOff) {
+  std::string camera = BoardCamera();
+  for (const auto at : {camera.find("300"), camera.rfind("300")}) camera.replace(at, 3, "750");
+  std::string scene = "%YAML:1.0\n---\n" + camera + "images:\n";
+  for (int i = 0; i < 2; ++i) {
+    const std::string name = "sheet" + std::to_string(i) + ".png";
+    PaintSheet(0.3 + 2.0 * i, folder_ / name);
+    scene += "  - { file: \"" + name + "\", camera: \"k\" }\n";
+  }
+  const Outcome run =
+      Calibrate("--scene=" + folder_.Write("far.yaml", scene) + " --output=" + Output());
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json made = ReadJson(Output() + "/calibration.json");
+  EXPECT_TRUE(made["rigid"].get<bool>());
+  EXPECT_NEAR(made["cameras"][0]["fx"].get<double>(), kFocal, 0.05 * kFocal);
+}
+
 TEST_F(CalibrateTest, ItsReportShowsThePhotosAndWhatEachHasAdded) {
   ASSERT_EQ(Calibrate(Photos() + " --output=" + Output()).exit_code, 0);
   const std::string report = ReadAll(Output() + "/report.html");
