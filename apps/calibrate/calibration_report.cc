@@ -181,6 +181,20 @@ std::string PhotoTable(const AdjustedPhotos& adjusted, const std::vector<std::st
   return html.str();
 }
 
+// Whether photos show circles enough to be matched by how they lie, and these are not the same.
+bool HaveSheetsOfTheirOwn(const AdjustedPhotos& adjusted, int camera) {
+  constexpr int kFewest = 4;  // Circles that make a pattern.
+  if (adjusted.rigid) return false;
+  std::vector<int> counts(adjusted.photos.size(), 0);
+  for (const AdjustedCircle& circle : adjusted.circles) {
+    if (circle.photo >= 0) ++counts[static_cast<std::size_t>(circle.photo)];
+  }
+  int sheets = 0;
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    sheets += adjusted.photos[i].camera == camera && counts[i] >= kFewest ? 1 : 0;
+  return sheets > 1;
+}
+
 }  // namespace
 
 std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera) {
@@ -220,6 +234,11 @@ std::vector<std::string> Advice(const AdjustedPhotos& adjusted, int camera) {
     if (seen == 0)
       advice.push_back(std::string("Fill the ") + corners[k] +
                        " corner: nothing was seen there, and distortion is largest in corners.");
+  }
+  if (HaveSheetsOfTheirOwn(adjusted, camera)) {
+    advice.emplace_back(
+        "Show one flat sheet, and all of it, in every photo: here the circles of each count as "
+        "those of another sheet, and tell less.");
   }
   if (made.num_photos < 5) advice.emplace_back("Take five photos or more, from different sides.");
   return advice;

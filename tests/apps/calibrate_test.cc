@@ -132,6 +132,7 @@ TEST_F(CalibrateTest, TheSceneSaysWhetherTheWorldIsRigid) {
     const Outcome run = Calibrate("--scene=" + stated + " --rigid=yes --output=" + Output());
     ASSERT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(ReadJson(Output() + "/calibration.json")["rigid"], rigid == "auto");
+    EXPECT_EQ(Count(run.out, "Show one flat sheet, and all of it,"), rigid == "no" ? 1 : 0);
     EXPECT_CONTAINS(ReadAll(Output() + "/scene.yaml"), "\"rigid\": \"" + rigid + "\"");
   }
   const Outcome run =
