@@ -13,11 +13,11 @@ struct ExifFocalLength {
   std::string words;      // Which tags say so, or why what they say is of no use; may be empty.
 };
 
-// From the EXIF data of a JPEG, WebP or PNG: FocalLengthIn35mmFilm, which compares diagonals (CIPA DC-008), else
-// FocalLength with the resolution of the focal plane. `width` and `height` are those of the photo,
-// pixels; one that was made smaller since has its focal length with it, where EXIF's size is still
-// that of the photo as taken. Figures that no lens has are passed over. Never throws, whatever is
-// broken in the file.
+// From the EXIF data of a JPEG, WebP or PNG: FocalLengthIn35mmFilm, which compares diagonals (CIPA
+// DC-008), else FocalLength with the resolution of the focal plane. `width` and `height` are those
+// of the photo, pixels; one that was made smaller since has its focal length with it, where EXIF's
+// size is still that of the photo as taken. Figures that no lens has are passed over. Never throws,
+// whatever is broken in the file.
 ExifFocalLength ReadExifFocalLength(const std::string& path, int width, int height);
 
 // How the EXIF data of a WebP say that its picture lies: EXIF's number, 1 (as it should) to 8; 1
