@@ -143,8 +143,7 @@ bool Adjustment::LeaveGridLinesOut() {
 
 // The same of circles.
 bool Adjustment::LeaveLatticeCirclesOut() {
-  constexpr int kUnknowns = 4;        // Place, size and turn of a lattice in its plane.
-  constexpr std::size_t kFewest = 6;  // Of which lattices are found (FindSquareLattice).
+  constexpr int kUnknowns = 4;  // Place, size and turn of a lattice in its plane.
   std::map<std::size_t, std::vector<AdjustProblem::LatticeCircle>> lattices;
   for (const AdjustProblem::LatticeCircle& circle : problem_->LatticeCircles())
     lattices[circle.world].push_back(circle);
@@ -154,10 +153,10 @@ bool Adjustment::LeaveLatticeCirclesOut() {
     for (const AdjustProblem::LatticeCircle& circle : circles)
       off.insert(off.end(), {circle.deviations.x(), circle.deviations.y()});
     const GridVerdict verdict = JudgeGrid(off, kUnknowns);
-    std::map<std::pair<int, int>, std::string>& left = lattices_[world].circles;
-    if (verdict.worst_is_off) left.erase(circles[verdict.worst / 2].place);
-    if (verdict.is_none || left.size() < kFewest) left.clear();
-    any = any || verdict.worst_is_off || left.empty();
+    SquareLattice& lattice = lattices_[world];
+    if (verdict.worst_is_off) lattice.circles.erase(circles[verdict.worst / 2].place);
+    if (verdict.is_none || !lattice.HasEnough()) lattice.circles.clear();
+    any = any || verdict.worst_is_off || lattice.circles.empty();
   }
   return any;
 }
@@ -175,7 +174,11 @@ bool Adjustment::FindGrids() {
   for (const Layout& layout : FoundLayouts()) lattices_.push_back(FindSquareLattice(layout));
   return std::any_of(grids_.begin(), grids_.end(),
                      [](const std::optional<SquareGrid>& grid) { return grid.has_value(); }) ||
-         std::any_of(lattices_.begin(), lattices_.end(),
+         HasLattice();
+}
+
+bool Adjustment::HasLattice() const {
+  return std::any_of(lattices_.begin(), lattices_.end(),
                      [](const SquareLattice& lattice) { return !lattice.circles.empty(); });
 }
 

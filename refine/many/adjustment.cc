@@ -225,10 +225,7 @@ void Adjustment::Report() {
     out_.notes.push_back(std::to_string(boards) +
                          " photos show a grid of equal squares: their poses are in squares");
   }
-  const bool has_lattice =
-      std::any_of(lattices_.begin(), lattices_.end(),
-                  [](const SquareLattice& lattice) { return !lattice.circles.empty(); });
-  if (has_lattice)
+  if (HasLattice())
     out_.notes.emplace_back("circles lie on a grid of equal squares, and count as that");
   if (start_ == nullptr) ReportSigmas(scale);
   out_.circles = problem_->Circles();

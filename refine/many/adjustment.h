@@ -104,6 +104,7 @@ class Adjustment {
   void StartOnGrids();
   bool LeaveGridLinesOut();
   bool LeaveLatticeCirclesOut();
+  bool HasLattice() const;
   bool HasMoved() const;
   std::vector<Layout> FoundLayouts() const;  // As the problem has them.
   void PrepareAnew();

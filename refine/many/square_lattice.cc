@@ -184,6 +184,7 @@ SquareLattice FindSquareLattice(const Layout& layout) {
     const std::pair<int, int> where(static_cast<int>(place.real()), static_cast<int>(place.imag()));
     lattice.circles.emplace(where, *point.id);
   }
+  if (!lattice.HasEnough()) lattice.circles.clear();
   return lattice;
 }
 

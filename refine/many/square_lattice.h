@@ -19,6 +19,8 @@ namespace circline {
 struct SquareLattice {
   std::map<std::pair<int, int>, std::string> circles;
 
+  // Fewer might be on one by chance.
+  bool HasEnough() const { return circles.size() >= 6; }
   // Squares, the longer side.
   int Width() const;
   // Place (i, j) lies at origin + i side + j (side, turned by 90 degrees): the least squares of its
@@ -27,7 +29,7 @@ struct SquareLattice {
 };
 
 // The lattice on which most circles lie, each to 2 % of a square, the others anywhere; half of the
-// places may be empty. Without circles where that might be chance, as with fewer than six.
+// places may be empty. Without circles where that might be chance.
 SquareLattice FindSquareLattice(const Layout& layout);
 
 // A circle's centre against its place: centre (2), origin (2), side (2); the deviation of either
