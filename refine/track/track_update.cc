@@ -28,16 +28,16 @@ class TrackFrame::Information {
     const TrackMap& map = frame_.map_;
     const Eigen::Index n = turn.rows(), c = H.rows() - n;
     frame_.columns_.assign(map.blocks().size(), -1);
-    Scratch::Matrix by_values = frame_.scratch_.NewMatrix(n, prior.num_values()),
-                    J = frame_.scratch_.NewMatrix(n, n + c);
+    Scratch::Matrix J = frame_.scratch_.NewMatrix(n, n + c);
     Scratch::Vector z = frame_.scratch_.NewVector(n);
     frame_.PriorParameters(fit);
-    prior.Residuals(frame_.parameters_.data(), z.data(), &by_values);
+    prior.Evaluate(frame_.parameters_.data(), z.data(), nullptr);
     Eigen::Index column = 0, first = 0;
     for (const int b : prior.blocks) {
       const BlockMatrix plus = PlusJacobian(b);
       frame_.columns_[static_cast<std::size_t>(b)] = column;
-      J.middleCols(column, plus.cols()).noalias() = by_values.middleCols(first, plus.rows()) * plus;
+      J.middleCols(column, plus.cols()).noalias() =
+          prior.by_values.middleCols(first, plus.rows()) * plus;
       column += plus.cols();
       first += plus.rows();
     }
@@ -93,7 +93,7 @@ class TrackFrame::Information {
   }
 
   Scratch::Matrix H;
-  Scratch::Matrix turn;   // The unknowns' tangents at the minimum, in the prior's charts.
+  Scratch::Matrix turn;   // The unknowns' tangents at the minimum, in those at the mean.
   Scratch::Vector moved;  // How far they are from the mean, in these.
   double log_det = 0.0;
 
