@@ -33,11 +33,6 @@ constexpr double kPlaneShare = 0.5;
 constexpr double kNegligible = 0.05;
 // Beyond these the odds are the same.
 constexpr double kMostLogOdds = 300.0;
-// The principal point is summed over so many steps to either side, of so many standard deviations:
-// a step of 12 pixels of 600, of the principal point of a camera that is a guess, changes a right
-// angle by up to 1.1 degrees, about what walls lean.
-constexpr int kMiddleSteps = 5;
-constexpr double kMiddleStep = 0.5;
 // The circles of a plane have its normal within this of that of one of them, degrees.
 constexpr double kSeedSigmaDeg = 5.0;
 
@@ -124,35 +119,24 @@ class StructureEvidence {
   };
   Odds At(double log_focal) const {
     const Features features = features_.At(log_focal);
-    const double middle_rad = middle_rad_ * std::exp(-log_focal);
-    return {RightAngles(features.pencils, middle_rad) + OnePlane(features.circles),
+    const CameraError camera{middle_rad_ * std::exp(-log_focal), 0.0};
+    return {RightAngles(features.pencils, camera) + OnePlane(features.circles),
             features.edges.size() < 2      ? 0.0
             : features.pencils.size() == 1 ? EdgesAtRightAngles(features)
-                                           : EdgesAlongThird(features, middle_rad)};
+                                           : EdgesAlongThird(features, camera)};
   }
 
  private:
-  // The principal point is the same for all pairs: at each place that it may have their odds are
-  // multiplied, and the products are summed.
-  static double RightAngles(const std::vector<UncertainDirection>& directions, double middle_rad) {
-    std::vector<RightAngle> pairs;
+  static double RightAngles(const std::vector<UncertainDirection>& directions,
+                            const CameraError& camera) {
+    double sum = 0.0;
     for (std::size_t j = 0; j < directions.size(); ++j) {
-      for (std::size_t i = 0; i < j; ++i) pairs.emplace_back(directions[i], directions[j]);
-    }
-    if (pairs.empty()) return 0.0;
-    double sum = 0.0, all = 0.0;
-    for (int x = -kMiddleSteps; x <= kMiddleSteps; ++x) {
-      for (int y = -kMiddleSteps; y <= kMiddleSteps; ++y) {
-        const Eigen::Vector2d off = kMiddleStep * Eigen::Vector2d(x, y);
-        const double weight = std::exp(-0.5 * off.squaredNorm());
-        double product = weight;
-        for (const RightAngle& pair : pairs)
-          product *= 0.5 + 0.5 * std::exp(pair.LogOdds(middle_rad * off));
-        sum += product;
-        all += weight;
+      for (std::size_t i = 0; i < j; ++i) {
+        const double odds = std::exp(RightAngle(directions[i], directions[j], camera).LogOdds());
+        sum += std::log(0.5 + 0.5 * odds);
       }
     }
-    return std::log(sum / all);
+    return sum;
   }
 
   // Of the edges around the only pencil as those of one thing with it.
@@ -163,11 +147,10 @@ class StructureEvidence {
   }
 
   // Of the lines outside the pencils as those of the third direction of one thing with two of them.
-  static double EdgesAlongThird(const Features& features, double middle_rad) {
+  static double EdgesAlongThird(const Features& features, const CameraError& camera) {
     std::vector<LineOdds> lines;
     for (const LineFit& edge : features.edges)
       lines.emplace_back(WithDirectionError(edge, kParallelSigmaRad));
-    const CameraError camera{middle_rad, 0.0};
     double sum = 0.0, pairs = 0.0;
     for (std::size_t i = 0; i < features.pencils.size(); ++i) {
       for (std::size_t j = i + 1; j < features.pencils.size(); ++j) {

@@ -75,21 +75,16 @@ RightAngle::RightAngle(const UncertainDirection& a, const UncertainDirection& b,
                        const CameraError& camera) {
   const Vector3d &p = a.direction, &q = b.direction;
   angle_ = std::asin(std::clamp(p.dot(q), -1.0, 1.0));
-  by_middle_ = -(q.z() * p.head<2>() + p.z() * q.head<2>());
+  const Eigen::Vector2d by_middle = -(q.z() * p.head<2>() + p.z() * q.head<2>());
   const double by_focal = -2.0 * p.z() * q.z(), lean = kRightAngleSigmaDeg * kDegree;
   variance_ = VarianceOfAngle(a, b) + lean * lean +
-              camera.middle_rad * camera.middle_rad * by_middle_.squaredNorm() +
+              camera.middle_rad * camera.middle_rad * by_middle.squaredNorm() +
               camera.log_focal * camera.log_focal * by_focal * by_focal;
   // The angle between two directions without relation, from 90 degrees, has the density cos (per
   // radian, Archimedes).
   constexpr double kTwiceGaussian = 0.7978845608028654;  // 2 / sqrt(2 pi): no sense of sign.
   log_peak_ = std::log(kRightAngleShare / (1.0 - kRightAngleShare) * kTwiceGaussian /
                        (std::sqrt(variance_) * std::cos(angle_)));
-}
-
-double RightAngle::LogOdds(const Eigen::Vector2d& middle) const {
-  const double angle = angle_ + by_middle_.dot(middle);
-  return log_peak_ - 0.5 * angle * angle / variance_;
 }
 
 bool Rectangular(const UncertainDirection& a, const UncertainDirection& b) {

@@ -45,13 +45,11 @@ class RightAngle {
  public:
   RightAngle(const UncertainDirection& a, const UncertainDirection& b,
              const CameraError& camera = CameraError());
-  // Logarithm of the odds that they are, where the principal point is off by so much (over the
-  // focal length, x and y).
-  double LogOdds(const Eigen::Vector2d& middle = Eigen::Vector2d::Zero()) const;
+  // Logarithm of the odds that they are.
+  double LogOdds() const { return log_peak_ - 0.5 * angle_ * angle_ / variance_; }
 
  private:
-  double angle_, variance_;    // From 90 degrees; radians.
-  Eigen::Vector2d by_middle_;  // What the principal point's error changes it by.
+  double angle_, variance_;  // From 90 degrees; radians.
   double log_peak_;
 };
 
