@@ -1,7 +1,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
-#include <set>
 #include <utility>
 
 #include "circline/estimators/statistics.h"
@@ -14,10 +13,7 @@ namespace {
 
 constexpr std::size_t kMaxReadings = 16;
 constexpr std::size_t kMostSamples = 8;  // Beside these, of what agrees with one line.
-// Of many circles the planes of those that explain the evidence best are starts, not of all: a
-// number, for time (circline_benchmark --benchmark_filter=CirclesOfAPlane), not chosen on photos.
-constexpr std::size_t kMostCircles = 6;
-constexpr double kHopeless = 300.0;  // Gaps that no start comes down.
+constexpr double kHopeless = 300.0;      // Gaps that no start comes down.
 constexpr double kNoRival = std::numeric_limits<double>::infinity();
 
 constexpr std::size_t kFew = 6;  // Of so few features any may be the odd one.
@@ -31,14 +27,13 @@ class ReadingSearch {
   Status Run() {
     // Lines that a fit has found odd are left out first, and then all are taken in: the fit knew
     // one pencil only.
-    std::vector<Candidate> queue = {{problem_.FirstReading(), seeds_, kNoRival}};
+    std::vector<Candidate> queue = {{problem_.FirstReading(), seeds_}};
     const Reading everything(problem_.features().size(), 1);
-    if (queue.front().reading != everything) queue.push_back({everything, seeds_, kNoRival});
+    if (queue.front().reading != everything) queue.push_back({everything, seeds_});
     // What lines agree on is not where the fits of their pencils lead.
     for (AgreeingLines& lines : FindAgreeingPencils(problem_, seeds_))
-      queue.push_back({std::move(lines.reading), std::move(lines.seeds), kNoRival});
-    for (Reading& reading : WithoutAngles())
-      queue.push_back({std::move(reading), seeds_, kNoRival});
+      queue.push_back({std::move(lines.reading), std::move(lines.seeds)});
+    for (Reading& reading : WithoutAngles()) queue.push_back({std::move(reading), seeds_});
     bool has_sampled = false;
     std::size_t most = kMaxReadings + queue.size() - 1;
     for (std::size_t next = 0; next < queue.size() && next < most; ++next) {
@@ -53,19 +48,18 @@ class ReadingSearch {
       const std::size_t num_before = queue.size();
       const std::vector<Seed> near = everything.size() > kFew ? SeedsAt(minima) : candidate.seeds;
       for (const State& minimum : minima) {
-        if (IsHopeless(minimum, candidate.parent_cost)) continue;
         for (Reading& other : Rivals(minimum)) {
           const bool is_known = std::any_of(queue.begin(), queue.end(), [&](const Candidate& c) {
             return problem_.IsSameReading(c.reading, other);
           });
-          if (!is_known) queue.push_back({std::move(other), near, minimum.cost});
+          if (!is_known) queue.push_back({std::move(other), near});
         }
       }
       // A compromise, or a loss that has settled on some odd lines, may not lead to what agrees.
       if (has_sampled || queue.size() == num_before) continue;
       has_sampled = true;
       for (AgreeingLines& lines : FindAgreeingLines(problem_, seeds_, kMostSamples)) {
-        queue.push_back({std::move(lines.reading), std::move(lines.seeds), kNoRival});
+        queue.push_back({std::move(lines.reading), std::move(lines.seeds)});
         ++most;
       }
     }
@@ -79,7 +73,6 @@ class ReadingSearch {
   struct Candidate {
     Reading reading;
     std::vector<Seed> seeds;
-    double parent_cost;  // Of the minimum that it leaves something out of.
   };
 
   // Readings without one of the known angles: seeds make little use of these, and lie where a wrong
@@ -107,7 +100,6 @@ class ReadingSearch {
     const std::vector<Seed>& seeds = candidate.seeds;
     std::vector<std::pair<std::size_t, State>> found;
     std::vector<std::size_t> tried;
-    std::set<int> circles;  // Whose planes were tried.
     const int best_circle = BestCircle(candidate);
     double best = kNoRival;
     bool is_consistent = false;  // The best one explains all that is to take part.
@@ -116,13 +108,11 @@ class ReadingSearch {
       // Where all evidence agrees, one circle's planes are those of all.
       const int source = seeds[start.seed].source;
       if (is_consistent && source < 0 && source != best_circle) continue;
-      if (source < 0 && circles.count(source) == 0 && circles.size() == kMostCircles) continue;
       const bool is_near = std::any_of(tried.begin(), tried.end(), [&](std::size_t other) {
         return IsSameSeed(seeds[start.seed], seeds[other]) && seeds[other].source != source;
       });
       if (is_consistent && (is_near || start.cost > best + kHopeless * MaxGap())) continue;
       tried.push_back(start.seed);
-      if (source < 0) circles.insert(source);
       if (!SolveFrom(is_consistent, best, &state)) continue;
       const bool is_known = std::any_of(found.begin(), found.end(), [&](const auto& other) {
         return IsSamePose(problem_, state, other.second);
@@ -217,13 +207,6 @@ class ReadingSearch {
     for (std::size_t i = 0; i < state.active.size(); ++i)
       count += problem_.TakesPart(i, state.active) ? 1 : 0;
     return 1e-4 / std::max(1, count);
-  }
-
-  // Of many features, where steps like the one from its parent would not lead to what competes.
-  bool IsHopeless(const State& minimum, double parent_cost) const {
-    const auto best = std::min_element(minima_.begin(), minima_.end(), HasLessCost);
-    return problem_.features().size() > kFew && best != minima_.end() &&
-           minimum.cost - kMaxReadings * (parent_cost - minimum.cost) > best->cost + MaxGap();
   }
 
   // Readings without what contradicts this minimum.
