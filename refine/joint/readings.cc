@@ -156,15 +156,6 @@ NoiseModel ScaledToFirstMinimum(const JointProblem& problem, std::vector<Seed>* 
     if (problem.features()[i].kind == Feature::Kind::kAngle) reading[i] = 0;
   }
   std::vector<SeedStart> starts = StartsOf(problem, *seeds, reading, &unused);
-  for (const AgreeingLines& lines : FindAgreeingPencils(problem, *seeds)) {
-    for (SeedStart& start : StartsOf(problem, lines.seeds, lines.reading, &unused)) {
-      seeds->push_back(lines.seeds[start.seed]);
-      start.seed = seeds->size() - 1;
-      starts.push_back(std::move(start));
-    }
-  }
-  std::stable_sort(starts.begin(), starts.end(),
-                   [](const SeedStart& a, const SeedStart& b) { return a.cost < b.cost; });
   if (starts.empty() ||
       !problem.SolveGraduated(problem.options().max_iterations, &starts.front().state).ok())
     return problem.options().noise_model;
