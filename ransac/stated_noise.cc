@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <cstdio>
 #include <vector>
 
@@ -12,74 +11,59 @@
 namespace circline {
 namespace {
 
-// How many points a feature has, and how many of them are outliers.
+// How many points there are, and how many of them are outliers.
 struct Points {
   std::ptrdiff_t all = 0, outliers = 0;
 
-  explicit Points(const CircleObservation& circle) { Add(circle.points.size(), circle.inliers); }
-  explicit Points(const PencilObservation& pencil) {
-    for (const LineObservation& line : pencil.lines) Add(line.points.size(), line.inliers);
+  explicit Points(const Observations& fitted) {
+    for (const CircleObservation& circle : fitted.circles) Add(circle);
+    for (const PencilObservation& pencil : fitted.pencils) {
+      for (const LineObservation& line : pencil.lines) Add(line);
+    }
   }
-  void Add(std::size_t num_points, const std::vector<std::uint8_t>& mask) {
-    all += static_cast<std::ptrdiff_t>(num_points);
-    outliers += static_cast<std::ptrdiff_t>(num_points) - std::count(mask.begin(), mask.end(), 1);
+  template <typename Feature>
+  void Add(const Feature& feature) {
+    const auto num_points = static_cast<std::ptrdiff_t>(feature.points.size());
+    all += num_points;
+    outliers += num_points - std::count(feature.inliers.begin(), feature.inliers.end(), 1);
   }
-  bool AreManyOutliers() const { return 3 * outliers >= all; }
 };
-
-// No other camera than the one given is looked for.
-FitOptions WithCameraGiven(FitOptions options) {
-  options.noise_model.camera = CameraSigma::Exact();
-  return options;
-}
-
-// Of a feature with the points `before`, which are those `after` where no noise is stated.
-std::string Problem(const char* what, const Points& before, const Points& after, double stated_px,
-                    double measured_px) {
-  constexpr double kFarLarger = 3.0;  // Times the stated noise.
-  const double ratio = measured_px / stated_px;
-  if (ratio < kFarLarger || 2 * after.outliers > before.outliers) return "";
-  char text[200];
-  std::snprintf(text, sizeof(text),
-                "its points lie %.3g px from %s, %.2g times the %.3g px stated as their noise "
-                "(sigma_px): state none, or a larger one",
-                measured_px, what, ratio, stated_px);
-  return text;
-}
 
 }  // namespace
 
-std::string StatedNoiseProblem(const FitOptions& options, const Camera& camera,
-                               const CircleObservation& circle) {
-  const Points before(circle);
-  if (!(circle.sigma_px > 0.0) || !before.AreManyOutliers()) return "";
-  Observations unstated;
-  unstated.camera = camera;
-  unstated.circles = {circle};
-  unstated.circles[0].sigma_px = 0.0;
-  if (!FitObservations(WithCameraGiven(options), &unstated).ok() || !unstated.circles[0].fit)
-    return "";
-  return Problem("the best ellipse", before, Points(unstated.circles[0]), circle.sigma_px,
-                 MeasurePointNoise(unstated, options.noise_model).circles[0]);
-}
-
-std::string StatedNoiseProblem(const FitOptions& options, const Camera& camera,
-                               const PencilObservation& pencil) {
-  const Points before(pencil);
-  if (!before.AreManyOutliers()) return "";
+std::string StatedNoiseProblem(const FitOptions& options, Observations feature) {
+  const Points before(feature);
+  if (before.outliers == 0 || 3 * before.outliers < before.all) return "";
   std::vector<double> stated;
-  Observations unstated;
-  unstated.camera = camera;
-  unstated.pencils = {pencil};
-  unstated.pencils[0].sigma_px = 0.0;
-  for (LineObservation& line : unstated.pencils[0].lines) {
-    stated.push_back(LineSigma(pencil, line));
-    line.sigma_px = 0.0;
+  for (CircleObservation& circle : feature.circles) {
+    stated.push_back(circle.sigma_px);
+    circle.sigma_px = 0.0;
+  }
+  for (PencilObservation& pencil : feature.pencils) {
+    for (LineObservation& line : pencil.lines) {
+      stated.push_back(LineSigma(pencil, line));
+      line.sigma_px = 0.0;
+    }
+    pencil.sigma_px = 0.0;
   }
   if (stated.empty() || !(Median(stated) > 0.0)) return "";
-  if (!FitObservations(WithCameraGiven(options), &unstated).ok()) return "";
-  return Problem("the best lines", before, Points(unstated.pencils[0]), Median(stated),
-                 Median(MeasurePointNoise(unstated, options.noise_model).lines[0]));
+  FitOptions fit_options = options;
+  fit_options.noise_model.camera = CameraSigma::Exact();  // No other camera is looked for.
+  if (!FitObservations(fit_options, &feature).ok()) return "";
+  const PointNoise noise = MeasurePointNoise(feature, options.noise_model);
+  std::vector<double> measured = noise.circles;
+  for (const std::vector<double>& lines : noise.lines)
+    measured.insert(measured.end(), lines.begin(), lines.end());
+  constexpr double kFarLarger = 3.0;  // Times the stated noise.
+  const double stated_px = Median(stated), measured_px = Median(measured);
+  const double ratio = measured_px / stated_px;
+  if (ratio < kFarLarger || 2 * Points(feature).outliers > before.outliers) return "";
+  char text[200];
+  std::snprintf(text, sizeof(text),
+                "its points lie %.3g px from the best %s, %.2g times the %.3g px stated as their "
+                "noise (sigma_px): state none, or a larger one",
+                measured_px, feature.circles.empty() ? "lines" : "ellipse", ratio, stated_px);
+  return text;
 }
 
 }  // namespace circline

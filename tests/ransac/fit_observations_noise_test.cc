@@ -225,6 +225,18 @@ TEST(FitObservationsNoise, AStatedNoiseThatIsFarTooSmallForLinesIsNamed) {
   }
 }
 
+TEST(FitObservationsNoise, WithoutPointsNoStatedNoiseIsDoubted) {
+  Observations observations;
+  observations.camera = TestCamera();
+  observations.circles.resize(1);
+  observations.circles[0].sigma_px = 0.05;
+  observations.pencils.resize(1);
+  observations.pencils[0].sigma_px = 0.05;
+  observations.pencils[0].lines.resize(2);
+  for (const std::string& problem : FitProblems(&observations))
+    EXPECT_EQ(problem.find("stated as their noise"), std::string::npos) << problem;
+}
+
 // A manhole's rim and, over 40 % of it, that of its frame.
 TEST(FitObservationsNoise, ASecondRimIsASecondReadingAndNamed) {
   Random random(5);
