@@ -39,11 +39,8 @@ double LogLikelihood(const Observations& fitted) {
 
 // Whether what the photo shows is curved otherwise at another focal length that may be.
 bool FocalBendsCurves(const Camera& camera, const CameraSigma& sigma) {
-  if (!sigma.IsWide()) return false;
-  if (camera.model == CameraModel::kFisheye) return true;
-  return camera.model == CameraModel::kOpenCV && !sigma.IsLensOpen() &&
-         std::any_of(camera.distortion.begin(), camera.distortion.end(),
-                     [](double k) { return k != 0.0; });
+  return sigma.IsWide() && camera.BendsLines() &&
+         (camera.model == CameraModel::kFisheye || !sigma.IsLensOpen());
 }
 
 // How far from the value given one is looked for, and how finely.

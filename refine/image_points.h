@@ -94,6 +94,8 @@ class ImagePoints {
   // Undistorts the points once, as the camera with these kCameraSize shifts has them, for all that
   // is asked with the same shifts later; with others each is undistorted anew, to the same values.
   void SeeThrough(const double* camera);
+  // The points as the camera of the last SeeThrough has them; before any, as the camera given has.
+  const std::vector<CalibratedPoint>& seen() const { return seen_.empty() ? points_ : seen_; }
   // Of the kCameraSize shifts these come first and have derivatives; those of the others are zero.
   int num_camera() const { return 4 + options_.num_distortion; }
 

@@ -33,14 +33,14 @@ inline bool FitPlaneCircle(const std::vector<Eigen::Vector2d>& points, Eigen::Ve
   return circle->allFinite();
 }
 
-// The circle of the plane Z = 0 through calibrated points, as a camera of exp(log_focal) times the
-// focal length sees them (distortion left out). False where they do not all lie before the camera.
-inline bool FitPlaneCircle(const std::vector<CalibratedPoint>& points, double log_focal,
-                           const CameraPose& pose, Eigen::Vector3d* circle) {
-  const double shrink = std::exp(-log_focal), distance = pose.rotation.col(2).dot(pose.translation);
+// The circle of the plane Z = 0 through calibrated points. False where they do not all lie before
+// the camera.
+inline bool FitPlaneCircle(const std::vector<CalibratedPoint>& points, const CameraPose& pose,
+                           Eigen::Vector3d* circle) {
+  const double distance = pose.rotation.col(2).dot(pose.translation);
   std::vector<Eigen::Vector2d> in_plane;
   for (const CalibratedPoint& p : points) {
-    const Eigen::Vector3d ray(shrink * p.x.x(), shrink * p.x.y(), 1.0);
+    const Eigen::Vector3d ray = p.Homogeneous();
     const double depth = distance / pose.rotation.col(2).dot(ray);
     if (!(depth > 0.0) || !std::isfinite(depth)) return false;
     in_plane.emplace_back((pose.rotation.transpose() * (depth * ray - pose.translation)).head<2>());

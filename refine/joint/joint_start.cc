@@ -19,7 +19,8 @@
 namespace circline {
 namespace {
 
-// A ray of the camera as given, seen through one with another focal length (distortion left out).
+// A direction that was fitted through the camera as given, seen through one with another focal
+// length (distortion left out).
 Eigen::Vector3d Refocused(const Eigen::Vector3d& ray, double log_focal) {
   const double shrink = std::exp(-log_focal);
   return {shrink * ray.x(), shrink * ray.y(), ray.z()};
@@ -29,9 +30,12 @@ Eigen::Vector3d Refocused(const Eigen::Vector3d& ray, double log_focal) {
 
 bool JointProblem::Ray(const State& state, const Eigen::Vector2d& pixel,
                        Eigen::Vector3d* ray) const {
+  const Camera& given = observations_.camera;
   CalibratedPoint p;
-  if (!PixelToCalibrated(observations_.camera, pixel, &p)) return false;
-  *ray = Refocused(p.Homogeneous(), LogFocalAt(state));
+  if (!PixelToCalibrated(given, pixel, &p)) return false;
+  if (camera_is_estimated_)
+    p = SeenThrough(ShiftedCamera(given, At(kCamera, state)), given, pixel, p);
+  *ray = p.Homogeneous();
   return true;
 }
 
@@ -40,8 +44,9 @@ bool JointProblem::Ray(const State& state, const Eigen::Vector2d& pixel,
 // camera.
 bool JointProblem::PlaceCircle(const CircleBlocks& c, State* state, Eigen::Vector3d* circle) const {
   const CameraPose pose = PoseAt(*state);
-  const ImagePoints& points = *term(c.term).weighed->points();
-  if (!FitPlaneCircle(points.points(), LogFocalAt(*state), pose, circle)) return false;
+  FeatureCost& contour = *term(c.term).weighed;
+  if (camera_is_estimated_) contour.SeeThrough(At(kCamera, *state));
+  if (!FitPlaneCircle(contour.points()->seen(), pose, circle)) return false;
   const Eigen::Vector3d center(circle->x(), circle->y(), 0.0);
   if (!((pose.rotation * center + pose.translation).z() > 0.0)) return false;
   if (!block(c.center).is_constant)

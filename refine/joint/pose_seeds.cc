@@ -183,12 +183,18 @@ void AddPriorSeeds(const EstimationOptions& options, const Observations& resolve
   }
 }
 
-// Calibrated coordinates shrink: x' = A x, A = diag(s, s, 1), s = exp(-log_focal) (the lens bends
-// the same rays, which is right at the middle of the photo). Covariances follow to first order.
-Observations Refocused(const Observations& resolved, double log_focal) {
-  Observations out = resolved;
+Observations Refocused(const JointProblem& problem, double log_focal) {
+  Observations out = problem.observations();
   out.camera.fx *= std::exp(log_focal);
   out.camera.fy *= std::exp(log_focal);
+  // A known lens bends the same pixels otherwise.
+  if (out.camera.BendsLines() && !problem.camera_sigma().IsLensOpen()) {
+    ResetFits(&out);
+    FitDirect(kAnySigmaPx, &out, nullptr, problem.options().noise_model);
+    return out;
+  }
+  // Else calibrated coordinates shrink: x' = A x, A = diag(s, s, 1), s = exp(-log_focal).
+  // Covariances follow to first order.
   const double s = std::exp(-log_focal);
   const Eigen::Vector3d a(s, s, 1.0), inverse(1.0 / s, 1.0 / s, 1.0);
   const auto turn = [](Eigen::Vector3d* v, Eigen::Matrix3d* covariance, const Eigen::Vector3d& by) {

@@ -137,7 +137,7 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
   if (takes_priors) AddPriorSeeds(problem.options(), resolved, 0.0, &seeds);
   if (!problem.camera_is_estimated() || !problem.camera_sigma().IsWide()) return seeds;
   for (const double start : FocalStarts(problem, resolved)) {
-    const Observations refocused = Refocused(resolved, start);
+    const Observations refocused = Refocused(problem, start);
     std::vector<Seed> more = CollectSeeds(refocused, seeders, start);
     if (takes_priors) AddPriorSeeds(problem.options(), refocused, start, &more);
     seeds.insert(seeds.end(), more.begin(), more.end());

@@ -65,8 +65,8 @@ void AddCircleSeeds(const Observations& resolved, double log_focal, std::vector<
 void AddPriorSeeds(const EstimationOptions& options, const Observations& resolved, double log_focal,
                    std::vector<Seed>* seeds);
 
-// The same observations, fits included, through a camera of another focal length.
-Observations Refocused(const Observations& resolved, double log_focal);
+// The observations of a problem, fits included, through a camera of another focal length.
+Observations Refocused(const JointProblem& problem, double log_focal);
 
 // --- imperfection_scales.cc: how exact this photo's world is, against what the noise model takes
 // it for: a board is flatter than a box, a box straighter than a street. ---

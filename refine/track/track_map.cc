@@ -35,7 +35,7 @@ class MapBuilder {
       CalibrateInliers(CameraOf(fit.state), circle.points, circle.inliers, &points);
       Eigen::Vector3d at;
       // Beyond a hypothesis' horizon: anywhere, and the frames to come decide.
-      if (!FitPlaneCircle(points, 0.0, pose, &at))
+      if (!FitPlaneCircle(points, pose, &at))
         at = Eigen::Vector3d(0.0, 0.0, pose.translation.norm());
       placed.push_back(at);
     }

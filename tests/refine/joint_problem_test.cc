@@ -4,11 +4,16 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <initializer_list>
 
+#include "circline/estimators/circle_pose.h"
 #include "circline/refine/joint/joint_result.h"
+#include "circline/refine/joint/readings.h"
 #include "tests/plane_scene.h"
+#include "tests/refine/simulated_options.h"
 
 namespace circline {
 namespace {
@@ -70,6 +75,37 @@ TEST(JointProblem, LeavingOutASecondLineCostsLessThanTheFirst) {
   const double first = cost_without({1}), second = cost_without({2}), both = cost_without({1, 2});
   EXPECT_GT(both, std::max(first, second));
   EXPECT_LT(both, first + second - 1.0);
+}
+
+// Under a strong lens another focal length bends the same photo otherwise: without noise the fits
+// there, and what a refinement starts from, are exact.
+TEST(JointProblem, StartsAtAnotherFocalLengthOfAStrongLens) {
+  constexpr double kMistake = 1.3, kPrior = 0.5;
+  PlaneScene scene(0.8);
+  scene.camera.distortion = {-0.4, 0.15, 0.0, 0.0, 0.0};
+  Observations observations = scene.Empty();
+  observations.frame.plane = "p0";
+  observations.circles = {scene.Circle("c", 2.0, 1.5, 1.2, 100)};
+  observations.circles[0].center = scene.Pixel(2.0, 1.5);
+  observations.circles[0].sigma_px = 0.3;
+  observations.camera.fx *= kMistake;
+  observations.camera.fy *= kMistake;
+  FitDirect(scene.sigma(), &observations);
+  const Observations resolved = ResolveWorld(observations);
+  EstimationOptions options = Exact();
+  options.camera_sigma = CameraSigma::Exact();
+  options.camera_sigma->log_focal = kPrior;
+  const JointProblem problem(resolved, options);
+
+  const double back = -std::log(kMistake);
+  std::array<CirclePose, 2> poses;
+  ASSERT_EQ(CirclePoses(Refocused(problem, back).circles[0].fit->conic, &poses), 2);
+  const Eigen::Vector3d normal = scene.pose.rotation.col(2);
+  EXPECT_LT(std::min(poses[0].normal.cross(normal).norm(), poses[1].normal.cross(normal).norm()),
+            1e-6);
+  State state;
+  ASSERT_TRUE(problem.Start(scene.pose, back, problem.FirstReading(), &state).ok());
+  EXPECT_NEAR(state.cost, 0.5 * std::pow(back / kPrior, 2), 1e-6);  // Of the prior alone.
 }
 
 }  // namespace
