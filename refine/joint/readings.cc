@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <optional>
 #include <utility>
@@ -33,17 +34,28 @@ std::string Join(const std::vector<std::string>& parts) {
   return out;
 }
 
+template <typename Feature>
+std::ptrdiff_t CountFits(const std::vector<Feature>& features) {
+  return std::count_if(features.begin(), features.end(),
+                       [](const Feature& f) { return f.fit.has_value(); });
+}
+
 // What is missing for a pose; where that is no circle or pencil, what the closed forms say.
 Status NoSeed(const Observations& fitted, const std::vector<std::string>& reasons) {
-  const auto has_fit = [](const auto& feature) { return feature.fit.has_value(); };
-  const auto circles = std::count_if(fitted.circles.begin(), fitted.circles.end(), has_fit);
-  const auto pencils = std::count_if(fitted.pencils.begin(), fitted.pencils.end(), has_fit);
-  if (circles > 0 || pencils > 1) return Status::Refused(Join(reasons));
+  const std::ptrdiff_t pencils = CountFits(fitted.pencils);
+  if (CountFits(fitted.circles) > 0 || pencils > 1) return Status::Refused(Join(reasons));
   if (pencils == 0) {
-    return Status::Refused(
-        "a pose takes a circle or two pencils of parallel lines; there is neither");
+    std::string message = "a pose takes a circle or two pencils of parallel lines; ";
+    const bool is_given = !fitted.circles.empty() || !fitted.pencils.empty();
+    message += is_given ? "none that is given could be fitted" : "there is neither";
+    if (fitted.num_dropped_points > 0) {
+      message += ": the camera cannot have seen " + std::to_string(fitted.num_dropped_points) +
+                 " of the points, its focal length or its lens is wrong";
+    }
+    return Status::Refused(message);
   }
-  const auto only = std::find_if(fitted.pencils.begin(), fitted.pencils.end(), has_fit);
+  const auto only = std::find_if(fitted.pencils.begin(), fitted.pencils.end(),
+                                 [](const PencilObservation& p) { return p.fit.has_value(); });
   return Status::Refused("there is only one pencil of parallel lines ('" + only->id +
                          "'); a pose takes another one, a circle, or a prior: a pose, or gravity "
                          "that does not run along it");
@@ -136,6 +148,10 @@ std::vector<Seed> AllSeeds(const JointProblem& problem, const Observations& reso
   const bool takes_priors = seeds.empty() && !problem.lines().empty();
   if (takes_priors) AddPriorSeeds(problem.options(), resolved, 0.0, &seeds);
   if (!problem.camera_is_estimated() || !problem.camera_sigma().IsWide()) return seeds;
+  // What can be seen through another focal length alone takes no part in the problem.
+  const bool is_seen =
+      CountFits(resolved.circles) > 0 || CountFits(resolved.pencils) > (takes_priors ? 0 : 1);
+  if (!is_seen) return seeds;
   for (const double start : FocalStarts(problem, resolved)) {
     const Observations refocused = Refocused(problem, start);
     std::vector<Seed> more = CollectSeeds(refocused, seeders, start);

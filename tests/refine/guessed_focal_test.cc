@@ -221,5 +221,23 @@ TEST(GuessedFocalLength, IsNeverKnownWorseThanBeforehand) {
   }
 }
 
+// Half the focal length of a strong lens has no room for what it shows at the side: that is what is
+// said, not that nothing was given.
+TEST(GuessedFocalLength, IsToBlameWhereNoPointCanHaveBeenSeen) {
+  PlaneScene scene(0.8);
+  scene.camera.fx = scene.camera.fy = 420.0;
+  scene.camera.distortion = {-0.45, 0.0, 0.0, 0.0, 0.0};  // One-to-one up to 241 px.
+  Observations observations = scene.Empty();
+  observations.circles = {scene.Circle("rim", 0.0, 5.4, 0.4, 60)};
+  observations.camera.fx *= 0.5;
+  observations.camera.fy *= 0.5;
+  const Status status = EstimatePose(observations, Guessed()).status;
+  EXPECT_EQ(status.code, StatusCode::kRefused);
+  EXPECT_NE(status.message.find("none that is given could be fitted: the camera cannot have seen "
+                                "60 of the points"),
+            std::string::npos)
+      << status.message;
+}
+
 }  // namespace
 }  // namespace circline
