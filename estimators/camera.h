@@ -34,11 +34,6 @@ struct Camera {
   double cx = 0.0, cy = 0.0;                  // Principal point, pixels.
   std::array<double, 8> distortion{};         // As the model orders them; unused ones are 0.
 
-  // Whether lines in space are bent in the photo.
-  bool BendsLines() const {
-    return model == CameraModel::kFisheye || distortion != std::array<double, 8>{};
-  }
-
   // Ok, or a sentence that names the field which is wrong.
   Status Validate() const;
 };

@@ -313,8 +313,7 @@ std::vector<FocalStart> FocalLengthStarts(const Observations& observations, doub
     return {};
   }
   std::vector<FocalStart> starts = Starts(observations, default_sigma_px, noise, problems).OfAll();
-  const bool is_distorted = observations.camera.BendsLines();
-  if (noise.camera.log_focal > 0.0 && is_distorted && !noise.camera.IsLensOpen()) {
+  if (noise.camera.log_focal > 0.0 && noise.camera.BendsWithFocal(observations.camera)) {
     AddErrorOfGuess(observations, default_sigma_px, noise, &starts);
   }
   return Distinct(std::move(starts));

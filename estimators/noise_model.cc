@@ -41,6 +41,11 @@ struct Extent {
 
 }  // namespace
 
+bool CameraSigma::BendsWithFocal(const Camera& camera) const {
+  return camera.model == CameraModel::kFisheye ||
+         (camera.distortion != Camera().distortion && !IsLensOpen());
+}
+
 Status CameraSigma::Validate() const {
   if (doubtful_log_focal > 0.0 && !(log_focal > 0.0))
     return Status::Invalid("camera.doubtful_log_focal takes a camera.log_focal that is positive");

@@ -50,6 +50,9 @@ struct CameraSigma {
   // Nothing is known of the lens: how much it bends is looked for in the photo, whatever the focal
   // length, and k1 is that of the photo, over the focal length's square.
   bool IsLensOpen() const { return k1 >= 0.1; }
+  // Whether this camera's lens bends a photo otherwise at another focal length: one that is known
+  // does, and a fisheye's does in any case.
+  bool BendsWithFocal(const Camera& camera) const;
   // Ok, or a sentence that names the field that is negative or not finite.
   Status Validate() const;
 };

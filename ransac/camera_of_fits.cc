@@ -37,12 +37,6 @@ double LogLikelihood(const Observations& fitted) {
   return sum;
 }
 
-// Whether what the photo shows is curved otherwise at another focal length that may be.
-bool FocalBendsCurves(const Camera& camera, const CameraSigma& sigma) {
-  return sigma.IsWide() && camera.BendsLines() &&
-         (camera.model == CameraModel::kFisheye || !sigma.IsLensOpen());
-}
-
 // How far from the value given one is looked for, and how finely.
 struct Range {
   double prior;  // Standard deviation.
@@ -93,7 +87,8 @@ double LikeliestShift(const Range& range, const FitPointsFn& fit_points,
 
 void TakeFocalOfFits(const CameraSigma& sigma, const FitPointsFn& fit_points,
                      Observations* observations) {
-  if (observations->stated_focal_px != 0.0 || !FocalBendsCurves(observations->camera, sigma))
+  if (observations->stated_focal_px != 0.0 || !sigma.IsWide() ||
+      !sigma.BendsWithFocal(observations->camera))
     return;
   constexpr double kMostLogFocal = 1.4;  // To a quarter and four times, at the most.
   const double prior = sigma.LargestLogFocal();

@@ -69,10 +69,8 @@ class PointFitter {
       ShareNoise(circles_[i], circle.points, circle.inliers, &*circle.fit);
     }
     for (const PencilObservation& pencil : run_.observations.pencils) {
-      Observations alone;
-      alone.camera = run_.observations.camera;
-      alone.pencils = {pencil};
-      const std::string problem = StatedNoiseProblem(run_.options, std::move(alone));
+      const std::string problem =
+          StatedNoiseProblem(run_.options, run_.observations.camera, pencil);
       if (!problem.empty()) run_.Report("pencil '" + pencil.id + "'", problem);
     }
     FitDirections(&lines_, &run_);
@@ -231,10 +229,7 @@ class PointFitter {
 
   // Where that is what makes outliers of most points, it is to blame, and not they.
   void DoubtStatedNoise(const CircleObservation& circle, FittedFeature* f) const {
-    Observations alone;
-    alone.camera = run_.observations.camera;
-    alone.circles = {circle};
-    const std::string problem = StatedNoiseProblem(run_.options, std::move(alone));
+    const std::string problem = StatedNoiseProblem(run_.options, run_.observations.camera, circle);
     if (problem.empty()) return;
     f->status = Status::Refused(problem);
     if (circle.fit) run_.Report("circle '" + circle.id + "'", problem);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>
+#include <utility>
 #include <vector>
 
 #include "circline/estimators/point_noise.h"
@@ -15,25 +16,24 @@ namespace {
 struct Points {
   std::ptrdiff_t all = 0, outliers = 0;
 
-  explicit Points(const Observations& fitted) {
-    for (const CircleObservation& circle : fitted.circles) Add(circle);
-    for (const PencilObservation& pencil : fitted.pencils) {
-      for (const LineObservation& line : pencil.lines) Add(line);
-    }
+  explicit Points(const CircleObservation& circle) { Add(circle); }
+  explicit Points(const PencilObservation& pencil) {
+    for (const LineObservation& line : pencil.lines) Add(line);
   }
+  explicit Points(const Observations& alone)
+      : Points(alone.circles.empty() ? Points(alone.pencils[0]) : Points(alone.circles[0])) {}
   template <typename Feature>
   void Add(const Feature& feature) {
     const auto num_points = static_cast<std::ptrdiff_t>(feature.points.size());
     all += num_points;
     outliers += num_points - std::count(feature.inliers.begin(), feature.inliers.end(), 1);
   }
+  bool AreManyOutliers() const { return outliers > 0 && 3 * outliers >= all; }
 };
 
-}  // namespace
-
-std::string StatedNoiseProblem(const FitOptions& options, Observations feature) {
+// Of a circle or a pencil alone, many of whose points are outliers.
+std::string Problem(const FitOptions& options, Observations feature) {
   const Points before(feature);
-  if (before.outliers == 0 || 3 * before.outliers < before.all) return "";
   std::vector<double> stated;
   for (CircleObservation& circle : feature.circles) {
     stated.push_back(circle.sigma_px);
@@ -64,6 +64,26 @@ std::string StatedNoiseProblem(const FitOptions& options, Observations feature) 
                 "noise (sigma_px): state none, or a larger one",
                 measured_px, feature.circles.empty() ? "lines" : "ellipse", ratio, stated_px);
   return text;
+}
+
+}  // namespace
+
+std::string StatedNoiseProblem(const FitOptions& options, const Camera& camera,
+                               const CircleObservation& circle) {
+  if (!Points(circle).AreManyOutliers()) return "";
+  Observations alone;
+  alone.camera = camera;
+  alone.circles = {circle};
+  return Problem(options, std::move(alone));
+}
+
+std::string StatedNoiseProblem(const FitOptions& options, const Camera& camera,
+                               const PencilObservation& pencil) {
+  if (!Points(pencil).AreManyOutliers()) return "";
+  Observations alone;
+  alone.camera = camera;
+  alone.pencils = {pencil};
+  return Problem(options, std::move(alone));
 }
 
 }  // namespace circline

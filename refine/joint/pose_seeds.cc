@@ -187,8 +187,7 @@ Observations Refocused(const JointProblem& problem, double log_focal) {
   Observations out = problem.observations();
   out.camera.fx *= std::exp(log_focal);
   out.camera.fy *= std::exp(log_focal);
-  // A known lens bends the same pixels otherwise.
-  if (out.camera.BendsLines() && !problem.camera_sigma().IsLensOpen()) {
+  if (problem.camera_sigma().BendsWithFocal(out.camera)) {
     ResetFits(&out);
     FitDirect(kAnySigmaPx, &out, nullptr, problem.options().noise_model);
     return out;

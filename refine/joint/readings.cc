@@ -49,8 +49,9 @@ Status NoSeed(const Observations& fitted, const std::vector<std::string>& reason
     const bool is_given = !fitted.circles.empty() || !fitted.pencils.empty();
     message += is_given ? "none that is given could be fitted" : "there is neither";
     if (fitted.num_dropped_points > 0) {
-      message += ": the camera cannot have seen " + std::to_string(fitted.num_dropped_points) +
-                 " of the points, its focal length or its lens is wrong";
+      message +=
+          ": the camera cannot have seen some of the points, as its focal length or its lens is "
+          "wrong";
     }
     return Status::Refused(message);
   }

@@ -234,7 +234,7 @@ TEST(GuessedFocalLength, IsToBlameWhereNoPointCanHaveBeenSeen) {
   const Status status = EstimatePose(observations, Guessed()).status;
   EXPECT_EQ(status.code, StatusCode::kRefused);
   EXPECT_NE(status.message.find("none that is given could be fitted: the camera cannot have seen "
-                                "60 of the points"),
+                                "some of the points"),
             std::string::npos)
       << status.message;
 }
